@@ -1,0 +1,5 @@
+"""`python -m thenar.cli` is `thenar`."""
+
+from . import main
+
+main()

@@ -1,0 +1,28 @@
+"""The offline compiler: recordings in, a build folder out.
+
+The four names below are loaded when first used, so that `thenar.compiler.recordings` stays light.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .boosting.classifier import LogitBoostClassifier
+    from .build.compile import compile_build
+    from .placement.id3 import grow_id3
+    from .recordings.graspset import GraspSet
+
+__all__ = ["GraspSet", "LogitBoostClassifier", "compile_build", "grow_id3"]
+
+_HOMES = {
+    "GraspSet": ".recordings.graspset",
+    "LogitBoostClassifier": ".boosting.classifier",
+    "compile_build": ".build.compile",
+    "grow_id3": ".placement.id3",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name], __name__), name)

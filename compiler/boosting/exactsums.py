@@ -1,0 +1,63 @@
+"""Weights and responses on a grid on which every sum is exact.
+
+A double holds every integer up to 2^53. So numbers rounded to multiples of 2^-e, with e chosen such that the sum of
+their magnitudes stays below 2^52 multiples, can be added and subtracted in any order, by any BLAS, on any number of
+threads, and give the same integer. The rounding costs at most half a multiple a number, n * 2^-53 of the total in the
+worst case: what an ordinary floating-point sum of n numbers may lose too. What the rounding left over can be put on a
+finer grid of its own, where a sum needs more than that.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+SUM_BITS = 52
+
+
+@dataclass(frozen=True, slots=True)
+class OnGrid:
+    """Numbers (K, n) as whole units: row k stands for units[k] * 2^-exponents[k], and any sum of units is exact."""
+
+    units: Floats  # (K, n) integers whose magnitudes sum to at most 2^52 a row and, unless all are 0, to about 2^51
+    exponents: NDArray[np.int32]  # (K,)
+
+    def values(self) -> Floats:
+        """Return the numbers (K, n) that the units stand for."""
+        values: Floats = np.ldexp(self.units, -self.exponents[:, np.newaxis])
+        return values
+
+    def branch_sums(self, left: Floats, missing: Floats | None) -> Floats:
+        """Return the sums (3, K) over the rows left of, right of and missing in a split; members are 0 or 1, (K, n).
+
+        The right sum is a difference, and exact all the same: all three are whole units.
+        """
+        in_left = np.einsum("kn,kn->k", self.units, left)
+        in_missing = np.zeros_like(in_left) if missing is None else np.einsum("kn,kn->k", self.units, missing)
+        branches = np.array([in_left, self.units.sum(axis=1) - in_left - in_missing, in_missing])
+        sums: Floats = np.ldexp(branches, -self.exponents)
+        return sums
+
+
+def on_grids(values: Floats) -> tuple[OnGrid, OnGrid]:
+    """Round each row of `values` (K, n) to the finest grid on which its sums are exact, and the rest to a finer one."""
+    n = values.shape[1]
+    sizes = np.abs(values)
+    # First from the largest magnitude, which no order of summation can change, then from the exact sum that it allows.
+    rough = SUM_BITS - _bits(sizes.max(axis=1, initial=0.0) * n)
+    total = np.rint(np.ldexp(sizes, rough[:, np.newaxis])).sum(axis=1)
+    # One bit is left as room for n/2 units of rounding, which is enough as long as n < 2^50.
+    exponents = (rough + np.where(total > 0, SUM_BITS - 1 - _bits(total), 0)).astype(np.int32)
+    scaled = np.ldexp(values, exponents[:, np.newaxis])
+    units = np.rint(scaled)
+    # The rest is at most half a unit a number, n/2 a row: that gives its grid without another look.
+    finer = SUM_BITS - n.bit_length()
+    rest = np.rint((scaled - units) * 2.0**finer)
+    return OnGrid(units, exponents), OnGrid(rest, exponents + np.int32(finer))
+
+
+def _bits(magnitudes: Floats) -> NDArray[np.int32]:
+    """Return the smallest b with magnitude < 2^b."""
+    return np.frexp(magnitudes)[1]

@@ -1,0 +1,135 @@
+"""The best decision stump of every class for one round's weights and responses.
+
+A stump's residual sum of squares is sum w z^2 less the explained part, sum over branches C_b^2 / W_b with W_b = sum w
+and C_b = sum w z. The first term is the same for every stump, so the explained parts are compared: sums of positive
+terms, without the cancellation that comparing residuals suffers once they are small.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .binning import Binned, ManyValued, SplitSums, TwoValued
+from .exactsums import on_grids
+
+Floats = NDArray[np.float64]
+Place = tuple[TwoValued | ManyValued, int, int]  # group of columns, position in it, split
+
+# A branch with less than this many grid units of weight is empty. The class's total has 2^50 to 2^52 units, so this is
+# a share of 1e-12: below it a branch's mean would be made of what the grid rounded away.
+EMPTY_UNITS = 2.0**12
+
+
+class Targets:
+    """Weights w and weighted responses w z of one round (K, n), 1 <= |z| <= z_max, and how to sum them exactly."""
+
+    def __init__(self, weights: Floats, responses: Floats) -> None:
+        """Put both on grids: coarse ones to compare stumps by, and the rest on fine ones for the values of branches."""
+        self.weights, self._fine_weights = on_grids(weights)
+        self.responses, self._fine_responses = on_grids(responses)
+
+    def branch_sums(self, left: Floats, missing: Floats | None) -> tuple[Floats, Floats]:
+        """Return sum w and sum w z (3, K) over the rows left, right and missing, each within two roundings."""
+        weight = self.weights.branch_sums(left, missing) + self._fine_weights.branch_sums(left, missing)
+        response = self.responses.branch_sums(left, missing) + self._fine_responses.branch_sums(left, missing)
+        return weight, response
+
+
+@dataclass(frozen=True, slots=True)
+class FittedStumps:
+    """The stumps of one round, and what they answer to the training rows."""
+
+    columns: NDArray[np.int32]  # (K,)
+    thresholds: Floats  # (K,)
+    values: Floats  # (K, 3) left, right, missing
+    answers: Floats  # (K, n)
+
+
+def fit_stumps(binned: Binned, targets: Targets, z_max: float) -> FittedStumps:
+    """Fit one stump a class. Equal stumps: the lowest column, then the lowest threshold wins. |value| <= z_max."""
+    columns, splits = _best_splits(binned, targets, _tie_bound(targets, z_max))
+    places = [(*binned.home[int(column)], int(split)) for column, split in zip(columns, splits, strict=True)]
+    left = np.array([group.goes_left(position, split) for group, position, split in places])
+    missing = _missing(places, left.shape)
+    values = _branch_values(targets, left, missing, z_max)
+    answers = np.where(left, values[:, :1], values[:, 1:2])
+    if missing is not None:
+        answers = np.where(missing, values[:, 2:], answers)
+    thresholds = np.array([group.threshold(position, split) for group, position, split in places])
+    return FittedStumps(columns.astype(np.int32), thresholds, values, answers)
+
+
+def _missing(places: Sequence[Place], shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
+    """Return (K, n) whether a row lacks the stump's column; None where no row lacks any."""
+    absent = [group.is_missing(position) for group, position, _ in places]
+    if all(rows is None for rows in absent):
+        return None
+    return np.array([np.zeros(shape[1], dtype=bool) if rows is None else rows for rows in absent])
+
+
+def _tie_bound(targets: Targets, z_max: float) -> Floats:
+    """Return, for each class (K,), how far apart rounding to the grid can bring two explained parts that are equal.
+
+    n rows rounded by half a unit each put at most n/2 units on C_b and on W_b, and with |C_b / W_b| <= z_max
+    |d(C^2/W)| <= 2 z_max |dC| + z_max^2 |dW|, summed over branches; twice that between two stumps. The 64 stands for
+    the roundings of the squares and quotients themselves. Units are those of `_explained`.
+    """
+    n = targets.weights.units.shape[1]
+    unit = np.ldexp(1.0, targets.responses.exponents - targets.weights.exponents)
+    bound: Floats = (2.0 * z_max * unit + (z_max * unit) ** 2) * n + 64.0
+    return bound
+
+
+def _best_splits(binned: Binned, targets: Targets, tie_bound: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the column and split (K,) that explain most, for each class; of equal ones the lowest."""
+    summands = np.concatenate([targets.weights.units, targets.responses.units])
+    totals = summands.sum(axis=1)
+    n_classes = len(summands) // 2
+    explained = np.full((binned.n_columns, n_classes), -np.inf)
+    splits = np.zeros((binned.n_columns, n_classes), dtype=np.intp)
+    for group in binned.groups:
+        for sums in group.sums(summands):
+            parts = _explained(sums, totals, n_classes)
+            most = parts.max(axis=0)
+            explained[sums.columns] = most
+            splits[sums.columns] = (parts >= most - tie_bound).argmax(axis=0)
+    columns = (explained >= explained.max(axis=0) - tie_bound).argmax(axis=0)
+    return columns, splits[columns, np.arange(n_classes)]
+
+
+def _explained(sums: SplitSums, totals: Floats, n_classes: int) -> Floats:
+    """Return the explained part (B - 1, c, K) of every split of a batch; -inf where there is no split."""
+    right = totals - sums.left
+    if sums.missing is not None:
+        right -= sums.missing
+    parts = _share(sums.left, n_classes)
+    parts += _share(right, n_classes)
+    if sums.missing is not None:
+        parts += _share(sums.missing, n_classes)
+    if sums.valid is not None:
+        parts[~sums.valid] = -np.inf
+    return parts
+
+
+def _share(sums: Floats, n_classes: int) -> Floats:
+    weight, response = sums[..., :n_classes], sums[..., n_classes:]
+    # Below EMPTY_UNITS this is less than the branch explains, and next to nothing.
+    part: Floats = response * response
+    part /= np.maximum(weight, EMPTY_UNITS)
+    return part
+
+
+def _branch_values(
+    targets: Targets, left: NDArray[np.bool_], missing: NDArray[np.bool_] | None, z_max: float
+) -> Floats:
+    """Return (K, 3): the weighted mean response of every branch; an empty one gets the mean of all rows."""
+    absent = None if missing is None else missing.astype(np.float64)
+    weight, response = targets.branch_sums(left.astype(np.float64), absent)
+    empty = weight < np.ldexp(EMPTY_UNITS, -targets.weights.exponents)
+    weight = np.where(empty, weight.sum(axis=0), weight)
+    response = np.where(empty, response.sum(axis=0), response)
+    values = np.divide(response, weight, out=np.zeros_like(response), where=weight > 0)
+    clamped: Floats = np.clip(values, -z_max, z_max).T
+    return clamped

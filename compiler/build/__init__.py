@@ -1,0 +1,1 @@
+"""The build folder: compiled, and verified against what was trained."""

@@ -1,0 +1,1 @@
+"""Wire protocols of gloves and scanners, one a file. Imports nothing else of thenar."""

@@ -1,0 +1,186 @@
+"""LogitBoost's rounds as properties: what must not change the answer, and what must stay finite."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from thenar.compiler.boosting.boost import BoostingError, boost
+from thenar.compiler.boosting.elementary import softmax
+from thenar.compiler.boosting.stumps import winners
+
+
+def grasps(seed: int, n: int = 60, bits: int = 6, joints: int = 2, classes: int = 3) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    labels = rng.integers(0, classes, size=n)
+    prototypes = rng.random((classes, bits)) < 0.4
+    X = np.column_stack(
+        [
+            prototypes[labels] ^ (rng.random((n, bits)) < 0.15),
+            rng.integers(1, 256, size=(n, joints)) // 3 + labels[:, None] * 9,
+        ]
+    )
+    return X.astype(np.int64), labels.astype(np.intp)
+
+
+@given(st.integers(0, 2**32))
+@settings(max_examples=25, deadline=None)
+def test_the_training_loss_never_rises_and_everything_stays_in_range(seed: int) -> None:
+    X, labels = grasps(seed)
+    stumps, history = boost(X, labels, 3, rounds=40)
+    losses = np.array(history.losses)
+    assert losses[0] == pytest.approx(np.log(3), abs=1e-15)
+    assert (np.diff(losses) <= 1e-12).all()
+    assert np.isfinite(stumps.values).all()
+    assert (np.abs(stumps.values) <= 3.0).all()
+    probability = softmax(stumps.scores(X).T)
+    np.testing.assert_allclose(probability.sum(axis=0), 1.0, rtol=1e-15)
+
+
+@given(st.integers(0, 2**32))
+@settings(max_examples=25, deadline=None)
+def test_the_order_of_rows_changes_nothing_at_all(seed: int) -> None:
+    X, labels = grasps(seed)
+    order = np.random.default_rng(seed).permutation(len(X))
+    a, _ = boost(X, labels, 3, rounds=30)
+    b, _ = boost(X[order], labels[order], 3, rounds=30)
+    assert a.columns.tobytes() == b.columns.tobytes()
+    assert a.thresholds.tobytes() == b.thresholds.tobytes()
+    assert a.values.tobytes() == b.values.tobytes()
+
+
+@given(st.integers(0, 2**32))
+@settings(max_examples=25, deadline=None)
+def test_an_increasing_recoding_of_a_joint_moves_thresholds_and_nothing_else(seed: int) -> None:
+    X, labels = grasps(seed)
+    recoded = X.copy()
+    recoded[:, 6:] = X[:, 6:] ** 2 + 1000
+    a, _ = boost(X, labels, 3, rounds=30)
+    b, _ = boost(recoded, labels, 3, rounds=30)
+    assert a.columns.tobytes() == b.columns.tobytes()
+    assert a.values.tobytes() == b.values.tobytes()
+
+
+@given(st.integers(0, 2**32), st.integers(2, 5))
+@settings(max_examples=25, deadline=None)
+def test_weights_count_as_repetitions(seed: int, times: int) -> None:
+    X, labels = grasps(seed)
+    repeats = np.random.default_rng(seed).integers(1, times + 1, size=len(X))
+    weighted, _ = boost(X, labels, 3, rounds=20, weights=repeats.astype(np.float64))
+    repeated, _ = boost(X.repeat(repeats, axis=0), labels.repeat(repeats), 3, rounds=20)
+    np.testing.assert_allclose(weighted.scores(X), repeated.scores(X), atol=1e-9)
+
+
+def test_duplicating_the_whole_set_keeps_every_answer() -> None:
+    X, labels = grasps(5, n=200)
+    a, _ = boost(X, labels, 3)
+    b, _ = boost(np.concatenate([X, X]), np.concatenate([labels, labels]), 3)
+    assert np.array_equal(winners(a.scores(X)), winners(b.scores(X)))
+    np.testing.assert_allclose(a.scores(X), b.scores(X), atol=1e-9)
+
+
+def test_a_constant_column_is_never_chosen() -> None:
+    X, labels = grasps(6)
+    stumps, _ = boost(np.column_stack([np.ones(len(X), dtype=np.int64), X]), labels, 3)
+    assert (stumps.columns > 0).all()
+
+
+def test_the_first_rounds_are_the_same_however_many_follow() -> None:
+    X, labels = grasps(7)
+    long, _ = boost(X, labels, 3, rounds=50)
+    short, _ = boost(X, labels, 3, rounds=10)
+    assert long.first(10).values.tobytes() == short.values.tobytes()
+    stages = list(long.staged_scores(X))
+    assert np.array_equal(stages[9], short.scores(X))
+    assert np.array_equal(stages[-1], long.scores(X))
+
+
+def test_without_a_varying_column_all_classes_stay_equal() -> None:
+    for X in (np.zeros((4, 2)), np.zeros((4, 0)), np.full((4, 1), np.nan)):
+        stumps, history = boost(X, np.array([0, 1, 2, 1]), 3)
+        assert stumps.n_rounds == 0
+        assert not stumps.scores(X).any()
+        assert winners(stumps.scores(X)).tolist() == [0, 0, 0, 0]
+        assert history.losses == (pytest.approx(np.log(3)),)
+
+
+def test_a_perfectly_separable_set_stays_finite_for_2000_rounds() -> None:
+    X = np.arange(40).reshape(40, 1)
+    labels = (np.arange(40) >= 20).astype(np.intp)
+    stumps, history = boost(X, labels, 2, rounds=2000)
+    assert np.isfinite(stumps.scores(X)).all()
+    assert history.losses[-1] < 1e-12
+    assert (np.diff(history.losses) <= 1e-16).all()
+
+
+def test_the_tolerance_stops_early_and_says_so() -> None:
+    X, labels = grasps(8)
+    stumps, history = boost(X, labels, 3, rounds=500, tolerance=1e-3)
+    assert history.stopped_early
+    assert 1 < stumps.n_rounds < 500
+    assert abs(history.losses[-1] - history.losses[-2]) < 1e-3 <= abs(history.losses[-2] - history.losses[-3])
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"rounds": 0}, "rounds=0"),
+        ({"shrinkage": 0.0}, "shrinkage=0.0"),
+        ({"shrinkage": 1.5}, "shrinkage=1.5"),
+        ({"z_max": 1.0}, "z_max=1.0"),
+        ({"z_max": float("inf")}, "z_max=inf"),
+        ({"n_classes": 2}, "labels run from 0 to 2"),
+        ({"weights": np.zeros(60)}, "row weights"),
+        ({"weights": -np.ones(60)}, "row weights"),
+        ({"weights": np.full(60, np.nan)}, "row weights"),
+        ({"labels": np.zeros(3, dtype=np.intp)}, "must be (n, d) and (n,)"),
+    ],
+)
+def test_options_out_of_range_are_refused_by_name(change: dict[str, object], word: str) -> None:
+    X, labels = grasps(9)
+    arguments = {"X": X, "labels": labels, "n_classes": 3, **change}
+    with pytest.raises(BoostingError) as refusal:
+        boost(**arguments)
+    assert word in str(refusal.value)
+
+
+def test_an_infinite_input_is_refused_with_row_and_column() -> None:
+    X = np.zeros((5, 3))
+    X[3, 1] = -np.inf
+    with pytest.raises(BoostingError, match="row 3, column 1"):
+        boost(X, np.array([0, 1, 0, 1, 0]), 2)
+
+
+SCRIPT = """
+import hashlib, sys
+import numpy as np
+from thenar.compiler.boosting.boost import boost
+rng = np.random.default_rng(1)
+y = rng.integers(0, 14, size=700)
+bits = rng.random((14, 60))[y] + rng.random((700, 60)) > 1.1
+X = np.column_stack([bits, rng.integers(0, 200, (700, 6)) + 9 * y[:, None]])
+stumps, history = boost(X.astype(np.int64), y, 14, rounds=30)
+parts = (stumps.columns, stumps.thresholds, stumps.values, np.array(history.losses))
+print(hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest())
+"""
+
+
+def test_threads_and_simd_change_no_bit() -> None:
+    settings_of_machines = [
+        {"OPENBLAS_NUM_THREADS": "1"},
+        {"OPENBLAS_NUM_THREADS": "2"},
+        {"OPENBLAS_CORETYPE": "Prescott"},
+        {"NPY_DISABLE_CPU_FEATURES": "AVX512F AVX512CD AVX512_SKX AVX2 FMA3"},
+    ]
+    digests = set()
+    for setting in settings_of_machines:
+        environment = {**os.environ, **setting, "PYTHONWARNINGS": "ignore"}
+        done = subprocess.run(
+            [sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True, check=True
+        )
+        digests.add(done.stdout.strip())
+    assert len(digests) == 1

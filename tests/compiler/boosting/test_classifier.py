@@ -1,0 +1,64 @@
+"""The estimator: scikit-learn's own contract, and what users rely on besides."""
+
+import numpy as np
+import pytest
+from sklearn.base import clone
+from sklearn.utils.estimator_checks import parametrize_with_checks
+
+from thenar.compiler import LogitBoostClassifier
+from thenar.runtime.errors import ThenarError
+
+
+@parametrize_with_checks([LogitBoostClassifier(rounds=20)])
+@pytest.mark.filterwarnings("ignore::sklearn.exceptions.SkipTestWarning")
+def test_scikit_learn_accepts_the_estimator(estimator: LogitBoostClassifier, check: object) -> None:
+    check(estimator)  # type: ignore[operator]  # raises AssertionError where the contract is broken
+
+
+X = np.array([[0, 10], [0, 200], [1, 30], [1, 220], [0, 20], [1, 210]])
+Y = np.array(["tip", "power", "tip", "power", "tip", "power"])
+
+
+def test_labels_come_back_as_they_were_given() -> None:
+    classifier = LogitBoostClassifier(rounds=5).fit(X, Y)
+    assert classifier.predict(X).tolist() == Y.tolist()
+    assert classifier.classes_.tolist() == ["power", "tip"]
+    np.testing.assert_allclose(classifier.predict_proba(X).sum(axis=1), 1.0, rtol=1e-15)
+
+
+def test_declared_classes_keep_their_column_though_no_row_has_them() -> None:
+    classifier = LogitBoostClassifier(rounds=50, classes=["power", "hook", "tip"]).fit(X, Y)
+    probability = classifier.predict_proba(X)
+    assert probability.shape == (6, 3)
+    assert (probability[:, 1] < 0.01).all()
+
+
+def test_a_label_outside_the_declared_classes_is_named() -> None:
+    with pytest.raises(ThenarError, match="'tip' of y is not among"):
+        LogitBoostClassifier(classes=["power", "hook"]).fit(X, Y)
+
+
+def test_one_class_alone_is_certain() -> None:
+    classifier = LogitBoostClassifier(rounds=3).fit(X, np.zeros(6, dtype=int))
+    assert (classifier.predict_proba(X) == 1.0).all()
+
+
+def test_a_missing_input_goes_its_own_way() -> None:
+    inputs = np.array([[0.0], [0.0], [1.0], [1.0], [np.nan], [np.nan]])
+    labels = np.array([0, 0, 1, 1, 2, 2])
+    classifier = LogitBoostClassifier(rounds=50).fit(inputs, labels)
+    assert classifier.predict(inputs).tolist() == labels.tolist()
+
+
+def test_staged_scores_end_where_scores_are() -> None:
+    classifier = LogitBoostClassifier(rounds=7).fit(X, Y)
+    stages = list(classifier.staged_scores(X))
+    assert len(stages) == classifier.n_rounds_ == 7
+    assert np.array_equal(stages[-1], classifier.scores(X))
+    assert len(classifier.losses_) == 8
+
+
+def test_fitting_twice_gives_the_same_bits() -> None:
+    a = LogitBoostClassifier(rounds=10).fit(X, Y)
+    b = clone(a).fit(X, Y)
+    assert a.stumps_.values.tobytes() == b.stumps_.values.tobytes()
