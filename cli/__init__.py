@@ -1,9 +1,9 @@
 """The command `thenar`: thin, each sub-command loaded only when it is called.
 
-Exit codes: 0 done, 1 a check that did not hold (`verify`), 2 a mistake that the user can mend, 130 Ctrl-C.
+Exit codes: 0 done, 1 a check that did not hold (`verify`), 2 a mistake that the user can mend, 130 Ctrl-C. A reader
+that goes away (`| head`) ends a command in silence, with click's 1.
 """
 
-import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -31,7 +31,7 @@ class _LazyGroup(click.Group):
 @click.group(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="thenar")
 def thenar() -> None:
-    r"""Grasps recorded on a glove in; the few switches worth keeping, and a recogniser that runs on them, out.
+    """Grasps recorded on a glove in; the few switches worth keeping, and a recogniser that runs on them, out.
 
     \b
     Example, from a table to a running recogniser:
@@ -54,10 +54,6 @@ def run(arguments: Sequence[str]) -> int:
         return _complain(mistake.format_message())
     except ThenarError as mistake:
         return _complain(str(mistake))
-    except BrokenPipeError:
-        # The reader went away (`| head`): nothing to say, and nobody to say it to.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
     except OSError as mistake:
         return _complain(f"{mistake.filename}: {mistake.strerror}" if mistake.filename else str(mistake))
     except (KeyboardInterrupt, click.Abort):

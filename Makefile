@@ -1,0 +1,74 @@
+# Every target makes and reuses .venv by itself.
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+SHARED := ../shared/data
+OUT    := out
+
+# The table that `make demo` runs on, and which of its columns are what.
+DATA    ?= $(SHARED)/icub_tactile_encoders/trials.csv.gz
+COLUMNS ?= examples/columns/icub.toml
+
+PACKAGES := cli compiler drivers firmware_templates runtime
+
+.PHONY: help demo test test-slow test-all lint format types bench docs check clean
+
+help:           ## list the targets
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 16
+
+$(VENV)/installed: pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
+	$(BIN)/python -m pip install --quiet --editable ".[compiler]" --group dev
+	touch $@
+
+demo: $(VENV)/installed  ## import, info, evaluate, compile, verify, run: DATA=table.csv COLUMNS=columns.toml
+	@test -e "$(DATA)" || { echo "make demo: $(DATA) is not there; name a table and its columns: make demo DATA=table.csv COLUMNS=columns.toml" >&2; exit 2; }
+	mkdir -p $(OUT)
+	$(BIN)/thenar import "$(DATA)" --columns "$(COLUMNS)" -o $(OUT)/set.grasps
+	$(BIN)/thenar info $(OUT)/set.grasps --plot $(OUT)/set.png
+	$(BIN)/thenar evaluate $(OUT)/set.grasps -o $(OUT)/evaluation.json
+	$(BIN)/thenar compile $(OUT)/set.grasps -o $(OUT)/build
+	$(BIN)/thenar verify $(OUT)/build $(OUT)/set.grasps
+	$(BIN)/thenar run $(OUT)/build --replay $(OUT)/set.grasps > $(OUT)/grasps.jsonl
+	@echo "The build is in $(OUT)/build, one recognised grasp a line in $(OUT)/grasps.jsonl, a picture in $(OUT)/set.png."
+
+test: $(VENV)/installed  ## the tests, under ten minutes on two cores
+	$(BIN)/python -m pytest -m "not slow" -n auto
+
+test-slow: $(VENV)/installed  ## the slower checks: real Weka, fuzzing, real recordings at full length
+	$(BIN)/python -m pytest -m slow -n auto
+
+test-all: test test-slow  ## both
+
+lint: $(VENV)/installed  ## ruff: rules and formatting
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+format: $(VENV)/installed  ## let ruff mend what it can
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+# An editable install is an import hook, invisible to mypy: it reads a throw-away real one.
+types: $(VENV)/installed  ## mypy --strict on an installed copy
+	rm -rf build .types
+	$(BIN)/python -m pip install --quiet --no-deps --target .types .
+	rm -rf build
+	$(BIN)/mypy $(foreach package,$(PACKAGES),-p thenar.$(package))
+
+$(VENV)/bench: $(VENV)/installed
+	$(BIN)/python -m pip install --quiet --group bench
+	touch $@
+
+bench: $(VENV)/bench  ## the benchmarks, as ratios against a peer or a bound in the same run
+	$(BIN)/python benchmarks/id3.py
+	$(BIN)/python benchmarks/boosting.py
+	$(BIN)/python benchmarks/runtime.py
+
+docs: $(VENV)/installed  ## the documentation as a site in site/, offline
+	$(BIN)/mkdocs build --strict --quiet
+
+check: lint types test  ## what a commit should pass
+
+clean:          ## remove everything that the targets make
+	rm -rf $(VENV) $(OUT) .types build site *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

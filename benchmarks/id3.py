@@ -1,0 +1,163 @@
+"""thenar's ID3 beside scikit-learn's entropy tree: seconds and memory as the rows grow from 1e3 to 1e6.
+
+Synthetic grasps: 14 prototypes of 160 bits, each bit flipped with probability 0.1; S = 200 prunes both trees, and
+scikit-learn's may go as deep as thenar's went. Every measurement has a process of its own, limited to one thread.
+Memory is the growth of the process's peak resident size above interpreter and imports, in MiB: all of it, the input
+matrix (one byte a bit for thenar, float32 for scikit-learn) included.
+
+    python benchmarks/id3.py [--quick] [--plot curves.png]
+"""
+
+import argparse
+import json
+import os
+import platform
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+N_BITS, N_CLASSES, N_BLOCK, MIN_SAMPLES, FLIP = 160, 14, 20_000, 200, 0.1
+ROWS = (1_000, 10_000, 100_000, 1_000_000)
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+MIB = 2**20
+
+
+class Measured(NamedTuple):
+    """Seconds to grow, peak growth in MiB, depth, leaves and rate on the rows grown from."""
+
+    seconds: float
+    mib: float
+    depth: int
+    leaves: int
+    rate: float
+
+
+def blocks(n: int) -> Any:
+    """Yield (start, bits, labels) of the synthetic grasps, block by block, so that making them takes no memory."""
+    import numpy as np
+
+    rng = np.random.default_rng(1)
+    prototypes = rng.random((N_CLASSES, N_BITS)) < 0.3
+    for start in range(0, n, N_BLOCK):
+        labels = rng.integers(N_CLASSES, size=min(N_BLOCK, n - start))
+        yield start, prototypes[labels] ^ (rng.random((len(labels), N_BITS), dtype=np.float32) < FLIP), labels
+
+
+def filled(n: int, dtype: str, width: int, convert: Any) -> tuple[Any, Any]:
+    import numpy as np
+
+    X, y = np.empty((n, width), dtype=dtype), np.empty(n, dtype=np.int64)
+    for start, bits, labels in blocks(n):
+        X[start : start + len(bits)] = convert(bits)
+        y[start : start + len(bits)] = labels
+    return X, y
+
+
+def peak_mib() -> float:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def measure_thenar(n: int, packed: bool) -> Measured:
+    import numpy as np
+
+    from thenar.compiler.placement.digits import Digits
+    from thenar.compiler.placement.id3 import grow_id3
+
+    before = peak_mib()
+    if packed:
+        X, y = filled(n, "uint8", N_BITS // 8, lambda bits: np.packbits(bits, axis=1, bitorder="little"))
+    else:
+        X, y = filled(n, "bool", N_BITS, lambda bits: bits)
+    start = time.perf_counter()
+    tree = grow_id3(Digits.from_packed_bits(X, N_BITS) if packed else X, y, min_samples=MIN_SAMPLES)
+    seconds, mib = time.perf_counter() - start, peak_mib() - before
+    right = sum(int((tree.predict(bits) == labels).sum()) for _, bits, labels in blocks(n))
+    return Measured(seconds, mib, tree.depth, tree.n_leaves, right / n)
+
+
+def measure_sklearn(n: int, depth: int) -> Measured:
+    from sklearn.tree import DecisionTreeClassifier
+
+    before = peak_mib()
+    X, y = filled(n, "float32", N_BITS, lambda bits: bits)
+    tree = DecisionTreeClassifier(criterion="entropy", max_depth=depth, min_samples_split=MIN_SAMPLES, random_state=0)
+    start = time.perf_counter()
+    tree.fit(X, y)
+    seconds, mib = time.perf_counter() - start, peak_mib() - before
+    right = sum(int((tree.predict(bits) == labels).sum()) for _, bits, labels in blocks(n))
+    return Measured(seconds, mib, int(tree.get_depth()), int(tree.get_n_leaves()), right / n)
+
+
+def in_own_process(*arguments: str) -> Measured:
+    """Run this file on one measurement, one thread; the best time of up to three that take under five seconds."""
+    runs: list[Measured] = []
+    while len(runs) < 3 and (not runs or runs[-1].seconds < 5):
+        command = [sys.executable, __file__, "--one", *arguments]
+        answer = subprocess.run(command, env=os.environ | ONE_THREAD, check=True, capture_output=True).stdout
+        runs.append(Measured(*json.loads(answer)))
+    return min(runs)
+
+
+def one(arguments: list[str]) -> Measured:
+    what, n, *depth = arguments
+    if what == "sklearn":
+        return measure_sklearn(int(n), int(depth[0]))
+    return measure_thenar(int(n), packed=what == "packed")
+
+
+def line(n: int, name: str, found: Measured, times: str) -> str:
+    return (
+        f"{n:9,}  {name:14}{found.seconds:9.3f} s {found.mib:8.0f} MiB"
+        f"{found.depth:7d}{found.leaves:8d}{found.rate:8.4f}  {times}"
+    )
+
+
+def compare(rows: tuple[int, ...]) -> dict[str, list[Measured]]:
+    """Measure and print line by line."""
+    curves: dict[str, list[Measured]] = {"thenar": [], "thenar, packed": [], "scikit-learn": []}
+    print(f"{platform.machine()}, one thread; {N_BITS} bits, {N_CLASSES} classes, S = {MIN_SAMPLES}, noise {FLIP}")
+    print("     rows  what                  time       peak  depth  leaves    rate")
+    for n in rows:
+        ours, packed = in_own_process("thenar", str(n)), in_own_process("packed", str(n))
+        theirs = in_own_process("sklearn", str(n), str(ours.depth))
+        allowed = 2 * n * N_BITS / 8 / MIB + 256
+        for (name, curve), found in zip(curves.items(), (ours, packed, theirs), strict=True):
+            curve.append(found)
+            times = f"{theirs.seconds / found.seconds:.0f} times as fast; {allowed:.0f} MiB are allowed"
+            print(line(n, name, found, times if found is not theirs else ""), flush=True)
+    return curves
+
+
+def plot(path: Path, rows: tuple[int, ...], curves: dict[str, list[Measured]]) -> None:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9, 4), layout="constrained")
+    for axes, unit, value in zip(figure.subplots(1, 2), ("s", "MiB"), ("seconds", "mib"), strict=True):
+        for name, curve in curves.items():
+            axes.loglog(rows, [getattr(found, value) for found in curve], "o-", label=name)
+        axes.set(xlabel="rows", ylabel=f"{'time' if unit == 's' else 'peak memory'} ({unit})")
+        axes.grid(visible=True, alpha=0.3)
+    axes.legend()
+    figure.savefig(path, dpi=150)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="up to 100,000 rows only")
+    parser.add_argument("--plot", type=Path, help="draw both curves here")
+    parser.add_argument("--one", nargs="+", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.one:
+        print(json.dumps(one(options.one)))
+        return
+    rows = ROWS[:-1] if options.quick else ROWS
+    curves = compare(rows)
+    if options.plot:
+        plot(options.plot, rows, curves)
+
+
+if __name__ == "__main__":
+    main()

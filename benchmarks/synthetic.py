@@ -1,0 +1,29 @@
+"""Rows that look like grasps, for benchmarks: seeded, of any number, and harder to part than random ones."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def grasp_like(
+    rows: int,
+    seed: int,
+    switches: int = 160,
+    joints: int = 16,
+    classes: int = 14,
+    flip: float = 0.1,
+) -> tuple[NDArray[np.bool_], NDArray[np.uint16], NDArray[np.intp]]:
+    """Return bits (rows, switches), codes (rows, joints) of half degrees, labels (rows,): classes in equal shares.
+
+    A grasp type is a pattern of a quarter of the switches ON, of which `flip` of the bits are wrong in every row, and a
+    posture with 10 degrees of spread.
+    """
+    rng = np.random.default_rng(seed)
+    patterns = rng.random((classes, switches)) < 0.25
+    postures = rng.uniform(40, 200, size=(classes, joints))
+    labels = np.arange(rows) % classes
+    bits = patterns[labels]
+    for start in range(0, rows, 1 << 16):  # in blocks: a million rows of doubles would be a gigabyte
+        block = bits[start : start + (1 << 16)]
+        block ^= rng.random(block.shape, dtype=np.float32) < flip
+    codes = np.rint(postures[labels] + rng.normal(0, 20, size=(rows, joints))).clip(0, 359).astype(np.uint16)
+    return bits, codes, labels

@@ -1,0 +1,34 @@
+"""`thenar export`: a .grasps file into a table for other programs."""
+
+from pathlib import Path
+
+import click
+
+from .common import any_path, existing_file
+
+
+@click.command("export")
+@click.argument("grasps", type=existing_file)
+@click.option("-o", "--output", type=any_path, required=True, help="The .csv, .csv.gz or .arff file to write.")
+@click.option("--codes", is_flag=True, help="Write the joints' integer codes instead of values in their units.")
+@click.option("--meta", is_flag=True, help="ARFF: write subject, object and trial too (CSV always holds them).")
+@click.option("--columns", type=any_path, help="Also write the columns.toml that imports the table again.")
+def command(grasps: Path, output: Path, codes: bool, meta: bool, columns: Path | None) -> None:
+    """Export GRASPS, a .grasps file, as CSV or as ARFF for Weka.
+
+    \b
+    Example:
+        thenar export set.grasps -o table.csv --columns columns.toml
+        thenar export set.grasps -o table.arff
+    """
+    from ..compiler.recordings.columns_of import columns_of
+    from ..compiler.recordings.export import export
+    from ..compiler.recordings.graspset import GraspSet
+    from ..runtime.files import write_atomically
+
+    grasp_set = GraspSet.load(grasps)
+    export(grasp_set, output, codes, meta)
+    if columns is not None:
+        arff = output.suffix.lower() == ".arff"
+        write_atomically(columns, columns_of(grasp_set, codes, meta or not arff).encode())
+    click.echo(f"{output}: {len(grasp_set)} grasps")

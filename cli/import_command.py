@@ -1,0 +1,56 @@
+"""`thenar import`: a table of labelled grasps into a .grasps file."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from .common import any_path, existing_file, json_flag, out, print_json, progress
+
+if TYPE_CHECKING:
+    from ..compiler.recordings.importer import ImportReport
+
+
+@click.command("import")
+@click.argument("table", type=existing_file)
+@click.option("-o", "--output", type=any_path, required=True, help="The .grasps file to write.")
+@click.option("--columns", type=existing_file, required=True, help="columns.toml: what each column of the table is.")
+@json_flag
+def command(table: Path, output: Path, columns: Path, as_json: bool) -> None:
+    """Import TABLE (.csv, .csv.gz, .arff, .arff.gz or .npz) as labelled grasps.
+
+    Missing or malformed cells and unknown labels stop the import, naming their rows and columns; what is merely odd
+    (constant switches, rows that two subjects share, ...) is counted in warnings.
+
+    \b
+    Example:
+        thenar import trials.csv.gz -o set.grasps --columns columns.toml
+    """
+    from ..compiler.recordings.importer import import_file
+
+    if output.suffix != ".grasps":
+        raise click.BadParameter(f"{output.name}: a set of grasps ends in .grasps", param_hint="--output")
+    with progress(f"importing {table.name}"):
+        grasp_set, report = import_file(table, columns)
+    grasp_set.save(output)
+    if as_json:
+        print_json(report)
+    else:
+        _print(report, output)
+
+
+def _print(report: "ImportReport", output: Path) -> None:
+    from rich.table import Table
+
+    for warning in report.warnings:
+        click.echo(f"warning: {warning.message}", err=True)
+    if report.coding:
+        table = Table("joint", "unit", "step", "largest error", "rms error", "values before", "after", title="Coding")
+        for cost in report.coding:
+            errors = (f"{cost.step:g}", f"{cost.largest_error:.3g}", f"{cost.rms_error:.3g}")
+            table.add_row(cost.joint, cost.unit, *errors, str(cost.distinct_before), str(cost.distinct_after))
+        out().print(table)
+    click.echo(
+        f"{output}: {report.rows} grasps of {report.grasp_types} types ({report.taxonomy}); "
+        f"subjects {report.subjects}, objects {report.objects}, switches {report.switches}, joints {report.joints}"
+    )

@@ -1,0 +1,96 @@
+"""`thenar info`: what a .grasps file holds."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from .common import any_path, existing_file, json_flag, out, print_json, progress
+
+if TYPE_CHECKING:
+    from ..compiler.recordings.graspset import GraspSet
+    from ..compiler.recordings.summary import Summary
+
+
+@click.command("info")
+@click.argument("grasps", type=existing_file)
+@click.option("--plot", type=any_path, help="Also draw it: a .png or .svg file to write.")
+@json_flag
+def command(grasps: Path, plot: Path | None, as_json: bool) -> None:
+    """Tell what GRASPS, a .grasps file, holds: counts, balance, odd columns and rows, and how separable it is.
+
+    The ceiling is the rate of the best possible memory: no classifier that sees only these inputs is right more often
+    on these rows. The neighbour rate is that of the nearest other row, with joints in standard deviations.
+
+    \b
+    Example:
+        thenar info set.grasps
+        thenar info set.grasps --plot set.png
+    """
+    from ..compiler.recordings.graspset import GraspSet
+    from ..compiler.recordings.summary import summarise
+
+    if plot is not None and plot.suffix.lower() not in (".png", ".svg"):
+        raise click.BadParameter(f"{plot.name}: a picture ends in .png or .svg", param_hint="--plot")
+    grasp_set = GraspSet.load(grasps)
+    with progress(f"comparing the rows of {grasps.name}"):
+        summary = summarise(grasp_set)
+    if plot is not None:
+        _draw(grasp_set, plot)
+    if as_json:
+        print_json(summary)
+    else:
+        _print(summary, grasps)
+
+
+def _draw(grasp_set: "GraspSet", path: Path) -> None:
+    from ..compiler.recordings.picture import draw
+    from ..runtime.files import write_atomically
+
+    write_atomically(path, draw(grasp_set, path.suffix.lower()[1:]))
+
+
+def _print(summary: "Summary", path: Path) -> None:
+    click.echo(
+        f"{path}: {summary.rows} grasps of {len(summary.grasps)} types ({summary.taxonomy}); "
+        f"subjects {len(summary.subjects)}, objects {len(summary.objects)}, "
+        f"switches {len(summary.switches)}, joints {len(summary.joints)}"
+    )
+    _print_counts(summary)
+    _print_joints(summary)
+    _print_separability(summary)
+    for warning in summary.warnings:
+        click.echo(f"warning: {warning.message}")
+
+
+def _print_counts(summary: "Summary") -> None:
+    from rich.table import Table
+
+    table = Table("grasp type", "rows", "share", title="Grasp types")
+    for grasp in summary.grasps:
+        table.add_row(grasp.name, str(grasp.rows), f"{grasp.rows / summary.rows:.1%}")
+    out().print(table)
+    click.echo(f"balance (rarest type over commonest): {summary.balance:.2f}")
+    for what, counts in (("subjects", summary.subjects), ("objects", summary.objects)):
+        click.echo(f"{what}: " + ", ".join(f"{count.name} ({count.rows})" for count in counts))
+
+
+def _print_joints(summary: "Summary") -> None:
+    from rich.table import Table
+
+    if not summary.joints:
+        return
+    table = Table("joint", "unit", "least", "largest", "distinct codes", title="Joints")
+    for joint in summary.joints:
+        table.add_row(joint.name, joint.unit, f"{joint.least:g}", f"{joint.largest:g}", str(joint.codes))
+    out().print(table)
+
+
+def _print_separability(summary: "Summary") -> None:
+    from rich.table import Table
+
+    table = Table("inputs", "distinct frames", "ceiling", "nearest neighbour", "over rows", title="Separability")
+    for line in summary.separability:
+        rate = "-" if line.neighbour_rate is None else f"{line.neighbour_rate:.1%}"
+        table.add_row(line.inputs, str(line.distinct_frames), f"{line.ceiling:.1%}", rate, str(line.neighbour_rows))
+    out().print(table)

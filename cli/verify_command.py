@@ -1,0 +1,63 @@
+"""`thenar verify`: is what runs what was trained?"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from .common import existing_file, existing_folder, json_flag, out, print_json, progress
+
+if TYPE_CHECKING:
+    from ..compiler.build.verify import Verification
+
+_SHOWN = 20
+
+
+@click.command("verify")
+@click.argument("build", metavar="BUILD", type=existing_folder)
+@click.argument("recordings", metavar="SET.grasps", type=existing_file)
+@json_flag
+def command(build: Path, recordings: Path, as_json: bool) -> int:
+    """Send every row through ensemble, float tables and integer tables, and hold the differences against their bounds.
+
+    Exits with 1 if a bound does not hold. The recordings need not be those that the build was compiled from.
+
+    \b
+    Example:
+        thenar verify build/ set.grasps
+    """
+    from ..compiler.build.verify import verify_build
+    from ..compiler.recordings.graspset import GraspSet
+
+    with progress("verifying") as report:
+        found = verify_build(build, GraspSet.load(recordings), report)
+    if as_json:
+        print_json(found)
+    else:
+        _print(found)
+    return 0 if found.holds else 1
+
+
+def _print(found: "Verification") -> None:
+    console = out()
+    console.print(
+        f"{found.rows} rows, {'the' if found.same_recordings else 'not the'} ones that the build was made from"
+    )
+    console.print(
+        f"ensemble to float tables: at most {found.collapse_difference:.3g} of a unit, "
+        f"allowed {found.collapse_bound:.3g}"
+    )
+    console.print(
+        f"float tables to integers: at most {found.integer_difference:.3f} steps, allowed {found.integer_bound:g}"
+    )
+    console.print(
+        f"margin above {found.safe_margin:g} steps: {found.covered} rows, of which {found.covered_changed} change class"
+    )
+    console.print(f"recognised: {found.correct_ensemble} by the ensemble, {found.correct_integers} by the integers")
+    console.print(f"rows that change class: {len(found.changed)}")
+    for row in found.changed[:_SHOWN]:
+        line = f"  row {row.row}: {row.ensemble} becomes {row.integers}, recorded {row.recorded}"
+        console.print(f"{line} (margin {row.margin:.1f} steps)", markup=False)
+    if len(found.changed) > _SHOWN:
+        console.print(f"  and {len(found.changed) - _SHOWN} more: --json lists them all")
+    console.print("holds" if found.holds else "DOES NOT HOLD: compile the build again")

@@ -1,0 +1,20 @@
+"""The recognition rate to expect of a build: its own recipe, placement included, cross-validated."""
+
+import numpy as np
+
+from ...runtime.manifest import Options, Recognised
+from ..boosting.stumps import winners
+from ..evaluation.folds import weka_folds
+from .training import Material, Report, train
+
+
+def cross_validated(material: Material, options: Options, report: Report) -> Recognised:
+    """Return the rate over stratified folds, each trained anew and without a look at its test rows."""
+    correct = 0
+    for number, fold in enumerate(weka_folds(material.labels, options.folds, options.seed)):
+        trained = train(material.rows(fold.train), options)
+        test = material.rows(fold.test)
+        scores = trained.stumps.scores(np.hstack([trained.kept(test), test.codes]))
+        correct += int(np.count_nonzero(winners(scores) == test.labels))
+        report(number + 1, options.folds)
+    return Recognised("honest", options.folds, options.seed, correct, len(material.labels))

@@ -1,0 +1,103 @@
+"""`verify_build`: is what runs what was trained, on every row of these recordings?"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from msgspec import Struct
+from numpy.typing import NDArray
+
+from ...runtime.build import ENSEMBLE_NAME, Build, read_member
+from ...runtime.errors import BuildError
+from ..boosting.stumps import Stumps
+from ..recordings.graspset import GraspSet
+from ..tables.compare import Comparison, compare
+from .ensemble import MAX_BYTES, ensemble_from_bytes
+from .errors import CompileError
+from .select import select_inputs
+
+
+class ChangedRow(Struct, frozen=True):
+    """A row, from 0, that the integers give another grasp type: recorded, by the ensemble, by the integers."""
+
+    row: int
+    recorded: str
+    ensemble: str
+    integers: str
+    margin: float
+
+
+class Verification(Struct, frozen=True, kw_only=True):
+    """What verification found on `rows` rows; differences beside the bounds that they must keep.
+
+    collapse_* compare the ensemble with the float tables, in units of score; integer_* the float tables with the
+    integers, in steps. covered counts rows whose margin exceeds safe_margin, covered_changed those of them that change.
+    """
+
+    same_recordings: bool
+    rows: int
+    collapse_difference: float
+    collapse_bound: float
+    integer_difference: float
+    integer_bound: float
+    safe_margin: float
+    covered: int
+    covered_changed: int
+    correct_ensemble: int
+    correct_integers: int
+    changed: tuple[ChangedRow, ...]
+    holds: bool
+
+
+def verify_build(
+    folder: str | Path, grasp_set: GraspSet, progress: Callable[[int, int], None] | None = None
+) -> Verification:
+    """Compare ensemble, float tables and integer tables on every row of `grasp_set`, compiled from or not.
+
+    Columns are found by name. Raises BuildError or SealError for a folder that is no sound build, CompileError for
+    recordings that lack its inputs.
+    """
+    if not len(grasp_set):
+        raise CompileError("the recordings have no rows: there is nothing to verify")
+    build = Build.load(folder)
+    stumps = _load_ensemble(Path(folder), build)
+    bits, codes = select_inputs(grasp_set, build.manifest)
+    comparison = compare(stumps, build.tables, bits, codes, progress)
+    grasps = np.array(build.grasps)
+    return Verification(
+        same_recordings=grasp_set.fingerprint() == build.manifest.source.fingerprint,
+        rows=len(grasp_set),
+        collapse_difference=comparison.collapse_difference,
+        collapse_bound=comparison.collapse_bound,
+        integer_difference=comparison.integer_difference,
+        integer_bound=comparison.integer_bound,
+        safe_margin=comparison.safe_margin,
+        covered=int(np.count_nonzero(comparison.covered)),
+        covered_changed=int(np.count_nonzero(comparison.covered[comparison.changed])),
+        correct_ensemble=int(np.count_nonzero(grasps[comparison.trained] == grasp_set.grasps)),
+        correct_integers=int(np.count_nonzero(grasps[comparison.deployed] == grasp_set.grasps)),
+        changed=_changed(comparison, grasps, grasp_set),
+        holds=comparison.holds,
+    )
+
+
+def _load_ensemble(folder: Path, build: Build) -> Stumps:
+    path = folder / ENSEMBLE_NAME
+    stumps = ensemble_from_bytes(read_member(path, MAX_BYTES, build.manifest.ensemble_sha256), str(path))
+    inputs = build.tables.n_switches + build.tables.n_joints
+    if (stumps.n_inputs, stumps.n_classes) != (inputs, build.tables.n_classes):
+        raise BuildError(f"{path} is the ensemble of another build: compile the build again")
+    return stumps
+
+
+def _changed(comparison: Comparison, grasps: NDArray[np.str_], grasp_set: GraspSet) -> tuple[ChangedRow, ...]:
+    return tuple(
+        ChangedRow(
+            row=int(row),
+            recorded=str(grasp_set.grasps[row]),
+            ensemble=str(grasps[comparison.trained[row]]),
+            integers=str(grasps[comparison.deployed[row]]),
+            margin=float(comparison.margins[row]),
+        )
+        for row in comparison.changed
+    )

@@ -1,0 +1,60 @@
+"""Confusion matrices as pictures."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .study import Study
+from .tables import Row, Table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from .tables import Confusion
+
+
+def draw_confusions(study: Study, folder: Path) -> list[Path]:
+    """Write a picture for each composition and protocol, subjects side by side; return the files.
+
+    They are `confusion-PROTOCOL-COMPOSITION.png` in `folder`, which is made if need be. Colour is the share of the true
+    grasp type's rows; numbers are percent of them, left out below 1 %. Raises OSError as the system gives it.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    return [
+        _draw(study.grasps, table, row, folder / f"confusion-{table.protocol}-{row.name}.png")
+        for table in study.tables
+        if table.name == "compositions"
+        for row in table.rows
+    ]
+
+
+def _draw(grasps: tuple[str, ...], table: Table, row: Row, path: Path) -> Path:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    side = 1.6 + 0.42 * len(grasps)
+    figure = Figure(figsize=(side * len(row.cells) + 0.6, side + 0.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(f"{row.name}: {row.what} ({table.protocol} protocol)")
+    all_axes = figure.subplots(1, len(row.cells), squeeze=False)[0]
+    for axes, name, cell in zip(all_axes, table.columns, row.cells, strict=True):
+        if cell.confusion is not None:
+            _draw_one(axes, grasps, cell.confusion)
+        axes.set_title(f"subject {name}: {100 * cell.rate.mean:.1f} %", fontsize=10)
+    all_axes[0].set_ylabel("true")
+    figure.savefig(path, dpi=120)
+    return path
+
+
+def _draw_one(axes: "Axes", grasps: tuple[str, ...], confusion: "Confusion") -> None:
+    counts = np.array(confusion, dtype=np.float64)
+    shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+    axes.imshow(shares, cmap="Blues", vmin=0, vmax=1)
+    axes.set_xticks(range(len(grasps)), grasps, rotation=90, fontsize=8)
+    axes.set_yticks(range(len(grasps)), grasps, fontsize=8)
+    axes.set_xlabel("recognised as")
+    for true, found in np.argwhere(shares >= 0.01):
+        share = shares[true, found]
+        colour = "white" if share > 0.6 else "black"
+        axes.text(found, true, f"{100 * share:.0f}", ha="center", va="center", fontsize=7, color=colour)

@@ -1,0 +1,140 @@
+"""What to fit for each of the tables, before anything is fitted."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Literal
+
+import numpy as np
+
+from .compositions import ALL_SWITCHES, SELECTED, Columns, Composition, available
+from .fits import Fit
+from .folds import Fold
+from .placements import Placements
+from .populations import Population
+from .protocols import Protocol, ProtocolName
+
+TableName = Literal["compositions", "generality", "pruning", "baselines"]
+Select = Callable[[Population, Fold], Columns]
+
+DRAWS = 5  # random placements that a placement is compared with
+
+
+@dataclass(frozen=True, slots=True)
+class CellPlan:
+    """The fits of one cell: `runs` of folds, one run a repeat; a cell of random draws has all repeats of each draw."""
+
+    part: Population
+    runs: tuple[tuple[Fit, ...], ...]
+
+    @property
+    def fits(self) -> list[Fit]:
+        """The fits of all runs."""
+        return [fit for run in self.runs for fit in run]
+
+
+@dataclass(frozen=True, slots=True)
+class RowPlan:
+    """A row of a table: its short name, what it is, and its cells, one a population."""
+
+    name: str
+    what: str
+    cells: tuple[CellPlan, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TablePlan:
+    """A table under one protocol."""
+
+    name: TableName
+    protocol: ProtocolName
+    rows: tuple[RowPlan, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Planner:
+    """Plans the tables for populations of one set, with n_joints joints, ID3 pruned by S = `prune`."""
+
+    parts: tuple[Population, ...]
+    placements: Placements
+    n_joints: int
+    prune: int
+    prune_list: tuple[int, ...]
+    seed: int
+
+    def table(self, name: TableName, protocol: Protocol) -> TablePlan:
+        """Return the plan of a table under a protocol."""
+        rows: dict[TableName, Callable[[Protocol], list[RowPlan]]] = {
+            "compositions": self._compositions,
+            "generality": self._generality,
+            "pruning": self._pruning,
+            "baselines": self._baselines,
+        }
+        return TablePlan(name, protocol.name, tuple(rows[name](protocol)))
+
+    def _compositions(self, protocol: Protocol) -> list[RowPlan]:
+        chosen = partial(self.own, protocol)
+        kinds = available(self._n_switches, self.n_joints)
+        return [self._row(kind.name, kind.what, kind, chosen) for kind in kinds]
+
+    def _generality(self, protocol: Protocol) -> list[RowPlan]:
+        def chosen_by(giver: Population, part: Population, fold: Fold) -> Columns:
+            # Another subject's placement has never seen this subject's rows: both protocols agree on it.
+            own = part is giver
+            return self.own(protocol, part, fold) if own else self.placements.id3(giver.rows, self.prune)
+
+        return [
+            self._row(giver.name, f"placement of subject {giver.name}", SELECTED, partial(chosen_by, giver))
+            for giver in self.parts
+        ]
+
+    def _pruning(self, protocol: Protocol) -> list[RowPlan]:
+        everyone = np.unique(np.concatenate([part.rows for part in self.parts]))
+
+        def pooled(least: int, part: Population, fold: Fold) -> Columns:
+            return self.placements.id3(protocol.may_choose_pooled(everyone, fold), least)
+
+        everything = self._row("all", "all switches", ALL_SWITCHES, lambda part, fold: ())
+        pruned = [self._row(str(s), f"S = {s}", SELECTED, partial(pooled, s)) for s in self.prune_list]
+        return [everything, *pruned]
+
+    def _baselines(self, protocol: Protocol) -> list[RowPlan]:
+        def rival(choose: Callable[..., Columns], part: Population, fold: Fold) -> Columns:
+            return choose(protocol.may_choose(part, fold), len(self.own(protocol, part, fold)))
+
+        def drawn(draw: int, part: Population, fold: Fold) -> Columns:
+            return self.placements.random(len(self.own(protocol, part, fold)), self.seed + draw)
+
+        draws = [self._row("random", f"mean of {DRAWS} draws", SELECTED, partial(drawn, draw)) for draw in range(DRAWS)]
+        return [
+            self._row("ID3", "the paper's placement", SELECTED, partial(self.own, protocol)),
+            self._row("CMIM", "forward conditional mutual information", SELECTED, partial(rival, self.placements.cmim)),
+            self._row("top-k", "largest mutual information each", SELECTED, partial(rival, self.placements.top)),
+            _joined(draws),
+        ]
+
+    @property
+    def _n_switches(self) -> int:
+        return int(self.placements.switches.shape[1])
+
+    def own(self, protocol: Protocol, part: Population, fold: Fold) -> Columns:
+        """Return the placement that ID3 chooses for a fold from the population's own rows, as the protocol allows."""
+        return self.placements.id3(protocol.may_choose(part, fold), self.prune)
+
+    def _row(self, name: str, what: str, kind: Composition, select: Select) -> RowPlan:
+        return RowPlan(name, what, tuple(self.cell(part, kind, select) for part in self.parts))
+
+    def cell(self, part: Population, kind: Composition, select: Select) -> CellPlan:
+        """Return the fits of composition `kind` on every fold of `part`; `select` gives the placement for a fold."""
+
+        def fit(fold: Fold) -> Fit:
+            placement = select(part, fold) if kind.needs_placement else ()
+            return Fit(fold, kind.columns(placement, self._n_switches, self.n_joints), part.grasps)
+
+        return CellPlan(part, tuple(tuple(map(fit, folds)) for folds in part.repeats))
+
+
+def _joined(rows: list[RowPlan]) -> RowPlan:
+    """Return one row whose cells hold the runs of all `rows`."""
+    cells = zip(*(row.cells for row in rows), strict=True)
+    return replace(rows[0], cells=tuple(CellPlan(same[0].part, sum((c.runs for c in same), ())) for same in cells))

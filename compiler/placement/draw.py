@@ -1,0 +1,74 @@
+"""The tree as a picture."""
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ...runtime.files import write_atomically
+from .errors import PlacementError
+from .printing import names_for
+from .tree import Tree
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FORMATS = ("svg", "png")
+_LEAF_INCHES, _LEVEL_INCHES, _LARGEST_INCHES = 0.6, 0.9, 200.0
+_FONT_SIZE = 6
+
+
+def draw_tree(tree: Tree, path: Path, names: Sequence[str] = (), class_names: Sequence[str] = ()) -> None:
+    """Write the picture of `tree` to `path`, .svg or .png: decisions with input and gain, leaves with class and rows.
+
+    The same tree gives the same bytes. Raises PlacementError for another kind of file or without matplotlib.
+    """
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in FORMATS:
+        raise PlacementError(f"{path.name}: a picture of a tree ends in .svg or .png")
+    try:
+        import matplotlib as mpl
+        from matplotlib.figure import Figure
+    except ImportError as reason:
+        raise PlacementError("drawing needs matplotlib: pip install 'thenar[compiler]'") from reason
+    size = (_LEAF_INCHES * tree.n_leaves + 1.5, _LEVEL_INCHES * tree.depth + 1.2)
+    picture = io.BytesIO()
+    with mpl.rc_context({"svg.hashsalt": "thenar", "font.size": _FONT_SIZE}):
+        figure = Figure(figsize=(min(size[0], _LARGEST_INCHES), min(size[1], _LARGEST_INCHES)))
+        axes = figure.add_axes((0, 0, 1, 1))
+        axes.set(xlim=(-1, tree.n_leaves), ylim=(-tree.depth - 0.5, 0.5))
+        axes.axis("off")
+        _compose(axes, tree, *names_for(tree, names, class_names))
+        figure.savefig(picture, format=kind, dpi=110, metadata={"Date": None} if kind == "svg" else {"Software": None})
+    write_atomically(path, picture.getvalue())
+
+
+def _compose(axes: "Axes", tree: Tree, names: Sequence[str], class_names: Sequence[str]) -> None:
+    places = [(across, -depth) for across, depth in zip(_places(tree), tree.depths, strict=True)]
+    for (x, y), node, children in zip(places, tree.nodes, tree.children, strict=True):
+        for value, child in zip(node.values, children, strict=True):
+            to_x, to_y = places[child]
+            axes.plot((x, to_x), (y, to_y), color="0.6", linewidth=0.8, zorder=1)
+            middle = ((x + to_x) / 2, (y + to_y) / 2)
+            axes.text(*middle, str(value), color="0.35", ha="center", va="center", backgroundcolor="white")
+        if node.input is None:
+            words, box = f"{class_names[node.majority]}\n{max(node.counts)}/{node.size}", ("round", "#e3efda")
+        else:
+            words, box = f"{names[node.input]}\n{node.gain:.3f}", ("square", "#dae3f3")
+        frame = {"boxstyle": box[0], "facecolor": box[1], "edgecolor": "0.5"}
+        axes.text(x, y, words, ha="center", va="center", bbox=frame, zorder=3)
+
+
+def _places(tree: Tree) -> list[float]:
+    """Return each node's place across: leaves side by side, a decision over the middle of its children."""
+    places = [0.0] * len(tree.nodes)
+    leaves = iter(range(len(tree.nodes)))
+    for number, node in enumerate(tree.nodes):
+        if node.input is None:
+            places[number] = next(leaves)
+    # In preorder children come after their parents, so backwards they are placed before them.
+    for number in reversed(range(len(tree.nodes))):
+        children = tree.children[number]
+        if children:
+            places[number] = (places[children[0]] + places[children[-1]]) / 2
+    return places

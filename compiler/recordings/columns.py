@@ -1,0 +1,133 @@
+"""`columns.toml`: which column of a table is the label, the subject, a switch, a joint, and how joints become codes."""
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+
+from .errors import ColumnsError
+from .names import nearest
+
+DEFAULT_GRID = 0.5
+
+
+class Calibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Two points of the straight line between codes and values, as in `Joint`."""
+
+    code_a: int
+    value_a: float
+    code_b: int
+    value_b: float
+
+
+class JointColumns(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Joint columns that are coded alike.
+
+    codes = true: the table holds integer codes 0..65535, with a `calibration` or without. Otherwise it holds values in
+    `unit`: coded by `calibration`, or on a `grid` that starts at `origin` (default: the column's least value, rounded
+    down to the grid).
+    """
+
+    columns: tuple[str, ...]
+    unit: str = "deg"
+    codes: bool = False
+    grid: float | None = None
+    origin: float | None = None
+    calibration: Calibration | None = None
+
+    def __post_init__(self) -> None:
+        if (self.codes or self.calibration) and (self.grid is not None or self.origin is not None):
+            raise ValueError("`grid` and `origin` are for values without a `calibration`: leave them out")
+        if not (math.isfinite(self.step) and self.step > 0):
+            raise ValueError(f"`grid` must be above 0, not {self.grid}")
+        if self.origin is not None and not math.isfinite(self.origin):
+            raise ValueError(f"`origin` must be a finite number, not {self.origin}")
+
+    @property
+    def step(self) -> float:
+        """The grid's width, in `unit`."""
+        return DEFAULT_GRID if self.grid is None else self.grid
+
+
+class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A columns.toml, key by key. Column lists hold globs (`*`, `?`, `[...]`); the other keys hold one column each."""
+
+    label: str
+    subject: str | None = None
+    object: str | None = None
+    trial: str | None = None
+    switches: tuple[str, ...] = ()
+    joints: tuple[JointColumns, ...] = ()
+    taxonomy: str | tuple[str, ...] = "own"
+    labels: dict[str, str] = {}
+    missing: Literal["error", "drop"] = "error"
+    delimiter: str = ","
+
+    def __post_init__(self) -> None:
+        if len(self.delimiter) != 1 or self.delimiter in '\r\n"':
+            raise ValueError(f"`delimiter` must be one character, not {self.delimiter!r}")
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """The columns of one table, by what they are; `joints` beside the entry that says how to code each."""
+
+    switches: tuple[str, ...]
+    joints: tuple[tuple[str, JointColumns], ...]
+
+
+def read_columns(path: Path) -> Columns:
+    """Read a columns.toml; raises ColumnsError naming the key that is wrong."""
+    try:
+        return msgspec.toml.decode(path.read_bytes(), type=Columns)
+    except (msgspec.DecodeError, UnicodeDecodeError) as reason:
+        raise ColumnsError(f"{path.name}: {_in_toml_words(str(reason))}") from reason
+
+
+def _in_toml_words(reason: str) -> str:
+    """Return msgspec's sentence with TOML's words and `joints[0]` for its path `$.joints[0]`."""
+    words = {
+        "Object ": "table ",
+        "field": "key",
+        "`$.": "`",
+        "`str`": "text",
+        "`object`": "table",
+        "Expected": "expected",
+    }
+    for theirs, ours in words.items():
+        reason = reason.replace(theirs, ours)
+    return reason.removesuffix(" - at `$`")
+
+
+def select(columns: Columns, names: Sequence[str]) -> Selection:
+    """Find the columns that `columns` speaks of among a table's `names`.
+
+    Raises ColumnsError if a column is missing, used twice, a glob matches nothing, or nothing is a switch or a joint.
+    """
+    single = [
+        column for column in (columns.label, columns.subject, columns.object, columns.trial) if column is not None
+    ]
+    for column in single:
+        if column not in names:
+            raise ColumnsError(f"the table has no column {column!r}{nearest(column, names)}")
+    switches = tuple(_matches("switches", columns.switches, names))
+    joints = tuple((name, entry) for entry in columns.joints for name in _matches("joints", entry.columns, names))
+    used = Counter([*single, *switches, *(name for name, _ in joints)])
+    if twice := [name for name, times in used.items() if times > 1]:
+        raise ColumnsError(f"column {twice[0]!r} is used {used[twice[0]]} times: name it once, or narrow the globs")
+    if not switches and not joints:
+        raise ColumnsError("no column is a switch or a joint: name some under `switches` or `[[joints]]`")
+    return Selection(switches, joints)
+
+
+def _matches(what: str, globs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
+    for glob in globs:
+        found = [name for name in names if fnmatchcase(name, glob)]
+        if not found:
+            raise ColumnsError(f"{what}: {glob!r} matches no column of the table{nearest(glob, names)}")
+        yield from found

@@ -1,0 +1,113 @@
+"""A table and its columns.toml into a `GraspSet`, and a report of what was found on the way."""
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from .coding import CodingCost, code_joint
+from .columns import Columns, read_columns, select
+from .errors import ColumnsError, RecordingError, TableError
+from .findings import Finding, find_oddities
+from .graspset import GraspSet
+from .names import list_names, list_rows
+from .reading import Readings, read_cells
+from .table import Table, read_table
+from .taxonomy import Taxonomy, own, published
+
+
+class ImportReport(msgspec.Struct, frozen=True):
+    """What `thenar import` says: what is in the set, what coding cost per joint, and what is odd."""
+
+    table: str
+    rows: int
+    subjects: int
+    objects: int
+    grasp_types: int
+    taxonomy: str
+    switches: int
+    joints: int
+    coding: tuple[CodingCost, ...]
+    warnings: tuple[Finding, ...]
+
+
+def import_file(table: Path, columns: Path) -> tuple[GraspSet, ImportReport]:
+    """Import the table in file `table` as the columns.toml in file `columns` says.
+
+    Raises TableError, ColumnsError or RecordingError, naming file, rows and columns; OSError as it comes.
+    """
+    wanted = read_columns(columns)
+    return import_table(read_table(table, wanted.delimiter), wanted)
+
+
+def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport]:
+    """Import `table` as `columns` says; raises TableError, ColumnsError or RecordingError."""
+    selection = select(columns, list(table.columns))
+    readings, dropped = read_cells(table, columns, selection)
+    grasps, taxonomy, aliases = _labels(table.what, columns, readings)
+    joints = [
+        code_joint(name, entry, readings.joints[:, column], readings.rows)
+        for column, (name, entry) in enumerate(selection.joints)
+    ]
+    empty = np.zeros((len(grasps), 0), np.uint16)
+    grasp_set = GraspSet(
+        switches=readings.switches,
+        switch_names=selection.switches,
+        codes=np.stack([codes for codes, _, _ in joints], axis=1) if joints else empty,
+        joints=tuple(joint for _, joint, _ in joints),
+        grasps=grasps,
+        taxonomy=taxonomy,
+        subjects=readings.subjects,
+        objects=readings.objects,
+        trials=readings.trials,
+    )
+    warnings = (*dropped, *aliases, *find_oddities(grasp_set, readings.rows))
+    return grasp_set, _report(table.what, grasp_set, tuple(cost for _, _, cost in joints), warnings)
+
+
+def _report(
+    what: str, grasp_set: GraspSet, coding: tuple[CodingCost, ...], warnings: tuple[Finding, ...]
+) -> ImportReport:
+    return ImportReport(
+        table=what,
+        rows=len(grasp_set),
+        subjects=len(np.unique(grasp_set.subjects)),
+        objects=len(np.unique(grasp_set.objects)),
+        grasp_types=len(np.unique(grasp_set.labels)),
+        taxonomy=grasp_set.taxonomy.name,
+        switches=len(grasp_set.switch_names),
+        joints=len(grasp_set.joints),
+        coding=coding,
+        warnings=warnings,
+    )
+
+
+def _labels(what: str, columns: Columns, readings: Readings) -> tuple[NDArray[np.str_], Taxonomy, list[Finding]]:
+    """Return each row's grasp type, the taxonomy, and the aliases that nobody needed."""
+    found, where = np.unique(readings.labels, return_inverse=True)
+    aliased = [columns.labels.get(label, label) for label in found.tolist()]
+    taxonomy = _taxonomy(columns, aliased)
+    unknown = np.array([taxonomy.find(label) is None for label in aliased])[where]
+    if unknown.any():
+        label = aliased[where[np.flatnonzero(unknown)[0]]]
+        raise TableError(
+            f"{what}: {unknown.sum()} unknown labels in {columns.label!r}, {list_rows(readings.rows[unknown])}; "
+            f"{label!r} is no grasp type of {taxonomy.name}{taxonomy.suggestion(label)}; [labels] can translate it"
+        )
+    unused = sorted(columns.labels.keys() - set(found.tolist()))
+    message = f"{len(unused)} entries of [labels] occur in no row: {list_names(unused)}"
+    return (
+        np.array([taxonomy.require(label) for label in aliased])[where],
+        taxonomy,
+        [Finding("unused aliases", len(unused), message)] if unused else [],
+    )
+
+
+def _taxonomy(columns: Columns, labels: list[str]) -> Taxonomy:
+    try:
+        if isinstance(columns.taxonomy, tuple):
+            return own(columns.taxonomy)
+        return own(sorted(set(labels))) if columns.taxonomy == "own" else published(columns.taxonomy)
+    except RecordingError as reason:
+        raise ColumnsError(f"taxonomy: {reason}") from reason

@@ -1,0 +1,119 @@
+"""A set as a picture: how many grasps of each type, which switches each type closes, which values its joints take."""
+
+import io
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import RecordingError
+from .graspset import GraspSet, Joint
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
+_BLUE = "#2f6690"
+_PALE = "#8fb3cc"
+_ORANGE = "#e07a1f"
+_JOINTS_A_ROW = 6
+# Beyond so many columns their names cannot be read side by side.
+_NAMED_SWITCHES = 90
+
+
+def draw(grasp_set: GraspSet, kind: str) -> bytes:
+    """Return the picture as the bytes of a "png" or "svg"; the same set gives the same bytes.
+
+    Raises RecordingError if matplotlib is not installed or the set has no rows.
+    """
+    try:
+        import matplotlib as mpl
+        from matplotlib.figure import Figure
+    except ImportError as reason:
+        raise RecordingError("drawing needs matplotlib: pip install 'thenar[compiler]'") from reason
+    if not len(grasp_set):
+        raise RecordingError("a set without rows cannot be drawn")
+    with mpl.rc_context(
+        {"svg.hashsalt": "thenar", "font.size": 8, "axes.spines.top": False, "axes.spines.right": False}
+    ):
+        figure = Figure(figsize=_size(grasp_set), layout="constrained", dpi=130)
+        _compose(figure, grasp_set)
+        file = io.BytesIO()
+        figure.savefig(file, format=kind, metadata={"Date": None} if kind == "svg" else {"Software": None})
+    return file.getvalue()
+
+
+def _size(grasp_set: GraspSet) -> tuple[float, float]:
+    """Return width and height in inches."""
+    width = max(9.0, 5.0 + 0.13 * min(len(grasp_set.switch_names), 120))
+    return width, sum(_heights(grasp_set))
+
+
+def _heights(grasp_set: GraspSet) -> list[float]:
+    types = 0.17 * len(_present(grasp_set)) + 0.9
+    rows_of_joints = -(-len(grasp_set.joints) // _JOINTS_A_ROW)
+    return [types + 0.9, *([rows_of_joints * types + 0.4] if rows_of_joints else [])]
+
+
+def _compose(figure: "Figure", grasp_set: GraspSet) -> None:
+    parts = figure.subfigures(len(_heights(grasp_set)), 1, height_ratios=_heights(grasp_set), squeeze=False)[:, 0]
+    if grasp_set.switch_names:
+        balance, contacts = parts[0].subplots(1, 2, width_ratios=(1, 3), sharey=True)
+        _draw_contacts(contacts, grasp_set)
+    else:
+        balance = parts[0].subplots()
+    _draw_balance(balance, grasp_set)
+    if grasp_set.joints:
+        _draw_joints(parts[-1], grasp_set)
+
+
+def _present(grasp_set: GraspSet) -> NDArray[np.intp]:
+    return np.unique(grasp_set.labels)
+
+
+def _draw_balance(axes: "Axes", grasp_set: GraspSet) -> None:
+    present = _present(grasp_set)
+    counts = np.bincount(grasp_set.labels)[present]
+    bars = axes.barh(np.arange(len(present)), counts, color=_BLUE)
+    axes.bar_label(bars, padding=2)
+    axes.set_yticks(np.arange(len(present)), [grasp_set.taxonomy.types[label] for label in present])
+    axes.set_ylim(len(present) - 0.5, -0.5)
+    axes.margins(x=0.1)
+    axes.set_title(f"{len(grasp_set)} grasps")
+    axes.set_xlabel("rows")
+
+
+def _draw_contacts(axes: "Axes", grasp_set: GraspSet) -> None:
+    closed = np.stack([grasp_set.switches[grasp_set.labels == label].mean(axis=0) for label in _present(grasp_set)])
+    image = axes.imshow(closed, aspect="auto", cmap="Blues", vmin=0, vmax=1, interpolation="nearest")
+    axes.figure.colorbar(image, ax=axes, label="share of rows closed", pad=0.01)
+    axes.tick_params(axis="y", labelleft=False, left=False)
+    names = grasp_set.switch_names
+    if len(names) <= _NAMED_SWITCHES:
+        axes.set_xticks(np.arange(len(names)), names, rotation=90, fontsize=6)
+    axes.set_title(f"contact on {len(names)} switches")
+
+
+def _draw_joints(part: "SubFigure", grasp_set: GraspSet) -> None:
+    part.suptitle("joint values: line from least to largest, bar the middle half, orange the median", fontsize=9)
+    count = len(grasp_set.joints)
+    rows = -(-count // _JOINTS_A_ROW)
+    panels = part.subplots(rows, min(count, _JOINTS_A_ROW), sharey=True, squeeze=False).ravel()
+    for panel, joint, codes in zip(panels, grasp_set.joints, grasp_set.codes.T, strict=False):
+        _draw_joint(panel, joint, codes, grasp_set)
+    for panel in panels[count:]:
+        panel.set_axis_off()
+
+
+def _draw_joint(axes: "Axes", joint: Joint, codes: NDArray[np.uint16], grasp_set: GraspSet) -> None:
+    present = _present(grasp_set)
+    points = [np.percentile(joint.value(codes[grasp_set.labels == label]), [0, 25, 50, 75, 100]) for label in present]
+    least, low, median, high, largest = np.array(points).T
+    where = np.arange(len(present))
+    axes.hlines(where, least, largest, color=_PALE, linewidth=1.2)
+    axes.hlines(where, low, high, color=_BLUE, linewidth=4)
+    axes.plot(median, where, "|", color=_ORANGE, markersize=8, markeredgewidth=1.8)
+    axes.set_yticks(where, [grasp_set.taxonomy.types[label] for label in present])
+    axes.set_ylim(len(present) - 0.5, -0.5)
+    axes.set_title(joint.name)
+    axes.set_xlabel(joint.unit)

@@ -1,0 +1,109 @@
+"""The cells of a table that a columns.toml asks for, checked: the first faults are named by row and column."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .cells import Parsed, Value, bits, codes, integers, names, numbers
+from .columns import Columns, Selection
+from .errors import TableError
+from .findings import Finding
+from .names import SHOWN, list_names, list_rows
+from .table import Column, Table
+
+
+@dataclass(frozen=True, slots=True)
+class Readings:
+    """What a table holds for a GraspSet: n rows by the numbers the user knows; (n, j) values or codes of the joints."""
+
+    rows: NDArray[np.int64]
+    labels: NDArray[np.str_]
+    subjects: NDArray[np.str_]
+    objects: NDArray[np.str_]
+    trials: NDArray[np.int64]
+    switches: NDArray[np.bool_]
+    joints: NDArray[np.float64]
+
+
+def read_cells(table: Table, columns: Columns, selection: Selection) -> tuple[Readings, list[Finding]]:
+    """Return what `table` holds, and a finding if rows with missing values were dropped.
+
+    Columns that the user does not name are "1" throughout. Raises TableError naming the first wrong or missing cells
+    and their number.
+    """
+    reader = _Reader(table)
+    labels = reader.names(columns.label)
+    subjects, objects = reader.names(columns.subject), reader.names(columns.object)
+    trials = np.ones(len(table.rows))
+    if columns.trial is not None:
+        trials = reader.read(columns.trial, integers, "whole numbers")
+    switches = [reader.read(name, bits, "0 or 1") for name in selection.switches]
+    joints = [
+        reader.read(name, codes, "codes 0..65535") if entry.codes else reader.read(name, numbers, "finite numbers")
+        for name, entry in selection.joints
+    ]
+    keep = reader.complete(drop=columns.missing == "drop")
+    readings = Readings(
+        rows=table.rows[keep],
+        labels=labels[keep],
+        subjects=subjects[keep],
+        objects=objects[keep],
+        trials=trials[keep].astype(np.int64),
+        switches=_side_by_side(switches, len(keep))[keep] == 1,
+        joints=_side_by_side(joints, len(keep))[keep],
+    )
+    return readings, reader.dropped(keep)
+
+
+def _side_by_side(columns: list[NDArray[np.float64]], rows: int) -> NDArray[np.float64]:
+    return np.stack(columns, axis=1) if columns else np.zeros((rows, 0))
+
+
+class _Reader:
+    """Reads columns of one table and keeps account of the cells that are missing or wrong."""
+
+    def __init__(self, table: Table) -> None:
+        self.table = table
+        self.missing: dict[str, NDArray[np.bool_]] = {}
+        self.wrong: dict[str, dict[str, NDArray[np.bool_]]] = {}
+
+    def read(self, name: str, parse: Callable[[Column], Parsed[Value]], expected: str) -> NDArray[Value]:
+        parsed = parse(self.table.columns[name])
+        if parsed.missing.any():
+            self.missing[name] = parsed.missing
+        if parsed.wrong.any():
+            self.wrong.setdefault(expected, {})[name] = parsed.wrong
+        return parsed.values
+
+    def names(self, column: str | None) -> NDArray[np.str_]:
+        return np.full(len(self.table.rows), "1") if column is None else self.read(column, names, "names")
+
+    def complete(self, drop: bool) -> NDArray[np.bool_]:
+        """Return which rows miss nothing; raises TableError on wrong cells, and on missing ones unless `drop`."""
+        faults = [f"not {expected}: {self._list(columns)}" for expected, columns in self.wrong.items()]
+        if self.missing and not drop:
+            faults.append(f'missing (missing = "drop" leaves their rows out): {self._list(self.missing)}')
+        if faults:
+            raise TableError(f"{self.table.what}: {'; '.join(faults)}")
+        keep = np.ones(len(self.table.rows), np.bool_)
+        for missing in self.missing.values():
+            keep &= ~missing
+        if not keep.any():
+            raise TableError(f"{self.table.what}: every row misses a value: {self._list(self.missing)}")
+        return keep
+
+    def dropped(self, keep: NDArray[np.bool_]) -> list[Finding]:
+        rows = self.table.rows[~keep]
+        if not rows.size:
+            return []
+        lack = list_names(list(self.missing))
+        message = f"{rows.size} rows with missing values were left out: {list_rows(rows)} (columns {lack})"
+        return [Finding("dropped rows", int(rows.size), message, tuple(rows[:SHOWN].tolist()), tuple(self.missing))]
+
+    def _list(self, columns: dict[str, NDArray[np.bool_]]) -> str:
+        """Return "3 cells are ...": how many cells, and the first of them in the order of rows."""
+        cells = sorted((row, name) for name, faulty in columns.items() for row in np.flatnonzero(faulty).tolist())
+        shown = [f"row {self.table.rows[row]} {name!r} ({str(self.table.columns[name][row])!r})" for row, name in cells]
+        return f"{len(cells)} cell{'s' if len(cells) > 1 else ''}, {list_names(shown)}"

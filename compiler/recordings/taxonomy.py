@@ -1,0 +1,135 @@
+"""Taxonomies of grasp types: Kamakura's 14, Cutkosky's 16, Feix's 33, and the user's own.
+
+A type may be written as its name, and in the published taxonomies also as its abbreviation, full name or number; case,
+underscores and punctuation do not count.
+"""
+
+import difflib
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from .errors import RecordingError
+from .names import check_names
+
+# Kamakura et al. 1980, Patterns of static prehension in normal hands, Am. J. Occup. Ther. 34(7):437-445, with the usual
+# abbreviations.
+_KAMAKURA = {
+    "PoS": "Power grip, standard type",
+    "PoH": "Power grip, hook type",
+    "PoI": "Power grip, index-extension type",
+    "PoE": "Power grip, extension type",
+    "PoD": "Power grip, distal type",
+    "Lat": "Lateral grip",
+    "Tpd": "Tripod grip, standard type",
+    "TVI": "Tripod grip, variation I",
+    "TVII": "Tripod grip, variation II",
+    "PMF": "Parallel mild flexion grip",
+    "CMF": "Circular mild flexion grip",
+    "Tip": "Tip grip",
+    "PE": "Parallel extension grip",
+    "Add": "Adduction grip",
+}
+
+# Cutkosky 1989, On grasp choice, grasp models, and the design of hands for manufacturing tasks, IEEE T-RA 5(3):269-279.
+_CUTKOSKY = (
+    "Large diameter; Small diameter; Medium wrap; Adducted thumb; Light tool; Thumb-4 finger; Thumb-3 finger; "
+    "Thumb-2 finger; Thumb-index finger; Disk (power); Sphere (power); Disk (precision); Sphere (precision); Tripod; "
+    "Hook, platform, push; Lateral pinch"
+)
+
+# Feix et al. 2016, The GRASP taxonomy of human grasp types, IEEE T-HMS 46(1).
+_FEIX = (
+    "Large Diameter; Small Diameter; Medium Wrap; Adducted Thumb; Light Tool; Prismatic 4 Finger; Prismatic 3 Finger; "
+    "Prismatic 2 Finger; Palmar Pinch; Power Disk; Power Sphere; Precision Disk; Precision Sphere; Tripod; Fixed Hook; "
+    "Lateral; Index Finger Extension; Extension Type; Distal Type; Writing Tripod; Tripod Variation; "
+    "Parallel Extension; Adduction Grip; Tip Pinch; Lateral Tripod; Sphere 4 Finger; Quadpod; Sphere 3 Finger; Stick; "
+    "Palmar; Ring; Ventral; Inferior Pincer"
+)
+
+_PUBLISHED = {
+    "kamakura14": tuple(_KAMAKURA),
+    "cutkosky16": tuple(_CUTKOSKY.split("; ")),
+    "feix33": tuple(_FEIX.split("; ")),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Taxonomy:
+    """The grasp types that a set may hold, in their order: a type's index is its label.
+
+    `name` is "kamakura14", "cutkosky16", "feix33", or the user's own. Raises RecordingError if two types are equal, a
+    name is empty, or a published name stands over other types than the published ones.
+    """
+
+    name: str
+    types: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        check_names("taxonomy", [self.name])
+        check_names("grasp type", self.types)
+        published = _PUBLISHED.get(self.name, self.types)
+        if self.types != published:
+            raise RecordingError(f"taxonomy {self.name} has {len(published)} types of its own: name yours otherwise")
+
+    @property
+    def full_names(self) -> tuple[str, ...]:
+        """The types written out, in the same order."""
+        return tuple(_KAMAKURA.values()) if self.name == "kamakura14" else self.types
+
+    def find(self, label: str) -> str | None:
+        """Return the type that `label` means, or None."""
+        return label if label in self.types else self._aliases().get(_plain(label))
+
+    def require(self, label: str) -> str:
+        """Return the type that `label` means; raises RecordingError naming the types that look most like it."""
+        found = self.find(label)
+        if found is None:
+            raise RecordingError(f"{label!r} is not a grasp type of {self.name}{self.suggestion(label)}")
+        return found
+
+    def suggestion(self, label: str) -> str:
+        """Return " (did you mean ...?)" with the nearest types, or the types to choose from when none is near."""
+        aliases = self._aliases()
+        near = {aliases[alias]: None for alias in difflib.get_close_matches(_plain(label), aliases, n=3)}
+        if near:
+            return f" (did you mean {' or '.join(map(repr, near))}?)"
+        shown = ", ".join(self.types[:5]) + (", ..." if len(self.types) > 5 else "")
+        return f" (its types: {shown})"
+
+    def _aliases(self) -> dict[str, str]:
+        """Plain spelling -> type; a spelling that two types share means neither."""
+        found: dict[str, str | None] = {}
+        for number, (name, full) in enumerate(zip(self.types, self.full_names, strict=True), start=1):
+            spellings = {name, full, str(number)} if self.name in _PUBLISHED else {name}
+            for plain in {_plain(spelling) for spelling in spellings}:
+                found[plain] = None if plain in found else name
+        return {plain: name for plain, name in found.items() if name is not None}
+
+
+def _plain(label: str) -> str:
+    """Return `label` with case, underscores and punctuation levelled: "Sphere_4_finger" -> "sphere 4 finger"."""
+    words = re.sub(r"[\W_]+", " ", label.casefold()).strip()
+    return str(int(words)) if words.isdecimal() else words or label
+
+
+def own(types: Iterable[str]) -> Taxonomy:
+    """Return the user's own taxonomy of `types`, in their order."""
+    return Taxonomy("own", tuple(types))
+
+
+def published(name: str) -> Taxonomy:
+    """Return the published taxonomy called `name`; raises RecordingError naming those there are."""
+    if name not in _PUBLISHED:
+        raise RecordingError(f"no taxonomy is called {name!r}: take one of {', '.join(_PUBLISHED)}, own, or a list")
+    return Taxonomy(name, _PUBLISHED[name])
+
+
+def is_published(taxonomy: Taxonomy) -> bool:
+    """Return whether `published(taxonomy.name)` is `taxonomy`."""
+    return taxonomy.name in _PUBLISHED
+
+
+KAMAKURA_14 = published("kamakura14")
+CUTKOSKY_16 = published("cutkosky16")
+FEIX_33 = published("feix33")

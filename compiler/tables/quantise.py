@@ -1,0 +1,90 @@
+"""From score tables to integer tables: one scale for all, the finest at which no sum can overflow.
+
+Rounding every row to whole steps moves a score by at most (inputs + 1)/2 steps, half a step for the bias and for each
+input's row. Two scores can therefore approach each other by at most inputs + 1 steps, and a frame whose best score
+leads by more than that keeps its grasp type.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...runtime.tables import IntegerTables
+from .balance import balance
+from .collapse import Floats, ScoreTables
+
+FINEST = 2.0**40  # steps per unit: far beyond what scores mean, and safe from overflow of the doubles
+
+Integers = NDArray[np.int16]
+
+
+def quantise(tables: ScoreTables, bits: NDArray[np.bool_], codes: NDArray[np.uint16], width: int = 16) -> IntegerTables:
+    """Return integer tables whose sums fit `width` bits (4 to 16), rounded half to even.
+
+    bits (n, s) and codes (n, j) are the rows trained on; their mean contributions stand in for missing inputs.
+    """
+    balanced = balance(tables)
+    scale = _finest_scale(balanced, 2 ** (width - 1) - 1)
+    switch_rows = _rounded(balanced.switch_rows, scale)
+    switch_means = _rounded(balanced.switch_rows * _mean(bits.astype(np.int64))[:, np.newaxis], scale)
+    thresholds, joint_rows, joint_means = [], [], []
+    for column, steps, rows in zip(codes.T, balanced.thresholds, balanced.joint_rows, strict=True):
+        mean = _rounded(_mean(rows[np.searchsorted(steps, column)]), scale)
+        merged_steps, merged_rows = _merged(steps, _rounded(rows, scale))
+        thresholds.append(merged_steps)
+        joint_rows.append(merged_rows)
+        # A mean computed in floating point may round to just outside of what it is the mean of.
+        joint_means.append(np.clip(mean, merged_rows.min(axis=0), merged_rows.max(axis=0)))
+    return IntegerTables(
+        bias=_rounded(balanced.bias, scale),
+        switch_rows=switch_rows,
+        thresholds=tuple(thresholds),
+        joint_rows=tuple(joint_rows),
+        switch_means=switch_means,
+        joint_means=np.array(joint_means, np.int16).reshape(len(joint_means), len(tables.bias)),
+        scale=scale,
+    )
+
+
+def _finest_scale(tables: ScoreTables, limit: int) -> float:
+    """Return the largest double at which no sum of rounded rows exceeds `limit`; 1 for tables of zeros.
+
+    Rounded terms never fall as the scale grows, so neither does the bound, and bisection over the doubles is exact.
+    """
+    whole = reach(tables, 1.0, rounded=False)
+    if whole == 0:
+        return 1.0
+    fits, too_fine = 0.0, min((limit + tables.n_inputs + 2) / whole, FINEST)
+    while (middle := (fits + too_fine) / 2) not in (fits, too_fine):
+        if reach(tables, middle) <= limit:
+            fits = middle
+        else:
+            too_fine = middle
+    return fits
+
+
+def reach(tables: ScoreTables, scale: float, *, rounded: bool = True) -> float:
+    """Return the largest absolute value that a partial sum of the scaled rows can take, in any order."""
+    choices = [tables.bias[np.newaxis], *tables.joint_rows, *tables.switch_rows[:, np.newaxis]]
+    upper, lower = np.zeros(len(tables.bias)), np.zeros(len(tables.bias))
+    for rows in choices:
+        steps = np.rint(rows * scale) if rounded else rows * scale
+        upper += np.maximum(steps.max(axis=0), 0)
+        lower += np.minimum(steps.min(axis=0), 0)
+    return float(max(upper.max(), -lower.min()))
+
+
+def _rounded(rows: Floats, scale: float) -> Integers:
+    return np.rint(rows * scale).astype(np.int16)
+
+
+def _merged(thresholds: NDArray[np.uint16], rows: Integers) -> tuple[NDArray[np.uint16], Integers]:
+    """Return the joint's thresholds and rows without the thresholds that rounding has made meaningless."""
+    kept = (rows[1:] != rows[:-1]).any(axis=1)
+    return thresholds[kept], rows[np.concatenate([[True], kept])]
+
+
+def _mean(rows: NDArray[np.int64] | Floats) -> Floats:
+    """Return the mean (K,) of rows (n, K), summed exactly, so that it has the same bits on every machine."""
+    return np.array([math.fsum(column) / len(rows) for column in rows.T])

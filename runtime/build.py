@@ -1,0 +1,93 @@
+"""A build folder, loaded: `build.json` says what the tables mean, `tables.bin` holds them."""
+
+import hashlib
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import manifest as manifest_file
+from . import tables as tables_file
+from .errors import BuildError
+from .manifest import Manifest, manifest_from_bytes
+from .scorer import LANE_OFFSET, Scorer
+from .tables import IntegerTables, tables_from_bytes
+
+MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME = "build.json", "tables.bin", "ensemble.bin"
+
+
+class Build:
+    """A recogniser for single frames, integer arithmetic only.
+
+    A frame is `bits` (s,), the kept switches in the order of `manifest.switches`, and `codes` (j,), the joints in the
+    order of `manifest.joints`. Of equal scores the first grasp type wins.
+    """
+
+    __slots__ = ("_scorer", "grasps", "manifest", "tables")
+
+    def __init__(self, manifest: Manifest, tables: IntegerTables) -> None:
+        """Put together what belongs together. Raises BuildError if the two describe different builds."""
+        named = len(manifest.grasps), len(manifest.switches), len(manifest.joints)
+        held = tables.n_classes, tables.n_switches, tables.n_joints
+        if named != held:
+            raise BuildError(
+                f"{MANIFEST_NAME} names {named[0]} grasp types, {named[1]} switches and {named[2]} joints, "
+                f"{TABLES_NAME} holds {held[0]}, {held[1]} and {held[2]}: compile the build again"
+            )
+        self.manifest = manifest
+        self.tables = tables
+        self.grasps = manifest.grasps
+        self._scorer = Scorer(tables)
+
+    @classmethod
+    def load(cls, folder: str | PathLike[str]) -> "Build":
+        """Return the build in `folder`.
+
+        Raises BuildError or SealError, naming the file, if one is missing, damaged, truncated, oversized, from another
+        build, or newer than this thenar.
+        """
+        where = Path(folder)
+        manifest = load_manifest(where)
+        path = where / TABLES_NAME
+        data = read_member(path, tables_file.MAX_BYTES, manifest.tables_sha256)
+        return cls(manifest, tables_from_bytes(data, str(path)))
+
+    def lanes(self, bits: ArrayLike, codes: ArrayLike) -> tuple[int, ...]:
+        """Return the scores of one frame as K plain integers, all 2^15 too high: enough to compare them."""
+        return self._scorer.lanes(bits, codes)
+
+    def lanes_without(
+        self, bits: ArrayLike, codes: ArrayLike, lost_switches: ArrayLike, lost_joints: ArrayLike
+    ) -> tuple[int, ...]:
+        """Return `lanes` with the mean contribution in place of every switch and joint that a mask calls lost."""
+        return self._scorer.lanes_without(bits, codes, lost_switches, lost_joints)
+
+    def scores(self, bits: ArrayLike, codes: ArrayLike) -> NDArray[np.int64]:
+        """Return the scores of one frame, (K,) in steps of 1 / `tables.scale`. Raises FrameError."""
+        return np.array(self._scorer.lanes(bits, codes)) - LANE_OFFSET
+
+    def classify(self, bits: ArrayLike, codes: ArrayLike) -> str:
+        """Return the grasp type of one frame. Raises FrameError."""
+        lanes = self._scorer.lanes(bits, codes)
+        return self.grasps[lanes.index(max(lanes))]
+
+
+def load_manifest(folder: Path) -> Manifest:
+    """Return what the `build.json` in `folder` says. Raises BuildError."""
+    path = folder / MANIFEST_NAME
+    return manifest_from_bytes(read_member(path, manifest_file.MAX_BYTES), str(path))
+
+
+def read_member(path: Path, largest: int, sha256: str | None = None) -> bytes:
+    """Return the bytes of one file of a build, at most `largest` of them, whose SHA-256 must be `sha256` if given."""
+    try:
+        with path.open("rb") as file:
+            data = file.read(largest + 1)
+    except OSError as wrong:
+        raise BuildError(f"{path} cannot be read: {wrong.strerror}; is {path.parent} a build?") from None
+    if len(data) > largest:
+        raise BuildError(f"{path} is larger than {largest} bytes: it is not of a build")
+    if sha256 is not None and hashlib.sha256(data).hexdigest() != sha256:
+        raise BuildError(f"{path} is not the one that {MANIFEST_NAME} describes: damaged, or from another build")
+    return data

@@ -1,0 +1,159 @@
+"""`build.json`: what a build is made of, from what, with which options and with what proof.
+
+Its bytes are canonical: fields in the order of the structs below, indented by two, one newline at the end; no date, no
+path, no host. `checksum` is the SHA-256 of those bytes with that field empty.
+"""
+
+import hashlib
+from typing import Annotated, Literal, TypeVar
+
+import msgspec
+from msgspec import Meta, Struct
+from msgspec.structs import replace
+
+from .errors import BuildError
+
+SCHEMA = 1
+MAX_BYTES = 16 << 20
+
+Inputs = Literal["both", "switches", "joints"]
+Count = Annotated[int, Meta(ge=0)]
+Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
+_T = TypeVar("_T")
+Name = Annotated[str, Meta(min_length=1)]
+
+
+class Source(Struct, frozen=True, forbid_unknown_fields=True):
+    """The recordings: SHA-256 of their content, number of rows, taxonomy, number of switches to choose from."""
+
+    fingerprint: Digest
+    rows: Count
+    taxonomy: str
+    switches: Count
+
+
+class Options(Struct, frozen=True, forbid_unknown_fields=True):
+    """Every option of `thenar compile`."""
+
+    prune: Count
+    rounds: Count
+    inputs: Inputs
+    shrinkage: float
+    folds: Count
+    seed: int
+
+
+class Switch(Struct, frozen=True, forbid_unknown_fields=True):
+    """A kept switch: its column in the recordings, from 0, its name, and the information (bits) that it brought."""
+
+    column: Count
+    name: Name
+    gain: float
+
+
+class Calibration(Struct, frozen=True, forbid_unknown_fields=True):
+    """A joint: its column among the recordings' joints, from 0, its name, and two points from code to value."""
+
+    column: Count
+    name: Name
+    unit: str
+    code_a: Count
+    value_a: float
+    code_b: Count
+    value_b: float
+
+
+class Proof(Struct, frozen=True, forbid_unknown_fields=True):
+    """What holds for the integers: no sum beyond `bound`, no score off by more than `error` steps, and therefore no
+    other grasp type wherever the ensemble's margin exceeds `safe_margin` steps: true of `covered` of the rows trained
+    on; `changed` of them have another grasp type than the ensemble gives.
+    """
+
+    width: int
+    scale: float
+    bound: Count
+    error: float
+    safe_margin: float
+    covered: Count
+    changed: Count
+
+
+class Recognised(Struct, frozen=True, forbid_unknown_fields=True):
+    """A recognition rate as counts. `protocol` says how it was measured, `folds` and `seed` with which split."""
+
+    protocol: Literal["training", "honest"]
+    folds: Count
+    seed: int
+    correct: Count
+    total: Count
+
+    @property
+    def rate(self) -> float:
+        """Correct rows as a share of all."""
+        return self.correct / self.total
+
+
+class Manifest(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The content of `build.json`."""
+
+    schema: int = SCHEMA
+    checksum: str = ""
+    thenar: str
+    tables_sha256: Digest
+    ensemble_sha256: Digest
+    source: Source
+    options: Options
+    grasps: Annotated[tuple[Name, ...], Meta(min_length=2)]
+    switches: tuple[Switch, ...]
+    joints: tuple[Calibration, ...]
+    proof: Proof
+    rates: tuple[Recognised, ...]
+
+
+class _Version(Struct, frozen=True):
+    schema: int
+
+
+def manifest_to_bytes(manifest: Manifest) -> bytes:
+    """Return the content of `build.json`, its checksum filled in."""
+    return _encode(replace(manifest, checksum=_checksum(manifest)))
+
+
+def manifest_from_bytes(data: bytes, what: str = "build.json") -> Manifest:
+    """Return what a `build.json`, which messages call `what`, says.
+
+    Raises BuildError if it is oversized, no such document, of a newer schema, or altered.
+    """
+    if len(data) > MAX_BYTES:
+        raise BuildError(f"{what} has {len(data)} bytes, a build has at most {MAX_BYTES}")
+    schema = _decode(data, _Version, what).schema
+    if schema > SCHEMA:
+        raise BuildError(f"{what} has schema {schema}, this thenar reads up to {SCHEMA}: update thenar")
+    if schema < 1:
+        raise BuildError(f"{what} has schema {schema}, the first was 1: it is not a build of thenar")
+    manifest = _decode(data, Manifest, what)
+    if data != _encode(manifest) or manifest.checksum != _checksum(manifest):
+        raise BuildError(f"{what} is altered: its checksum does not match; compile the build again")
+    for kind, names in (
+        ("grasp types", manifest.grasps),
+        ("switches", tuple(switch.name for switch in manifest.switches)),
+        ("joints", tuple(joint.name for joint in manifest.joints)),
+    ):
+        if len(set(names)) < len(names):
+            raise BuildError(f"{what} names two {kind} alike: compile the build again")
+    return manifest
+
+
+def _decode(data: bytes, kind: type[_T], what: str) -> _T:
+    try:
+        return msgspec.json.decode(data, type=kind)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as wrong:
+        raise BuildError(f"{what} is not a build's: {wrong}") from None
+
+
+def _encode(manifest: Manifest) -> bytes:
+    return msgspec.json.format(msgspec.json.encode(manifest), indent=2) + b"\n"
+
+
+def _checksum(manifest: Manifest) -> str:
+    return hashlib.sha256(_encode(replace(manifest, checksum=""))).hexdigest()

@@ -1,0 +1,57 @@
+"""A small set of grasps as a file, and a build of it, for the sub-commands to work on."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thenar.compiler import GraspSet, compile_build
+from thenar.compiler.recordings.graspset import Joint
+from thenar.compiler.recordings.taxonomy import own
+
+Thenar = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+@pytest.fixture(scope="session")
+def thenar() -> Thenar:
+    """Run `thenar` in a process of its own."""
+
+    def run(*arguments: object) -> "subprocess.CompletedProcess[str]":
+        command = [sys.executable, "-m", "thenar.cli", *map(str, arguments)]
+        return subprocess.run(command, capture_output=True, text=True, check=False)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def small_set() -> GraspSet:
+    random = np.random.default_rng(4)
+    labels = np.arange(60) % 3
+    centres = np.array([[60, 90], [120, 70], [100, 160]])
+    return GraspSet(
+        switches=np.array([[0, 0, 1, 1, 0, 1], [0, 1, 0, 1, 1, 0], [1, 0, 0, 1, 1, 1]], bool)[labels]
+        ^ (random.random((60, 6)) < 0.1),
+        switch_names=tuple(f"s{number}" for number in range(6)),
+        codes=(centres[labels] + random.integers(-20, 20, (60, 2))).astype(np.uint16),
+        joints=tuple(Joint(f"j{number}", "deg", 0, 0.0, 255, 127.5) for number in range(2)),
+        grasps=np.array(["cup", "pen", "rod"])[labels],
+        taxonomy=own(["cup", "pen", "rod"]),
+        subjects=np.full(60, "A"),
+        objects=np.full(60, "thing"),
+        trials=np.arange(60),
+    )
+
+
+@pytest.fixture(scope="session")
+def set_file(small_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("recordings") / "set.grasps"
+    small_set.save(path)
+    return path
+
+
+@pytest.fixture
+def build_folder(small_set: GraspSet, tmp_path: Path) -> Path:
+    return compile_build(small_set, tmp_path / "build", rounds=10, folds=0).folder

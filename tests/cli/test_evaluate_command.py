@@ -1,0 +1,204 @@
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thenar.cli import run
+from thenar.compiler.recordings.graspset import GraspSet, Joint
+from thenar.compiler.recordings.taxonomy import own
+
+QUICK = ("--rounds", "2", "--repeats", "1", "--jobs", "1")
+
+
+def make_set(per_type: int = 8) -> GraspSet:
+    random = np.random.default_rng(1)
+    labels = np.tile(np.repeat([0, 1, 2], per_type), 2)
+    switches = np.eye(3, 6, dtype=bool)[labels] ^ (random.random((len(labels), 6)) < 0.1)
+    return GraspSet(
+        switches=switches,
+        switch_names=tuple(f"s{i}" for i in range(6)),
+        codes=(50 * labels[:, np.newaxis] + random.integers(0, 60, (len(labels), 1))).astype(np.uint16),
+        joints=(Joint("thumb", "deg", 0, 0.0, 200, 100.0),),
+        grasps=np.array(["hook", "pinch [tip]", "power"])[labels],
+        taxonomy=own(["hook", "pinch [tip]", "power"]),
+        subjects=np.repeat(["Ann", "[b]Bob"], len(labels) // 2),
+        objects=np.full(len(labels), "cup"),
+        trials=np.tile(np.arange(per_type), 6),
+    )
+
+
+@pytest.fixture(scope="module")
+def grasps(tmp_path_factory: pytest.TempPathFactory) -> str:
+    path = tmp_path_factory.mktemp("sets") / "set.grasps"
+    make_set().save(path)
+    return str(path)
+
+
+def test_the_papers_tables_are_printed_with_both_protocols_explained(
+    grasps: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["evaluate", grasps, *QUICK]) == 0
+    printed, complaints = capsys.readouterr()
+    for text in (
+        "Protocol paper: The placement is chosen once, from all rows",
+        "Protocol honest: The placement is chosen anew inside each training fold",
+        "Tables II and V): paper protocol",
+        "Tables III and VI): honest protocol",
+        "Tables IV and VII): paper protocol",
+        "ID3 beside other placements of as many switches, Sel-Co: honest protocol",
+        "Angle + NoSel-Co",
+        "placement of subject [b]Bob",
+        "48 rows, 3 grasp types; 4 stratified folds, 1 repeat(s) from seed 1",
+    ):
+        assert text in printed
+    assert not complaints
+
+
+def test_every_rate_has_its_interval_in_percent(grasps: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["evaluate", grasps, *QUICK, "--tables", "compositions", "--protocol", "paper", "--json"]) == 0
+    rate = json.loads(capsys.readouterr().out)["tables"][0]["rows"][0]["cells"][0]["rate"]
+    assert run(["evaluate", grasps, *QUICK, "--tables", "compositions", "--protocol", "paper"]) == 0
+    expected = f"{100 * rate['mean']:.1f} [{100 * rate['low']:.1f}, {100 * rate['high']:.1f}]"
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if "Angle + All-Co" in line)
+    assert expected in line
+
+
+def test_json_on_stdout_and_in_the_file_are_one_document(
+    grasps: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / "result.json"
+    arguments = ["--prune", "3", "--prune-list", "5, 0,5", "--seed", "7", "--subject", "Ann", "--no-baselines"]
+    assert run(["evaluate", grasps, *QUICK, *arguments, "--json", "-o", str(output)]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result == json.loads(output.read_text())
+    options = {"subjects": ["Ann"], "prune": 3, "prune_list": [5, 0], "seed": 7, "rounds": 2, "scheme": "stratified"}
+    assert options.items() <= result["options"].items()
+    assert {table["name"] for table in result["tables"]} == {"compositions", "pruning"}
+    assert result["left_out"] == [{"name": "generality", "reason": "another's placement needs a second subject"}]
+
+
+def test_confusion_matrices_are_printed_and_drawn_on_request(
+    grasps: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["--tables", "compositions", "--protocol", "honest", "--confusion", "--plot", str(tmp_path / "drawn")]
+    assert run(["evaluate", grasps, *QUICK, *arguments]) == 0
+    printed = capsys.readouterr().out
+    assert "VII NoSel-Co, subject [b]Bob, honest protocol" in printed
+    assert "pinch [tip]" in printed
+    names = [f"confusion-honest-{name}.png" for name in ("I", "II", "III", "IV", "V", "VI", "VII")]
+    assert sorted(path.name for path in (tmp_path / "drawn").iterdir()) == sorted(names)
+
+
+@pytest.mark.parametrize(("by", "said"), [("subject", "one subject left out"), ("block", "4 blocks of trials")])
+def test_other_cuts_say_what_they_are(grasps: str, by: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["evaluate", grasps, *QUICK, "--by", by, "--protocol", "honest"]) == 0
+    assert said in capsys.readouterr().out
+
+
+def test_a_composition_without_inputs_is_marked_and_explained(grasps: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["evaluate", grasps, *QUICK, "--prune", "1000", "--tables", "compositions"]) == 0
+    printed = capsys.readouterr().out
+    assert "the most frequent grasp type is answered" in printed
+    assert any("VI " in line and "]*" in line for line in printed.splitlines())
+
+
+def test_a_grasp_type_too_rare_for_the_folds_is_a_warning_on_stderr(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    make_set(per_type=3).save(tmp_path / "few.grasps")
+    assert run(["evaluate", str(tmp_path / "few.grasps"), *QUICK, "--json"]) == 0
+    printed, complaints = capsys.readouterr()
+    assert "warning: subject Ann has 3 row(s) of hook: fewer than the 4 folds" in complaints.replace("\n", " ")
+    assert len(json.loads(printed)["warnings"]) == 6
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["--subject", "Zoe"], "no subject 'Zoe' in the set; its subjects are Ann, [b]Bob"),
+        (["--by", "object"], "leaving one object out needs two or more"),
+        (["--by", "block", "--folds", "20"], "8 trial numbers cannot be cut into 20 folds"),
+        (["--folds", "100"], "24 rows cannot be cut into 100 folds"),
+        (["--folds", "1"], "--folds"),
+        (["--prune-list", "0,x"], "'0,x' is not a list of whole numbers such as 0,13,62"),
+        (["--tables", "composition"], "'composition' is none of compositions, generality, pruning, baselines"),
+    ],
+)
+def test_a_users_mistake_ends_with_2_and_a_sentence(
+    grasps: str, arguments: list[str], reason: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["evaluate", grasps, *QUICK, *arguments]) == 2
+    printed, complaints = capsys.readouterr()
+    assert not printed
+    assert reason in complaints
+    assert "Traceback" not in complaints
+
+
+def test_help_shows_an_example(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["evaluate", "--help"]) == 0
+    assert "    thenar evaluate set.grasps --by subject --protocol honest" in capsys.readouterr().out
+
+
+def descendants(pid: int) -> list[int]:
+    children: list[int] = []
+    for thread in Path(f"/proc/{pid}/task").glob("*"):
+        children += map(int, (thread / "children").read_text().split())
+    return children + [deeper for child in children for deeper in descendants(child)]
+
+
+def is_running(pid: int) -> bool:
+    status = Path(f"/proc/{pid}/status")
+    return status.exists() and "State:\tZ" not in status.read_text()
+
+
+def all_end(pids: list[int], within_s: float) -> bool:
+    deadline = time.monotonic() + within_s
+    while any(map(is_running, pids)) and time.monotonic() < deadline:
+        os.sched_yield()
+    return not any(map(is_running, pids))
+
+
+def processor_time_s(pid: int) -> float:
+    user, system = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11:13]
+    return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+
+
+def wait_until_two_workers_are_at_work(evaluation: subprocess.Popen[str]) -> list[int]:
+    """Starting a worker takes less than a second of processor time; more of it is work."""
+    found: list[int] = []
+    while sum(processor_time_s(pid) > 1 for pid in found) < 2:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            evaluation.wait(0.05)
+            raise AssertionError(evaluation.communicate())
+        found = descendants(evaluation.pid)
+    return found
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="needs /proc")
+@pytest.mark.parametrize("whole_group", [True, False], ids=["as Ctrl-C in a terminal", "as kill -INT"])
+def test_an_interrupt_ends_the_workers_and_writes_nothing(grasps: str, tmp_path: Path, whole_group: bool) -> None:
+    output = tmp_path / "result.json"
+    program = [sys.executable, "-c", "from thenar.cli import main; main()", "evaluate", grasps]
+    endless = [*program, "--rounds", "1000000", "--jobs", "2", "-o", str(output)]
+    evaluation = subprocess.Popen(
+        endless, start_new_session=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    try:
+        workers = wait_until_two_workers_are_at_work(evaluation)
+        (os.killpg if whole_group else os.kill)(evaluation.pid, signal.SIGINT)
+        printed, complaints = evaluation.communicate(timeout=30)
+    finally:
+        if evaluation.poll() is None:
+            os.killpg(evaluation.pid, signal.SIGKILL)
+    assert evaluation.returncode == 130
+    assert complaints.strip() == "thenar: interrupted"
+    assert not printed
+    assert list(tmp_path.iterdir()) == []
+    assert all_end(workers, within_s=10)

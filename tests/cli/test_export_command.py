@@ -1,0 +1,61 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thenar.cli import run
+from thenar.compiler import GraspSet
+from thenar.compiler.recordings.graspset import Joint
+from thenar.compiler.recordings.taxonomy import own
+
+
+@pytest.fixture
+def grasps(tmp_path: Path) -> Path:
+    GraspSet(
+        switches=np.array([[0, 1], [1, 1]]),
+        switch_names=("thumb", "palm"),
+        codes=np.array([[3], [5]]),
+        joints=(Joint("index", "deg", 0, 10.0, 1, 10.5),),
+        grasps=np.array(["mug", "ball"]),
+        taxonomy=own(["mug", "ball"]),
+        subjects=np.array(["A", "B"]),
+        objects=np.array(["x", "x"]),
+        trials=np.array([1, 2]),
+    ).save(tmp_path / "set.grasps")
+    return tmp_path / "set.grasps"
+
+
+@pytest.mark.parametrize("suffix", ["csv", "csv.gz", "arff"])
+@pytest.mark.parametrize("flags", [[], ["--codes"]])
+def test_an_exported_table_imports_again(grasps: Path, suffix: str, flags: list[str]) -> None:
+    table, columns, again = (str(grasps.with_name(name)) for name in (f"t.{suffix}", "columns.toml", "again.grasps"))
+    meta = ["--meta"] if suffix == "arff" else []
+    assert run(["export", str(grasps), "-o", table, "--columns", columns, *flags, *meta]) == 0
+    assert run(["import", table, "-o", again, "--columns", columns]) == 0
+    assert GraspSet.load(again).fingerprint() == GraspSet.load(grasps).fingerprint()
+
+
+def test_values_are_written_unless_codes_are_asked_for(grasps: Path) -> None:
+    table = grasps.with_name("t.csv")
+    assert run(["export", str(grasps), "-o", str(table)]) == 0
+    assert table.read_text().splitlines()[1] == "mug,A,x,1,0,1,11.5"
+    assert run(["export", str(grasps), "-o", str(table), "--codes"]) == 0
+    assert table.read_text().splitlines()[1] == "mug,A,x,1,0,1,3"
+
+
+def test_an_arff_without_meta_imports_with_its_columns_file(grasps: Path) -> None:
+    table, columns, again = (str(grasps.with_name(name)) for name in ("t.arff", "columns.toml", "again.grasps"))
+    assert run(["export", str(grasps), "-o", table, "--columns", columns]) == 0
+    assert run(["import", table, "-o", again, "--columns", columns]) == 0
+    assert GraspSet.load(again).subjects.tolist() == ["1", "1"]
+
+
+def test_a_table_of_another_kind_is_refused(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["export", str(grasps), "-o", str(grasps.with_name("t.xlsx"))]) == 2
+    assert capsys.readouterr().err.startswith("thenar: t.xlsx: an exported table ends in ")
+
+
+def test_a_damaged_set_is_refused_with_the_reason(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    grasps.write_bytes(grasps.read_bytes()[:-1])
+    assert run(["export", str(grasps), "-o", str(grasps.with_name("t.csv"))]) == 2
+    assert capsys.readouterr().err.startswith("thenar: set.grasps is truncated: ")

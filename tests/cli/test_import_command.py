@@ -1,0 +1,80 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from thenar.cli import run
+from thenar.compiler import GraspSet
+
+TABLE = "label,who,s1,s2,j1\nmug,A,0,0,10.2\nball,A,1,0,20\nmug,B,0,0,30\nball,B,1,0,\n"
+COLUMNS = """label = "label"
+subject = "who"
+switches = ["s*"]
+missing = "drop"
+[[joints]]
+columns = ["j*"]
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "table.csv").write_text(TABLE)
+    (tmp_path / "columns.toml").write_text(COLUMNS)
+    return tmp_path
+
+
+def thenar_import(folder: Path, *more: str, output: str = "set.grasps") -> int:
+    columns = str(folder / "columns.toml")
+    return run(["import", str(folder / "table.csv"), "-o", str(folder / output), "--columns", columns, *more])
+
+
+def test_a_table_becomes_a_set(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert thenar_import(folder) == 0
+    grasp_set = GraspSet.load(folder / "set.grasps")
+    assert grasp_set.grasps.tolist() == ["mug", "ball", "mug"]
+    said = capsys.readouterr()
+    assert "3 grasps of 2 types (own); subjects 2, objects 1, switches 2, joints 1" in said.out
+    assert "j1" in said.out
+    assert "warning: 1 switches never change: s2\n" in said.err
+    assert "warning: 1 rows with missing values were left out: row 5 (columns j1)\n" in said.err
+
+
+def test_json_is_one_document_with_the_warnings_in_it(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert thenar_import(folder, "--json") == 0
+    said = capsys.readouterr()
+    report = json.loads(said.out)
+    assert (report["rows"], report["grasp_types"], report["coding"][0]["joint"]) == (3, 2, "j1")
+    assert [warning["kind"] for warning in report["warnings"]] == [
+        "dropped rows",
+        "constant switches",
+        "grasp types that a subject lacks",
+    ]
+    assert said.err == ""
+
+
+def test_a_faulty_table_is_one_sentence_and_exit_code_2(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "table.csv").write_text(TABLE.replace("mug,B,0", "mug,B,2"))
+    assert thenar_import(folder) == 2
+    assert capsys.readouterr().err == "thenar: table.csv: not 0 or 1: 1 cell, row 4 's1' ('2')\n"
+    assert not (folder / "set.grasps").exists()
+
+
+def test_a_set_must_be_called_grasps(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert thenar_import(folder, output="set.csv") == 2
+    assert "set.csv: a set of grasps ends in .grasps" in capsys.readouterr().err
+
+
+def test_the_old_set_stays_when_the_import_fails(folder: Path) -> None:
+    assert thenar_import(folder) == 0
+    before = (folder / "set.grasps").read_bytes()
+    (folder / "table.csv").write_text("label\n")
+    assert thenar_import(folder) == 2
+    assert (folder / "set.grasps").read_bytes() == before
+
+
+def test_help_shows_an_example_line_by_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["import", "--help"]) == 0
+    assert (
+        "  Example:\n      thenar import trials.csv.gz -o set.grasps --columns columns.toml\n"
+        in capsys.readouterr().out
+    )

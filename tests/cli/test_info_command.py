@@ -1,0 +1,65 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thenar.cli import run
+from thenar.compiler import GraspSet
+from thenar.compiler.recordings.graspset import Joint
+from thenar.compiler.recordings.taxonomy import own
+
+
+@pytest.fixture
+def grasps(tmp_path: Path) -> Path:
+    GraspSet(
+        switches=np.array([[0, 1], [1, 1], [0, 1], [1, 1]]),
+        switch_names=("thumb", "palm"),
+        codes=np.array([[3], [5], [3], [6]]),
+        joints=(Joint("index", "deg", 0, 10.0, 1, 10.5),),
+        grasps=np.array(["mug", "ball", "mug", "ball"]),
+        taxonomy=own(["mug", "ball"]),
+        subjects=np.array(["A", "B", "A", "A"]),
+        objects=np.array(["x", "x", "y", "x"]),
+        trials=np.arange(4),
+    ).save(tmp_path / "set.grasps")
+    return tmp_path / "set.grasps"
+
+
+def test_a_set_is_described_for_people(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["info", str(grasps)]) == 0
+    said = capsys.readouterr().out
+    for words in (
+        "4 grasps of 2 types (own); subjects 2, objects 2, switches 2, joints 1",
+        "balance (rarest type over commonest): 1.00",
+        "subjects: A (3), B (1)",
+        "warning: 1 switches never change: palm",
+        "Separability",
+    ):
+        assert words in said
+
+
+def test_a_set_is_described_for_machines(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["info", str(grasps), "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["fingerprint"] == GraspSet.load(grasps).fingerprint()
+    assert summary["grasps"] == [{"name": "mug", "rows": 2}, {"name": "ball", "rows": 2}]
+    assert [line["ceiling"] for line in summary["separability"]] == [1.0, 1.0, 1.0]
+
+
+@pytest.mark.parametrize(("suffix", "start"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
+def test_a_picture_is_drawn_when_asked_for(grasps: Path, suffix: str, start: bytes) -> None:
+    picture = grasps.with_name(f"set.{suffix}")
+    assert run(["info", str(grasps), "--plot", str(picture)]) == 0
+    assert picture.read_bytes().startswith(start)
+
+
+def test_a_picture_of_another_kind_is_refused(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["info", str(grasps), "--plot", "set.gif"]) == 2
+    assert "set.gif: a picture ends in .png or .svg" in capsys.readouterr().err
+
+
+def test_another_file_is_refused_with_the_reason(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "set.grasps").write_bytes(b"label,s1\n")
+    assert run(["info", str(tmp_path / "set.grasps")]) == 2
+    assert "set.grasps is not a thenar THNRGRSP file" in capsys.readouterr().err

@@ -1,0 +1,85 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thenar.cli import run
+from thenar.compiler import GraspSet, grow_id3
+
+
+def test_the_placement_is_printed_for_people(set_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["place", str(set_file)]) == 0
+    said = capsys.readouterr().out
+    for words in ("cumulative share", "s4", "0.6008", "37.9%", "of 6 switches", "of 1.585 bits"):
+        assert words in said
+
+
+def test_the_placement_is_printed_for_machines_and_stored(
+    set_file: Path, small_set: GraspSet, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stored = tmp_path / "placement.json"
+    assert run(["place", str(set_file), "--prune", "5", "--json", "-o", str(stored)]) == 0
+    placement = json.loads(capsys.readouterr().out)
+    assert json.loads(stored.read_text()) == placement
+    tree = grow_id3(small_set.switches, small_set.grasps, min_samples=5)
+    assert [chosen["number"] for chosen in placement["switches"]] == list(tree.inputs)
+    assert [chosen["name"] for chosen in placement["switches"]] == [f"s{number}" for number in tree.inputs]
+    assert [chosen["gain_bits"] for chosen in placement["switches"]] == list(tree.gains)
+    assert placement["switches"][-1]["cumulative_share"] == pytest.approx(sum(tree.gains) / np.log2(3))
+    assert (placement["prune"], placement["n_switches"], placement["rows"]) == (5, 6, 60)
+    assert placement["fingerprint"] == small_set.fingerprint()
+
+
+def test_the_tree_is_printed_with_the_names_of_switches_and_grasps(
+    set_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["place", str(set_file), "--tree"]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("s4?  60 rows, gain 0.6008 bits")
+    assert "pen  2 rows" in said
+
+
+def test_the_tree_is_drawn(set_file: Path, tmp_path: Path) -> None:
+    assert run(["place", str(set_file), "--draw", str(tmp_path / "tree.svg")]) == 0
+    assert "<!-- s4" in (tmp_path / "tree.svg").read_text()
+
+
+def test_nodes_at_which_nothing_gains_are_said(
+    small_set: GraspSet, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bits = np.array([[0, 0], [0, 1], [1, 0], [1, 1]], bool)
+    rows = small_set.rows([0, 1, 4, 3])
+    exclusive_or = GraspSet(
+        bits, ("a", "b"), rows.codes, rows.joints, rows.grasps, rows.taxonomy, rows.subjects, rows.objects, rows.trials
+    )
+    exclusive_or.save(tmp_path / "xor.grasps")
+    assert run(["place", str(tmp_path / "xor.grasps")]) == 0
+    assert "at 1 of the decisions no switch gains anything alone" in capsys.readouterr().out
+
+
+def test_a_set_without_switches_is_refused(
+    small_set: GraspSet, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    s = small_set
+    none = np.zeros((len(s), 0), bool)
+    GraspSet(none, (), s.codes, s.joints, s.grasps, s.taxonomy, s.subjects, s.objects, s.trials).save(
+        tmp_path / "joints.grasps"
+    )
+    assert run(["place", str(tmp_path / "joints.grasps")]) == 2
+    assert capsys.readouterr().err == "thenar: the set has no switches to place: it holds joints only\n"
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        (["--draw", "tree.pdf"], "tree.pdf: a picture ends in .png or .svg"),
+        (["--tree", "--json"], "--tree is for people and --json for machines"),
+        (["--prune", "-1"], "-1 is not in the range x>=0"),
+    ],
+)
+def test_a_mistake_is_one_sentence_and_code_two(
+    set_file: Path, options: list[str], reason: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["place", str(set_file), *options]) == 2
+    assert reason in capsys.readouterr().err

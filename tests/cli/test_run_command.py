@@ -1,0 +1,52 @@
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+from thenar.compiler import GraspSet
+from thenar.runtime import Build
+
+FORBIDDEN = """
+import sys
+class Forbidden:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in ("sklearn", "scipy", "joblib", "matplotlib", "jinja2"):
+            raise AssertionError(f"imports {name}")
+sys.meta_path.insert(0, Forbidden())
+from thenar.cli import run
+sys.exit(run(sys.argv[1:]))
+"""
+
+
+def test_every_frame_gives_one_line(thenar, small_set: GraspSet, set_file: Path, build_folder: Path) -> None:
+    done = thenar("run", build_folder, "--replay", set_file, "--period-us", 500)
+    assert done.returncode == 0, done.stderr
+    lines = [json.loads(line) for line in done.stdout.splitlines()]
+    build = Build.load(build_folder)
+    kept = [switch.column for switch in build.manifest.switches]
+    frames = zip(small_set.switches[:, kept], small_set.codes, strict=True)
+    assert [line["grasp"] for line in lines] == [build.classify(bits, codes) for bits, codes in frames]
+    assert [line["time_us"] for line in lines] == list(range(0, 500 * 60, 500))
+    assert [line["recorded"] for line in lines] == small_set.grasps.tolist()
+    assert list(lines[0]) == ["time_us", "grasp", "probability", "margin", "degraded", "recorded"]
+    assert all(1 / 3 <= line["probability"] <= 1 and line["margin"] >= 0 and not line["degraded"] for line in lines)
+    correct = sum(line["grasp"] == line["recorded"] for line in lines)
+    assert f"{correct} of 60 frames recognised as recorded" in done.stderr
+
+
+def test_it_runs_with_the_base_dependencies_alone(set_file: Path, build_folder: Path) -> None:
+    command = [sys.executable, "-c", FORBIDDEN, "run", build_folder, "--replay", set_file]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert len(done.stdout.splitlines()) == 60
+
+
+def test_a_reader_that_goes_away_leaves_no_traceback(set_file: Path, build_folder: Path) -> None:
+    command = [sys.executable, "-m", "thenar.cli", "run", build_folder, "--replay", set_file]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        complaint = process.stderr.read().decode()
+    assert "Traceback" not in complaint
+    assert "Error" not in complaint

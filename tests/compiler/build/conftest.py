@@ -1,0 +1,38 @@
+"""A small set of grasps that can be learnt, with switches and joints."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from thenar.compiler.recordings.graspset import GraspSet, Joint
+from thenar.compiler.recordings.taxonomy import own
+
+
+def _make_set(seed: int = 0, rows: int = 96, switches: int = 14, joints: int = 3, types: int = 4) -> GraspSet:
+    random = np.random.default_rng(seed)
+    labels = np.arange(rows) % types
+    closed = np.random.default_rng(99).random((types, switches)) < 0.5
+    centres = np.random.default_rng(98).integers(40, 200, (types, joints))
+    names = ("cup", "pen", "plate", "rod", "ball", "key")[:types]
+    return GraspSet(
+        switches=closed[labels] ^ (random.random((rows, switches)) < 0.12),
+        switch_names=tuple(f"s{number}" for number in range(switches)),
+        codes=np.clip(centres[labels] + random.normal(0, 25, (rows, joints)), 0, 255).astype(np.uint16),
+        joints=tuple(Joint(f"j{number}", "deg", 0, 0.0, 255, 127.5) for number in range(joints)),
+        grasps=np.array(names)[labels],
+        taxonomy=own([*names, "never seen"]),
+        subjects=np.full(rows, "A"),
+        objects=np.full(rows, "thing"),
+        trials=np.arange(rows),
+    )
+
+
+@pytest.fixture(scope="session")
+def make_set() -> Callable[..., GraspSet]:
+    return _make_set
+
+
+@pytest.fixture(scope="session")
+def grasp_set() -> GraspSet:
+    return _make_set()

@@ -1,0 +1,145 @@
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thenar.compiler import GraspSet, compile_build, grow_id3
+from thenar.compiler.build.errors import CompileError
+from thenar.compiler.evaluation.errors import EvaluationError
+from thenar.drivers.errors import ThenarError
+from thenar.runtime import Build
+
+ROUNDS = 12
+
+
+def _bytes(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def test_a_build_knows_its_inputs_and_recognises_what_it_was_trained_on(grasp_set: GraspSet, tmp_path: Path) -> None:
+    report = compile_build(grasp_set, tmp_path / "build", rounds=ROUNDS)
+    build = Build.load(tmp_path / "build")
+    kept = [switch.column for switch in build.manifest.switches]
+    frames = zip(grasp_set.switches[:, kept], grasp_set.codes, strict=True)
+    found = np.array([build.classify(bits, codes) for bits, codes in frames])
+    correct = int(np.count_nonzero(found == grasp_set.grasps))
+    training, honest = report.manifest.rates
+    assert (training.protocol, training.correct, training.total) == ("training", correct, len(grasp_set))
+    assert (honest.protocol, honest.folds, honest.seed, honest.total) == ("honest", 4, 1, len(grasp_set))
+    assert correct > honest.correct > len(grasp_set) / 2
+    assert build.grasps == ("cup", "pen", "plate", "rod")
+    assert [switch.name for switch in build.manifest.switches] == [f"s{column}" for column in kept]
+    assert [joint.name for joint in build.manifest.joints] == ["j0", "j1", "j2"]
+
+
+def test_the_switches_are_the_placement_in_its_order(grasp_set: GraspSet, tmp_path: Path) -> None:
+    manifest = compile_build(grasp_set, tmp_path / "build", rounds=1, prune=20, folds=0).manifest
+    tree = grow_id3(grasp_set.switches, grasp_set.labels, min_samples=20)
+    assert [switch.column for switch in manifest.switches] == list(tree.inputs)
+    assert [switch.gain for switch in manifest.switches] == list(tree.gains)
+
+
+def test_provenance_is_written(grasp_set: GraspSet, tmp_path: Path) -> None:
+    report = compile_build(grasp_set, tmp_path / "build", rounds=ROUNDS, prune=5, shrinkage=0.5, folds=3, seed=9)
+    document = json.loads((tmp_path / "build" / "build.json").read_bytes())
+    assert document["options"] == {
+        "prune": 5, "rounds": ROUNDS, "inputs": "both", "shrinkage": 0.5, "folds": 3, "seed": 9
+    }  # fmt: skip
+    assert document["source"]["fingerprint"] == grasp_set.fingerprint()
+    assert document["proof"]["bound"] <= 32767
+    inputs = len(document["switches"]) + len(document["joints"])
+    assert (document["proof"]["error"], document["proof"]["safe_margin"]) == ((inputs + 1) / 2, inputs + 1)
+    for member in ("tables", "ensemble"):
+        data = (tmp_path / "build" / f"{member}.bin").read_bytes()
+        assert document[f"{member}_sha256"] == hashlib.sha256(data).hexdigest()
+    assert report.tables_bytes == (tmp_path / "build" / "tables.bin").stat().st_size
+    assert str(tmp_path) not in (tmp_path / "build" / "build.json").read_text()
+
+
+@pytest.mark.parametrize(("inputs", "switches", "joints"), [("switches", True, False), ("joints", False, True)])
+def test_either_kind_of_input_will_do(grasp_set: GraspSet, tmp_path: Path, inputs, switches, joints) -> None:
+    manifest = compile_build(grasp_set, tmp_path / "build", rounds=ROUNDS, inputs=inputs, folds=0).manifest
+    assert (bool(manifest.switches), bool(manifest.joints)) == (switches, joints)
+    assert Build.load(tmp_path / "build").tables.n_joints == 3 * joints
+
+
+@pytest.mark.parametrize("lacking", [{"switches": 0}, {"joints": 0}])
+def test_recordings_of_one_kind_need_no_option(make_set, tmp_path: Path, lacking) -> None:
+    compile_build(make_set(**lacking), tmp_path / "build", rounds=2)
+    assert Build.load(tmp_path / "build").grasps
+
+
+@pytest.mark.parametrize(
+    ("shape", "options", "reason"),
+    [
+        ({"switches": 0}, {"inputs": "switches"}, "the recordings have no switches"),
+        ({"joints": 0}, {"inputs": "joints"}, "the recordings have no joints"),
+        ({"types": 1}, {}, "nothing to tell apart"),
+        ({}, {"inputs": "switches", "prune": 1000}, "no switch is worth keeping: lower --prune"),
+        ({}, {"rounds": 0}, "rounds=0"),
+        ({}, {"shrinkage": 2.0}, "shrinkage=2.0"),
+        ({}, {"prune": -1}, "min_samples is -1"),
+        ({"rows": 4}, {"folds": 5}, "cannot be cut into 5 folds"),
+    ],
+)
+def test_what_makes_no_build_is_refused_and_nothing_written(make_set, tmp_path, shape, options, reason) -> None:
+    with pytest.raises((ThenarError, EvaluationError), match=reason):
+        compile_build(make_set(**shape), tmp_path / "build", **{"rounds": 2, **options})
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_progress_rises_to_the_end(grasp_set: GraspSet, tmp_path: Path) -> None:
+    seen: list[tuple[int, int]] = []
+    compile_build(grasp_set, tmp_path / "build", rounds=3, folds=2, progress=lambda *step: seen.append(step))
+    assert seen == [(1, 9), (2, 9), (3, 9), (6, 9), (9, 9)]
+
+
+def test_an_interrupt_leaves_the_old_build_and_no_litter(grasp_set: GraspSet, tmp_path: Path) -> None:
+    def interrupt(done: int, _total: int) -> None:
+        if done == 4:
+            raise KeyboardInterrupt
+
+    compile_build(grasp_set, tmp_path / "build", rounds=3, folds=0)
+    before = _bytes(tmp_path / "build")
+    with pytest.raises(KeyboardInterrupt):
+        compile_build(grasp_set, tmp_path / "build", rounds=5, folds=0, progress=interrupt)
+    assert _bytes(tmp_path / "build") == before
+    assert [path.name for path in tmp_path.iterdir()] == ["build"]
+
+
+def test_same_recordings_and_options_give_the_same_bytes(make_set, tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        compile_build(make_set(), tmp_path / name, rounds=ROUNDS)
+    assert _bytes(tmp_path / "one") == _bytes(tmp_path / "two")
+
+
+@pytest.mark.parametrize("environment", [("1", "0"), ("2", "77")])
+def test_threads_and_hash_seed_change_no_byte(grasp_set: GraspSet, tmp_path: Path, environment) -> None:
+    compile_build(grasp_set, tmp_path / "here", rounds=ROUNDS)
+    grasp_set.save(tmp_path / "set.grasps")
+    threads, hash_seed = environment
+    subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            "import sys; from thenar.compiler import GraspSet, compile_build\n"
+            f"compile_build(GraspSet.load(sys.argv[1]), sys.argv[2], rounds={ROUNDS})",
+            tmp_path / "set.grasps",
+            tmp_path / "there",
+        ],
+        env=os.environ | {"OPENBLAS_NUM_THREADS": threads, "OMP_NUM_THREADS": threads, "PYTHONHASHSEED": hash_seed},
+        check=True,
+    )
+    assert _bytes(tmp_path / "here") == _bytes(tmp_path / "there")
+
+
+def test_a_file_in_the_way_is_refused_before_any_work(grasp_set: GraspSet, tmp_path: Path) -> None:
+    (tmp_path / "notes").mkdir()
+    (tmp_path / "notes" / "mine.txt").write_text("keep me")
+    with pytest.raises(CompileError, match="not empty and not a build"):
+        compile_build(grasp_set, tmp_path / "notes", progress=lambda *_: pytest.fail("worked in vain"))

@@ -1,0 +1,60 @@
+import contextlib
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.compiler.boosting.stumps import Stumps
+from thenar.compiler.build.ensemble import KIND, ensemble_from_bytes, ensemble_to_bytes
+from thenar.compiler.recordings.arrays import pack
+from thenar.drivers.errors import ThenarError
+from thenar.runtime.sealed import seal
+
+HEADER = b'{"n_inputs":5,"shrinkage":0.5}'
+
+
+def _arrays() -> dict[str, np.ndarray]:
+    random = np.random.default_rng(0)
+    return {
+        "columns": random.integers(0, 5, (3, 2)).astype("<i4"),
+        "thresholds": random.normal(size=(3, 2)),
+        "values": random.normal(size=(3, 2, 3)),
+    }
+
+
+def test_what_was_written_is_read_again_bit_for_bit() -> None:
+    stumps = Stumps(5, **_arrays(), shrinkage=0.5)
+    data = ensemble_to_bytes(stumps)
+    read = ensemble_from_bytes(data)
+    assert (read.n_inputs, read.shrinkage) == (5, 0.5)
+    for name, array in _arrays().items():
+        assert np.array_equal(getattr(read, name), array)
+    assert ensemble_to_bytes(read) == data
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"columns": np.full((3, 2), 5, "<i4")},
+        {"columns": np.full((3, 2), -1, "<i4")},
+        {"columns": np.zeros(6, "<i4")},
+        {"thresholds": np.zeros((2, 2))},
+        {"thresholds": np.full((3, 2), np.nan)},
+        {"values": np.full((3, 2, 3), np.inf)},
+        {"values": np.zeros((3, 2, 3), "<f4")},
+        {"more": np.zeros(1)},
+    ],
+)
+def test_a_sealed_file_that_contradicts_itself_is_refused(change: dict[str, np.ndarray]) -> None:
+    with pytest.raises(ThenarError, match=r"ensemble\.bin is damaged"):
+        ensemble_from_bytes(seal(KIND, 1, pack(HEADER, _arrays() | change)))
+
+
+@given(data=st.data())
+def test_mutated_content_is_read_or_refused(data: st.DataObject) -> None:
+    payload = bytearray(pack(HEADER, _arrays()))
+    for _ in range(data.draw(st.integers(1, 3))):
+        payload[data.draw(st.integers(0, len(payload) - 1))] = data.draw(st.integers(0, 255))
+    with contextlib.suppress(ThenarError):
+        ensemble_from_bytes(seal(KIND, 1, bytes(payload)))

@@ -1,0 +1,99 @@
+from pathlib import Path
+
+import pytest
+
+from thenar.compiler.build.errors import CompileError
+from thenar.compiler.build.staging import check_target, publish
+
+OLD = {"build.json": b"old", "tables.bin": b"old"}
+NEW = {"build.json": b"new", "tables.bin": b"new", "ensemble.bin": b"new"}
+
+
+def _content(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def _fill(folder: Path, files: dict[str, bytes]) -> None:
+    folder.mkdir()
+    for name, data in files.items():
+        (folder / name).write_bytes(data)
+
+
+@pytest.mark.parametrize("before", [None, {}, OLD])
+def test_a_build_takes_its_place_and_leaves_nothing_beside_it(tmp_path: Path, before: dict[str, bytes] | None) -> None:
+    if before is not None:
+        _fill(tmp_path / "build", before)
+    publish(NEW, check_target(tmp_path / "build"))
+    assert _content(tmp_path / "build") == NEW
+    assert [path.name for path in tmp_path.iterdir()] == ["build"]
+
+
+@pytest.mark.parametrize("interrupted", [1, 2])
+def test_interrupted_at_either_rename_the_old_build_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, interrupted: int
+) -> None:
+    _fill(tmp_path / "build", OLD)
+    renames, rename = [], Path.rename
+
+    def counting(self: Path, target: Path) -> Path:
+        renames.append(target)
+        if len(renames) == interrupted:
+            raise KeyboardInterrupt
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "rename", counting)
+    with pytest.raises(KeyboardInterrupt):
+        publish(NEW, tmp_path / "build")
+    assert _content(tmp_path / "build") == OLD
+    assert [path.name for path in tmp_path.iterdir()] == ["build"]
+
+
+def test_a_full_disk_leaves_the_old_build(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    _fill(tmp_path / "build", OLD)
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        publish(NEW, tmp_path / "build")
+    assert _content(tmp_path / "build") == OLD
+    assert [path.name for path in tmp_path.iterdir()] == ["build"]
+
+
+def test_what_a_crash_left_aside_is_cleared_by_the_next_build(tmp_path: Path) -> None:
+    _fill(tmp_path / ".build.old", OLD)
+    publish(NEW, tmp_path / "build")
+    assert _content(tmp_path / "build") == NEW
+    assert [path.name for path in tmp_path.iterdir()] == ["build"]
+
+
+@pytest.mark.parametrize(
+    ("files", "reason"),
+    [
+        ({"notes.txt": b"mine"}, "is not empty and not a build"),
+        ({**OLD, "notes.txt": b"mine"}, r"holds notes\.txt, which is not of a build"),
+    ],
+)
+def test_a_users_files_are_never_deleted(tmp_path: Path, files: dict[str, bytes], reason: str) -> None:
+    _fill(tmp_path / "build", files)
+    with pytest.raises(CompileError, match=reason):
+        check_target(tmp_path / "build")
+
+
+def test_a_file_is_no_folder(tmp_path: Path) -> None:
+    (tmp_path / "build").write_bytes(b"")
+    with pytest.raises(CompileError, match="is a file"):
+        check_target(tmp_path / "build")
+
+
+def test_a_parent_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(CompileError, match=r"nowhere is no folder: make it first"):
+        check_target(tmp_path / "nowhere" / "build")
+
+
+def test_a_link_to_a_build_stays_a_link(tmp_path: Path) -> None:
+    _fill(tmp_path / "real", OLD)
+    (tmp_path / "link").symlink_to(tmp_path / "real")
+    publish(NEW, check_target(tmp_path / "link"))
+    assert (tmp_path / "link").is_symlink()
+    assert _content(tmp_path / "real") == NEW

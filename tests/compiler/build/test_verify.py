@@ -1,0 +1,102 @@
+import hashlib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from msgspec.structs import replace as replace_fields
+
+from thenar.compiler import GraspSet, compile_build
+from thenar.compiler.build.errors import CompileError
+from thenar.compiler.build.verify import verify_build
+from thenar.runtime import BuildError
+from thenar.runtime.manifest import manifest_from_bytes, manifest_to_bytes
+from thenar.runtime.tables import tables_from_bytes, tables_to_bytes
+
+
+@pytest.fixture
+def folder(grasp_set: GraspSet, tmp_path: Path) -> Path:
+    compile_build(grasp_set, tmp_path / "build", rounds=15, folds=0)
+    return tmp_path / "build"
+
+
+def _silence(folder: Path, joints: int) -> None:
+    """Make the first joints say nothing, and seal everything again, as a faulty compiler would."""
+    tables = tables_from_bytes((folder / "tables.bin").read_bytes())
+    rows = tuple(rows * (number >= joints) for number, rows in enumerate(tables.joint_rows))
+    silent = replace(tables, joint_rows=tuple(row.astype(np.int16) for row in rows), joint_means=0 * tables.joint_means)
+    data = tables_to_bytes(silent)
+    manifest = manifest_from_bytes((folder / "build.json").read_bytes())
+    (folder / "tables.bin").write_bytes(data)
+    described = replace_fields(manifest, tables_sha256=hashlib.sha256(data).hexdigest())
+    (folder / "build.json").write_bytes(manifest_to_bytes(described))
+
+
+def test_a_build_holds_on_the_recordings_it_was_made_from(folder: Path, grasp_set: GraspSet) -> None:
+    found = verify_build(folder, grasp_set)
+    proof = manifest_from_bytes((folder / "build.json").read_bytes()).proof
+    assert found.holds
+    assert found.same_recordings
+    assert found.collapse_difference <= found.collapse_bound
+    assert 0 < found.integer_difference <= found.integer_bound == proof.error
+    assert (found.covered, len(found.changed)) == (proof.covered, proof.changed)
+    assert found.covered_changed == 0
+
+
+def test_other_recordings_with_their_columns_in_another_order_will_do(folder: Path, make_set) -> None:
+    other = make_set(seed=5)
+    shuffled = GraspSet(
+        other.switches[:, ::-1], other.switch_names[::-1], other.codes[:, ::-1], other.joints[::-1],
+        other.grasps, other.taxonomy, other.subjects, other.objects, other.trials,
+    )  # fmt: skip
+    found, straight = verify_build(folder, shuffled), verify_build(folder, other)
+    assert not found.same_recordings
+    assert found.holds
+    assert found == straight
+    assert found.correct_integers > found.rows / 2
+
+
+def test_tables_that_are_not_the_ensembles_do_not_hold(folder: Path, grasp_set: GraspSet) -> None:
+    _silence(folder, 1)
+    found = verify_build(folder, grasp_set)
+    assert not found.holds
+    assert found.integer_difference > found.integer_bound
+
+
+def test_every_changed_row_is_told(folder: Path, grasp_set: GraspSet) -> None:
+    _silence(folder, 3)
+    found = verify_build(folder, grasp_set)
+    assert found.changed
+    assert found.covered_changed > 0
+    for row in found.changed:
+        assert row.recorded == grasp_set.grasps[row.row]
+        assert row.ensemble != row.integers
+        assert row.margin >= 0
+
+
+def test_missing_inputs_are_named(folder: Path, make_set) -> None:
+    with pytest.raises(CompileError, match="lack joints that the build needs: j2"):
+        verify_build(folder, make_set(joints=2))
+
+
+def test_codes_that_mean_something_else_are_refused(folder: Path, grasp_set: GraspSet) -> None:
+    moved = replace(grasp_set.joints[1], value_a=10.0)
+    joints = (grasp_set.joints[0], moved, grasp_set.joints[2])
+    other = GraspSet(
+        grasp_set.switches, grasp_set.switch_names, grasp_set.codes, joints,
+        grasp_set.grasps, grasp_set.taxonomy, grasp_set.subjects, grasp_set.objects, grasp_set.trials,
+    )  # fmt: skip
+    with pytest.raises(CompileError, match="joint j1 is coded differently"):
+        verify_build(folder, other)
+
+
+def test_the_ensemble_of_another_build_is_refused(folder: Path, make_set, tmp_path: Path) -> None:
+    compile_build(make_set(seed=3), tmp_path / "other", rounds=15, folds=0)
+    (folder / "ensemble.bin").write_bytes((tmp_path / "other" / "ensemble.bin").read_bytes())
+    with pytest.raises(BuildError, match=r"ensemble\.bin is not the one"):
+        verify_build(folder, make_set())
+
+
+def test_recordings_without_rows_are_refused(folder: Path, grasp_set: GraspSet) -> None:
+    with pytest.raises(CompileError, match="no rows"):
+        verify_build(folder, grasp_set.rows(np.array([], int)))

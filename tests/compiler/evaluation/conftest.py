@@ -1,0 +1,42 @@
+"""Sets of grasps with a structure that the tests know."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from thenar.compiler.recordings.graspset import GraspSet, Joint
+from thenar.compiler.recordings.taxonomy import own
+
+TYPES = ("hook", "pinch", "power", "tip")
+
+
+def _make(
+    n_switches: int = 12,
+    n_joints: int = 2,
+    subjects: str = "AB",
+    per_type: int = 12,
+    noise: float = 0.1,
+    seed: int = 1,
+) -> GraspSet:
+    """Every subject grasps each type `per_type` times: a random prototype a type, bits flipped by `noise`."""
+    random = np.random.default_rng(seed)
+    labels = np.tile(np.repeat(np.arange(len(TYPES)), per_type), len(subjects))
+    bits = (random.random((len(TYPES), n_switches)) < 0.5)[labels]
+    angles = random.integers(20, 200, (len(TYPES), n_joints))[labels]
+    return GraspSet(
+        switches=bits ^ (random.random(bits.shape) < noise),
+        switch_names=tuple(f"s{i}" for i in range(n_switches)),
+        codes=(angles + random.integers(-20, 21, angles.shape)).astype(np.uint16),
+        joints=tuple(Joint(f"j{i}", "deg", 0, 0.0, 200, 100.0) for i in range(n_joints)),
+        grasps=np.array(TYPES)[labels],
+        taxonomy=own(TYPES),
+        subjects=np.repeat(list(subjects), len(TYPES) * per_type),
+        objects=np.tile(["cup", "pen"], len(labels) // 2),
+        trials=np.tile(np.arange(per_type), len(subjects) * len(TYPES)),
+    )
+
+
+@pytest.fixture(scope="session")
+def make_grasps() -> Callable[..., GraspSet]:
+    return _make

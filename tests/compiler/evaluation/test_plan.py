@@ -1,0 +1,115 @@
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from thenar.compiler.evaluation.placements import Placements
+from thenar.compiler.evaluation.plan import DRAWS, Planner, RowPlan, TablePlan
+from thenar.compiler.evaluation.populations import populations
+from thenar.compiler.evaluation.protocols import HONEST, PAPER, Protocol
+from thenar.compiler.recordings.graspset import GraspSet
+
+Make = Callable[..., GraspSet]
+both_protocols = pytest.mark.parametrize("protocol", [PAPER, HONEST], ids=lambda protocol: protocol.name)
+
+
+def planner_of(grasps: GraspSet, prune: int = 0, repeats: int = 2) -> Planner:
+    parts = populations(grasps, "stratified", 4, repeats, 1)
+    return Planner(parts, Placements(grasps.switches, grasps.labels), len(grasps.joints), prune, (0, 30), 1)
+
+
+@pytest.fixture(scope="module")
+def planner(make_grasps: Make) -> Planner:
+    return planner_of(make_grasps(noise=0.25))
+
+
+def row(table: TablePlan, name: str) -> RowPlan:
+    (found,) = (candidate for candidate in table.rows if candidate.name == name)
+    return found
+
+
+@both_protocols
+def test_every_cell_tests_each_row_of_its_subject_once_a_repeat(planner: Planner, protocol: Protocol) -> None:
+    for name in ("compositions", "generality", "pruning"):
+        for line in planner.table(name, protocol).rows:
+            for cell in line.cells:
+                for run in cell.runs:
+                    assert np.array_equal(np.sort(np.concatenate([fit.fold.test for fit in run])), cell.part.rows)
+
+
+def test_what_needs_no_placement_is_the_same_work_under_both_protocols(planner: Planner) -> None:
+    paper, honest = (planner.table("compositions", protocol) for protocol in (PAPER, HONEST))
+    shared = {line.name for line in paper.rows if line.cells == row(honest, line.name).cells}
+    assert shared == {"I", "IV", "V"}
+
+
+def test_the_papers_placement_is_one_a_subject_and_the_honest_one_differs_by_fold(planner: Planner) -> None:
+    for cell in row(planner.table("compositions", PAPER), "VI").cells:
+        assert len({fit.columns for fit in cell.fits}) == 1
+    columns = [{fit.columns for fit in cell.fits} for cell in row(planner.table("compositions", HONEST), "VI").cells]
+    assert max(map(len, columns)) > 1
+
+
+@both_protocols
+def test_the_diagonal_of_generality_is_composition_six(planner: Planner, protocol: Protocol) -> None:
+    six = row(planner.table("compositions", protocol), "VI")
+    for i, line in enumerate(planner.table("generality", protocol).rows):
+        assert line.cells[i] == six.cells[i]
+
+
+def test_off_the_diagonal_both_protocols_take_the_others_placement(planner: Planner) -> None:
+    paper, honest = (planner.table("generality", protocol) for protocol in (PAPER, HONEST))
+    for i, line in enumerate(paper.rows):
+        giver = planner.parts[i]
+        given = tuple(sorted(planner.placements.id3(giver.rows, 0)))
+        for j, cell in enumerate(line.cells):
+            if i != j:
+                assert cell == honest.rows[i].cells[j]
+                assert {fit.columns for fit in cell.fits} == {given}
+
+
+@both_protocols
+def test_pruning_starts_from_all_switches_and_takes_one_placement_for_all_subjects(
+    planner: Planner, protocol: Protocol
+) -> None:
+    table = planner.table("pruning", protocol)
+    assert [line.name for line in table.rows] == ["all", "0", "30"]
+    assert {fit.columns for cell in table.rows[0].cells for fit in cell.fits} == {tuple(range(12))}
+    everyone = np.concatenate([part.rows for part in planner.parts])
+    for line, least in zip(table.rows[1:], (0, 30), strict=True):
+        for cell in line.cells:
+            for fit in cell.fits:
+                seen = everyone if protocol is PAPER else np.setdiff1d(everyone, fit.fold.test)
+                assert fit.columns == tuple(sorted(planner.placements.id3(seen, least)))
+
+
+@both_protocols
+def test_baselines_have_as_many_switches_as_id3_in_every_fold(planner: Planner, protocol: Protocol) -> None:
+    table = planner.table("baselines", protocol)
+    id3 = row(table, "ID3")
+    assert [line.name for line in table.rows] == ["ID3", "CMIM", "top-k", "random"]
+    for line in table.rows:
+        for cell, reference in zip(line.cells, id3.cells, strict=True):
+            draws = DRAWS if line.name == "random" else 1
+            assert len(cell.runs) == draws * len(reference.runs)
+            sizes = [len(fit.columns) for fit in reference.fits] * draws
+            assert [len(fit.columns) for fit in cell.fits] == sizes
+
+
+def test_pruning_by_s_makes_the_placements_of_all_tables_smaller(make_grasps: Make) -> None:
+    grasps = make_grasps(noise=0.25)
+    for name, line in (("compositions", "VI"), ("generality", "A"), ("baselines", "CMIM")):
+        full, pruned = (
+            len(row(planner_of(grasps, prune).table(name, PAPER), line).cells[0].fits[0].columns) for prune in (0, 20)
+        )
+        assert pruned < full
+
+
+def test_random_draws_differ_and_follow_the_seed(planner: Planner) -> None:
+    def drawn(seed: int) -> list[tuple[int, ...]]:
+        cell = row(replace(planner, seed=seed).table("baselines", PAPER), "random").cells[0]
+        return [run[0].columns for run in cell.runs[:: len(cell.part.repeats)]]
+
+    assert len(set(drawn(1))) > 1
+    assert drawn(1) == drawn(1) != drawn(100)

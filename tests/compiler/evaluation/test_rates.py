@@ -1,0 +1,86 @@
+import pytest
+from hypothesis import assume, example, given
+from hypothesis import strategies as st
+from scipy.stats import binomtest, t
+
+from thenar.compiler.evaluation.rates import Average, Rate
+
+totals = st.integers(1, 2000)
+
+
+@st.composite
+def repeated(draw: st.DrawFn) -> tuple[tuple[int, ...], int]:
+    total = draw(totals)
+    return tuple(draw(st.lists(st.integers(0, total), min_size=1, max_size=6))), total
+
+
+@given(st.data())
+def test_one_repeat_has_wilsons_interval_as_scipy_computes_it(data: st.DataObject) -> None:
+    total = data.draw(totals)
+    correct = data.draw(st.integers(0, total))
+    rate = Rate.of((correct,), total)
+    expected = binomtest(correct, total).proportion_ci(0.95, method="wilson")
+    assert (rate.low, rate.high) == pytest.approx((expected.low, expected.high), abs=1e-12)
+
+
+@given(repeated())
+@example(((0, 0, 0), 5))
+@example(((5, 5, 5), 5))
+@example(((1, 0), 1))
+def test_the_interval_holds_the_mean_and_stays_within_0_and_1(case: tuple[tuple[int, ...], int]) -> None:
+    rate = Rate.of(*case)
+    assert 0 <= rate.low <= rate.mean <= rate.high <= 1
+    assert rate.mean == pytest.approx(sum(case[0]) / len(case[0]) / case[1])
+
+
+@given(repeated())
+def test_it_is_never_narrower_than_students_t_over_the_repeats(case: tuple[tuple[int, ...], int]) -> None:
+    correct, total = case
+    assume(len(set(correct)) > 1)
+    rates = [count / total for count in correct]
+    spread = sum((r - sum(rates) / len(rates)) ** 2 for r in rates) / (len(rates) - 1)
+    expected = t.interval(0.95, len(rates) - 1, sum(rates) / len(rates), (spread / len(rates)) ** 0.5)
+    rate = Rate.of(correct, total)
+    assert rate.low <= max(0, expected[0]) + 1e-12
+    assert rate.high >= min(1, expected[1]) - 1e-12
+
+
+@given(totals, st.integers(2, 5))
+def test_repeats_that_all_recognise_everything_still_leave_doubt(total: int, repeats: int) -> None:
+    rate = Rate.of((total,) * repeats, total)
+    assert rate.high == 1
+    assert rate.low == pytest.approx(Rate.of((total,), total).low)
+    assert rate.low < 1
+
+
+def test_repeats_that_differ_widely_widen_the_interval() -> None:
+    agreeing, differing = Rate.of((900, 900, 900), 1000), Rate.of((850, 900, 950), 1000)
+    assert differing.mean == agreeing.mean
+    assert differing.low < agreeing.low
+    assert differing.high > agreeing.high
+
+
+@pytest.mark.parametrize(("correct", "total"), [((), 5), ((6,), 5), ((-1,), 5), ((0,), 0)])
+def test_what_is_no_rate_is_refused(correct: tuple[int, ...], total: int) -> None:
+    with pytest.raises(ValueError, match="no rate"):
+        Rate.of(correct, total)
+
+
+@given(repeated())
+def test_the_average_of_one_rate_is_that_rate(case: tuple[tuple[int, ...], int]) -> None:
+    rate = Rate.of(*case)
+    average = Average.of((rate,))
+    assert (average.mean, average.low, average.high) == pytest.approx((rate.mean, rate.low, rate.high))
+
+
+@given(repeated(), st.integers(2, 9))
+def test_the_average_of_k_equal_rates_is_root_k_times_surer(case: tuple[tuple[int, ...], int], k: int) -> None:
+    rate = Rate.of(*case)
+    average = Average.of((rate,) * k)
+    assert average.mean == pytest.approx(rate.mean)
+    assert average.mean - average.low == pytest.approx((rate.mean - rate.low) / k**0.5, abs=1e-9)
+    assert average.high - average.mean == pytest.approx((rate.high - rate.mean) / k**0.5, abs=1e-9)
+
+
+def test_every_rate_weighs_the_same_in_an_average_whatever_its_rows() -> None:
+    assert Average.of((Rate.of((10,), 10), Rate.of((0,), 1000))).mean == 0.5

@@ -1,0 +1,153 @@
+from collections.abc import Callable
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from thenar.compiler.evaluation.errors import EvaluationError
+from thenar.compiler.evaluation.study import TABLES, Options, Study, evaluate
+from thenar.compiler.evaluation.tables import Row, Table
+from thenar.compiler.recordings.graspset import GraspSet
+
+Make = Callable[..., GraspSet]
+QUICK = Options(rounds=5, repeats=2, prune_list=(0, 10))
+
+
+@pytest.fixture(scope="module")
+def study(make_grasps: Make) -> Study:
+    return evaluate(make_grasps(noise=0.2), QUICK, jobs=1)
+
+
+def table(study: Study, name: str, protocol: str = "honest") -> Table:
+    (found,) = (candidate for candidate in study.tables if (candidate.name, candidate.protocol) == (name, protocol))
+    return found
+
+
+def row(table: Table, name: str) -> Row:
+    (found,) = (candidate for candidate in table.rows if candidate.name == name)
+    return found
+
+
+def test_every_table_comes_under_both_protocols_in_the_papers_layout(study: Study) -> None:
+    assert [(t.name, t.protocol) for t in study.tables] == [(name, p) for name in TABLES for p in ("paper", "honest")]
+    for each in study.tables:
+        assert each.columns == ("A", "B")
+    assert [r.name for r in table(study, "compositions").rows] == ["I", "II", "III", "IV", "V", "VI", "VII"]
+    assert [r.name for r in table(study, "generality").rows] == ["A", "B"]
+    assert [r.name for r in table(study, "pruning").rows] == ["all", "0", "10"]
+
+
+def test_every_rate_has_a_repeat_for_each_seed_over_all_rows_of_the_subject(study: Study) -> None:
+    for each in study.tables:
+        for line in each.rows:
+            for cell in line.cells:
+                assert cell.rate.total == 48
+                assert len(cell.rate.correct) == 2 * (5 if line.name == "random" else 1)
+                assert cell.rate.low <= cell.rate.mean <= cell.rate.high
+
+
+def test_confusion_matrices_count_every_row_in_every_repeat_and_agree_with_the_rates(study: Study) -> None:
+    assert study.grasps == ("hook", "pinch", "power", "tip")
+    for protocol in ("paper", "honest"):
+        for line in table(study, "compositions", protocol).rows:
+            for cell in line.cells:
+                counts = np.array(cell.confusion)
+                assert counts.sum(axis=1).tolist() == [24, 24, 24, 24]
+                assert np.trace(counts) == sum(cell.rate.correct)
+
+
+def test_the_number_of_switches_of_each_composition_adds_up(study: Study) -> None:
+    lines = {line.name: line.switches.mean for line in table(study, "compositions").rows}
+    assert lines["I"] == lines["V"] == 12
+    assert lines["IV"] == 0
+    assert lines["II"] == lines["VI"]
+    assert lines["VI"] + lines["VII"] == pytest.approx(12)
+
+
+def test_draws_of_random_placements_show_their_range(study: Study) -> None:
+    for cell in row(table(study, "baselines"), "random").cells:
+        assert cell.draws is not None
+        assert cell.draws.least <= cell.draws.mean <= cell.draws.most
+        assert cell.draws.mean == pytest.approx(cell.rate.mean)
+    assert all(cell.draws is None for cell in row(table(study, "baselines"), "ID3").cells)
+
+
+def test_the_same_set_and_options_give_the_same_result_on_any_number_of_workers(
+    make_grasps: Make, study: Study
+) -> None:
+    again = evaluate(make_grasps(noise=0.2), QUICK, jobs=2)
+    assert msgspec.json.encode(again) == msgspec.json.encode(study)
+
+
+def test_choosing_from_test_rows_flatters_where_there_is_nothing_to_learn(make_grasps: Make) -> None:
+    # Coin flips say nothing about the grasp: an honest rate is about 1 in 4, and the paper's protocol is above it.
+    grasps = make_grasps(n_switches=200, n_joints=0, subjects="A", noise=0.5, per_type=10)
+    study = evaluate(grasps, replace(QUICK, rounds=20, repeats=3, tables=("compositions",)), jobs=1)
+    paper, honest = (row(table(study, "compositions", name), "VI").cells[0].rate for name in ("paper", "honest"))
+    assert paper.mean > honest.mean + 0.1
+    assert honest.low <= 0.25 <= honest.high
+
+
+def test_a_perfect_switch_for_each_grasp_is_found_and_enough(make_grasps: Make) -> None:
+    grasps = make_grasps(noise=0.0, n_joints=0)
+    study = evaluate(grasps, QUICK, jobs=1)
+    assert row(table(study, "compositions"), "VI").average.mean == 1
+
+
+def test_without_switches_there_are_the_joints_and_no_placements(make_grasps: Make) -> None:
+    study = evaluate(make_grasps(n_switches=0), QUICK, jobs=1)
+    assert [(t.name, t.protocol) for t in study.tables] == [("compositions", "paper"), ("compositions", "honest")]
+    assert [(t.name, t.reason) for t in study.left_out] == [
+        (name, "a placement needs switches, and the set has none") for name in ("generality", "pruning", "baselines")
+    ]
+    assert [line.name for line in study.tables[0].rows] == ["IV"]
+
+
+def test_without_joints_there_are_the_switches(make_grasps: Make) -> None:
+    study = evaluate(make_grasps(n_joints=0), replace(QUICK, tables=("compositions",)), jobs=1)
+    assert [line.name for line in study.tables[0].rows] == ["V", "VI", "VII"]
+
+
+def test_a_composition_left_without_inputs_shows_the_rate_of_the_most_frequent_grasp(make_grasps: Make) -> None:
+    grasps = make_grasps(n_joints=0, subjects="A")
+    study = evaluate(grasps, replace(QUICK, prune=1000, tables=("compositions",), protocols=("honest",)), jobs=1)
+    (cell,) = row(table(study, "compositions"), "VI").cells
+    assert (cell.switches.most, cell.no_inputs) == (0, 8)
+    assert cell.rate.mean <= 0.25
+    assert row(table(study, "compositions"), "V").cells[0].no_inputs == 0
+
+
+def test_one_subject_alone_has_nobody_elses_placement(make_grasps: Make) -> None:
+    study = evaluate(make_grasps(), replace(QUICK, subjects=("B",)), jobs=1)
+    assert {t.name for t in study.tables} == {"compositions", "pruning", "baselines"}
+    assert [t.name for t in study.left_out] == ["generality"]
+    assert study.tables[0].columns == ("B",)
+    assert study.rows == 48
+
+
+def test_pruning_the_pool_of_one_subject_by_the_same_s_is_composition_six(make_grasps: Make) -> None:
+    study = evaluate(make_grasps(noise=0.2), replace(QUICK, subjects=("A",), prune=10), jobs=1)
+    for protocol in ("paper", "honest"):
+        six = row(table(study, "compositions", protocol), "VI").cells[0].rate
+        assert row(table(study, "pruning", protocol), "10").cells[0].rate == six
+        assert row(table(study, "baselines", protocol), "ID3").cells[0].rate == six
+
+
+@pytest.mark.parametrize("scheme", ["subject", "object", "block"])
+def test_other_cuts_have_one_repeat_and_a_column_a_subject(make_grasps: Make, scheme: str) -> None:
+    study = evaluate(make_grasps(), replace(QUICK, scheme=scheme, protocols=("honest",)), jobs=1)
+    assert ("generality" in {t.name for t in study.tables}) == (scheme != "subject")
+    for each in study.tables:
+        assert each.columns == ("A", "B")
+        assert all(len(c.rate.correct) == 1 for line in each.rows for c in line.cells if line.name != "random")
+
+
+def test_an_unknown_subject_is_refused_with_those_there_are(make_grasps: Make) -> None:
+    with pytest.raises(EvaluationError, match="no subject 'Z' in the set; its subjects are A, B"):
+        evaluate(make_grasps(), replace(QUICK, subjects=("A", "Z")))
+
+
+def test_a_set_without_rows_is_refused(make_grasps: Make) -> None:
+    with pytest.raises(EvaluationError, match="no rows"):
+        evaluate(make_grasps().rows([]), QUICK)

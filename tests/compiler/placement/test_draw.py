@@ -1,0 +1,41 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thenar.compiler import grow_id3
+from thenar.compiler.placement.draw import draw_tree
+from thenar.compiler.placement.errors import PlacementError
+from thenar.compiler.placement.tree import Tree
+
+
+@pytest.fixture
+def tree() -> Tree:
+    random = np.random.default_rng(3)
+    return grow_id3(random.integers(0, 3, (30, 4)), random.integers(0, 3, 30))
+
+
+def test_every_decision_and_leaf_is_in_the_picture(tree: Tree, tmp_path: Path) -> None:
+    draw_tree(tree, tmp_path / "tree.svg", ["thumb", "palm", "ring", "wrist"], ["cup", "pen", "rod"])
+    picture = (tmp_path / "tree.svg").read_text()
+    for name, number in (("thumb", 0), ("palm", 1), ("ring", 2), ("wrist", 3)):
+        assert picture.count(f"<!-- {name}") == sum(node.input == number for node in tree.nodes)
+    leaves = sum(picture.count(f"<!-- {name}") for name in ("cup", "pen", "rod"))
+    assert leaves == tree.n_leaves
+
+
+def test_the_same_tree_makes_the_same_file(tree: Tree, tmp_path: Path) -> None:
+    for name in ("a.svg", "b.svg", "a.png", "b.png"):
+        draw_tree(tree, tmp_path / name)
+    assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_a_single_leaf_can_be_drawn(tmp_path: Path) -> None:
+    draw_tree(grow_id3([[0]], ["cup"]), tmp_path / "leaf.png")
+    assert (tmp_path / "leaf.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_another_kind_of_file_is_refused(tree: Tree, tmp_path: Path) -> None:
+    with pytest.raises(PlacementError, match=r"tree\.pdf: a picture of a tree ends in \.svg or \.png"):
+        draw_tree(tree, tmp_path / "tree.pdf")

@@ -1,0 +1,124 @@
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from thenar.compiler.placement.gain import Counts, Node, best_position, compare_scores, entropy_bits, gain_bits
+
+tables = arrays(np.int64, st.tuples(st.integers(1, 5), st.integers(2, 4)), elements=st.integers(0, 30))
+large_tables = arrays(np.int64, (3, 2), elements=st.integers(1, 10**9))
+
+
+def precise_score(table: Counts) -> mpmath.mpf:
+    def f(n: int) -> mpmath.mpf:
+        return n * mpmath.log(n) if n else mpmath.mpf(0)
+
+    counts = (f(m) for m in table.ravel().tolist())
+    return mpmath.fsum(counts) - mpmath.fsum(f(m) for m in table.sum(axis=0).tolist())
+
+
+def precise_gain(table: Counts) -> mpmath.mpf:
+    whole = precise_score(table.sum(axis=1, keepdims=True))
+    return (precise_score(table) - whole) / (int(table.sum()) * mpmath.log(2))
+
+
+def node_of(*inputs: Counts) -> Node:
+    """Return the node whose inputs have these tables."""
+    cells = np.concatenate([table[:, 1:] for table in inputs], axis=1)
+    starts = np.cumsum([0] + [table.shape[1] - 1 for table in inputs])[:-1]
+    return Node(inputs[0].sum(axis=1), cells, starts)
+
+
+@given(tables.filter(np.any))
+def test_the_gain_is_that_of_sixty_digits(table: Counts) -> None:
+    with mpmath.workdps(60):
+        assert gain_bits(table) == pytest.approx(float(precise_gain(table)), abs=1e-14)
+
+
+@given(tables.filter(np.any))
+def test_the_gain_is_the_fall_of_entropy(table: Counts) -> None:
+    n = table.sum()
+    left = sum(part.sum() / n * entropy_bits(part.tolist()) for part in table.T if part.any())
+    assert gain_bits(table) == pytest.approx(entropy_bits(table.sum(axis=1).tolist()) - left, abs=1e-12)
+
+
+@given(st.lists(st.integers(1, 50), min_size=1, max_size=4), st.lists(st.integers(1, 50), min_size=2, max_size=4))
+def test_an_independent_input_gains_exactly_nothing(classes: list[int], values: list[int]) -> None:
+    table = np.outer(classes, values)
+    assert gain_bits(table) == 0.0
+    if len(classes) > 1:
+        table[0, 0] += 1
+        assert gain_bits(table) > 0.0
+
+
+@given(large_tables, large_tables)
+def test_scores_of_large_counts_compare_as_sixty_digits_do(one: Counts, other: Counts) -> None:
+    with mpmath.workdps(60):
+        assert compare_scores(one, other) == mpmath.sign(precise_score(one) - precise_score(other))
+    assert compare_scores(one, one[::-1]) == 0
+
+
+@given(large_tables, st.integers(-1, 1))
+def test_one_row_in_a_billion_decides(table: Counts, moved: int) -> None:
+    other = table.copy()
+    other[:, 0] += (moved, 0, 0)
+    other[:, 1] -= (moved, 0, 0)
+    with mpmath.workdps(60):
+        assert compare_scores(table, other) == mpmath.sign(precise_score(table) - precise_score(other))
+
+
+@pytest.mark.parametrize("m", [10**6, 10**9])
+def test_the_smallest_gain_of_all_is_chosen_over_none(m: int) -> None:
+    nothing, least = np.full((2, 2), m), np.array([[m + 1, m - 1], [m, m]])
+    assert best_position(node_of(nothing, least), np.array([0, 1])) == 1
+    assert best_position(node_of(nothing, nothing, least, least), np.array([0, 1, 3, 2])) == 3
+    assert gain_bits(least) > 0.0
+
+
+@given(st.lists(arrays(np.int64, (3, 2), elements=st.integers(0, 12)), min_size=2, max_size=5))
+def test_the_best_of_small_tables_is_that_of_the_exact_products(inputs: list[Counts]) -> None:
+    totals = np.maximum.reduce([table.sum(axis=1) for table in inputs])
+    for table in inputs:
+        table[:, 0] += totals - table.sum(axis=1)
+    varying = [i for i, table in enumerate(inputs) if table.sum(axis=0).all()]
+    numbers = np.arange(len(inputs))
+    with mpmath.workdps(60):
+        scores = {i: mpmath.nstr(precise_score(inputs[i]), 45) for i in varying}
+        wanted = max(varying, key=lambda i: mpmath.mpf(scores[i]), default=None)
+    assert best_position(node_of(*inputs), numbers) == wanted
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ([[8, 0], [4, 4]], [[7, 1], [2, 6]]),
+        ([[6, 0], [3, 3], [3, 3]], [[5, 1], [4, 2], [1, 5]]),
+        ([[12, 0], [6, 6]], [[12, 0, 0], [6, 6, 0]]),
+    ],
+)
+def test_gains_of_one_value_and_other_terms_go_to_the_lowest_number(
+    one: list[list[int]], other: list[list[int]]
+) -> None:
+    first, second = np.array(one), np.array(other)
+    assert compare_scores(first, second) == 0
+    for tables in ((first, second), (second, first)):
+        assert best_position(node_of(*tables), np.array([0, 1])) == 0
+        assert best_position(node_of(*tables), np.array([1, 0])) == 1
+
+
+def test_the_lowest_number_wins_among_many_equal_inputs() -> None:
+    table = np.array([[5, 2], [1, 4]])
+    numbers = np.array([7, 3, 9, 4])
+    assert best_position(node_of(table, table, table[:, ::-1], table), numbers) == 1
+
+
+def test_nothing_is_best_where_nothing_varies() -> None:
+    assert best_position(node_of(np.array([[5, 0], [4, 0]]), np.array([[0, 5], [0, 4]])), np.array([0, 1])) is None
+
+
+def test_inputs_of_different_numbers_of_values_are_compared() -> None:
+    three, two = np.array([[4, 0, 0], [0, 2, 2]]), np.array([[3, 1], [1, 3]])
+    assert best_position(node_of(two, three), np.array([0, 1])) == 1
+    assert best_position(node_of(three, two), np.array([0, 1])) == 0

@@ -1,0 +1,79 @@
+"""Any set of grasps at all, for properties."""
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+
+from thenar.compiler.recordings.errors import RecordingError
+from thenar.compiler.recordings.graspset import GraspSet, Joint
+from thenar.compiler.recordings.names import check_names
+from thenar.compiler.recordings.taxonomy import CUTKOSKY_16, FEIX_33, KAMAKURA_14, Taxonomy, own
+
+
+def _is_name(text: str) -> bool:
+    try:
+        check_names("name", [text])
+    except RecordingError:
+        return False
+    return True
+
+
+NAMES = st.one_of(
+    st.sampled_from(["grasp", "trial", "a[1]", "it's", '50 % "x"', "a, b", "\\n", "ä*", "{0}"]), st.text(max_size=6)
+)
+NAMES = NAMES.map(str.strip).filter(_is_name)
+VALUES = st.floats(-1e6, 1e6)
+
+
+@st.composite
+def _joints(draw: st.DrawFn, name: str) -> Joint:
+    code_a, code_b = draw(st.lists(st.integers(0, 65535), min_size=2, max_size=2, unique=True))
+    try:
+        return Joint(name, draw(NAMES), code_a, draw(VALUES), code_b, draw(VALUES))
+    except RecordingError:
+        return Joint(name, "deg", code_a, 0.0, code_b, 1.0)
+
+
+@st.composite
+def _grasp_sets(draw: st.DrawFn) -> GraspSet:
+    rows = draw(st.integers(1, 12))
+    columns = draw(st.lists(NAMES, min_size=1, max_size=20, unique=True))
+    split = draw(st.integers(0, len(columns)))
+    joints = tuple(draw(_joints(name)) for name in columns[split:])
+    types = st.lists(NAMES, min_size=1, max_size=5, unique=True).map(own)
+    taxonomy: Taxonomy = draw(st.one_of(st.sampled_from([KAMAKURA_14, CUTKOSKY_16, FEIX_33]), types))
+    random = np.random.default_rng(draw(st.integers(0, 2**32)))
+    people, things = (draw(st.lists(NAMES, min_size=1, max_size=3)) for _ in range(2))
+    return GraspSet(
+        switches=random.random((rows, split)) < 0.5,
+        switch_names=tuple(columns[:split]),
+        codes=random.integers(0, 65536, (rows, len(joints)), dtype=np.uint16),
+        joints=joints,
+        grasps=random.choice(taxonomy.types, rows),
+        taxonomy=taxonomy,
+        subjects=random.choice(people, rows),
+        objects=random.choice(things, rows),
+        trials=random.integers(-(2**53), 2**53, rows),
+    )
+
+
+@pytest.fixture(scope="session")
+def grasp_sets() -> st.SearchStrategy[GraspSet]:
+    return _grasp_sets()
+
+
+@pytest.fixture
+def small() -> GraspSet:
+    """Six rows: rows 0 and 3 hold one frame of two subjects, rows 1 and 2 one frame of two grasp types."""
+    switches = [[0, 0, 1, 1], [0, 1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 1], [0, 1, 1, 1], [0, 0, 0, 0]]
+    return GraspSet(
+        switches=np.array(switches),
+        switch_names=("dead", "thumb", "palm", "palm copy"),
+        codes=np.array([[1, 7], [2, 7], [2, 7], [1, 7], [3, 7], [4, 7]]),
+        joints=(Joint("index", "deg", 0, -10.0, 100, 40.0), Joint("wrist", "deg", 0, 0.0, 1, 0.5)),
+        grasps=np.array(["PoS", "PoH", "Tip", "PoS", "Tip", "PoH"]),
+        taxonomy=KAMAKURA_14,
+        subjects=np.array(["A", "A", "A", "B", "B", "A"]),
+        objects=np.array(["mug"] * 6),
+        trials=np.arange(6),
+    )

@@ -1,0 +1,64 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.compiler.recordings.coding import code_joint
+from thenar.compiler.recordings.columns import Calibration, JointColumns
+from thenar.compiler.recordings.errors import TableError
+
+ANGLES = st.lists(st.floats(-400, 400), min_size=1, max_size=20)
+
+
+def rows(values: np.ndarray) -> np.ndarray:
+    return np.arange(2, len(values) + 2)
+
+
+@given(ANGLES, st.sampled_from([0.1, 0.5, 1.0, 3.0]))
+def test_no_value_moves_by_more_than_half_the_grid(angles: list[float], grid: float) -> None:
+    values = np.array(angles)
+    codes, joint, cost = code_joint("j", JointColumns(("j",), grid=grid), values, rows(values))
+    errors = np.abs(joint.value(codes) - values)
+    assert errors.max() <= grid / 2 + 1e-9
+    assert cost.largest_error == errors.max()
+    assert cost.rms_error == pytest.approx(float(np.sqrt(np.mean(errors**2))))
+    assert cost.distinct_before == len(set(values.tolist()))
+    assert cost.distinct_after == len(set(codes.tolist())) <= cost.distinct_before
+
+
+@given(ANGLES)
+def test_the_grid_starts_on_a_multiple_of_itself_at_or_below_the_least_value(angles: list[float]) -> None:
+    values = np.array(angles)
+    codes, joint, _ = code_joint("j", JointColumns(("j",), grid=0.5), values, rows(values))
+    assert joint.value_a <= values.min() < joint.value_a + 0.5
+    assert joint.value_a % 0.5 == 0
+    assert codes.min() in (0, 1)
+    assert joint.step == 0.5
+
+
+def test_codes_are_taken_as_they_are() -> None:
+    values = np.array([1.0, 255.0, 65535.0])
+    codes, joint, cost = code_joint("j", JointColumns(("j",), "raw", codes=True), values, rows(values))
+    assert codes.tolist() == joint.value(codes).tolist() == values.tolist()
+    assert cost.largest_error == 0
+
+
+def test_values_are_coded_by_a_calibration_when_there_is_one() -> None:
+    entry = JointColumns(("j",), calibration=Calibration(100, 0.0, 200, -90.0))
+    codes, _, cost = code_joint("j", entry, np.array([0.0, -45.2, -90.0]), np.arange(3))
+    assert codes.tolist() == [100, 150, 200]
+    assert cost.largest_error == pytest.approx(0.2)
+    assert cost.step == 0.9
+
+
+@pytest.mark.parametrize(
+    ("entry", "advice"),
+    [
+        (JointColumns(("j",), grid=0.001), "take a coarser grid"),
+        (JointColumns(("j",), origin=1.0), "check origin and calibration"),
+        (JointColumns(("j",), calibration=Calibration(0, 10.0, 1, 11.0)), "check origin and calibration"),
+    ],
+)
+def test_values_beyond_the_codes_are_refused_with_their_rows(entry: JointColumns, advice: str) -> None:
+    with pytest.raises(TableError, match=f"joint 'j': rows? .* would get codes outside 0..65535: {advice}"):
+        code_joint("j", entry, np.array([0.0, 100.0, 5.0]), np.array([2, 3, 4]))

@@ -1,0 +1,120 @@
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from thenar.compiler.recordings.columns import Calibration, Columns, JointColumns, read_columns, select
+from thenar.compiler.recordings.errors import ColumnsError
+
+NAMES = ["grasp", "who", "what", "s1", "s2", "s10", "j1", "j2"]
+
+
+def read(text: str, folder: Path) -> Columns:
+    path = folder / "columns.toml"
+    path.write_text(text)
+    return read_columns(path)
+
+
+def test_every_key_is_read(tmp_path: Path) -> None:
+    text = """
+        label = "grasp"
+        subject = "who"
+        object = "what"
+        trial = "n"
+        switches = ["s*"]
+        taxonomy = ["a", "b"]
+        missing = "drop"
+        delimiter = ";"
+        [labels]
+        alpha = "a"
+        [[joints]]
+        columns = ["j1"]
+        unit = "rad"
+        grid = 1
+        origin = -3
+        [[joints]]
+        columns = ["j2"]
+        codes = true
+        calibration = { code_a = 1, value_a = 0, code_b = 255, value_b = 90.5 }
+    """
+    assert read(text, tmp_path) == Columns(
+        label="grasp",
+        subject="who",
+        object="what",
+        trial="n",
+        switches=("s*",),
+        taxonomy=("a", "b"),
+        missing="drop",
+        delimiter=";",
+        labels={"alpha": "a"},
+        joints=(
+            JointColumns(("j1",), "rad", grid=1.0, origin=-3.0),
+            JointColumns(("j2",), codes=True, calibration=Calibration(1, 0.0, 255, 90.5)),
+        ),
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "missing required key `label`"),
+        ("label = 3", "expected text, got `int` - at `label`"),
+        ('label = "a"\nlables = 1', "unknown key `lables`"),
+        ('label = "a"\n[[joints]]\ncolumns = ["b"]\ngird = 1', r"unknown key `gird` - at `joints\[0\]`"),
+        ('label = "a"\nmissing = "skip"', "'skip'"),
+        ('label = "a"\ndelimiter = ""', "`delimiter` must be one character"),
+        ('label = "a"\n[[joints]]\ncolumns = ["b"]\ngrid = 0', "`grid` must be above 0, not 0"),
+        ('label = "a"\n[[joints]]\ncolumns = ["b"]\ngrid = nan', "`grid` must be above 0"),
+        ('label = "a"\n[[joints]]\ncolumns = ["b"]\ncodes = true\ngrid = 1', "`grid` and `origin` are for values"),
+        ('label = "a"\n[[joints]]\ncolumns = ["b"]\norigin = inf', "`origin` must be a finite number"),
+        ("label = ", "Invalid value"),
+    ],
+)
+def test_a_wrong_key_is_named(text: str, reason: str, tmp_path: Path) -> None:
+    with pytest.raises(ColumnsError, match=f"columns.toml: .*{reason}"):
+        read(text, tmp_path)
+
+
+def test_a_file_that_is_not_utf8_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "columns.toml").write_bytes(b'label = "\xff"')
+    with pytest.raises(ColumnsError, match=r"columns\.toml"):
+        read_columns(tmp_path / "columns.toml")
+
+
+def test_globs_pick_columns_in_their_own_order_then_the_tables() -> None:
+    columns = Columns("grasp", switches=("s1*", "s2"), joints=(JointColumns(("j2",)), JointColumns(("j1",))))
+    selection = select(columns, NAMES)
+    assert selection.switches == ("s1", "s10", "s2")
+    assert selection.joints == (("j2", columns.joints[0]), ("j1", columns.joints[1]))
+
+
+def test_globs_heed_case() -> None:
+    with pytest.raises(ColumnsError, match="switches: 'S\\*' matches no column"):
+        select(Columns("grasp", switches=("S*",)), NAMES)
+
+
+@pytest.mark.parametrize(
+    ("columns", "reason"),
+    [
+        (Columns("grap", switches=("s*",)), r"no column 'grap' \(did you mean 'grasp'\?\)"),
+        (Columns("grasp", subject="whom", switches=("s*",)), r"no column 'whom' \(did you mean 'who'"),
+        (Columns("grasp", joints=(JointColumns(("k3",)),)), "joints: 'k3' matches no column"),
+        (Columns("grasp", switches=("s*", "s1")), "column 's1' is used 2 times"),
+        (Columns("grasp", switches=("*",)), "column 'grasp' is used 2 times"),
+        (Columns("grasp", subject="grasp", switches=("s*",)), "column 'grasp' is used 2 times"),
+        (Columns("grasp"), "no column is a switch or a joint"),
+    ],
+)
+def test_columns_that_do_not_fit_the_table_are_refused(columns: Columns, reason: str) -> None:
+    with pytest.raises(ColumnsError, match=reason):
+        select(columns, NAMES)
+
+
+@given(text=st.text('label=[]{}"#\n.*0'))
+@settings(deadline=None)
+def test_any_text_is_a_columns_file_or_refused(text: str, tmp_path_factory: pytest.TempPathFactory) -> None:
+    folder = tmp_path_factory.getbasetemp()
+    with suppress(ColumnsError):
+        assert isinstance(read(text, folder), Columns)

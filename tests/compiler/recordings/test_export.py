@@ -1,0 +1,102 @@
+import gzip
+from dataclasses import replace
+from pathlib import Path
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from thenar.compiler.recordings.columns_of import columns_of
+from thenar.compiler.recordings.errors import TableError
+from thenar.compiler.recordings.export import export, to_arff, to_csv
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.recordings.importer import import_file
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("export")
+
+
+@given(data=st.data(), suffix=st.sampled_from(["csv", "csv.gz", "arff"]), codes=st.booleans())
+@settings(deadline=None)
+def test_an_exported_table_reads_back_as_the_same_set(
+    data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet], folder: Path, suffix: str, codes: bool
+) -> None:
+    grasp_set = data.draw(grasp_sets)
+    table, columns = folder / f"table.{suffix}", folder / "columns.toml"
+    export(grasp_set, table, codes=codes, meta=True)
+    columns.write_text(columns_of(grasp_set, codes), encoding="utf-8")
+    again, report = import_file(table, columns)
+    assert again.fingerprint() == grasp_set.fingerprint()
+    assert all(cost.largest_error <= 1e-9 * max(1e6, abs(cost.step) * 65536) for cost in report.coding)
+
+
+def test_a_csv_holds_values_or_codes(small: GraspSet) -> None:
+    assert to_csv(small).splitlines()[:3] == [
+        "grasp,subject,object,trial,dead,thumb,palm,palm copy,index,wrist",
+        "PoS,A,mug,0,0,0,1,1,-9.5,3.5",
+        "PoH,A,mug,1,0,1,0,0,-9,3.5",
+    ]
+    assert to_csv(small, codes=True).splitlines()[1] == "PoS,A,mug,0,0,0,1,1,1,7"
+
+
+def test_an_arff_is_switches_joints_and_the_class_last(small: GraspSet) -> None:
+    types = "PoS,PoH,PoI,PoE,PoD,Lat,Tpd,TVI,TVII,PMF,CMF,Tip,PE,Add"
+    assert to_arff(small).splitlines()[:12] == [
+        "@relation grasps",
+        "",
+        "@attribute dead {0,1}",
+        "@attribute thumb {0,1}",
+        "@attribute palm {0,1}",
+        "@attribute 'palm copy' {0,1}",
+        "@attribute index numeric",
+        "@attribute wrist numeric",
+        f"@attribute grasp {{{types}}}",
+        "",
+        "@data",
+        "0,0,1,1,-9.5,3.5,PoS",
+    ]
+
+
+def test_an_arff_with_meta_begins_with_subject_object_and_trial(small: GraspSet) -> None:
+    lines = to_arff(small, meta=True).splitlines()
+    assert lines[2:5] == ["@attribute subject {A,B}", "@attribute object {mug}", "@attribute trial numeric"]
+    assert lines[-1] == "A,mug,5,0,0,0,0,-8,3.5,PoH"
+
+
+def test_what_arff_would_misread_is_quoted(small: GraspSet) -> None:
+    joints = (replace(small.joints[0], name="50 % {a}"), replace(small.joints[1], name="it's \\"))
+    grasp_set = GraspSet(
+        small.switches,
+        small.switch_names,
+        small.codes,
+        joints,
+        small.grasps,
+        small.taxonomy,
+        small.subjects,
+        small.objects,
+        small.trials,
+    )
+    assert "@attribute '50 \\% {a}' numeric" in to_arff(grasp_set)
+    assert "@attribute 'it\\'s \\\\' numeric" in to_arff(grasp_set)
+
+
+def test_the_same_set_gives_the_same_gzip(small: GraspSet, tmp_path: Path) -> None:
+    for name in ("a.csv.gz", "b.csv.gz"):
+        export(small, tmp_path / name)
+    assert (tmp_path / "a.csv.gz").read_bytes() == (tmp_path / "b.csv.gz").read_bytes()
+    assert gzip.decompress((tmp_path / "a.csv.gz").read_bytes()).decode() == to_csv(small)
+
+
+def test_another_suffix_is_refused(small: GraspSet, tmp_path: Path) -> None:
+    with pytest.raises(TableError, match=r"table\.xlsx: an exported table ends in \.csv, \.csv\.gz or \.arff"):
+        export(small, tmp_path / "table.xlsx")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_twelve_digits_are_enough_for_every_code(small: GraspSet) -> None:
+    joint = replace(small.joints[0], code_a=0, value_a=1e6, code_b=65535, value_b=1e6 + 70)
+    values = [float(f"{value:.12g}") for value in joint.value(np.arange(65536))]
+    assert joint.code(values).tolist() == list(range(65536))

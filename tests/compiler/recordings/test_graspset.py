@@ -1,0 +1,136 @@
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from thenar.compiler import GraspSet
+from thenar.compiler.recordings.errors import RecordingError
+from thenar.compiler.recordings.graspset import Joint
+
+
+def fields(grasp_set: GraspSet) -> dict[str, Any]:
+    names = ["switches", "switch_names", "codes", "joints", "grasps", "taxonomy", "subjects", "objects", "trials"]
+    return {name: getattr(grasp_set, name) for name in names}
+
+
+@given(data=st.data())
+@settings(deadline=None)
+def test_labels_are_the_grasps_numbers_in_the_taxonomy(
+    data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet]
+) -> None:
+    grasp_set = data.draw(grasp_sets)
+    assert [grasp_set.taxonomy.types[label] for label in grasp_set.labels] == grasp_set.grasps.tolist()
+    assert len(grasp_set) == len(grasp_set.labels)
+
+
+@given(data=st.data())
+@settings(deadline=None)
+def test_rows_picks_every_array_alike(data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet]) -> None:
+    grasp_set = data.draw(grasp_sets)
+    index = data.draw(st.lists(st.integers(0, len(grasp_set) - 1), max_size=5))
+    picked = grasp_set.rows(index)
+    for name in ("switches", "codes", "grasps", "subjects", "objects", "trials", "labels"):
+        assert getattr(picked, name).tolist() == [getattr(grasp_set, name)[row].tolist() for row in index]
+    mask = np.zeros(len(grasp_set), bool)
+    mask[index] = True
+    assert grasp_set.rows(mask).trials.tolist() == grasp_set.trials[sorted(set(index))].tolist()
+
+
+def test_arrays_have_the_promised_types_and_cannot_be_written(small: GraspSet) -> None:
+    kinds = {name: getattr(small, name).dtype.kind for name in ("switches", "codes", "grasps", "trials", "labels")}
+    assert kinds == {"switches": "b", "codes": "u", "grasps": "U", "trials": "i", "labels": "i"}
+    assert small.codes.dtype == np.uint16
+    for name in ("switches", "codes", "grasps", "subjects", "objects", "trials", "labels"):
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(small, name)[0] = getattr(small, name)[1]
+
+
+def test_what_the_caller_does_to_his_array_does_not_reach_the_set(small: GraspSet) -> None:
+    codes = small.codes.copy()
+    grasp_set = GraspSet(**fields(small) | {"codes": codes})
+    codes[:] = 0
+    assert np.array_equal(grasp_set.codes, small.codes)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"switches": np.zeros((6, 3), bool)}, r"switches has shape \(6, 3\), not \(6, 4\)"),
+        ({"switches": np.full((6, 4), 2)}, "switches holds numbers that do not fit into bool"),
+        ({"codes": np.full((6, 2), 65536)}, "codes holds numbers that do not fit into uint16"),
+        ({"codes": np.full((6, 2), -1)}, "codes holds numbers that do not fit into uint16"),
+        ({"codes": np.full((6, 2), 0.5)}, "codes holds float64, not uint16"),
+        ({"codes": np.full((6, 2), "1")}, "codes holds <U1, not uint16"),
+        ({"trials": np.zeros(5, int)}, r"trials has shape \(5,\), not \(6,\)"),
+        ({"subjects": np.zeros(6, int)}, "subjects holds int64, not str"),
+        ({"objects": np.array(["mug"] * 5 + [""])}, "object '' is empty"),
+        ({"grasps": np.array(["PoS"] * 5 + ["Pox"])}, "row 5: 'Pox' is not a type of taxonomy kamakura14"),
+        ({"switch_names": ("a", "b", "c", "index")}, "column 'index' occurs twice"),
+        (
+            {"switch_names": (), "joints": (), "switches": np.zeros((6, 0)), "codes": np.zeros((6, 0))},
+            "at least one switch or joint",
+        ),
+    ],
+)
+def test_a_set_that_contradicts_itself_is_refused(small: GraspSet, change: dict[str, Any], reason: str) -> None:
+    with pytest.raises(RecordingError, match=reason):
+        GraspSet(**fields(small) | change)
+
+
+def test_sets_of_switches_alone_and_of_joints_alone_are_sets(small: GraspSet) -> None:
+    assert GraspSet(**fields(small) | {"joints": (), "codes": np.zeros((6, 0))}).joint_names == ()
+    assert GraspSet(**fields(small) | {"switch_names": (), "switches": np.zeros((6, 0))}).joint_names == (
+        "index",
+        "wrist",
+    )
+
+
+def test_the_fingerprint_sees_every_field_and_nothing_else(small: GraspSet) -> None:
+    assert GraspSet(**fields(small)).fingerprint() == small.fingerprint()
+    changes: list[dict[str, Any]] = [
+        {name: getattr(small, name)[::-1]} for name in ("switches", "codes", "grasps", "subjects", "trials")
+    ]
+    changes += [{"objects": np.array(["mug"] * 5 + ["cup"])}, {"switch_names": ("a", "b", "c", "d")}]
+    changes += [{"joints": (replace(small.joints[0], value_a=-11.0), small.joints[1])}]
+    prints = {GraspSet(**fields(small) | change).fingerprint() for change in changes}
+    assert len(prints | {small.fingerprint()}) == len(changes) + 1
+
+
+def test_load_is_the_inverse_of_save(small: GraspSet, tmp_path: Path) -> None:
+    small.save(tmp_path / "set.grasps")
+    assert GraspSet.load(str(tmp_path / "set.grasps")).fingerprint() == small.fingerprint()
+
+
+def test_a_joint_reads_codes_as_values_by_its_two_points() -> None:
+    joint = Joint("index", "deg", 117, 0.0, 217, -90.0)
+    assert float(joint.value(117)) == 0.0
+    assert joint.value([117, 167, 217]).tolist() == [0.0, -45.0, -90.0]
+
+
+@given(data=st.data())
+@settings(deadline=None)
+def test_code_is_the_inverse_of_value(data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet]) -> None:
+    for joint in data.draw(grasp_sets).joints:
+        codes = np.array([0, 1, 2, 999, 65534, 65535])
+        assert joint.code(joint.value(codes)).tolist() == codes.tolist()
+
+
+@pytest.mark.parametrize(
+    ("points", "reason"),
+    [
+        ((5, 0.0, 5, 1.0), "take two of 0..65535"),
+        ((-1, 0.0, 5, 1.0), "take two of 0..65535"),
+        ((0, 0.0, 65536, 1.0), "take two of 0..65535"),
+        ((0, 1.0, 5, 1.0), "cannot be told apart"),
+        ((0, 1.0, 5, float("nan")), "cannot be told apart"),
+        ((0, -1e308, 1, 1e308), "cannot be told apart"),
+        ((0, 1e12, 1, 1e12 + 1), "cannot be told apart"),
+    ],
+)
+def test_a_calibration_that_is_no_line_is_refused(points: tuple[int, float, int, float], reason: str) -> None:
+    with pytest.raises(RecordingError, match=reason):
+        Joint("index", "deg", *points)

@@ -1,0 +1,35 @@
+import numpy as np
+import pytest
+
+from thenar.compiler.recordings.errors import RecordingError
+from thenar.compiler.recordings.names import check_names, list_names, list_rows, nearest
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [("", "is empty"), (" a", "blank"), ("a\n", "blank"), ("a\tb", "control"), ("\ud800", "control"), ("?", "missing")],
+)
+def test_a_name_that_a_file_format_would_lose_is_refused(name: str, reason: str) -> None:
+    with pytest.raises(RecordingError, match=reason):
+        check_names("column", ["fine", name])
+
+
+def test_ordinary_names_of_any_language_pass() -> None:
+    check_names("column", ["thumb 1", "親指", "a,b", "it's", "50 %"])
+
+
+def test_equal_names_are_refused() -> None:
+    with pytest.raises(RecordingError, match="switch 'a' occurs twice"):
+        check_names("switch", ["a", "b", "a"])
+
+
+def test_a_near_name_is_suggested_and_a_far_one_is_not() -> None:
+    assert nearest("subjct", ["subject", "object"]).startswith(" (did you mean 'subject'")
+    assert nearest("zzz", ["subject", "object"]) == ""
+
+
+def test_long_lists_are_cut_and_counted() -> None:
+    assert list_names(["a", "b"]) == "a, b"
+    assert list_names([*"abcdefg"]) == "a, b, c, d, e and 2 more"
+    assert list_rows(np.array([4])) == "row 4"
+    assert list_rows(np.array([4, 9])) == "rows 4, 9"

@@ -1,0 +1,87 @@
+import numpy as np
+import pytest
+
+from thenar.compiler.recordings.columns import Columns, JointColumns, select
+from thenar.compiler.recordings.errors import TableError
+from thenar.compiler.recordings.findings import Finding
+from thenar.compiler.recordings.reading import Readings, read_cells
+from thenar.compiler.recordings.table import Column, Table
+
+GOOD = {
+    "g": ["a", "b", "c"],
+    "who": ["x", "y", "y"],
+    "n": ["1", "2", "3"],
+    "s": ["0", "1", "true"],
+    "j": ["1.5", "2", "3"],
+}
+
+
+def read(columns: Columns, **cells: Column) -> tuple[Readings, list[Finding]]:
+    table = Table("t.csv", GOOD | cells, np.array([2, 3, 5]))
+    return read_cells(table, columns, select(columns, list(table.columns)))
+
+
+ALL = Columns("g", subject="who", trial="n", switches=("s",), joints=(JointColumns(("j",)),))
+DROP = Columns("g", subject="who", trial="n", switches=("s",), joints=(JointColumns(("j",)),), missing="drop")
+
+
+def test_cells_become_arrays() -> None:
+    readings, found = read(ALL)
+    assert readings.labels.tolist() == ["a", "b", "c"]
+    assert readings.subjects.tolist() == ["x", "y", "y"]
+    assert readings.trials.tolist() == [1, 2, 3]
+    assert readings.switches.tolist() == [[False], [True], [True]]
+    assert readings.joints.tolist() == [[1.5], [2.0], [3.0]]
+    assert found == []
+
+
+def test_columns_that_are_not_named_are_one_of_each() -> None:
+    readings, _ = read(Columns("g", switches=("s",)))
+    assert readings.subjects.tolist() == readings.objects.tolist() == ["1", "1", "1"]
+    assert readings.trials.tolist() == [1, 1, 1]
+    assert readings.joints.shape == (3, 0)
+    assert read(Columns("g", joints=ALL.joints))[0].switches.shape == (3, 0)
+
+
+def test_wrong_cells_are_counted_and_named_by_the_users_rows() -> None:
+    with pytest.raises(TableError) as refused:
+        read(ALL, s=["0", "2", "no"], j=["x", "1", "inf"], n=["1", "1.5", "2"])
+    assert str(refused.value) == (
+        "t.csv: not whole numbers: 1 cell, row 3 'n' ('1.5'); "
+        "not 0 or 1: 2 cells, row 3 's' ('2'), row 5 's' ('no'); "
+        "not finite numbers: 2 cells, row 2 'j' ('x'), row 5 'j' ('inf')"
+    )
+
+
+def test_codes_must_be_codes() -> None:
+    columns = Columns("g", joints=(JointColumns(("j",), codes=True),))
+    with pytest.raises(TableError, match=r"not codes 0\.\.65535: 1 cell, row 2 'j' \('1\.5'\)"):
+        read(columns)
+
+
+def test_missing_cells_are_an_error_unless_their_rows_may_be_dropped() -> None:
+    with pytest.raises(TableError, match=r"missing .*: 2 cells, row 2 'j' \(''\), row 5 'who' \('\?'\)"):
+        read(ALL, j=["", "2", "3"], who=["x", "y", "?"])
+
+
+def test_dropped_rows_are_counted_and_named() -> None:
+    readings, (finding,) = read(DROP, j=["", "2", "3"], who=["x", "y", "?"])
+    assert readings.rows.tolist() == [3]
+    assert readings.labels.tolist() == ["b"]
+    assert (finding.kind, finding.count, finding.rows, finding.columns) == ("dropped rows", 2, (2, 5), ("who", "j"))
+    assert finding.message == "2 rows with missing values were left out: rows 2, 5 (columns who, j)"
+
+
+def test_a_wrong_cell_is_an_error_even_in_a_row_that_would_be_dropped() -> None:
+    with pytest.raises(TableError, match="not 0 or 1"):
+        read(DROP, s=["2", "1", "1"], j=["", "2", "3"])
+
+
+def test_a_table_of_which_nothing_is_left_is_refused() -> None:
+    with pytest.raises(TableError, match=r"t\.csv: every row misses a value: 3 cells"):
+        read(DROP, g=["", "?", " "])
+
+
+def test_a_row_that_misses_a_label_is_found_among_numbers_too() -> None:
+    with pytest.raises(TableError, match=r"missing .*: 1 cell, row 3 'g' \('nan'\)"):
+        read(Columns("g", switches=("s",)), g=np.array([1.0, np.nan, 2.0]))

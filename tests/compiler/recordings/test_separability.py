@@ -1,0 +1,70 @@
+from collections import Counter
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from thenar.compiler.recordings.graspset import GraspSet, Joint
+from thenar.compiler.recordings.separability import NEIGHBOUR_ROWS, separabilities
+from thenar.compiler.recordings.taxonomy import own
+
+
+def blobs(rows: int, gap: int) -> GraspSet:
+    """Two grasp types, `gap` codes apart."""
+    random = np.random.default_rng(3)
+    labels = np.arange(rows) % 2
+    return GraspSet(
+        switches=(labels[:, None] == 1) ^ (random.random((rows, 1)) < 0.2),
+        switch_names=("palm",),
+        codes=(random.integers(0, 100, (rows, 2)) + labels[:, None] * gap).astype(np.uint16),
+        joints=tuple(Joint(name, "deg", 0, 0.0, 1, 0.5) for name in ("index", "wrist")),
+        grasps=np.array(["a", "b"])[labels],
+        taxonomy=own(["a", "b"]),
+        subjects=np.full(rows, "A"),
+        objects=np.full(rows, "mug"),
+        trials=np.arange(rows),
+    )
+
+
+@given(data=st.data())
+@settings(deadline=None)
+def test_the_ceiling_is_the_rate_of_the_best_memory(
+    data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet]
+) -> None:
+    drawn = data.draw(grasp_sets)
+    grasp_set = drawn.rows(data.draw(st.lists(st.integers(0, len(drawn) - 1), min_size=1, max_size=9)))
+    for line in separabilities(grasp_set):
+        switches = grasp_set.switches.tolist() if line.inputs != "joints" else [[]] * len(grasp_set)
+        codes = grasp_set.codes.tolist() if line.inputs != "switches" else [[]] * len(grasp_set)
+        memory: dict[tuple[int, ...], Counter[str]] = {}
+        for bits, numbers, grasp in zip(switches, codes, grasp_set.grasps.tolist(), strict=True):
+            memory.setdefault((*bits, *numbers), Counter())[grasp] += 1
+        assert line.distinct_frames == len(memory)
+        assert line.ceiling == sum(max(counts.values()) for counts in memory.values()) / len(grasp_set)
+
+
+def test_a_set_is_judged_by_what_it_has(small: GraspSet) -> None:
+    assert [line.inputs for line in separabilities(small)] == ["switches", "joints", "both"]
+
+
+def test_types_that_lie_apart_are_told_apart_and_equal_ones_are_not() -> None:
+    apart = {line.inputs: line.neighbour_rate for line in separabilities(blobs(200, 1000))}
+    assert apart["joints"] == apart["both"] == 1.0
+    mixed = {line.inputs: line.neighbour_rate for line in separabilities(blobs(200, 0))}
+    assert mixed["joints"] == pytest.approx(0.5, abs=0.12)
+
+
+def test_the_neighbour_is_another_row() -> None:
+    (line,) = [line for line in separabilities(blobs(2, 1)) if line.inputs == "joints"]
+    assert line.neighbour_rate == 0.0
+
+
+def test_a_large_set_is_sampled_and_says_so() -> None:
+    lines = separabilities(blobs(NEIGHBOUR_ROWS + 1, 1000))
+    assert {line.neighbour_rows for line in lines} == {NEIGHBOUR_ROWS}
+    assert lines == separabilities(blobs(NEIGHBOUR_ROWS + 1, 1000))
+
+
+def test_one_row_has_no_neighbour() -> None:
+    assert {line.neighbour_rate for line in separabilities(blobs(1, 0))} == {None}

@@ -1,0 +1,44 @@
+import hypothesis.strategies as st
+import numpy as np
+from hypothesis import given, settings
+
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.recordings.summary import Count, JointRange, summarise
+
+
+def test_a_set_is_counted(small: GraspSet) -> None:
+    summary = summarise(small)
+    assert (summary.rows, summary.taxonomy, summary.fingerprint) == (6, "kamakura14", small.fingerprint())
+    assert summary.grasps == (Count("PoS", 2), Count("PoH", 2), Count("Tip", 2))
+    assert len(summary.absent) == 11
+    assert summary.balance == 1.0
+    assert summary.subjects == (Count("A", 4), Count("B", 2))
+    assert summary.objects == (Count("mug", 6),)
+    assert [(use.name, round(use.closed, 3)) for use in summary.switches] == [
+        ("dead", 0.0),
+        ("thumb", 0.5),
+        ("palm", 0.5),
+        ("palm copy", 0.5),
+    ]
+    assert summary.joints == (JointRange("index", "deg", -9.5, -8.0, 4), JointRange("wrist", "deg", 3.5, 3.5, 1))
+    assert {finding.kind for finding in summary.warnings} >= {"constant switches", "contradictory frames"}
+    assert summary.warnings[-2].rows == (2, 3)
+
+
+@given(data=st.data())
+@settings(deadline=None)
+def test_counts_add_up_for_any_set(data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet]) -> None:
+    grasp_set = data.draw(grasp_sets)
+    summary = summarise(grasp_set)
+    for counts in (summary.grasps, summary.subjects, summary.objects):
+        assert sum(count.rows for count in counts) == len(grasp_set)
+    assert len(summary.grasps) + len(summary.absent) == len(grasp_set.taxonomy.types)
+    assert 0 < summary.balance <= 1
+    for joint, codes in zip(summary.joints, grasp_set.codes.T, strict=True):
+        assert joint.codes == len(np.unique(codes))
+        assert joint.least <= joint.largest
+
+
+def test_a_set_without_rows_has_a_summary(small: GraspSet) -> None:
+    summary = summarise(small.rows([]))
+    assert (summary.rows, summary.grasps, summary.balance, summary.separability) == (0, (), 0.0, ())

@@ -1,0 +1,128 @@
+import gzip
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from thenar.compiler.recordings.errors import TableError
+from thenar.compiler.recordings.table import Table, read_table
+
+
+def csv(content: bytes, folder: Path, delimiter: str = ",") -> Table:
+    (folder / "table.csv").write_bytes(content)
+    return read_table(folder / "table.csv", delimiter)
+
+
+def test_a_csv_is_columns_of_text_and_rows_by_their_line(tmp_path: Path) -> None:
+    table = csv(b'\xef\xbb\xbfa, b\r\n1,x\r\n\r\n2,"y, ""z"""\r\n', tmp_path)
+    assert {name: list(column) for name, column in table.columns.items()} == {"a": ["1", "2"], "b": ["x", 'y, "z"']}
+    assert table.rows.tolist() == [2, 4]
+
+
+def test_a_gzipped_csv_is_the_same_table(tmp_path: Path) -> None:
+    path = tmp_path / "t.b.csv.gz"
+    path.write_bytes(gzip.compress(b"a;b\n1;2\n"))
+    assert dict(read_table(path, ";").columns) == {"a": ("1",), "b": ("2",)}
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (b"a,b\n1,2\n3\n", "row 3 has 1 cells, its header 2"),
+        (b"a,b\n1,2,3\n", "row 2 has 3 cells, its header 2"),
+        (b'a,b\n1,"2\n', "unexpected end of data"),
+        (b'a,b\n1,"2"3\n', "row 2: ',' expected after '\"'"),
+        (b"a,a\n1,2\n", "column 'a' occurs twice"),
+        (b"a,\n1,2\n", "column '' is empty"),
+        (b"a,b\n", "has no rows"),
+        (b"", "has no rows"),
+        (b"a\n\xff\n", "is not UTF-8 text: invalid start byte"),
+    ],
+)
+def test_a_csv_that_is_no_table_is_refused_with_the_row(content: bytes, reason: str, tmp_path: Path) -> None:
+    with pytest.raises(TableError, match=f"table.csv.*{reason}"):
+        csv(content, tmp_path)
+
+
+@pytest.mark.parametrize("damage", [slice(0, -9), slice(1, None)])
+def test_a_damaged_gzip_is_refused(damage: slice, tmp_path: Path) -> None:
+    (tmp_path / "t.csv.gz").write_bytes(gzip.compress(b"a,b\n1,2\n" * 50)[damage])
+    with pytest.raises(TableError, match=r"t\.csv\.gz is damaged"):
+        read_table(tmp_path / "t.csv.gz")
+
+
+def test_arrays_of_an_npz_are_columns(tmp_path: Path) -> None:
+    path = tmp_path / "t.npz"
+    np.savez(
+        path,
+        y=np.array(["a", "b"]),
+        raw=np.array([b"a", b"b"]),
+        X=np.arange(4).reshape(2, 2),
+        on=np.array([True, False]),
+    )
+    table = read_table(path)
+    assert {name: list(column) for name, column in table.columns.items()} == {
+        "y": ["a", "b"],
+        "raw": ["a", "b"],
+        "X.0": [0, 2],
+        "X.1": [1, 3],
+        "on": [1, 0],
+    }
+    assert table.rows.tolist() == [1, 2]
+
+
+@pytest.mark.parametrize(
+    ("arrays", "reason"),
+    [
+        ({"a": np.zeros(2), "b": np.zeros(3)}, r"its arrays have \[2, 3\] rows"),
+        ({"a": np.zeros((2, 2, 2))}, "array 'a' has 3 dimensions"),
+        ({"a": np.zeros(2, complex)}, "array 'a' holds complex128"),
+        ({"a": np.array([{}, {}])}, "cannot be read as npz: Object arrays cannot be loaded"),
+        ({"a": np.zeros(0)}, "has no rows"),
+        ({}, r"its arrays have \[\] rows"),
+    ],
+)
+def test_an_npz_that_is_no_table_is_refused(arrays: dict[str, np.ndarray], reason: str, tmp_path: Path) -> None:
+    np.savez(tmp_path / "t.npz", allow_pickle=True, **arrays)
+    with pytest.raises(TableError, match=reason):
+        read_table(tmp_path / "t.npz")
+
+
+def test_what_is_no_npz_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "t.npz").write_bytes(b"a,b\n1,2\n")
+    with pytest.raises(TableError, match=r"t\.npz cannot be read as npz"):
+        read_table(tmp_path / "t.npz")
+
+
+def test_another_suffix_is_refused_naming_those_that_are_read(tmp_path: Path) -> None:
+    with pytest.raises(TableError, match=r"table\.xlsx: a table ends in \.csv"):
+        read_table(tmp_path / "table.xlsx")
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("tables")
+
+
+ARFF = st.text("@{}',\"%? \\\nab01").map(
+    lambda text: f"@relation r\n@attribute a numeric\n{text}\n@data\n{text}\n".encode()
+)
+
+
+@given(
+    st.sampled_from(["csv", "csv.gz", "arff", "arff.gz", "npz"]),
+    st.one_of(st.binary(), st.text('a1,"\r\n \0').map(str.encode), ARFF),
+    st.booleans(),
+)
+@settings(deadline=None)
+def test_any_bytes_are_a_table_or_refused_and_never_crash(
+    folder: Path, suffix: str, content: bytes, zipped: bool
+) -> None:
+    path = folder / f"t.{suffix}"
+    path.write_bytes(gzip.compress(content) if zipped else content)
+    with suppress(TableError):
+        table = read_table(path)
+        assert {len(column) for column in table.columns.values()} == {len(table.rows)}

@@ -1,0 +1,84 @@
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.compiler.recordings.errors import RecordingError
+from thenar.compiler.recordings.taxonomy import (
+    CUTKOSKY_16,
+    FEIX_33,
+    KAMAKURA_14,
+    Taxonomy,
+    is_published,
+    own,
+    published,
+)
+
+PUBLISHED = [KAMAKURA_14, CUTKOSKY_16, FEIX_33]
+
+
+def test_the_published_taxonomies_have_as_many_types_as_their_names_say() -> None:
+    assert [len(taxonomy.types) for taxonomy in PUBLISHED] == [14, 16, 33]
+    assert [taxonomy.name for taxonomy in PUBLISHED] == ["kamakura14", "cutkosky16", "feix33"]
+    assert all(published(taxonomy.name) == taxonomy and is_published(taxonomy) for taxonomy in PUBLISHED)
+
+
+@pytest.mark.parametrize("taxonomy", PUBLISHED, ids=lambda taxonomy: taxonomy.name)
+def test_a_type_is_found_by_name_full_name_and_number_in_any_case(taxonomy: Taxonomy) -> None:
+    for number, (name, full) in enumerate(zip(taxonomy.types, taxonomy.full_names, strict=True), start=1):
+        for spelling in (
+            name,
+            full,
+            full.upper(),
+            full.replace(" ", "_"),
+            str(number),
+            f"{number:02}",
+            f" {name.lower()}",
+        ):
+            assert taxonomy.find(spelling) == name
+    assert taxonomy.find("0") is None
+    assert taxonomy.find(str(len(taxonomy.types) + 1)) is None
+
+
+def test_labels_of_recordings_are_read_as_feix_wrote_them() -> None:
+    assert FEIX_33.find("Adduction_Grip") == "Adduction Grip"
+    assert FEIX_33.find("Sphere_4_finger") == "Sphere 4 Finger"
+    assert CUTKOSKY_16.find("disk power") == "Disk (power)"
+    assert KAMAKURA_14.find("Power grip standard type") == "PoS"
+
+
+def test_an_unknown_label_is_answered_with_the_nearest_types() -> None:
+    with pytest.raises(RecordingError, match=r"'Adducted Grip' is not a grasp type of feix33 .*'Adduction Grip'"):
+        FEIX_33.require("Adducted Grip")
+    with pytest.raises(RecordingError, match=r"its types: PoS, PoH, PoI, PoE, PoD, \.\.\."):
+        KAMAKURA_14.require("zzzz")
+
+
+def test_numbers_mean_nothing_in_a_taxonomy_of_ones_own() -> None:
+    assert own(["mug", "7"]).find("1") is None
+    assert own(["mug", "7"]).find("7") == "7"
+    assert own(["mug", "7"]).find("MUG") == "mug"
+
+
+def test_a_spelling_that_two_types_share_means_only_the_exact_one() -> None:
+    taxonomy = own(["a b", "a_b"])
+    assert [taxonomy.find(label) for label in ("a b", "a_b", "A B")] == ["a b", "a_b", None]
+
+
+@given(st.lists(st.text("abc 1?_-", min_size=1, max_size=4), min_size=1, max_size=6))
+def test_every_type_is_found_as_itself(types: list[str]) -> None:
+    try:
+        taxonomy = own(types)
+    except RecordingError:
+        return
+    assert [taxonomy.require(name) for name in types] == types
+
+
+def test_types_that_cannot_be_told_apart_or_read_are_refused() -> None:
+    with pytest.raises(RecordingError, match="grasp type 'x' occurs twice"):
+        own(["x", "y", "x"])
+    with pytest.raises(RecordingError, match="grasp type '' is empty"):
+        own([""])
+    with pytest.raises(RecordingError, match="taxonomy feix33 has 33 types of its own"):
+        Taxonomy("feix33", ("x",))
+    with pytest.raises(RecordingError, match="no taxonomy is called 'feix'"):
+        published("feix")

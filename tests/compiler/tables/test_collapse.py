@@ -1,0 +1,73 @@
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.compiler.boosting.stumps import Stumps
+from thenar.compiler.tables.collapse import collapse
+
+
+@given(
+    seed=st.integers(0, 10_000),
+    rounds=st.integers(0, 30),
+    classes=st.integers(2, 5),
+    switches=st.integers(0, 5),
+    joints=st.integers(0, 3),
+    shrinkage=st.sampled_from([1.0, 0.1]),
+)
+def test_tables_score_as_stumps_do(make_stumps, make_rows, seed, rounds, classes, switches, joints, shrinkage) -> None:
+    if switches + joints == 0:
+        switches = 1
+    stumps = make_stumps(seed, rounds, classes, switches, joints, shrinkage)
+    bits, codes = make_rows(seed, switches=switches, joints=joints)
+    expected = stumps.scores(np.hstack([bits, codes]))
+    magnitude = shrinkage * np.abs(stumps.values[:, :, :2]).sum()
+    assert np.abs(collapse(stumps, switches).scores(bits, codes) - expected).max() <= 1e-12 * magnitude
+
+
+def _one_stump(column: int, threshold: float) -> Stumps:
+    """Class 0's stump looks at `column`; class 1's says nothing."""
+    columns = np.array([[column, 0]], np.int32)
+    values = np.array([[[-8.0, 4.0, 99.0], [0.0, 0.0, 99.0]]])
+    return Stumps(2, columns, np.array([[threshold, 0.5]]), values, 1.0)
+
+
+def test_a_switch_becomes_a_constant_and_a_row() -> None:
+    tables = collapse(_one_stump(0, 0.5), 1)
+    # A round adds (K-1)/K * (g - mean g): of -8 in one of two classes, -2 and +2.
+    assert tables.bias.tolist() == [-2.0, 2.0]
+    assert tables.switch_rows.tolist() == [[3.0, -3.0]]
+
+
+def test_a_code_at_the_threshold_goes_left() -> None:
+    tables = collapse(_one_stump(1, 7.0), 1)
+    assert tables.thresholds[0].tolist() == [7]
+    codes = np.array([[6], [7], [8]], np.uint16)
+    assert tables.scores(np.zeros((3, 1), bool), codes)[:, 0].tolist() == [-2.0, -2.0, 1.0]
+
+
+def test_thresholds_between_the_same_two_codes_are_one() -> None:
+    first, second = _one_stump(1, 7.25), _one_stump(1, 7.75)
+    both = Stumps(
+        2,
+        np.vstack([first.columns, second.columns]),
+        np.vstack([first.thresholds, second.thresholds]),
+        np.vstack([first.values, second.values]),
+        1.0,
+    )
+    tables = collapse(both, 1)
+    assert tables.thresholds[0].tolist() == [7]
+    assert tables.joint_rows[0].tolist() == [[-4.0, 4.0], [2.0, -2.0]]
+
+
+def test_a_threshold_that_no_code_passes_makes_no_bin() -> None:
+    for threshold, score in ((-0.5, 1.0), (65535.0, -2.0), (1e300, -2.0)):
+        tables = collapse(_one_stump(1, threshold), 1)
+        assert tables.thresholds[0].size == 0
+        assert tables.joint_rows[0].tolist() == [[score, -score]]
+
+
+def test_an_ensemble_without_rounds_is_all_zeros(make_stumps) -> None:
+    tables = collapse(make_stumps(rounds=0), 6)
+    assert not tables.bias.any()
+    assert not tables.switch_rows.any()
+    assert [rows.tolist() for rows in tables.joint_rows] == [[[0.0] * 4]] * 3

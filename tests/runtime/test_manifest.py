@@ -1,0 +1,90 @@
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from thenar.runtime.errors import BuildError, ThenarError
+from thenar.runtime.manifest import MAX_BYTES, Manifest, manifest_from_bytes, manifest_to_bytes
+
+
+@pytest.fixture(scope="module")
+def manifest(make_tables, describe) -> Manifest:
+    return describe(make_tables())
+
+
+def test_what_was_written_is_read_again(manifest: Manifest) -> None:
+    data = manifest_to_bytes(manifest)
+    read = manifest_from_bytes(data)
+    assert replace(read, checksum="") == manifest
+    assert manifest_to_bytes(read) == data
+
+
+def test_it_is_json_that_people_can_read(manifest: Manifest) -> None:
+    data = manifest_to_bytes(manifest)
+    assert data.endswith(b"}\n")
+    assert json.loads(data)["switches"][3] == {"column": 3, "name": "s3", "gain": 0.5}
+
+
+@given(data=st.data())
+def test_any_changed_byte_is_refused(manifest: Manifest, data: st.DataObject) -> None:
+    document = bytearray(manifest_to_bytes(manifest))
+    position = data.draw(st.integers(0, len(document) - 1))
+    document[position] = data.draw(st.integers(0, 255).filter(lambda byte: byte != document[position]))
+    with pytest.raises(BuildError):
+        manifest_from_bytes(bytes(document))
+
+
+@given(st.binary(max_size=300) | st.text(alphabet='{}[]":,0123456789schema \\un', max_size=300).map(str.encode))
+def test_random_bytes_are_refused(data: bytes) -> None:
+    with pytest.raises(ThenarError):
+        manifest_from_bytes(data)
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
+    max_leaves=6,
+)
+
+
+@given(data=st.data(), value=json_values)
+def test_any_field_may_hold_anything_and_is_refused(manifest: Manifest, data: st.DataObject, value: object) -> None:
+    document = json.loads(manifest_to_bytes(manifest))
+    document[data.draw(st.sampled_from(sorted(document)))] = value
+    with pytest.raises(BuildError):
+        manifest_from_bytes(json.dumps(document).encode())
+
+
+def test_a_newer_schema_is_refused_by_its_number_whatever_else_it_holds() -> None:
+    with pytest.raises(BuildError, match="schema 2, this thenar reads up to 1: update thenar"):
+        manifest_from_bytes(b'{"schema": 2, "something": "new"}')
+
+
+def test_a_field_that_is_unknown_is_refused(manifest: Manifest) -> None:
+    document = json.loads(manifest_to_bytes(manifest)) | {"extra": 1}
+    with pytest.raises(BuildError, match="unknown field `extra`"):
+        manifest_from_bytes(json.dumps(document).encode())
+
+
+def test_a_document_written_otherwise_is_refused(manifest: Manifest) -> None:
+    document = json.loads(manifest_to_bytes(manifest))
+    with pytest.raises(BuildError, match="altered"):
+        manifest_from_bytes(json.dumps(document).encode())
+
+
+def test_two_switches_of_one_name_are_refused(manifest: Manifest) -> None:
+    twice = replace(manifest, switches=(manifest.switches[0], manifest.switches[0]))
+    with pytest.raises(BuildError, match="names two switches alike"):
+        manifest_from_bytes(manifest_to_bytes(twice))
+
+
+def test_deep_nesting_is_refused() -> None:
+    with pytest.raises(BuildError):
+        manifest_from_bytes(b'{"a":' + b"[" * 200_000 + b"]" * 200_000 + b"}")
+
+
+def test_an_oversized_document_is_refused() -> None:
+    with pytest.raises(BuildError, match="at most"):
+        manifest_from_bytes(b" " * (MAX_BYTES + 1))

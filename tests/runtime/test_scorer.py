@@ -1,0 +1,92 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.runtime.errors import FrameError
+from thenar.runtime.scorer import LANE_OFFSET, Scorer
+from thenar.runtime.tables import IntegerTables
+
+
+def _sum(tables: IntegerTables, bits, codes, lost_bits, lost_codes) -> np.ndarray:
+    """The definition, term by term."""
+    total = tables.bias.astype(np.int64)
+    for bit, lost, row, mean in zip(bits, lost_bits, tables.switch_rows, tables.switch_means, strict=True):
+        total = total + (mean if lost else row * int(bit))
+    for a, (code, lost) in enumerate(zip(codes, lost_codes, strict=True)):
+        bin_ = sum(int(threshold) < int(code) for threshold in tables.thresholds[a])
+        total = total + (tables.joint_means[a] if lost else tables.joint_rows[a][bin_])
+    return total
+
+
+@st.composite
+def frames(draw, switches: int, joints: int):
+    def flags(n: int) -> np.ndarray:
+        return np.array(draw(st.lists(st.booleans(), min_size=n, max_size=n)), bool)
+
+    codes = draw(st.lists(st.integers(0, 300) | st.just(65535), min_size=joints, max_size=joints))
+    return flags(switches), np.array(codes, np.uint16), flags(switches), flags(joints)
+
+
+@given(data=st.data(), seed=st.integers(0, 50), switches=st.integers(0, 12), joints=st.integers(0, 4))
+def test_scores_are_the_sum_of_the_rows(make_tables, data, seed, switches, joints) -> None:
+    tables = make_tables(seed, switches=switches, joints=joints)
+    bits, codes, lost_bits, lost_codes = data.draw(frames(switches, joints))
+    scorer, none = Scorer(tables), [False] * (switches + joints)
+    whole = np.array(scorer.lanes(bits, codes)) - LANE_OFFSET
+    assert np.array_equal(whole, _sum(tables, bits, codes, none[:switches], none[:joints]))
+    degraded = np.array(scorer.lanes_without(bits, codes, lost_bits, lost_codes)) - LANE_OFFSET
+    assert np.array_equal(degraded, _sum(tables, bits, codes, lost_bits, lost_codes))
+
+
+def test_a_code_equal_to_a_threshold_goes_left_of_it(make_tables) -> None:
+    tables = make_tables(switches=0, joints=1)
+    threshold = int(tables.thresholds[0][2])
+    scorer = Scorer(tables)
+    for code, bin_ in ((threshold, 2), (threshold + 1, 3)):
+        expected = tables.bias.astype(int) + tables.joint_rows[0][bin_] + LANE_OFFSET
+        assert scorer.lanes([], [code]) == tuple(expected)
+        assert scorer.lanes_without([], [code], [], [False]) == tuple(expected)
+
+
+@pytest.mark.parametrize("sign", [+1, -1])
+def test_lanes_at_the_edge_of_int16_do_not_spill(sign: int) -> None:
+    bias = np.array([32767 * sign, -32767 * sign, 0], np.int16)
+    none = np.zeros((0, 3), np.int16)
+    assert Scorer(IntegerTables(bias, none, (), (), none, none, 1.0)).lanes([], []) == tuple(
+        bias.astype(int) + LANE_OFFSET
+    )
+
+
+@pytest.mark.parametrize("kind", [np.uint16, np.uint8, np.int32, np.int64, list])
+def test_codes_may_come_in_any_integers(make_tables, kind) -> None:
+    scorer, codes = Scorer(make_tables()), [3, 200, 77]
+    given_codes = codes if kind is list else np.array(codes, kind)
+    assert scorer.lanes([0, 1] * 4 + [1], given_codes) == scorer.lanes(
+        np.array([0, 1] * 4 + [1], bool), np.uint16(codes)
+    )
+
+
+@pytest.mark.parametrize(
+    ("bits", "codes", "reason"),
+    [
+        (np.zeros(8, bool), [0, 0, 0], r"switches of shape \(8,\), the build has 9"),
+        (np.zeros((9, 1), bool), [0, 0, 0], "the build has 9"),
+        ([2] + [0] * 8, [0, 0, 0], "0 or 1, this frame has 2"),
+        (np.full(9, np.nan), [0, 0, 0], "0 or 1, this frame has nan"),
+        (np.zeros(9, bool), [0, 0], r"codes of shape \(2,\), the build has 3 joints"),
+        (np.zeros(9, bool), [0, -1, 0], "0 to 65535, this frame has -1"),
+        (np.zeros(9, bool), [0, 65536, 0], "0 to 65535, this frame has 65536"),
+        (np.zeros(9, bool), [0, 1.5, 0], "codes are integers, this frame has float64"),
+        (np.zeros(9, bool), ["a", "b", "c"], "codes are integers"),
+    ],
+)
+def test_a_frame_that_does_not_fit_is_refused(make_tables, bits, codes, reason: str) -> None:
+    with pytest.raises(FrameError, match=reason):
+        Scorer(make_tables()).lanes(bits, codes)
+
+
+def test_masks_that_do_not_fit_are_refused(make_tables) -> None:
+    scorer = Scorer(make_tables())
+    with pytest.raises(FrameError, match="lost joints"):
+        scorer.lanes_without(np.zeros(9, bool), [0, 0, 0], np.zeros(9, bool), np.zeros(2, bool))

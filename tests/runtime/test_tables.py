@@ -1,0 +1,150 @@
+import contextlib
+import tracemalloc
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.runtime.errors import BuildError, SealError, ThenarError
+from thenar.runtime.sealed import seal
+from thenar.runtime.tables import KIND, MAX_BYTES, IntegerTables, tables_from_bytes, tables_to_bytes
+
+sizes = st.fixed_dictionaries(
+    {
+        "seed": st.integers(0, 99),
+        "classes": st.integers(2, 6),
+        "switches": st.integers(0, 9),
+        "joints": st.integers(0, 3),
+        "bins": st.integers(1, 5),
+    }
+)
+
+
+def _payload(tables: IntegerTables) -> bytearray:
+    return bytearray(tables_to_bytes(tables)[56:])
+
+
+@given(size=sizes)
+def test_what_was_written_is_read_again(make_tables, size) -> None:
+    data = tables_to_bytes(make_tables(**size))
+    assert tables_to_bytes(tables_from_bytes(data)) == data
+
+
+def test_the_bytes_are_as_documented() -> None:
+    tables = IntegerTables(
+        bias=np.array([1, -1], np.int16),
+        switch_rows=np.array([[2, -2]], np.int16),
+        thresholds=(np.array([258], np.uint16),),
+        joint_rows=(np.array([[3, -3], [4, -4]], np.int16),),
+        switch_means=np.array([[5, -5]], np.int16),
+        joint_means=np.array([[6, -6]], np.int16),
+        scale=1.0,
+    )
+    counts = bytes.fromhex("0200 0100 0100 0000 000000000000f03f 0100")
+    rows = bytes.fromhex("0100ffff 0200feff 0500fbff 0600faff 0201 0300fdff 0400fcff")
+    assert bytes(_payload(tables)) == counts + rows
+
+
+@given(size=sizes, data=st.data())
+def test_no_partial_sum_of_any_frame_leaves_the_bound(make_tables, size, data) -> None:
+    tables = make_tables(**size)
+    terms = [tables.bias]
+    for row, mean in zip(tables.switch_rows, tables.switch_means, strict=True):
+        terms.append(data.draw(st.sampled_from([row, mean, 0 * row])))
+    for rows, mean in zip(tables.joint_rows, tables.joint_means, strict=True):
+        terms.append(data.draw(st.sampled_from([*rows, mean])))
+    order = data.draw(st.permutations(terms))
+    assert np.abs(np.cumsum(np.array(order, np.int64), axis=0)).max() <= tables.bound
+
+
+def test_the_bound_is_reached() -> None:
+    one = np.ones((1, 2), np.int16)
+    tables = IntegerTables(7 * one[0], 5 * one, (np.array([], np.uint16),), (3 * one,), one, one, 1.0)
+    assert tables.bound == 15
+
+
+def test_a_tampered_table_that_could_overflow_is_refused(make_tables) -> None:
+    tables = make_tables()
+    payload = _payload(tables)
+    start = 16 + 2 * tables.n_joints
+    payload[start : start + 2] = (32767).to_bytes(2, "little")
+    with pytest.raises(BuildError, match=r"tables\.bin is damaged: a sum could reach \d+, beyond 32767"):
+        tables_from_bytes(seal(KIND, 1, bytes(payload)))
+
+
+def test_the_most_negative_integer_does_not_slip_through(make_tables) -> None:
+    tables = make_tables(switches=0, joints=0)
+    with pytest.raises(BuildError, match="a sum could reach 32768"):
+        replace(tables, bias=np.full(5, -32768, np.int16))
+
+
+def test_thresholds_that_do_not_increase_are_refused(make_tables) -> None:
+    tables = make_tables()
+    with pytest.raises(BuildError, match="thresholds of joint 1 are not strictly increasing"):
+        replace(tables, thresholds=(tables.thresholds[0], tables.thresholds[1][::-1], tables.thresholds[2]))
+
+
+@pytest.mark.parametrize("scale", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_scale_that_is_no_scale_is_refused(make_tables, scale: float) -> None:
+    with pytest.raises(BuildError, match="scale"):
+        replace(make_tables(), scale=scale)
+
+
+@pytest.mark.parametrize("change", [{"bias": np.zeros(4, np.int16)}, {"bias": np.zeros(5)}, {"joint_rows": ()}])
+def test_arrays_that_do_not_belong_together_are_refused(make_tables, change) -> None:
+    with pytest.raises(BuildError):
+        replace(make_tables(), **change)
+
+
+@pytest.mark.parametrize(
+    ("offset", "count", "reason"),
+    [
+        (0, 1, "1 grasp types"),
+        (0, 1025, "1025 grasp types"),
+        (2, 4097, "4097 switches"),
+        (4, 257, "257 joints"),
+        (2, 4096, "its counts call for"),
+        (6, 1, "offset 6"),
+    ],
+)
+def test_counts_are_held_against_their_caps_and_the_length(make_tables, offset: int, count: int, reason: str) -> None:
+    payload = _payload(make_tables())
+    payload[offset : offset + 2] = count.to_bytes(2, "little")
+    with pytest.raises(BuildError, match=reason):
+        tables_from_bytes(seal(KIND, 1, bytes(payload)))
+
+
+def test_an_oversized_file_is_refused() -> None:
+    with pytest.raises(BuildError, match=f"at most {MAX_BYTES}"):
+        tables_from_bytes(bytes(MAX_BYTES + 1))
+
+
+def test_a_newer_file_is_refused_by_its_number() -> None:
+    with pytest.raises(SealError, match="format 2"):
+        tables_from_bytes(seal(KIND, 2, b""))
+
+
+@given(payload=st.binary(max_size=300))
+def test_any_sealed_content_is_read_or_refused_without_much_memory(payload: bytes) -> None:
+    tracemalloc.start()
+    try:
+        with contextlib.suppress(ThenarError):
+            tables_from_bytes(seal(KIND, 1, payload))
+    finally:
+        _, peak = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+    assert peak < 1 << 20
+
+
+@given(size=sizes, data=st.data())
+def test_mutated_content_is_read_or_refused(make_tables, size, data) -> None:
+    payload = _payload(make_tables(**size))
+    for _ in range(data.draw(st.integers(1, 4))):
+        payload[data.draw(st.integers(0, len(payload) - 1))] = data.draw(st.integers(0, 255))
+    try:
+        tables = tables_from_bytes(seal(KIND, 1, bytes(payload)))
+    except ThenarError:
+        return
+    assert tables_to_bytes(tables)[56:] == bytes(payload)

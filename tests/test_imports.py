@@ -1,0 +1,84 @@
+"""Imports run one way between the rooms of the house (docs/architecture.md), read off the sources."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGES = ("cli", "compiler", "drivers", "firmware_templates", "runtime")
+
+# What modules whose name starts with the key may import of ours; the longest key that fits counts.
+ALLOWED = {
+    "drivers": ("drivers",),
+    "firmware_templates": (),
+    "runtime": ("runtime", "drivers"),
+    "runtime.tables": ("runtime.errors", "runtime.sealed"),
+    "runtime.errors": ("drivers.errors",),
+    "compiler": ("runtime", "drivers.errors", "compiler"),
+    "compiler.recordings": ("runtime", "drivers.errors", "compiler.recordings"),
+    "compiler.placement": ("runtime", "drivers.errors", "compiler.recordings", "compiler.placement"),
+    "compiler.boosting": ("runtime", "drivers.errors", "compiler.boosting"),
+    "compiler.tables": ("runtime", "drivers.errors", "compiler.boosting", "compiler.tables"),
+    "compiler.evaluation": (
+        "runtime",
+        "drivers.errors",
+        "compiler.recordings",
+        "compiler.placement",
+        "compiler.boosting",
+        "compiler.evaluation",
+    ),
+    "cli": PACKAGES,
+}
+
+# Third-party packages of the extra `compiler`, which a board does not have.
+WORKSTATION_ONLY = {"sklearn", "scipy", "matplotlib", "joblib"}
+
+
+def modules() -> Iterator[tuple[str, ast.Module]]:
+    for package in PACKAGES:
+        for path in sorted((ROOT / package).rglob("*.py")):
+            name = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+            yield name, ast.parse(path.read_text())
+
+
+def resolve(name: str, is_package: bool, node: ast.ImportFrom) -> str:
+    """Return what a `from ... import` of module `name` names, relative to the repository."""
+    if not node.level:
+        return node.module or ""
+    parts = name.split(".") if is_package else name.split(".")[:-1]
+    base = parts[: len(parts) - node.level + 1]
+    return ".".join([*base, *(node.module or "").split(".")]).strip(".")
+
+
+def imports(name: str, tree: ast.Module) -> Iterator[str]:
+    is_package = (ROOT / Path(*name.split(".")) / "__init__.py").exists()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield resolve(name, is_package, node)
+
+
+def fits(name: str, rooms: tuple[str, ...]) -> bool:
+    return any(name == room or name.startswith(room + ".") for room in rooms)
+
+
+@pytest.mark.parametrize(("name", "tree"), list(modules()), ids=lambda value: value if isinstance(value, str) else "")
+def test_a_module_imports_only_what_its_room_may(name: str, tree: ast.Module) -> None:
+    room = max((key for key in ALLOWED if fits(name, (key,))), key=len)
+    ours = {imported for imported in imports(name, tree) if imported.split(".")[0] in (*PACKAGES, "thenar")}
+    assert not {imported for imported in ours if not fits(imported, (*ALLOWED[room], name))}
+
+
+@pytest.mark.parametrize(("name", "tree"), list(modules()), ids=lambda value: value if isinstance(value, str) else "")
+def test_the_boards_side_names_no_workstation_package_at_the_top(name: str, tree: ast.Module) -> None:
+    if not fits(name, ("runtime", "drivers", "cli", "compiler.recordings")):
+        return
+    top = ast.Module([node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)], [])
+    assert not WORKSTATION_ONLY & {imported.split(".")[0] for imported in imports(name, top)}
+
+
+def test_the_sources_are_found_at_all() -> None:
+    assert len(list(modules())) > 40

@@ -1,0 +1,113 @@
+"""What is installed: every package, under one name, and a runtime that needs the base dependencies only."""
+
+import importlib.metadata as metadata
+import os
+import re
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tomllib
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+FOLDERS = PROJECT["tool"]["setuptools"]["package-dir"]
+
+
+def test_every_folder_with_python_in_it_is_listed_as_a_package() -> None:
+    found = set()
+    for name, folder in FOLDERS.items():
+        for init in (ROOT / folder).rglob("__init__.py"):
+            inner = init.parent.relative_to(ROOT / folder).parts
+            found.add(".".join([name, *inner]))
+    assert found == set(PROJECT["tool"]["setuptools"]["packages"])
+
+
+def test_every_package_is_marked_as_typed() -> None:
+    assert all((ROOT / folder / "py.typed").exists() for folder in FOLDERS.values())
+
+
+def test_no_top_level_package_of_a_common_name_is_installed() -> None:
+    assert all(name.startswith("thenar.") for name in PROJECT["tool"]["setuptools"]["packages"])
+
+
+def base_distributions() -> set[str]:
+    """Return the names of thenar's base dependencies and of theirs."""
+    names: set[str] = set()
+    left = [re.split(r"[ <>=!~;\[]", requirement, maxsplit=1)[0] for requirement in PROJECT["project"]["dependencies"]]
+    while left:
+        name = left.pop()
+        try:
+            requirements = metadata.requires(name) or []
+        except metadata.PackageNotFoundError:
+            continue  # a dependency of another platform
+        if name not in names:
+            names.add(name)
+            left += [re.split(r"[ <>=!~;\[(]", r, maxsplit=1)[0] for r in requirements if "extra ==" not in r]
+    return names
+
+
+@pytest.fixture(scope="module")
+def board(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the Python of a virtual environment with the wheel and its base dependencies and nothing else."""
+    folder = tmp_path_factory.mktemp("board")
+    source = folder / "source"
+    for name in FOLDERS.values():
+        shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("pyproject.toml", "README.md", "LICENSE", "MANIFEST.in"):
+        shutil.copy(ROOT / name, source / name)
+    pip = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation"]
+    subprocess.run(
+        [*pip, "--wheel-dir", folder / "wheel", source],
+        check=True,
+        env={**os.environ, "PIP_NO_INDEX": "1", "PIP_NO_CACHE_DIR": "1"},
+    )
+    venv.create(folder / "env", with_pip=False, symlinks=True)
+    site = Path(sysconfig.get_path("purelib", "venv", {"base": str(folder / "env"), "platbase": str(folder / "env")}))
+    for name in base_distributions():
+        for file in metadata.files(name) or []:
+            top = file.parts[0]
+            if top != ".." and not (site / top).exists():
+                (site / top).symlink_to(Path(str(metadata.distribution(name).locate_file(top))))
+    (wheel,) = (folder / "wheel").glob("*.whl")
+    with zipfile.ZipFile(wheel) as content:
+        content.extractall(site)
+    return folder / "env" / "bin" / "python"
+
+
+def on_board(board: Path, code: str) -> str:
+    done = subprocess.run([board, "-I", "-W", "error", "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.slow
+def test_the_wheel_holds_every_module_and_no_other(board: Path) -> None:
+    listed = on_board(
+        board,
+        "import thenar.runtime, pathlib; r = pathlib.Path(thenar.runtime.__file__).parents[1]; "
+        "print(*sorted(p.relative_to(r).as_posix() for p in r.rglob('*.py')))",
+    )
+    expected = []
+    for name, folder in FOLDERS.items():
+        short = name.removeprefix("thenar.")
+        expected += [f"{short}/{p.relative_to(ROOT / folder).as_posix()}" for p in (ROOT / folder).rglob("*.py")]
+    assert listed.split() == sorted(expected)
+
+
+@pytest.mark.slow
+def test_a_board_has_none_of_the_workstations_packages_and_imports_the_runtime(board: Path) -> None:
+    for name in ("sklearn", "scipy", "joblib", "matplotlib", "jinja2"):
+        refusal = f"import importlib.util; assert importlib.util.find_spec('{name}') is None"
+        on_board(board, refusal)
+    on_board(board, "import thenar.runtime, thenar.drivers, thenar.compiler.recordings.graspset")
+
+
+@pytest.mark.slow
+def test_the_command_runs_on_a_board(board: Path) -> None:
+    assert "compile" in on_board(board, "from thenar.cli import run; raise SystemExit(run(['--help']))")
