@@ -55,6 +55,7 @@ types: $(VENV)/installed  ## mypy --strict on an installed copy
 	$(BIN)/python -m pip install --quiet --no-deps --target .types .
 	rm -rf build
 	$(BIN)/mypy $(foreach package,$(PACKAGES),-p thenar.$(package))
+	MYPYPATH=.types:benchmarks $(BIN)/mypy --explicit-package-bases tests benchmarks
 
 $(VENV)/bench: $(VENV)/installed
 	$(BIN)/python -m pip install --quiet --group bench

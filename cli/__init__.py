@@ -56,6 +56,10 @@ def run(arguments: Sequence[str]) -> int:
         return _complain(str(mistake))
     except OSError as mistake:
         return _complain(f"{mistake.filename}: {mistake.strerror}" if mistake.filename else str(mistake))
+    except MemoryError as lack:
+        return _complain(f"not enough memory ({lack}): take fewer rows or columns")
+    except ModuleNotFoundError as lack:
+        return _complain(f"{lack.name} is not installed: pip install 'thenar[compiler]'")
     except (KeyboardInterrupt, click.Abort):
         click.echo("thenar: interrupted", err=True)
         return 130

@@ -1,5 +1,6 @@
 """What the sub-commands share: paths, the `--json` flag, consoles, and a progress bar for work longer than a second."""
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,22 +11,50 @@ import msgspec
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+
+class _OutputFile(click.Path):
+    """A file to write: no folder, in a folder that is there, so that no long work ends in an error."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        path = Path(os.fsdecode(super().convert(value, param, ctx)))
+        if not path.parent.is_dir():
+            self.fail(f"There is no folder '{path.parent}' to write '{path.name}' into: make it first.", param, ctx)
+        return path
+
+
 existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
 existing_folder = click.Path(exists=True, file_okay=False, path_type=Path)
 any_path = click.Path(path_type=Path)
+output_file = _OutputFile(dir_okay=False, writable=True, path_type=Path)
 
 json_flag = click.option("--json", "as_json", is_flag=True, help="Print one JSON document for machines instead.")
 
 
+def keep_apart(*paths: Path | None) -> None:
+    """Raise UsageError if two of the `paths` of one command are the same file: writing one would destroy the other."""
+    seen = set()
+    for path in filter(None, paths):
+        if path.resolve() in seen:
+            raise click.UsageError(
+                f"{path} is named twice: what is written there would replace what is read or written"
+            )
+        seen.add(path.resolve())
+
+
 def out() -> Console:
     """Return the console for results. Wide tables are not cut when piped into a file."""
-    console = Console(highlight=False)
-    return console if console.is_terminal else Console(highlight=False, width=200)
+    console = _console()
+    return console if console.is_terminal else _console(width=200)
 
 
 def err() -> Console:
     """Return the console for warnings and progress."""
-    return Console(stderr=True, highlight=False)
+    return _console(stderr=True)
+
+
+def _console(stderr: bool = False, width: int | None = None) -> Console:
+    # The names of the user's columns and files may hold brackets and colons, which are no markup.
+    return Console(stderr=stderr, width=width, highlight=False, markup=False, emoji=False)
 
 
 def print_json(result: Any) -> None:
@@ -38,7 +67,7 @@ def progress(what: str) -> Iterator[Callable[[int, int], None]]:
     """Yield report(done, total), which draws a bar on stderr when that is a terminal and nothing otherwise."""
     console = err()
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),

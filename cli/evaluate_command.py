@@ -1,11 +1,11 @@
 """`thenar evaluate`: the paper's tables for the user's own recordings."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from .common import any_path, err, existing_file, json_flag, print_json, progress
+from .common import err, existing_file, json_flag, keep_apart, output_file, print_json, progress
 
 if TYPE_CHECKING:
     from ..compiler.evaluation.study import Study
@@ -30,7 +30,16 @@ def _tables(_: click.Context, __: click.Parameter, value: str) -> tuple[str, ...
     return tuple(name for name in TABLES if name in parts)
 
 
+def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, ...]:
+    return ("paper", "honest") if value == "both" else (value,)
+
+
+def _scheme(_: click.Context, __: click.Parameter, value: str | None) -> str:
+    return value or "stratified"
+
+
 _COUNT = click.IntRange(min=1)
+_FOLDER = click.Path(file_okay=False, path_type=Path)
 
 
 @click.command()
@@ -39,6 +48,8 @@ _COUNT = click.IntRange(min=1)
 @click.option("--folds", type=click.IntRange(min=2), default=4, show_default=True, help="Folds of cross-validation.")
 @click.option(
     "--by",
+    "scheme",
+    callback=_scheme,
     type=click.Choice(("subject", "object", "block")),
     help="Leave out a subject, an object, or a range of trials (as many as folds) at a time, instead of random rows.",
 )
@@ -53,35 +64,32 @@ _COUNT = click.IntRange(min=1)
     show_default=True,
     help="Each S of pooled pruning.",
 )
-@click.option("--protocol", type=click.Choice(("both", "paper", "honest")), default="both", show_default=True)
+@click.option(
+    "--protocol",
+    "protocols",
+    callback=_protocols,
+    type=click.Choice(("both", "paper", "honest")),
+    default="both",
+    show_default=True,
+    help="Whose rows choose the placement.",
+)
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of the first repeat.")
 @click.option("--jobs", type=_COUNT, help="Worker processes. The result does not depend on it.  [default: all cores]")
 @click.option(
     "--tables", callback=_tables, metavar="NAME,...", default=",".join(TABLES), show_default=True, help="Which tables."
 )
-@click.option("--no-baselines", is_flag=True, help="Leave out the table of baselines.")
 @click.option("--confusion", is_flag=True, help="Print the confusion matrix of every composition and subject.")
-@click.option("--plot", "folder", type=any_path, metavar="FOLDER", help="Draw the confusion matrices there.")
-@click.option("-o", "--output", type=any_path, metavar="FILE", help="Write the whole result there, as JSON.")
+@click.option("--plot", "folder", type=_FOLDER, metavar="FOLDER", help="Draw the confusion matrices there.")
+@click.option("-o", "--output", type=output_file, metavar="FILE", help="Write the whole result there, as JSON.")
 @json_flag
 def command(
     grasps: Path,
-    subjects: tuple[str, ...],
-    folds: int,
-    by: str | None,
-    repeats: int,
-    rounds: int,
-    prune: int,
-    prune_list: tuple[int, ...],
-    protocol: str,
-    seed: int,
     jobs: int | None,
-    tables: tuple[str, ...],
-    no_baselines: bool,
     confusion: bool,
     folder: Path | None,
     output: Path | None,
     as_json: bool,
+    **asked: Any,
 ) -> None:
     """Cross-validate GRASPS and print the paper's tables: recognition rates in percent, with 95 % intervals.
 
@@ -99,21 +107,10 @@ def command(
     from ..compiler.evaluation.study import Options, evaluate
     from ..compiler.recordings.graspset import GraspSet
 
-    if no_baselines:
-        tables = tuple(name for name in tables if name != "baselines")
-    given = {
-        "subjects": subjects,
-        "scheme": by or "stratified",
-        "folds": folds,
-        "repeats": repeats,
-        "rounds": rounds,
-        "prune": prune,
-        "prune_list": prune_list,
-        "protocols": ("paper", "honest") if protocol == "both" else (protocol,),
-        "tables": tables,
-        "seed": seed,
-    }
-    options = msgspec.convert(given, Options)
+    options = msgspec.convert(asked, Options)
+    if (confusion or folder is not None) and "compositions" not in options.tables:
+        raise click.UsageError("--confusion and --plot show the compositions: name them among --tables")
+    keep_apart(grasps, output)
     with progress("evaluating") as report:
         study = evaluate(GraspSet.load(grasps), options, jobs or -1, report)
     _write(study, folder, output)

@@ -4,15 +4,15 @@ from pathlib import Path
 
 import click
 
-from .common import any_path, existing_file
+from .common import existing_file, keep_apart, output_file, progress
 
 
 @click.command("export")
 @click.argument("grasps", type=existing_file)
-@click.option("-o", "--output", type=any_path, required=True, help="The .csv, .csv.gz or .arff file to write.")
+@click.option("-o", "--output", type=output_file, required=True, help="The .csv, .csv.gz or .arff file to write.")
 @click.option("--codes", is_flag=True, help="Write the joints' integer codes instead of values in their units.")
 @click.option("--meta", is_flag=True, help="ARFF: write subject, object and trial too (CSV always holds them).")
-@click.option("--columns", type=any_path, help="Also write the columns.toml that imports the table again.")
+@click.option("--columns", type=output_file, help="Also write the columns.toml that imports the table again.")
 def command(grasps: Path, output: Path, codes: bool, meta: bool, columns: Path | None) -> None:
     """Export GRASPS, a .grasps file, as CSV or as ARFF for Weka.
 
@@ -26,8 +26,10 @@ def command(grasps: Path, output: Path, codes: bool, meta: bool, columns: Path |
     from ..compiler.recordings.graspset import GraspSet
     from ..runtime.files import write_atomically
 
+    keep_apart(grasps, output, columns)
     grasp_set = GraspSet.load(grasps)
-    export(grasp_set, output, codes, meta)
+    with progress(f"exporting {grasps.name}"):
+        export(grasp_set, output, codes, meta)
     if columns is not None:
         arff = output.suffix.lower() == ".arff"
         write_atomically(columns, columns_of(grasp_set, codes, meta or not arff).encode())

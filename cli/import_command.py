@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import any_path, existing_file, json_flag, out, print_json, progress
+from .common import existing_file, json_flag, keep_apart, out, output_file, print_json, progress
 
 if TYPE_CHECKING:
     from ..compiler.recordings.importer import ImportReport
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @click.command("import")
 @click.argument("table", type=existing_file)
-@click.option("-o", "--output", type=any_path, required=True, help="The .grasps file to write.")
+@click.option("-o", "--output", type=output_file, required=True, help="The .grasps file to write.")
 @click.option("--columns", type=existing_file, required=True, help="columns.toml: what each column of the table is.")
 @json_flag
 def command(table: Path, output: Path, columns: Path, as_json: bool) -> None:
@@ -30,6 +30,7 @@ def command(table: Path, output: Path, columns: Path, as_json: bool) -> None:
 
     if output.suffix != ".grasps":
         raise click.BadParameter(f"{output.name}: a set of grasps ends in .grasps", param_hint="--output")
+    keep_apart(table, columns, output)
     with progress(f"importing {table.name}"):
         grasp_set, report = import_file(table, columns)
     grasp_set.save(output)

@@ -2,7 +2,10 @@
 
 import os
 import shutil
+import subprocess
+from collections.abc import Callable
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
@@ -10,20 +13,33 @@ REQUIRE_ALL = os.environ.get("THENAR_REQUIRE_ALL") == "1"
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
+WEKA_JAR = Path("/usr/share/java/weka.jar")  # where Debian's package puts it
+
+
+def lacking(what: str) -> NoReturn:
+    """Fail under THENAR_REQUIRE_ALL=1, as in CI; skip by name elsewhere."""
+    (pytest.fail if REQUIRE_ALL else pytest.skip)(f"{what} is missing")
+
+
 def need(path: Path) -> Path:
-    """Return `path`; if it is not there, fail under THENAR_REQUIRE_ALL=1 and skip by name elsewhere."""
-    if not path.exists():
-        (pytest.fail if REQUIRE_ALL else pytest.skip)(f"data set {path.name} is missing")
-    return path
+    """Return `path`, a data set or a file of a package, if it is there."""
+    return path if path.exists() else lacking(path.name)
 
 
 def need_tool(name: str) -> str:
-    """Return the path of program `name`; if it is not installed, fail under THENAR_REQUIRE_ALL=1 and skip elsewhere."""
-    found = shutil.which(name)
-    if found is None:
-        (pytest.fail if REQUIRE_ALL else pytest.skip)(f"program {name} is missing")
-        raise AssertionError
-    return found
+    """Return the path of program `name` if it is installed."""
+    return shutil.which(name) or lacking(f"program {name}")
+
+
+@pytest.fixture(scope="session")
+def weka() -> Callable[..., str]:
+    """Return a function that runs a class of the real Weka 3.6 with arguments and returns what it prints."""
+    command = [need_tool("java"), "-cp", str(need(WEKA_JAR))]
+
+    def run(*arguments: str) -> str:
+        return subprocess.run([*command, *arguments], check=True, capture_output=True, text=True).stdout
+
+    return run
 
 
 @pytest.fixture(scope="session")

@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 from ...drivers.errors import ThenarError
 from .binning import bin_columns
 from .elementary import softmax_and_loss
-from .stumpfit import FittedStumps, Targets, fit_stumps
+from .stumpfit import Targets, fit_stumps
 from .stumps import Stumps, centred
 
 Floats = NDArray[np.float64]
+
+# Ties are counted on the grid in units that grow with the square of z_max: far above this, all stumps would tie.
+LARGEST_Z_MAX = 100.0
 
 
 class BoostingError(ThenarError, ValueError):
@@ -48,17 +51,22 @@ def boost(
     Stops early where the mean log-likelihood changes by less than `tolerance` in a round (Weka's -L; None: never), or
     where no column varies. `on_round(done, rounds)` is called after every round. Raises BoostingError.
     """
-    _check(X, labels, n_classes, rounds, shrinkage, z_max, weights)
+    _check_options(rounds, shrinkage, z_max)
+    _check_rows(X, labels, n_classes, weights)
+    if weights is not None:
+        # By a power of two, which changes no answer: now sums of huge weights stay finite, and of tiny ones exact.
+        weights = np.ldexp(weights, -np.frexp(weights.max())[1])
     binned = bin_columns(X)
     member = labels == np.arange(n_classes)[:, np.newaxis]
     scores = np.zeros((n_classes, len(X)))
     probability, loss = softmax_and_loss(scores, labels, weights)
     losses = [loss]
-    fitted: list[FittedStumps] = []
+    fitted: list[tuple[NDArray[np.int32], Floats, Floats]] = []
     stopped = False
     while len(fitted) < rounds and binned.groups and not stopped:
         stumps = fit_stumps(binned, _targets(probability, member, z_max, weights), z_max)
-        fitted.append(stumps)
+        # Not the answers: of a million rows they would be a hundred megabytes a round.
+        fitted.append((stumps.columns, stumps.thresholds, stumps.values))
         scores += centred(stumps.answers, shrinkage)
         probability, loss = softmax_and_loss(scores, labels, weights)
         losses.append(loss)
@@ -78,36 +86,39 @@ def _targets(probability: Floats, member: NDArray[np.bool_], z_max: float, row_w
     return Targets(sizes * np.maximum(own, 1.0 / z_max), np.where(member, sizes, -sizes))
 
 
-def _stack(fitted: list[FittedStumps], n_inputs: int, n_classes: int, shrinkage: float) -> Stumps:
+def _stack(
+    fitted: list[tuple[NDArray[np.int32], Floats, Floats]], n_inputs: int, n_classes: int, shrinkage: float
+) -> Stumps:
     rounds = len(fitted)
     return Stumps(
         n_inputs,
-        np.array([stumps.columns for stumps in fitted], dtype=np.int32).reshape(rounds, n_classes),
-        np.array([stumps.thresholds for stumps in fitted]).reshape(rounds, n_classes),
-        np.array([stumps.values for stumps in fitted]).reshape(rounds, n_classes, 3),
+        np.array([columns for columns, _, _ in fitted], dtype=np.int32).reshape(rounds, n_classes),
+        np.array([thresholds for _, thresholds, _ in fitted]).reshape(rounds, n_classes),
+        np.array([values for _, _, values in fitted]).reshape(rounds, n_classes, 3),
         shrinkage,
     )
 
 
-def _check(
-    X: NDArray[np.generic],
-    labels: NDArray[np.intp],
-    n_classes: int,
-    rounds: int,
-    shrinkage: float,
-    z_max: float,
-    weights: Floats | None,
-) -> None:
+def _check_options(rounds: int, shrinkage: float, z_max: float) -> None:
+    if rounds < 1:
+        raise BoostingError(f"rounds={rounds} must be at least 1")
+    if not 0 < shrinkage <= 1:
+        raise BoostingError(f"shrinkage={shrinkage} must be above 0 and at most 1")
+    if not 1 < z_max <= LARGEST_Z_MAX:
+        raise BoostingError(f"z_max={z_max} must be above 1 and at most {LARGEST_Z_MAX:g}")
+
+
+def _check_rows(X: NDArray[np.generic], labels: NDArray[np.intp], n_classes: int, weights: Floats | None) -> None:
     if X.ndim != 2 or len(X) == 0 or labels.shape != (len(X),):
         raise BoostingError(f"inputs {X.shape} and labels {labels.shape} must be (n, d) and (n,) with at least one row")
     if labels.min() < 0 or labels.max() >= n_classes:
         raise BoostingError(f"labels run from {labels.min()} to {labels.max()}, classes from 0 to {n_classes - 1}")
-    if rounds < 1 or not 0 < shrinkage <= 1 or not 1 < z_max < float("inf"):
-        raise BoostingError(
-            f"rounds={rounds} must be at least 1, shrinkage={shrinkage} in (0, 1], z_max={z_max} above 1 and finite"
-        )
-    if weights is not None and (weights.shape != labels.shape or not (weights >= 0).all() or not weights.any()):
-        raise BoostingError("row weights must be (n,) numbers of at least 0, not all 0")
+    if weights is not None and not _are_weights(weights, labels.shape):
+        raise BoostingError("row weights must be (n,) finite numbers of at least 0, not all 0")
     if X.dtype.kind == "f" and np.isinf(X).any():
         row, column = np.argwhere(np.isinf(X))[0]
         raise BoostingError(f"row {row}, column {column} is infinite; a joint angle is finite or NaN for missing")
+
+
+def _are_weights(weights: Floats, shape: tuple[int, ...]) -> bool:
+    return weights.shape == shape and bool(np.isfinite(weights).all() and (weights >= 0).all() and weights.any())

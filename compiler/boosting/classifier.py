@@ -27,7 +27,7 @@ class LogitBoostClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc
     ----------
     rounds : number of boosting rounds; each fits one stump a class (the paper: 100).
     shrinkage : factor on every stump's answer, in (0, 1] (Weka's -H).
-    z_max : clamp of the working response and of every stump's answer (Weka 3.6: the constant 3).
+    z_max : clamp of the working response and of every stump's answer, in (1, 100] (Weka 3.6: the constant 3).
     tolerance : stop where the mean log-likelihood changes by less than this in a round (Weka's -L); None never stops.
     classes : labels that exist even where y lacks some of them (a fold without a rare class); None: those in y.
 
@@ -60,7 +60,9 @@ class LogitBoostClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc
         """Train on X (n, d) and labels y (n,). Raises ValueError saying what does not fit."""
         inputs, targets = validate_data(self, X, y, ensure_all_finite="allow-nan", dtype=_kept_dtypes(X))
         check_classification_targets(targets)
-        weights = None if sample_weight is None else _check_sample_weight(sample_weight, inputs, dtype=np.float64)
+        weights = None
+        if sample_weight is not None:
+            weights = _check_sample_weight(sample_weight, inputs, dtype=np.float64, ensure_non_negative=True)
         self.classes_ = np.unique(targets) if self.classes is None else np.asarray(self.classes)
         labels = self._index(targets)
         if weights is not None:

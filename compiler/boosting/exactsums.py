@@ -2,9 +2,9 @@
 
 A double holds every integer up to 2^53. So numbers rounded to multiples of 2^-e, with e chosen such that the sum of
 their magnitudes stays below 2^52 multiples, can be added and subtracted in any order, by any BLAS, on any number of
-threads, and give the same integer. The rounding costs at most half a multiple a number, n * 2^-53 of the total in the
-worst case: what an ordinary floating-point sum of n numbers may lose too. What the rounding left over can be put on a
-finer grid of its own, where a sum needs more than that.
+threads, and give the same integer. The rounding costs at most half a multiple a number, n * 2^-51 of the total in the
+worst case: four times what an ordinary floating-point sum of n numbers may lose. What the rounding left over can be put
+on a finer grid of its own, where a sum needs more than that.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ SUM_BITS = 52
 class OnGrid:
     """Numbers (K, n) as whole units: row k stands for units[k] * 2^-exponents[k], and any sum of units is exact."""
 
-    units: Floats  # (K, n) integers whose magnitudes sum to at most 2^52 a row and, unless all are 0, to about 2^51
+    units: Floats  # (K, n) integers whose magnitudes sum to at most 2^52 a row and, unless all are 0, to 2^50 at least
     exponents: NDArray[np.int32]  # (K,)
 
     def values(self) -> Floats:

@@ -17,8 +17,8 @@ from .exactsums import on_grids
 Floats = NDArray[np.float64]
 Place = tuple[TwoValued | ManyValued, int, int]  # group of columns, position in it, split
 
-# A branch with less than this many grid units of weight is empty. The class's total has 2^50 to 2^52 units, so this is
-# a share of 1e-12: below it a branch's mean would be made of what the grid rounded away.
+# A branch with less than this many grid units of weight is empty. The class's total has 2^50 to 2^51 units, so this is
+# a share of 2e-12 to 4e-12: below it a branch's mean would be made of what the grid rounded away.
 EMPTY_UNITS = 2.0**12
 
 

@@ -22,6 +22,7 @@ from ...runtime.manifest import (
     manifest_to_bytes,
 )
 from ...runtime.tables import IntegerTables, tables_to_bytes
+from ..evaluation.folds import check_cut
 from ..recordings.graspset import GraspSet
 from ..tables.collapse import collapse
 from ..tables.compare import Comparison, compare
@@ -64,6 +65,8 @@ def compile_build(
     target = check_target(Path(folder))
     options = Options(prune, rounds, inputs, float(shrinkage), folds, seed)
     material = material_of(grasp_set, options)
+    if folds:
+        check_cut(len(grasp_set), folds, "rows")
     steps = _Steps(progress, rounds, folds)
     trained = train(material, options, steps.round_done)
     bits = trained.kept(material)

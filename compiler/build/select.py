@@ -34,8 +34,11 @@ def _columns(kind: str, wanted: list[str], there: tuple[str, ...]) -> list[int]:
 def _check_calibration(built: Calibration, recorded: Joint) -> None:
     values = np.array([built.value_a, built.value_b])
     meant = recorded.value([built.code_a, built.code_b])
-    if recorded.unit != built.unit or not np.allclose(meant, values, rtol=0, atol=abs(recorded.step) * 1e-6):
+    same = np.isclose(meant, values, rtol=0, atol=abs(recorded.step) * 1e-6)
+    if recorded.unit != built.unit or not same.all():
+        point = int(same.argmin())
+        code = (built.code_a, built.code_b)[point]
         raise CompileError(
-            f"joint {built.name} is coded differently here: code {built.code_a} is {meant[0]:g} {recorded.unit}, in "
-            f"the build {built.value_a:g} {built.unit}; import these recordings with the build's grid and origin"
+            f"joint {built.name} is coded differently here: code {code} is {meant[point]:g} {recorded.unit}, in the "
+            f"build {values[point]:g} {built.unit}; import these recordings with the build's grid and origin"
         )

@@ -1,6 +1,7 @@
 """A build folder is published whole: written beside its place, made durable, then renamed into it."""
 
 import os
+import secrets
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,38 +21,50 @@ def check_target(folder: Path) -> Path:
     target = folder.resolve()
     if not target.parent.is_dir():
         raise CompileError(f"{target.parent} is no folder: make it first, then compile into {folder}")
-    if not target.exists():
-        return target
-    if not target.is_dir():
+    if not os.access(target.parent, os.W_OK | os.X_OK):
+        raise CompileError(f"{target.parent} may not be written to: name a folder elsewhere")
+    if target.exists() and not target.is_dir():
         raise CompileError(f"{folder} is a file: name a folder for the build")
-    names = {path.name for path in target.iterdir()}
-    if names and MANIFEST_NAME not in names:
+    if target.exists() and any(target.iterdir()) and not (target / MANIFEST_NAME).exists():
         raise CompileError(f"{folder} is not empty and not a build: name another folder, or empty this one")
-    if foreign := sorted(names - MEMBERS):
-        raise CompileError(f"{folder} holds {foreign[0]}, which is not of a build: move it, or name another folder")
+    for place in (target, _aside(target)):
+        _refuse_foreign(place)
     return target
 
 
-def publish(files: Mapping[str, bytes], target: Path) -> None:
-    """Write `files` as the folder `target`, in place of what `check_target` allowed there.
+def _refuse_foreign(folder: Path) -> None:
+    for path in sorted(folder.iterdir()) if folder.exists() else ():
+        if path.name not in MEMBERS or not path.is_file():
+            raise CompileError(f"{folder} holds {path.name}, which is not of a build: move it, or name another folder")
 
-    Interrupted, it leaves the old build and nothing else; after a crash in the moment between two renames the old build
-    is in `.NAME.old` beside the place of the new one.
+
+def publish(files: Mapping[str, bytes], target: Path) -> None:
+    """Write `files` as the folder `target`, in place of what `check_target` allows there.
+
+    Interrupted, it leaves the old build or the new one, whole, and nothing else; after a crash in the moment between
+    two renames the old build is in `.NAME.old` beside the place of the new one. Raises CompileError as `check_target`
+    does.
     """
-    staged = target.with_name(f".{target.name}.{os.getpid()}.part")
-    staged.mkdir()
+    # Not named after the process: in a container the next one may have the same number, and meet what a crash left.
+    staged = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
     try:
+        staged.mkdir()
         for name, data in files.items():
             write_atomically(staged / name, data)
-        _exchange(staged, target)
+        # Again, because training takes its time and the folder is the user's.
+        _exchange(staged, check_target(target))
     except BaseException:
         shutil.rmtree(staged, ignore_errors=True)
         raise
     sync_folder(target.parent)
 
 
+def _aside(target: Path) -> Path:
+    return target.with_name(f".{target.name}.old")
+
+
 def _exchange(staged: Path, target: Path) -> None:
-    aside = target.with_name(f".{target.name}.old")
+    aside = _aside(target)
     try:
         if target.exists():
             _discard(aside)

@@ -78,4 +78,6 @@ def train(material: Material, options: Options, report: Report | None = None) ->
         shrinkage=options.shrinkage,
         on_round=report,
     )
+    if not stumps.n_rounds:
+        raise CompileError("no input differs between rows: there is nothing to tell grasp types apart by")
     return Trained(columns, gains, stumps)

@@ -7,11 +7,16 @@ from .populations import Population, Scheme
 
 
 def concerns(grasp_set: GraspSet, parts: tuple[Population, ...], scheme: Scheme, n_folds: int) -> tuple[str, ...]:
-    """Return a sentence for each grasp type too rare for the folds, or tested where it was never trained."""
+    """Return a sentence for each grasp type that is alone, too rare for the folds, or tested but never trained."""
+    alone = [
+        f"subject {part.name}: every row is of {grasp_set.taxonomy.types[part.grasps[0]]}, nothing is to be told apart"
+        for part in parts
+        if len(part.grasps) == 1
+    ]
     found = [text for part in parts for text in _untrained(grasp_set, part)]
     if scheme == "stratified":
         found = [text for part in parts for text in _rare(grasp_set, part, n_folds)] + found
-    return tuple(found)
+    return tuple(alone + found)
 
 
 def _rare(grasp_set: GraspSet, part: Population, n_folds: int) -> list[str]:

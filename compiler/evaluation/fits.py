@@ -1,7 +1,10 @@
 """The work of an evaluation: independent fits, each done once, on all cores, with the same result on any number."""
 
-from collections.abc import Callable, Iterable
+import signal
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,11 +74,25 @@ def run_fits(
     results: dict[Fit, Labels] = {}
     with parallel_config(backend="loky", inner_max_num_threads=1):
         workers = Parallel(n_jobs=jobs, return_as="generator_unordered")
-        for number, found in workers(delayed(_numbered)(i, X, labels, fit, training) for i, fit in enumerate(todo)):
+        with _interrupts_held():
+            answers = workers(delayed(_numbered)(i, X, labels, fit, training) for i, fit in enumerate(todo))
+        for number, found in answers:
             results[todo[number]] = found
             if progress is not None:
                 progress(len(results), len(todo))
     return results
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Let a Ctrl-C wait. Processes started meanwhile never get it, so none complains of it: this one ends them."""
+    # loky asks for this helper process of Python's, and its start would lift the block.
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _numbered(number: int, X: Inputs, labels: Labels, fit: Fit, training: Training) -> tuple[int, Labels]:

@@ -21,7 +21,8 @@ class Rate:
 
         (p + z^2/2n +- z sqrt(p (1 - p)/n + z^2/4n^2)) / (1 + z^2/n)        (E. B. Wilson 1927; z = 1.96)
 
-    With one repeat it is Wilson's alone.
+    With one repeat it is Wilson's alone. Where the rate is of several random draws, each repeated, Student's t is over
+    the draws: the repeats of one draw say nothing of the next.
     """
 
     correct: tuple[int, ...]
@@ -31,14 +32,18 @@ class Rate:
     high: float
 
     @classmethod
-    def of(cls, correct: tuple[int, ...], total: int) -> Self:
-        """Return the rate of `correct` rows of `total` in each repeat; ValueError unless 0 <= correct <= total > 0."""
+    def of(cls, correct: tuple[int, ...], total: int, repeats_a_draw: int = 1) -> Self:
+        """Return the rate of `correct` rows of `total` in each repeat; ValueError unless 0 <= correct <= total > 0.
+
+        `repeats_a_draw` repeats on end belong to one random draw; without draws each repeat stands for itself.
+        """
         if not correct or total < 1 or not all(0 <= count <= total for count in correct):
             raise ValueError(f"{correct} recognised of {total} rows is no rate")
         mean = sum(correct) / (len(correct) * total)
         bounds = [_wilson(mean, total)]
-        if len(correct) > 1:
-            bounds.append(_student([count / total for count in correct]))
+        starts = range(0, len(correct), repeats_a_draw)
+        if len(starts) > 1:
+            bounds.append(_student([fmean(correct[i : i + repeats_a_draw]) / total for i in starts]))
         return cls(correct, total, mean, *_hull(mean, bounds))
 
 

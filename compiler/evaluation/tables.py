@@ -87,11 +87,12 @@ class Reader:
     def cell(self, plan: CellPlan, *, confusing: bool) -> Cell:
         """Return the cell of a plan, with its confusion matrix if `confusing`."""
         correct = tuple(sum(map(self._correct, run)) for run in plan.runs)
-        rate = Rate.of(correct, plan.part.total)
+        repeats = len(plan.part.repeats)
+        rate = Rate.of(correct, plan.part.total, repeats if len(correct) > repeats else 1)
         counts = [sum(column < self.n_switches for column in fit.columns) for fit in plan.fits]
         empty = sum(not fit.columns for fit in plan.fits)
         confusion = self._confusion(plan.fits) if confusing else None
-        return Cell(rate, Spread.of(counts), empty, _draws(rate, len(plan.part.repeats)), confusion)
+        return Cell(rate, Spread.of(counts), empty, _draws(rate, repeats), confusion)
 
     def _row(self, plan: RowPlan, *, confusing: bool) -> Row:
         cells = tuple(self.cell(cell, confusing=confusing) for cell in plan.cells)

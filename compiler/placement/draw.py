@@ -33,7 +33,8 @@ def draw_tree(tree: Tree, path: Path, names: Sequence[str] = (), class_names: Se
         raise PlacementError("drawing needs matplotlib: pip install 'thenar[compiler]'") from reason
     size = (_LEAF_INCHES * tree.n_leaves + 1.5, _LEVEL_INCHES * tree.depth + 1.2)
     picture = io.BytesIO()
-    with mpl.rc_context({"svg.hashsalt": "thenar", "font.size": _FONT_SIZE}):
+    # A "$" in a name is a "$".
+    with mpl.rc_context({"svg.hashsalt": "thenar", "font.size": _FONT_SIZE, "text.parse_math": False}):
         figure = Figure(figsize=(min(size[0], _LARGEST_INCHES), min(size[1], _LARGEST_INCHES)))
         axes = figure.add_axes((0, 0, 1, 1))
         axes.set(xlim=(-1, tree.n_leaves), ylim=(-tree.depth - 0.5, 0.5))

@@ -6,7 +6,9 @@ gives the same bytes whatever zlib is installed, and so that no file can ask for
 
 import io
 import zipfile
+import zlib
 from collections.abc import Mapping
+from tokenize import TokenError
 
 import numpy as np
 from numpy.lib import format as npy
@@ -15,6 +17,20 @@ from numpy.typing import NDArray
 from ...runtime.errors import SealError
 
 AnyArray = NDArray[np.generic]
+
+# What zipfile and numpy's header parser answer bad bytes with; MemoryError is an array that claims to be huge.
+UNREADABLE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    ValueError,
+    EOFError,
+    OSError,
+    RuntimeError,
+    MemoryError,
+    SyntaxError,
+    OverflowError,
+    TokenError,
+)
 
 _HEADER = "header"
 
@@ -42,8 +58,7 @@ def unpack(payload: bytes, what: str = "payload") -> tuple[bytes, dict[str, AnyA
             arrays = {info.filename.removesuffix(".npy"): _read(members, info) for info in members.infolist()}
             if len(arrays) != len(members.infolist()):
                 raise SealError(f"{what} holds an array twice")
-    # zipfile and numpy's header parser answer bad bytes with all of these.
-    except (zipfile.BadZipFile, ValueError, EOFError, OSError, RuntimeError, SyntaxError, OverflowError) as reason:
+    except UNREADABLE as reason:
         raise SealError(f"{what} holds no arrays that can be read: {reason}") from reason
     header = arrays.pop(_HEADER, None)
     if header is None or header.dtype != np.uint8:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .graspset import CODES
+from .names import fault
 from .table import Column
 
 MISSING_NUMBERS = frozenset({"", "?", "na", "nan"})
@@ -55,12 +56,18 @@ def codes(column: Column) -> Parsed[np.float64]:
 
 
 def names(column: Column) -> Parsed[np.str_]:
-    """Read `column` as names without outer blanks; missing: empty and ?. Whole numbers read as such: 3, not 3.0."""
+    """Read `column` as names without outer blanks; missing: empty and ?, wrong: with control characters.
+
+    Whole numbers read as such: 3, not 3.0.
+    """
     if isinstance(column, np.ndarray):
         texts = ["" if np.isnan(cell) else np.format_float_positional(cell, trim="-") for cell in column]
     else:
         texts = [cell.strip() for cell in column]
-    return Parsed(np.array(texts, np.str_), np.isin(texts, list(MISSING_NAMES)), np.zeros(len(texts), np.bool_))
+    # Looked up as str: an array of them would lose NULs at their ends.
+    faulty = {text for text in {*texts} - MISSING_NAMES if fault(text)}
+    missing, wrong = (np.array([text in found for text in texts], np.bool_) for found in (MISSING_NAMES, faulty))
+    return Parsed(np.array(texts, np.str_), missing, wrong)
 
 
 def _parsed(values: NDArray[np.float64], column: Column) -> Parsed[np.float64]:

@@ -60,5 +60,8 @@ def _joint(name: str, entry: JointColumns, least: float) -> Joint:
         return Joint(name, entry.unit, points.code_a, points.value_a, points.code_b, points.value_b)
     if entry.codes:
         return Joint(name, entry.unit, 0, 0.0, 1, 1.0)
-    origin = math.floor(least / entry.step) * entry.step if entry.origin is None else entry.origin
+    steps = least / entry.step
+    # Where the grid cannot be counted, no Joint will have it either.
+    floor = math.floor(steps) * entry.step if math.isfinite(steps) else least
+    origin = floor if entry.origin is None else entry.origin
     return Joint(name, entry.unit, 0, origin, _FAR, origin + _FAR * entry.step)

@@ -1,5 +1,7 @@
 """`columns.toml`: which column of a table is the label, the subject, a switch, a joint, and how joints become codes."""
 
+import codecs
+import glob
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -84,7 +86,7 @@ class Selection:
 def read_columns(path: Path) -> Columns:
     """Read a columns.toml; raises ColumnsError naming the key that is wrong."""
     try:
-        return msgspec.toml.decode(path.read_bytes(), type=Columns)
+        return msgspec.toml.decode(path.read_bytes().removeprefix(codecs.BOM_UTF8), type=Columns)
     except (msgspec.DecodeError, UnicodeDecodeError) as reason:
         raise ColumnsError(f"{path.name}: {_in_toml_words(str(reason))}") from reason
 
@@ -109,15 +111,18 @@ def select(columns: Columns, names: Sequence[str]) -> Selection:
 
     Raises ColumnsError if a column is missing, used twice, a glob matches nothing, or nothing is a switch or a joint.
     """
-    single = [
-        column for column in (columns.label, columns.subject, columns.object, columns.trial) if column is not None
-    ]
-    for column in single:
-        if column not in names:
-            raise ColumnsError(f"the table has no column {column!r}{nearest(column, names)}")
+    meta = {
+        "label": columns.label,
+        "subject": columns.subject,
+        "object": columns.object,
+        "trial": columns.trial,
+    }
+    for key, column in meta.items():
+        if column is not None and column not in names:
+            raise ColumnsError(f"{key}: the table has no column {column!r}{nearest(column, names)}")
     switches = tuple(_matches("switches", columns.switches, names))
     joints = tuple((name, entry) for entry in columns.joints for name in _matches("joints", entry.columns, names))
-    used = Counter([*single, *switches, *(name for name, _ in joints)])
+    used = Counter([*filter(None, meta.values()), *switches, *(name for name, _ in joints)])
     if twice := [name for name, times in used.items() if times > 1]:
         raise ColumnsError(f"column {twice[0]!r} is used {used[twice[0]]} times: name it once, or narrow the globs")
     if not switches and not joints:
@@ -126,8 +131,10 @@ def select(columns: Columns, names: Sequence[str]) -> Selection:
 
 
 def _matches(what: str, globs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
-    for glob in globs:
-        found = [name for name in names if fnmatchcase(name, glob)]
+    for pattern in globs:
+        found = [name for name in names if fnmatchcase(name, pattern)]
         if not found:
-            raise ColumnsError(f"{what}: {glob!r} matches no column of the table{nearest(glob, names)}")
+            advice = f"; for the column of that name write {glob.escape(pattern)!r}"
+            advice = advice if pattern in names else nearest(pattern, names)
+            raise ColumnsError(f"{what}: {pattern!r} matches no column of the table{advice}")
         yield from found

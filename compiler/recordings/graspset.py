@@ -43,7 +43,7 @@ class Joint:
         if not math.isfinite(largest) or not abs(self.step) > 1e-9 * largest:
             raise RecordingError(
                 f"joint {self.name} is calibrated to {self.value_a} and {self.value_b} {self.unit}: "
-                "its codes cannot be told apart"
+                "its codes cannot be told apart; take a coarser grid or points further apart"
             )
 
     @property
@@ -56,8 +56,9 @@ class Joint:
         return self.value_a + (np.asarray(code, dtype=np.float64) - self.code_a) * self.step
 
     def code(self, value: ArrayLike) -> NDArray[np.float64]:
-        """Return the nearest codes of `value`, as whole floats that may lie outside 0..65535; inverse of `value`."""
-        return np.rint(self.code_a + (np.asarray(value, dtype=np.float64) - self.value_a) / self.step)
+        """Return the nearest codes of `value`, as whole floats that may lie outside 0..65535 (infinitely far)."""
+        with np.errstate(over="ignore"):
+            return np.rint(self.code_a + (np.asarray(value, dtype=np.float64) - self.value_a) / self.step)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,7 +16,7 @@ def check_names(what: str, names: Iterable[str]) -> None:
     """Raise RecordingError unless `names` are distinct, not empty, and free of control characters and outer blanks."""
     seen: set[str] = set()
     for name in names:
-        if reason := _fault(name):
+        if reason := fault(name):
             raise RecordingError(f"{what} {name!r} {reason}")
         if name in seen:
             raise RecordingError(f"{what} {name!r} occurs twice")
@@ -24,14 +24,18 @@ def check_names(what: str, names: Iterable[str]) -> None:
 
 
 def nearest(name: str, names: Sequence[str]) -> str:
-    """Return " (did you mean ...?)" with the names most like `name`, or nothing."""
+    """Return " (did you mean ...?)" with the names most like `name`, or the first of `names` when none is near."""
     near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
-    return f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
+    return f" (did you mean {' or '.join(map(repr, near))}?)" if near else f" (there are: {list_names(names)})"
 
 
-def list_names(names: Sequence[str]) -> str:
-    """Return the first few names and how many more there are: "a, b, c, d, e and 7 more"."""
-    more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+def list_names(names: Sequence[str], count: int | None = None) -> str:
+    """Return the first few names and how many more of `count` there are: "a, b, c, d, e and 7 more".
+
+    `names` need hold no more than the first SHOWN when their `count` is given.
+    """
+    total = len(names) if count is None else count
+    more = f" and {total - SHOWN} more" if total > SHOWN else ""
     return ", ".join(names[:SHOWN]) + more
 
 
@@ -40,7 +44,8 @@ def list_rows(rows: NDArray[np.int64]) -> str:
     return f"row{'s' if len(rows) > 1 else ''} {list_names(rows.astype(str).tolist())}"
 
 
-def _fault(name: str) -> str:
+def fault(name: str) -> str:
+    """Return why `name` would not survive every file format, or nothing."""
     if not name:
         return "is empty"
     if name == "?":

@@ -1,6 +1,7 @@
 """A set as a picture: how many grasps of each type, which switches each type closes, which values its joints take."""
 
 import io
+import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,8 +18,13 @@ _BLUE = "#2f6690"
 _PALE = "#8fb3cc"
 _ORANGE = "#e07a1f"
 _JOINTS_A_ROW = 6
+# More joints would make a picture that no program opens.
+_DRAWN_JOINTS = 60
+# Pixels; hundreds of grasp types are drawn smaller rather than refused by the renderer.
+_TALLEST = 20_000
 # Beyond so many columns their names cannot be read side by side.
 _NAMED_SWITCHES = 90
+_LONGEST_NAME = 30
 
 
 def draw(grasp_set: GraspSet, kind: str) -> bytes:
@@ -33,10 +39,23 @@ def draw(grasp_set: GraspSet, kind: str) -> bytes:
         raise RecordingError("drawing needs matplotlib: pip install 'thenar[compiler]'") from reason
     if not len(grasp_set):
         raise RecordingError("a set without rows cannot be drawn")
-    with mpl.rc_context(
-        {"svg.hashsalt": "thenar", "font.size": 8, "axes.spines.top": False, "axes.spines.right": False}
+    with (
+        mpl.rc_context(
+            {
+                "svg.hashsalt": "thenar",
+                "font.size": 8,
+                "axes.spines.top": False,
+                "axes.spines.right": False,
+                # A dollar in a name is a dollar.
+                "text.parse_math": False,
+            }
+        ),
+        warnings.catch_warnings(),
     ):
-        figure = Figure(figsize=_size(grasp_set), layout="constrained", dpi=130)
+        # A letter that the font lacks is drawn as a box; the rest of the picture is still worth having.
+        warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from font")
+        size = _size(grasp_set)
+        figure = Figure(figsize=size, layout="constrained", dpi=min(130, _TALLEST / size[1]))
         _compose(figure, grasp_set)
         file = io.BytesIO()
         figure.savefig(file, format=kind, metadata={"Date": None} if kind == "svg" else {"Software": None})
@@ -51,7 +70,7 @@ def _size(grasp_set: GraspSet) -> tuple[float, float]:
 
 def _heights(grasp_set: GraspSet) -> list[float]:
     types = 0.17 * len(_present(grasp_set)) + 0.9
-    rows_of_joints = -(-len(grasp_set.joints) // _JOINTS_A_ROW)
+    rows_of_joints = -(-min(len(grasp_set.joints), _DRAWN_JOINTS) // _JOINTS_A_ROW)
     return [types + 0.9, *([rows_of_joints * types + 0.4] if rows_of_joints else [])]
 
 
@@ -71,12 +90,20 @@ def _present(grasp_set: GraspSet) -> NDArray[np.intp]:
     return np.unique(grasp_set.labels)
 
 
+def _types(grasp_set: GraspSet) -> list[str]:
+    return [_short(grasp_set.taxonomy.types[label]) for label in _present(grasp_set)]
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= _LONGEST_NAME else f"{name[: _LONGEST_NAME - 1]}…"
+
+
 def _draw_balance(axes: "Axes", grasp_set: GraspSet) -> None:
     present = _present(grasp_set)
     counts = np.bincount(grasp_set.labels)[present]
     bars = axes.barh(np.arange(len(present)), counts, color=_BLUE)
     axes.bar_label(bars, padding=2)
-    axes.set_yticks(np.arange(len(present)), [grasp_set.taxonomy.types[label] for label in present])
+    axes.set_yticks(np.arange(len(present)), _types(grasp_set))
     axes.set_ylim(len(present) - 0.5, -0.5)
     axes.margins(x=0.1)
     axes.set_title(f"{len(grasp_set)} grasps")
@@ -90,13 +117,18 @@ def _draw_contacts(axes: "Axes", grasp_set: GraspSet) -> None:
     axes.tick_params(axis="y", labelleft=False, left=False)
     names = grasp_set.switch_names
     if len(names) <= _NAMED_SWITCHES:
-        axes.set_xticks(np.arange(len(names)), names, rotation=90, fontsize=6)
+        axes.set_xticks(np.arange(len(names)), list(map(_short, names)), rotation=90, fontsize=6)
+    else:
+        axes.set_xlabel("number of the switch, from 0")
     axes.set_title(f"contact on {len(names)} switches")
 
 
 def _draw_joints(part: "SubFigure", grasp_set: GraspSet) -> None:
-    part.suptitle("joint values: line from least to largest, bar the middle half, orange the median", fontsize=9)
-    count = len(grasp_set.joints)
+    count = min(len(grasp_set.joints), _DRAWN_JOINTS)
+    which = "" if count == len(grasp_set.joints) else f" of the first {count} of {len(grasp_set.joints)} joints"
+    part.suptitle(
+        f"joint values{which}: line from least to largest, bar the middle half, orange the median", fontsize=9
+    )
     rows = -(-count // _JOINTS_A_ROW)
     panels = part.subplots(rows, min(count, _JOINTS_A_ROW), sharey=True, squeeze=False).ravel()
     for panel, joint, codes in zip(panels, grasp_set.joints, grasp_set.codes.T, strict=False):
@@ -113,7 +145,7 @@ def _draw_joint(axes: "Axes", joint: Joint, codes: NDArray[np.uint16], grasp_set
     axes.hlines(where, least, largest, color=_PALE, linewidth=1.2)
     axes.hlines(where, low, high, color=_BLUE, linewidth=4)
     axes.plot(median, where, "|", color=_ORANGE, markersize=8, markeredgewidth=1.8)
-    axes.set_yticks(where, [grasp_set.taxonomy.types[label] for label in present])
+    axes.set_yticks(where, _types(grasp_set))
     axes.set_ylim(len(present) - 0.5, -0.5)
-    axes.set_title(joint.name)
-    axes.set_xlabel(joint.unit)
+    axes.set_title(_short(joint.name))
+    axes.set_xlabel(_short(joint.unit))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,7 +79,11 @@ class _Reader:
         return parsed.values
 
     def names(self, column: str | None) -> NDArray[np.str_]:
-        return np.full(len(self.table.rows), "1") if column is None else self.read(column, names, "names")
+        return (
+            np.full(len(self.table.rows), "1")
+            if column is None
+            else self.read(column, names, "names that can be printed")
+        )
 
     def complete(self, drop: bool) -> NDArray[np.bool_]:
         """Return which rows miss nothing; raises TableError on wrong cells, and on missing ones unless `drop`."""
@@ -103,7 +108,9 @@ class _Reader:
         return [Finding("dropped rows", int(rows.size), message, tuple(rows[:SHOWN].tolist()), tuple(self.missing))]
 
     def _list(self, columns: dict[str, NDArray[np.bool_]]) -> str:
-        """Return "3 cells are ...": how many cells, and the first of them in the order of rows."""
-        cells = sorted((row, name) for name, faulty in columns.items() for row in np.flatnonzero(faulty).tolist())
-        shown = [f"row {self.table.rows[row]} {name!r} ({str(self.table.columns[name][row])!r})" for row, name in cells]
-        return f"{len(cells)} cell{'s' if len(cells) > 1 else ''}, {list_names(shown)}"
+        """Return "3 cells, ...": how many cells, and the first of them in the order of rows, then of columns."""
+        count = sum(int(faulty.sum()) for faulty in columns.values())
+        first = [(row, name) for name, faulty in columns.items() for row in np.flatnonzero(faulty)[:SHOWN].tolist()]
+        first.sort(key=itemgetter(0))
+        shown = [f"row {self.table.rows[row]} {name!r} ({str(self.table.columns[name][row])!r})" for row, name in first]
+        return f"{count} cell{'s' if count > 1 else ''}, {list_names(shown, count)}"

@@ -12,8 +12,10 @@ from pathlib import Path
 from typing import TextIO
 
 import numpy as np
+from numpy.lib import format as npy
 from numpy.typing import NDArray
 
+from .arrays import UNREADABLE
 from .errors import RecordingError, TableError
 from .names import check_names
 
@@ -69,7 +71,7 @@ def _open_text(path: Path) -> Iterator[TextIO]:
     except (gzip.BadGzipFile, EOFError, zlib.error) as reason:
         raise TableError(f"{path.name} is damaged: {reason}") from reason
     except UnicodeDecodeError as reason:
-        raise TableError(f"{path.name} is not UTF-8 text: {reason.reason}") from reason
+        raise TableError(f"{path.name} is not UTF-8 text: {reason.reason}; save it as UTF-8") from reason
 
 
 def _read_csv(what: str, lines: TextIO, delimiter: str) -> Table:
@@ -77,16 +79,17 @@ def _read_csv(what: str, lines: TextIO, delimiter: str) -> Table:
     rows: list[int] = []
     cells: list[list[str]] = []
     try:
-        names = [name.strip() for name in next(reader, [])]
-        for row in reader:
-            if not row:
-                continue
+        filled = filter(None, reader)
+        names = [name.strip() for name in next(filled, [])]
+        for row in filled:
             if len(row) != len(names):
                 raise TableError(f"{what} row {reader.line_num} has {len(row)} cells, its header {len(names)}")
             rows.append(reader.line_num)
             cells.append(row)
     except csv.Error as reason:
         raise TableError(f"{what} row {reader.line_num}: {reason}") from reason
+    if "" in names:
+        raise TableError(f"{what}: column {names.index('') + 1} has no name in the header: give it one")
     check_names("column", names)
     return Table(what, dict(zip(names, zip(*cells, strict=True), strict=bool(cells))), np.array(rows, np.int64))
 
@@ -94,15 +97,27 @@ def _read_csv(what: str, lines: TextIO, delimiter: str) -> Table:
 def _read_npz(path: Path) -> Table:
     columns: dict[str, Column] = {}
     try:
-        with np.load(path, allow_pickle=False) as arrays:
-            for key in arrays.files:
-                columns |= _columns_of(key, arrays[key])
-    except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, OSError) as reason:
+        with zipfile.ZipFile(path) as members:
+            for info in members.infolist():
+                found = _columns_of(info.filename.removesuffix(".npy"), _read_member(members, info))
+                if twice := columns.keys() & found.keys():
+                    raise TableError(f"two arrays make a column {min(twice)!r}")
+                columns |= found
+    except UNREADABLE as reason:
         raise TableError(f"{path.name} cannot be read as npz: {reason}") from reason
     lengths = {len(column) for column in columns.values()}
     if len(lengths) != 1:
         raise TableError(f"{path.name}: its arrays have {sorted(lengths)} rows, which makes no table")
     return Table(path.name, columns, np.arange(1, lengths.pop() + 1))
+
+
+def _read_member(members: zipfile.ZipFile, info: zipfile.ZipInfo) -> NDArray[np.generic]:
+    # Not by numpy.load, which answers a file that is no zip, or a member that is no array, with something else.
+    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise TableError(f"{info.filename} is not compressed as numpy.savez does")
+    with members.open(info) as file:
+        array: NDArray[np.generic] = npy.read_array(file, allow_pickle=False)
+    return array
 
 
 def _columns_of(key: str, array: NDArray[np.generic]) -> dict[str, Column]:

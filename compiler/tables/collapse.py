@@ -37,7 +37,10 @@ class ScoreTables:
 
     def scores(self, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> Floats:
         """Return F (n, K) of the kept switches (n, s) and the joints' codes (n, j)."""
-        scores: Floats = self.bias + bits.astype(np.float64) @ self.switch_rows
+        # Row after row and not as a matrix product, whose bits depend on the machine.
+        scores = np.tile(self.bias, (len(bits), 1))
+        for closed, row in zip(bits.T, self.switch_rows, strict=True):
+            scores += np.where(closed[:, np.newaxis], row, 0.0)
         for column, thresholds, rows in zip(codes.T, self.thresholds, self.joint_rows, strict=True):
             scores += rows[np.searchsorted(thresholds, column)]
         return scores

@@ -14,7 +14,9 @@ from ...runtime.tables import IntegerTables
 from .balance import balance
 from .collapse import Floats, ScoreTables
 
-FINEST = 2.0**40  # steps per unit: far beyond what scores mean, and safe from overflow of the doubles
+# Steps per unit. At this scale the least safe margin, 2 steps, is still more than what the ensemble takes for a tie
+# (stumps.TIE): a row that is safe is never one that the ensemble decided by the number of the class.
+FINEST = 2.0**30
 
 Integers = NDArray[np.int16]
 
@@ -48,7 +50,7 @@ def quantise(tables: ScoreTables, bits: NDArray[np.bool_], codes: NDArray[np.uin
 
 
 def _finest_scale(tables: ScoreTables, limit: int) -> float:
-    """Return the largest double at which no sum of rounded rows exceeds `limit`; 1 for tables of zeros.
+    """Return the largest double below FINEST at which no sum of rounded rows exceeds `limit`; 1 for tables of zeros.
 
     Rounded terms never fall as the scale grows, so neither does the bound, and bisection over the doubles is exact.
     """

@@ -63,18 +63,24 @@ def test_the_papers_tables_are_printed_with_both_protocols_explained(
 
 def test_every_rate_has_its_interval_in_percent(grasps: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["evaluate", grasps, *QUICK, "--tables", "compositions", "--protocol", "paper", "--json"]) == 0
-    rate = json.loads(capsys.readouterr().out)["tables"][0]["rows"][0]["cells"][0]["rate"]
+    result = json.loads(capsys.readouterr().out)["tables"][0]["rows"][0]
+    rate = result["cells"][0]["rate"]
     assert run(["evaluate", grasps, *QUICK, "--tables", "compositions", "--protocol", "paper"]) == 0
     expected = f"{100 * rate['mean']:.1f} [{100 * rate['low']:.1f}, {100 * rate['high']:.1f}]"
     (line,) = (line for line in capsys.readouterr().out.splitlines() if "Angle + All-Co" in line)
     assert expected in line
+    average = result["average"]
+    last = f"{100 * average['mean']:.1f} [{100 * average['low']:.1f}, {100 * average['high']:.1f}]"
+    assert line.rstrip(" │").endswith(last)
+    assert last != expected
 
 
 def test_json_on_stdout_and_in_the_file_are_one_document(
     grasps: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     output = tmp_path / "result.json"
-    arguments = ["--prune", "3", "--prune-list", "5, 0,5", "--seed", "7", "--subject", "Ann", "--no-baselines"]
+    arguments = ["--prune", "3", "--prune-list", "5, 0,5", "--seed", "7", "--subject", "Ann"]
+    arguments += ["--tables", "pruning, generality,compositions"]
     assert run(["evaluate", grasps, *QUICK, *arguments, "--json", "-o", str(output)]) == 0
     result = json.loads(capsys.readouterr().out)
     assert result == json.loads(output.read_text())
@@ -127,6 +133,10 @@ def test_a_grasp_type_too_rare_for_the_folds_is_a_warning_on_stderr(
         (["--by", "block", "--folds", "20"], "8 trial numbers cannot be cut into 20 folds"),
         (["--folds", "100"], "24 rows cannot be cut into 100 folds"),
         (["--folds", "1"], "--folds"),
+        (["--confusion", "--tables", "pruning"], "--confusion and --plot show the compositions: name them"),
+        (["--plot", "pictures", "--tables", "baselines"], "--confusion and --plot show the compositions: name them"),
+        (["-o", "no/such/result.json"], "There is no folder 'no/such'"),
+        (["--plot", __file__], "is a file"),
         (["--prune-list", "0,x"], "'0,x' is not a list of whole numbers such as 0,13,62"),
         (["--tables", "composition"], "'composition' is none of compositions, generality, pruning, baselines"),
     ],
@@ -139,6 +149,14 @@ def test_a_users_mistake_ends_with_2_and_a_sentence(
     assert not printed
     assert reason in complaints
     assert "Traceback" not in complaints
+
+
+def test_an_install_without_the_extra_says_what_is_missing(
+    grasps: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "joblib", None)
+    assert run(["evaluate", grasps, *QUICK]) == 2
+    assert capsys.readouterr().err == "thenar: joblib is not installed: pip install 'thenar[compiler]'\n"
 
 
 def test_help_shows_an_example(capsys: pytest.CaptureFixture[str]) -> None:
@@ -181,6 +199,15 @@ def wait_until_two_workers_are_at_work(evaluation: subprocess.Popen[str]) -> lis
     return found
 
 
+def is_worker(pid: int) -> bool:
+    return is_running(pid) and b"popen_loky" in Path(f"/proc/{pid}/cmdline").read_bytes()
+
+
+def blocks_interrupts(pid: int) -> bool:
+    (line,) = (line for line in Path(f"/proc/{pid}/status").read_text().splitlines() if line.startswith("SigBlk"))
+    return bool(int(line.split()[1], 16) >> (signal.SIGINT - 1) & 1)
+
+
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="needs /proc")
 @pytest.mark.parametrize("whole_group", [True, False], ids=["as Ctrl-C in a terminal", "as kill -INT"])
 def test_an_interrupt_ends_the_workers_and_writes_nothing(grasps: str, tmp_path: Path, whole_group: bool) -> None:
@@ -192,6 +219,8 @@ def test_an_interrupt_ends_the_workers_and_writes_nothing(grasps: str, tmp_path:
     )
     try:
         workers = wait_until_two_workers_are_at_work(evaluation)
+        # From their first moment: an interrupt while Python starts would be a traceback of theirs.
+        assert sum(map(blocks_interrupts, filter(is_worker, workers))) >= 2
         (os.killpg if whole_group else os.kill)(evaluation.pid, signal.SIGINT)
         printed, complaints = evaluation.communicate(timeout=30)
     finally:

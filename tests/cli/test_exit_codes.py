@@ -2,12 +2,14 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from thenar.cli import COMMANDS
 
+Thenar = Callable[..., subprocess.CompletedProcess[str]]
 HEAVY = ("sklearn", "scipy", "joblib", "matplotlib", "numpy")
 
 
@@ -20,7 +22,7 @@ def _one_sentence(done: "subprocess.CompletedProcess[str]") -> str:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_has_help_with_an_example(thenar, command: str) -> None:
+def test_every_command_has_help_with_an_example(thenar: Thenar, command: str) -> None:
     done = thenar(command, "--help")
     assert done.returncode == 0, done.stderr
     assert f"thenar {command} " in done.stdout.split("Example:")[1]
@@ -39,26 +41,26 @@ def test_help_loads_no_heavy_library(arguments: list[str]) -> None:
     assert done.stdout.splitlines()[-1] == "[]"
 
 
-def test_no_command_at_all_shows_the_help(thenar) -> None:
+def test_no_command_at_all_shows_the_help(thenar: Thenar) -> None:
     done = thenar()
     assert done.returncode == 2
     assert "Commands:" in done.stdout + done.stderr
 
 
-def test_an_unknown_command_is_one_sentence(thenar) -> None:
+def test_an_unknown_command_is_one_sentence(thenar: Thenar) -> None:
     assert "No such command 'fly'" in _one_sentence(thenar("fly"))
 
 
-def test_an_unknown_option_is_one_sentence(thenar, set_file: Path) -> None:
+def test_an_unknown_option_is_one_sentence(thenar: Thenar, set_file: Path) -> None:
     assert "--wings" in _one_sentence(thenar("compile", set_file, "--wings", "2"))
 
 
-def test_a_missing_file_is_one_sentence(thenar, tmp_path: Path) -> None:
+def test_a_missing_file_is_one_sentence(thenar: Thenar, tmp_path: Path) -> None:
     assert "does not exist" in _one_sentence(thenar("compile", tmp_path / "no.grasps", "-o", tmp_path / "b"))
 
 
 @pytest.mark.parametrize("command", ["compile", "verify", "run"])
-def test_a_foreign_file_is_one_sentence(thenar, tmp_path: Path, build_folder: Path, command: str) -> None:
+def test_a_foreign_file_is_one_sentence(thenar: Thenar, tmp_path: Path, build_folder: Path, command: str) -> None:
     foreign = tmp_path / "foreign.grasps"
     foreign.write_text("not grasps")
     arguments = {
@@ -69,13 +71,13 @@ def test_a_foreign_file_is_one_sentence(thenar, tmp_path: Path, build_folder: Pa
     assert "is not a thenar THNRGRSP file" in _one_sentence(thenar(command, *arguments[command]))
 
 
-def test_a_damaged_build_is_one_sentence(thenar, set_file: Path, build_folder: Path) -> None:
+def test_a_damaged_build_is_one_sentence(thenar: Thenar, set_file: Path, build_folder: Path) -> None:
     data = (build_folder / "tables.bin").read_bytes()
     (build_folder / "tables.bin").write_bytes(data[:-1])
     assert "tables.bin is not the one" in _one_sentence(thenar("run", build_folder, "--replay", set_file))
 
 
-def test_a_folder_of_the_users_is_one_sentence_and_untouched(thenar, set_file: Path, tmp_path: Path) -> None:
+def test_a_folder_of_the_users_is_one_sentence_and_untouched(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("keep me")
     assert "not empty and not a build" in _one_sentence(thenar("compile", set_file, "-o", tmp_path))
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]

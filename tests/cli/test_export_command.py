@@ -59,3 +59,21 @@ def test_a_damaged_set_is_refused_with_the_reason(grasps: Path, capsys: pytest.C
     grasps.write_bytes(grasps.read_bytes()[:-1])
     assert run(["export", str(grasps), "-o", str(grasps.with_name("t.csv"))]) == 2
     assert capsys.readouterr().err.startswith("thenar: set.grasps is truncated: ")
+
+
+@pytest.mark.parametrize(("table", "columns"), [("set.grasps", None), ("t.csv", "set.grasps"), ("t.csv", "t.csv")])
+def test_neither_the_set_nor_the_table_is_overwritten(
+    grasps: Path, table: str, columns: str | None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = grasps.read_bytes()
+    more = [] if columns is None else ["--columns", str(grasps.with_name(columns))]
+    assert run(["export", str(grasps), "-o", str(grasps.with_name(table)), *more]) == 2
+    assert " is named twice" in capsys.readouterr().err
+    assert [path.name for path in grasps.parent.iterdir()] == ["set.grasps"]
+    assert grasps.read_bytes() == before
+
+
+def test_a_columns_file_that_cannot_be_written_stops_the_export_before_it_begins(grasps: Path) -> None:
+    columns = grasps.with_name("no") / "columns.toml"
+    assert run(["export", str(grasps), "-o", str(grasps.with_name("t.csv")), "--columns", str(columns)]) == 2
+    assert [path.name for path in grasps.parent.iterdir()] == ["set.grasps"]

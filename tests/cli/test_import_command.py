@@ -78,3 +78,34 @@ def test_help_shows_an_example_line_by_line(capsys: pytest.CaptureFixture[str]) 
         "  Example:\n      thenar import trials.csv.gz -o set.grasps --columns columns.toml\n"
         in capsys.readouterr().out
     )
+
+
+def test_names_with_brackets_and_colons_are_printed_as_they_are(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "table.csv").write_text(TABLE.replace("j1", "j[/x] [deg] :thumbs_up:"))
+    assert thenar_import(folder) == 0
+    assert "j[/x] [deg] :thumbs_up:" in capsys.readouterr().out
+    assert run(["info", str(folder / "set.grasps")]) == 0
+    assert "j[/x] [deg] :thumbs_up:" in capsys.readouterr().out
+
+
+def test_the_columns_file_is_never_overwritten(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    columns = (folder / "columns.toml").rename(folder / "c.grasps")
+    assert run(["import", str(folder / "table.csv"), "-o", str(columns), "--columns", str(columns)]) == 2
+    assert "c.grasps is named twice" in capsys.readouterr().err
+    assert columns.read_text() == COLUMNS
+
+
+def test_a_folder_that_is_not_there_is_named_before_anything_is_read(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "table.csv").write_text("no table")
+    assert thenar_import(folder, output="no/set.grasps") == 2
+    assert f"There is no folder '{folder / 'no'}' to write 'set.grasps' into" in capsys.readouterr().err
+
+
+def test_a_folder_is_no_file_to_write(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "set.grasps").mkdir()
+    assert thenar_import(folder) == 2
+    assert "set.grasps' is a directory" in capsys.readouterr().err

@@ -31,6 +31,7 @@ def test_a_set_is_described_for_people(grasps: Path, capsys: pytest.CaptureFixtu
     said = capsys.readouterr().out
     for words in (
         "4 grasps of 2 types (own); subjects 2, objects 2, switches 2, joints 1",
+        "50.0%",
         "balance (rarest type over commonest): 1.00",
         "subjects: A (3), B (1)",
         "warning: 1 switches never change: palm",
@@ -63,3 +64,23 @@ def test_another_file_is_refused_with_the_reason(tmp_path: Path, capsys: pytest.
     (tmp_path / "set.grasps").write_bytes(b"label,s1\n")
     assert run(["info", str(tmp_path / "set.grasps")]) == 2
     assert "set.grasps is not a thenar THNRGRSP file" in capsys.readouterr().err
+
+
+def test_a_picture_never_replaces_the_set(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    named = grasps.rename(grasps.with_name("set.png"))
+    assert run(["info", str(named), "--plot", str(named)]) == 2
+    assert "set.png is named twice" in capsys.readouterr().err
+    assert GraspSet.load(named).grasps.tolist() == ["mug", "ball", "mug", "ball"]
+
+
+def test_too_little_memory_is_one_sentence(
+    grasps: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def too_much(path: Path) -> GraspSet:
+        raise MemoryError("Unable to allocate 7 TiB")
+
+    monkeypatch.setattr(GraspSet, "load", too_much)
+    assert run(["info", str(grasps)]) == 2
+    assert capsys.readouterr().err == (
+        "thenar: not enough memory (Unable to allocate 7 TiB): take fewer rows or columns\n"
+    )

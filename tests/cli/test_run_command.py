@@ -1,11 +1,13 @@
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from thenar.compiler import GraspSet
 from thenar.runtime import Build
 
+Thenar = Callable[..., subprocess.CompletedProcess[str]]
 FORBIDDEN = """
 import sys
 class Forbidden:
@@ -18,7 +20,7 @@ sys.exit(run(sys.argv[1:]))
 """
 
 
-def test_every_frame_gives_one_line(thenar, small_set: GraspSet, set_file: Path, build_folder: Path) -> None:
+def test_every_frame_gives_one_line(thenar: Thenar, small_set: GraspSet, set_file: Path, build_folder: Path) -> None:
     done = thenar("run", build_folder, "--replay", set_file, "--period-us", 500)
     assert done.returncode == 0, done.stderr
     lines = [json.loads(line) for line in done.stdout.splitlines()]
@@ -35,14 +37,14 @@ def test_every_frame_gives_one_line(thenar, small_set: GraspSet, set_file: Path,
 
 
 def test_it_runs_with_the_base_dependencies_alone(set_file: Path, build_folder: Path) -> None:
-    command = [sys.executable, "-c", FORBIDDEN, "run", build_folder, "--replay", set_file]
+    command = [sys.executable, "-c", FORBIDDEN, "run", str(build_folder), "--replay", str(set_file)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert len(done.stdout.splitlines()) == 60
 
 
 def test_a_reader_that_goes_away_leaves_no_traceback(set_file: Path, build_folder: Path) -> None:
-    command = [sys.executable, "-m", "thenar.cli", "run", build_folder, "--replay", set_file]
+    command = [sys.executable, "-m", "thenar.cli", "run", str(build_folder), "--replay", str(set_file)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdout is not None
         assert process.stderr is not None

@@ -1,5 +1,7 @@
 import hashlib
 import json
+import subprocess
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,6 +9,8 @@ from msgspec.structs import replace as replace_fields
 
 from thenar.runtime.manifest import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.tables import tables_from_bytes, tables_to_bytes
+
+Thenar = Callable[..., subprocess.CompletedProcess[str]]
 
 
 def _silence_joints(folder: Path) -> None:
@@ -19,14 +23,14 @@ def _silence_joints(folder: Path) -> None:
     (folder / "build.json").write_bytes(manifest_to_bytes(described))
 
 
-def test_a_sound_build_holds(thenar, set_file: Path, build_folder: Path) -> None:
+def test_a_sound_build_holds(thenar: Thenar, set_file: Path, build_folder: Path) -> None:
     done = thenar("verify", build_folder, set_file)
     assert done.returncode == 0, done.stderr
     assert "60 rows, the ones that the build was made from" in done.stdout
     assert done.stdout.endswith("holds\n")
 
 
-def test_a_broken_bound_exits_with_1_and_lists_rows(thenar, set_file: Path, build_folder: Path) -> None:
+def test_a_broken_bound_exits_with_1_and_lists_rows(thenar: Thenar, set_file: Path, build_folder: Path) -> None:
     _silence_joints(build_folder)
     done = thenar("verify", build_folder, set_file)
     assert done.returncode == 1
@@ -34,7 +38,7 @@ def test_a_broken_bound_exits_with_1_and_lists_rows(thenar, set_file: Path, buil
     assert "  row " in done.stdout
 
 
-def test_json_lists_every_changed_row(thenar, set_file: Path, build_folder: Path) -> None:
+def test_json_lists_every_changed_row(thenar: Thenar, set_file: Path, build_folder: Path) -> None:
     _silence_joints(build_folder)
     done = thenar("verify", build_folder, set_file, "--json")
     found = json.loads(done.stdout)

@@ -34,7 +34,7 @@ def test_fuzzing_finds_no_crash(corpus: Path, tmp_path: Path) -> None:
         (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)("atheris is missing")
     harness = Path(__file__).with_name("fuzz_build.py")
     limits = [f"-runs={RUNS}", "-seed=1", "-max_len=4096", "-rss_limit_mb=1024", f"-artifact_prefix={tmp_path}/"]
-    command = [sys.executable, harness, *limits, corpus]
+    command = [sys.executable, str(harness), *limits, str(corpus)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 0, done.stderr[-3000:]
     assert f"Done {RUNS} runs" in done.stderr

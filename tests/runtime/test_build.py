@@ -1,3 +1,4 @@
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +9,11 @@ from hypothesis import strategies as st
 from thenar.runtime import Build
 from thenar.runtime.build import MANIFEST_NAME, TABLES_NAME
 from thenar.runtime.errors import BuildError, ThenarError
+from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import MAX_BYTES, IntegerTables, tables_to_bytes
 
+MakeTables = Callable[..., IntegerTables]
+Describe = Callable[[IntegerTables], Manifest]
 MEMBERS = [MANIFEST_NAME, TABLES_NAME]
 
 
@@ -22,7 +26,7 @@ def test_a_loaded_build_scores_and_classifies_as_the_one_written(build: Build, f
         assert loaded.classify(bits, codes) == loaded.grasps[int(scores.argmax())]
 
 
-def test_a_tie_goes_to_the_lowest_number(describe) -> None:
+def test_a_tie_goes_to_the_lowest_number(describe: Describe) -> None:
     none = np.zeros((0, 4), np.int16)
     tables = IntegerTables(np.array([1, 5, 5, 2], np.int16), none, (), (), none, none, 1.0)
     assert Build(describe(tables), tables).classify([], []) == "grasp 1"
@@ -58,7 +62,7 @@ def test_mutated_files_are_refused_by_name(folder: Path, member: str, data: st.D
         path.write_bytes(good)
 
 
-def test_tables_of_another_build_are_refused(folder: Path, make_tables) -> None:
+def test_tables_of_another_build_are_refused(folder: Path, make_tables: MakeTables) -> None:
     (folder / TABLES_NAME).write_bytes(tables_to_bytes(make_tables(seed=1)))
     with pytest.raises(BuildError, match=r"not the one that build\.json describes"):
         Build.load(folder)
@@ -71,6 +75,6 @@ def test_an_oversized_file_is_not_read_to_its_end(folder: Path) -> None:
         Build.load(folder)
 
 
-def test_names_and_tables_must_agree(describe, make_tables) -> None:
+def test_names_and_tables_must_agree(describe: Describe, make_tables: MakeTables) -> None:
     with pytest.raises(BuildError, match="names 5 grasp types, 9 switches and 3 joints"):
         Build(describe(make_tables()), make_tables(switches=8))

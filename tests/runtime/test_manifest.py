@@ -1,4 +1,5 @@
 import json
+from collections.abc import Callable
 
 import pytest
 from hypothesis import given
@@ -7,10 +8,14 @@ from msgspec.structs import replace
 
 from thenar.runtime.errors import BuildError, ThenarError
 from thenar.runtime.manifest import MAX_BYTES, Manifest, manifest_from_bytes, manifest_to_bytes
+from thenar.runtime.tables import IntegerTables
+
+MakeTables = Callable[..., IntegerTables]
+Describe = Callable[[IntegerTables], Manifest]
 
 
 @pytest.fixture(scope="module")
-def manifest(make_tables, describe) -> Manifest:
+def manifest(make_tables: MakeTables, describe: Describe) -> Manifest:
     return describe(make_tables())
 
 

@@ -1,4 +1,5 @@
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -7,11 +8,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.runtime import Build, FrameError, Recognizer
+from thenar.runtime.manifest import Manifest
 from thenar.runtime.recognizer import Frame
+from thenar.runtime.tables import IntegerTables
+
+MakeTables = Callable[..., IntegerTables]
+Describe = Callable[[IntegerTables], Manifest]
 
 
 @pytest.fixture(scope="module")
-def loaded(make_tables, describe) -> Build:
+def loaded(make_tables: MakeTables, describe: Describe) -> Build:
     tables = make_tables()
     return Build(describe(tables), tables)
 
@@ -19,6 +25,10 @@ def loaded(make_tables, describe) -> Build:
 def _frame(seed: int) -> Frame:
     random = np.random.default_rng(seed)
     return Frame(seed, random.random(9) < 0.5, random.integers(0, 256, 3).astype(np.uint16))
+
+
+def _lost(frame: Frame) -> Frame:
+    return replace(frame, lost_switches=np.ones(9, bool), lost_joints=np.ones(3, bool))
 
 
 @given(seed=st.integers(0, 10_000))
@@ -46,9 +56,8 @@ def test_a_lost_input_is_replaced_by_its_mean_and_the_frame_is_degraded(loaded: 
 
 def test_what_a_lost_input_reads_does_not_matter(loaded: Build) -> None:
     frame, recognizer = _frame(2), Recognizer(loaded)
-    lost = {"lost_switches": np.ones(9, bool), "lost_joints": np.ones(3, bool)}
-    other = replace(_frame(3), time_us=2, **lost)
-    assert recognizer.recognise(replace(frame, **lost)) == recognizer.recognise(other)
+    other = replace(_frame(3), time_us=2)
+    assert recognizer.recognise(_lost(frame)) == recognizer.recognise(_lost(other))
 
 
 def test_masks_that_mark_nothing_change_nothing(loaded: Build) -> None:
@@ -60,3 +69,10 @@ def test_masks_that_mark_nothing_change_nothing(loaded: Build) -> None:
 def test_a_frame_of_another_glove_is_refused(loaded: Build) -> None:
     with pytest.raises(FrameError):
         Recognizer(loaded).recognise(Frame(0, np.zeros(3, bool), np.zeros(3, np.uint16)))
+
+
+def test_a_tie_goes_to_the_grasp_named_first(make_tables: MakeTables, describe: Describe) -> None:
+    tables = make_tables(switches=0, joints=0)
+    tied = replace(tables, bias=np.array([1, 7, 2, 7, 0], np.int16))
+    found = Recognizer(Build(describe(tied), tied)).recognise(Frame(0, np.zeros(0, bool), np.zeros(0, np.uint16)))
+    assert (found.grasp, found.margin) == ("grasp 1", 0)

@@ -1,14 +1,26 @@
+from collections.abc import Callable, Iterable
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import ArrayLike
 
 from thenar.runtime.errors import FrameError
 from thenar.runtime.scorer import LANE_OFFSET, Scorer
 from thenar.runtime.tables import IntegerTables
 
+MakeTables = Callable[..., IntegerTables]
+Drawn = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
-def _sum(tables: IntegerTables, bits, codes, lost_bits, lost_codes) -> np.ndarray:
+
+def _sum(
+    tables: IntegerTables,
+    bits: Iterable[bool],
+    codes: Iterable[int],
+    lost_bits: Iterable[bool],
+    lost_codes: Iterable[bool],
+) -> np.ndarray:
     """The definition, term by term."""
     total = tables.bias.astype(np.int64)
     for bit, lost, row, mean in zip(bits, lost_bits, tables.switch_rows, tables.switch_means, strict=True):
@@ -20,7 +32,7 @@ def _sum(tables: IntegerTables, bits, codes, lost_bits, lost_codes) -> np.ndarra
 
 
 @st.composite
-def frames(draw, switches: int, joints: int):
+def frames(draw: st.DrawFn, switches: int, joints: int) -> Drawn:
     def flags(n: int) -> np.ndarray:
         return np.array(draw(st.lists(st.booleans(), min_size=n, max_size=n)), bool)
 
@@ -29,7 +41,9 @@ def frames(draw, switches: int, joints: int):
 
 
 @given(data=st.data(), seed=st.integers(0, 50), switches=st.integers(0, 12), joints=st.integers(0, 4))
-def test_scores_are_the_sum_of_the_rows(make_tables, data, seed, switches, joints) -> None:
+def test_scores_are_the_sum_of_the_rows(
+    make_tables: MakeTables, data: st.DataObject, seed: int, switches: int, joints: int
+) -> None:
     tables = make_tables(seed, switches=switches, joints=joints)
     bits, codes, lost_bits, lost_codes = data.draw(frames(switches, joints))
     scorer, none = Scorer(tables), [False] * (switches + joints)
@@ -39,7 +53,7 @@ def test_scores_are_the_sum_of_the_rows(make_tables, data, seed, switches, joint
     assert np.array_equal(degraded, _sum(tables, bits, codes, lost_bits, lost_codes))
 
 
-def test_a_code_equal_to_a_threshold_goes_left_of_it(make_tables) -> None:
+def test_a_code_equal_to_a_threshold_goes_left_of_it(make_tables: MakeTables) -> None:
     tables = make_tables(switches=0, joints=1)
     threshold = int(tables.thresholds[0][2])
     scorer = Scorer(tables)
@@ -59,11 +73,11 @@ def test_lanes_at_the_edge_of_int16_do_not_spill(sign: int) -> None:
 
 
 @pytest.mark.parametrize("kind", [np.uint16, np.uint8, np.int32, np.int64, list])
-def test_codes_may_come_in_any_integers(make_tables, kind) -> None:
+def test_codes_may_come_in_any_integers(make_tables: MakeTables, kind: type) -> None:
     scorer, codes = Scorer(make_tables()), [3, 200, 77]
-    given_codes = codes if kind is list else np.array(codes, kind)
+    given_codes: ArrayLike = codes if kind is list else np.array(codes, kind)
     assert scorer.lanes([0, 1] * 4 + [1], given_codes) == scorer.lanes(
-        np.array([0, 1] * 4 + [1], bool), np.uint16(codes)
+        np.array([0, 1] * 4 + [1], bool), np.array(codes, np.uint16)
     )
 
 
@@ -81,12 +95,14 @@ def test_codes_may_come_in_any_integers(make_tables, kind) -> None:
         (np.zeros(9, bool), ["a", "b", "c"], "codes are integers"),
     ],
 )
-def test_a_frame_that_does_not_fit_is_refused(make_tables, bits, codes, reason: str) -> None:
+def test_a_frame_that_does_not_fit_is_refused(
+    make_tables: MakeTables, bits: ArrayLike, codes: ArrayLike, reason: str
+) -> None:
     with pytest.raises(FrameError, match=reason):
         Scorer(make_tables()).lanes(bits, codes)
 
 
-def test_masks_that_do_not_fit_are_refused(make_tables) -> None:
+def test_masks_that_do_not_fit_are_refused(make_tables: MakeTables) -> None:
     scorer = Scorer(make_tables())
     with pytest.raises(FrameError, match="lost joints"):
         scorer.lanes_without(np.zeros(9, bool), [0, 0, 0], np.zeros(9, bool), np.zeros(2, bool))

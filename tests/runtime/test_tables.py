@@ -1,6 +1,8 @@
 import contextlib
 import tracemalloc
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +12,9 @@ from hypothesis import strategies as st
 from thenar.runtime.errors import BuildError, SealError, ThenarError
 from thenar.runtime.sealed import seal
 from thenar.runtime.tables import KIND, MAX_BYTES, IntegerTables, tables_from_bytes, tables_to_bytes
+
+MakeTables = Callable[..., IntegerTables]
+Size = dict[str, int]
 
 sizes = st.fixed_dictionaries(
     {
@@ -27,7 +32,7 @@ def _payload(tables: IntegerTables) -> bytearray:
 
 
 @given(size=sizes)
-def test_what_was_written_is_read_again(make_tables, size) -> None:
+def test_what_was_written_is_read_again(make_tables: MakeTables, size: Size) -> None:
     data = tables_to_bytes(make_tables(**size))
     assert tables_to_bytes(tables_from_bytes(data)) == data
 
@@ -48,7 +53,7 @@ def test_the_bytes_are_as_documented() -> None:
 
 
 @given(size=sizes, data=st.data())
-def test_no_partial_sum_of_any_frame_leaves_the_bound(make_tables, size, data) -> None:
+def test_no_partial_sum_of_any_frame_leaves_the_bound(make_tables: MakeTables, size: Size, data: st.DataObject) -> None:
     tables = make_tables(**size)
     terms = [tables.bias]
     for row, mean in zip(tables.switch_rows, tables.switch_means, strict=True):
@@ -65,7 +70,7 @@ def test_the_bound_is_reached() -> None:
     assert tables.bound == 15
 
 
-def test_a_tampered_table_that_could_overflow_is_refused(make_tables) -> None:
+def test_a_tampered_table_that_could_overflow_is_refused(make_tables: MakeTables) -> None:
     tables = make_tables()
     payload = _payload(tables)
     start = 16 + 2 * tables.n_joints
@@ -74,26 +79,26 @@ def test_a_tampered_table_that_could_overflow_is_refused(make_tables) -> None:
         tables_from_bytes(seal(KIND, 1, bytes(payload)))
 
 
-def test_the_most_negative_integer_does_not_slip_through(make_tables) -> None:
+def test_the_most_negative_integer_does_not_slip_through(make_tables: MakeTables) -> None:
     tables = make_tables(switches=0, joints=0)
     with pytest.raises(BuildError, match="a sum could reach 32768"):
         replace(tables, bias=np.full(5, -32768, np.int16))
 
 
-def test_thresholds_that_do_not_increase_are_refused(make_tables) -> None:
+def test_thresholds_that_do_not_increase_are_refused(make_tables: MakeTables) -> None:
     tables = make_tables()
     with pytest.raises(BuildError, match="thresholds of joint 1 are not strictly increasing"):
         replace(tables, thresholds=(tables.thresholds[0], tables.thresholds[1][::-1], tables.thresholds[2]))
 
 
 @pytest.mark.parametrize("scale", [0.0, -1.0, float("nan"), float("inf")])
-def test_a_scale_that_is_no_scale_is_refused(make_tables, scale: float) -> None:
+def test_a_scale_that_is_no_scale_is_refused(make_tables: MakeTables, scale: float) -> None:
     with pytest.raises(BuildError, match="scale"):
         replace(make_tables(), scale=scale)
 
 
 @pytest.mark.parametrize("change", [{"bias": np.zeros(4, np.int16)}, {"bias": np.zeros(5)}, {"joint_rows": ()}])
-def test_arrays_that_do_not_belong_together_are_refused(make_tables, change) -> None:
+def test_arrays_that_do_not_belong_together_are_refused(make_tables: MakeTables, change: dict[str, Any]) -> None:
     with pytest.raises(BuildError):
         replace(make_tables(), **change)
 
@@ -109,7 +114,9 @@ def test_arrays_that_do_not_belong_together_are_refused(make_tables, change) -> 
         (6, 1, "offset 6"),
     ],
 )
-def test_counts_are_held_against_their_caps_and_the_length(make_tables, offset: int, count: int, reason: str) -> None:
+def test_counts_are_held_against_their_caps_and_the_length(
+    make_tables: MakeTables, offset: int, count: int, reason: str
+) -> None:
     payload = _payload(make_tables())
     payload[offset : offset + 2] = count.to_bytes(2, "little")
     with pytest.raises(BuildError, match=reason):
@@ -139,7 +146,7 @@ def test_any_sealed_content_is_read_or_refused_without_much_memory(payload: byte
 
 
 @given(size=sizes, data=st.data())
-def test_mutated_content_is_read_or_refused(make_tables, size, data) -> None:
+def test_mutated_content_is_read_or_refused(make_tables: MakeTables, size: Size, data: st.DataObject) -> None:
     payload = _payload(make_tables(**size))
     for _ in range(data.draw(st.integers(1, 4))):
         payload[data.draw(st.integers(0, len(payload) - 1))] = data.draw(st.integers(0, 255))
@@ -148,3 +155,15 @@ def test_mutated_content_is_read_or_refused(make_tables, size, data) -> None:
     except ThenarError:
         return
     assert tables_to_bytes(tables)[56:] == bytes(payload)
+
+
+@pytest.mark.parametrize("kind", ["switch_means", "joint_means"])
+def test_the_bound_counts_what_stands_in_for_missing_inputs(make_tables: MakeTables, kind: str) -> None:
+    tables = make_tables()
+    means = getattr(tables, kind).copy()
+    means[1, 2] = 30_000
+    bound = replace(tables, **{kind: means}).bound
+    assert 30_000 < bound <= 30_000 + tables.bound
+    means[:2, 2] = 30_000
+    with pytest.raises(BuildError, match="could overflow"):
+        replace(tables, **{kind: means})

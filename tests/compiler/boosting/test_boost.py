@@ -3,6 +3,8 @@
 import os
 import subprocess
 import sys
+import tracemalloc
+from typing import Any
 
 import numpy as np
 import pytest
@@ -105,7 +107,7 @@ def test_without_a_varying_column_all_classes_stay_equal() -> None:
         assert stumps.n_rounds == 0
         assert not stumps.scores(X).any()
         assert winners(stumps.scores(X)).tolist() == [0, 0, 0, 0]
-        assert history.losses == (pytest.approx(np.log(3)),)
+        assert history.losses == pytest.approx((np.log(3),))
 
 
 def test_a_perfectly_separable_set_stays_finite_for_2000_rounds() -> None:
@@ -132,15 +134,18 @@ def test_the_tolerance_stops_early_and_says_so() -> None:
         ({"shrinkage": 0.0}, "shrinkage=0.0"),
         ({"shrinkage": 1.5}, "shrinkage=1.5"),
         ({"z_max": 1.0}, "z_max=1.0"),
-        ({"z_max": float("inf")}, "z_max=inf"),
+        ({"z_max": 100.5}, "z_max=100.5"),
+        ({"z_max": float("nan")}, "z_max=nan"),
         ({"n_classes": 2}, "labels run from 0 to 2"),
         ({"weights": np.zeros(60)}, "row weights"),
         ({"weights": -np.ones(60)}, "row weights"),
         ({"weights": np.full(60, np.nan)}, "row weights"),
+        ({"weights": np.full(60, np.inf)}, "row weights"),
+        ({"weights": np.ones(59)}, "row weights"),
         ({"labels": np.zeros(3, dtype=np.intp)}, "must be (n, d) and (n,)"),
     ],
 )
-def test_options_out_of_range_are_refused_by_name(change: dict[str, object], word: str) -> None:
+def test_options_out_of_range_are_refused_by_name(change: dict[str, Any], word: str) -> None:
     X, labels = grasps(9)
     arguments = {"X": X, "labels": labels, "n_classes": 3, **change}
     with pytest.raises(BoostingError) as refusal:
@@ -184,3 +189,27 @@ def test_threads_and_simd_change_no_bit() -> None:
         )
         digests.add(done.stdout.strip())
     assert len(digests) == 1
+
+
+@pytest.mark.parametrize("factor", [2.0**-1060, 1e-300, 2.0**-30, 1e7, 1e300, 2.0**1022])
+def test_the_unit_of_the_weights_does_not_matter(factor: float) -> None:
+    X, labels = grasps(10)
+    a, before = boost(X, labels, 3, rounds=20)
+    b, after = boost(X, labels, 3, rounds=20, weights=np.full(len(X), factor))
+    assert np.array_equal(a.columns, b.columns)
+    np.testing.assert_allclose(b.values, a.values, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(after.losses, before.losses, rtol=1e-13)
+
+
+def test_memory_does_not_grow_by_the_rows_in_every_round() -> None:
+    X, labels = grasps(11, n=4000)
+
+    def peak(rounds: int) -> int:
+        tracemalloc.start()
+        boost(X, labels, 3, rounds=rounds)
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return most
+
+    a_round_of_answers = 3 * len(X) * 8
+    assert peak(105) - peak(5) < 5 * a_round_of_answers

@@ -1,5 +1,7 @@
 """The estimator: scikit-learn's own contract, and what users rely on besides."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from sklearn.base import clone
@@ -11,8 +13,10 @@ from thenar.runtime.errors import ThenarError
 
 @parametrize_with_checks([LogitBoostClassifier(rounds=20)])
 @pytest.mark.filterwarnings("ignore::sklearn.exceptions.SkipTestWarning")
-def test_scikit_learn_accepts_the_estimator(estimator: LogitBoostClassifier, check: object) -> None:
-    check(estimator)  # type: ignore[operator]  # raises AssertionError where the contract is broken
+def test_scikit_learn_accepts_the_estimator(
+    estimator: LogitBoostClassifier, check: Callable[[LogitBoostClassifier], None]
+) -> None:
+    check(estimator)  # raises AssertionError where the contract is broken
 
 
 X = np.array([[0, 10], [0, 200], [1, 30], [1, 220], [0, 20], [1, 210]])
@@ -62,3 +66,9 @@ def test_fitting_twice_gives_the_same_bits() -> None:
     a = LogitBoostClassifier(rounds=10).fit(X, Y)
     b = clone(a).fit(X, Y)
     assert a.stumps_.values.tobytes() == b.stumps_.values.tobytes()
+
+
+def test_a_negative_sample_weight_is_refused() -> None:
+    X, y = np.arange(6).reshape(6, 1), np.array([0, 1, 0, 1, 0, 1])
+    with pytest.raises(ValueError, match=r"[Nn]egative"):
+        LogitBoostClassifier(rounds=2).fit(X, y, sample_weight=np.array([1, 1, 1, 1, 1, -1.0]))

@@ -3,6 +3,7 @@
 from fractions import Fraction
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -93,3 +94,39 @@ def test_complementary_and_duplicate_columns_tie_and_the_lowest_wins() -> None:
     weights = rng.random((1, 200))
     fitted = fit_stumps(bin_columns(X), Targets(weights, weights * np.where(bit, 1.9, -1.8)), Z_MAX)
     assert fitted.columns[0] == 1
+
+
+def _equal_sums(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Weights and responses (1, 40): the first row has exactly what the next two have together."""
+    rng = np.random.default_rng(seed)
+    weights, ratios = rng.random((1, 40)), np.full((1, 40), -1.7)
+    weights[0, 1:3] = weights[0, 0] / 2
+    ratios[0, :3] = 1.9
+    responses = weights * ratios
+    responses[0, 1:3] = responses[0, 0] / 2
+    first, others = np.arange(40) == 0, np.isin(np.arange(40), (1, 2))
+    return np.stack([first, others]).astype(np.float64), weights, responses
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_columns_of_equal_sums_tie_however_the_grid_rounds_them(seed: int) -> None:
+    branches, weights, responses = _equal_sums(seed)
+    for columns in (branches.T, branches[::-1].T):
+        fitted = fit_stumps(bin_columns(columns), Targets(weights, responses), Z_MAX)
+        assert fitted.columns[0] == 0
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_splits_of_equal_sums_tie_and_the_lowest_wins(seed: int) -> None:
+    (first, others), weights, responses = _equal_sums(seed)
+    for column in (1 + first - others, 1 - first + others):
+        fitted = fit_stumps(bin_columns(column[:, np.newaxis]), Targets(weights, responses), Z_MAX)
+        assert fitted.thresholds[0] == 0.5
+
+
+def test_a_light_branch_keeps_the_bits_that_the_coarse_grid_drops() -> None:
+    weights = np.array([[1e-9 / 3, 0.7, 0.3]])
+    left = np.array([[1.0, 0.0, 0.0]])
+    weight, response = Targets(weights, weights * 1.3).branch_sums(left, None)
+    np.testing.assert_allclose(weight[0], weights[:, 0], rtol=1e-15)
+    np.testing.assert_allclose(response[0], weights[:, 0] * 1.3, rtol=1e-15)

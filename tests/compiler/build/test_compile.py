@@ -3,7 +3,10 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +16,9 @@ from thenar.compiler.build.errors import CompileError
 from thenar.compiler.evaluation.errors import EvaluationError
 from thenar.drivers.errors import ThenarError
 from thenar.runtime import Build
+from thenar.runtime.manifest import Inputs
 
+Make = Callable[..., GraspSet]
 ROUNDS = 12
 
 
@@ -62,14 +67,16 @@ def test_provenance_is_written(grasp_set: GraspSet, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("inputs", "switches", "joints"), [("switches", True, False), ("joints", False, True)])
-def test_either_kind_of_input_will_do(grasp_set: GraspSet, tmp_path: Path, inputs, switches, joints) -> None:
+def test_either_kind_of_input_will_do(
+    grasp_set: GraspSet, tmp_path: Path, inputs: Inputs, switches: bool, joints: bool
+) -> None:
     manifest = compile_build(grasp_set, tmp_path / "build", rounds=ROUNDS, inputs=inputs, folds=0).manifest
     assert (bool(manifest.switches), bool(manifest.joints)) == (switches, joints)
     assert Build.load(tmp_path / "build").tables.n_joints == 3 * joints
 
 
 @pytest.mark.parametrize("lacking", [{"switches": 0}, {"joints": 0}])
-def test_recordings_of_one_kind_need_no_option(make_set, tmp_path: Path, lacking) -> None:
+def test_recordings_of_one_kind_need_no_option(make_set: Make, tmp_path: Path, lacking: dict[str, int]) -> None:
     compile_build(make_set(**lacking), tmp_path / "build", rounds=2)
     assert Build.load(tmp_path / "build").grasps
 
@@ -87,7 +94,9 @@ def test_recordings_of_one_kind_need_no_option(make_set, tmp_path: Path, lacking
         ({"rows": 4}, {"folds": 5}, "cannot be cut into 5 folds"),
     ],
 )
-def test_what_makes_no_build_is_refused_and_nothing_written(make_set, tmp_path, shape, options, reason) -> None:
+def test_what_makes_no_build_is_refused_and_nothing_written(
+    make_set: Make, tmp_path: Path, shape: dict[str, int], options: dict[str, Any], reason: str
+) -> None:
     with pytest.raises((ThenarError, EvaluationError), match=reason):
         compile_build(make_set(**shape), tmp_path / "build", **{"rounds": 2, **options})
     assert list(tmp_path.iterdir()) == []
@@ -112,14 +121,16 @@ def test_an_interrupt_leaves_the_old_build_and_no_litter(grasp_set: GraspSet, tm
     assert [path.name for path in tmp_path.iterdir()] == ["build"]
 
 
-def test_same_recordings_and_options_give_the_same_bytes(make_set, tmp_path: Path) -> None:
+def test_same_recordings_and_options_give_the_same_bytes(make_set: Make, tmp_path: Path) -> None:
     for name in ("one", "two"):
         compile_build(make_set(), tmp_path / name, rounds=ROUNDS)
     assert _bytes(tmp_path / "one") == _bytes(tmp_path / "two")
 
 
 @pytest.mark.parametrize("environment", [("1", "0"), ("2", "77")])
-def test_threads_and_hash_seed_change_no_byte(grasp_set: GraspSet, tmp_path: Path, environment) -> None:
+def test_threads_and_hash_seed_change_no_byte(
+    grasp_set: GraspSet, tmp_path: Path, environment: tuple[str, str]
+) -> None:
     compile_build(grasp_set, tmp_path / "here", rounds=ROUNDS)
     grasp_set.save(tmp_path / "set.grasps")
     threads, hash_seed = environment
@@ -143,3 +154,23 @@ def test_a_file_in_the_way_is_refused_before_any_work(grasp_set: GraspSet, tmp_p
     (tmp_path / "notes" / "mine.txt").write_text("keep me")
     with pytest.raises(CompileError, match="not empty and not a build"):
         compile_build(grasp_set, tmp_path / "notes", progress=lambda *_: pytest.fail("worked in vain"))
+
+
+def test_joints_that_never_move_make_no_build(make_set: Make, tmp_path: Path) -> None:
+    still = replace(make_set(switches=0), codes=np.full((96, 3), 7, np.uint16))
+    with pytest.raises(CompileError, match="no input differs between rows"):
+        compile_build(still, tmp_path / "build")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("folds", [-1, 1, 97])
+def test_impossible_folds_are_refused_before_any_work(grasp_set: GraspSet, tmp_path: Path, folds: int) -> None:
+    with pytest.raises(EvaluationError, match="fold"):
+        compile_build(grasp_set, tmp_path / "build", folds=folds, progress=lambda *_: pytest.fail("worked in vain"))
+
+
+def test_a_fold_that_keeps_no_switch_is_named(grasp_set: GraspSet, tmp_path: Path) -> None:
+    options: dict[str, Any] = {"inputs": "switches", "prune": 80, "rounds": 1}
+    assert compile_build(grasp_set, tmp_path / "build", folds=0, **options).manifest.switches
+    with pytest.raises(CompileError, match="in fold 1: no switch is worth keeping"):
+        compile_build(grasp_set, tmp_path / "build", folds=4, **options)

@@ -1,3 +1,4 @@
+import os
 from pathlib import Path
 
 import pytest
@@ -97,3 +98,52 @@ def test_a_link_to_a_build_stays_a_link(tmp_path: Path) -> None:
     publish(NEW, check_target(tmp_path / "link"))
     assert (tmp_path / "link").is_symlink()
     assert _content(tmp_path / "real") == NEW
+
+
+def test_files_put_into_the_folder_during_the_training_stay(tmp_path: Path) -> None:
+    _fill(tmp_path / "build", OLD)
+    target = check_target(tmp_path / "build")
+    (target / "notes.txt").write_bytes(b"mine")
+    with pytest.raises(CompileError, match=r"holds notes\.txt"):
+        publish(NEW, target)
+    assert _content(target) == {**OLD, "notes.txt": b"mine"}
+    assert [path.name for path in tmp_path.iterdir()] == ["build"]
+
+
+def test_a_folder_by_the_name_of_a_file_of_a_build_is_not_of_a_build(tmp_path: Path) -> None:
+    _fill(tmp_path / "build", {"build.json": b"old"})
+    _fill(tmp_path / "build" / "tables.bin", {"notes.txt": b"mine"})
+    with pytest.raises(CompileError, match=r"holds tables\.bin, which is not of a build"):
+        check_target(tmp_path / "build")
+
+
+def test_a_users_files_aside_are_never_deleted(tmp_path: Path) -> None:
+    _fill(tmp_path / "build", OLD)
+    _fill(tmp_path / ".build.old", {**OLD, "notes.txt": b"mine"})
+    with pytest.raises(CompileError, match=r"\.build\.old holds notes\.txt"):
+        check_target(tmp_path / "build")
+    assert _content(tmp_path / ".build.old") == {**OLD, "notes.txt": b"mine"}
+
+
+def test_what_a_crash_left_half_deleted_is_cleared_by_the_next_build(tmp_path: Path) -> None:
+    _fill(tmp_path / "build", OLD)
+    _fill(tmp_path / ".build.old", {"tables.bin": b"old"})
+    publish(NEW, check_target(tmp_path / "build"))
+    assert _content(tmp_path / "build") == NEW
+    assert [path.name for path in tmp_path.iterdir()] == ["build"]
+
+
+def test_what_a_killed_process_of_the_same_number_left_is_not_in_the_way(tmp_path: Path) -> None:
+    _fill(tmp_path / f".build.{os.getpid()}.part", {"tables.bin": b"ol"})
+    publish(NEW, check_target(tmp_path / "build"))
+    assert _content(tmp_path / "build") == NEW
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_parent_that_may_not_be_written_to_is_refused_before_any_work(tmp_path: Path) -> None:
+    tmp_path.chmod(0o555)
+    try:
+        with pytest.raises(CompileError, match="may not be written to"):
+            check_target(tmp_path / "build")
+    finally:
+        tmp_path.chmod(0o755)

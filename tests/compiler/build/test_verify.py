@@ -1,4 +1,5 @@
 import hashlib
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,8 @@ from thenar.compiler.build.verify import verify_build
 from thenar.runtime import BuildError
 from thenar.runtime.manifest import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.tables import tables_from_bytes, tables_to_bytes
+
+Make = Callable[..., GraspSet]
 
 
 @pytest.fixture
@@ -43,7 +46,7 @@ def test_a_build_holds_on_the_recordings_it_was_made_from(folder: Path, grasp_se
     assert found.covered_changed == 0
 
 
-def test_other_recordings_with_their_columns_in_another_order_will_do(folder: Path, make_set) -> None:
+def test_other_recordings_with_their_columns_in_another_order_will_do(folder: Path, make_set: Make) -> None:
     other = make_set(seed=5)
     shuffled = GraspSet(
         other.switches[:, ::-1], other.switch_names[::-1], other.codes[:, ::-1], other.joints[::-1],
@@ -72,9 +75,12 @@ def test_every_changed_row_is_told(folder: Path, grasp_set: GraspSet) -> None:
         assert row.recorded == grasp_set.grasps[row.row]
         assert row.ensemble != row.integers
         assert row.margin >= 0
+    gained = sum(row.integers == row.recorded for row in found.changed)
+    lost = sum(row.ensemble == row.recorded for row in found.changed)
+    assert found.correct_integers == found.correct_ensemble + gained - lost < found.correct_ensemble
 
 
-def test_missing_inputs_are_named(folder: Path, make_set) -> None:
+def test_missing_inputs_are_named(folder: Path, make_set: Make) -> None:
     with pytest.raises(CompileError, match="lack joints that the build needs: j2"):
         verify_build(folder, make_set(joints=2))
 
@@ -86,11 +92,18 @@ def test_codes_that_mean_something_else_are_refused(folder: Path, grasp_set: Gra
         grasp_set.switches, grasp_set.switch_names, grasp_set.codes, joints,
         grasp_set.grasps, grasp_set.taxonomy, grasp_set.subjects, grasp_set.objects, grasp_set.trials,
     )  # fmt: skip
-    with pytest.raises(CompileError, match="joint j1 is coded differently"):
+    with pytest.raises(CompileError, match="joint j1 is coded differently here: code 0 is 10 deg, in the build 0 deg"):
         verify_build(folder, other)
 
 
-def test_the_ensemble_of_another_build_is_refused(folder: Path, make_set, tmp_path: Path) -> None:
+def test_the_point_at_which_codes_mean_something_else_is_named(folder: Path, grasp_set: GraspSet) -> None:
+    steeper = replace(grasp_set.joints[1], value_b=200.0)
+    other = replace(grasp_set, joints=(grasp_set.joints[0], steeper, grasp_set.joints[2]))
+    with pytest.raises(CompileError, match=r"code 255 is 200 deg, in the build 127\.5 deg"):
+        verify_build(folder, other)
+
+
+def test_the_ensemble_of_another_build_is_refused(folder: Path, make_set: Make, tmp_path: Path) -> None:
     compile_build(make_set(seed=3), tmp_path / "other", rounds=15, folds=0)
     (folder / "ensemble.bin").write_bytes((tmp_path / "other" / "ensemble.bin").read_bytes())
     with pytest.raises(BuildError, match=r"ensemble\.bin is not the one"):

@@ -54,3 +54,10 @@ def test_an_object_of_its_own_grasp_type_is_noticed_when_objects_are_left_out(ma
     )
     (text,) = concerns(grasps, populations(grasps, "object", 4, 1, 1), "object", 4)
     assert text.startswith("12 row(s) of hook of subject A")
+
+
+def test_a_subject_of_one_grasp_type_is_named(make_grasps: Make) -> None:
+    grasps = make_grasps()
+    only = grasps.rows(np.flatnonzero((grasps.subjects == "B") | (grasps.grasps == "tip")))
+    (text,) = concerns(only, populations(only, "stratified", 4, 1, 1), "stratified", 4)
+    assert text == "subject A: every row is of tip, nothing is to be told apart"

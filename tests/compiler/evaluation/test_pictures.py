@@ -1,7 +1,11 @@
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
-from thenar.compiler.evaluation.pictures import draw_confusions
+import numpy as np
+from matplotlib.figure import Figure
+
+from thenar.compiler.evaluation.pictures import draw_confusions, draw_matrix
 from thenar.compiler.evaluation.study import Options, evaluate
 from thenar.compiler.recordings.graspset import GraspSet
 
@@ -13,3 +17,21 @@ def test_every_composition_and_protocol_has_its_picture(make_grasps: Callable[..
     names = [f"confusion-{protocol}-{name}.png" for protocol in ("paper", "honest") for name in ("V", "VI", "VII")]
     assert [path.name for path in drawn] == names
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in drawn)
+
+
+def test_a_dollar_in_a_name_is_a_dollar(make_grasps: Callable[..., GraspSet], tmp_path: Path) -> None:
+    options = Options(rounds=2, repeats=1, tables=("compositions",), protocols=("honest",))
+    study = evaluate(make_grasps(n_switches=0), options, jobs=1)
+    named = replace(study, grasps=(r"$\left{$", *study.grasps[1:]))
+    (first,), (second,) = (draw_confusions(named, tmp_path / name) for name in ("one", "two"))
+    assert first.read_bytes() == second.read_bytes()
+    assert list(first.parent.iterdir()) == [first]
+
+
+def test_numbers_and_colours_are_shares_of_the_true_types_rows() -> None:
+    axes = Figure().subplots()
+    draw_matrix(axes, ("cup", "pen", "rod"), ((150, 50, 0), (1, 199, 0), (0, 0, 0)))
+    (image,) = axes.images
+    assert np.allclose(np.asarray(image.get_array()), [[0.75, 0.25, 0], [0.005, 0.995, 0], [0, 0, 0]])
+    written = {text.get_position(): text.get_text() for text in axes.texts}
+    assert written == {(0, 0): "75", (1, 0): "25", (1, 1): "100"}

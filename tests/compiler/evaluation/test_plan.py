@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler.evaluation.placements import Placements
-from thenar.compiler.evaluation.plan import DRAWS, Planner, RowPlan, TablePlan
+from thenar.compiler.evaluation.plan import DRAWS, Planner, RowPlan, TableName, TablePlan
 from thenar.compiler.evaluation.populations import populations
 from thenar.compiler.evaluation.protocols import HONEST, PAPER, Protocol
 from thenar.compiler.recordings.graspset import GraspSet
@@ -97,9 +97,20 @@ def test_baselines_have_as_many_switches_as_id3_in_every_fold(planner: Planner, 
             assert [len(fit.columns) for fit in cell.fits] == sizes
 
 
+@both_protocols
+def test_baselines_choose_from_the_rows_that_id3_may_choose_from(planner: Planner, protocol: Protocol) -> None:
+    table = planner.table("baselines", protocol)
+    for name, choose in (("CMIM", planner.placements.cmim), ("top-k", planner.placements.top)):
+        for cell in row(table, name).cells:
+            for fit in cell.fits:
+                seen = cell.part.rows if protocol is PAPER else fit.fold.train
+                assert fit.columns == tuple(sorted(choose(seen, len(fit.columns))))
+
+
 def test_pruning_by_s_makes_the_placements_of_all_tables_smaller(make_grasps: Make) -> None:
     grasps = make_grasps(noise=0.25)
-    for name, line in (("compositions", "VI"), ("generality", "A"), ("baselines", "CMIM")):
+    lines: dict[TableName, str] = {"compositions": "VI", "generality": "A", "baselines": "CMIM"}
+    for name, line in lines.items():
         full, pruned = (
             len(row(planner_of(grasps, prune).table(name, PAPER), line).cells[0].fits[0].columns) for prune in (0, 20)
         )

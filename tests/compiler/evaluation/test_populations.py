@@ -5,14 +5,14 @@ import pytest
 
 from thenar.compiler.evaluation.errors import EvaluationError
 from thenar.compiler.evaluation.folds import weka_folds
-from thenar.compiler.evaluation.populations import populations
+from thenar.compiler.evaluation.populations import Scheme, populations
 from thenar.compiler.recordings.graspset import GraspSet
 
 Make = Callable[..., GraspSet]
 
 
 @pytest.mark.parametrize("scheme", ["stratified", "object", "block"])
-def test_a_subject_is_trained_and_tested_on_own_rows_alone(make_grasps: Make, scheme: str) -> None:
+def test_a_subject_is_trained_and_tested_on_own_rows_alone(make_grasps: Make, scheme: Scheme) -> None:
     grasps = make_grasps()
     parts = populations(grasps, scheme, n_folds=4, repeats=2, seed=1)
     assert [part.name for part in parts] == ["A", "B"]
@@ -43,7 +43,7 @@ def test_repeats_are_wekas_folds_of_the_following_seeds(make_grasps: Make) -> No
 
 
 @pytest.mark.parametrize("scheme", ["subject", "object", "block"])
-def test_a_cut_without_chance_is_not_repeated(make_grasps: Make, scheme: str) -> None:
+def test_a_cut_without_chance_is_not_repeated(make_grasps: Make, scheme: Scheme) -> None:
     assert all(len(part.repeats) == 1 for part in populations(make_grasps(), scheme, 4, 3, 1))
 
 

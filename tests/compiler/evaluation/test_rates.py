@@ -58,6 +58,16 @@ def test_repeats_that_differ_widely_widen_the_interval() -> None:
     assert differing.mean == agreeing.mean
     assert differing.low < agreeing.low
     assert differing.high > agreeing.high
+    students = t.interval(0.95, 2, 0.9, 0.05 / 3**0.5)
+    assert (differing.low, differing.high) == pytest.approx((students[0], 1.0))
+    assert Rate.of((450, 500, 550), 1000).high == pytest.approx(students[1] - 0.4)
+
+
+def test_repeats_of_one_draw_are_no_more_certain_than_its_mean() -> None:
+    repeated = Rate.of((800, 802, 900, 902, 851, 849), 1000, repeats_a_draw=2)
+    alone = Rate.of((801, 901, 850), 1000)
+    assert (repeated.mean, repeated.low, repeated.high) == pytest.approx((alone.mean, alone.low, alone.high))
+    assert repeated.low < Rate.of(repeated.correct, 1000).low
 
 
 @pytest.mark.parametrize(("correct", "total"), [((), 5), ((6,), 5), ((-1,), 5), ((0,), 0)])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler.evaluation.errors import EvaluationError
+from thenar.compiler.evaluation.populations import Scheme
 from thenar.compiler.evaluation.study import TABLES, Options, Study, evaluate
 from thenar.compiler.evaluation.tables import Row, Table
 from thenar.compiler.recordings.graspset import GraspSet
@@ -119,7 +120,9 @@ def test_a_composition_left_without_inputs_shows_the_rate_of_the_most_frequent_g
 
 
 def test_one_subject_alone_has_nobody_elses_placement(make_grasps: Make) -> None:
-    study = evaluate(make_grasps(), replace(QUICK, subjects=("B",)), jobs=1)
+    grasps = make_grasps()
+    study = evaluate(grasps, replace(QUICK, subjects=("B",)), jobs=1)
+    assert study.fingerprint == grasps.fingerprint()
     assert {t.name for t in study.tables} == {"compositions", "pruning", "baselines"}
     assert [t.name for t in study.left_out] == ["generality"]
     assert study.tables[0].columns == ("B",)
@@ -135,7 +138,7 @@ def test_pruning_the_pool_of_one_subject_by_the_same_s_is_composition_six(make_g
 
 
 @pytest.mark.parametrize("scheme", ["subject", "object", "block"])
-def test_other_cuts_have_one_repeat_and_a_column_a_subject(make_grasps: Make, scheme: str) -> None:
+def test_other_cuts_have_one_repeat_and_a_column_a_subject(make_grasps: Make, scheme: Scheme) -> None:
     study = evaluate(make_grasps(), replace(QUICK, scheme=scheme, protocols=("honest",)), jobs=1)
     assert ("generality" in {t.name for t in study.tables}) == (scheme != "subject")
     for each in study.tables:

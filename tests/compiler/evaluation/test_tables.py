@@ -5,6 +5,7 @@ from thenar.compiler.evaluation.fits import Fit
 from thenar.compiler.evaluation.folds import Fold
 from thenar.compiler.evaluation.plan import CellPlan, RowPlan, TablePlan
 from thenar.compiler.evaluation.populations import Population
+from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.evaluation.tables import Reader
 
 # Six rows of labels 2 and 5 (others do not occur), two folds, two repeats of the same folds; switches are columns 0..2.
@@ -36,15 +37,18 @@ def test_the_confusion_matrix_adds_up_the_repeats_true_types_in_rows() -> None:
 
 def test_switches_are_counted_without_the_joints_and_fits_without_inputs_are_told() -> None:
     cell = READER.cell(CELL, confusing=False)
-    assert (cell.switches.least, cell.switches.mean, cell.switches.most) == (0, pytest.approx(7 / 4), 3)
+    assert (cell.switches.least, cell.switches.most) == (0, 3)
+    assert cell.switches.mean == pytest.approx(7 / 4)
     assert cell.no_inputs == 1
 
 
 def test_more_runs_than_repeats_are_draws_with_a_range_of_their_own() -> None:
     cell = READER.cell(CellPlan(PART, (FIRST, FIRST, SECOND, SECOND)), confusing=False)
     assert cell.draws is not None
-    assert (cell.draws.least, cell.draws.most) == (pytest.approx(4 / 6), pytest.approx(5 / 6))
+    assert (cell.draws.least, cell.draws.most) == pytest.approx((4 / 6, 5 / 6))
+    assert cell.rate == Rate.of((5, 5, 4, 4), 6, repeats_a_draw=2)
     assert READER.cell(CELL, confusing=False).draws is None
+    assert READER.cell(CELL, confusing=False).rate == Rate.of((5, 4), 6)
 
 
 def test_a_row_averages_its_subjects_and_only_compositions_carry_confusions() -> None:

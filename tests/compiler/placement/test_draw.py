@@ -39,3 +39,8 @@ def test_a_single_leaf_can_be_drawn(tmp_path: Path) -> None:
 def test_another_kind_of_file_is_refused(tree: Tree, tmp_path: Path) -> None:
     with pytest.raises(PlacementError, match=r"tree\.pdf: a picture of a tree ends in \.svg or \.png"):
         draw_tree(tree, tmp_path / "tree.pdf")
+
+
+def test_a_dollar_in_a_name_is_a_dollar(tmp_path: Path) -> None:
+    draw_tree(grow_id3([[0], [1]], [0, 1]), tmp_path / "tree.svg", [r"$\left{$"], ["$a$", "b"])
+    assert r"<!-- $\left{$" in (tmp_path / "tree.svg").read_text()

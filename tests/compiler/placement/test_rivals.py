@@ -3,6 +3,7 @@
 from collections import Counter
 from fractions import Fraction
 from math import prod
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from thenar.compiler.placement import rivals
+from thenar.compiler.placement.cooccurrence import Cooccurrence
 from thenar.compiler.placement.errors import PlacementError
 from thenar.compiler.placement.rivals import forward_cmim, random_placement, top_mutual_information
 
@@ -24,7 +27,7 @@ def data(draw: st.DrawFn) -> Data:
     return random.random((n, d)) < random.choice([0.1, 0.5]), random.integers(0, classes, n)
 
 
-def power(*columns: npt.NDArray[np.int64]) -> int:
+def power(*columns: npt.NDArray[Any]) -> int:
     """Return the product of m ^ m over the counts m of equal rows: e to the power of n times their information."""
     return prod(m**m for m in Counter(zip(*(column.tolist() for column in columns), strict=True)).values())
 
@@ -40,7 +43,8 @@ def varying(X: Bits) -> list[int]:
 
 def cmim_by_definition(X: Bits, y: npt.NDArray[np.int64], m: int) -> tuple[int, ...]:
     none = np.zeros(len(y), bool)
-    rest, chosen = varying(X), []
+    rest = varying(X)
+    chosen: list[int] = []
     scores = {a: information(y, X[:, a], none) for a in rest}
     while rest and len(chosen) < m:
         best = max(rest, key=lambda a: scores[a])
@@ -62,6 +66,28 @@ def test_the_top_ones_are_sorted_by_information_then_number(drawn: Data, m: int)
     none = np.zeros(len(y), bool)
     wanted = sorted(varying(X), key=lambda a: (-information(y, X[:, a], none), a))
     assert top_mutual_information(X, y, m) == tuple(wanted[:m])
+
+
+class Rough(Cooccurrence):
+    """Floating-point information that is off by as much as its bound admits, as it might be on another machine."""
+
+    def __init__(self, X: Bits, labels: npt.NDArray[np.intp], n_classes: int) -> None:
+        super().__init__(X, labels, n_classes)
+        self.error_bound = 0.5
+        self.random = np.random.default_rng(len(X))
+
+    def information(self, given: int | None = None) -> npt.NDArray[np.float64]:
+        exact = super().information(given)
+        return exact + self.random.uniform(-0.5, 0.5, exact.shape)
+
+
+@given(data(), st.integers(0, 8))
+def test_rounding_within_its_bound_decides_nothing(drawn: Data, m: int) -> None:
+    X, y = drawn
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rivals, "Cooccurrence", Rough)
+        rough = forward_cmim(X, y, m), top_mutual_information(X, y, m)
+    assert rough == (forward_cmim(X, y, m), top_mutual_information(X, y, m))
 
 
 @given(data())

@@ -10,7 +10,7 @@ from thenar.compiler.recordings.table import Table, read_table
 HEADER = """% a comment
 @RELATION 'a b'
 @attribute 'my joint' NUMERIC
-@attribute s {0, 1}
+@ATTRIBUTE s {0, 1}
 @attribute\tclass {'Disk (power)', 'Hook, platform, push', "it's", 'it\\'s not', x}
 
 @data

@@ -1,5 +1,6 @@
 import io
 import zipfile
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -108,3 +109,13 @@ def test_mutated_bytes_are_read_or_refused_and_never_crash(data: st.DataObject) 
         return
     assert isinstance(header, bytes)
     assert all(array.nbytes <= len(payload) for array in arrays.values())
+
+
+@given(st.lists(st.tuples(st.integers(0, 127), st.sampled_from(b"()[]{}'\",:9-<uO \0\n")), min_size=1, max_size=4))
+@example([(63, ord("("))])
+def test_a_mutated_header_in_a_sound_zip_is_read_or_refused_and_never_crashes(changes: list[tuple[int, int]]) -> None:
+    member = bytearray(npy(np.zeros(8, np.uint8)))
+    for place, byte in changes:
+        member[place] = byte
+    with suppress(SealError):
+        assert len(unpack(with_members(header=bytes(member)))[0]) == 8

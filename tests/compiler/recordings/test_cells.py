@@ -56,10 +56,10 @@ def test_anything_else_is_no_switch(word: str) -> None:
 
 
 def test_a_trial_is_a_whole_number() -> None:
-    parsed = integers(["3", "-4.0", "", "1.5", "1e300", "x"])
+    parsed = integers(["3", "-4.0", "", "1.5", "1e300", "x", str(2**53), str(2**53 + 2)])
     assert parsed.values[:2].tolist() == [3, -4]
-    assert parsed.missing.tolist() == [False, False, True, False, False, False]
-    assert parsed.wrong.tolist() == [False, False, False, True, True, True]
+    assert parsed.missing.tolist() == [False, False, True, False, False, False, False, False]
+    assert parsed.wrong.tolist() == [False, False, False, True, True, True, False, True]
 
 
 def test_a_code_is_a_whole_number_of_sixteen_bits() -> None:
@@ -72,3 +72,9 @@ def test_names_lose_their_outer_blanks_and_whole_numbers_their_point() -> None:
     parsed = names(np.array([3.0, 0.5, np.nan]))
     assert parsed.values.tolist() == ["3", "0.5", ""]
     assert parsed.missing.tolist() == [False, False, True]
+
+
+def test_a_name_with_a_control_character_is_wrong_wherever_it_stands() -> None:
+    cells = ["a\0", "\0", "a\nb", "fine", "", "?"]
+    assert names(cells).wrong.tolist() == [True, True, True, False, False, False]
+    assert names(cells).missing.tolist() == [False, False, False, False, True, True]

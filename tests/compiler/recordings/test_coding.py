@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from thenar.compiler.recordings.coding import code_joint
 from thenar.compiler.recordings.columns import Calibration, JointColumns
-from thenar.compiler.recordings.errors import TableError
+from thenar.compiler.recordings.errors import RecordingError, TableError
 
 ANGLES = st.lists(st.floats(-400, 400), min_size=1, max_size=20)
 
@@ -62,3 +62,10 @@ def test_values_are_coded_by_a_calibration_when_there_is_one() -> None:
 def test_values_beyond_the_codes_are_refused_with_their_rows(entry: JointColumns, advice: str) -> None:
     with pytest.raises(TableError, match=f"joint 'j': rows? .* would get codes outside 0..65535: {advice}"):
         code_joint("j", entry, np.array([0.0, 100.0, 5.0]), np.array([2, 3, 4]))
+
+
+@pytest.mark.parametrize("values", [[0.0, 1e308], [-1e308, 1e308], [-1e308, 0.0], [1e308, 1e308]])
+@pytest.mark.parametrize("grid", [0.5, 0.001])
+def test_values_beyond_all_counting_are_refused_as_well(values: list[float], grid: float) -> None:
+    with pytest.raises((TableError, RecordingError), match="take a coarser grid"):
+        code_joint("j", JointColumns(("j",), grid=grid), np.array(values), np.arange(2))

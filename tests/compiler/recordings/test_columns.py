@@ -100,6 +100,10 @@ def test_globs_heed_case() -> None:
     [
         (Columns("grap", switches=("s*",)), r"no column 'grap' \(did you mean 'grasp'\?\)"),
         (Columns("grasp", subject="whom", switches=("s*",)), r"no column 'whom' \(did you mean 'who'"),
+        (
+            Columns("grasp", trial="zzz", switches=("s*",)),
+            r"trial: the .* 'zzz' \(there are: grasp, who, .* and 3 more\)",
+        ),
         (Columns("grasp", joints=(JointColumns(("k3",)),)), "joints: 'k3' matches no column"),
         (Columns("grasp", switches=("s*", "s1")), "column 's1' is used 2 times"),
         (Columns("grasp", switches=("*",)), "column 'grasp' is used 2 times"),
@@ -118,3 +122,14 @@ def test_any_text_is_a_columns_file_or_refused(text: str, tmp_path_factory: pyte
     folder = tmp_path_factory.getbasetemp()
     with suppress(ColumnsError):
         assert isinstance(read(text, folder), Columns)
+
+
+def test_a_byte_order_mark_is_skipped(tmp_path: Path) -> None:
+    (tmp_path / "columns.toml").write_bytes(b"\xef\xbb\xbflabel = 'a'")
+    assert read_columns(tmp_path / "columns.toml") == Columns("a")
+
+
+def test_a_column_with_brackets_in_its_name_is_answered_with_the_glob_that_finds_it() -> None:
+    with pytest.raises(ColumnsError, match=r"for the column of that name write 'force\[\[\]N\]'"):
+        select(Columns("g", switches=("force[N]",)), ["g", "force[N]"])
+    assert select(Columns("g", switches=("force[[]N]",)), ["g", "force[N]"]).switches == ("force[N]",)

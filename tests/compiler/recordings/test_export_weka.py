@@ -1,22 +1,18 @@
 """Weka itself opens what is exported."""
 
-import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.conftest import need, need_tool
 from thenar.compiler.recordings.export import export
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import own
 
+pytestmark = pytest.mark.slow
+
 AWKWARD = ("it's", '50 % "x"', "a, b", "{0}", "\\n", "semi;colon", "plain", "two words")
-
-
-def weka(*arguments: str) -> str:
-    command = [need_tool("java"), "-cp", str(need(Path("/usr/share/java/weka.jar"))), *arguments]
-    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
 
 
 @pytest.fixture
@@ -36,8 +32,7 @@ def awkward() -> GraspSet:
     )
 
 
-@pytest.mark.slow
-def test_weka_reads_every_name_row_and_type(awkward: GraspSet, tmp_path: Path) -> None:
+def test_weka_reads_every_name_row_and_type(weka: Callable[..., str], awkward: GraspSet, tmp_path: Path) -> None:
     export(awkward, tmp_path / "table.arff", meta=True)
     report = weka("weka.core.Instances", str(tmp_path / "table.arff"))
     assert "Num Instances:  40" in report
@@ -47,8 +42,9 @@ def test_weka_reads_every_name_row_and_type(awkward: GraspSet, tmp_path: Path) -
     assert nominal == [True, True, False, *[True] * 4, *[False] * 4, True]
 
 
-@pytest.mark.slow
-def test_weka_gives_back_the_values_and_the_grasp_types(awkward: GraspSet, tmp_path: Path) -> None:
+def test_weka_gives_back_the_values_and_the_grasp_types(
+    weka: Callable[..., str], awkward: GraspSet, tmp_path: Path
+) -> None:
     export(awkward, tmp_path / "table.arff")
     weka("weka.core.converters.CSVSaver", "-i", str(tmp_path / "table.arff"), "-o", str(tmp_path / "table.csv"))
     rows = (tmp_path / "table.csv").read_text().splitlines()[1:]
@@ -59,8 +55,9 @@ def test_weka_gives_back_the_values_and_the_grasp_types(awkward: GraspSet, tmp_p
         assert values == [*awkward.switches[row], *joints]
 
 
-@pytest.mark.slow
-def test_weka_trains_on_it_with_the_last_attribute_as_class(awkward: GraspSet, tmp_path: Path) -> None:
+def test_weka_trains_on_it_with_the_last_attribute_as_class(
+    weka: Callable[..., str], awkward: GraspSet, tmp_path: Path
+) -> None:
     export(awkward, tmp_path / "table.arff")
     report = weka("weka.classifiers.rules.ZeroR", "-t", str(tmp_path / "table.arff"), "-no-cv")
     assert "ZeroR predicts class value: it's" in report

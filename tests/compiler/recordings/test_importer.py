@@ -94,3 +94,9 @@ def test_the_aml_recordings_are_read_as_their_readme_describes_them(aml_table: P
         77,
         157,
     ]
+
+
+def test_a_value_beyond_the_codes_is_named_by_the_users_row() -> None:
+    rows = {"g": ["a", "b"], "j": ["0", "1e6"]}
+    with pytest.raises(TableError, match="joint 'j': row 9 would get codes outside"):
+        import_table(Table("t.csv", rows, np.array([7, 9])), Columns("g", joints=JOINTS))

@@ -85,3 +85,18 @@ def test_a_table_of_which_nothing_is_left_is_refused() -> None:
 def test_a_row_that_misses_a_label_is_found_among_numbers_too() -> None:
     with pytest.raises(TableError, match=r"missing .*: 1 cell, row 3 'g' \('nan'\)"):
         read(Columns("g", switches=("s",)), g=np.array([1.0, np.nan, 2.0]))
+
+
+def test_a_label_that_cannot_be_printed_is_named_by_its_row() -> None:
+    with pytest.raises(TableError, match=r"t\.csv: not names that can be printed: 1 cell, row 3 'g' \('b\\x07'\)"):
+        read(ALL, g=["a", "b\x07", "c"])
+
+
+def test_of_many_wrong_cells_the_first_rows_are_named_and_the_rest_counted() -> None:
+    columns = [f"s{number}" for number in range(10)]
+    table = Table("t.csv", {"g": ["a"] * 9} | {name: ["7"] * 9 for name in columns}, np.arange(1, 10))
+    wanted = Columns("g", switches=("s*",))
+    with pytest.raises(TableError) as refused:
+        read_cells(table, wanted, select(wanted, list(table.columns)))
+    shown = ", ".join(f"row 1 's{number}' ('7')" for number in range(5))
+    assert str(refused.value) == f"t.csv: not 0 or 1: 90 cells, {shown} and 85 more"

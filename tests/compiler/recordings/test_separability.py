@@ -1,4 +1,5 @@
 from collections import Counter
+from dataclasses import replace
 
 import hypothesis.strategies as st
 import numpy as np
@@ -53,6 +54,13 @@ def test_types_that_lie_apart_are_told_apart_and_equal_ones_are_not() -> None:
     assert apart["joints"] == apart["both"] == 1.0
     mixed = {line.inputs: line.neighbour_rate for line in separabilities(blobs(200, 0))}
     assert mixed["joints"] == pytest.approx(0.5, abs=0.12)
+
+
+def test_a_joint_that_moves_far_does_not_drown_one_that_tells() -> None:
+    told = blobs(200, 200)
+    codes = told.codes * np.array([1, 600]) % 60_000
+    far = replace(told, codes=codes.astype(np.uint16))
+    assert {line.inputs: line.neighbour_rate for line in separabilities(far)}["joints"] == 1.0
 
 
 def test_the_neighbour_is_another_row() -> None:

@@ -1,4 +1,6 @@
 import gzip
+import io
+import zipfile
 from contextlib import suppress
 from pathlib import Path
 
@@ -22,6 +24,11 @@ def test_a_csv_is_columns_of_text_and_rows_by_their_line(tmp_path: Path) -> None
     assert table.rows.tolist() == [2, 4]
 
 
+def test_blank_lines_before_the_header_are_skipped(tmp_path: Path) -> None:
+    table = csv(b"\n\na\n1\n", tmp_path)
+    assert (dict(table.columns), table.rows.tolist()) == ({"a": ("1",)}, [4])
+
+
 def test_a_gzipped_csv_is_the_same_table(tmp_path: Path) -> None:
     path = tmp_path / "t.b.csv.gz"
     path.write_bytes(gzip.compress(b"a;b\n1;2\n"))
@@ -36,10 +43,10 @@ def test_a_gzipped_csv_is_the_same_table(tmp_path: Path) -> None:
         (b'a,b\n1,"2\n', "unexpected end of data"),
         (b'a,b\n1,"2"3\n', "row 2: ',' expected after '\"'"),
         (b"a,a\n1,2\n", "column 'a' occurs twice"),
-        (b"a,\n1,2\n", "column '' is empty"),
+        (b"a,\n1,2\n", "column 2 has no name in the header"),
         (b"a,b\n", "has no rows"),
         (b"", "has no rows"),
-        (b"a\n\xff\n", "is not UTF-8 text: invalid start byte"),
+        (b"a\n\xff\n", "is not UTF-8 text: invalid start byte; save it as UTF-8"),
     ],
 )
 def test_a_csv_that_is_no_table_is_refused_with_the_row(content: bytes, reason: str, tmp_path: Path) -> None:
@@ -47,9 +54,12 @@ def test_a_csv_that_is_no_table_is_refused_with_the_row(content: bytes, reason: 
         csv(content, tmp_path)
 
 
-@pytest.mark.parametrize("damage", [slice(0, -9), slice(1, None)])
-def test_a_damaged_gzip_is_refused(damage: slice, tmp_path: Path) -> None:
-    (tmp_path / "t.csv.gz").write_bytes(gzip.compress(b"a,b\n1,2\n" * 50)[damage])
+GZIP = gzip.compress(b"a,b\n1,2\n" * 50)
+
+
+@pytest.mark.parametrize("damaged", [GZIP[:-9], GZIP[1:], GZIP[:10] + b"\xff" + GZIP[11:], GZIP[:-5] + bytes(5)])
+def test_a_damaged_gzip_is_refused(damaged: bytes, tmp_path: Path) -> None:
+    (tmp_path / "t.csv.gz").write_bytes(damaged)
     with pytest.raises(TableError, match=r"t\.csv\.gz is damaged"):
         read_table(tmp_path / "t.csv.gz")
 
@@ -91,10 +101,59 @@ def test_an_npz_that_is_no_table_is_refused(arrays: dict[str, np.ndarray], reaso
         read_table(tmp_path / "t.npz")
 
 
-def test_what_is_no_npz_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "t.npz").write_bytes(b"a,b\n1,2\n")
-    with pytest.raises(TableError, match=r"t\.npz cannot be read as npz"):
+def _zip(members: dict[str, bytes], compression: int = zipfile.ZIP_STORED) -> bytes:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", compression) as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    return file.getvalue()
+
+
+def _npy(array: np.ndarray) -> bytes:
+    file = io.BytesIO()
+    np.save(file, array)
+    return file.getvalue()
+
+
+ONE = _npy(np.ones(1))
+# A header that claims eight terabytes, in as many bytes as the true one.
+HUGE = ONE.replace(b"(1,), }             ", b"(999999999999,), }  ")
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (b"", "File is not a zip file"),
+        (b"a,b\n1,2\n", "File is not a zip file"),
+        (ONE, "File is not a zip file"),
+        (_zip({"a.npy": ONE})[:-30], "File is not a zip file"),
+        (_zip({"readme.txt": b"no array at all"}), "magic string is not correct"),
+        (_zip({"a.npy": ONE[:-1]}), "EOF"),
+        (_zip({"a.npy": ONE.replace(b")", b"(")}), "EOF in multi-line statement"),
+        (_zip({"a.npy": HUGE}), "Unable to allocate"),
+        (_zip({"a.npy": ONE}, zipfile.ZIP_BZIP2), r"a\.npy is not compressed as numpy\.savez does"),
+        (_zip({"a.0.npy": ONE, "a.npy": _npy(np.ones((1, 2)))}), r"two arrays make a column 'a\.0'"),
+    ],
+)
+def test_what_is_no_npz_is_refused(content: bytes, reason: str, tmp_path: Path) -> None:
+    (tmp_path / "t.npz").write_bytes(content)
+    with pytest.raises(TableError, match=rf"t\.npz cannot be read as npz: .*{reason}"):
         read_table(tmp_path / "t.npz")
+
+
+@given(st.lists(st.tuples(st.integers(0), st.integers(0, 255)), min_size=1, max_size=5), st.booleans())
+@settings(deadline=None)
+def test_a_mutated_npz_is_a_table_or_refused_and_never_crashes(
+    folder: Path, changes: list[tuple[int, int]], deflated: bool
+) -> None:
+    members = {"a.npy": _npy(np.array(["x", "y"])), "X.npy": _npy(np.eye(2))}
+    content = bytearray(_zip(members, zipfile.ZIP_DEFLATED if deflated else zipfile.ZIP_STORED))
+    for place, byte in changes:
+        content[place % len(content)] = byte
+    (folder / "mutated.npz").write_bytes(content)
+    with suppress(TableError):
+        table = read_table(folder / "mutated.npz")
+        assert {len(column) for column in table.columns.values()} == {len(table.rows)}
 
 
 def test_another_suffix_is_refused_naming_those_that_are_read(tmp_path: Path) -> None:

@@ -1,14 +1,22 @@
+from collections.abc import Callable
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.tables.balance import balance
 from thenar.compiler.tables.collapse import ScoreTables, collapse
 from thenar.compiler.tables.quantise import reach
 
+MakeStumps = Callable[..., Stumps]
+MakeRows = Callable[..., tuple[np.ndarray, np.ndarray]]
+
 
 @given(seed=st.integers(0, 10_000), joints=st.integers(0, 3))
-def test_balancing_changes_no_score_and_never_coarsens(make_stumps, make_rows, seed: int, joints: int) -> None:
+def test_balancing_changes_no_score_and_never_coarsens(
+    make_stumps: MakeStumps, make_rows: MakeRows, seed: int, joints: int
+) -> None:
     tables = collapse(make_stumps(seed, joints=joints), 6)
     balanced = balance(tables)
     bits, codes = make_rows(seed, joints=joints)
@@ -17,7 +25,7 @@ def test_balancing_changes_no_score_and_never_coarsens(make_stumps, make_rows, s
 
 
 @given(seed=st.integers(0, 10_000))
-def test_with_the_bias_gone_partial_sums_reach_no_further_than_scores(make_stumps, seed: int) -> None:
+def test_with_the_bias_gone_partial_sums_reach_no_further_than_scores(make_stumps: MakeStumps, seed: int) -> None:
     tables = collapse(make_stumps(seed, rounds=60), 6)
     balanced = balance(tables)
     gone = np.abs(balanced.bias) < 1e-12

@@ -1,9 +1,14 @@
+from collections.abc import Callable
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.tables.collapse import collapse
+
+MakeStumps = Callable[..., Stumps]
+MakeRows = Callable[..., tuple[np.ndarray, np.ndarray]]
 
 
 @given(
@@ -14,7 +19,16 @@ from thenar.compiler.tables.collapse import collapse
     joints=st.integers(0, 3),
     shrinkage=st.sampled_from([1.0, 0.1]),
 )
-def test_tables_score_as_stumps_do(make_stumps, make_rows, seed, rounds, classes, switches, joints, shrinkage) -> None:
+def test_tables_score_as_stumps_do(
+    make_stumps: MakeStumps,
+    make_rows: MakeRows,
+    seed: int,
+    rounds: int,
+    classes: int,
+    switches: int,
+    joints: int,
+    shrinkage: float,
+) -> None:
     if switches + joints == 0:
         switches = 1
     stumps = make_stumps(seed, rounds, classes, switches, joints, shrinkage)
@@ -66,8 +80,18 @@ def test_a_threshold_that_no_code_passes_makes_no_bin() -> None:
         assert tables.joint_rows[0].tolist() == [[score, -score]]
 
 
-def test_an_ensemble_without_rounds_is_all_zeros(make_stumps) -> None:
+def test_an_ensemble_without_rounds_is_all_zeros(make_stumps: MakeStumps) -> None:
     tables = collapse(make_stumps(rounds=0), 6)
     assert not tables.bias.any()
     assert not tables.switch_rows.any()
     assert [rows.tolist() for rows in tables.joint_rows] == [[[0.0] * 4]] * 3
+
+
+def test_scores_are_added_row_after_row_and_not_as_the_machine_likes(make_stumps: MakeStumps) -> None:
+    tables = collapse(make_stumps(3, rounds=200, switches=90, joints=0), 90)
+    bits = np.random.default_rng(3).random((50, 90)) < 0.5
+    for frame, scores in zip(bits, tables.scores(bits, np.zeros((50, 0), np.uint16)), strict=True):
+        expected = tables.bias
+        for row in tables.switch_rows[frame]:
+            expected = expected + row
+        assert scores.tobytes() == expected.tobytes()
