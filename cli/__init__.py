@@ -1,74 +1,24 @@
-"""The command `thenar`: thin, each sub-command loaded only when it is called.
+"""The command `thenar`: thin, and light until a sub-command is called.
 
-Exit codes: 0 done, 1 a check that did not hold (`verify`), 2 a mistake that the user can mend, 130 Ctrl-C. A reader
-that goes away (`| head`) ends a command in silence, with click's 1.
+Exit codes: 0 done, 1 a check that did not hold (`verify`), 2 a mistake that the user can mend, 130 Ctrl-C.
 """
 
 import sys
 from collections.abc import Sequence
-from importlib import import_module
 
-import click
-
-from ..drivers.errors import ThenarError
-
-COMMANDS = ("import", "export", "info", "place", "evaluate", "compile", "verify", "run")
-
-
-class _LazyGroup(click.Group):
-    """Sub-command NAME is `command` in the module `NAME_command` of this package."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(COMMANDS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in COMMANDS:
-            return None
-        command: click.Command = import_module(f".{cmd_name}_command", __name__).command
-        return command
-
-
-@click.group(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="thenar")
-def thenar() -> None:
-    """Grasps recorded on a glove in; the few switches worth keeping, and a recogniser that runs on them, out.
-
-    \b
-    Example, from a table to a running recogniser:
-        thenar import table.csv -o set.grasps --columns columns.toml
-        thenar evaluate set.grasps
-        thenar compile set.grasps -o build/
-        thenar verify build/ set.grasps
-        thenar run build/ --replay set.grasps
-    """
+INTERRUPTED = 130
 
 
 def run(arguments: Sequence[str]) -> int:
     """Run `thenar` with `arguments` and return its exit code; what the user did wrong is one sentence on stderr."""
     try:
-        code = thenar.main(list(arguments), prog_name="thenar", standalone_mode=False)
-    except click.exceptions.NoArgsIsHelpError as help_wanted:
-        help_wanted.show()
-        return 2
-    except click.ClickException as mistake:
-        return _complain(mistake.format_message())
-    except ThenarError as mistake:
-        return _complain(str(mistake))
-    except OSError as mistake:
-        return _complain(f"{mistake.filename}: {mistake.strerror}" if mistake.filename else str(mistake))
-    except MemoryError as lack:
-        return _complain(f"not enough memory ({lack}): take fewer rows or columns")
-    except ModuleNotFoundError as lack:
-        return _complain(f"{lack.name} is not installed: pip install 'thenar[compiler]'")
-    except (KeyboardInterrupt, click.Abort):
-        click.echo("thenar: interrupted", err=True)
-        return 130
-    return code if isinstance(code, int) else 0
+        # In here, so that a Ctrl-C while the libraries load is one like any other.
+        from .group import run_group
 
-
-def _complain(message: str) -> int:
-    click.echo(f"thenar: {message}", err=True)
-    return 2
+        return run_group(arguments)
+    except KeyboardInterrupt:
+        sys.stderr.write("thenar: interrupted\n")
+        return INTERRUPTED
 
 
 def main() -> None:

@@ -3,8 +3,17 @@
 from pathlib import Path
 
 import click
+from msgspec import Struct
 
-from .common import existing_file, keep_apart, output_file, progress
+from .common import existing_file, json_flag, keep_apart, output_file, print_json, progress
+
+
+class Exported(Struct, frozen=True):
+    """What was written: the table, the columns.toml that reads it back if asked for, and the number of grasps."""
+
+    output: str
+    columns: str | None
+    grasps: int
 
 
 @click.command("export")
@@ -13,7 +22,8 @@ from .common import existing_file, keep_apart, output_file, progress
 @click.option("--codes", is_flag=True, help="Write the joints' integer codes instead of values in their units.")
 @click.option("--meta", is_flag=True, help="ARFF: write subject, object and trial too (CSV always holds them).")
 @click.option("--columns", type=output_file, help="Also write the columns.toml that imports the table again.")
-def command(grasps: Path, output: Path, codes: bool, meta: bool, columns: Path | None) -> None:
+@json_flag
+def command(grasps: Path, output: Path, codes: bool, meta: bool, columns: Path | None, as_json: bool) -> None:
     """Export GRASPS, a .grasps file, as CSV or as ARFF for Weka.
 
     \b
@@ -33,4 +43,7 @@ def command(grasps: Path, output: Path, codes: bool, meta: bool, columns: Path |
     if columns is not None:
         arff = output.suffix.lower() == ".arff"
         write_atomically(columns, columns_of(grasp_set, codes, meta or not arff).encode())
-    click.echo(f"{output}: {len(grasp_set)} grasps")
+    if as_json:
+        print_json(Exported(str(output), None if columns is None else str(columns), len(grasp_set)))
+    else:
+        click.echo(f"{output}: {len(grasp_set)} grasps")

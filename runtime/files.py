@@ -9,8 +9,16 @@ def write_atomically(path: Path, data: bytes) -> None:
     """Write `data` to `path`: temporary file beside it, fsync, rename, fsync of the folder.
 
     A reader sees the old file or the new one, never a part; after a kill or a full disk the old one is still there.
-    Raises OSError as the operating system gives it.
+    Raises OSError as the operating system gives it, with `path` as its file.
     """
+    try:
+        _write_beside_and_rename(path, data)
+    except OSError as reason:
+        # The user has never heard of the temporary file.
+        raise OSError(reason.errno, reason.strerror, str(path)) from reason
+
+
+def _write_beside_and_rename(path: Path, data: bytes) -> None:
     descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
     try:
         with os.fdopen(descriptor, "wb") as file:

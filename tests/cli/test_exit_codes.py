@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from thenar.cli import COMMANDS
+from thenar.cli.group import COMMANDS
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
 HEAVY = ("sklearn", "scipy", "joblib", "matplotlib", "numpy")
@@ -111,3 +111,17 @@ def test_ctrl_c_exits_with_130_and_leaves_the_old_build_alone(set_file: Path, bu
     assert done.stderr.strip() == "thenar: interrupted"
     assert {path.name: path.read_bytes() for path in build_folder.iterdir()} == before
     assert [path.name for path in build_folder.parent.iterdir()] == ["build"]
+
+
+def test_ctrl_c_while_the_libraries_load_is_one_like_any_other() -> None:
+    program = (
+        "import os, signal, sys\n"
+        "from thenar.cli import run\n"
+        "class Interrupts:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'click': os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Interrupts())\n"
+        "sys.exit(run(['--help']))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "thenar: interrupted\n")

@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,12 @@ def test_an_exported_table_imports_again(grasps: Path, suffix: str, flags: list[
     assert run(["export", str(grasps), "-o", table, "--columns", columns, *flags, *meta]) == 0
     assert run(["import", table, "-o", again, "--columns", columns]) == 0
     assert GraspSet.load(again).fingerprint() == GraspSet.load(grasps).fingerprint()
+
+
+def test_machines_are_told_what_was_written(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = grasps.with_name("t.csv")
+    assert run(["export", str(grasps), "-o", str(table), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"output": str(table), "columns": None, "grasps": 2}
 
 
 def test_values_are_written_unless_codes_are_asked_for(grasps: Path) -> None:

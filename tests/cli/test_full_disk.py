@@ -51,5 +51,5 @@ def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(
         assert run(command) == 2
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
     said = capsys.readouterr().err
-    assert said.startswith("thenar: ")
+    assert said.startswith(f"thenar: {written}: ")
     assert said.count("\n") == 1

@@ -32,6 +32,7 @@ def test_numbers_and_colours_are_shares_of_the_true_types_rows() -> None:
     axes = Figure().subplots()
     draw_matrix(axes, ("cup", "pen", "rod"), ((150, 50, 0), (1, 199, 0), (0, 0, 0)))
     (image,) = axes.images
-    assert np.allclose(np.asarray(image.get_array()), [[0.75, 0.25, 0], [0.005, 0.995, 0], [0, 0, 0]])
+    shares = np.array([[0.75, 0.25, 0.0], [0.005, 0.995, 0.0], [0.0, 0.0, 0.0]])
+    assert np.allclose(np.asarray(image.get_array()), shares)
     written = {text.get_position(): text.get_text() for text in axes.texts}
     assert written == {(0, 0): "75", (1, 0): "25", (1, 1): "100"}

@@ -1,0 +1,70 @@
+"""The group of sub-commands, and what becomes of errors: a sentence and an exit code.
+
+Each sub-command is loaded only when it is called. A reader that goes away (`| head`) ends a command in silence, with
+click's exit code 1.
+"""
+
+from collections.abc import Sequence
+from importlib import import_module
+
+import click
+
+from ..drivers.errors import ThenarError
+
+COMMANDS = ("import", "export", "info", "place", "evaluate", "compile", "verify", "run")
+
+
+class _LazyGroup(click.Group):
+    """Sub-command NAME is `command` in the module `NAME_command` of this package."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = import_module(f".{cmd_name}_command", __package__).command
+        return command
+
+
+@click.group(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="thenar")
+def thenar() -> None:
+    """Grasps recorded on a glove in; the few switches worth keeping, and a recogniser that runs on them, out.
+
+    \b
+    Example, from a table to a running recogniser:
+        thenar import table.csv -o set.grasps --columns columns.toml
+        thenar evaluate set.grasps
+        thenar compile set.grasps -o build/
+        thenar verify build/ set.grasps
+        thenar run build/ --replay set.grasps
+    """
+
+
+def run_group(arguments: Sequence[str]) -> int:
+    """Run `thenar` with `arguments` and return its exit code; what the user did wrong is one sentence on stderr."""
+    try:
+        code = thenar.main(list(arguments), prog_name="thenar", standalone_mode=False)
+    except click.exceptions.NoArgsIsHelpError as help_wanted:
+        help_wanted.show()
+        return 2
+    except click.ClickException as mistake:
+        return _complain(mistake.format_message())
+    except ThenarError as mistake:
+        return _complain(str(mistake))
+    except OSError as mistake:
+        return _complain(f"{mistake.filename}: {mistake.strerror}" if mistake.filename else str(mistake))
+    except MemoryError as lack:
+        return _complain(f"not enough memory ({lack}): take fewer rows or columns")
+    except ModuleNotFoundError as lack:
+        return _complain(f"{lack.name} is not installed: pip install 'thenar[compiler]'")
+    except (KeyboardInterrupt, click.Abort):
+        click.echo("thenar: interrupted", err=True)
+        return 130
+    return code if isinstance(code, int) else 0
+
+
+def _complain(message: str) -> int:
+    click.echo(f"thenar: {message}", err=True)
+    return 2
