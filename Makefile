@@ -67,7 +67,7 @@ bench: $(VENV)/bench  ## the benchmarks, as ratios against a peer or a bound in 
 	$(BIN)/python benchmarks/runtime.py
 
 docs: $(VENV)/installed  ## the documentation as a site in site/, offline
-	$(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 check: lint types test  ## what a commit should pass
 

@@ -17,8 +17,20 @@ class _OutputFile(click.Path):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         path = Path(os.fsdecode(super().convert(value, param, ctx)))
+        if not path.name:
+            self.fail("A file to write needs a name.", param, ctx)
         if not path.parent.is_dir():
             self.fail(f"There is no folder '{path.parent}' to write '{path.name}' into: make it first.", param, ctx)
+        return path
+
+
+class _PictureFile(_OutputFile):
+    """A picture to write, of a kind that can be drawn."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        path = super().convert(value, param, ctx)
+        if path.suffix.lower() not in (".png", ".svg"):
+            self.fail(f"{path.name}: a picture ends in .png or .svg", param, ctx)
         return path
 
 
@@ -26,6 +38,7 @@ existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
 existing_folder = click.Path(exists=True, file_okay=False, path_type=Path)
 any_path = click.Path(path_type=Path)
 output_file = _OutputFile(dir_okay=False, writable=True, path_type=Path)
+picture_file = _PictureFile(dir_okay=False, writable=True, path_type=Path)
 
 json_flag = click.option("--json", "as_json", is_flag=True, help="Print one JSON document for machines instead.")
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import existing_file, json_flag, keep_apart, out, output_file, print_json, progress
+from .common import existing_file, json_flag, keep_apart, out, picture_file, print_json, progress
 
 if TYPE_CHECKING:
     from ..compiler.recordings.graspset import GraspSet
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @click.command("info")
 @click.argument("grasps", type=existing_file)
-@click.option("--plot", type=output_file, help="Also draw it: a .png or .svg file to write.")
+@click.option("--plot", type=picture_file, help="Also draw it: a .png or .svg file to write.")
 @json_flag
 def command(grasps: Path, plot: Path | None, as_json: bool) -> None:
     """Tell what GRASPS, a .grasps file, holds: counts, balance, odd columns and rows, and how separable it is.
@@ -30,8 +30,6 @@ def command(grasps: Path, plot: Path | None, as_json: bool) -> None:
     from ..compiler.recordings.graspset import GraspSet
     from ..compiler.recordings.summary import summarise
 
-    if plot is not None and plot.suffix.lower() not in (".png", ".svg"):
-        raise click.BadParameter(f"{plot.name}: a picture ends in .png or .svg", param_hint="--plot")
     keep_apart(grasps, plot)
     grasp_set = GraspSet.load(grasps)
     with progress(f"comparing the rows of {grasps.name}"):

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import existing_file, json_flag, keep_apart, out, output_file, print_json, progress
+from .common import existing_file, json_flag, keep_apart, out, output_file, picture_file, print_json, progress
 
 if TYPE_CHECKING:
     from ..compiler.placement.placement import Placement
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 @click.argument("grasps", type=existing_file)
 @click.option("--prune", type=click.IntRange(min=0), default=0, metavar="S", help="End nodes of fewer than S rows.")
 @click.option("--tree", "show_tree", is_flag=True, help="Also print the tree.")
-@click.option("--draw", type=output_file, help="Also draw the tree: an .svg or .png file to write.")
+@click.option("--draw", type=picture_file, help="Also draw the tree: an .svg or .png file to write.")
 @click.option("-o", "--output", type=output_file, help="Also store the placement: a .json file to write.")
 @json_flag
 def command(grasps: Path, prune: int, show_tree: bool, draw: Path | None, output: Path | None, as_json: bool) -> None:
@@ -32,8 +32,6 @@ def command(grasps: Path, prune: int, show_tree: bool, draw: Path | None, output
     from ..compiler.placement.placement import place
     from ..compiler.recordings.graspset import GraspSet
 
-    if draw is not None and draw.suffix.lower() not in (".png", ".svg"):
-        raise click.BadParameter(f"{draw.name}: a picture ends in .png or .svg", param_hint="--draw")
     if as_json and show_tree:
         raise click.UsageError("--tree is for people and --json for machines: take one of them")
     keep_apart(grasps, draw, output)

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...drivers.errors import ThenarError
+from ..elementary import softmax_and_loss
 from .binning import bin_columns
-from .elementary import softmax_and_loss
 from .stumpfit import Targets, fit_stumps
 from .stumps import Stumps, centred
 

@@ -10,8 +10,8 @@ from sklearn.utils import Tags
 from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import _check_sample_weight, check_is_fitted, validate_data
 
+from ..elementary import softmax
 from .boost import BoostingError, boost
-from .elementary import softmax
 from .stumps import winners
 
 Floats = NDArray[np.float64]

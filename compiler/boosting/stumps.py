@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .elementary import add_up
+from ..elementary import add_up
 
 Floats = NDArray[np.float64]
 

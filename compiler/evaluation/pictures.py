@@ -1,12 +1,12 @@
 """Confusion matrices as pictures."""
 
-import io
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...runtime.files import write_atomically
+from ..pictures import painting, rendered
 from .study import Study
 from .tables import Row, Table
 
@@ -22,11 +22,8 @@ def draw_confusions(study: Study, folder: Path) -> list[Path]:
     They are `confusion-PROTOCOL-COMPOSITION.png` in `folder`, which is made if need be. Colour is the share of the true
     grasp type's rows; numbers are percent of them, left out below 1 %. Raises OSError as the system gives it.
     """
-    import matplotlib as mpl
-
     folder.mkdir(parents=True, exist_ok=True)
-    # A "$" in a name is a "$".
-    with mpl.rc_context({"text.parse_math": False}):
+    with painting(font_size=10):
         return [
             _draw(study.grasps, table, row, folder / f"confusion-{table.protocol}-{row.name}.png")
             for table in study.tables
@@ -39,7 +36,7 @@ def _draw(grasps: tuple[str, ...], table: Table, row: Row, path: Path) -> Path:
     from matplotlib.figure import Figure
 
     side = 1.6 + 0.42 * len(grasps)
-    figure = Figure(figsize=(side * len(row.cells) + 0.6, side + 0.4), layout="constrained")
+    figure = Figure(figsize=(side * len(row.cells) + 0.6, side + 0.4), layout="constrained", dpi=120)
     figure.suptitle(f"{row.name}: {row.what} ({table.protocol} protocol)")
     all_axes = figure.subplots(1, len(row.cells), squeeze=False)[0]
     for axes, name, cell in zip(all_axes, table.columns, row.cells, strict=True):
@@ -47,9 +44,7 @@ def _draw(grasps: tuple[str, ...], table: Table, row: Row, path: Path) -> Path:
             draw_matrix(axes, grasps, cell.confusion)
         axes.set_title(f"subject {name}: {100 * cell.rate.mean:.1f} %", fontsize=10)
     all_axes[0].set_ylabel("true")
-    picture = io.BytesIO()
-    figure.savefig(picture, format="png", dpi=120, metadata={"Software": None})
-    write_atomically(path, picture.getvalue())
+    write_atomically(path, rendered(figure, "png"))
     return path
 
 

@@ -1,19 +1,17 @@
 """The tree as a picture."""
 
-import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...runtime.files import write_atomically
-from .errors import PlacementError
+from ..pictures import painting, rendered
 from .printing import names_for
 from .tree import Tree
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FORMATS = ("svg", "png")
 _LEAF_INCHES, _LEVEL_INCHES, _LARGEST_INCHES = 0.6, 0.9, 200.0
 _FONT_SIZE = 6
 
@@ -21,27 +19,19 @@ _FONT_SIZE = 6
 def draw_tree(tree: Tree, path: Path, names: Sequence[str] = (), class_names: Sequence[str] = ()) -> None:
     """Write the picture of `tree` to `path`, .svg or .png: decisions with input and gain, leaves with class and rows.
 
-    The same tree gives the same bytes. Raises PlacementError for another kind of file or without matplotlib.
+    The same tree gives the same bytes. Raises PictureError for another kind of file or without matplotlib.
     """
-    kind = path.suffix.lower().removeprefix(".")
-    if kind not in FORMATS:
-        raise PlacementError(f"{path.name}: a picture of a tree ends in .svg or .png")
-    try:
-        import matplotlib as mpl
-        from matplotlib.figure import Figure
-    except ImportError as reason:
-        raise PlacementError("drawing needs matplotlib: pip install 'thenar[compiler]'") from reason
     size = (_LEAF_INCHES * tree.n_leaves + 1.5, _LEVEL_INCHES * tree.depth + 1.2)
-    picture = io.BytesIO()
-    # A "$" in a name is a "$".
-    with mpl.rc_context({"svg.hashsalt": "thenar", "font.size": _FONT_SIZE, "text.parse_math": False}):
-        figure = Figure(figsize=(min(size[0], _LARGEST_INCHES), min(size[1], _LARGEST_INCHES)))
+    with painting(_FONT_SIZE):
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(min(size[0], _LARGEST_INCHES), min(size[1], _LARGEST_INCHES)), dpi=110)
         axes = figure.add_axes((0, 0, 1, 1))
         axes.set(xlim=(-1, tree.n_leaves), ylim=(-tree.depth - 0.5, 0.5))
         axes.axis("off")
         _compose(axes, tree, *names_for(tree, names, class_names))
-        figure.savefig(picture, format=kind, dpi=110, metadata={"Date": None} if kind == "svg" else {"Software": None})
-    write_atomically(path, picture.getvalue())
+        picture = rendered(figure, path.suffix.lower().removeprefix("."))
+    write_atomically(path, picture)
 
 
 def _compose(axes: "Axes", tree: Tree, names: Sequence[str], class_names: Sequence[str]) -> None:

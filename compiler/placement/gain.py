@@ -11,20 +11,19 @@ separate two scores, whole-number arithmetic can (`logsums`).
 from collections import Counter
 from dataclasses import dataclass
 from functools import lru_cache
-from math import frexp, fsum
+from math import fsum
 from sys import float_info
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from ..elementary import log
 from .logsums import sign_of_f_sum
 
 Counts = npt.NDArray[np.int64]
 
 _LN_2 = 0.6931471805599453
-_SQRT_HALF = 0.7071067811865476
-_LOG_TERMS = 12
 _UNIT: float = 2.0**-53
 
 
@@ -170,15 +169,4 @@ def entropy_bits(totals: list[int]) -> float:
 
 @lru_cache(maxsize=1 << 16)
 def _n_log_n(n: int) -> float:
-    """Return n ln n from ln n = e ln 2 + 2 artanh((m - 1) / (m + 1)), n = m 2^e, m in [sqrt 1/2, sqrt 2)."""
-    if n < 2:
-        return 0.0
-    mantissa, exponent = frexp(n)
-    if mantissa < _SQRT_HALF:
-        mantissa, exponent = 2 * mantissa, exponent - 1
-    s = (mantissa - 1) / (mantissa + 1)
-    series = 0.0
-    for k in range(_LOG_TERMS, -1, -1):
-        series = series * (s * s) + 1 / (2 * k + 1)
-    logarithm: float = exponent * _LN_2 + 2 * s * series
-    return n * logarithm
+    return n * float(log(np.array(float(n)))) if n > 1 else 0.0

@@ -1,12 +1,11 @@
 """A set as a picture: how many grasps of each type, which switches each type closes, which values its joints take."""
 
-import io
-import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..pictures import painting, rendered
 from .errors import RecordingError
 from .graspset import GraspSet, Joint
 
@@ -30,36 +29,17 @@ _LONGEST_NAME = 30
 def draw(grasp_set: GraspSet, kind: str) -> bytes:
     """Return the picture as the bytes of a "png" or "svg"; the same set gives the same bytes.
 
-    Raises RecordingError if matplotlib is not installed or the set has no rows.
+    Raises RecordingError if the set has no rows, PictureError if matplotlib is not installed.
     """
-    try:
-        import matplotlib as mpl
-        from matplotlib.figure import Figure
-    except ImportError as reason:
-        raise RecordingError("drawing needs matplotlib: pip install 'thenar[compiler]'") from reason
     if not len(grasp_set):
         raise RecordingError("a set without rows cannot be drawn")
-    with (
-        mpl.rc_context(
-            {
-                "svg.hashsalt": "thenar",
-                "font.size": 8,
-                "axes.spines.top": False,
-                "axes.spines.right": False,
-                # A dollar in a name is a dollar.
-                "text.parse_math": False,
-            }
-        ),
-        warnings.catch_warnings(),
-    ):
-        # A letter that the font lacks is drawn as a box; the rest of the picture is still worth having.
-        warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from font")
+    with painting(font_size=8):
+        from matplotlib.figure import Figure
+
         size = _size(grasp_set)
         figure = Figure(figsize=size, layout="constrained", dpi=min(130, _TALLEST / size[1]))
         _compose(figure, grasp_set)
-        file = io.BytesIO()
-        figure.savefig(file, format=kind, metadata={"Date": None} if kind == "svg" else {"Software": None})
-    return file.getvalue()
+        return rendered(figure, kind)
 
 
 def _size(grasp_set: GraspSet) -> tuple[float, float]:

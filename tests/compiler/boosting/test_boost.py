@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thenar.compiler.boosting.boost import BoostingError, boost
-from thenar.compiler.boosting.elementary import softmax
 from thenar.compiler.boosting.stumps import winners
+from thenar.compiler.elementary import softmax
 
 
 def grasps(seed: int, n: int = 60, bits: int = 6, joints: int = 2, classes: int = 3) -> tuple[np.ndarray, np.ndarray]:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from thenar.compiler.boosting.boost import boost
-from thenar.compiler.boosting.elementary import softmax
 from thenar.compiler.boosting.stumps import Stumps
+from thenar.compiler.elementary import softmax
 
 SETS = ("bin3", "bin14nom", "dupfeat", "missing", "twoclass", "separable", "rare", "paper14")
 PARTS = {"half/P_train": "train_idx", "half/P_test": "test_idx", "all/P": None}

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from thenar.compiler import grow_id3
+from thenar.compiler.pictures import PictureError
 from thenar.compiler.placement.draw import draw_tree
-from thenar.compiler.placement.errors import PlacementError
 from thenar.compiler.placement.tree import Tree
 
 
@@ -37,7 +37,7 @@ def test_a_single_leaf_can_be_drawn(tmp_path: Path) -> None:
 
 
 def test_another_kind_of_file_is_refused(tree: Tree, tmp_path: Path) -> None:
-    with pytest.raises(PlacementError, match=r"tree\.pdf: a picture of a tree ends in \.svg or \.png"):
+    with pytest.raises(PictureError, match=r"ends in \.png or \.svg, not in \.pdf"):
         draw_tree(tree, tmp_path / "tree.pdf")
 
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from thenar.compiler.boosting.elementary import add_up, exp, log, softmax, softmax_and_loss
+from thenar.compiler.elementary import add_up, exp, log, softmax, softmax_and_loss
 
 mpmath.mp.dps = 50
 
