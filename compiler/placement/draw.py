@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _LEAF_INCHES, _LEVEL_INCHES, _LARGEST_INCHES = 0.6, 0.9, 200.0
+_LETTER_INCHES = 0.055  # of _FONT_SIZE
 _FONT_SIZE = 6
 
 
@@ -21,7 +22,9 @@ def draw_tree(tree: Tree, path: Path, names: Sequence[str] = (), class_names: Se
 
     The same tree gives the same bytes. Raises PictureError for another kind of file or without matplotlib.
     """
-    size = (_LEAF_INCHES * tree.n_leaves + 1.5, _LEVEL_INCHES * tree.depth + 1.2)
+    names, class_names = names_for(tree, names, class_names)
+    leaf_inches = max(_LEAF_INCHES, _LETTER_INCHES * max(map(len, class_names)) + 0.2)
+    size = (leaf_inches * tree.n_leaves + 1.5, _LEVEL_INCHES * tree.depth + 1.2)
     with painting(_FONT_SIZE):
         from matplotlib.figure import Figure
 
@@ -29,7 +32,7 @@ def draw_tree(tree: Tree, path: Path, names: Sequence[str] = (), class_names: Se
         axes = figure.add_axes((0, 0, 1, 1))
         axes.set(xlim=(-1, tree.n_leaves), ylim=(-tree.depth - 0.5, 0.5))
         axes.axis("off")
-        _compose(axes, tree, *names_for(tree, names, class_names))
+        _compose(axes, tree, names, class_names)
         picture = rendered(figure, path.suffix.lower().removeprefix("."))
     write_atomically(path, picture)
 

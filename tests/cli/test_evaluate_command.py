@@ -191,7 +191,9 @@ def processor_time_s(pid: int) -> float:
 def wait_until_two_workers_are_at_work(evaluation: subprocess.Popen[str]) -> list[int]:
     """Starting a worker takes less than a second of processor time; more of it is work."""
     found: list[int] = []
+    deadline = time.monotonic() + 120
     while sum(processor_time_s(pid) > 1 for pid in found) < 2:
+        assert time.monotonic() < deadline, "two workers were asked for and never came to work"
         with contextlib.suppress(subprocess.TimeoutExpired):
             evaluation.wait(0.05)
             raise AssertionError(evaluation.communicate())
