@@ -23,7 +23,7 @@ def lacking(what: str) -> NoReturn:
 
 def need(path: Path) -> Path:
     """Return `path`, a data set or a file of a package, if it is there."""
-    return path if path.exists() else lacking(path.name)
+    return path if path.exists() else lacking("/".join(path.parts[-2:]))
 
 
 def need_tool(name: str) -> str:
