@@ -79,9 +79,7 @@ def _print(made: "BuildReport", folder: Path) -> None:
         f"switches and {len(manifest.joints)} joints; tables of {made.tables_bytes} bytes"
     )
     if manifest.switches:
-        console.print(
-            f"switches: {', '.join(switch.name for switch in manifest.switches)}", markup=False, soft_wrap=True
-        )
+        console.print(f"switches: {', '.join(switch.name for switch in manifest.switches)}", soft_wrap=True)
     for rate in manifest.rates:
         how = "on the rows trained on" if rate.protocol == "training" else f"in {rate.folds} folds, placement and all"
         console.print(f"recognised {how}: {rate.correct} of {rate.total} ({rate.rate:.1%})")

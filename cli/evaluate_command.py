@@ -132,7 +132,7 @@ def _write(study: "Study", folder: Path | None, output: Path | None) -> None:
 
 def _show(study: "Study", *, as_json: bool, confusion: bool) -> None:
     for warning in study.warnings:
-        err().print(f"warning: {warning}", markup=False)
+        err().print(f"warning: {warning}")
     if as_json:
         print_json(study)
         return

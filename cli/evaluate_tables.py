@@ -24,7 +24,7 @@ def print_study(study: Study, *, confusion: bool) -> None:
     console = out()
     for protocol in PROTOCOLS:
         if protocol.name in study.options.protocols:
-            console.print(f"Protocol {protocol.name}: {protocol.meaning}", markup=False)
+            console.print(f"Protocol {protocol.name}: {protocol.meaning}")
     for table in study.tables:
         console.print()
         console.print(Text(f"{_TITLES[table.name]}: {table.protocol} protocol", "bold"))
@@ -33,8 +33,8 @@ def print_study(study: Study, *, confusion: bool) -> None:
             console.print(f"{_NO_INPUTS} some folds had no input: there, the most frequent grasp type is answered")
     console.print()
     for missing in study.left_out:
-        console.print(f"no table of {missing.name}: {missing.reason}", markup=False)
-    console.print(_footing(study), markup=False)
+        console.print(f"no table of {missing.name}: {missing.reason}")
+    console.print(_footing(study))
     if confusion:
         _print_confusions(console, study)
 

@@ -57,7 +57,7 @@ def _print(found: "Verification") -> None:
     console.print(f"rows that change class: {len(found.changed)}")
     for row in found.changed[:_SHOWN]:
         line = f"  row {row.row}: {row.ensemble} becomes {row.integers}, recorded {row.recorded}"
-        console.print(f"{line} (margin {row.margin:.1f} steps)", markup=False)
+        console.print(f"{line} (margin {row.margin:.1f} steps)")
     if len(found.changed) > _SHOWN:
         console.print(f"  and {len(found.changed) - _SHOWN} more: --json lists them all")
     console.print("holds" if found.holds else "DOES NOT HOLD: compile the build again")

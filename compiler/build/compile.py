@@ -80,7 +80,7 @@ def compile_build(
         thenar=version("thenar"),
         tables_sha256=hashlib.sha256(tables).hexdigest(),
         ensemble_sha256=hashlib.sha256(ensemble).hexdigest(),
-        source=Source(grasp_set.fingerprint(), len(grasp_set), grasp_set.taxonomy.name, len(grasp_set.switch_names)),
+        source=_source(grasp_set),
         options=options,
         grasps=material.grasps,
         switches=_switches(grasp_set, trained),
@@ -105,6 +105,10 @@ class _Steps:
 
     def fold_done(self, done: int, _folds: int) -> None:
         self.round_done(self._rounds * (1 + done), self._rounds)
+
+
+def _source(grasp_set: GraspSet) -> Source:
+    return Source(grasp_set.fingerprint(), len(grasp_set), grasp_set.taxonomy.name, len(grasp_set.switch_names))
 
 
 def _switches(grasp_set: GraspSet, trained: Trained) -> tuple[Switch, ...]:
