@@ -3,6 +3,7 @@ import io
 import zipfile
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -95,7 +96,7 @@ def test_arrays_of_an_npz_are_columns(tmp_path: Path) -> None:
         ({}, r"its arrays have \[\] rows"),
     ],
 )
-def test_an_npz_that_is_no_table_is_refused(arrays: dict[str, np.ndarray], reason: str, tmp_path: Path) -> None:
+def test_an_npz_that_is_no_table_is_refused(arrays: dict[str, Any], reason: str, tmp_path: Path) -> None:
     np.savez(tmp_path / "t.npz", **arrays)
     with pytest.raises(TableError, match=reason):
         read_table(tmp_path / "t.npz")
