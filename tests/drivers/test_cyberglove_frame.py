@@ -1,0 +1,96 @@
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.drivers.cyberglove_frame import OVERHEAD, SENSORS, Counts, Decoder, Record, encode
+
+VALUES = st.lists(st.integers(1, 255), min_size=SENSORS, max_size=SENSORS).map(bytes)
+RECORDS = st.builds(Record, VALUES, st.booleans(), st.sampled_from([None, None, "too fast", "unplugged"]))
+OPEN_HAND = Record(bytes(range(60, 78)))
+
+
+def chunked(stream: bytes, cuts: list[int]) -> list[bytes]:
+    ends = sorted({0, len(stream), *(cut % (len(stream) + 1) for cut in cuts)})
+    return [stream[start:end] for start, end in pairwise(ends)]
+
+
+def test_a_record_of_18_sensors_is_20_bytes() -> None:
+    assert encode(OPEN_HAND) == b"S" + bytes(range(60, 78)) + b"\0"
+    assert encode(Record(OPEN_HAND.sensors, streamed=False))[:1] == b"G"
+    assert len(encode(OPEN_HAND)) == SENSORS + OVERHEAD == 20
+
+
+@given(RECORDS)
+def test_what_is_encoded_is_decoded(record: Record) -> None:
+    decoder = Decoder()
+    assert decoder.feed(encode(record)) == [record]
+    assert decoder.counts == Counts(records=1, faults=int(record.fault is not None))
+
+
+@given(st.lists(st.integers(1, 255), min_size=22, max_size=22).map(bytes))
+def test_a_glove_of_22_sensors_is_decoded_as_such(values: bytes) -> None:
+    assert Decoder(22).feed(encode(Record(values))) == [Record(values)]
+    assert Decoder(18).feed(encode(Record(values))) == []
+
+
+@given(st.lists(st.one_of(RECORDS.map(encode), st.binary(max_size=60))), st.lists(st.integers(0, 10_000)))
+def test_any_chunks_give_the_same_records_and_the_same_counts(parts: list[bytes], cuts: list[int]) -> None:
+    stream = b"".join(parts)
+    at_once, in_chunks = Decoder(), Decoder()
+    expected = at_once.feed(stream)
+    assert [record for chunk in chunked(stream, cuts) for record in in_chunks.feed(chunk)] == expected
+    assert in_chunks.counts == at_once.counts
+
+
+@given(st.binary(max_size=1000), RECORDS)
+def test_after_garbage_and_a_nul_the_next_record_is_found(garbage: bytes, record: Record) -> None:
+    assert Decoder().feed(garbage + b"\0" + encode(record))[-1] == record
+
+
+@given(RECORDS, st.integers(1, 30))
+def test_a_stream_that_is_opened_in_the_middle_is_in_step_with_its_next_record(record: Record, cut: int) -> None:
+    encoded = encode(record)
+    assert Decoder().feed(encoded[cut:] + encoded + encoded)[-2:] == [record, record]
+
+
+@given(VALUES, st.integers(0, 18))
+def test_a_lost_byte_costs_one_record(values: bytes, place: int) -> None:
+    encoded = encode(Record(values))
+    decoder = Decoder()
+    assert decoder.feed(encoded[:place] + encoded[place + 1 :] + encode(OPEN_HAND)) == [OPEN_HAND]
+    assert decoder.counts.wrong_start + decoder.counts.wrong_length == 1
+
+
+@given(VALUES)
+def test_a_lost_nul_costs_both_records_and_no_more(values: bytes) -> None:
+    encoded = encode(Record(values))
+    assert Decoder().feed(encoded[:-1] + encoded + encoded) == [Record(values)]
+
+
+@pytest.mark.parametrize("ending", [b"es", b"eg"])
+def test_e_s_and_g_are_sensor_values_unless_there_are_two_bytes_too_many(ending: bytes) -> None:
+    values = b"S" * (SENSORS - 2) + ending
+    assert Decoder().feed(encode(Record(values))) == [Record(values)]
+    (record,) = Decoder().feed(b"S" + values + ending + b"\0")
+    assert record.sensors == values
+    assert record.fault == ("too fast" if ending == b"es" else "unplugged")
+
+
+@pytest.mark.parametrize("ending", [b"e", b"en", b"xs", b"ese"])
+def test_any_other_surplus_is_no_record(ending: bytes) -> None:
+    decoder = Decoder()
+    assert decoder.feed(b"S" + OPEN_HAND.sensors + ending + b"\0") == []
+    assert decoder.counts == Counts(wrong_length=1)
+
+
+def test_what_is_no_record_is_counted_by_what_was_wrong() -> None:
+    decoder = Decoder()
+    assert decoder.feed(b"\0\0\x03\0Sab\0" + b"S" * 4000 + b"\0" + encode(OPEN_HAND)) == [OPEN_HAND]
+    assert decoder.counts == Counts(records=1, wrong_start=1, wrong_length=2)
+
+
+def test_a_zero_among_the_sensors_is_refused() -> None:
+    with pytest.raises(ValueError, match="sensor 2 is 0"):
+        encode(Record(bytes([7, 7, 0, 7])))
