@@ -1,8 +1,8 @@
-"""exp, log and softmax with the same bits on every machine.
+"""exp, log, sine, cosine and softmax with the same bits on every machine.
 
 numpy and the C library pick an exp by processor, and their last bits differ. These are made of single IEEE operations
 (add, multiply, divide, round, scale by a power of two) in one fixed order, which every machine rounds alike. Errors
-stay below 1 ulp for exp and 2 ulp for log (tests hold them against mpmath).
+stay below 1 ulp for exp, and 2 ulp for log, sine and cosine (tests hold them against mpmath).
 """
 
 import math
@@ -20,6 +20,27 @@ _EXP_UNDERFLOW = -746.0
 _EXP_TERMS = tuple(1.0 / math.factorial(n) for n in range(13, 1, -1))
 _LOG_TERMS = tuple(2.0 / n for n in range(23, 1, -2))
 _SQRT_HALF = 0.7071067811865476
+_TWO_OVER_PI = 0.6366197723675814
+# pi/2 in three parts, of 33 bits each: products with a small whole number are exact.
+_HALF_PI_HIGH = 1.5707963267341256
+_HALF_PI_MIDDLE = 6.077100506303966e-11
+_HALF_PI_LOW = 2.0222662487959506e-21
+_SIN_TERMS = (
+    -1.66666666666666324348e-01,
+    8.33333333332248946124e-03,
+    -1.98412698298579493134e-04,
+    2.75573137070700676789e-06,
+    -2.50507602534068634195e-08,
+    1.58969099521155010221e-10,
+)
+_COS_TERMS = (
+    4.16666666666666019037e-02,
+    -1.38888888888741095749e-03,
+    2.48015872894767294178e-05,
+    -2.75573143513906633035e-07,
+    2.08757232129817482790e-09,
+    -1.13596475577881948265e-11,
+)
 
 
 def exp(x: Floats) -> Floats:
@@ -84,3 +105,24 @@ def softmax_and_loss(scores: Floats, labels: NDArray[np.intp], weights: Floats |
     if weights is None:
         return shares, math.fsum(losses.tolist()) / labels.size
     return shares, math.fsum((losses * weights).tolist()) / math.fsum(weights.tolist())
+
+
+def sincos(x: Floats) -> tuple[Floats, Floats]:
+    """Return sin x and cos x for |x| <= 1000, any shape (minimax polynomials of fdlibm's kernels)."""
+    quarter = np.rint(x * _TWO_OVER_PI)
+    rest = ((x - quarter * _HALF_PI_HIGH) - quarter * _HALF_PI_MIDDLE) - quarter * _HALF_PI_LOW
+    square = rest * rest
+    sine = rest + rest * square * _series(square, _SIN_TERMS)
+    cosine = (1.0 - 0.5 * square) + square * square * _series(square, _COS_TERMS)
+    turn = quarter.astype(np.int64)
+    swapped = (turn & 1).astype(bool)
+    first, second = np.where(swapped, cosine, sine), np.where(swapped, sine, cosine)
+    return np.where(turn & 2, -first, first), np.where((turn + 1) & 2, -second, second)
+
+
+def _series(x: Floats, terms: tuple[float, ...]) -> Floats:
+    total = np.full_like(x, terms[-1])
+    for term in terms[-2::-1]:
+        total *= x
+        total += term
+    return total

@@ -1,16 +1,14 @@
 """The work of an evaluation: independent fits, each done once, on all cores, with the same result on any number."""
 
-import signal
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from multiprocessing import resource_tracker
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..boosting.boost import boost
 from ..boosting.stumps import winners
+from ..workers import in_workers
 from .compositions import Columns
 from .folds import Fold
 
@@ -68,32 +66,24 @@ def run_fits(
     jobs  worker processes, as joblib counts them: -1 for all cores, 1 for none beside this one. A worker runs one
           thread. Sums in boosting are exact, so the result does not depend on the number of workers.
     """
-    from joblib import Parallel, delayed, parallel_config
-
     todo = list(dict.fromkeys(fits))
     results: dict[Fit, Labels] = {}
-    with parallel_config(backend="loky", inner_max_num_threads=1):
-        workers = Parallel(n_jobs=jobs, return_as="generator_unordered")
-        with _interrupts_held():
-            answers = workers(delayed(_numbered)(i, X, labels, fit, training) for i, fit in enumerate(todo))
-        for number, found in answers:
-            results[todo[number]] = found
-            if progress is not None:
-                progress(len(results), len(todo))
+    tasks = (_Task(number, X, labels, fit, training) for number, fit in enumerate(todo))
+    for number, found in in_workers(_numbered, tasks, jobs):
+        results[todo[number]] = found
+        if progress is not None:
+            progress(len(results), len(todo))
     return results
 
 
-@contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Let a Ctrl-C wait. Processes started meanwhile never get it, so none complains of it: this one ends them."""
-    # loky asks for this helper process of Python's, and its start would lift the block.
-    resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Task:
+    number: int
+    X: Inputs
+    labels: Labels
+    fit: Fit
+    training: Training
 
 
-def _numbered(number: int, X: Inputs, labels: Labels, fit: Fit, training: Training) -> tuple[int, Labels]:
-    return number, predictions(X, labels, fit, training)
+def _numbered(task: _Task) -> tuple[int, Labels]:
+    return task.number, predictions(task.X, task.labels, task.fit, task.training)

@@ -1,0 +1,49 @@
+"""Independent pieces of work on all cores, each answer handed over as soon as it is there."""
+
+import signal
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from typing import TypeVar
+
+Task = TypeVar("Task")
+Answer = TypeVar("Answer")
+
+
+def in_workers(work: Callable[[Task], Answer], tasks: Iterable[Task], jobs: int) -> Iterator[Answer]:
+    """Yield the answers in the order in which they come.
+
+    jobs  worker processes, as joblib counts them: -1 for all cores, 1 for this process alone. A worker runs one thread.
+    """
+    if jobs == 1:
+        yield from map(work, tasks)
+        return
+    from joblib import Parallel, delayed, parallel_config
+
+    with parallel_config(backend="loky", inner_max_num_threads=1):
+        workers = Parallel(n_jobs=jobs, return_as="generator_unordered")
+        with _interrupts_held():
+            answers = workers(delayed(work)(task) for task in tasks)
+        yield from answers
+
+
+def workers_of(jobs: int) -> int:
+    """Return how many processes work when `jobs` are asked for."""
+    if jobs == 1:
+        return 1
+    from joblib import effective_n_jobs
+
+    return int(effective_n_jobs(jobs))
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Let a Ctrl-C wait. Processes started meanwhile never get it, so none complains of it: this one ends them."""
+    from multiprocessing import resource_tracker
+
+    # loky asks for this helper process of Python's, and its start would lift the block.
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -1,0 +1,72 @@
+"""Sine and cosine against 50-digit arithmetic.
+
+The bound of 2 ulp: taking off quarter turns leaves a rest that two subtractions round, each by half an ulp at most (the
+products before them are exact, and where digits cancel nothing is lost). Relative to the result it counts for no
+more, as x cot x <= 1 and x tan x <= 0.8 up to pi/4; the kernels round twice more, by half an ulp each. The four never
+meet in full: the second subtraction takes off less than 2e-18. The worst seen in 160 000 numbers is 1.5.
+"""
+
+import mpmath
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from thenar.compiler.elementary import sincos
+
+mpmath.mp.dps = 50
+FURTHEST = 1000.0
+QUARTERS = 636  # so many quarter turns fit
+
+
+def ulps(got: float, truth: mpmath.mpf) -> float:
+    return float(abs(mpmath.mpf(got) - truth) / mpmath.mpf(float(np.spacing(abs(float(truth))))))
+
+
+def assert_close(x: float) -> None:
+    sine, cosine = (float(part[0]) for part in sincos(np.array([x])))
+    assert sine == 0.0 if x == 0.0 else ulps(sine, mpmath.sin(mpmath.mpf(x))) <= 2.0
+    assert ulps(cosine, mpmath.cos(mpmath.mpf(x))) <= 2.0
+
+
+@given(st.floats(-FURTHEST, FURTHEST))
+def test_sine_and_cosine_are_within_two_ulp(x: float) -> None:
+    assert_close(x)
+
+
+@given(st.integers(-QUARTERS, QUARTERS), st.integers(-3, 3), st.sampled_from([0.0, 1e-12, 1e-6, 1e-3]))
+def test_so_they_are_beside_their_zeros_where_digits_cancel(quarter: int, steps: int, off: float) -> None:
+    x = quarter * np.pi / 2 + off
+    assert_close(float(x + steps * np.spacing(x)))
+
+
+@given(st.integers(-QUARTERS, QUARTERS - 1))
+def test_so_they_are_where_one_quarter_ends_and_the_next_begins(quarter: int) -> None:
+    assert_close((quarter + 0.5) * np.pi / 2)
+
+
+@given(arrays(np.float64, (3, 2), elements=st.floats(-FURTHEST, FURTHEST)))
+def test_a_number_has_the_same_bits_in_any_company_and_the_sine_is_odd(x: np.ndarray) -> None:
+    sine, cosine = sincos(x)
+    assert sine.shape == cosine.shape == x.shape
+    for row, column in np.ndindex(*x.shape):
+        alone = sincos(x[row, column : column + 1])
+        assert (alone[0][0], alone[1][0]) == (sine[row, column], cosine[row, column])
+    turned = sincos(-x)
+    np.testing.assert_array_equal(turned[0], -sine)
+    np.testing.assert_array_equal(turned[1], cosine)
+
+
+def test_they_are_exact_at_nought() -> None:
+    sine, cosine = sincos(np.array([0.0]))
+    assert (sine[0], cosine[0]) == (0.0, 1.0)
+
+
+def test_their_bits_are_those_of_every_machine() -> None:
+    sine, cosine = sincos(np.array([0.5, 2.0, 100.0, -999.0]))
+    assert [value.hex() for value in sine.tolist()] == GOLDEN_SINES
+    assert [value.hex() for value in cosine.tolist()] == GOLDEN_COSINES
+
+
+GOLDEN_SINES = ["0x1.eaee8744b05f0p-2", "0x1.d18f6ead1b445p-1", "-0x1.03425b78c4db8p-1", "0x1.b18870e886e35p-6"]
+GOLDEN_COSINES = ["0x1.c1528065b7d50p-1", "-0x1.aa22657537205p-2", "0x1.b981dbf665fdfp-1", "0x1.ffd21b0401f9ap-1"]

@@ -1,0 +1,35 @@
+import os
+
+import pytest
+
+from thenar.compiler.workers import in_workers, workers_of
+
+
+def squared_where(number: int) -> tuple[int, int]:
+    return number * number, os.getpid()
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_every_piece_of_work_is_answered_once(jobs: int) -> None:
+    answers = in_workers(squared_where, iter(range(20)), jobs)
+    assert sorted(answer for answer, _ in answers) == [number * number for number in range(20)]
+
+
+def test_one_job_is_done_in_this_process_and_several_in_others() -> None:
+    assert {process for _, process in in_workers(squared_where, range(3), 1)} == {os.getpid()}
+    assert os.getpid() not in {process for _, process in in_workers(squared_where, range(3), 2)}
+
+
+def test_no_work_has_no_answers() -> None:
+    assert list(in_workers(squared_where, [], 2)) == []
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_what_is_wrong_in_a_worker_is_raised_here(jobs: int) -> None:
+    with pytest.raises(ZeroDivisionError):
+        list(in_workers((1).__truediv__, [1, 0], jobs))
+
+
+def test_as_many_processes_work_as_are_asked_for() -> None:
+    assert (workers_of(1), workers_of(3)) == (1, 3)
+    assert workers_of(-1) >= 1
