@@ -1,0 +1,21 @@
+"""Scenes: grasps, hands and faults, simulated only as a scene calls for.
+
+The names below are loaded when first used: who draws a glove needs no simulation.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .decode import load_scene
+    from .simulation import Simulated, simulate
+
+__all__ = ["Simulated", "load_scene", "simulate"]
+
+_HOMES = {"Simulated": ".simulation", "load_scene": ".decode", "simulate": ".simulation"}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name], __name__), name)

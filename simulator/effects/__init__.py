@@ -1,0 +1,1 @@
+"""The effects, one module each, imported only when a scene lists them (registry.py)."""

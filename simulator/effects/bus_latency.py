@@ -1,0 +1,72 @@
+"""Switches that are not read at once: sixteen to a port, one port after the other over the bus."""
+
+from typing import Annotated
+
+import numpy as np
+from msgspec import Meta
+from numpy.typing import NDArray
+
+from ...compiler.elementary import log
+from .. import ports
+from ..batch import Batch
+from ..effect import Effect, EffectParameters, Setting, Step
+from ..errors import SceneError
+from ..frames import drawn_rows
+from ..layout import murakami160
+from ..streams import Draw
+
+
+class Parameters(EffectParameters, frozen=True):
+    """Microseconds to read one port, and how much longer on average; that share is drawn from an exponential law.
+
+    The default is one MCP23017 at 400 kHz: 5 bytes on the wire are 48 clocks, and the bus must then be free for 1.3 us.
+    """
+
+    us_per_port: Annotated[int, Meta(gt=0, le=1_000_000)] = 121
+    jitter_us: Annotated[float, Meta(ge=0.0, le=1e6)] = 0.0
+
+
+EFFECT = Effect(
+    name="bus.latency",
+    summary="ports are read one after the other",
+    stage="frame",
+    reads=("on_us",),
+    writes=("delay_us",),
+    timed=True,
+)
+
+
+def prepare(parameters: Parameters, setting: Setting) -> Step:
+    """Return the step that says how long after the frame's start each switch is read: when its port's reading ends.
+
+    Raises SceneError where all ports together take longer than there is from one frame to the next.
+    """
+    _check_scan(parameters, setting)
+    return _jittered(parameters, drawn_rows(setting)) if parameters.jitter_us else _steady(parameters)
+
+
+def _check_scan(parameters: Parameters, setting: Setting) -> None:
+    there = ports.count(len(murakami160()))
+    scan_us = there * (parameters.us_per_port + parameters.jitter_us)
+    if scan_us > setting.period_us:
+        raise SceneError(
+            f"effects.bus.latency: {there} ports take {scan_us:g} us on average, and there are {setting.period_us} us"
+            " from one frame to the next: lower us_per_port, jitter_us or recording.rate_hz"
+        )
+
+
+def _steady(parameters: Parameters) -> Step:
+    def step(batch: Batch, draw: Draw) -> None:
+        batch.delay_us = (ports.of(batch.on_us.shape[1]) + 1) * parameters.us_per_port
+
+    return step
+
+
+def _jittered(parameters: Parameters, rows: NDArray[np.intp]) -> Step:
+    def step(batch: Batch, draw: Draw) -> None:
+        switches = batch.on_us.shape[1]
+        chances = draw.per_repetition(len(rows), ports.count(switches)).uniform()[:, rows]
+        longer = np.rint(-parameters.jitter_us * log(chances)).astype(np.int64)
+        batch.delay_us = np.cumsum(parameters.us_per_port + longer, axis=2)[:, :, ports.of(switches)]
+
+    return step

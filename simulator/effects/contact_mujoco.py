@@ -1,0 +1,54 @@
+"""contact.mujoco: the hand closes on the object in MuJoCo, with friction and in time (extra `sim`)."""
+
+from typing import Annotated
+
+from msgspec import Meta
+
+from ..contact import ContactModel
+from ..effect import Effect, EffectParameters, Setting
+from ..errors import SimMissingError
+from ..layout import murakami160
+
+
+class Parameters(EffectParameters, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """How time is stepped, and what skin, friction and the hold on the object are.
+
+    dt_ms, steps     60 steps of 5 ms come closer to rest than 100 of 2 ms, and cost less; what steps too long make of a
+                     grasp is reported as not settled
+    friction         of skin on things: ours, of the order measured on dry fingertips (0.5 to 1.5)
+    skin_n_per_mm    stiffness of the skin of one capsule: ours, of the order measured on finger pulps pressed by a few
+                     newtons
+    reach_mm         a switch shares in the force on its capsule if its top comes as near the object as this: the glove
+                     bridges what it stands out less, as in contact.quasistatic
+    weld_n_per_m, weld_nm_per_rad    what holds the object to its commanded pose; a soft hold lets a pinched one creep
+    """
+
+    dt_ms: Annotated[float, Meta(gt=0.0, le=10.0)] = 5.0
+    steps: Annotated[int, Meta(ge=1, le=10_000)] = 60
+    friction: Annotated[float, Meta(gt=0.0, le=10.0)] = 0.8
+    skin_n_per_mm: Annotated[float, Meta(gt=0.0, le=20.0)] = 2.0
+    reach_mm: Annotated[float, Meta(ge=0.0, le=5.0)] = 1.0
+    weld_n_per_m: Annotated[float, Meta(gt=0.0, le=20_000.0)] = 3000.0
+    weld_nm_per_rad: Annotated[float, Meta(gt=0.0, le=20.0)] = 5.0
+
+
+EFFECT = Effect(
+    name="contact.mujoco",
+    summary="the hand closes on the object in MuJoCo: rigid bodies, friction, time",
+    stage="contact",
+    reads=("posture_deg", "pose", "grip_n"),
+    writes=(
+        *("posture_deg", "pose", "commanded_deg", "commanded_pose", "forces_n"),
+        *("settled", "residual_n", "residual_nmm", "between_n"),
+    ),
+    conflicts=("contact.quasistatic",),
+)
+
+
+def model(parameters: Parameters, setting: Setting) -> ContactModel:
+    """Return the contact model. Raises SimMissingError where MuJoCo is not installed: a scene is read without it."""
+    try:
+        from ..mujoco_grasp import MujocoContact
+    except ImportError as missing:
+        raise SimMissingError(f"contact.mujoco needs MuJoCo ({missing}): pip install 'thenar[sim]'") from missing
+    return MujocoContact(parameters, murakami160())

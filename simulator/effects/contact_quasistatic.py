@@ -1,0 +1,109 @@
+"""contact.quasistatic: hand and object at rest, in numpy. The contact model of every scene that names no other."""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from itertools import groupby
+from typing import Annotated
+
+import msgspec
+import numpy as np
+
+from ..contact import Contact, ContactModel, Load
+from ..effect import Effect, EffectParameters, Setting
+from ..hand import CAPSULES, Hand
+from ..layout import Switches, murakami160
+from ..pose import rotation_vector
+from ..quasistatic import Case, Rest, Skin, close
+from ..split import split
+
+_Positive = Annotated[float, msgspec.Meta(gt=0.0, le=1000.0)]
+# So many repetitions are solved at a time: enough to outweigh numpy's calls, few enough for the processor's cache.
+_TOGETHER = 512
+
+
+class Parameters(EffectParameters, frozen=True):
+    """How skin gives, and how long to look for rest. Defaults are ours, of the order of published finger pulp.
+
+    press_n_per_mm, soft_mm  each place of skin, and how far it gives more easily at first
+    drag_n_per_mm, friction  sideways, until it slips
+    reach_mm                 how far above its top a switch feels an object: skin bulges, and a glove spreads the load
+    most_steps               Newton steps before a repetition counts as not settled
+    """
+
+    press_n_per_mm: _Positive = 3.0
+    soft_mm: Annotated[float, msgspec.Meta(gt=0.0, le=5.0)] = 0.5
+    drag_n_per_mm: _Positive = 1.5
+    friction: Annotated[float, msgspec.Meta(ge=0.0, le=2.0)] = 0.8
+    reach_mm: Annotated[float, msgspec.Meta(ge=0.0, le=5.0)] = 1.0
+    most_steps: Annotated[int, msgspec.Meta(ge=1, le=1000)] = 40
+
+
+EFFECT = Effect(
+    name="contact.quasistatic",
+    summary="hand and object at rest: skin springs, sticking friction, weight",
+    stage="contact",
+    reads=("posture_deg", "pose", "grip_n"),
+    writes=(
+        *("posture_deg", "pose", "commanded_deg", "commanded_pose", "forces_n"),
+        *("settled", "residual_n", "residual_nmm", "between_n"),
+    ),
+    conflicts=("contact.mujoco",),
+)
+
+
+class _Quasistatic:
+    def __init__(self, parameters: Parameters) -> None:
+        self.skin = Skin(parameters.press_n_per_mm, parameters.soft_mm, parameters.drag_n_per_mm, parameters.friction)
+        self.reach_mm, self.most_steps = parameters.reach_mm, parameters.most_steps
+
+    def solve(self, loads: Sequence[Load]) -> list[Contact]:
+        solved: list[Contact] = []
+        for _, same_hand in groupby(loads, key=lambda load: load.condition.hand.size):
+            for together in _bundles(list(same_hand)):
+                cases = [
+                    Case(load.condition, load.posture_deg.T * (np.pi / 180.0), load.pose.T, load.grip_n)
+                    for load in together
+                ]
+                rests = close(cases, self.skin, self.most_steps)
+                solved += [self._contact(load, rest) for load, rest in zip(together, rests, strict=True)]
+        return solved
+
+    def _contact(self, load: Load, rest: Rest) -> Contact:
+        hand, shape = load.condition.hand, load.condition.thing.shape
+        capsules = np.zeros((len(CAPSULES), len(load.grip_n)))
+        for sphere, capsule in enumerate(hand.sphere_capsules):
+            capsules[capsule] += rest.presses[sphere]
+        tops = _switches(hand).tops(hand.skeleton(rest.angles))
+        forces, between = split(_switches(hand), self.reach_mm - rest.pose.distance(shape, tops)[0], capsules)
+        pose = np.concatenate([rest.pose.position, rotation_vector(rest.pose.rotation)])
+        return Contact(
+            posture_deg=rest.angles.T * (180.0 / np.pi),
+            pose=pose.T,
+            forces_n=forces.T,
+            capsules_n=capsules.T,
+            between_n=between,
+            settled=rest.settled,
+            residual_n=rest.residual_n,
+            residual_nmm=rest.residual_nmm,
+            steps=int(np.add.reduce(rest.steps)),
+        )
+
+
+@lru_cache(maxsize=8)
+def _switches(hand: Hand) -> Switches:
+    return Switches(hand, murakami160())
+
+
+def _bundles(loads: list[Load]) -> list[list[Load]]:
+    """Return the loads in bundles of about `_TOGETHER` repetitions."""
+    bundles: list[list[Load]] = [[]]
+    for load in loads:
+        if bundles[-1] and sum(len(other.grip_n) for other in bundles[-1]) + len(load.grip_n) > _TOGETHER:
+            bundles.append([])
+        bundles[-1].append(load)
+    return bundles
+
+
+def model(parameters: Parameters, setting: Setting) -> ContactModel:
+    """Return the contact model."""
+    return _Quasistatic(parameters)

@@ -1,0 +1,109 @@
+"""First contact is no blow: the grip grows, and each switch closes when the force on it passes its threshold.
+
+The contact model is solved at evenly spaced levels of grip; between them force grows in a straight line, from nothing
+at the first touch. On release the same happens backwards.
+A switch that is pressed only in passing closes and opens once.
+"""
+
+from collections.abc import Sequence
+from itertools import islice
+from typing import Annotated
+
+import numpy as np
+from msgspec import Meta
+from numpy.typing import NDArray
+
+from ..batch import NEVER, Batch
+from ..contact import Contact, ContactModel, Load
+from ..effect import Effect, EffectParameters, Setting, Together
+from ..errors import SceneError
+from ..streams import Draw
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Bits = NDArray[np.bool_]
+
+
+class Parameters(EffectParameters, frozen=True):
+    """How long the grip grows, in milliseconds, and at how many levels it is solved.
+
+    The default time is ours, of the order of the load phase of lifts (Johansson and Westling 1984, Exp. Brain Res. 56).
+    """
+
+    rise_ms: Annotated[float, Meta(gt=0.0, le=10_000.0)] = 200.0
+    levels: Annotated[int, Meta(ge=1, le=100)] = 10
+
+
+EFFECT = Effect(
+    name="contact.ramp",
+    summary="the grip grows, and switches close one by one",
+    stage="switch",
+    reads=("commanded_deg", "commanded_pose", "grip_n", "forces_n", "thresholds_n", "settled", "on_us", "off_us"),
+    writes=("on_us", "off_us", "settled"),
+    timed=True,
+)
+
+
+def prepare(parameters: Parameters, setting: Setting, contact: ContactModel) -> Together:
+    """Return what times every switch. Raises SceneError where the grip is not full when the row is read."""
+    rise_us = 1e3 * parameters.rise_ms
+    if rise_us > setting.hold_us:
+        raise SceneError(
+            f"effects.contact.ramp: the grip still grows when the row is read: rise_ms = {parameters.rise_ms:g} is"
+            f" longer than recording.hold_ms = {setting.hold_us / 1e3:g}"
+        )
+    below = parameters.levels - 1
+
+    def act(batches: Sequence[Batch], draws: Sequence[Draw]) -> None:
+        found = iter(contact.solve([load for batch in batches for load in _loads(batch, parameters.levels)]))
+        for batch, draw in zip(batches, draws, strict=True):
+            grown = list(islice(found, below))
+            draw.count("grips solved", len(batch) * below)
+            draw.count("solver steps", sum(one.steps for one in grown))
+            _time(batch, grown, rise_us)
+
+    return act
+
+
+def _loads(batch: Batch, levels: int) -> list[Load]:
+    """Return what a batch tells its hands at every level of grip below the full one."""
+    told = (batch.condition, batch.commanded_deg, batch.commanded_pose)
+    return [Load(*told, batch.grip_n * (level / levels)) for level in range(1, levels)]
+
+
+def _time(batch: Batch, grown: Sequence[Contact], rise_us: float) -> None:
+    """Enter when the switches of a batch close and open, from the contacts at the levels below the full grip."""
+    forces = np.array([np.zeros_like(batch.forces_n), *(one.forces_n for one in grown), batch.forces_n])
+    up_us, down_us = crossings(forces, batch.thresholds_n, rise_us / (len(grown) + 1))
+    lets_go = (batch.off_us != NEVER) & (up_us != NEVER) & (down_us == NEVER)
+    # Backwards from where the hand lets go, the force that first closed a switch is the last to keep it closed.
+    batch.off_us = np.where(lets_go, batch.off_us + np.where(lets_go, round(rise_us) - up_us, 0), down_us)
+    batch.on_us = up_us
+    batch.settled = np.logical_and.reduce([batch.settled, *(one.settled for one in grown)])
+
+
+def crossings(forces_n: Floats, thresholds_n: Floats, level_us: float) -> tuple[Integers, Integers]:
+    """Return when (n, s) each switch closes for the first time and opens for the last, NEVER where it does not.
+
+    forces_n (levels + 1, n, s) come level_us apart, the first at 0; thresholds_n (s,). One that is closed at the end
+    does not open.
+    """
+    closed = forces_n > thresholds_n
+    levels = len(closed) - 1
+    first, last = closed.argmax(axis=0), levels - closed[::-1].argmax(axis=0)
+    up = _between(forces_n, thresholds_n, np.maximum(first - 1, 0)) * level_us
+    down = _between(forces_n, thresholds_n, np.minimum(last, levels - 1)) * level_us
+    ever: Bits = np.logical_or.reduce(closed)
+    return _times(np.maximum(up, 0.0), ever), _times(down, np.greater(ever, closed[-1]))
+
+
+def _between(forces_n: Floats, thresholds_n: Floats, level: NDArray[np.intp]) -> Floats:
+    """Return at which level, and what part of the way to the next, force passes the threshold."""
+    here = np.take_along_axis(forces_n, level[None], axis=0)[0]
+    change = np.take_along_axis(forces_n, level[None] + 1, axis=0)[0] - here
+    levels: Floats = level + (thresholds_n - here) / np.where(change == 0.0, 1.0, change)
+    return levels
+
+
+def _times(time_us: Floats, there: Bits) -> Integers:
+    return np.where(there, np.ceil(np.where(there, time_us, 0.0)).astype(np.int64), NEVER)

@@ -1,0 +1,38 @@
+"""Frames that do not start on the beat: the computer's clock ticks evenly, its scheduler does not."""
+
+from typing import Annotated
+
+import numpy as np
+from msgspec import Meta
+
+from ..batch import Batch
+from ..effect import Effect, EffectParameters, Setting, Step
+from ..frames import drawn_rows
+from ..streams import Draw
+
+
+class Parameters(EffectParameters, frozen=True):
+    """How far frames stray from their beat: standard deviation in microseconds."""
+
+    sd_us: Annotated[float, Meta(gt=0.0, le=1e6)] = 300.0
+
+
+EFFECT = Effect(
+    name="frame.jitter",
+    summary="frames start early or late, in order",
+    stage="frame",
+    reads=("frame_us",),
+    writes=("frame_us",),
+    timed=True,
+)
+
+
+def prepare(parameters: Parameters, setting: Setting) -> Step:
+    """Return the step that moves every frame by a normal deviate of its own, and keeps them in order."""
+    rows = drawn_rows(setting)
+
+    def step(batch: Batch, draw: Draw) -> None:
+        shift = np.rint(parameters.sd_us * draw.per_repetition(len(rows)).normal()[:, rows])
+        batch.frame_us = np.sort(batch.frame_us + shift.astype(np.int64), axis=1)
+
+    return step

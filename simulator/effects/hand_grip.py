@@ -1,0 +1,34 @@
+"""No grasp is pressed twice alike: grip force varies from repetition to repetition."""
+
+from typing import Annotated
+
+from msgspec import Meta
+
+from ...compiler.elementary import exp
+from ..batch import Batch
+from ..effect import Effect, EffectParameters, Setting, Step
+from ..streams import Draw
+
+
+class Parameters(EffectParameters, frozen=True):
+    """Standard deviation of the logarithm of the force: 0.25 is about a quarter of it. Fitted to the paper's rates."""
+
+    log_sd: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.25
+
+
+EFFECT = Effect(
+    name="hand.grip",
+    summary="grip force varies from repetition to repetition",
+    stage="posture",
+    reads=("grip_n",),
+    writes=("grip_n",),
+)
+
+
+def prepare(parameters: Parameters, setting: Setting) -> Step:
+    """Return the step that multiplies the grip by a lognormal factor of median 1."""
+
+    def step(batch: Batch, draw: Draw) -> None:
+        batch.grip_n = batch.grip_n * exp(parameters.log_sd * draw.per_repetition().normal())
+
+    return step

@@ -1,0 +1,36 @@
+"""No grasp is shaped twice alike: joint angles vary from repetition to repetition."""
+
+from typing import Annotated
+
+import numpy as np
+from msgspec import Meta
+
+from ..batch import Batch
+from ..effect import Effect, EffectParameters, Setting, Step
+from ..hand import DOF, LIMITS_DEG
+from ..streams import Draw
+
+
+class Parameters(EffectParameters, frozen=True):
+    """Standard deviation of each joint angle, one by one. The default was fitted to the paper's rates."""
+
+    sd_deg: Annotated[float, Meta(ge=0.0, le=45.0)] = 1.5
+
+
+EFFECT = Effect(
+    name="hand.posture",
+    summary="joint angles vary from repetition to repetition",
+    stage="posture",
+    reads=("posture_deg",),
+    writes=("posture_deg",),
+)
+
+
+def prepare(parameters: Parameters, setting: Setting) -> Step:
+    """Return the step that shifts every joint by a normal deviate of its own, within what it can reach."""
+
+    def step(batch: Batch, draw: Draw) -> None:
+        shifted = batch.posture_deg + parameters.sd_deg * draw.per_repetition(len(DOF)).normal()
+        batch.posture_deg = np.clip(shifted, LIMITS_DEG[:, 0], LIMITS_DEG[:, 1])
+
+    return step

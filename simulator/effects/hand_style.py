@@ -1,0 +1,49 @@
+"""Everybody holds things in a way of their own: habits of the hand, and of each grasp type, and how hard one grips."""
+
+from typing import Annotated
+
+import numpy as np
+from msgspec import Meta
+
+from ...compiler.elementary import exp
+from ..batch import Batch
+from ..effect import Effect, EffectParameters, Setting, Step
+from ..hand import DOF, LIMITS_DEG
+from ..streams import Draw
+
+_Degrees = Annotated[float, Meta(ge=0.0, le=45.0)]
+
+
+class Parameters(EffectParameters, frozen=True):
+    """Standard deviations between subjects. All defaults are ours.
+
+    sd_deg        of each joint angle, the same in all that the subject does
+    habit_sd_deg  of each joint angle besides, for each grasp type of the subject's
+    log_sd        of the logarithm of the grip force
+    """
+
+    sd_deg: _Degrees = 2.0
+    habit_sd_deg: _Degrees = 3.0
+    log_sd: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.15
+
+
+EFFECT = Effect(
+    name="hand.style",
+    summary="every subject has habits of posture, also by grasp type, and a grip of their own",
+    stage="posture",
+    reads=("posture_deg", "grip_n"),
+    writes=("posture_deg", "grip_n"),
+)
+
+
+def prepare(parameters: Parameters, setting: Setting) -> Step:
+    """Return the step that gives the posture and the grip of a batch its subject's style."""
+
+    def step(batch: Batch, draw: Draw) -> None:
+        own = draw.per_subject(len(DOF) + 1).normal()
+        habit = draw.per_type(len(DOF)).normal()
+        offset = parameters.sd_deg * own[:-1] + parameters.habit_sd_deg * habit
+        batch.posture_deg = np.clip(batch.posture_deg + offset, LIMITS_DEG[:, 0], LIMITS_DEG[:, 1])
+        batch.grip_n = batch.grip_n * exp(parameters.log_sd * own[-1:])
+
+    return step

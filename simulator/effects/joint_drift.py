@@ -1,0 +1,36 @@
+"""The CyberGlove slips and warms up: its calibration drifts as a session goes on."""
+
+from typing import Annotated
+
+from msgspec import Meta
+
+from ..batch import Batch
+from ..cyberglove import SENSORS
+from ..effect import Effect, EffectParameters, Setting, Step
+from ..streams import Draw
+
+
+class Parameters(EffectParameters, frozen=True):
+    """Standard deviation, over sensors and subjects, of how far a sensor has drifted when the session ends. Ours."""
+
+    deg_per_session: Annotated[float, Meta(ge=0.0, le=90.0)] = 5.0
+
+
+EFFECT = Effect(
+    name="joint.drift",
+    summary="joint sensors drift, trial by trial, each subject's in their own way",
+    stage="sense",
+    reads=("trials", "sensors_deg"),
+    writes=("sensors_deg",),
+)
+
+
+def prepare(parameters: Parameters, setting: Setting) -> Step:
+    """Return the step that shifts every sensor in proportion to the trials that went before."""
+
+    def step(batch: Batch, draw: Draw) -> None:
+        whole = parameters.deg_per_session * draw.per_subject(len(SENSORS)).normal()
+        gone = batch.trials / setting.session_trials
+        batch.sensors_deg = batch.sensors_deg + (gone[:, None] * whole)[:, None]
+
+    return step

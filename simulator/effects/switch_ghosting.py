@@ -1,0 +1,61 @@
+"""Switches in a matrix without diodes: where three corners of a rectangle are closed, the fourth reads closed.
+
+Current takes any way round: a switch reads closed wherever closed ones join its row and its column, in however many
+steps. Keyboards call it ghosting; with one diode a switch there is none. Every switch of a frame counts as it was when
+its own row was read: what changes from one row to the next (bus.latency) is not followed.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import ports
+from ..batch import Batch
+from ..effect import Effect, EffectParameters, Setting, Step
+from ..streams import Draw
+
+Bits = NDArray[np.bool_]
+
+
+class Parameters(EffectParameters, frozen=True):
+    """Nothing to set: a row of the matrix is a port, a column one of its sixteen places."""
+
+
+EFFECT = Effect(
+    name="switch.ghosting",
+    summary="a matrix without diodes closes the fourth corner",
+    stage="read",
+    reads=("bits",),
+    writes=("bits",),
+)
+
+
+def prepare(parameters: Parameters, setting: Setting) -> Step:
+    """Return the step that closes every switch to which current finds a way."""
+
+    def step(batch: Batch, draw: Draw) -> None:
+        batch.bits = joined(batch.bits)
+
+    return step
+
+
+def joined(bits: Bits) -> Bits:
+    """Return what a matrix reads (..., s) whose closed switches are bits (..., s)."""
+    switches = bits.shape[-1]
+    rows, columns = ports.of(switches), np.arange(switches) % ports.SIZE
+    wires = _columns(bits)
+    for row in range(len(wires)):
+        # Rows that share a column with this one become one net with it. Rows that touch fall into one net at the latest
+        # when the first of them has its turn, and nets move as one from then on: after the last row all is joined.
+        touching = (wires & wires[row]) != 0
+        net = np.bitwise_or.reduce(np.where(touching, wires, 0), axis=0)
+        wires = np.where(touching, net, wires)
+    return np.moveaxis((wires[rows] >> columns.reshape(-1, *[1] * (bits.ndim - 1))) & 1, 0, -1).astype(np.bool_)
+
+
+def _columns(bits: Bits) -> NDArray[np.uint16]:
+    """Return for each row (rows, ...) the columns it is joined to, one bit each."""
+    rows = ports.count(bits.shape[-1])
+    packed = np.zeros((*bits.shape[:-1], rows * 2), dtype=np.uint8)
+    bytes_ = np.packbits(bits, axis=-1, bitorder="little")
+    packed[..., : bytes_.shape[-1]] = bytes_
+    return np.moveaxis(packed.view("<u2"), -1, 0)

@@ -1,0 +1,29 @@
+"""Switches that never close: a broken wire, a worn-out dome."""
+
+from ..batch import Batch
+from ..effect import Effect, Setting, Step
+from ..streams import Draw
+from ..stuck import StuckParameters, chooser
+
+
+class Parameters(StuckParameters, frozen=True):
+    """Which switches. One that is also stuck closed (switch.stuck_closed) reads closed."""
+
+
+EFFECT = Effect(
+    name="switch.stuck_open",
+    summary="some switches never read closed",
+    stage="read",
+    reads=("bits",),
+    writes=("bits",),
+)
+
+
+def prepare(parameters: Parameters, setting: Setting) -> Step:
+    """Return the step that opens them. Raises SceneError where the glove has no such switch."""
+    stuck = chooser(EFFECT.name, parameters)
+
+    def step(batch: Batch, draw: Draw) -> None:
+        batch.bits = batch.bits & ~stuck(draw)
+
+    return step

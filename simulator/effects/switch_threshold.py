@@ -1,0 +1,38 @@
+"""Switches are not all alike: each closes at a force of its own, around 1.0 N."""
+
+from typing import Annotated
+
+import numpy as np
+from msgspec import Meta
+
+from ..batch import Batch
+from ..effect import Effect, EffectParameters, Setting, Step
+from ..streams import Draw
+
+# No tact switch closes by itself. Ours.
+LEAST_N = 0.2
+
+
+class Parameters(EffectParameters, frozen=True):
+    """Standard deviation of the force between the switches of a glove, in newtons. Ours; none is below `LEAST_N`."""
+
+    sd_n: Annotated[float, Meta(ge=0.0, le=5.0)] = 0.15
+
+
+EFFECT = Effect(
+    name="switch.threshold",
+    summary="each switch closes at a force of its own",
+    stage="switch",
+    reads=("thresholds_n",),
+    writes=("thresholds_n",),
+)
+
+
+def prepare(parameters: Parameters, setting: Setting) -> Step:
+    """Return the step that shifts every threshold by a normal deviate, the glove's own."""
+
+    def step(batch: Batch, draw: Draw) -> None:
+        deviates = draw.per_glove(len(batch.thresholds_n)).normal()
+        batch.thresholds_n = np.maximum(batch.thresholds_n + parameters.sd_n * deviates, LEAST_N)
+
+    return step

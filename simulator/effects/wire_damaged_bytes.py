@@ -1,0 +1,49 @@
+"""Bytes that arrive with one of their eight bits turned: noise on a line without parity."""
+
+from dataclasses import replace
+from typing import Annotated
+
+import numpy as np
+from msgspec import Meta
+from numpy.typing import NDArray
+
+from ..batch import Batch
+from ..effect import Effect, EffectParameters, Setting, Step
+from ..frames import drawn_rows
+from ..streams import Draw
+
+Bytes = NDArray[np.uint8]
+
+
+class Parameters(EffectParameters, frozen=True):
+    """The share of all bytes that is damaged."""
+
+    rate: Annotated[float, Meta(gt=0.0, lt=1.0)] = 1e-4
+
+
+EFFECT = Effect(
+    name="wire.damaged_bytes",
+    summary="bits are turned on the serial lines",
+    stage="wire",
+    reads=("traffic",),
+    writes=("traffic",),
+    on_wire=True,
+)
+
+
+def damaged(data: Bytes, chances: NDArray[np.float64], rate: float) -> Bytes:
+    """Return the bytes as they arrive, for one uniform number each, any shape: below `rate` it says which bit turns."""
+    bit = np.minimum(8.0 * chances / rate, 7.0).astype(np.uint8)
+    return np.where(chances < rate, data ^ (np.uint8(1) << bit), data)
+
+
+def prepare(parameters: Parameters, setting: Setting) -> Step:
+    """Return the step that damages bytes."""
+    rows = drawn_rows(setting)
+
+    def step(batch: Batch, draw: Draw) -> None:
+        traffic = batch.traffic
+        chances = draw.per_repetition(*traffic.data.shape[1:]).uniform()[:, rows]
+        batch.traffic = replace(traffic, data=damaged(traffic.data, chances, parameters.rate))
+
+    return step

@@ -1,0 +1,46 @@
+"""Bytes that never arrive: an overrun receiver, a plug that is pulled for a moment."""
+
+from dataclasses import replace
+from typing import Annotated
+
+import numpy as np
+from msgspec import Meta
+from numpy.typing import NDArray
+
+from ..batch import Batch
+from ..effect import Effect, EffectParameters, Setting, Step
+from ..frames import drawn_rows
+from ..streams import Draw
+
+
+class Parameters(EffectParameters, frozen=True):
+    """The share of all bytes that is lost."""
+
+    rate: Annotated[float, Meta(gt=0.0, lt=1.0)] = 1e-4
+
+
+EFFECT = Effect(
+    name="wire.lost_bytes",
+    summary="bytes are lost on the serial lines",
+    stage="wire",
+    reads=("traffic",),
+    writes=("traffic",),
+    on_wire=True,
+)
+
+
+def arrives(chances: NDArray[np.float64], rate: float) -> NDArray[np.bool_]:
+    """Return which bytes arrive, for one uniform number each, any shape."""
+    return chances >= rate
+
+
+def prepare(parameters: Parameters, setting: Setting) -> Step:
+    """Return the step that loses bytes."""
+    rows = drawn_rows(setting)
+
+    def step(batch: Batch, draw: Draw) -> None:
+        traffic = batch.traffic
+        chances = draw.per_repetition(*traffic.data.shape[1:]).uniform()[:, rows]
+        batch.traffic = replace(traffic, arrives=traffic.arrives & arrives(chances, parameters.rate))
+
+    return step

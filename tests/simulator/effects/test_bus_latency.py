@@ -1,0 +1,67 @@
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from thenar.simulator.effects.bus_latency import Parameters, prepare
+from thenar.simulator.errors import SceneError
+from thenar.simulator.frames import frame_times, hold_frame
+
+
+@pytest.fixture
+def delay(make_batch: Callable, make_draw: Callable, make_setting: Callable) -> Callable[..., tuple[np.ndarray, int]]:
+    """Return a function of the parameters, the repetitions and the number of switches."""
+
+    def delayed(
+        parameters: Parameters, rows: range = range(3), switches: int = 160, **changes: object
+    ) -> tuple[np.ndarray, int]:
+        batch = make_batch(rows)
+        setting = make_setting(timed=True, **changes)
+        batch.on_us = np.zeros((len(batch), switches), dtype=np.int64)
+        batch.frame_us = np.tile(frame_times(setting), (len(batch), 1))
+        draw = make_draw("bus.latency", batch)
+        prepare(parameters, setting)(batch, draw)
+        assert batch.delay_us is not None
+        return batch.delay_us, draw.draws.counts["bus.latency"]
+
+    return delayed
+
+
+def test_one_port_follows_the_other_and_nothing_is_drawn(delay: Callable) -> None:
+    us, drawn = delay(Parameters(us_per_port=100), switches=40)
+    assert us.tolist() == [100] * 16 + [200] * 16 + [300] * 8
+    assert drawn == 0
+
+
+def test_switches_of_a_port_are_read_together_and_no_port_before_its_turn(delay: Callable) -> None:
+    us, drawn = delay(Parameters(us_per_port=100, jitter_us=30.0))
+    frames = us.shape[1]
+    assert us.shape == (3, frames, 160)
+    by_port = us.reshape(3, frames, 10, 16)
+    assert (by_port == by_port[..., :1]).all()
+    assert (np.diff(by_port[..., 0], axis=2, prepend=0) >= 100).all()
+    assert drawn == 3 * frames * 10
+
+
+def test_the_extra_time_is_on_average_what_was_said(delay: Callable) -> None:
+    us, _ = delay(Parameters(us_per_port=100, jitter_us=50.0), range(300))
+    extra = np.diff(us[:, :, ::16], axis=2, prepend=0) - 100
+    assert abs(extra.mean() - 50.0) < 1.0
+    assert abs(extra.std() - 50.0) < 1.0
+
+
+@pytest.mark.parametrize("parameters", [Parameters(us_per_port=101), Parameters(us_per_port=90, jitter_us=11.0)])
+def test_a_scan_that_lasts_longer_than_a_frame_is_refused(parameters: Parameters, make_setting: Callable) -> None:
+    prepare(parameters, make_setting(timed=True, period_us=1010))
+    with pytest.raises(SceneError, match=r"effects\.bus\.latency: 10 ports take 1010 us .* 1009 us from one frame"):
+        prepare(parameters, make_setting(timed=True, period_us=1009))
+
+
+def test_a_repetition_alone_and_a_longer_lead_leave_the_frame_that_is_read_as_it_is(
+    delay: Callable, make_setting: Callable
+) -> None:
+    parameters = Parameters(jitter_us=20.0)
+    many, _ = delay(parameters, range(6))
+    alone, _ = delay(parameters, range(4, 5), first_us=-200_000, release_us=0)
+    short, long = hold_frame(make_setting(timed=True)), hold_frame(make_setting(timed=True, first_us=-200_000))
+    assert np.array_equal(many[4, short], alone[0, long])

@@ -1,0 +1,121 @@
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.simulator.batch import NEVER, Batch
+from thenar.simulator.contact import Contact, Load
+from thenar.simulator.effects.contact_ramp import Parameters, crossings, prepare
+from thenar.simulator.errors import SceneError
+
+RISE_US, HOLD_US, LETS_GO_US = 100_000, 250_000, 260_000
+
+
+@dataclass(frozen=True)
+class Press:
+    """A contact model whose forces (n, s) are a function of the grip (n, 1); it does not settle below a grip."""
+
+    forces: Callable[[np.ndarray], np.ndarray]
+    settles_n: float = 0.0
+
+    def solve(self, loads: Sequence[Load]) -> list[Contact]:
+        return [self._solve(load.posture_deg, load.pose, load.grip_n) for load in loads]
+
+    def _solve(self, posture_deg: np.ndarray, pose: np.ndarray, grip_n: np.ndarray) -> Contact:
+        n = np.zeros(len(grip_n))
+        settled = grip_n >= self.settles_n
+        forces = self.forces(grip_n[:, None] + 0.0 * posture_deg[:, :1] + 0.0 * pose[:, :1])
+        return Contact(posture_deg, pose, forces, np.zeros((len(n), 20)), n, settled, n, n, 3 * len(n))
+
+
+@pytest.fixture(scope="module")
+def ramped(make_batch: Callable, make_draw: Callable, make_setting: Callable) -> Callable[..., Batch]:
+    """Return a function of a contact model, parameters and release: a batch of grips 10 and 20 N on 1 N switches."""
+
+    def make(model: Press, levels: int = 10, release_us: int = 200_000) -> Batch:
+        batch: Batch = make_batch(range(2))
+        batch.commanded_deg, batch.commanded_pose = np.zeros((2, 20)), np.zeros((2, 6))
+        batch.grip_n = np.array([10.0, 20.0])
+        batch.forces_n = model.forces(batch.grip_n[:, None])
+        batch.settled = np.ones(2, dtype=np.bool_)
+        batch.thresholds_n = np.ones(batch.forces_n.shape[1])
+        closed = batch.forces_n > 1.0
+        batch.on_us = np.where(closed, 0, NEVER)
+        batch.off_us = np.where(closed, LETS_GO_US, NEVER) if release_us else np.full_like(batch.on_us, NEVER)
+        setting = make_setting(timed=True, hold_us=HOLD_US, release_us=release_us)
+        prepare(Parameters(rise_ms=100.0, levels=levels), setting, model)([batch], [make_draw("contact.ramp", batch)])
+        return batch
+
+    return make
+
+
+def test_what_was_solved_on_the_way_is_counted(
+    make_batch: Callable, make_draw: Callable, make_setting: Callable, ramped: Callable
+) -> None:
+    """Two hands at four levels below the full grip, three steps each."""
+    batch, draw = ramped(Press(lambda grip: grip)), make_draw("contact.ramp", make_batch(range(2)))
+    prepare(Parameters(levels=5), make_setting(), Press(lambda grip: grip))([batch], [draw])
+    assert draw.draws.counts == {"grips solved": 8, "solver steps": 24}
+
+
+def test_a_switch_closes_when_the_growing_force_passes_its_threshold(ramped: Callable) -> None:
+    """Forces of 0.05, 0.25 and 1 times the grip: 1 N is reached at 20, 4 and 1 N of 10 and 20 N."""
+    batch = ramped(Press(lambda grip: grip * np.array([0.05, 0.25, 1.0])))
+    assert batch.on_us.tolist() == [[NEVER, 40_000, 10_000], [NEVER, 20_000, 5_000]]
+
+
+def test_release_is_the_mirror_image(ramped: Callable) -> None:
+    batch = ramped(Press(lambda grip: grip * np.array([0.05, 0.25, 1.0])))
+    assert batch.off_us.tolist() == [[NEVER, LETS_GO_US + 60_000, LETS_GO_US + 90_000], [NEVER, 340_000, 355_000]]
+    batch = ramped(Press(lambda grip: grip * np.array([0.05, 0.25, 1.0])), release_us=0)
+    assert (batch.off_us == NEVER).all()
+
+
+def test_a_switch_that_is_pressed_only_in_passing_closes_and_opens(ramped: Callable) -> None:
+    """It bears the grip up to 5 N and then less: 10 N less the grip."""
+    batch = ramped(Press(lambda grip: np.maximum(np.minimum(grip, 10.0 - grip), 0.0)))
+    assert batch.on_us.tolist() == [[10_000], [5_000]]
+    assert batch.off_us.tolist() == [[90_000], [45_000]]
+
+
+@pytest.mark.parametrize("levels", [1, 2, 7])
+def test_the_model_is_solved_at_all_levels_but_the_full_one(
+    make_batch: Callable, ramped: Callable, levels: int
+) -> None:
+    grips: list[np.ndarray] = []
+
+    def forces(grip: np.ndarray) -> np.ndarray:
+        grips.append(grip[:, 0] / [10.0, 20.0])
+        return grip
+
+    ramped(Press(forces), levels)
+    solved = grips[1:]  # the first call made the forces at full grip
+    assert np.allclose(solved, [[level / levels] * 2 for level in range(1, levels)])
+
+
+def test_what_does_not_settle_on_the_way_is_marked(ramped: Callable) -> None:
+    assert ramped(Press(lambda grip: grip, settles_n=1.5)).settled.tolist() == [False, True]
+
+
+@given(st.integers(0, 2**32), st.integers(1, 12))
+def test_at_every_level_switches_are_as_their_forces_say_unless_they_flicker(seed: int, levels: int) -> None:
+    random = np.random.default_rng(seed)
+    forces = np.concatenate([np.zeros((1, 2, 30)), random.uniform(0.0, 2.0, (levels, 2, 30))])
+    thresholds = random.uniform(0.5, 1.5, 30)
+    on, off = crossings(forces, thresholds, 1000.0)
+    closed = forces > thresholds
+    at = 1000 * np.arange(levels + 1)[:, None, None]
+    reads = (on <= at) & (at < off)
+    changes = np.count_nonzero(np.diff(closed, axis=0), axis=0)
+    plain = changes <= np.where(closed[-1], 1, 2)
+    assert np.array_equal(reads[:, plain], closed[:, plain])
+    assert np.array_equal(reads[-1], closed[-1])
+    assert (reads >= closed).all()
+
+
+def test_a_grip_that_is_not_full_when_the_row_is_read_is_refused(make_setting: Callable) -> None:
+    with pytest.raises(SceneError, match=r"contact\.ramp: .* rise_ms = 300 is longer than recording\.hold_ms = 250"):
+        prepare(Parameters(rise_ms=300.0), make_setting(hold_us=250_000), Press(lambda grip: grip))

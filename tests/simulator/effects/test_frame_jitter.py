@@ -1,0 +1,49 @@
+from collections.abc import Callable
+
+import msgspec
+import numpy as np
+import pytest
+
+from thenar.simulator.batch import Batch
+from thenar.simulator.effect import Setting
+from thenar.simulator.effects.frame_jitter import Parameters, prepare
+from thenar.simulator.frames import frame_times, hold_frame
+
+MakeBatch = Callable[..., Batch]
+
+
+def jittered(make_batch: MakeBatch, make_draw: Callable, setting: Setting, sd_us: float, rows: range) -> np.ndarray:
+    batch = make_batch(rows)
+    batch.frame_us = np.tile(frame_times(setting), (len(batch), 1))
+    prepare(Parameters(sd_us=sd_us), setting)(batch, make_draw("frame.jitter", batch))
+    return batch.frame_us
+
+
+@pytest.mark.parametrize("sd_us", [100.0, 5_000.0, 100_000.0])
+def test_frames_keep_their_order_however_late(
+    make_batch: MakeBatch, make_draw: Callable, make_setting: Callable, sd_us: float
+) -> None:
+    times = jittered(make_batch, make_draw, make_setting(timed=True), sd_us, range(50))
+    assert (np.diff(times, axis=1) >= 0).all()
+
+
+def test_frames_stray_as_much_as_said(make_batch: MakeBatch, make_draw: Callable, make_setting: Callable) -> None:
+    setting = make_setting(timed=True)
+    late = jittered(make_batch, make_draw, setting, 300.0, range(400)) - frame_times(setting)
+    assert abs(late.mean()) < 10.0
+    assert abs(late.std() - 300.0) < 10.0
+
+
+def test_a_repetition_alone_and_a_longer_lead_leave_the_frame_that_is_read_as_it_is(
+    make_batch: MakeBatch, make_draw: Callable, make_setting: Callable
+) -> None:
+    short, long = make_setting(timed=True), make_setting(timed=True, first_us=-200_000, release_us=0)
+    many = jittered(make_batch, make_draw, short, 100.0, range(6))
+    alone = jittered(make_batch, make_draw, long, 100.0, range(4, 5))
+    assert many[4, hold_frame(short)] == alone[0, hold_frame(long)]
+
+
+@pytest.mark.parametrize("sd_us", [0.0, -1.0, 2e6])
+def test_impossible_spreads_are_refused(sd_us: float) -> None:
+    with pytest.raises(msgspec.ValidationError, match="sd_us"):
+        msgspec.convert({"sd_us": sd_us}, Parameters)

@@ -1,0 +1,52 @@
+"""The calibration of the joint sensors drifts as a session goes on."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from thenar.simulator.batch import Batch
+from thenar.simulator.condition import Condition
+from thenar.simulator.effect import Setting
+from thenar.simulator.effects.joint_drift import EFFECT, Parameters, prepare
+from thenar.simulator.streams import Draw
+
+Drift = Callable[..., np.ndarray]
+
+
+@pytest.fixture(scope="session")
+def drift(
+    make_batch: Callable[..., Batch],
+    make_condition: Callable[..., Condition],
+    make_draw: Callable[..., Draw],
+    make_setting: Callable[..., Setting],
+) -> Drift:
+    """Return a function of subject and trials of 100 that returns what is added (n, 2 frames, 18)."""
+
+    def run(subject: str, trials: list[int], deg_per_session: float = 5.0) -> np.ndarray:
+        batch = make_batch(range(len(trials)), make_condition(subject))
+        batch.trials = np.array(trials)
+        batch.sensors_deg = np.zeros((len(trials), 2, 18))
+        prepare(Parameters(deg_per_session=deg_per_session), make_setting(session_trials=100))(
+            batch, make_draw(EFFECT.name, batch)
+        )
+        return batch.sensors_deg
+
+    return run
+
+
+def test_it_begins_at_nought_and_goes_on_in_a_straight_line(drift: Drift) -> None:
+    added = drift("A", [0, 25, 50, 100])
+    assert not added[0].any()
+    np.testing.assert_allclose(added[2], 2.0 * added[1], rtol=1e-12)
+    np.testing.assert_allclose(added[3], 4.0 * added[1], rtol=1e-12)
+    np.testing.assert_array_equal(added[:, 0], added[:, 1])
+
+
+def test_every_sensor_of_every_subject_drifts_its_own_way_as_far_as_is_asked(drift: Drift) -> None:
+    ends = np.stack([drift(f"subject {number}", [100], deg_per_session=8.0)[0, 0] for number in range(200)])
+    # 3600 drifts: four standard errors of mean and sd.
+    assert abs(ends.mean()) < 4 * 8.0 / 3600**0.5
+    assert abs(ends.std() - 8.0) < 4 * 8.0 / 7200**0.5
+    assert (ends > 0.0).any()
+    assert (ends < 0.0).any()

@@ -1,0 +1,60 @@
+"""Noise on the joint sensors: a draw a frame, and one for the whole repetition."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from thenar.simulator.batch import Batch
+from thenar.simulator.effect import Setting
+from thenar.simulator.effects.joint_noise import EFFECT, Parameters, prepare
+from thenar.simulator.frames import frame_times, hold_frame
+from thenar.simulator.streams import Draw
+
+Noise = Callable[..., np.ndarray]
+
+
+@pytest.fixture(scope="session")
+def noise(
+    make_batch: Callable[..., Batch], make_draw: Callable[..., Draw], make_setting: Callable[..., Setting]
+) -> Noise:
+    """Return a function of n, timed and parameters that returns what is added (n, F, 18)."""
+
+    def run(n: int, timed: bool, sd_deg: float, trial_sd_deg: float = 0.0) -> np.ndarray:
+        batch, setting = make_batch(range(n)), make_setting(timed=timed)
+        batch.sensors_deg = np.full((n, len(frame_times(setting)), 18), 50.0)
+        prepare(Parameters(sd_deg=sd_deg, trial_sd_deg=trial_sd_deg), setting)(batch, make_draw(EFFECT.name, batch))
+        return batch.sensors_deg - 50.0
+
+    return run
+
+
+def test_every_frame_has_noise_of_its_own(noise: Noise) -> None:
+    added = noise(40, True, sd_deg=2.0)
+    count = added.size
+    # Four standard errors of mean and sd.
+    assert abs(added.mean()) < 4 * 2.0 / count**0.5
+    assert abs(added.std() - 2.0) < 4 * 2.0 / (2 * count) ** 0.5
+    assert abs(np.corrcoef(added[:, :-1].ravel(), added[:, 1:].ravel())[0, 1]) < 4 / count**0.5
+
+
+def test_a_repetitions_offset_is_the_same_in_all_its_frames(noise: Noise) -> None:
+    added = noise(200, True, sd_deg=0.0, trial_sd_deg=5.0)
+    np.testing.assert_array_equal(added, np.repeat(added[:, :1], added.shape[1], axis=1))
+    assert abs(added[:, 0].std() - 5.0) < 4 * 5.0 / (2 * added[:, 0].size) ** 0.5
+
+
+def test_the_two_add_up(noise: Noise) -> None:
+    both, frames, offsets = (
+        noise(3, True, sd_deg=2.0, trial_sd_deg=5.0),
+        noise(3, True, sd_deg=2.0, trial_sd_deg=0.0),
+        noise(3, True, sd_deg=0.0, trial_sd_deg=5.0),
+    )
+    np.testing.assert_allclose(both, frames + offsets, atol=1e-12)
+
+
+def test_the_frame_that_is_read_out_is_as_noisy_whether_or_not_there_are_others(
+    noise: Noise, make_setting: Callable[..., Setting]
+) -> None:
+    alone, among = (noise(5, timed, sd_deg=2.0, trial_sd_deg=5.0) for timed in (False, True))
+    np.testing.assert_array_equal(alone[:, 0], among[:, hold_frame(make_setting(timed=True))])

@@ -1,0 +1,104 @@
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.simulator.effects import port_dead, switch_stuck_closed, switch_stuck_open
+from thenar.simulator.effects.switch_ghosting import Parameters, joined, prepare
+from thenar.simulator.ledger import Ledger
+from thenar.simulator.pipeline import compile_pipeline
+from thenar.simulator.scene import Glove
+
+
+def searched(bits: np.ndarray) -> np.ndarray:
+    """Return what the matrix reads, by walking from each row along closed switches: the oracle."""
+    closed = {divmod(int(switch), 16) for switch in np.flatnonzero(bits)}
+    reads = np.zeros_like(bits)
+    for row in {row for row, _ in closed}:
+        rows, columns = {row}, set[int]()
+        while True:
+            wider = columns | {column for r, column in closed if r in rows}
+            more = rows | {r for r, column in closed if column in wider}
+            if (more, wider) == (rows, columns):
+                break
+            rows, columns = more, wider
+        for column in columns:
+            if 16 * row + column < len(bits):
+                reads[16 * row + column] = True
+    return reads
+
+
+@given(st.integers(1, 160), st.integers(0, 2**32), st.floats(0.0, 0.25))
+def test_the_matrix_reads_what_a_walk_through_it_finds(switches: int, seed: int, share: float) -> None:
+    bits = np.random.default_rng(seed).random((4, switches)) < share
+    assert np.array_equal(joined(bits), [searched(one) for one in bits])
+
+
+def test_the_fourth_corner_of_a_rectangle_closes() -> None:
+    bits = np.zeros(160, dtype=np.bool_)
+    bits[[16 * 1 + 2, 16 * 1 + 7, 16 * 5 + 2]] = True
+    assert np.flatnonzero(joined(bits) & ~bits).tolist() == [16 * 5 + 7]
+
+
+def test_a_chain_through_all_rows_joins_them_whatever_their_order() -> None:
+    """Row after row shares one column with the next, in a random order of rows: all become one net."""
+    order = np.random.default_rng(1).permutation(10)
+    bits = np.zeros((10, 16), dtype=np.bool_)
+    bits[order, np.arange(10)] = bits[order, np.arange(1, 11)] = True
+    assert np.array_equal(joined(bits.ravel()).reshape(10, 16), np.tile(np.arange(16) < 11, (10, 1)))
+
+
+@given(st.sets(st.integers(0, 159), max_size=2))
+def test_two_closed_switches_are_always_right(closed: set[int]) -> None:
+    bits = np.isin(np.arange(160), list(closed))
+    assert np.array_equal(joined(bits), bits)
+
+
+@given(st.integers(0, 2**32))
+def test_nothing_opens_and_twice_is_once(seed: int) -> None:
+    bits = np.random.default_rng(seed).random((3, 160)) < 0.08
+    reads = joined(bits)
+    assert (reads >= bits).all()
+    assert np.array_equal(joined(reads), reads)
+
+
+@pytest.mark.parametrize("shape", [(2, 3, 160), (1, 1, 5)])
+def test_every_frame_is_a_matrix_of_its_own(
+    make_batch: Callable, make_draw: Callable, make_setting: Callable, shape: tuple[int, ...]
+) -> None:
+    batch = make_batch(range(shape[0]))
+    batch.bits = bits = np.random.default_rng(2).random(shape) < 0.1
+    draw = make_draw("switch.ghosting", batch)
+    prepare(Parameters(), make_setting())(batch, draw)
+    assert batch.bits.shape == shape
+    for place in np.ndindex(*shape[:2]):
+        assert np.array_equal(batch.bits[place], searched(bits[place]))
+    assert not draw.draws.counts
+
+
+@pytest.mark.parametrize(
+    ("others", "reads"),
+    [
+        ([], []),
+        ([("switch.stuck_closed", switch_stuck_closed.Parameters(switches=(18, 23, 82)))], [18, 23, 82, 87]),
+        # What is stuck open reads closed by way of the others; a dead port reads open, but its wires still join.
+        (
+            [
+                ("switch.stuck_open", switch_stuck_open.Parameters(switches=(87,))),
+                ("switch.stuck_closed", switch_stuck_closed.Parameters(switches=(18, 23, 82))),
+                ("port.dead", port_dead.Parameters(ports=(1,))),
+            ],
+            [82, 87],
+        ),
+    ],
+)
+def test_current_flows_through_stuck_switches_and_dead_ports(
+    make_scene: Callable, make_batch: Callable, others: list, reads: list[int]
+) -> None:
+    """Row 1, columns 2 and 7, and row 5, column 2; the threshold is so high that the hand closes nothing."""
+    batch, effects = make_batch(range(1)), ["switch.ghosting", *others]
+    glove = Glove(threshold_n=20.0)
+    compile_pipeline(make_scene(effects, glove=glove)).run([batch], Ledger())
+    assert np.flatnonzero(batch.bits[0, 0]).tolist() == reads

@@ -1,0 +1,106 @@
+"""Switches that are stuck, open or closed."""
+
+from collections.abc import Callable
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.simulator.batch import Batch
+from thenar.simulator.effect import Setting
+from thenar.simulator.effects import switch_stuck_closed, switch_stuck_open
+from thenar.simulator.errors import SceneError
+from thenar.simulator.layout import murakami160
+from thenar.simulator.streams import Draw
+
+BOTH = [(switch_stuck_open, False), (switch_stuck_closed, True)]
+NAMES = [patch.name for patch in murakami160()]
+Read = Callable[..., np.ndarray]
+
+
+@pytest.fixture(scope="session")
+def read(
+    make_batch: Callable[..., Batch], make_draw: Callable[..., Draw], make_setting: Callable[..., Setting]
+) -> Read:
+    """Return a function of modules with parameters that returns the bits (3, 2, 160) read of random ones."""
+
+    def run(*effects: tuple) -> np.ndarray:
+        batch = make_batch(range(3))
+        batch.bits = np.random.default_rng(5).random((3, 2, 160)) < 0.5
+        for module, parameters in effects:
+            module.prepare(module.Parameters(**parameters), make_setting())(batch, make_draw(module.EFFECT.name, batch))
+        return batch.bits
+
+    return run
+
+
+@pytest.mark.parametrize(("module", "value"), BOTH)
+def test_named_switches_are_stuck_in_every_frame_and_the_others_are_not(
+    read: Read, module: object, value: bool
+) -> None:
+    free, stuck = read(), read((module, {"switches": (3, NAMES[7], 159)}))
+    assert (stuck[:, :, [3, 7, 159]] == value).all()
+    others = np.delete(np.arange(160), [3, 7, 159])
+    np.testing.assert_array_equal(stuck[:, :, others], free[:, :, others])
+
+
+@pytest.mark.parametrize(("module", "value"), BOTH)
+@given(count=st.integers(1, 160))
+def test_as_many_as_are_asked_for_are_drawn_and_fewer_are_among_them(
+    read: Read, module: object, value: bool, count: int
+) -> None:
+    stuck = (read((module, {"count": count})) == value).all(axis=(0, 1))
+    # With 6 random bits beside, about 2 of the other switches look stuck by chance: what is counted is what changed.
+    by_chance = (read() == value).all(axis=(0, 1))
+    assert count <= np.count_nonzero(stuck) <= count + np.count_nonzero(by_chance)
+    fewer = (read((module, {"count": max(count - 1, 1)})) == value).all(axis=(0, 1))
+    assert not (fewer & ~stuck).any()
+
+
+@pytest.mark.parametrize(("module", "value"), BOTH)
+def test_one_is_drawn_where_nothing_is_said(read: Read, module: object, value: bool) -> None:
+    changed = (read((module, {})) != read()).any(axis=(0, 1))
+    assert np.count_nonzero(changed) == 1
+
+
+def test_open_and_closed_ones_are_drawn_apart_and_closed_wins(read: Read) -> None:
+    opened, closed = (
+        (read((module, {"count": 40})) != read()).any(axis=(0, 1))
+        for module in (switch_stuck_open, switch_stuck_closed)
+    )
+    assert (opened != closed).any()
+    both = read((switch_stuck_open, {"switches": (4, 5)}), (switch_stuck_closed, {"switches": (5, 6)}))
+    assert not both[:, :, 4].any()
+    assert both[:, :, 5].all()
+    assert "switch.stuck_open" in switch_stuck_closed.EFFECT.after
+
+
+@pytest.mark.parametrize(("module", "value"), BOTH)
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        ({"switches": (160,)}, ("switches", "no switch 160", "0 to 159")),
+        ({"switches": (-1,)}, ("switches", "no switch -1")),
+        ({"switches": ("index_distal_11",)}, ("index_distal_11", "did you mean 'index_distal_1'")),
+        ({"count": 161}, ("count", "161", "the glove has 160")),
+    ],
+)
+def test_switches_that_are_not_there_are_refused_with_the_place(
+    module: object, value: bool, parameters: dict, words: tuple[str, ...], make_setting: Callable[..., Setting]
+) -> None:
+    given = module.Parameters(**parameters)  # type: ignore[attr-defined]
+    with pytest.raises(SceneError) as caught:
+        module.prepare(given, make_setting())  # type: ignore[attr-defined]
+    for word in (f"effects.{module.EFFECT.name}", *words):  # type: ignore[attr-defined]
+        assert word in str(caught.value)
+
+
+@pytest.mark.parametrize(("module", "value"), BOTH)
+@pytest.mark.parametrize(
+    "text", ['{"switches": []}', '{"count": 0}', '{"switches": [1], "count": 1}', '{"howmany": 1}']
+)
+def test_parameters_that_say_nothing_or_too_much_are_refused(module: object, value: bool, text: str) -> None:
+    with pytest.raises(msgspec.ValidationError):
+        msgspec.json.decode(text, type=module.Parameters)  # type: ignore[attr-defined]

@@ -1,0 +1,59 @@
+from collections.abc import Callable
+
+import msgspec
+import numpy as np
+import pytest
+
+from thenar.simulator.batch import Batch
+from thenar.simulator.effect import Setting
+from thenar.simulator.effects.wire_lost_bytes import Parameters, arrives, prepare
+from thenar.simulator.traffic import Traffic
+
+MakeBatch = Callable[..., Batch]
+
+
+def through(
+    make_batch: MakeBatch, make_draw: Callable, setting: Setting, shape: tuple[int, int], rows: range, rate: float = 0.2
+) -> np.ndarray:
+    batch = make_batch(rows)
+    zeros = np.zeros((len(batch), *shape), dtype=np.uint8)
+    batch.traffic = Traffic(zeros, zeros.astype(np.int64), np.ones(zeros.shape, dtype=np.bool_), 26)
+    before = batch.traffic
+    prepare(Parameters(rate=rate), setting)(batch, make_draw("wire.lost_bytes", batch))
+    assert batch.traffic.data is before.data
+    assert before.arrives.all()
+    return batch.traffic.arrives
+
+
+def test_a_byte_is_lost_where_its_number_is_below_the_rate() -> None:
+    chances = np.array([0.001, 0.0099, 0.01, 0.5])
+    assert arrives(chances, 0.01).tolist() == [False, False, True, True]
+    assert np.arange(4)[arrives(chances, 0.01)].tolist() == [2, 3]
+
+
+def test_the_share_that_is_lost_is_the_rate(make_batch: MakeBatch, make_draw: Callable, make_setting: Callable) -> None:
+    came = through(make_batch, make_draw, make_setting(), (1, 46), range(500), rate=0.2)
+    assert abs(1.0 - came.mean() - 0.2) < 0.01
+
+
+def test_one_number_a_byte_whatever_else_happens_to_the_frame_that_is_read(
+    make_batch: MakeBatch, make_draw: Callable, make_setting: Callable
+) -> None:
+    alone = through(make_batch, make_draw, make_setting(), (1, 46), range(4, 5))
+    timed = make_setting(timed=True)
+    many = through(make_batch, make_draw, timed, (33, 46), range(6))
+    assert np.array_equal(many[4, 28], alone[0, 0])
+
+
+def test_what_was_lost_before_stays_lost(make_batch: MakeBatch, make_draw: Callable, make_setting: Callable) -> None:
+    batch = make_batch(range(2))
+    data = np.zeros((2, 1, 46), dtype=np.uint8)
+    batch.traffic = Traffic(data, data.astype(np.int64), np.zeros(data.shape, dtype=np.bool_), 26)
+    prepare(Parameters(), make_setting())(batch, make_draw("wire.lost_bytes", batch))
+    assert not batch.traffic.arrives.any()
+
+
+@pytest.mark.parametrize("rate", [0.0, 1.0, -0.1])
+def test_impossible_rates_are_refused(rate: float) -> None:
+    with pytest.raises(msgspec.ValidationError, match="rate"):
+        msgspec.convert({"rate": rate}, Parameters)

@@ -1,0 +1,135 @@
+"""No effect disturbs another's random numbers, and a repetition made alone is the one of the full run.
+
+What an effect draws is recorded word by word, with the counter that it was drawn at. Where one scene has many frames
+and another a single one, effects that draw for every frame read on in the same numbers: the shorter begins the longer.
+"""
+
+from collections.abc import Callable, Iterable
+from itertools import combinations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from thenar.simulator.batch import Batch
+from thenar.simulator.ledger import Ledger
+from thenar.simulator.pipeline import Pipeline, compile_pipeline
+from thenar.simulator.registry import CONTACTS, NAMES, load
+from thenar.simulator.scene import Scene
+from thenar.simulator.streams import Draw
+
+SceneMaker = Callable[..., Scene]
+BatchMaker = Callable[..., Batch]
+# An effect and where it drew, (seed, repetition, condition, subject): the words.
+Words = dict[tuple[str, tuple[int, ...]], bytes]
+
+OTHERS = [name for name in NAMES if name not in CONTACTS]
+# Parameters with which everybody who can draw does, and the contact models are quick.
+LIVELY: dict[str, dict[str, object]] = {
+    "bus.latency": {"jitter_us": 20.0},
+    "port.dead": {"count": 2},
+    "switch.stuck_open": {"count": 3},
+    "switch.stuck_closed": {"count": 3},
+    "wire.lost_bytes": {"rate": 0.01},
+    "wire.damaged_bytes": {"rate": 0.01},
+    "joint.noise": {"trial_sd_deg": 5.0},
+    "contact.ramp": {"levels": 2},
+    "contact.quasistatic": {"most_steps": 2},
+    "contact.mujoco": {"steps": 2},
+}
+
+
+def lively(names: Iterable[str]) -> list[tuple]:
+    return [(name, load(name).Parameters(**LIVELY.get(name, {}))) for name in names]
+
+
+@pytest.fixture(scope="module")
+def record(make_scene: SceneMaker, make_batch: BatchMaker) -> Callable[..., tuple[Pipeline, Words, Batch]]:
+    """Return a function of effects that simulates them on a batch and returns pipeline, all words drawn, and batch."""
+
+    def run(names: Iterable[str], repetitions: Iterable[int] = (0, 3)) -> tuple[Pipeline, Words, Batch]:
+        pipeline, batch, words = compile_pipeline(make_scene(lively(names))), make_batch(repetitions), Words()
+        plain = Draw._words
+
+        def recorded(draw: Draw, repetition: int, condition: int, subject: int, size: int) -> np.ndarray:
+            drawn = plain(draw, repetition, condition, subject, size)
+            key = (draw.effect, (draw.seed, repetition, condition, subject))
+            assert key not in words, f"{draw.effect} draws the same numbers twice"
+            words[key] = drawn.tobytes()
+            return drawn
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(Draw, "_words", recorded)
+            pipeline.run([batch], Ledger())
+        return pipeline, words, batch
+
+    return run
+
+
+def of(effect: str, words: Words) -> Words:
+    return {key: drawn for key, drawn in words.items() if key[0] == effect}
+
+
+def assert_undisturbed(effect: str, one: tuple[Pipeline, Words, Batch], other: tuple[Pipeline, Words, Batch]) -> None:
+    drawn, again = of(effect, one[1]), of(effect, other[1])
+    assert drawn.keys() == again.keys()
+    same_time = one[0].setting.timed == other[0].setting.timed
+    for key, words in drawn.items():
+        few, many = sorted((words, again[key]), key=len)
+        assert many.startswith(few), effect
+        assert few == many or not same_time, effect
+
+
+@pytest.fixture(scope="module")
+def alone(record: Callable[..., tuple[Pipeline, Words, Batch]]) -> dict[str, tuple[Pipeline, Words, Batch]]:
+    """What every effect draws where it is the only one."""
+    return {name: record([name]) for name in NAMES}
+
+
+PAIRS = [pair for pair in combinations(NAMES, 2) if pair != CONTACTS]
+
+
+def test_all_that_can_draw_do(alone: dict[str, tuple[Pipeline, Words, Batch]]) -> None:
+    silent = {name for name in NAMES if not of(name, alone[name][1])}
+    assert silent == {*CONTACTS, "contact.ramp", "hand.transition", "switch.ghosting"}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_adding_any_other_effect_leaves_its_draws_as_they_were(
+    name: str, record: Callable[..., tuple[Pipeline, Words, Batch]], alone: dict[str, tuple[Pipeline, Words, Batch]]
+) -> None:
+    for pair in (pair for pair in PAIRS if pair[0] == name):
+        both = record(pair)
+        for effect in pair:
+            assert_undisturbed(effect, alone[effect], both)
+
+
+SUBSETS = st.sets(st.sampled_from(OTHERS)).flatmap(
+    lambda others: st.sampled_from(CONTACTS).map(lambda contact: {contact, *others})
+)
+
+
+@settings(max_examples=25, deadline=None)
+@given(names=SUBSETS)
+def test_in_any_company_it_draws_what_it_draws_alone(
+    names: set[str],
+    record: Callable[..., tuple[Pipeline, Words, Batch]],
+    alone: dict[str, tuple[Pipeline, Words, Batch]],
+) -> None:
+    together = record(names)
+    for effect in names:
+        assert_undisturbed(effect, alone[effect], together)
+
+
+@settings(max_examples=25, deadline=None)
+@given(names=SUBSETS, repetitions=st.lists(st.integers(0, 99), min_size=2, max_size=4, unique=True))
+def test_a_repetition_made_alone_is_the_one_of_the_full_run(
+    names: set[str], repetitions: list[int], record: Callable[..., tuple[Pipeline, Words, Batch]]
+) -> None:
+    _, words, batch = record(names, repetitions)
+    for row, number in enumerate(repetitions):
+        _, few, single = record(names, [number])
+        assert few.items() <= words.items()
+        for field in ("forces_n", "bits", "raw", "settled"):
+            assert getattr(single, field)[0].tobytes() == getattr(batch, field)[row].tobytes(), field
