@@ -11,7 +11,7 @@ import click
 
 from ..drivers.errors import ThenarError
 
-COMMANDS = ("import", "export", "info", "place", "evaluate", "compile", "verify", "run")
+COMMANDS = ("simulate", "plan", "import", "export", "info", "place", "draw", "evaluate", "compile", "verify", "run")
 
 
 class _LazyGroup(click.Group):

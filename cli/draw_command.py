@@ -1,0 +1,135 @@
+"""`thenar draw`: the glove as a picture, palm up."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from .common import existing_file, keep_apart, picture_file, progress
+
+if TYPE_CHECKING:
+    from ..compiler.recordings.graspset import GraspSet
+    from ..simulator.handpanels import Picture
+
+
+def _titled_paths(_context: click.Context, _option: click.Parameter, given: tuple[str, ...]) -> list[tuple[str, Path]]:
+    """Return title and path of each [NAME=]PATH; without a NAME, the title is the file's."""
+    return [_titled_path(text) for text in given]
+
+
+def _titled_path(text: str) -> tuple[str, Path]:
+    title, is_named, rest = text.partition("=")
+    if not is_named or Path(text).exists():
+        title, rest = Path(text).resolve().stem, text
+    if not title or not rest:
+        raise click.BadParameter(f"'{text}' is not NAME=PATH")
+    if not Path(rest).exists():
+        raise click.BadParameter(f"There is no file or folder '{rest}'.")
+    return title, Path(rest)
+
+
+@click.command("draw")
+@click.argument("grasps", type=existing_file, required=False)
+@click.option("-o", "--output", type=picture_file, required=True, help="The picture to write: an .svg or .png file.")
+@click.option("--numbers", is_flag=True, help="Of all switches: write each one's number in the set, from 0, into it.")
+@click.option("--per-grasp", is_flag=True, help="Of GRASPS: a hand for each grasp type, on one scale.")
+@click.option("--place", "choose", is_flag=True, help="Of GRASPS: the switches that `thenar place` would keep.")
+@click.option(
+    "--prune", type=click.IntRange(min=0), default=0, metavar="S", help="With --place: as `thenar place` does."
+)
+@click.option(
+    "--kept",
+    multiple=True,
+    callback=_titled_paths,
+    metavar="[NAME=]PATH",
+    help="What a placement, a build or a list of names keeps; several of them are drawn side by side.",
+)
+def command(
+    grasps: Path | None,
+    output: Path,
+    numbers: bool,
+    per_grasp: bool,
+    choose: bool,
+    prune: int,
+    kept: list[tuple[str, Path]],
+) -> None:
+    """Draw the glove murakami160, palm up, the sides of the digits unfolded beside them, every switch a circle.
+
+    Without GRASPS: all its switches, or with --kept those that placements keep, with their order. Of GRASPS, a .grasps
+    file with the glove's switches: how often each closed; or with --place those worth keeping, for each subject and for
+    all rows pooled. In an .svg each circle says on hovering what it is.
+
+    \b
+    Example:
+        thenar draw --numbers -o glove.svg
+        thenar draw set.grasps --per-grasp -o contacts.png
+        thenar draw set.grasps --place -o kept.svg
+        thenar draw --kept A=a.json --kept build/ -o kept.svg
+    """
+    _check_options(grasps, numbers, per_grasp, choose, prune, bool(kept))
+    for source in (grasps, *(path for _, path in kept)):
+        keep_apart(source, output)
+    if grasps is None:
+        _write(_without_grasps(numbers, kept), output)
+        return
+    from ..compiler.recordings.graspset import GraspSet
+    from ..simulator.handpanels import contacts
+
+    grasp_set = GraspSet.load(grasps)
+    _write(_placements(grasp_set, prune) if choose else contacts(grasp_set, per_grasp), output)
+
+
+def _check_options(
+    grasps: Path | None, numbers: bool, per_grasp: bool, choose: bool, prune: int, some_kept: bool
+) -> None:
+    if grasps is None and (per_grasp or choose):
+        raise click.UsageError("--per-grasp and --place need GRASPS: a .grasps file")
+    if grasps is not None and (some_kept or numbers):
+        raise click.UsageError("--kept and --numbers draw the glove itself: leave GRASPS out")
+    if numbers and some_kept:
+        raise click.UsageError("--kept writes the order of the kept switches into them: leave --numbers out")
+    if per_grasp and choose:
+        raise click.UsageError("--per-grasp draws contacts and --place what is kept: take one of them")
+    if prune and not choose:
+        raise click.UsageError("--prune belongs to --place")
+
+
+def _without_grasps(numbers: bool, kept: list[tuple[str, Path]]) -> "Picture":
+    from ..simulator import handpanels
+    from .kept_files import kept_names
+
+    if not kept:
+        return handpanels.all_switches(numbers)
+    return handpanels.kept([(title, kept_names(path)) for title, path in kept])
+
+
+def _placements(grasp_set: "GraspSet", prune: int) -> "Picture":
+    """Return a hand for each subject and one for all rows pooled, or one hand if there is but one subject."""
+    import numpy as np
+
+    from ..compiler.placement.placement import place
+    from ..simulator.handmap import hand_map
+    from ..simulator.handpanels import kept
+
+    hand_map().numbers_of(grasp_set.switch_names)  # a foreign set is refused before a tree is grown
+    subjects = np.unique(grasp_set.subjects).tolist()
+    groups = [(subject, grasp_set.rows(grasp_set.subjects == subject)) for subject in subjects]
+    if len(subjects) != 1:
+        groups.append(("pooled", grasp_set))
+    chosen = []
+    with progress("growing a tree of each hand") as report:
+        for done, (title, rows) in enumerate(groups):
+            report(done, len(groups))
+            chosen.append((title, [switch.name for switch in place(rows, prune)[0].switches]))
+    return kept(chosen)
+
+
+def _write(picture: "Picture", path: Path) -> None:
+    from ..runtime.files import write_atomically
+    from ..simulator.draw import draw
+
+    with progress(f"drawing {path.name}"):
+        data = draw(picture, path.suffix.lower()[1:])
+    write_atomically(path, data)
+    hands = len(picture.panels)
+    click.echo(f"{path}: {hands} hand{'s' if hands > 1 else ''}")

@@ -1,0 +1,67 @@
+"""`thenar plan`: how the hands of a scene hold objects that nobody planned yet."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from .common import json_flag, keep_apart, out, output_file, print_json, progress
+
+if TYPE_CHECKING:
+    from ..simulator.planning import Planned
+
+
+@click.command("plan")
+@click.argument("scene")
+@click.option("-o", "--output", type=output_file, required=True, metavar="POSTURES.json", help="The file to write.")
+@click.option("--anew", is_flag=True, help="Plan everything, also what is planned already.")
+@click.option(
+    "--jobs", type=click.IntRange(1), help="Worker processes. The result does not depend on it.  [default: all cores]"
+)
+@json_flag
+def command(scene: str, output: Path, anew: bool, jobs: int | None, as_json: bool) -> None:
+    """Plan how hands of all lengths in SCENE hold each of its objects: a TOML file, or a shipped scene by its name.
+
+    Shipped objects are planned already. To use the postures, a scene names the file: postures = "POSTURES.json".
+
+    \b
+    Example:
+        thenar plan scene.toml -o postures.json
+    """
+    from ..simulator.decode import load_scene
+    from ..simulator.planning import plan_scene
+
+    keep_apart(Path(scene), output)
+    loaded = load_scene(scene)
+    with progress(f"planning {loaded.name}") as report:
+        postures, planned = plan_scene(loaded, jobs or -1, report, anew=anew)
+    postures.save(output)
+    if as_json:
+        print_json(planned)
+        return
+    _print(planned, output)
+
+
+def _print(planned: "list[Planned]", path: Path) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    console = out()
+    table = Table(title=Text("Planned postures, worst of all hand lengths", "bold"), title_justify="left")
+    for column in ("grasp type", "object"):
+        table.add_column(column)
+    for column in ("hands mm", "gap mm", "sunk mm", "not balanced"):
+        table.add_column(column, justify="right")
+    for one in planned:
+        lengths = [held.length_mm for held in one.entry.held]
+        table.add_row(
+            Text(one.entry.grasp),
+            Text(one.entry.object),
+            f"{lengths[0]:g} - {lengths[-1]:g}",
+            f"{one.gap_mm:.1f}",
+            f"{one.sunk_mm:.1f}",
+            f"{one.imbalance:.0%}",
+        )
+    if planned:
+        console.print(table)
+    console.print(f"{path}: {len(planned)} object(s) planned" + ("" if planned else ": all were planned already"))

@@ -1,0 +1,170 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thenar.cli import run
+from thenar.compiler import GraspSet, compile_build, grow_id3
+from thenar.compiler.recordings.taxonomy import own
+from thenar.simulator.layout import murakami160
+
+NAMES = tuple(patch.name for patch in murakami160())
+
+
+@pytest.fixture(scope="module")
+def glove_set(small_set: GraspSet) -> GraspSet:
+    """60 grasps of two subjects on all 160 switches, of which a few tell the types apart."""
+    bits = np.random.default_rng(8).random((60, 160)) < 0.1
+    bits[:, [3, 30, 31, 60, 90, 140]] = small_set.switches
+    subjects = np.array(["A", "B"])[np.arange(60) // 30]
+    s = small_set
+    return GraspSet(bits, NAMES, s.codes, s.joints, s.grasps, own(s.taxonomy.types), subjects, s.objects, s.trials)
+
+
+@pytest.fixture(scope="module")
+def glove_file(glove_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("glove") / "glove.grasps"
+    glove_set.save(path)
+    return path
+
+
+def marks(svg: Path, hand: int = 0) -> list[str]:
+    """Return the names of a hand's kept switches in their order, as hovering tells them."""
+    lines = [line.split(">", 2)[2] for line in svg.read_text().splitlines() if f'id="dot-{hand}-' in line]
+    kept = [line.removesuffix("</title>").split(": kept, number ") for line in lines if ": kept" in line]
+    return [name for name, _ in sorted(kept, key=lambda words: int(words[1]))]
+
+
+def test_the_glove_is_drawn_with_or_without_numbers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plain, numbered = tmp_path / "plain.svg", tmp_path / "numbered.SVG"
+    assert run(["draw", "-o", str(plain)]) == 0
+    assert run(["draw", "--numbers", "-o", str(numbered)]) == 0
+    assert plain.read_text().count("<title>") == 160
+    assert numbered.read_text().count("<title>") == 320
+    assert capsys.readouterr().out == f"{plain}: 1 hand\n{numbered}: 1 hand\n"
+
+
+def test_contacts_are_drawn_together_and_by_type(
+    glove_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    together, by_type = tmp_path / "together.png", tmp_path / "by_type.svg"
+    assert run(["draw", str(glove_file), "-o", str(together)]) == 0
+    assert run(["draw", str(glove_file), "--per-grasp", "-o", str(by_type)]) == 0
+    assert together.read_bytes().startswith(b"\x89PNG")
+    assert by_type.read_text().count("<title>") == 3 * 160
+    assert f"{by_type}: 3 hands" in capsys.readouterr().out
+
+
+def test_placements_are_drawn_for_each_subject_and_pooled(
+    glove_file: Path, glove_set: GraspSet, tmp_path: Path
+) -> None:
+    picture = tmp_path / "kept.svg"
+    assert run(["draw", str(glove_file), "--place", "--prune", "5", "-o", str(picture)]) == 0
+    for hand, rows in enumerate((range(30), range(30, 60), range(60))):
+        tree = grow_id3(glove_set.switches[rows], glove_set.labels[rows], min_samples=5)
+        assert marks(picture, hand) == [NAMES[number] for number in tree.inputs]
+
+
+def test_one_subject_is_one_hand(glove_set: GraspSet, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    glove_set.rows(np.arange(30)).save(tmp_path / "a.grasps")
+    assert run(["draw", str(tmp_path / "a.grasps"), "--place", "-o", str(tmp_path / "a.svg")]) == 0
+    assert capsys.readouterr().out.endswith("a.svg: 1 hand\n")
+
+
+def test_a_placement_a_build_and_lists_are_drawn_side_by_side(
+    glove_file: Path, glove_set: GraspSet, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    placement, listed, text = tmp_path / "a.json", tmp_path / "listed.json", tmp_path / "names.txt"
+    assert run(["place", str(glove_file), "-o", str(placement)]) == 0
+    build = compile_build(glove_set, tmp_path / "build", rounds=2, folds=0).folder
+    listed.write_text(json.dumps([NAMES[7], NAMES[2]]))
+    text.write_text(f"{NAMES[11]}\n\n  {NAMES[4]}\r\n")
+    picture = tmp_path / "kept.svg"
+    sources = [f"A={placement}", str(build), f"x={listed}", str(text)]
+    assert run(["draw", *(word for source in sources for word in ("--kept", source)), "-o", str(picture)]) == 0
+    chosen = [switch["name"] for switch in json.loads(placement.read_text())["switches"]]
+    assert marks(picture, 0) == marks(picture, 1) == chosen
+    assert (marks(picture, 2), marks(picture, 3)) == ([NAMES[7], NAMES[2]], [NAMES[11], NAMES[4]])
+    drawn = picture.read_text()
+    assert all(f"<!-- {title}" in drawn for title in ("A", "build", "x", "names"))
+
+
+def test_one_list_may_be_drawn_under_two_names(tmp_path: Path) -> None:
+    (tmp_path / "a=b.txt").write_text(NAMES[0])
+    listed = str(tmp_path / "a=b.txt")
+    assert run(["draw", "--kept", listed, "--kept", f"B={listed}", "-o", str(tmp_path / "two.svg")]) == 0
+    assert "<!-- a=b" in (tmp_path / "two.svg").read_text()
+
+
+def test_a_set_of_another_glove_is_refused_by_its_first_strange_switch(
+    set_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for options in ([], ["--place"], ["--per-grasp"]):
+        assert run(["draw", str(set_file), *options, "-o", str(tmp_path / "no.svg")]) == 2
+        assert "'s0' is no switch of the glove murakami160" in capsys.readouterr().err
+    assert not (tmp_path / "no.svg").exists()
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (b"", "keeps no switches"),
+        (b"[]", "keeps no switches"),
+        (b'{"rates": []}', "is no list of switches (Object missing required field `switches`)"),
+        (b"[1, 2]", "is no list of switches (Expected `str`, got `int` - at `$[0]`)"),
+        (b'["palm_heel_1", ', "is no list of switches (Input data was truncated)"),
+        (b"\xff\xfe\x00", "is no text"),
+        (b"palm_heel_1\npalm_hel_2", "'palm_hel_2' is no switch of the glove murakami160 (did you mean 'palm_heel_2'"),
+        (b"palm_heel_1\npalm_heel_1", "switch 'palm_heel_1' is kept twice"),
+    ],
+)
+def test_a_file_that_lists_no_switches_is_refused_with_the_reason(
+    content: bytes, reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "kept.txt").write_bytes(content)
+    assert run(["draw", "--kept", str(tmp_path / "kept.txt"), "-o", str(tmp_path / "no.svg")]) == 2
+    assert reason in capsys.readouterr().err
+
+
+def test_a_folder_that_is_no_build_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["draw", "--kept", str(tmp_path), "-o", str(tmp_path / "no.svg")]) == 2
+    assert "build.json cannot be read" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        (["--per-grasp"], "need GRASPS"),
+        (["--place"], "need GRASPS"),
+        (["--prune", "3"], "--prune belongs to --place"),
+        (["--kept", "nowhere.json"], "There is no file or folder 'nowhere.json'"),
+        (["--kept", "=x"], "'=x' is not NAME=PATH"),
+        (["GRASPS", "--numbers"], "leave GRASPS out"),
+        (["GRASPS", "--kept", "GRASPS"], "leave GRASPS out"),
+        (["--numbers", "--kept", "GRASPS"], "leave --numbers out"),
+        (["GRASPS", "--place", "--per-grasp"], "take one of them"),
+        (["-o", "glove.pdf"], "a picture ends in .png or .svg"),
+        (["-o", "no/such/glove.svg"], "There is no folder 'no/such'"),
+    ],
+)
+def test_a_mistake_is_one_sentence_and_code_two(
+    glove_file: Path, options: list[str], reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [str(glove_file) if word == "GRASPS" else word for word in options]
+    output = [] if "-o" in words else ["-o", str(tmp_path / "no.svg")]
+    assert run(["draw", *words, *output]) == 2
+    assert reason in capsys.readouterr().err
+
+
+def test_a_picture_needs_a_name(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["draw"]) == 2
+    assert "--output" in capsys.readouterr().err
+
+
+def test_nothing_that_is_read_is_written_over(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    listed = tmp_path / "kept.svg"
+    listed.write_text(NAMES[0])
+    assert run(["draw", "--kept", str(listed), "-o", str(listed)]) == 2
+    assert "is named twice" in capsys.readouterr().err
+    assert listed.read_text() == NAMES[0]

@@ -1,0 +1,215 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from thenar.cli import run
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.simulator import load_scene, simulate
+from thenar.simulator.scenes import shipped
+
+SMALL = ("--jobs", "1", "--repetitions", "1")
+Captured = pytest.CaptureFixture[str]
+
+
+def complaint(captured: Captured) -> str:
+    printed, complaints = captured.readouterr()
+    assert not printed
+    assert complaints.startswith("thenar: ")
+    assert complaints.count("\n") == 1
+    return complaints
+
+
+def test_a_shipped_scene_becomes_a_set_and_says_that_it_is_simulated(tmp_path: Path, capsys: Captured) -> None:
+    path = tmp_path / "set.grasps"
+    assert run(["simulate", "quick", *SMALL, "-o", str(path)]) == 0
+    made = GraspSet.load(path)
+    assert {*made.subjects.tolist()} == {"A", "C"}
+    printed = capsys.readouterr().out
+    assert f"{path}: {len(made)} rows, simulated: scene quick, seed 1, 2 subject(s), 28 grasps" in printed
+    assert "Grasps, simulated" in printed
+
+
+def test_the_summary_has_a_row_for_every_grasp_type_and_every_step(tmp_path: Path, capsys: Captured) -> None:
+    assert run(["simulate", "quick", *SMALL, "-o", str(tmp_path / "set.grasps")]) == 0
+    rows = [[cell.strip() for cell in line.split("│")[1:-1]] for line in capsys.readouterr().out.splitlines()]
+    grasps, steps = ([row for row in rows if len(row) == count] for count in (10, 8))
+    assert [row[:2] for row in grasps] == [[name, "2"] for name in load_types()]
+    assert [row[:2] for row in steps if row[1] == "effect"] == [
+        [name, "effect"]
+        for name in ("hand.style", "hand.posture", "hand.object_pose", "hand.grip", "switch.threshold", "joint.noise")
+    ]
+    assert ["contact.quasistatic", "own"] in [row[:2] for row in steps]
+    assert steps[-1][0] == "all"
+
+
+def load_types() -> tuple[str, ...]:
+    return tuple(dict.fromkeys(item.grasp for item in load_scene("quick").objects))
+
+
+def test_json_holds_the_whole_report(tmp_path: Path, capsys: Captured) -> None:
+    path = tmp_path / "set.grasps"
+    assert run(["simulate", "quick", *SMALL, "-o", str(path), "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["simulated"] is True
+    assert (report["scene"], report["repetitions"], report["rows"]) == ("quick", 28, len(GraspSet.load(path)))
+    assert len(report["grasps"]) == 14
+    assert {"name", "own", "calls", "grasps", "draws", "seconds", "us_a_grasp", "share"} <= report["steps"][0].keys()
+
+
+def test_a_scene_can_be_changed_on_the_way(tmp_path: Path, capsys: Captured) -> None:
+    path = tmp_path / "set.grasps"
+    changes = ["--repetitions", "2", "--seed", "5", "--subject", "C"]
+    assert run(["simulate", "quick", "--jobs", "1", *changes, "-o", str(path), "--json"]) == 0
+    scene = load_scene("quick")
+    changed = msgspec.structs.replace(scene, repetitions=2, seed=5, subjects=scene.subjects[1:])
+    assert GraspSet.load(path).fingerprint() == simulate(changed, jobs=1).grasp_set.fingerprint()
+    assert json.loads(capsys.readouterr().out)["subjects"] == ["C"]
+
+
+HASTY = "\n[effects.contact.quasistatic]\nmost_steps = 12\n"
+
+
+@pytest.fixture
+def hasty(tmp_path: Path) -> Path:
+    """Return a scene in which not every hand comes to rest."""
+    path = tmp_path / "hasty.toml"
+    path.write_text(shipped()["quick"].read_text() + HASTY)
+    return path
+
+
+def test_what_did_not_settle_is_warned_of_by_name(hasty: Path, tmp_path: Path, capsys: Captured) -> None:
+    path = tmp_path / "set.grasps"
+    assert run(["simulate", str(hasty), *SMALL, "-o", str(path), "--json"]) == 0
+    unsettled = json.loads(capsys.readouterr().out)["unsettled"]
+    assert run(["simulate", str(hasty), *SMALL, "-o", str(path)]) == 0
+    warning = capsys.readouterr().err
+    assert warning.startswith(f"warning: {len(unsettled)} of 28 grasps cannot be trusted, and are left out of the set")
+    for one in unsettled[:10]:
+        place = f"subject {one['subject']}, {one['grasp']} with {one['object']}, repetition {one['repetition']}"
+        assert f"{place}: the hand did not come to rest" in warning
+    assert ("more, which --json names" in warning) == (len(unsettled) > 10)
+    assert len(GraspSet.load(path)) == 28 - len(unsettled)
+
+
+def test_what_did_not_settle_is_kept_when_asked(hasty: Path, tmp_path: Path, capsys: Captured) -> None:
+    path = tmp_path / "set.grasps"
+    assert run(["simulate", str(hasty), *SMALL, "-o", str(path), "--keep-unsettled"]) == 0
+    assert "cannot be trusted, and are kept as asked" in capsys.readouterr().err
+    assert len(GraspSet.load(path)) == 28
+
+
+def test_explaining_names_every_step_and_what_it_costs_and_writes_nothing(tmp_path: Path, capsys: Captured) -> None:
+    assert run(["simulate", "quick", *SMALL, "--explain"]) == 0
+    printed = capsys.readouterr().out
+    assert printed.index("hand.style") < printed.index("contact.quasistatic") < printed.index("glove.sample")
+    assert "28 grasps on 1 core(s) should take about" in printed
+    assert "measured here on" in printed
+    assert run(["simulate", "quick", *SMALL, "--explain", "--json"]) == 0
+    explanation = json.loads(capsys.readouterr().out)
+    assert {"reads", "writes", "timed", "on_wire", "draws_a_grasp", "us_a_grasp"} <= explanation["steps"][0].keys()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_ablation_shows_rates_changes_and_times(tmp_path: Path, capsys: Captured) -> None:
+    scene = tmp_path / "one.toml"
+    text = shipped()["quick"].read_text()
+    scene.write_text(text[: text.index("[effects")].replace('name = "A"', 'name = "Z"') + "[effects.joint.noise]\n")
+    asked = ["simulate", str(scene), "--jobs", "1", "--repetitions", "2", "--subject", "Z", "--ablate"]
+    assert run([*asked, "--json"]) == 0
+    whole, without = json.loads(capsys.readouterr().out)["variants"]
+    assert (whole["without"], without["without"]) == (None, "joint.noise")
+    assert run(asked) == 0
+    printed = capsys.readouterr().out
+    assert "Scene one without each of its effects, simulated" in printed
+    for variant in (whole, without):
+        for one in variant["rates"]:
+            assert (
+                "{:.1f} [{:.1f}, {:.1f}]".format(*(100 * one["rate"][key] for key in ("mean", "low", "high")))
+                in printed
+            )
+    for one in without["rates"]:
+        change = one["change"]
+        assert "{:+.1f} [{:+.1f}, {:+.1f}]".format(*(100 * change[key] for key in ("mean", "low", "high"))) in printed
+
+
+def test_shipped_scenes_are_listed_with_what_they_are(capsys: Captured) -> None:
+    assert run(["simulate", "--list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(shipped())
+    assert all("Simulated." in line for line in lines)
+    assert run(["simulate", "--list", "--json"]) == 0
+    assert [scene["name"] for scene in json.loads(capsys.readouterr().out)] == list(shipped())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["quick"], "say one of --output, --explain, --ablate, --list"),
+        (["quick", "--explain", "--ablate"], "say one of"),
+        (["--explain"], "name a scene"),
+        (["quick", "--list"], "leave out quick"),
+        (["quick", "--explain", "--keep-unsettled"], "--keep-unsettled is about the set"),
+        (["quik", "--explain"], "no shipped scene is called 'quik' (did you mean 'quick'?)"),
+        (["no/such.toml", "--explain"], "such.toml"),
+        (["quick", "--explain", "--subject", "Q"], "scene quick has no subject 'Q'"),
+        (["quick", "--explain", "--repetitions", "0"], "repetitions"),
+        (["quick", "-o", "no/such/folder/set.grasps"], "There is no folder"),
+    ],
+)
+def test_what_cannot_be_done_is_one_sentence(arguments: list[str], reason: str, capsys: Captured) -> None:
+    assert run(["simulate", *arguments]) == 2
+    assert reason in complaint(capsys)
+
+
+def test_a_scene_is_not_overwritten_by_its_own_set(hasty: Path, capsys: Captured) -> None:
+    before = hasty.read_text()
+    assert run(["simulate", str(hasty), "-o", str(hasty)]) == 2
+    assert "named twice" in complaint(capsys)
+    assert hasty.read_text() == before
+
+
+def test_a_bad_scene_is_one_sentence_with_file_and_line(tmp_path: Path, capsys: Captured) -> None:
+    scene = tmp_path / "bad.toml"
+    scene.write_text(shipped()["quick"].read_text() + "\n[effects.joint.noize]\n")
+    assert run(["simulate", str(scene), "-o", str(tmp_path / "set.grasps")]) == 2
+    said = complaint(capsys)
+    assert "bad.toml, line" in said
+    assert "did you mean 'joint.noise'" in said
+    assert not (tmp_path / "set.grasps").exists()
+
+
+def test_an_interrupt_ends_with_130_and_leaves_the_old_set_alone(tmp_path: Path) -> None:
+    old, ready = tmp_path / "set.grasps", tmp_path / "ready"
+    old.write_bytes(b"old")
+    program = (
+        "import pathlib, sys\n"
+        "from contextlib import contextmanager\n"
+        "from thenar.cli import simulate_command as module\n"
+        "@contextmanager\n"
+        f"def telling(what): yield lambda done, total: pathlib.Path({str(ready)!r}).touch()\n"
+        "module.progress = telling\n"
+        "from thenar.cli import run\n"
+        "sys.exit(run(sys.argv[1:]))"
+    )
+    command = [sys.executable, "-c", program, "simulate", "crowd", "--jobs", "2", "-o", str(old)]
+    process = subprocess.Popen(
+        command, start_new_session=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    try:
+        while not ready.exists():
+            assert process.poll() is None
+            os.sched_yield()
+        os.killpg(process.pid, signal.SIGINT)
+        printed, complaints = process.communicate(timeout=60)
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+    assert (process.returncode, printed, complaints.strip()) == (130, "", "thenar: interrupted")
+    assert old.read_bytes() == b"old"
+    assert {path.name for path in tmp_path.iterdir()} == {"set.grasps", "ready"}
