@@ -2,14 +2,12 @@
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
-SHARED := ../shared/data
 OUT    := out
 
-# The table that `make demo` runs on, and which of its columns are what.
-DATA    ?= $(SHARED)/icub_tactile_encoders/trials.csv.gz
-COLUMNS ?= examples/columns/icub.toml
+# The scene that `make demo` simulates: a shipped one by its name, or a file.
+SCENE ?= quick
 
-PACKAGES := cli compiler drivers firmware_templates runtime
+PACKAGES := cli compiler drivers firmware_templates runtime simulator
 
 .PHONY: help demo test test-slow test-all lint format types bench docs check clean
 
@@ -19,19 +17,20 @@ help:           ## list the targets
 $(VENV)/installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
-	$(BIN)/python -m pip install --quiet --editable ".[compiler]" --group dev
+	$(BIN)/python -m pip install --quiet --editable ".[compiler,sim]" --group dev
 	touch $@
 
-demo: $(VENV)/installed  ## import, info, evaluate, compile, verify, run: DATA=table.csv COLUMNS=columns.toml
-	@test -e "$(DATA)" || { echo "make demo: $(DATA) is not there; name a table and its columns: make demo DATA=table.csv COLUMNS=columns.toml" >&2; exit 2; }
+demo: $(VENV)/installed  ## simulate, draw, evaluate, compile, verify, run: SCENE=quick
 	mkdir -p $(OUT)
-	$(BIN)/thenar import "$(DATA)" --columns "$(COLUMNS)" -o $(OUT)/set.grasps
-	$(BIN)/thenar info $(OUT)/set.grasps --plot $(OUT)/set.png
+	$(BIN)/thenar simulate "$(SCENE)" -o $(OUT)/set.grasps
+	$(BIN)/thenar draw $(OUT)/set.grasps -o $(OUT)/contacts.svg
+	$(BIN)/thenar draw $(OUT)/set.grasps --place -o $(OUT)/kept.svg
 	$(BIN)/thenar evaluate $(OUT)/set.grasps -o $(OUT)/evaluation.json
 	$(BIN)/thenar compile $(OUT)/set.grasps -o $(OUT)/build
 	$(BIN)/thenar verify $(OUT)/build $(OUT)/set.grasps
 	$(BIN)/thenar run $(OUT)/build --replay $(OUT)/set.grasps > $(OUT)/grasps.jsonl
-	@echo "The build is in $(OUT)/build, one recognised grasp a line in $(OUT)/grasps.jsonl, a picture in $(OUT)/set.png."
+	@echo "Simulated grasps are in $(OUT)/set.grasps, the build is in $(OUT)/build, one recognised grasp a line in $(OUT)/grasps.jsonl;"
+	@echo "hand maps: $(OUT)/contacts.svg (which switches close), $(OUT)/kept.svg (which are kept); the rates: $(OUT)/evaluation.json."
 
 test: $(VENV)/installed  ## the tests, under ten minutes on two cores
 	$(BIN)/python -m pytest -m "not slow" -n auto
@@ -65,6 +64,7 @@ bench: $(VENV)/bench  ## the benchmarks, as ratios against a peer or a bound in 
 	$(BIN)/python benchmarks/id3.py
 	$(BIN)/python benchmarks/boosting.py
 	$(BIN)/python benchmarks/runtime.py
+	$(BIN)/python benchmarks/simulator.py
 
 docs: $(VENV)/installed  ## the documentation as a site in site/, offline
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet

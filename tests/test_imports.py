@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("cli", "compiler", "drivers", "firmware_templates", "runtime")
+PACKAGES = ("cli", "compiler", "drivers", "firmware_templates", "runtime", "simulator")
 
 # What modules whose name starts with the key may import of ours; the longest key that fits counts.
 ALLOWED = {
@@ -19,6 +19,7 @@ ALLOWED = {
     "compiler": ("runtime", "drivers.errors", "compiler"),
     "compiler.pictures": ("runtime.errors",),
     "compiler.elementary": (),
+    "compiler.workers": (),
     "compiler.recordings": ("runtime", "drivers.errors", "compiler.recordings", "compiler.pictures"),
     "compiler.placement": (
         "runtime",
@@ -37,13 +38,23 @@ ALLOWED = {
         "compiler.placement",
         "compiler.boosting",
         "compiler.pictures",
+        "compiler.workers",
         "compiler.evaluation",
+    ),
+    "simulator": (
+        "runtime",
+        "drivers",
+        "compiler.recordings",
+        "compiler.elementary",
+        "compiler.pictures",
+        "compiler.workers",
+        "simulator",
     ),
     "cli": PACKAGES,
 }
 
-# Third-party packages of the extra `compiler`, which a board does not have.
-WORKSTATION_ONLY = {"sklearn", "scipy", "matplotlib", "joblib"}
+# Third-party packages of the extras `compiler` and `sim`, which a board does not have.
+WORKSTATION_ONLY = {"sklearn", "scipy", "matplotlib", "joblib", "mujoco"}
 
 
 def modules() -> Iterator[tuple[str, ast.Module]]:

@@ -1,0 +1,61 @@
+"""Grasps as several contact models solve them, and what tables are made of."""
+
+import time
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from thenar.simulator.batch import Batch
+from thenar.simulator.contact import Contact, ContactModel, load_of
+from thenar.simulator.ledger import Ledger
+from thenar.simulator.pipeline import Pipeline, compile_pipeline
+from thenar.simulator.postures import Postures
+from thenar.simulator.scene import Scene
+from thenar.simulator.session import sessions
+
+
+def solved(model: ContactModel, batches: Sequence[Batch]) -> tuple[list[Contact], float]:
+    """Return what a model makes of batches, solved together, and its processor time in seconds."""
+    start = time.process_time()
+    contacts = model.solve([load_of(batch) for batch in batches])
+    seconds = time.process_time() - start
+    return contacts, seconds
+
+
+def told(scene: Scene, repetitions: int) -> Iterator[Batch]:
+    """Yield every condition's first repetitions, as the contact model gets them."""
+    pipeline = compile_pipeline(scene)
+    before = tuple(stop for stop in pipeline.stops if stop.effect.stage == "posture")
+    for session in sessions(scene, Postures.of(scene)):
+        for place, trials in enumerate(session.trials):
+            batch = session.batch(place, np.arange(min(repetitions, len(trials))))
+            Pipeline(pipeline.setting, before).run([batch], Ledger())
+            yield batch
+
+
+def jaccard(pairs: Iterable[tuple[np.ndarray, np.ndarray]]) -> float:
+    """Return the switches ON in both over those ON in either, of all grasps together."""
+    both, either = np.sum([[(a & b).sum(), (a | b).sum()] for a, b in pairs], axis=0)
+    return float(both / either) if either else 1.0
+
+
+def together(found: Iterable[Contact], field: str) -> np.ndarray:
+    return np.concatenate([getattr(each, field) for each in found])
+
+
+def on_sets(found: Iterable[Contact], threshold_n: float) -> list[np.ndarray]:
+    return [each.forces_n > threshold_n for each in found]
+
+
+def of_settled(found: list[Contact], field: str) -> np.ndarray:
+    kept: np.ndarray = together(found, field)[together(found, "settled")]
+    return kept
+
+
+def row(*cells: object) -> str:
+    return f"| {' | '.join(map(str, cells))} |"
+
+
+def table(head: Iterable[str], lines: Iterable[str]) -> str:
+    names = list(head)
+    return "\n".join([row(*names), f"|{'---|' * len(names)}", *lines])
