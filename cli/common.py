@@ -16,11 +16,17 @@ class _OutputFile(click.Path):
     """A file to write: no folder, in a folder that is there, so that no long work ends in an error."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        from ..runtime.files import is_special
+
         path = Path(os.fsdecode(super().convert(value, param, ctx)))
         if not path.name:
             self.fail("A file to write needs a name.", param, ctx)
         if not path.parent.is_dir():
             self.fail(f"There is no folder '{path.parent}' to write '{path.name}' into: make it first.", param, ctx)
+        if not os.access(path.parent, os.W_OK):
+            self.fail(f"Nothing may be written into folder '{path.parent}'.", param, ctx)
+        if is_special(path):
+            self.fail(f"'{path}' is a device or a pipe: name a file.", param, ctx)
         return path
 
 

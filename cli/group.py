@@ -5,6 +5,7 @@ click's exit code 1.
 """
 
 from collections.abc import Sequence
+from concurrent.futures import BrokenExecutor
 from importlib import import_module
 
 import click
@@ -51,7 +52,7 @@ def run_group(arguments: Sequence[str]) -> int:
         return 2
     except click.ClickException as mistake:
         return _complain(mistake.format_message())
-    except ThenarError as mistake:
+    except (ThenarError, BrokenExecutor) as mistake:
         return _complain(str(mistake))
     except OSError as mistake:
         return _complain(f"{mistake.filename}: {mistake.strerror}" if mistake.filename else str(mistake))

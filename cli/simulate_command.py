@@ -1,5 +1,7 @@
 """`thenar simulate`: a scene in, a set of grasps out, and what each of its effects does and costs."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -56,13 +58,14 @@ def command(
         _list(as_json=as_json)
         return
     loaded = _load(scene, repetitions, seed, subjects)
-    if output is not None:
-        keep_apart(Path(scene), loaded.postures, output)
-        _simulate(loaded, output, jobs or -1, keep_unsettled=keep_unsettled, as_json=as_json)
-    elif explain:
-        _explain(loaded, jobs or -1, as_json=as_json)
-    else:
-        _ablate(loaded, jobs or -1, as_json=as_json)
+    with _located(scene):
+        if output is not None:
+            keep_apart(Path(scene), loaded.postures, output)
+            _simulate(loaded, output, jobs or -1, keep_unsettled=keep_unsettled, as_json=as_json)
+        elif explain:
+            _explain(loaded, jobs or -1, as_json=as_json)
+        else:
+            _ablate(loaded, jobs or -1, as_json=as_json)
 
 
 def _check_modes(scene: str | None, given: tuple[object, ...], *, keep_unsettled: bool) -> None:
@@ -97,6 +100,18 @@ def _load(name: str, repetitions: int | None, seed: int | None, subjects: tuple[
         seed=scene.seed if seed is None else seed,
         subjects=tuple(known[subject] for subject in known if not subjects or subject in subjects),
     )
+
+
+@contextmanager
+def _located(name: str) -> Iterator[None]:
+    """Say of what is wrong with a scene in which file and line it stands."""
+    from ..simulator.decode import located
+    from ..simulator.errors import SceneError
+
+    try:
+        yield
+    except SceneError as fault:
+        raise located(name, fault) from fault
 
 
 def _simulate(scene: "Scene", output: Path, jobs: int, *, keep_unsettled: bool, as_json: bool) -> None:

@@ -6,6 +6,8 @@ from rich.table import Table
 from rich.text import Text
 
 from ..simulator.explain import Explanation
+from ..simulator.pipeline import DEFAULT_CONTACT
+from ..simulator.registry import CONTACTS
 from ..simulator.report import GraspReport, Report, StepReport
 from .ablation import Ablation, Change, Recognised, Variant
 from .common import err, out
@@ -165,6 +167,9 @@ def print_ablation(ablation: Ablation) -> None:
         "each subject; rates in %, with 95 % intervals;\n"
         "changes in percentage points, of grasps that settled with and without; time of a few grasps, best of several"
     )
+    for variant in ablation.variants:
+        if variant.without in CONTACTS:
+            console.print(f"without {variant.without}: {DEFAULT_CONTACT} closes the hands in its place")
 
 
 def _name(variant: Variant) -> str:
@@ -177,7 +182,7 @@ def _cells(one: Recognised) -> tuple[str, str]:
 
 
 def _change(change: Change | None) -> str:
-    return "" if change is None else f"{100 * change.mean:+.1f} [{100 * change.low:+.1f}, {100 * change.high:+.1f}]"
+    return "" if change is None else f"{100 * change.mean:+z.1f} [{100 * change.low:+z.1f}, {100 * change.high:+z.1f}]"
 
 
 def _times(variant: Variant, whole: Variant) -> tuple[str, str]:

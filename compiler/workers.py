@@ -2,6 +2,7 @@
 
 import signal
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from typing import TypeVar
 
@@ -13,6 +14,8 @@ def in_workers(work: Callable[[Task], Answer], tasks: Iterable[Task], jobs: int)
     """Yield the answers in the order in which they come.
 
     jobs  worker processes, as joblib counts them: -1 for all cores, 1 for this process alone. A worker runs one thread.
+
+    Raises BrokenExecutor if a worker is killed or cannot start, and whatever the work raises.
     """
     if jobs == 1:
         yield from map(work, tasks)
@@ -21,9 +24,14 @@ def in_workers(work: Callable[[Task], Answer], tasks: Iterable[Task], jobs: int)
 
     with parallel_config(backend="loky", inner_max_num_threads=1):
         workers = Parallel(n_jobs=jobs, return_as="generator_unordered")
-        with _interrupts_held():
-            answers = workers(delayed(work)(task) for task in tasks)
-        yield from answers
+        try:
+            with _interrupts_held():
+                answers = workers(delayed(work)(task) for task in tasks)
+            yield from answers
+        except (BrokenExecutor, BrokenPipeError) as reason:
+            raise BrokenExecutor(
+                "a worker process ended before its work was done, perhaps for want of memory: --jobs 1 takes none"
+            ) from reason
 
 
 def workers_of(jobs: int) -> int:

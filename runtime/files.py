@@ -1,5 +1,6 @@
 """Files that are written whole or not at all."""
 
+import errno
 import os
 import tempfile
 from pathlib import Path
@@ -9,8 +10,11 @@ def write_atomically(path: Path, data: bytes) -> None:
     """Write `data` to `path`: temporary file beside it, fsync, rename, fsync of the folder.
 
     A reader sees the old file or the new one, never a part; after a kill or a full disk the old one is still there.
-    Raises OSError as the operating system gives it, with `path` as its file.
+    Raises OSError as the operating system gives it, with `path` as its file; also where `path` is a device or a pipe,
+    which a rename would replace.
     """
+    if is_special(path):
+        raise OSError(errno.EINVAL, "is a device or a pipe, not a file that could be replaced", str(path))
     try:
         _write_beside_and_rename(path, data)
     except OSError as reason:
@@ -31,6 +35,11 @@ def _write_beside_and_rename(path: Path, data: bytes) -> None:
         Path(temporary).unlink(missing_ok=True)
         raise
     sync_folder(path.parent)
+
+
+def is_special(path: Path) -> bool:
+    """Return whether something is there that is neither a file nor a folder, such as /dev/null."""
+    return path.exists() and not path.is_file() and not path.is_dir()
 
 
 def sync_folder(folder: Path) -> None:

@@ -1,5 +1,6 @@
 """From a scene's TOML file to a Scene; what is wrong in it is told with file, line, key, and what to write instead."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.resources.abc import Traversable
@@ -49,6 +50,17 @@ def load_scene(name_or_path: str | Path) -> Scene:
     tables = source.tables()
     check_finite(source, (), tables)
     return _Decoder(source, convert(source, (), tables, _File), path.parent).scene(path.stem)
+
+
+def located(name_or_path: str | Path, fault: SceneError) -> SceneError:
+    """Return an error about a key of a scene with file and line added, where it says which key but not where.
+
+    That is what shows when the effects are put together; any other error comes back as it is.
+    """
+    key, _, reason = str(fault).partition(": ")
+    if not re.fullmatch(r"(effects|recording)(\.\w+)+", key):
+        return fault
+    return read_source(_file(Path(name_or_path))).error(tuple(key.split(".")), reason)
 
 
 def _file(path: Path) -> Traversable:

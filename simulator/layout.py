@@ -22,7 +22,7 @@ STANDS_OUT_MM = 0.4
 # Places on a segment: (how far along it, degrees around it: 0 on the pad, positive to the radial side of a finger).
 _TIP = (-1.0, 45.0)  # on the round tip, half way between pad and end
 _SIDE = 85.0
-# Rows of the palm along its five capsules, which meet at the wrist: about 11 mm apart; the ball of the thumb has its own.
+# Rows of the palm along its five capsules, which meet at the wrist: about 11 mm apart; the thumb has its own ball.
 _PALM_ROWS = {
     "palm_index": (0.55, 0.78, 1.0),
     "palm_middle": (0.35, 0.65, 0.97),

@@ -29,9 +29,6 @@ _SINK_IN_MM = 0.3  # how deep a pad that touches lies
 _CLEAR_MM = 1.0  # how far everything else keeps away
 _OVERLAP = 0.85  # of two fingers' radii: how near they come
 
-# Half turns about an object's own axes: they leave every shape as it is.
-_HALF_TURNS = tuple(np.diag(signs) for signs in ([1.0, 1, 1], [1.0, -1, -1], [-1.0, 1, -1], [-1.0, -1, 1]))
-
 
 class Misfit:
     """The residuals of one hand, grasp type and object, for many candidates (26, n) at a time."""
@@ -124,14 +121,7 @@ def object_start(hand: Hand, prehension: Prehension, shape: Shape) -> Floats:
     length, breadth = hand.size.length_mm, hand.size.breadth_mm
     touch = np.array(prehension.at) * [length, breadth, breadth]
     position = touch + away * _half(shape, axes.T @ away)
-    return np.concatenate([position, rotation_vector(_turned_less(axes)[:, :, None])[:, 0]])
-
-
-def _turned_less(axes: Floats) -> Floats:
-    """Return axes (3, 3) of the same object that are not near half a turn away, where rotation vectors end."""
-    if np.trace(axes) > -0.9:
-        return axes
-    return max((axes @ turn for turn in _HALF_TURNS), key=np.trace)
+    return np.concatenate([position, rotation_vector(axes[:, :, None])[:, 0]])
 
 
 def _half(shape: Shape, direction: Floats) -> float:

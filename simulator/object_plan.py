@@ -63,11 +63,11 @@ def plan_object(work: Work) -> Planned:
     Raises PlanError where a length fails that is asked for; beyond these, the usual ones are planned until one fails.
     """
     plans = _outwards(work)
-    entry = _entry(work, plans)
+    entry = entry_of(work, plans)
     gap, sunk = _halfway(entry, work.thing)
     if max(gap, sunk) > TOLERANCE_MM:
         plans = _evened(work, plans)
-        entry = _entry(work, plans)
+        entry = entry_of(work, plans)
         gap, sunk = _halfway(entry, work.thing)
     return Planned(
         entry,
@@ -119,7 +119,8 @@ def _halfway(entry: Entry, thing: Thing) -> tuple[float, float]:
     return max((gap for gap, _ in measured), default=-math.inf), max((sunk for _, sunk in measured), default=-math.inf)
 
 
-def _entry(work: Work, plans: dict[float, Plan]) -> Entry:
+def entry_of(work: Work, plans: dict[float, Plan]) -> Entry:
+    """Return plans by hand length, in order, as data: rounded, and each turn as near the one before as can be."""
     held: list[HeldAt] = []
     for length, one in plans.items():
         pose = one.held.pose.copy()

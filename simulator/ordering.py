@@ -69,7 +69,7 @@ def _check_after(places: Sequence[Place]) -> None:
 
 def _sorted(places: list[Place]) -> Iterator[Place]:
     by_name = {place.effect.name: place for place in places}
-    sorter = TopologicalSorter({name: sorted(_waits_for(place, places)) for name, place in by_name.items()})
+    sorter = TopologicalSorter({name: _waits_for(place, places) for name, place in by_name.items()})
     try:
         sorter.prepare()
     except CycleError as reason:

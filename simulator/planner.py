@@ -15,12 +15,15 @@ from .errors import PlanError
 from .hand import LIMITS_DEG, Hand
 from .misfit import Misfit
 from .pose import Pose, rotation_vector
+from .postures import FRICTION
 from .prehension import Prehension
 from .shapes import Shape
 
 Floats = NDArray[np.float64]
 
 TOLERANCE_MM = 4.0  # what the contact model still closes, or presses out
+# How much of the push friction bears when pads do not push straight against each other: the sine of its angle.
+BORNE = FRICTION / float(np.sqrt(1.0 + FRICTION * FRICTION))
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,19 +43,27 @@ class Plan:
     imbalance: float
 
     def holds(self) -> bool:
-        """Return whether every pad is near enough, and no skin too deep in the object."""
-        return max(self.gap_mm, self.sunk_mm) <= TOLERANCE_MM
+        """Return whether every pad is near enough, no skin too deep in the object, and friction does the rest."""
+        return self.excess() <= 1.0
+
+    def excess(self) -> float:
+        """Return the worst fault over what is tolerated of it."""
+        return max(self.gap_mm / TOLERANCE_MM, self.sunk_mm / TOLERANCE_MM, self.imbalance / BORNE)
 
 
 def plan(hand: Hand, grasp: str, prehension: Prehension, thing: Thing, near: Held | None = None) -> Plan:
     """Return a posture of `hand` that holds `thing`; `near` is one of a hand of nearly the same size to start from.
 
-    Raises PlanError if the best one leaves a pad more than 4 mm off, or lets skin sink in as deep.
+    Raises PlanError if the best one leaves a pad too far off, lets skin sink in too deep, or pushes the object away.
     """
+    from threadpoolctl import threadpool_limits
+
     misfit = Misfit(hand, prehension, thing.shape)
-    plans = [] if near is None else [_descend(misfit, _start_near(misfit, near))]
-    if not any(one.holds() for one in plans):
-        plans += [_descend(misfit, start) for start in _starts(misfit)]
+    # Small matrices: more threads would take longer, and come to other last digits.
+    with threadpool_limits(1):
+        plans = [] if near is None else [_descend(misfit, _start_near(misfit, near))]
+        if not any(one.holds() for one in plans):
+            plans += [_descend(misfit, start) for start in _starts(misfit)]
     best = _best(plans)
     if not best.holds():
         raise PlanError(_refusal(hand, grasp, thing, best))
@@ -68,15 +79,18 @@ def measure(hand: Hand, held: Held, shape: Shape) -> tuple[float, float]:
 
 def _best(plans: Iterable[Plan]) -> Plan:
     """Return the plan of the least cost among those that hold; if none does, what comes nearest to holding."""
-    return min(plans, key=lambda one: (not one.holds(), one.cost if one.holds() else max(one.gap_mm, one.sunk_mm)))
+    return min(plans, key=lambda one: (not one.holds(), one.cost if one.holds() else one.excess()))
 
 
 def _refusal(hand: Hand, grasp: str, thing: Thing, best: Plan) -> str:
-    wrong = [f"leaves {best.gap_mm:.0f} mm under a pad"] if best.gap_mm > TOLERANCE_MM else []
-    wrong += [f"lets skin sink in {best.sunk_mm:.0f} mm"] if best.sunk_mm > TOLERANCE_MM else []
+    wrong = (
+        (best.gap_mm / TOLERANCE_MM, f"leaves {best.gap_mm:.1f} mm under a pad (at most {TOLERANCE_MM:g})"),
+        (best.sunk_mm / TOLERANCE_MM, f"lets skin sink in {best.sunk_mm:.1f} mm (at most {TOLERANCE_MM:g})"),
+        (best.imbalance / BORNE, f"leaves {best.imbalance:.0%} of the push unbalanced (friction bears {BORNE:.0%})"),
+    )
     return (
         f"a hand of {hand.size.length_mm:g} mm cannot hold {thing.name!r} with grasp type {grasp!r}: the best posture "
-        f"{' and '.join(wrong)}, and {TOLERANCE_MM:g} mm are the most; take an object of another size, or another "
+        f"{' and '.join(words for excess, words in wrong if excess > 1.0)}; take an object of another size, or another "
         "grasp type for it"
     )
 

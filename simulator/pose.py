@@ -81,9 +81,10 @@ def _quaternion(matrix: Floats) -> Floats:
         ]
     )
     largest = ways[np.arange(4), np.arange(4)].argmax(axis=0)
-    way: Floats = ways[largest, :, np.arange(m.shape[2])].T
+    way = ways[largest, :, np.arange(m.shape[2])].T
     norm = np.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2] + way[3] * way[3])
-    return way / np.where(way[0] < 0.0, -norm, norm)
+    unit: Floats = way / np.where(way[0] < 0.0, -norm, norm)
+    return unit
 
 
 def _angle(sine: Floats, cosine: Floats) -> Floats:

@@ -1,9 +1,9 @@
 """Which effects there are, by name. Naming them here imports none of them."""
 
-import difflib
 from importlib import import_module
 from types import ModuleType
 
+from ..compiler.recordings.names import nearest
 from .errors import SceneError
 
 # In the order in which they act where nothing else decides.
@@ -33,11 +33,7 @@ CONTACTS = ("contact.quasistatic", "contact.mujoco")
 
 
 def load(name: str) -> ModuleType:
-    """Import and return the module of effect `name`. Raises SceneError naming the nearest where there is none."""
+    """Import and return the module of effect `name`. Raises SceneError naming what is near where there is none."""
     if name not in NAMES:
-        near = difflib.get_close_matches(name, NAMES, n=1)
-        raise SceneError(
-            f"there is no effect {name!r}"
-            + (f": did you mean {near[0]!r}?" if near else f"; there are {', '.join(NAMES)}")
-        )
+        raise SceneError(f"there is no effect {name!r}{nearest(name, NAMES)}")
     return import_module(f".effects.{name.replace('.', '_')}", __package__)

@@ -38,18 +38,23 @@ class Session:
 
 def sessions(scene: Scene, postures: Postures) -> tuple[Session, ...]:
     """Return every subject's session. Raises SceneError where an object has no planned posture."""
-    return tuple(_session(scene, subject, postures) for subject in scene.subjects)
+    return tuple(session_of(scene, conditions_of(scene, subject, postures)) for subject in scene.subjects)
 
 
-def _session(scene: Scene, subject: Subject, postures: Postures) -> Session:
+def conditions_of(scene: Scene, subject: Subject, postures: Postures) -> tuple[Condition, ...]:
+    """Return what a subject does with every object. Raises SceneError where one has no planned posture."""
     hand = subject.hand()
-    found, words = [], []
-    for item, repetitions in scene.shares():
-        if repetitions:
-            thing = item.thing()
-            found.append(Condition(subject.name, hand, item.grasp, thing, postures.held(hand, item.grasp, thing)))
-            words.append(_words(scene.seed, found[-1], repetitions))
-    return _in_order(tuple(found), words)
+    things = [(item.grasp, item.thing()) for item, repetitions in scene.shares() if repetitions]
+    return tuple(
+        Condition(subject.name, hand, grasp, thing, postures.held(hand, grasp, thing)) for grasp, thing in things
+    )
+
+
+def session_of(scene: Scene, conditions: tuple[Condition, ...]) -> Session:
+    """Return the session of the subject whose conditions these are."""
+    repetitions = [share for _, share in scene.shares() if share]
+    words = [_words(scene.seed, each, count) for each, count in zip(conditions, repetitions, strict=True)]
+    return _in_order(conditions, words)
 
 
 def _words(seed: int, condition: Condition, repetitions: int) -> NDArray[np.uint64]:

@@ -127,5 +127,5 @@ def _corner(beyond: Floats) -> Floats:
         total = total + side * side
     length = np.sqrt(total)
     nearest = np.arange(len(beyond))[:, None, None] == beyond.argmax(axis=0)
-    gradient: Floats = np.where(length > 0.0, outside / (length + _TINY), nearest.astype(np.float64))
+    gradient: Floats = np.where(length > 0.0, outside / np.maximum(length, _TINY), nearest.astype(np.float64))
     return gradient

@@ -16,7 +16,7 @@ from .errors import SceneError
 from .frames import at_a_time, hold_frame
 from .layout import murakami160
 from .ledger import Ledger
-from .notes import Notes, notes_of
+from .notes import Notes, Unsettled, notes_of
 from .pipeline import Pipeline, compile_pipeline
 from .postures import Postures
 from .report import Report, grasp_reports, step_reports
@@ -82,7 +82,8 @@ def simulate(
     made = _gathered(in_workers(_run, works, jobs), total, progress)
     rows = _in_order(plan, made.rows)
     if not len(rows):
-        raise SceneError(f"scene {scene.name}: in none of its {total} repetitions does the hand come to rest")
+        why = _unsettled(scene, made)[0].why
+        raise SceneError(f"scene {scene.name}: none of its {total} repetitions can be trusted; of the first, {why}")
     found = _set_of(scene, plan, rows)
     return Simulated(found, _report(scene, rows, found, made, perf_counter() - start, keep_unsettled=keep_unsettled))
 
@@ -150,19 +151,24 @@ def _set_of(scene: Scene, plan: Sequence[Session], rows: Rows) -> GraspSet:
 
 
 def _report(scene: Scene, rows: Rows, found: GraspSet, made: _Done, seconds: float, *, keep_unsettled: bool) -> Report:
-    subjects = tuple(subject.name for subject in scene.subjects)
-    unsettled = (one for note in made.notes for one in note.unsettled)
     return Report(
         simulated=True,
         scene=scene.name,
         seed=scene.seed,
-        subjects=subjects,
+        subjects=tuple(subject.name for subject in scene.subjects),
         repetitions=sum(note.repetitions for note in made.notes),
         rows=len(rows),
         seconds=seconds,
         lost_frames=sum(note.lost_frames for note in made.notes),
         kept_unsettled=keep_unsettled,
-        unsettled=tuple(sorted(unsettled, key=lambda one: (subjects.index(one.subject), one.trial))),
+        unsettled=_unsettled(scene, made),
         grasps=grasp_reports(rows, found.labels, found.taxonomy.types, made.notes),
         steps=tuple(step_reports(made.ledger)),
     )
+
+
+def _unsettled(scene: Scene, made: _Done) -> tuple[Unsettled, ...]:
+    """Return the repetitions that did not settle, in the order of the sessions."""
+    place = {subject.name: number for number, subject in enumerate(scene.subjects)}
+    unsettled = (one for note in made.notes for one in note.unsettled)
+    return tuple(sorted(unsettled, key=lambda one: (place[one.subject], one.trial)))

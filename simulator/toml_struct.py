@@ -108,7 +108,8 @@ def _sentence(reason: str, value: object, kind: type[S], inner: Place) -> str:
         wanted = " or ".join(_TYPES.get(name, name) for name in found[1].split(" | ") if name != "null")
         return f"must be {wanted}, not {_shown(value)}"
     if found := re.fullmatch(r"Expected `.+` ([<>]=?) (.+)", reason):
-        return f"must be {_BOUNDS[found[1]]} {float(found[2]):.15g}, not {value}"
+        bound = found[2] if found[2].lstrip("-").isdigit() else f"{float(found[2]):.15g}"
+        return f"must be {_BOUNDS[found[1]]} {bound}, not {value}"
     if reason.startswith("Invalid enum value"):
         choices = [choice for choice in _choices(kind, inner) if isinstance(choice, str)]
         return f"{_shown(value)} is not among its values{nearest(str(value), choices)}"

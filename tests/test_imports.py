@@ -54,7 +54,7 @@ ALLOWED = {
 }
 
 # Third-party packages of the extras `compiler` and `sim`, which a board does not have.
-WORKSTATION_ONLY = {"sklearn", "scipy", "matplotlib", "joblib", "mujoco"}
+WORKSTATION_ONLY = {"sklearn", "scipy", "matplotlib", "joblib", "mujoco", "threadpoolctl"}
 
 
 def modules() -> Iterator[tuple[str, ast.Module]]:

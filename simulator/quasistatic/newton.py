@@ -19,7 +19,7 @@ _HOLD_STIFFNESS = np.array([HOLD_N_PER_MM] * 3 + [HOLD_NMM_PER_RAD] * 3)[:, None
 
 def newton_step(balance: Balance) -> Floats:
     """Return the step (26, n) of angles, position and turn; shortened, where it is long or would drive skin in deep."""
-    joints, coupling, body = _stiffness(balance)
+    joints, coupling, body = stiffness(balance)
     found = solve_arrow(joints, coupling, body, balance.on_joints.reshape(5, 4, -1), balance.on_object)
     longest: Floats = (np.abs(found) / _LARGEST_STEP).max(axis=0)
     found = found / np.maximum(longest, 1.0)
@@ -37,7 +37,7 @@ def _unhurt(balance: Balance, step: Floats) -> Floats:
     return 1.0 / np.maximum(worst, 1.0)
 
 
-def _stiffness(balance: Balance) -> tuple[Floats, Floats, Floats]:
+def stiffness(balance: Balance) -> tuple[Floats, Floats, Floats]:
     """Return the matrix in blocks: joints (5, 4, 4, n), joints with object (5, 4, 6, n), object (6, 6, n).
 
     Only spheres that touch in any of the repetitions are summed: the others would add nothing but zeros.

@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiler.elementary import add_up
+
 Floats = NDArray[np.float64]
 
 
@@ -22,13 +24,13 @@ def cross(a: Floats, b: Floats) -> Floats:
 
 def length(vectors: Floats) -> Floats:
     """Return (n,) of (3, n)."""
-    return np.sqrt(vectors[0] * vectors[0] + vectors[1] * vectors[1] + vectors[2] * vectors[2])
+    return np.sqrt(add_up(vectors * vectors))
 
 
 def turn(now: Floats, then: Floats) -> Floats:
     """Return the small turn (3, n) from rotations `then` to `now` (3, 3, n), in hand axes."""
     columns = cross(then.swapaxes(0, 1), now.swapaxes(0, 1))
-    return (columns[0] + columns[1] + columns[2]) * 0.5
+    return add_up(columns) * 0.5
 
 
 def turned(frames: Floats, vectors: Floats) -> Floats:

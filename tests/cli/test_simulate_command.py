@@ -38,7 +38,7 @@ def test_a_shipped_scene_becomes_a_set_and_says_that_it_is_simulated(tmp_path: P
 def test_the_summary_has_a_row_for_every_grasp_type_and_every_step(tmp_path: Path, capsys: Captured) -> None:
     assert run(["simulate", "quick", *SMALL, "-o", str(tmp_path / "set.grasps")]) == 0
     rows = [[cell.strip() for cell in line.split("│")[1:-1]] for line in capsys.readouterr().out.splitlines()]
-    grasps, steps = ([row for row in rows if len(row) == count] for count in (10, 8))
+    grasps, steps = ([row for row in rows if len(row) == count] for count in (11, 8))
     assert [row[:2] for row in grasps] == [[name, "2"] for name in load_types()]
     assert [row[:2] for row in steps if row[1] == "effect"] == [
         [name, "effect"]
@@ -182,6 +182,24 @@ def test_a_bad_scene_is_one_sentence_with_file_and_line(tmp_path: Path, capsys: 
     assert "bad.toml, line" in said
     assert "did you mean 'joint.noise'" in said
     assert not (tmp_path / "set.grasps").exists()
+
+
+@pytest.mark.parametrize("mode", ["--explain", "--ablate"])
+@pytest.mark.parametrize(
+    ("added", "sentence"),
+    [
+        ("[effects.hand.transition]", "line 45: effects.hand.transition: there is no time before contact"),
+        ("[effects.switch.stuck_open]\ncount = 161", "line 46: effects.switch.stuck_open.count: 161 switches cannot"),
+    ],
+)
+def test_what_shows_when_effects_are_put_together_is_told_with_file_and_line(
+    added: str, sentence: str, mode: str, tmp_path: Path, capsys: Captured
+) -> None:
+    scene = tmp_path / "bad.toml"
+    text = shipped()["quick"].read_text()
+    scene.write_text(text + "\n" * (44 - text.count("\n")) + added)
+    assert run(["simulate", str(scene), mode]) == 2
+    assert complaint(capsys).startswith(f"thenar: bad.toml, {sentence}")
 
 
 def test_an_interrupt_ends_with_130_and_leaves_the_old_set_alone(tmp_path: Path) -> None:

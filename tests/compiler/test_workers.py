@@ -1,4 +1,6 @@
 import os
+import signal
+from concurrent.futures import BrokenExecutor
 
 import pytest
 
@@ -28,6 +30,16 @@ def test_no_work_has_no_answers() -> None:
 def test_what_is_wrong_in_a_worker_is_raised_here(jobs: int) -> None:
     with pytest.raises(ZeroDivisionError):
         list(in_workers((1).__truediv__, [1, 0], jobs))
+
+
+def killed(_number: int) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_worker_that_is_killed_is_an_error_and_the_next_work_has_new_ones() -> None:
+    with pytest.raises(BrokenExecutor, match="ended before its work was done"):
+        list(in_workers(killed, range(3), 2))
+    assert len(list(in_workers(squared_where, range(3), 2))) == 3
 
 
 def test_as_many_processes_work_as_are_asked_for() -> None:

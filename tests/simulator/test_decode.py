@@ -1,4 +1,3 @@
-import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -226,18 +225,3 @@ def test_a_missing_file_is_told_the_names_of_the_shipped_scenes(tmp_path: Path) 
         SceneError, match=r"there is no file .*quick\.toml; scenes that are shipped go by name: .*quick"
     ):
         load_scene(tmp_path / "quick.toml")
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_the_docs_give_every_parameter_of_every_effect_with_its_default(name: str) -> None:
-    page = (ROOT / "docs" / "scenes.md").read_text()
-    effects = page[page.index("## Effects") :].split("\n\n")[2]
-    own = effects[effects.index(f"| `{name}` |") :]
-    own = own[: own.find("\n| `")] if "\n| `" in own else own
-    parameters = load(name).Parameters
-    defaults = dict(zip(parameters.__struct_fields__, parameters.__struct_defaults__, strict=True))
-    documented = {row.split("`")[1]: row.split(" | ")[-2] for row in re.findall(r"\| (`\w+`.* \|.*) \|$", own, re.M)}
-    assert documented.keys() == defaults.keys() - {"after"}
-    for parameter, value in documented.items():
-        default = defaults[parameter]
-        assert value.removesuffix(" (fit)") == str(default) or (default is None and value in ("drawn", "1"))

@@ -52,11 +52,12 @@ def record(make_scene: SceneMaker, make_batch: BatchMaker) -> Callable[..., tupl
         pipeline, batch, words = compile_pipeline(make_scene(lively(names))), make_batch(repetitions), Words()
         plain = Draw._words
 
-        def recorded(draw: Draw, repetition: int, condition: int, subject: int, size: int) -> np.ndarray:
-            drawn = plain(draw, repetition, condition, subject, size)
-            key = (draw.effect, (draw.seed, repetition, condition, subject))
-            assert key not in words, f"{draw.effect} draws the same numbers twice"
-            words[key] = drawn.tobytes()
+        def recorded(draw: Draw, repetitions: list[int], condition: int, subject: int, size: int) -> np.ndarray:
+            drawn = plain(draw, repetitions, condition, subject, size)
+            for repetition, row in zip(repetitions, drawn, strict=True):
+                key = (draw.effect, (draw.seed, repetition, condition, subject))
+                assert key not in words, f"{draw.effect} draws the same numbers twice"
+                words[key] = row.tobytes()
             return drawn
 
         with pytest.MonkeyPatch.context() as patch:

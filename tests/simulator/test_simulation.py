@@ -10,9 +10,11 @@ import pytest
 from thenar.simulator import load_scene, simulate
 from thenar.simulator.effects.contact_quasistatic import Parameters
 from thenar.simulator.errors import SceneError
+from thenar.simulator.explain import explain
 from thenar.simulator.ledger import Ledger
 from thenar.simulator.pipeline import compile_pipeline
 from thenar.simulator.postures import Postures
+from thenar.simulator.registry import load
 from thenar.simulator.report import Report
 from thenar.simulator.scene import Listed, Scene
 from thenar.simulator.session import sessions
@@ -101,6 +103,17 @@ def test_another_seed_makes_another_set(quick: Simulated) -> None:
     assert (other.codes != quick.grasp_set.codes).any()
 
 
+def test_the_more_frames_the_fewer_repetitions_are_simulated_at_a_time() -> None:
+    """10 001 frames each: four at a time, or the two batches of three that make at least four."""
+    jitter = Listed("frame.jitter", load("frame.jitter").Parameters())
+    recording = msgspec.structs.replace(QUICK.recording, rate_hz=10_000.0, hold_ms=1000.0)
+    scene = msgspec.structs.replace(QUICK, recording=recording, effects=(jitter,), subjects=QUICK.subjects[:1])
+    seen: list[int] = []
+    simulate(scene, jobs=1, keep_unsettled=True, progress=lambda done, total: seen.append(done))
+    assert seen == [6, 12, 18]
+    assert explain(scene, jobs=1).measured == 6
+
+
 def peak_bytes(scene: Scene) -> int:
     tracemalloc.start()
     simulate(scene, jobs=1, block=8)
@@ -182,8 +195,15 @@ def test_what_did_not_settle_is_left_out_and_named_unless_it_is_to_be_kept() -> 
 
 
 def test_a_scene_in_which_nothing_settles_is_an_error() -> None:
-    with pytest.raises(SceneError, match="in none of its 36 repetitions does the hand come to rest"):
+    with pytest.raises(SceneError, match="none of its 36 repetitions can be trusted; of the first, the hand did not"):
         simulate(hasty(QUICK, 1), jobs=1)
+
+
+def test_a_scene_of_which_no_byte_arrives_says_so_and_blames_no_hand() -> None:
+    lossy = Listed("wire.lost_bytes", load("wire.lost_bytes").Parameters(rate=0.999))
+    scene = msgspec.structs.replace(QUICK, effects=(*QUICK.effects, lossy))
+    with pytest.raises(SceneError, match="of the first, no frame arrived whole"):
+        simulate(scene, jobs=1)
 
 
 def test_the_report_says_what_came_out_and_that_it_is_simulated(quick: Simulated) -> None:

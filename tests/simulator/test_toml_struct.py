@@ -15,7 +15,7 @@ class Thing(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     sd_deg: float = 0.0
     hold_ms: float = 0.0
     rate_hz: float = 1.0
-    count: int = 1
+    count: Annotated[int, msgspec.Meta(le=2**63 - 1)] = 1
     tags: tuple[str, ...] = ()
     kind: Literal["last", "all"] = "last"
     kinds: tuple[Literal["last", "all"], ...] = ()
@@ -46,6 +46,7 @@ def test_a_table_becomes_a_struct() -> None:
         ("width_mm = -5", "a.toml, line 2: thing.width_mm: must be above 0, not -5"),
         ("width_mm = 0", "a.toml, line 2: thing.width_mm: must be above 0, not 0"),
         ("width_mm = 1e6", "a.toml, line 2: thing.width_mm: must be at most 200, not 1000000.0"),
+        ("width_mm = 1\ncount = 9223372036854775808", "thing.count: must be at most 9223372036854775807, not"),
         ("width_mm = 1\nmass_g = 0.5", "a.toml, line 3: thing.mass_g: must be at least 1, not 0.5"),
         ("width_mm = 'wide'", "a.toml, line 2: thing.width_mm: must be a number, not 'wide'"),
         ("width_mm = true", "a.toml, line 2: thing.width_mm: must be a number, not true"),

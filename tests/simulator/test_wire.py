@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from thenar.drivers import scanner_frame as scanner
 from thenar.simulator.batch import Batch
 from thenar.simulator.effect import Setting
 from thenar.simulator.errors import SceneError
@@ -70,13 +71,14 @@ def test_more_than_256_frames_still_match(make_sent: Callable, receive: Callable
     assert np.array_equal(batch.bits, bits)
 
 
-def test_bytes_take_ten_bits_each_at_115200_baud_and_wait_for_the_scan(make_sent: Callable) -> None:
+def test_bytes_take_ten_bits_each_at_115200_baud_and_wait_for_the_scan_and_the_glove(make_sent: Callable) -> None:
     batch = make_sent(every_10_ms(1), delay_us=np.full(160, 1500))
     at_us = batch.traffic.at_us[0]
     assert at_us.shape == (FRAMES, STATE_BYTES + RECORD_BYTES)
     assert at_us[2, 0] == 20_000 + 1500 + 87
     assert at_us[2, STATE_BYTES - 1] == 20_000 + 1500 + 2257
-    assert at_us[2, -1] == 20_000 + 1737
+    # 18 sensors, a quarter of a millisecond each, and 20 bytes.
+    assert at_us[2, -1] == 20_000 + 4500 + 1737
 
 
 def test_a_frame_waits_until_the_line_is_free(make_sent: Callable) -> None:
@@ -110,6 +112,33 @@ def test_a_lost_end_costs_two_frames(make_sent: Callable, receive: Callable) -> 
     assert batch.lost is not None
     assert np.argwhere(batch.lost).tolist() == [[0, 1], [0, 2]]
     assert np.array_equal(batch.bits[0, 1:3], bits[0, [0, 0]])
+
+
+def test_only_the_states_of_switches_are_taken_for_such(make_sent: Callable, receive: Callable) -> None:
+    batch = make_sent(every_10_ms(1))
+    bits = batch.bits
+    other = scanner.encode(scanner.Frame(scanner.STATE + 1, 3, bytes(20)))
+    data = batch.traffic.data.copy()
+    data[0, 3, :STATE_BYTES] = np.frombuffer(other, dtype=np.uint8)
+    batch.traffic = replace(batch.traffic, data=data)
+    receive(batch)
+    assert batch.lost is not None
+    assert np.flatnonzero(batch.lost[0]).tolist() == [3]
+    assert np.array_equal(batch.bits[0, 3], bits[0, 2])
+
+
+def test_a_record_in_which_the_glove_complains_is_not_taken(make_sent: Callable, receive: Callable) -> None:
+    """Of record 1 the end is lost, and of record 2 all but its last two sensors, which read 'es', and its end."""
+    batch = make_sent(every_10_ms(1))
+    raw = batch.raw
+    data = batch.traffic.data.copy()
+    data[0, 2, -3:-1] = list(b"es")
+    batch.traffic = replace(batch.traffic, data=data)
+    lose(batch, (0, 1, -1), *((0, 2, place) for place in range(STATE_BYTES, STATE_BYTES + RECORD_BYTES - 3)))
+    receive(batch)
+    assert batch.lost is not None
+    assert np.flatnonzero(batch.lost[0]).tolist() == [1, 2]
+    assert np.array_equal(batch.raw[0, 2], raw[0, 0])
 
 
 def test_before_the_first_frame_there_is_no_contact_and_the_first_joints_that_come(
@@ -177,6 +206,6 @@ def test_bytes_are_counted(make_sent: Callable, make_draw: MakeDraw, make_settin
 
 
 def test_frames_faster_than_the_line_are_refused(make_setting: MakeSetting) -> None:
-    with pytest.raises(SceneError, match=r"recording.rate_hz: 500 frames .* at most 443"):
+    with pytest.raises(SceneError, match=r"recording.rate_hz: 500 frames .* at most 160"):
         SEND[1](make_setting(timed=True, period_us=2000))
-    SEND[1](make_setting(timed=True, period_us=2257))
+    SEND[1](make_setting(timed=True, period_us=6237))

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.simulator.batch import Batch
+from thenar.simulator.condition import Condition
 from thenar.simulator.effect import Setting
 from thenar.simulator.effects import switch_stuck_closed, switch_stuck_open
 from thenar.simulator.errors import SceneError
@@ -22,12 +23,15 @@ Read = Callable[..., np.ndarray]
 
 @pytest.fixture(scope="session")
 def read(
-    make_batch: Callable[..., Batch], make_draw: Callable[..., Draw], make_setting: Callable[..., Setting]
+    make_batch: Callable[..., Batch],
+    make_condition: Callable[..., Condition],
+    make_draw: Callable[..., Draw],
+    make_setting: Callable[..., Setting],
 ) -> Read:
-    """Return a function of modules with parameters that returns the bits (3, 2, 160) read of random ones."""
+    """Return a function of modules with parameters, and of a subject: what is read of random bits (3, 2, 160)."""
 
-    def run(*effects: tuple) -> np.ndarray:
-        batch = make_batch(range(3))
+    def run(*effects: tuple, subject: str = "A") -> np.ndarray:
+        batch = make_batch(range(3), make_condition(subject))
         batch.bits = np.random.default_rng(5).random((3, 2, 160)) < 0.5
         for module, parameters in effects:
             module.prepare(module.Parameters(**parameters), make_setting())(batch, make_draw(module.EFFECT.name, batch))
@@ -63,6 +67,12 @@ def test_as_many_as_are_asked_for_are_drawn_and_fewer_are_among_them(
 def test_one_is_drawn_where_nothing_is_said(read: Read, module: object, value: bool) -> None:
     changed = (read((module, {})) != read()).any(axis=(0, 1))
     assert np.count_nonzero(changed) == 1
+
+
+@pytest.mark.parametrize(("module", "value"), BOTH)
+def test_everybody_wears_the_same_glove(read: Read, module: object, value: bool) -> None:
+    first, second = (read((module, {"count": 20}), subject=subject) for subject in "AB")
+    np.testing.assert_array_equal(first, second)
 
 
 def test_open_and_closed_ones_are_drawn_apart_and_closed_wins(read: Read) -> None:

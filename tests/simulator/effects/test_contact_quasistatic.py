@@ -1,0 +1,169 @@
+"""The default contact model: loads in, contacts out, none depending on the others."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from thenar.simulator.batch import Batch
+from thenar.simulator.condition import Condition
+from thenar.simulator.contact import Contact, ContactModel, Load
+from thenar.simulator.decode import load_scene
+from thenar.simulator.effect import Setting
+from thenar.simulator.effects.contact_quasistatic import EFFECT, Parameters, model
+from thenar.simulator.layout import murakami160
+from thenar.simulator.pose import Pose
+from thenar.simulator.postures import Postures
+from thenar.simulator.session import sessions
+
+FIELDS = ("posture_deg", "pose", "forces_n", "capsules_n", "between_n", "settled", "residual_n", "residual_nmm")
+
+
+@pytest.fixture(scope="module")
+def conditions() -> list[Condition]:
+    """Four grasps of each of three hands."""
+    scene = load_scene("kamakura")
+    return [
+        condition
+        for session in sessions(scene, Postures.of(scene))
+        for condition in session.conditions
+        if condition.grasp in ("PoS", "CMF") or condition.thing.name == "pin"
+    ]
+
+
+@pytest.fixture(scope="module")
+def default(make_setting: Callable[..., Setting]) -> ContactModel:
+    return model(Parameters(), make_setting())
+
+
+def load(condition: Condition, n: int = 3, seed: int = 1) -> Load:
+    draw, held = np.random.default_rng(seed), condition.held
+    pose = held.pose + draw.normal(size=(n, 6)) * np.array([1.5] * 3 + [0.044] * 3)
+    grip_n = held.grip_n * np.exp(0.25 * draw.normal(size=n))
+    return Load(condition, held.posture_deg + 1.5 * draw.normal(size=(n, 20)), pose, grip_n)
+
+
+def assert_same(one: Contact, other: Contact, rows: slice = slice(None)) -> None:
+    for field in FIELDS:
+        assert np.array_equal(getattr(one, field), getattr(other, field)[rows]), field
+
+
+def test_no_force_is_lost_between_segments_and_switches(conditions: list[Condition], default: ContactModel) -> None:
+    for contact in default.solve([load(condition) for condition in conditions]):
+        shared = contact.forces_n.sum(axis=1) + contact.between_n
+        assert shared == pytest.approx(contact.capsules_n.sum(axis=1), rel=1e-12)
+        assert (contact.forces_n >= 0.0).all()
+        assert (contact.between_n >= 0.0).all()
+
+
+def test_contacts_have_the_shapes_that_are_promised(conditions: list[Condition], default: ContactModel) -> None:
+    (contact,) = default.solve([load(conditions[0], 5)])
+    shapes = [getattr(contact, field).shape for field in FIELDS]
+    assert shapes == [(5, 20), (5, 6), (5, 160), (5, 20), (5,), (5,), (5,), (5,)]
+    assert contact.steps > 0
+
+
+def test_loads_of_several_hands_come_back_in_their_order(conditions: list[Condition], default: ContactModel) -> None:
+    loads = [load(condition, 2 + number % 3) for number, condition in enumerate(conditions)]
+    assert len({id(one.condition.hand) for one in loads}) > 1
+    mixed = loads[::2] + loads[1::2]  # hands in turn, so that none of them stands together
+    for one, contact in zip(mixed, default.solve(mixed), strict=True):
+        assert_same(default.solve([one])[0], contact)
+
+
+def test_the_order_of_loads_does_not_matter(conditions: list[Condition], default: ContactModel) -> None:
+    loads = [load(condition) for condition in conditions]
+    there = default.solve(loads)
+    for one, other in zip(there, reversed(default.solve(loads[::-1])), strict=True):
+        assert_same(one, other)
+
+
+def test_a_repetition_comes_out_the_same_alone(conditions: list[Condition], default: ContactModel) -> None:
+    for condition in conditions[::3]:
+        whole = load(condition, 7)
+        (together,) = default.solve([whole])
+        for one in (0, 3, 6):
+            own = slice(one, one + 1)
+            part = Load(condition, whole.posture_deg[own], whole.pose[own], whole.grip_n[own])
+            assert_same(default.solve([part])[0], together, own)
+
+
+def test_more_repetitions_than_are_solved_at_a_time_come_out_the_same(
+    conditions: list[Condition], default: ContactModel
+) -> None:
+    many = [load(conditions[0], 300, seed) for seed in range(3)]  # bundles hold about 512
+    together = default.solve(many)
+    assert_same(default.solve(many[2:])[0], together[2])
+    assert_same(default.solve(many[:1])[0], together[0])
+
+
+def test_nothing_to_solve_is_nothing_solved(default: ContactModel) -> None:
+    assert default.solve([]) == []
+
+
+def test_a_pose_at_rest_is_where_the_object_is_felt(conditions: list[Condition], default: ContactModel) -> None:
+    told = load(conditions[0], 4)
+    (contact,) = default.solve([told])
+    condition = told.condition
+    centres = condition.hand.spheres(condition.hand.skeleton(np.radians(contact.posture_deg.T)))
+    distance = Pose.of(contact.pose.T).distance(condition.thing.shape, centres)[0]
+    sunk = condition.hand.sphere_radii[:, None] - distance
+    pressed, touched = np.zeros((20, 4)), np.zeros((20, 4), dtype=bool)
+    for sphere, capsule in enumerate(condition.hand.sphere_capsules):
+        # 3 N per mm, half as much at first, as the parameters say.
+        pressed[capsule] += 3.0 * np.where(sunk[sphere] > 0.5, sunk[sphere] - 0.25, np.maximum(sunk[sphere], 0.0) ** 2)
+        touched[capsule] |= sunk[sphere] > 0.0
+    found = contact.capsules_n.T
+    assert found == pytest.approx(pressed, abs=1e-9)
+    assert not found[~touched].any()
+
+
+def test_switches_press_only_on_segments_that_do(conditions: list[Condition], default: ContactModel) -> None:
+    capsules = np.array([patch.capsule for patch in murakami160()])
+    for contact in default.solve([load(condition) for condition in conditions]):
+        for capsule in range(20):
+            shared = contact.forces_n[:, capsules == capsule].sum(axis=1)
+            assert (shared <= contact.capsules_n[:, capsule] * (1.0 + 1e-12)).all()
+
+
+def test_a_switch_that_reaches_further_feels_more(
+    conditions: list[Condition], make_setting: Callable[..., Setting]
+) -> None:
+    told = [load(condition) for condition in conditions]
+    lost = [
+        sum(contact.between_n.sum() for contact in model(Parameters(reach_mm=reach), make_setting()).solve(told))
+        for reach in (0.0, 1.0, 3.0)
+    ]
+    assert lost[0] > lost[1] > lost[2]
+
+
+def test_what_does_not_come_to_rest_is_marked(
+    conditions: list[Condition], make_setting: Callable[..., Setting]
+) -> None:
+    (contact,) = model(Parameters(most_steps=1), make_setting()).solve([load(conditions[0])])
+    assert not contact.settled.any()
+    assert contact.steps == 3
+
+
+def test_neither_loads_nor_conditions_are_changed(conditions: list[Condition], default: ContactModel) -> None:
+    told = load(conditions[0])
+    before = replace(told, posture_deg=told.posture_deg.copy(), pose=told.pose.copy(), grip_n=told.grip_n.copy())
+    default.solve([told])
+    for field in ("posture_deg", "pose", "grip_n"):
+        assert np.array_equal(getattr(told, field), getattr(before, field))
+
+
+def test_it_conflicts_with_the_other_model_and_declares_what_it_writes() -> None:
+    assert EFFECT.conflicts == ("contact.mujoco",)
+    assert EFFECT.stage == "contact"
+    assert set(EFFECT.writes) <= set(Batch.__dataclass_fields__)
+
+
+@pytest.mark.parametrize(
+    "given", [{"press_n_per_mm": 0.0}, {"soft_mm": -1.0}, {"friction": 2.1}, {"most_steps": 0}, {"stiffness": 1.0}]
+)
+def test_impossible_parameters_are_refused(given: dict[str, float]) -> None:
+    with pytest.raises(msgspec.ValidationError):
+        msgspec.convert(given, Parameters)

@@ -1,0 +1,155 @@
+"""docs/scenes.md against the structs that decode a scene: every key, every default and every limit is what it says."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+import msgspec
+import pytest
+
+from thenar.simulator.decode import _File, load_scene
+from thenar.simulator.population import SURVEYS, Population
+from thenar.simulator.registry import NAMES, load
+from thenar.simulator.scene import Glove, Recording, SceneObject, Subject
+from thenar.simulator.scenes import shipped
+from thenar.simulator.shapes import Box, Cylinder, Sphere
+
+PAGE = (Path(__file__).parents[1] / "docs" / "scenes.md").read_text(encoding="utf-8")
+
+Documented = dict[str, dict[str, str]]  # key -> column -> cell
+
+
+def table(heading: str) -> list[dict[str, str]]:
+    """Return the rows of the table whose heading begins with `heading`; a cell left empty has the one above."""
+    lines = PAGE[PAGE.index(f"\n| {heading}") + 1 :].split("\n\n")[0].splitlines()
+    cells = [[cell.strip() for cell in line.strip("|").split(" |")] for line in lines]
+    return [dict(zip(cells[0], row, strict=True)) for row in cells[2:]]
+
+
+def keyed(rows: list[dict[str, str]], column: str) -> Documented:
+    """Return rows by the keys that `column` names, which may be several."""
+    return {key: row for row in rows for key in re.findall(r"`(\w+)`", row[column].partition(":")[0])}
+
+
+def metas(annotation: Any) -> Iterator[msgspec.Meta]:
+    if get_origin(annotation) is Annotated:
+        yield from (extra for extra in annotation.__metadata__ if isinstance(extra, msgspec.Meta))
+        yield from metas(annotation.__origin__)
+    elif get_origin(annotation) is not tuple:  # what a list holds is no limit of the list
+        for inside in get_args(annotation):
+            yield from metas(inside)
+
+
+def limits(kind: type[msgspec.Struct], key: str) -> str:
+    """Return what the struct says of the limits of a key, in the words of the page."""
+    found = list(metas(get_type_hints(kind, include_extras=True)[key]))
+    if not found:
+        return ""
+    meta = found[0]
+    if meta.min_length is not None:
+        return {1: "at least one"}[meta.min_length]
+    if meta.lt is not None:
+        return f"between {meta.gt:g} and {meta.lt:g}"
+    if meta.gt is not None:
+        return f"above {meta.gt:g}" + ("" if meta.le is None else f", at most {number(meta.le)}")
+    return f"from {meta.ge:g}" if meta.le is None else f"{number(meta.ge)} to {number(meta.le)}"
+
+
+def number(value: float | None) -> str:
+    return {2**63 - 1: "2^63 - 1", 1e6: "10^6"}.get(value or 0, f"{value:.15g}")
+
+
+def default(kind: type[msgspec.Struct], key: str) -> object:
+    return next(field.default for field in msgspec.structs.fields(kind) if field.name == key)
+
+
+def shown(value: object) -> set[str]:
+    """Return how the page may write a default."""
+    if value is msgspec.NODEFAULT:
+        return {"required", ""}
+    if value is None:
+        return {"drawn", "1"}
+    if isinstance(value, str):
+        return {f'`"{value}"`'}
+    return {str(value), f"{value:g}"}
+
+
+def effect_rows() -> Iterator[tuple[str, dict[str, str]]]:
+    name = ""
+    for row in table("effect |"):
+        name = row["effect"].strip("`") or name
+        yield name, row
+
+
+def test_every_effect_is_documented_and_none_that_is_not_there() -> None:
+    assert sorted({name for name, _ in effect_rows()}) == sorted(NAMES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_effect_has_the_parameters_defaults_and_limits_of_the_page(name: str) -> None:
+    kind = load(name).Parameters
+    documented = keyed([row for effect, row in effect_rows() if effect == name], "parameter")
+    assert documented.keys() == {*kind.__struct_fields__} - {"after"}
+    for key, row in documented.items():
+        assert row["default"].removesuffix(" (fit)") in shown(default(kind, key)), key
+        assert row["limits"] == limits(kind, key), key
+
+
+TABLES = {
+    "key of `[recording]`": Recording,
+    "key of `[glove]`": Glove,
+    "key of `[population]`": Population,
+    "key of `[[subjects]]`": Subject,
+}
+
+
+@pytest.mark.parametrize("heading", TABLES)
+def test_a_table_of_a_scene_has_the_keys_defaults_and_limits_of_the_page(heading: str) -> None:
+    kind, documented = TABLES[heading], keyed(table(heading), heading)
+    assert documented.keys() == {*kind.__struct_fields__}
+    for key, row in documented.items():
+        assert row.get("default", "").partition(" (")[0] in shown(default(kind, key)) | {""}, key
+        assert row["limits"] == limits(kind, key) or key == "name", key
+
+
+def test_the_keys_of_an_object_are_those_of_the_page() -> None:
+    heading = "key of `[[objects]]`"
+    documented = keyed(table(heading), heading)
+    shapes = {key: kind for kind in (Sphere, Cylinder, Box) for key in kind.__struct_fields__}
+    assert documented.keys() == {*SceneObject.__struct_fields__, *shapes}
+    assert documented["mass_g"]["limits"] == limits(SceneObject, "mass_g")
+    for key, kind in shapes.items():
+        assert documented[key]["default"] in shown(default(kind, key)), key
+        assert documented[key]["limits"] == limits(kind, key) or key == "edge_mm", key
+
+
+def test_the_keys_of_a_scene_are_those_of_the_page() -> None:
+    documented = keyed(table("key | meaning"), "key")
+    # [effects.GROUP.NAME] stands for `effects`.
+    assert {key for key in documented if key.islower()} >= {*_File.__struct_fields__} - {
+        *("subjects", "population", "recording", "glove", "effects")
+    }
+    assert documented["seed"]["limits"] == limits(_File, "seed")
+    assert documented["repetitions"]["limits"] == limits(_File, "repetitions")
+
+
+def test_the_surveys_are_those_of_the_page() -> None:
+    rows = {row["mm, mean ± standard deviation"].strip("`"): list(row.values())[1:] for row in table("mm, mean")}
+    assert rows.keys() == SURVEYS.keys()
+    for survey, (men, women) in SURVEYS.items():
+        spreads = (men.length, women.length, men.breadth, women.breadth)
+        cells = [cell.removesuffix(" (ours)") for cell in rows[survey]]
+        assert cells == [f"{spread.mean:.1f} ± {spread.sd:g}" for spread in spreads]
+
+
+def test_every_shipped_scene_is_on_the_page_with_its_hands_and_repetitions() -> None:
+    rows = {name: row["what it is"] for row in table("scene |") for name in re.findall(r"`([\w-]+)`", row["scene"])}
+    assert rows.keys() == shipped().keys()
+    for name in ("kamakura", "cutkosky", "kamakura-def", "cutkosky-def"):
+        sizes = [f"{one.hand_length_mm:g} x {one.hand_breadth_mm:g}" for one in load_scene(name).subjects]
+        assert f"({', '.join(sizes)} mm)" in rows[name]
+    assert f"{load_scene('quick').repetitions} repetitions" in rows["quick"]
+    crowd = load_scene("crowd")
+    assert f"{len(crowd.subjects)} hands" in rows["crowd"]
+    assert f"{crowd.repetitions} repetitions" in rows["crowd"]
