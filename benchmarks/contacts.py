@@ -5,13 +5,13 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from thenar.simulator.batch import Batch
-from thenar.simulator.contact import Contact, ContactModel, load_of
-from thenar.simulator.ledger import Ledger
-from thenar.simulator.pipeline import Pipeline, compile_pipeline
-from thenar.simulator.postures import Postures
-from thenar.simulator.scene import Scene
-from thenar.simulator.session import sessions
+from thenar.simulator.contact.model import Contact, ContactModel, load_of
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.ledger import Ledger
+from thenar.simulator.pipeline.pipeline import Pipeline, compile_pipeline
+from thenar.simulator.planning.postures import Postures
+from thenar.simulator.running.session import sessions
+from thenar.simulator.scenes.scene import Scene
 
 
 def solved(model: ContactModel, batches: Sequence[Batch]) -> tuple[list[Contact], float]:

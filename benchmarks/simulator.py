@@ -20,13 +20,13 @@ import msgspec
 import numpy as np
 from contacts import jaccard, of_settled, on_sets, row, solved, table, together, told
 
-from thenar.simulator.batch import Batch
-from thenar.simulator.contact import Contact, ContactModel
-from thenar.simulator.decode import load_scene
+from thenar.simulator.contact.model import Contact, ContactModel
 from thenar.simulator.effects import contact_mujoco, contact_quasistatic
-from thenar.simulator.pipeline import compile_pipeline
-from thenar.simulator.scene import Scene
-from thenar.simulator.simulation import simulate
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.pipeline import compile_pipeline
+from thenar.simulator.running.simulation import simulate
+from thenar.simulator.scenes.decode import load_scene
+from thenar.simulator.scenes.scene import Scene
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 # What is compared, and at most how many milliseconds a grasp may take of each.

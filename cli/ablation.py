@@ -12,10 +12,10 @@ from ..compiler.evaluation.fits import Fit, Training, run_fits
 from ..compiler.evaluation.populations import populations
 from ..compiler.evaluation.rates import Rate
 from ..compiler.recordings.graspset import GraspSet
-from ..simulator.pipeline import DEFAULT_CONTACT
-from ..simulator.sampling import best_us
-from ..simulator.scene import Scene
-from ..simulator.simulation import Simulated, simulate
+from ..simulator.pipeline.pipeline import DEFAULT_CONTACT
+from ..simulator.running.sampling import best_us
+from ..simulator.running.simulation import Simulated, simulate
+from ..simulator.scenes.scene import Scene
 
 Progress = Callable[[int, int], None]
 Bits = NDArray[np.bool_]

@@ -9,7 +9,7 @@ from .common import existing_file, keep_apart, picture_file, progress
 
 if TYPE_CHECKING:
     from ..compiler.recordings.graspset import GraspSet
-    from ..simulator.handpanels import Picture
+    from ..simulator.handmaps.handpanels import Picture
 
 
 def _titled_paths(_context: click.Context, _option: click.Parameter, given: tuple[str, ...]) -> list[tuple[str, Path]]:
@@ -73,7 +73,7 @@ def command(
         _write(_without_grasps(numbers, kept), output)
         return
     from ..compiler.recordings.graspset import GraspSet
-    from ..simulator.handpanels import contacts
+    from ..simulator.handmaps.handpanels import contacts
 
     grasp_set = GraspSet.load(grasps)
     _write(_placements(grasp_set, prune) if choose else contacts(grasp_set, per_grasp), output)
@@ -95,7 +95,7 @@ def _check_options(
 
 
 def _without_grasps(numbers: bool, kept: list[tuple[str, Path]]) -> "Picture":
-    from ..simulator import handpanels
+    from ..simulator.handmaps import handpanels
     from .kept_files import kept_names
 
     if not kept:
@@ -108,8 +108,8 @@ def _placements(grasp_set: "GraspSet", prune: int) -> "Picture":
     import numpy as np
 
     from ..compiler.placement.placement import place
-    from ..simulator.handmap import hand_map
-    from ..simulator.handpanels import kept
+    from ..simulator.handmaps.handmap import hand_map
+    from ..simulator.handmaps.handpanels import kept
 
     hand_map().numbers_of(grasp_set.switch_names)  # a foreign set is refused before a tree is grown
     subjects = np.unique(grasp_set.subjects).tolist()
@@ -126,7 +126,7 @@ def _placements(grasp_set: "GraspSet", prune: int) -> "Picture":
 
 def _write(picture: "Picture", path: Path) -> None:
     from ..runtime.files import write_atomically
-    from ..simulator.draw import draw
+    from ..simulator.handmaps.draw import draw
 
     with progress(f"drawing {path.name}"):
         data = draw(picture, path.suffix.lower()[1:])

@@ -56,6 +56,8 @@ def _print(summary: "Summary", path: Path) -> None:
         f"subjects {len(summary.subjects)}, objects {len(summary.objects)}, "
         f"switches {len(summary.switches)}, joints {len(summary.joints)}"
     )
+    if summary.simulated:
+        click.echo(f"simulated: {summary.simulated}")
     _print_counts(summary)
     _print_joints(summary)
     _print_separability(summary)

@@ -11,7 +11,7 @@ import msgspec
 from .common import json_flag, keep_apart, output_file, print_json, progress
 
 if TYPE_CHECKING:
-    from ..simulator.scene import Scene
+    from ..simulator.scenes.scene import Scene
 
 _MODES = ("--output", "--explain", "--ablate", "--list")
 
@@ -86,8 +86,8 @@ def _check_modes(scene: str | None, given: tuple[object, ...], *, keep_unsettled
 def _load(name: str, repetitions: int | None, seed: int | None, subjects: tuple[str, ...]) -> "Scene":
     """Return the scene, changed as asked for. Raises SceneError if it is none, or has no such subject."""
     from ..compiler.recordings.names import nearest
-    from ..simulator.decode import load_scene
     from ..simulator.errors import SceneError
+    from ..simulator.scenes.decode import load_scene
 
     scene = load_scene(name)
     known = {subject.name: subject for subject in scene.subjects}
@@ -105,8 +105,8 @@ def _load(name: str, repetitions: int | None, seed: int | None, subjects: tuple[
 @contextmanager
 def _located(name: str) -> Iterator[None]:
     """Say of what is wrong with a scene in which file and line it stands."""
-    from ..simulator.decode import located
     from ..simulator.errors import SceneError
+    from ..simulator.scenes.decode import located
 
     try:
         yield
@@ -115,7 +115,7 @@ def _located(name: str) -> Iterator[None]:
 
 
 def _simulate(scene: "Scene", output: Path, jobs: int, *, keep_unsettled: bool, as_json: bool) -> None:
-    from ..simulator.simulation import simulate
+    from ..simulator.running.simulation import simulate
 
     with progress(f"simulating {scene.name}") as report:
         simulated = simulate(scene, jobs, report, keep_unsettled=keep_unsettled)
@@ -129,7 +129,7 @@ def _simulate(scene: "Scene", output: Path, jobs: int, *, keep_unsettled: bool, 
 
 
 def _explain(scene: "Scene", jobs: int, *, as_json: bool) -> None:
-    from ..simulator.explain import explain
+    from ..simulator.running.explain import explain
 
     explanation = explain(scene, jobs)
     if as_json:

@@ -5,10 +5,10 @@ from pathlib import Path
 from rich.table import Table
 from rich.text import Text
 
-from ..simulator.explain import Explanation
-from ..simulator.pipeline import DEFAULT_CONTACT
-from ..simulator.registry import CONTACTS
-from ..simulator.report import GraspReport, Report, StepReport
+from ..simulator.pipeline.pipeline import DEFAULT_CONTACT
+from ..simulator.pipeline.registry import CONTACTS
+from ..simulator.running.explain import Explanation
+from ..simulator.running.report import GraspReport, Report, StepReport
 from .ablation import Ablation, Change, Recognised, Variant
 from .common import err, out
 

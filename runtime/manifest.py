@@ -23,13 +23,16 @@ _T = TypeVar("_T")
 Name = Annotated[str, Meta(min_length=1)]
 
 
-class Source(Struct, frozen=True, forbid_unknown_fields=True):
-    """The recordings: SHA-256 of their content, number of rows, taxonomy, number of switches to choose from."""
+class Source(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """The recordings: SHA-256 of their content, number of rows, taxonomy, number of switches to choose from; and what
+    simulated them, which recordings leave out.
+    """
 
     fingerprint: Digest
     rows: Count
     taxonomy: str
     switches: Count
+    simulated: str = ""
 
 
 class Options(Struct, frozen=True, forbid_unknown_fields=True):

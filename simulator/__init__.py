@@ -7,12 +7,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .decode import load_scene
-    from .simulation import Simulated, simulate
+    from .running.simulation import Simulated, simulate
+    from .scenes.decode import load_scene
 
 __all__ = ["Simulated", "load_scene", "simulate"]
 
-_HOMES = {"Simulated": ".simulation", "load_scene": ".decode", "simulate": ".simulation"}
+_HOMES = {"Simulated": ".running.simulation", "load_scene": ".scenes.decode", "simulate": ".running.simulation"}
 
 
 def __getattr__(name: str) -> Any:

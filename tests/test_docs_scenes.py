@@ -8,12 +8,12 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 import msgspec
 import pytest
 
-from thenar.simulator.decode import _File, load_scene
-from thenar.simulator.population import SURVEYS, Population
-from thenar.simulator.registry import NAMES, load
-from thenar.simulator.scene import Glove, Recording, SceneObject, Subject
+from thenar.simulator.body.shapes import Box, Cylinder, Sphere
+from thenar.simulator.pipeline.registry import NAMES, load
 from thenar.simulator.scenes import shipped
-from thenar.simulator.shapes import Box, Cylinder, Sphere
+from thenar.simulator.scenes.decode import _File, load_scene
+from thenar.simulator.scenes.population import SURVEYS, Population
+from thenar.simulator.scenes.scene import Glove, Recording, SceneObject, Subject
 
 PAGE = (Path(__file__).parents[1] / "docs" / "scenes.md").read_text(encoding="utf-8")
 
@@ -96,7 +96,7 @@ def test_an_effect_has_the_parameters_defaults_and_limits_of_the_page(name: str)
         assert row["limits"] == limits(kind, key), key
 
 
-TABLES = {
+TABLES: dict[str, type[msgspec.Struct]] = {
     "key of `[recording]`": Recording,
     "key of `[glove]`": Glove,
     "key of `[population]`": Population,

@@ -41,6 +41,15 @@ ALLOWED = {
         "compiler.workers",
         "compiler.evaluation",
     ),
+    "simulator.body": ("compiler.elementary", "compiler.recordings", "simulator.streams", "simulator.body"),
+    "simulator.handmaps": (
+        "drivers.errors",
+        "compiler.elementary",
+        "compiler.recordings",
+        "compiler.pictures",
+        "simulator.body",
+        "simulator.handmaps",
+    ),
     "simulator": (
         "runtime",
         "drivers",

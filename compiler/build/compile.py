@@ -108,7 +108,13 @@ class _Steps:
 
 
 def _source(grasp_set: GraspSet) -> Source:
-    return Source(grasp_set.fingerprint(), len(grasp_set), grasp_set.taxonomy.name, len(grasp_set.switch_names))
+    return Source(
+        fingerprint=grasp_set.fingerprint(),
+        rows=len(grasp_set),
+        taxonomy=grasp_set.taxonomy.name,
+        switches=len(grasp_set.switch_names),
+        simulated=grasp_set.simulated,
+    )
 
 
 def _switches(grasp_set: GraspSet, trained: Trained) -> tuple[Switch, ...]:

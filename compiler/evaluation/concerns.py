@@ -7,7 +7,11 @@ from .populations import Population, Scheme
 
 
 def concerns(grasp_set: GraspSet, parts: tuple[Population, ...], scheme: Scheme, n_folds: int) -> tuple[str, ...]:
-    """Return a sentence for each grasp type that is alone, too rare for the folds, or tested but never trained."""
+    """Return a sentence if the grasps are simulated, and for each grasp type that is alone, too rare for the folds, or
+    tested but never trained.
+    """
+    made = grasp_set.simulated
+    simulated = [f"these grasps are simulated ({made}): the rates are not those of recorded ones"] if made else []
     alone = [
         f"subject {part.name}: every row is of {grasp_set.taxonomy.types[part.grasps[0]]}, nothing is to be told apart"
         for part in parts
@@ -16,7 +20,7 @@ def concerns(grasp_set: GraspSet, parts: tuple[Population, ...], scheme: Scheme,
     found = [text for part in parts for text in _untrained(grasp_set, part)]
     if scheme == "stratified":
         found = [text for part in parts for text in _rare(grasp_set, part, n_folds)] + found
-    return tuple(alone + found)
+    return tuple(simulated + alone + found)
 
 
 def _rare(grasp_set: GraspSet, part: Population, n_folds: int) -> list[str]:

@@ -30,13 +30,14 @@ _DTYPES = {"switches": "u1", "codes": "<u2", "grasps": "<u4", "subjects": "<u4",
 AnyGraspSet = TypeVar("AnyGraspSet", bound=GraspSet)
 
 
-class _Header(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class _Header(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     rows: int
     switches: tuple[str, ...]
     joints: tuple[Joint, ...]
     taxonomy: Taxonomy
     subjects: tuple[str, ...]
     objects: tuple[str, ...]
+    simulated: str = ""
 
 
 def save(grasp_set: GraspSet, path: Path) -> None:
@@ -63,6 +64,7 @@ def _pack(grasp_set: GraspSet) -> bytes:
         taxonomy=grasp_set.taxonomy,
         subjects=tuple(subjects.tolist()),
         objects=tuple(objects.tolist()),
+        simulated=grasp_set.simulated,
     )
     arrays: dict[str, AnyArray] = {
         "switches": np.packbits(grasp_set.switches, axis=1),
@@ -89,6 +91,7 @@ def _unpack(cls: type[AnyGraspSet], header_bytes: bytes, arrays: dict[str, AnyAr
         subjects=_names("subjects", header.subjects, arrays),
         objects=_names("objects", header.objects, arrays),
         trials=arrays["trials"].astype(np.int64),
+        simulated=header.simulated,
     )
 
 

@@ -70,6 +70,7 @@ class GraspSet:
     grasps    (n,) str         taxonomy      holds every one of them
     subjects, objects (n,) str, trials (n,) int64: who, what with, and the number of the repetition
     labels    (n,) intp        index of each grasp in taxonomy.types
+    simulated                  what simulated them; empty: they were recorded
 
     Raises RecordingError naming the array and the row that does not fit.
     """
@@ -84,6 +85,7 @@ class GraspSet:
     objects: NDArray[np.str_]
     trials: NDArray[np.int64]
     labels: NDArray[np.intp] = field(init=False)
+    simulated: str = ""
 
     def __post_init__(self) -> None:
         rows = len(self.grasps)
@@ -96,6 +98,7 @@ class GraspSet:
             self._freeze(name, np.str_, (rows,))
             check_names(name[:-1], np.unique(getattr(self, name)).tolist())
         self._freeze("trials", np.int64, (rows,))
+        check_names("simulated", filter(None, [self.simulated]))
         object.__setattr__(self, "labels", self._label())
         self.labels.setflags(write=False)
 
@@ -134,8 +137,18 @@ class GraspSet:
         """Return the set of the rows that `index` picks (numbers or a mask of n), in that order."""
         pick = np.asarray(index)
         pick = pick if pick.size else pick.astype(np.intp)
-        picked = (self.grasps[pick], self.taxonomy, self.subjects[pick], self.objects[pick], self.trials[pick])
-        return GraspSet(self.switches[pick], self.switch_names, self.codes[pick], self.joints, *picked)
+        return GraspSet(
+            switches=self.switches[pick],
+            switch_names=self.switch_names,
+            codes=self.codes[pick],
+            joints=self.joints,
+            grasps=self.grasps[pick],
+            taxonomy=self.taxonomy,
+            subjects=self.subjects[pick],
+            objects=self.objects[pick],
+            trials=self.trials[pick],
+            simulated=self.simulated,
+        )
 
     def fingerprint(self) -> str:
         """Return the SHA-256 of the content, in hex: equal for equal sets, whatever file or machine they come from."""
@@ -145,6 +158,7 @@ class GraspSet:
         digest.update(np.packbits(self.switches, axis=1).tobytes())
         digest.update(self.codes.astype("<u2").tobytes())
         digest.update(self.trials.astype("<i8").tobytes())
+        digest.update(self.simulated.encode())
         return digest.hexdigest()
 
     @classmethod

@@ -34,9 +34,14 @@ class JointRange(msgspec.Struct, frozen=True):
 
 
 class Summary(msgspec.Struct, frozen=True):
-    """A set in numbers. `balance` is the rarest grasp type's count over the commonest one's."""
+    """A set in numbers.
+
+    simulated  what simulated the grasps; empty: they were recorded
+    balance    the rarest grasp type's count over the commonest one's
+    """
 
     rows: int
+    simulated: str
     fingerprint: str
     taxonomy: str
     grasps: tuple[Count, ...]
@@ -57,6 +62,7 @@ def summarise(grasp_set: GraspSet) -> Summary:
     present = counts[counts > 0]
     return Summary(
         rows=len(grasp_set),
+        simulated=grasp_set.simulated,
         fingerprint=grasp_set.fingerprint(),
         taxonomy=grasp_set.taxonomy.name,
         grasps=tuple(count for count in grasps if count.rows),

@@ -7,12 +7,12 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from ...compiler.elementary import log
-from .. import ports
-from ..batch import Batch
-from ..effect import Effect, EffectParameters, Setting, Step
+from ..body.layout import murakami160
 from ..errors import SceneError
-from ..frames import drawn_rows
-from ..layout import murakami160
+from ..pipeline import ports
+from ..pipeline.batch import Batch
+from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.frames import drawn_rows
 from ..streams import Draw
 
 

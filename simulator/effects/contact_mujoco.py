@@ -4,10 +4,10 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from ..contact import ContactModel
-from ..effect import Effect, EffectParameters, Setting
+from ..body.layout import murakami160
+from ..contact.model import ContactModel
 from ..errors import SimMissingError
-from ..layout import murakami160
+from ..pipeline.effect import Effect, EffectParameters, Setting
 
 
 class Parameters(EffectParameters, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -48,7 +48,7 @@ EFFECT = Effect(
 def model(parameters: Parameters, setting: Setting) -> ContactModel:
     """Return the contact model. Raises SimMissingError where MuJoCo is not installed: a scene is read without it."""
     try:
-        from ..mujoco_grasp import MujocoContact
+        from ..contact.mujoco_grasp import MujocoContact
     except ImportError as missing:
         raise SimMissingError(f"contact.mujoco needs MuJoCo ({missing}): pip install 'thenar[sim]'") from missing
     return MujocoContact(parameters, murakami160())

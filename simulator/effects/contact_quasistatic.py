@@ -8,13 +8,13 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from ..contact import Contact, ContactModel, Load
-from ..effect import Effect, EffectParameters, Setting
-from ..hand import CAPSULES, Hand
-from ..layout import Switches, murakami160
-from ..pose import rotation_vector
-from ..quasistatic import Case, Rest, Skin, close
-from ..split import split
+from ..body.hand import CAPSULES, Hand
+from ..body.layout import Switches, murakami160
+from ..body.pose import rotation_vector
+from ..contact.model import Contact, ContactModel, Load
+from ..contact.quasistatic import Case, Rest, Skin, close
+from ..contact.split import split
+from ..pipeline.effect import Effect, EffectParameters, Setting
 
 _Positive = Annotated[float, msgspec.Meta(gt=0.0, le=1000.0)]
 # So many repetitions are solved at a time: enough to outweigh numpy's calls, few enough for the processor's cache.

@@ -13,10 +13,10 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from ..batch import NEVER, Batch
-from ..contact import Contact, ContactModel, Load
-from ..effect import Effect, EffectParameters, Setting, Together
+from ..contact.model import Contact, ContactModel, Load
 from ..errors import SceneError
+from ..pipeline.batch import NEVER, Batch
+from ..pipeline.effect import Effect, EffectParameters, Setting, Together
 from ..streams import Draw
 
 Floats = NDArray[np.float64]

@@ -5,9 +5,9 @@ from typing import Annotated
 import numpy as np
 from msgspec import Meta
 
-from ..batch import Batch
-from ..effect import Effect, EffectParameters, Setting, Step
-from ..frames import drawn_rows
+from ..pipeline.batch import Batch
+from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.frames import drawn_rows
 from ..streams import Draw
 
 

@@ -5,8 +5,8 @@ from typing import Annotated
 from msgspec import Meta
 
 from ...compiler.elementary import exp
-from ..batch import Batch
-from ..effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.batch import Batch
+from ..pipeline.effect import Effect, EffectParameters, Setting, Step
 from ..streams import Draw
 
 

@@ -7,8 +7,8 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from ...compiler.elementary import sincos
-from ..batch import Batch
-from ..effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.batch import Batch
+from ..pipeline.effect import Effect, EffectParameters, Setting, Step
 from ..streams import Draw
 
 Floats = NDArray[np.float64]

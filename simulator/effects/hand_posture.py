@@ -5,9 +5,9 @@ from typing import Annotated
 import numpy as np
 from msgspec import Meta
 
-from ..batch import Batch
-from ..effect import Effect, EffectParameters, Setting, Step
-from ..hand import DOF, LIMITS_DEG
+from ..body.hand import DOF, LIMITS_DEG
+from ..pipeline.batch import Batch
+from ..pipeline.effect import Effect, EffectParameters, Setting, Step
 from ..streams import Draw
 
 

@@ -6,9 +6,9 @@ import numpy as np
 from msgspec import Meta
 
 from ...compiler.elementary import exp
-from ..batch import Batch
-from ..effect import Effect, EffectParameters, Setting, Step
-from ..hand import DOF, LIMITS_DEG
+from ..body.hand import DOF, LIMITS_DEG
+from ..pipeline.batch import Batch
+from ..pipeline.effect import Effect, EffectParameters, Setting, Step
 from ..streams import Draw
 
 _Degrees = Annotated[float, Meta(ge=0.0, le=45.0)]

@@ -11,11 +11,11 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from ..batch import Batch
-from ..cyberglove import sensors_deg
-from ..effect import Effect, EffectParameters, Setting, Step
+from ..body.cyberglove import sensors_deg
+from ..body.hand import DOF, LIMITS_DEG
 from ..errors import SceneError
-from ..hand import DOF, LIMITS_DEG
+from ..pipeline.batch import Batch
+from ..pipeline.effect import Effect, EffectParameters, Setting, Step
 from ..streams import Draw
 
 Floats = NDArray[np.float64]

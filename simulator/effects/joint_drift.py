@@ -4,9 +4,9 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from ..batch import Batch
-from ..cyberglove import SENSORS
-from ..effect import Effect, EffectParameters, Setting, Step
+from ..body.cyberglove import SENSORS
+from ..pipeline.batch import Batch
+from ..pipeline.effect import Effect, EffectParameters, Setting, Step
 from ..streams import Draw
 
 

@@ -8,10 +8,10 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from ..batch import Batch
-from ..cyberglove import SENSORS
-from ..effect import Effect, EffectParameters, Setting, Step
-from ..frames import drawn_rows
+from ..body.cyberglove import SENSORS
+from ..pipeline.batch import Batch
+from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.frames import drawn_rows
 from ..streams import Draw
 
 _Degrees = Annotated[float, Meta(ge=0.0, le=45.0)]

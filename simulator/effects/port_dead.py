@@ -10,11 +10,11 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from .. import ports
-from ..batch import Batch
-from ..effect import Effect, EffectParameters, Setting, Step
+from ..body.layout import murakami160
 from ..errors import SceneError
-from ..layout import murakami160
+from ..pipeline import ports
+from ..pipeline.batch import Batch
+from ..pipeline.effect import Effect, EffectParameters, Setting, Step
 from ..streams import Draw
 
 Bits = NDArray[np.bool_]

@@ -11,8 +11,8 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from ..batch import NEVER, Batch
-from ..effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.batch import NEVER, Batch
+from ..pipeline.effect import Effect, EffectParameters, Setting, Step
 from ..streams import Draw
 
 Bits = NDArray[np.bool_]

@@ -8,9 +8,9 @@ its own row was read: what changes from one row to the next (bus.latency) is not
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import ports
-from ..batch import Batch
-from ..effect import Effect, EffectParameters, Setting, Step
+from ..pipeline import ports
+from ..pipeline.batch import Batch
+from ..pipeline.effect import Effect, EffectParameters, Setting, Step
 from ..streams import Draw
 
 Bits = NDArray[np.bool_]

@@ -1,9 +1,9 @@
 """Switches that are always closed: a short circuit, a dome that is jammed."""
 
-from ..batch import Batch
-from ..effect import Effect, Setting, Step
+from ..pipeline.batch import Batch
+from ..pipeline.effect import Effect, Setting, Step
+from ..pipeline.stuck import StuckParameters, chooser
 from ..streams import Draw
-from ..stuck import StuckParameters, chooser
 
 
 class Parameters(StuckParameters, frozen=True):

@@ -5,8 +5,8 @@ from typing import Annotated
 import numpy as np
 from msgspec import Meta
 
-from ..batch import Batch
-from ..effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.batch import Batch
+from ..pipeline.effect import Effect, EffectParameters, Setting, Step
 from ..streams import Draw
 
 # No tact switch closes by itself. Ours.

@@ -7,9 +7,9 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from ..batch import Batch
-from ..effect import Effect, EffectParameters, Setting, Step
-from ..frames import drawn_rows
+from ..pipeline.batch import Batch
+from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.frames import drawn_rows
 from ..streams import Draw
 
 Bytes = NDArray[np.uint8]

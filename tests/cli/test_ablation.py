@@ -9,8 +9,8 @@ from thenar.compiler.evaluation.errors import EvaluationError
 from thenar.compiler.evaluation.study import Options, evaluate
 from thenar.simulator import load_scene, simulate
 from thenar.simulator.effects.contact_quasistatic import Parameters
-from thenar.simulator.registry import load
-from thenar.simulator.scene import Listed, Scene
+from thenar.simulator.pipeline.registry import load
+from thenar.simulator.scenes.scene import Listed, Scene
 
 KEPT = ("hand.posture", "joint.noise")
 # So much noise that it matters to joints, and to nothing else.

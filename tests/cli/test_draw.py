@@ -7,7 +7,7 @@ import pytest
 from thenar.cli import run
 from thenar.compiler import GraspSet, compile_build, grow_id3
 from thenar.compiler.recordings.taxonomy import own
-from thenar.simulator.layout import murakami160
+from thenar.simulator.body.layout import murakami160
 
 NAMES = tuple(patch.name for patch in murakami160())
 

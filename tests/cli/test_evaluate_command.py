@@ -155,7 +155,7 @@ def test_an_install_without_the_extra_says_what_is_missing(
     grasps: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setitem(sys.modules, "joblib", None)
-    assert run(["evaluate", grasps, *QUICK]) == 2
+    assert run(["evaluate", grasps, *QUICK, "--jobs", "2"]) == 2
     assert capsys.readouterr().err == "thenar: joblib is not installed: pip install 'thenar[compiler]'\n"
 
 

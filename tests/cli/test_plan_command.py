@@ -10,7 +10,7 @@ import pytest
 
 from thenar.cli import run
 from thenar.simulator import load_scene
-from thenar.simulator.postures import Postures
+from thenar.simulator.planning.postures import Postures
 from thenar.simulator.scenes import shipped
 
 Captured = pytest.CaptureFixture[str]

@@ -5,14 +5,14 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 import pytest
 
-from thenar.simulator.anthropometry import Size
-from thenar.simulator.batch import Batch
-from thenar.simulator.condition import Condition, Held, Pad, Thing
-from thenar.simulator.effect import EffectParameters, Setting
-from thenar.simulator.hand import Hand
-from thenar.simulator.registry import NAMES, load
-from thenar.simulator.scene import Glove, Listed, Recording, Scene, SceneObject, Subject
-from thenar.simulator.shapes import Cylinder
+from thenar.simulator.body.anthropometry import Size
+from thenar.simulator.body.condition import Condition, Held, Pad, Thing
+from thenar.simulator.body.hand import Hand
+from thenar.simulator.body.shapes import Cylinder
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.effect import EffectParameters, Setting
+from thenar.simulator.pipeline.registry import NAMES, load
+from thenar.simulator.scenes.scene import Glove, Listed, Recording, Scene, SceneObject, Subject
 from thenar.simulator.streams import Draw, Draws, Site
 
 BAR = Cylinder(diameter_mm=40.0, length_mm=120.0)

@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thenar.simulator.batch import Batch
-from thenar.simulator.ledger import Ledger
-from thenar.simulator.pipeline import Pipeline, compile_pipeline
-from thenar.simulator.registry import CONTACTS, NAMES, load
-from thenar.simulator.scene import Scene
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.ledger import Ledger
+from thenar.simulator.pipeline.pipeline import Pipeline, compile_pipeline
+from thenar.simulator.pipeline.registry import CONTACTS, NAMES, load
+from thenar.simulator.scenes.scene import Scene
 from thenar.simulator.streams import Draw
 
 SceneMaker = Callable[..., Scene]

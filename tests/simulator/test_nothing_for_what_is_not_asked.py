@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from thenar.simulator.batch import Batch
-from thenar.simulator.ledger import Ledger
-from thenar.simulator.pipeline import compile_pipeline
-from thenar.simulator.registry import NAMES
-from thenar.simulator.scene import Scene
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.ledger import Ledger
+from thenar.simulator.pipeline.pipeline import compile_pipeline
+from thenar.simulator.pipeline.registry import NAMES
+from thenar.simulator.scenes.scene import Scene
 
 ONE = (
     "hand.style",
@@ -64,9 +64,9 @@ small = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(small)
 
 import thenar.simulator.effects
-from thenar.simulator.ledger import Ledger
-from thenar.simulator.pipeline import compile_pipeline
-from thenar.simulator.registry import NAMES
+from thenar.simulator.pipeline.ledger import Ledger
+from thenar.simulator.pipeline.pipeline import compile_pipeline
+from thenar.simulator.pipeline.registry import NAMES
 
 batch, ledger = small._batch(range(2)), Ledger()
 tracemalloc.start()
@@ -162,12 +162,12 @@ def test_what_only_some_effects_need_is_imported_for_these_alone(audits: dict[tu
     bare = audited(())
     needed = {
         "mujoco": (OTHER,),
-        "thenar.simulator.mujoco_grasp": (OTHER,),
-        "thenar.simulator.quasistatic": (ONE, ()),
-        "thenar.simulator.wire": (ONE, OTHER),
+        "thenar.simulator.contact.mujoco_grasp": (OTHER,),
+        "thenar.simulator.contact.quasistatic": (ONE, ()),
+        "thenar.simulator.pipeline.wire": (ONE, OTHER),
         "thenar.drivers.scanner_frame": (ONE, OTHER),
-        "thenar.simulator.stuck": (ONE, OTHER),
-        "thenar.simulator.ports": (ONE, OTHER),
+        "thenar.simulator.pipeline.stuck": (ONE, OTHER),
+        "thenar.simulator.pipeline.ports": (ONE, OTHER),
     }
     for module, scenes in needed.items():
         for listed, audit in {**audits, (): bare}.items():

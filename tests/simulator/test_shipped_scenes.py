@@ -3,12 +3,12 @@
 import pytest
 from msgspec.structs import replace
 
-from thenar.simulator.decode import load_scene
-from thenar.simulator.effect import EffectParameters
-from thenar.simulator.pipeline import compile_pipeline
-from thenar.simulator.postures import Postures
-from thenar.simulator.scene import Scene, Subject
+from thenar.simulator.pipeline.effect import EffectParameters
+from thenar.simulator.pipeline.pipeline import compile_pipeline
+from thenar.simulator.planning.postures import Postures
 from thenar.simulator.scenes import shipped
+from thenar.simulator.scenes.decode import load_scene
+from thenar.simulator.scenes.scene import Scene, Subject
 
 MEN = {"A": (188, 84), "B": (196, 89), "C": (181, 81), "D": (185, 83), "E": (192, 86), "F": (199, 91)}
 FAULTS = {

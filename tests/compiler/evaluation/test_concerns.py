@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -61,3 +62,9 @@ def test_a_subject_of_one_grasp_type_is_named(make_grasps: Make) -> None:
     only = grasps.rows(np.flatnonzero((grasps.subjects == "B") | (grasps.grasps == "tip")))
     (text,) = concerns(only, populations(only, "stratified", 4, 1, 1), "stratified", 4)
     assert text == "subject A: every row is of tip, nothing is to be told apart"
+
+
+def test_rates_of_simulated_grasps_are_called_that(make_grasps: Make) -> None:
+    simulated = replace(make_grasps(), simulated="scene quick, seed 1")
+    (text,) = concerns(simulated, populations(simulated, "stratified", 4, 1, 1), "stratified", 4)
+    assert text.startswith("these grasps are simulated (scene quick, seed 1)")

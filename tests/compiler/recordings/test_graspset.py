@@ -134,3 +134,11 @@ def test_code_is_the_inverse_of_value(data: st.DataObject, grasp_sets: st.Search
 def test_a_calibration_that_is_no_line_is_refused(points: tuple[int, float, int, float], reason: str) -> None:
     with pytest.raises(RecordingError, match=reason):
         Joint("index", "deg", *points)
+
+
+def test_a_simulated_set_says_so_and_is_another_set_than_the_same_recorded(small: GraspSet, tmp_path: Path) -> None:
+    simulated = GraspSet(**fields(small) | {"simulated": "scene quick, seed 1"})
+    simulated.save(tmp_path / "set.grasps")
+    assert GraspSet.load(tmp_path / "set.grasps").simulated == "scene quick, seed 1"
+    assert simulated.rows([0]).simulated == simulated.simulated
+    assert simulated.fingerprint() != small.fingerprint()

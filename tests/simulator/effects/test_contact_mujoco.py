@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -13,16 +14,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from thenar.simulator.anthropometry import Size
-from thenar.simulator.condition import Condition, Held, Pad, Thing
-from thenar.simulator.contact import Contact, Load
-from thenar.simulator.effect import Setting
+from thenar.simulator.body.anthropometry import Size
+from thenar.simulator.body.condition import Condition, Held, Pad, Thing
+from thenar.simulator.body.hand import CAPSULES, DOF, LIMITS_DEG, Hand
+from thenar.simulator.body.pose import Pose
+from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
+from thenar.simulator.contact.grip import GRAVITY, STIFFNESS, torques
+from thenar.simulator.contact.model import Contact, Load
+from thenar.simulator.contact.mujoco_model import build
 from thenar.simulator.effects.contact_mujoco import Parameters, model
-from thenar.simulator.grip import GRAVITY, STIFFNESS, torques
-from thenar.simulator.hand import CAPSULES, DOF, LIMITS_DEG, Hand
-from thenar.simulator.mujoco_model import build
-from thenar.simulator.pose import Pose
-from thenar.simulator.shapes import Box, Cylinder, Shape, Sphere
+from thenar.simulator.pipeline.effect import Setting
 
 SIZES = st.builds(Size, length_mm=st.floats(150.0, 220.0), breadth_mm=st.floats(65.0, 100.0))
 ANGLES = arrays(np.float64, 20, elements=st.floats(0.0, 1.0)).map(
@@ -55,7 +56,7 @@ def told(condition: Condition, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarr
 def solve(make_setting: Callable[..., Setting]) -> Callable[..., Contact]:
     """Return a function that closes n hands, under parameters of its own."""
 
-    def solve(condition: Condition, n: int = 4, **parameters: float) -> Contact:
+    def solve(condition: Condition, n: int = 4, **parameters: Any) -> Contact:
         return model(Parameters(**parameters), make_setting()).solve([Load(condition, *told(condition, n))])[0]
 
     return solve
@@ -289,7 +290,7 @@ WITHOUT_MUJOCO = """
 import sys
 sys.modules["mujoco"] = None
 from thenar.simulator.errors import SimMissingError
-from thenar.simulator.registry import load
+from thenar.simulator.pipeline.registry import load
 effect = load("contact.mujoco")
 parameters = effect.Parameters(steps=3)
 try:

@@ -7,16 +7,16 @@ import msgspec
 import numpy as np
 import pytest
 
-from thenar.simulator.batch import Batch
-from thenar.simulator.condition import Condition
-from thenar.simulator.contact import Contact, ContactModel, Load
-from thenar.simulator.decode import load_scene
-from thenar.simulator.effect import Setting
+from thenar.simulator.body.condition import Condition
+from thenar.simulator.body.layout import murakami160
+from thenar.simulator.body.pose import Pose
+from thenar.simulator.contact.model import Contact, ContactModel, Load
 from thenar.simulator.effects.contact_quasistatic import EFFECT, Parameters, model
-from thenar.simulator.layout import murakami160
-from thenar.simulator.pose import Pose
-from thenar.simulator.postures import Postures
-from thenar.simulator.session import sessions
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.effect import Setting
+from thenar.simulator.planning.postures import Postures
+from thenar.simulator.running.session import sessions
+from thenar.simulator.scenes.decode import load_scene
 
 FIELDS = ("posture_deg", "pose", "forces_n", "capsules_n", "between_n", "settled", "residual_n", "residual_nmm")
 

@@ -4,10 +4,10 @@ import msgspec
 import numpy as np
 import pytest
 
-from thenar.simulator.batch import Batch
-from thenar.simulator.effect import Setting
 from thenar.simulator.effects.frame_jitter import Parameters, prepare
-from thenar.simulator.frames import frame_times, hold_frame
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.effect import Setting
+from thenar.simulator.pipeline.frames import frame_times, hold_frame
 
 MakeBatch = Callable[..., Batch]
 

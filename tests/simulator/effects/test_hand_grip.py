@@ -4,9 +4,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from thenar.simulator.batch import Batch
-from thenar.simulator.effect import Setting
 from thenar.simulator.effects.hand_grip import EFFECT, Parameters, prepare
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.effect import Setting
 from thenar.simulator.streams import Draw
 
 

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from thenar.simulator.batch import Batch
-from thenar.simulator.effect import Setting
 from thenar.simulator.effects.hand_object_pose import EFFECT, Parameters, prepare, turned
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.effect import Setting
 from thenar.simulator.streams import Draw
 
 VECTORS = arrays(np.float64, (3, 3), elements=st.floats(-1.8, 1.8))  # up to half a turn

@@ -6,10 +6,10 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.batch import Batch
-from thenar.simulator.effect import Setting
+from thenar.simulator.body.hand import LIMITS_DEG
 from thenar.simulator.effects.hand_posture import EFFECT, Parameters, prepare
-from thenar.simulator.hand import LIMITS_DEG
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.effect import Setting
 from thenar.simulator.streams import Draw
 
 

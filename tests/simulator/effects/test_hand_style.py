@@ -5,11 +5,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from thenar.simulator.batch import Batch
-from thenar.simulator.condition import Condition
-from thenar.simulator.effect import Setting
+from thenar.simulator.body.condition import Condition
+from thenar.simulator.body.hand import LIMITS_DEG
 from thenar.simulator.effects.hand_style import EFFECT, Parameters, prepare
-from thenar.simulator.hand import LIMITS_DEG
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.effect import Setting
 from thenar.simulator.streams import Draw
 
 # Far from all limits, so that nothing is clipped unless a test wants it.

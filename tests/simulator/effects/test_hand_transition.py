@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.batch import Batch
-from thenar.simulator.cyberglove import sensors_deg
-from thenar.simulator.effect import Setting
+from thenar.simulator.body.cyberglove import sensors_deg
+from thenar.simulator.body.hand import DOF, LIMITS_DEG
 from thenar.simulator.effects.hand_transition import Parameters, path, prepare
 from thenar.simulator.errors import SceneError
-from thenar.simulator.hand import DOF, LIMITS_DEG
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.effect import Setting
 
 MakeBatch = Callable[..., Batch]
 

@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from thenar.simulator.batch import Batch
-from thenar.simulator.condition import Condition
-from thenar.simulator.effect import Setting
+from thenar.simulator.body.condition import Condition
 from thenar.simulator.effects.joint_drift import EFFECT, Parameters, prepare
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.effect import Setting
 from thenar.simulator.streams import Draw
 
 Drift = Callable[..., np.ndarray]

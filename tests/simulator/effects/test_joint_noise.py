@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from thenar.simulator.batch import Batch
-from thenar.simulator.effect import Setting
 from thenar.simulator.effects.joint_noise import EFFECT, Parameters, prepare
-from thenar.simulator.frames import frame_times, hold_frame
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.effect import Setting
+from thenar.simulator.pipeline.frames import frame_times, hold_frame
 from thenar.simulator.streams import Draw
 
 Noise = Callable[..., np.ndarray]

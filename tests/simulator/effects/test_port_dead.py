@@ -4,10 +4,10 @@ import msgspec
 import numpy as np
 import pytest
 
-from thenar.simulator.batch import Batch
-from thenar.simulator.condition import Condition
+from thenar.simulator.body.condition import Condition
 from thenar.simulator.effects.port_dead import Parameters, prepare
 from thenar.simulator.errors import SceneError
+from thenar.simulator.pipeline.batch import Batch
 
 MakeBatch = Callable[..., Batch]
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.batch import NEVER, Batch
 from thenar.simulator.effects.switch_bounce import Parameters, prepare
+from thenar.simulator.pipeline.batch import NEVER, Batch
 
 ON_US, OFF_US = 20_000, 100_000
 

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from thenar.simulator.effects import port_dead, switch_stuck_closed, switch_stuck_open
 from thenar.simulator.effects.switch_ghosting import Parameters, joined, prepare
-from thenar.simulator.ledger import Ledger
-from thenar.simulator.pipeline import compile_pipeline
-from thenar.simulator.scene import Glove
+from thenar.simulator.pipeline.ledger import Ledger
+from thenar.simulator.pipeline.pipeline import compile_pipeline
+from thenar.simulator.scenes.scene import Glove
 
 
 def searched(bits: np.ndarray) -> np.ndarray:

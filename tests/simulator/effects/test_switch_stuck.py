@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.batch import Batch
-from thenar.simulator.condition import Condition
-from thenar.simulator.effect import Setting
+from thenar.simulator.body.condition import Condition
+from thenar.simulator.body.layout import murakami160
 from thenar.simulator.effects import switch_stuck_closed, switch_stuck_open
 from thenar.simulator.errors import SceneError
-from thenar.simulator.layout import murakami160
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.effect import Setting
 from thenar.simulator.streams import Draw
 
 BOTH = [(switch_stuck_open, False), (switch_stuck_closed, True)]

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.batch import Batch
-from thenar.simulator.condition import Condition
-from thenar.simulator.effect import Setting
+from thenar.simulator.body.condition import Condition
 from thenar.simulator.effects.switch_threshold import EFFECT, LEAST_N, Parameters, prepare
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.effect import Setting
 from thenar.simulator.streams import Draw
 
 Thresholds = Callable[..., np.ndarray]

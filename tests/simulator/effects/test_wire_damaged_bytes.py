@@ -4,10 +4,10 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.batch import Batch
-from thenar.simulator.effect import Setting
 from thenar.simulator.effects.wire_damaged_bytes import Parameters, damaged, prepare
-from thenar.simulator.traffic import Traffic
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.effect import Setting
+from thenar.simulator.pipeline.traffic import Traffic
 
 MakeBatch = Callable[..., Batch]
 

@@ -4,10 +4,10 @@ import msgspec
 import numpy as np
 import pytest
 
-from thenar.simulator.batch import Batch
-from thenar.simulator.effect import Setting
 from thenar.simulator.effects.wire_lost_bytes import Parameters, arrives, prepare
-from thenar.simulator.traffic import Traffic
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.effect import Setting
+from thenar.simulator.pipeline.traffic import Traffic
 
 MakeBatch = Callable[..., Batch]
 

@@ -1,0 +1,1 @@
+"""What is simulated: hands, gloves and objects, and how they lie."""

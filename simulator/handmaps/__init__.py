@@ -1,0 +1,1 @@
+"""Hand maps: the glove as one sees one's own palm."""

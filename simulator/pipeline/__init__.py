@@ -1,0 +1,1 @@
+"""Effects and the glove's own steps, compiled from a scene into one list, and what they work on."""

@@ -1,0 +1,73 @@
+"""A batch: repetitions of one condition on their way through the pipeline."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..body.condition import Condition
+from .traffic import Traffic
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Bits = NDArray[np.bool_]
+
+# The time of a switch that never closes or never opens.
+NEVER = np.iinfo(np.int64).max
+
+
+@dataclass(slots=True, eq=False)
+class Batch:
+    """n repetitions, s switches, F frames. A field is there once a step has written it, not before.
+
+    Time runs from the first contact of a repetition, in microseconds; the transition before it is negative.
+
+    repetitions (n,)      their numbers within the condition, from 0
+    trials      (n,)      their places in the subject's session, from 0
+    previous_deg (n, 20)  the planned posture of the trial before, where the hand comes from
+    posture_deg (n, 20)   joint angles; first as commanded, then as settled by the contact model
+    pose        (n, 6)    the object in hand axes: mm, rotation vector in radians; likewise
+    commanded_deg, commanded_pose  what the contact model was told, (n, 20) and (n, 6)
+    grip_n      (n,)      the force that the pads share
+    forces_n    (n, s)    on every switch at full grip
+    settled     (n,)      False where the contact model gave up: such a repetition is reported, never kept in silence
+    residual_n, residual_nmm (n,)   force and moment on the object that nothing balances
+    between_n   (n,)      pressed on skin between the switches
+    thresholds_n (s,)     what closes each switch
+    on_us, off_us (n, s)  when each switch closes and opens; NEVER
+    frame_us    (n, F)    when each frame's scan begins
+    delay_us              how much later each switch is read, as broadcasts to (n, F, s); None: at once
+    bits        (n, F, s) what the scanner reads
+    sensors_deg (n, F, 18) what the CyberGlove's sensors feel
+    raw         (n, F, 18) uint8, its bytes, 1 to 255
+    traffic               the bytes on the serial lines, while they are there
+    lost        (n, F)    frames that did not arrive
+    """
+
+    condition: Condition
+    repetitions: Integers
+    trials: Integers
+    previous_deg: Floats
+    posture_deg: Floats = field(init=False)
+    pose: Floats = field(init=False)
+    commanded_deg: Floats = field(init=False)
+    commanded_pose: Floats = field(init=False)
+    grip_n: Floats = field(init=False)
+    forces_n: Floats = field(init=False)
+    settled: Bits = field(init=False)
+    residual_n: Floats = field(init=False)
+    residual_nmm: Floats = field(init=False)
+    between_n: Floats = field(init=False)
+    thresholds_n: Floats = field(init=False)
+    on_us: Integers = field(init=False)
+    off_us: Integers = field(init=False)
+    frame_us: Integers = field(init=False)
+    delay_us: Integers | None = None
+    bits: Bits = field(init=False)
+    sensors_deg: Floats = field(init=False)
+    raw: NDArray[np.uint8] = field(init=False)
+    traffic: Traffic = field(init=False)
+    lost: Bits | None = None
+
+    def __len__(self) -> int:
+        return len(self.repetitions)

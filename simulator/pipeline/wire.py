@@ -1,0 +1,169 @@
+"""The serial lines: frames sent as bytes, and what a driver makes of the bytes that arrive.
+
+Two lines of 115200 baud, 8 data bits, no parity, one stop bit: the scanner's STATE frames and the CyberGlove's streamed
+records, which the glove sends once it has digitised its sensors one by one: hence its 160 records a second at most.
+Between `SEND` and `RECEIVE` the wire effects do what they will with the bytes.
+"""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...drivers import cyberglove_frame as glove
+from ...drivers import scanner_frame as scanner
+from ..body.layout import murakami160
+from ..errors import SceneError
+from ..streams import Draw
+from .batch import Batch
+from .effect import Effect, Setting, Step
+from .traffic import Traffic
+
+Bits = NDArray[np.bool_]
+Bytes = NDArray[np.uint8]
+Integers = NDArray[np.int64]
+# Chunks of bytes in, what the frames they complete carry out.
+Feed = Callable[[bytes], list[bytes]]
+
+BAUD = 115_200
+_BITS_A_BYTE = 10
+# What the vendor's manual says of a sensor, as a public driver quotes it; its filter, which takes more, is off.
+_DIGITISED_US = 250 * glove.SENSORS
+
+
+def _send(setting: Setting) -> Step:
+    _check_rate(setting)
+
+    def send(batch: Batch, draw: Draw) -> None:
+        """Put bits on the line once their scan is through, raw once it is digitised from the frame's beginning on."""
+        scanned = batch.frame_us if batch.delay_us is None else batch.frame_us + batch.delay_us.max(axis=-1)
+        states, records = _states(batch.bits), _records(batch.raw)
+        data = np.concatenate([states, records], axis=2)
+        at_us = [_arrivals(scanned, states.shape[2]), _arrivals(batch.frame_us + _DIGITISED_US, records.shape[2])]
+        batch.traffic = Traffic(data, np.concatenate(at_us, axis=2), np.ones(data.shape, np.bool_), states.shape[2])
+        draw.count("bytes sent", data.size)
+
+    return send
+
+
+def _check_rate(setting: Setting) -> None:
+    state_us = _sent_us((len(murakami160()) + 7) // 8 + scanner.OVERHEAD)
+    longest = max(state_us, _DIGITISED_US + _sent_us(glove.SENSORS + glove.OVERHEAD))
+    if setting.timed and setting.period_us < longest:
+        raise SceneError(
+            f"recording.rate_hz: {1e6 / setting.period_us:g} frames a second are more than the glove's serial lines"
+            f" deliver: one takes {longest} us; ask for at most {1_000_000 // longest}, or list no wire effects"
+        )
+
+
+def _receive(setting: Setting) -> Step:
+    return receive
+
+
+def receive(batch: Batch, draw: Draw) -> None:
+    """Decode what arrived, as a driver does, and take for each frame the newest there is by the time it is due.
+
+    A switch frame or glove record that did not arrive leaves the one before it in place. Before the first: no contact,
+    and the joints of the first to come. A repetition to which one of the lines brought nothing at all is not `settled`.
+    """
+    traffic, switches = batch.traffic, batch.bits.shape[2]
+    states, state_came = _received(traffic, slice(0, traffic.scanner), (switches + 7) // 8, _payloads)
+    records, record_came = _received(traffic, slice(traffic.scanner, None), glove.SENSORS, _sensors)
+    state, record = _newest(state_came), _newest(record_came)
+    record = np.where(record >= 0, record, np.argmax(record_came, axis=1)[:, None])
+    bits = scanner.unpack_bits(np.take_along_axis(states, np.maximum(state, 0)[:, :, None], axis=1), switches)
+    batch.bits = bits & (state >= 0)[:, :, None]
+    batch.raw = np.take_along_axis(records, record[:, :, None], axis=1)
+    batch.lost = ~(state_came & record_came)
+    batch.settled = batch.settled & state_came.any(axis=1) & record_came.any(axis=1)
+
+
+def _states(bits: Bits) -> Bytes:
+    sent = [
+        scanner.encode(scanner.Frame(scanner.STATE, number & 0xFF, payload.tobytes()))
+        for repetition in scanner.pack_bits(bits)
+        for number, payload in enumerate(repetition)
+    ]
+    return _matrix(sent, bits.shape[:2])
+
+
+def _records(raw: Bytes) -> Bytes:
+    return _matrix([glove.encode(glove.Record(one.tobytes())) for some in raw for one in some], raw.shape[:2])
+
+
+def _matrix(sent: list[bytes], shape: tuple[int, ...]) -> Bytes:
+    return np.frombuffer(b"".join(sent), dtype=np.uint8).reshape(*shape, -1)
+
+
+def _arrivals(ready_us: Integers, size: int) -> Integers:
+    """Return when each byte (n, F, size) is in, of frames ready at (n, F): each waits until the one before is out."""
+    turn = np.arange(ready_us.shape[1]) * _sent_us(size)
+    starts = np.maximum.accumulate(ready_us - turn, axis=1) + turn
+    times: Integers = starts[:, :, None] + np.array([_sent_us(count) for count in range(1, size + 1)])
+    return times
+
+
+def _sent_us(size: int) -> int:
+    return -(-size * _BITS_A_BYTE * 1_000_000 // BAUD)
+
+
+def _received(traffic: Traffic, line: slice, width: int, decoder: Callable[[], Feed]) -> tuple[Bytes, Bits]:
+    """Return what arrived in time for each frame (n, F, width), and whether anything did (n, F)."""
+    at_us, arrives = traffic.at_us[:, :, line], traffic.arrives[:, :, line]
+    values = np.ones((*at_us.shape[:2], width), dtype=np.uint8)
+    came = np.zeros(at_us.shape[:2], dtype=np.bool_)
+    for row, (data, times, through) in enumerate(zip(traffic.data[:, :, line], at_us, arrives, strict=True)):
+        decoded = [pair for pair in _decoded(data[through], times[through], decoder()) if len(pair[1]) == width]
+        frames = np.searchsorted(times[:, -1], [time for time, _ in decoded])
+        whole = b"".join([value for _, value in decoded])
+        values[row, frames] = np.frombuffer(whole, dtype=np.uint8).reshape(-1, width)
+        came[row, frames] = True
+    return values, came
+
+
+def _decoded(data: Bytes, at_us: Integers, feed: Feed) -> Iterator[tuple[int, bytes]]:
+    """Yield what each frame carries, and when its last byte was in; like a driver's, a reading goes up to a zero."""
+    start, whole = 0, data.tobytes()
+    for zero in np.flatnonzero(data == 0).tolist():
+        for value in feed(whole[start : zero + 1]):
+            yield int(at_us[zero]), value
+        start = zero + 1
+
+
+def _payloads() -> Feed:
+    decoder = scanner.Decoder()
+    return lambda chunk: [frame.payload for frame in decoder.feed(chunk) if frame.kind == scanner.STATE]
+
+
+def _sensors() -> Feed:
+    decoder = glove.Decoder()
+    return lambda chunk: [record.sensors for record in decoder.feed(chunk) if record.fault is None]
+
+
+def _newest(came: Bits) -> NDArray[np.intp]:
+    """Return for each frame (n, F) the number of the newest that came, -1 before the first."""
+    return np.maximum.accumulate(np.where(came, np.arange(came.shape[1]), -1), axis=1)
+
+
+SEND = (
+    Effect(
+        name="glove.send",
+        summary="puts frames and records on the serial lines as bytes",
+        stage="wire",
+        reads=("bits", "raw", "frame_us", "delay_us"),
+        writes=("traffic",),
+        on_wire=True,
+    ),
+    _send,
+)
+RECEIVE = (
+    Effect(
+        name="glove.receive",
+        summary="decodes the bytes that arrive, as a driver does",
+        stage="wire",
+        reads=("traffic", "bits", "settled"),
+        writes=("bits", "raw", "lost", "settled"),
+        on_wire=True,
+    ),
+    _receive,
+)

@@ -1,0 +1,173 @@
+"""Planned postures as data: for every grasp type and object, how hands of some lengths hold it.
+
+A hand between two lengths takes a posture between theirs; lengths are planned one from the next, so neighbours differ
+little. An entry is found by its grasp type and the object's shape, so a changed object never meets an old posture.
+
+The file is JSON: {"format": 1, "taxonomy": NAME, "entries": [{grasp, object, shape, grip_n, down, spheres, held:
+[{length_mm, posture_deg, pose, shares}, ...]}, ...]}.
+"""
+
+from collections.abc import Iterable
+from importlib.resources import files
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Self
+
+import msgspec
+import numpy as np
+
+from ...runtime.files import write_atomically
+from ..body.anthropometry import Size
+from ..body.condition import Held, Pad, Thing
+from ..body.hand import Hand
+from ..body.shapes import Shape
+from ..contact.grip import GRAVITY
+from ..errors import SceneError
+from ..scenes.scene import Scene
+
+FORMAT = 1
+_SPHERES = len(Hand(Size(1.0, 1.0)).sphere_capsules)
+
+_Share = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
+_Sphere = Annotated[int, msgspec.Meta(ge=0, lt=_SPHERES)]
+
+# A hand presses an object as it presses a weightless one, and besides so much that pads with this friction on its two
+# sides would bear twice its weight.
+FRICTION = 0.8
+
+_ADVICE = 'plan it with `thenar plan SCENE -o FILE`, and write postures = "FILE" in the scene'
+
+
+class HeldAt(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A posture at one hand length: joint angles (20) in degrees, pose (6) in mm and radians, shares of the pads."""
+
+    length_mm: float
+    posture_deg: Annotated[tuple[float, ...], msgspec.Meta(min_length=20, max_length=20)]
+    pose: Annotated[tuple[float, ...], msgspec.Meta(min_length=6, max_length=6)]
+    shares: tuple[_Share, ...]
+
+
+class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How one grasp type holds one object: spheres of skin that press, and a posture a hand length, in order."""
+
+    grasp: str
+    object: str
+    shape: Shape
+    grip_n: Annotated[float, msgspec.Meta(gt=0.0)]
+    down: tuple[float, float, float]
+    spheres: Annotated[tuple[_Sphere, ...], msgspec.Meta(min_length=1)]
+    held: Annotated[tuple[HeldAt, ...], msgspec.Meta(min_length=1)]
+
+    def __post_init__(self) -> None:
+        lengths = [held.length_mm for held in self.held]
+        if any(low >= high for low, high in pairwise(lengths)):
+            raise ValueError(f"the hands of {self.object!r} are not in order, shortest first")
+        if any(len(held.shares) != len(self.spheres) for held in self.held):
+            raise ValueError(f"{self.object!r} has {len(self.spheres)} spheres, and not a share for each")
+
+    def covers(self, length_mm: float) -> bool:
+        """Return whether a hand so long lies between planned ones."""
+        return self.held[0].length_mm <= length_mm <= self.held[-1].length_mm
+
+
+class _Head(msgspec.Struct, frozen=True):
+    format: int
+
+
+class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    format: int
+    taxonomy: str
+    entries: tuple[Entry, ...]
+
+
+class Postures:
+    """The planned postures of a taxonomy's grasp types; of two entries for one type and shape, the later counts."""
+
+    def __init__(self, taxonomy: str, entries: Iterable[Entry]) -> None:
+        self.taxonomy = taxonomy
+        self._found = {(entry.grasp, entry.shape): entry for entry in entries}
+        self.entries = tuple(self._found.values())
+
+    @classmethod
+    def shipped(cls, taxonomy: str) -> Self:
+        """Return the postures that come with thenar for a taxonomy; none if it has none."""
+        resource = files(__package__) / "data" / f"{taxonomy}.postures.json"
+        return cls.decode(resource.read_bytes(), resource.name) if resource.is_file() else cls(taxonomy, ())
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Return the postures that `save` wrote. Raises SceneError if the file is missing or none of those."""
+        try:
+            content = path.read_bytes()
+        except FileNotFoundError:
+            raise SceneError(f"{path}: there is no such file of planned postures: `thenar plan` makes it") from None
+        except OSError as reason:
+            raise SceneError(f"{path}: cannot be read: {reason.strerror}") from reason
+        return cls.decode(content, str(path))
+
+    @classmethod
+    def decode(cls, content: bytes, name: str) -> Self:
+        """Return the postures in the content of file `name`."""
+        try:
+            head = msgspec.json.decode(content, type=_Head)
+            if head.format != FORMAT:
+                raise SceneError(f"{name} holds postures of format {head.format}, not {FORMAT}: plan them anew")
+            known = msgspec.json.decode(content, type=_File)
+        except (msgspec.MsgspecError, UnicodeDecodeError) as wrong:
+            raise SceneError(f"{name} holds no planned postures: {wrong}: `thenar plan` makes such a file") from wrong
+        return cls(known.taxonomy, known.entries)
+
+    @classmethod
+    def of(cls, scene: Scene) -> Self:
+        """Return what a scene can use: the shipped postures, and those of its own file, which come first.
+
+        Raises SceneError if that file is missing, no such file, or of another taxonomy.
+        """
+        shipped = cls.shipped(scene.taxonomy)
+        if scene.postures is None:
+            return shipped
+        own = cls.load(scene.postures)
+        if own.taxonomy != scene.taxonomy:
+            raise SceneError(
+                f"{scene.postures} was planned for {own.taxonomy}, the scene is of {scene.taxonomy}: "
+                "name another file of `postures`"
+            )
+        return cls(scene.taxonomy, (*shipped.entries, *own.entries))
+
+    def save(self, path: Path) -> None:
+        """Write the file whole or not at all."""
+        write_atomically(path, msgspec.json.encode(_File(FORMAT, self.taxonomy, self.entries)) + b"\n")
+
+    def entry(self, grasp: str, thing: Thing) -> Entry | None:
+        """Return how this grasp type holds an object of this shape, if it was planned."""
+        return self._found.get((grasp, thing.shape))
+
+    def held(self, hand: Hand, grasp: str, thing: Thing) -> Held:
+        """Return how `hand` holds `thing`, between the two planned lengths next to its own.
+
+        Raises SceneError naming grasp and object where nothing was planned, or not for so small or large a hand.
+        """
+        entry = self.entry(grasp, thing)
+        what = f"grasp type {grasp!r} with object {thing.name!r}"
+        if entry is None:
+            raise SceneError(f"no planned posture of {what}: {_ADVICE}")
+        length = hand.size.length_mm
+        lengths = [held.length_mm for held in entry.held]
+        if not entry.covers(length):
+            raise SceneError(
+                f"{what} is planned for hands of {lengths[0]:g} to {lengths[-1]:g} mm, not of {length:g} mm: {_ADVICE}"
+            )
+        above = min(max(sum(known < length for known in lengths), 1), len(lengths) - 1)
+        low, high = entry.held[max(above - 1, 0)], entry.held[above]
+        return _between(entry, low, high, length, entry.grip_n + thing.mass_kg * GRAVITY / FRICTION)
+
+
+def _between(entry: Entry, low: HeldAt, high: HeldAt, length: float, grip_n: float) -> Held:
+    span = high.length_mm - low.length_mm
+    part = (length - low.length_mm) / span if span else 0.0
+    posture, pose, shares = (
+        np.array(a) * (1.0 - part) + np.array(b) * part
+        for a, b in ((low.posture_deg, high.posture_deg), (low.pose, high.pose), (low.shares, high.shares))
+    )
+    pads = tuple(Pad(sphere, float(share)) for sphere, share in zip(entry.spheres, shares, strict=True))
+    return Held(posture, pose, pads, grip_n, np.array(entry.down))

@@ -1,0 +1,113 @@
+"""What simulating a scene will do and cost, before it is done: the steps, and each one's time on a few grasps."""
+
+from collections.abc import Sequence
+
+import msgspec
+
+from ...compiler.workers import workers_of
+from ..pipeline.frames import at_a_time
+from ..pipeline.ledger import Entry, Ledger
+from ..pipeline.pipeline import Pipeline, Stop, compile_pipeline
+from ..planning.postures import Postures
+from ..scenes.scene import Scene
+from .sampling import sample
+from .session import Session, conditions_of, session_of
+
+# So many grasps are measured, fewer where each has many frames.
+_MEASURED = 256
+
+
+class StepPlan(msgspec.Struct, frozen=True):
+    """A step: what it is, and what it drew and took on the grasps that were measured.
+
+    own      True for a step that every scene has      reads, writes  fields of a batch
+    timed    whether it lives in time, so that whole streams of frames are simulated
+    on_wire  whether it acts on bytes, so that frames are sent and received
+    share    of the time of all steps
+    """
+
+    name: str
+    summary: str
+    own: bool
+    stage: str
+    reads: tuple[str, ...]
+    writes: tuple[str, ...]
+    timed: bool
+    on_wire: bool
+    draws_a_grasp: float
+    us_a_grasp: float
+    share: float
+
+
+class Explanation(msgspec.Struct, frozen=True):
+    """The steps of a scene in order, and what to expect.
+
+    timed, on_wire  whether frames are simulated one by one, and sent as bytes
+    measured        grasps that were simulated to measure, of so many `conditions`
+    us_a_grasp      of one process        expected_s  for all repetitions on `workers` processes
+    """
+
+    scene: str
+    repetitions: int
+    timed: bool
+    on_wire: bool
+    steps: tuple[StepPlan, ...]
+    measured: int
+    conditions: int
+    us_a_grasp: float
+    workers: int
+    expected_s: float
+
+
+def explain(scene: Scene, jobs: int = -1) -> Explanation:
+    """Return what `simulate` would do with a scene, measured on a few grasps.
+
+    Raises SceneError if the scene cannot be simulated.
+    """
+    pipeline = compile_pipeline(scene)
+    postures = Postures.of(scene)
+    conditions = [conditions_of(scene, subject, postures) for subject in scene.subjects]
+    # One session is enough: of all of them, an order alone can take minutes.
+    plan = [session_of(scene, conditions[len(conditions) // 2])]
+    ledger = _measured(pipeline, plan)
+    first = ledger.entries[pipeline.stops[0].effect.name]
+    steps = tuple(_step(stop, ledger.entries[stop.effect.name], ledger.nanoseconds) for stop in pipeline.stops)
+    repetitions, workers = len(plan[0].before) * len(conditions), workers_of(jobs)
+    us_a_grasp = sum(step.us_a_grasp for step in steps)
+    return Explanation(
+        scene=scene.name,
+        repetitions=repetitions,
+        timed=pipeline.setting.timed,
+        on_wire=pipeline.setting.on_wire,
+        steps=steps,
+        measured=first.grasps,
+        conditions=first.calls,
+        us_a_grasp=us_a_grasp,
+        workers=workers,
+        expected_s=us_a_grasp * repetitions / workers / 1e6,
+    )
+
+
+def _measured(pipeline: Pipeline, plan: Sequence[Session]) -> Ledger:
+    """Return what some repetitions of all conditions of one session cost."""
+    pipeline.run(sample(plan, 1)[:1], Ledger())  # what is done once, such as importing
+    ledger = Ledger()
+    pipeline.run(sample(plan, at_a_time(pipeline.setting, _MEASURED)), ledger)
+    return ledger
+
+
+def _step(stop: Stop, entry: Entry, all_ns: int) -> StepPlan:
+    effect = stop.effect
+    return StepPlan(
+        name=effect.name,
+        summary=effect.summary,
+        own=stop.own,
+        stage=effect.stage,
+        reads=effect.reads,
+        writes=effect.writes,
+        timed=effect.timed,
+        on_wire=effect.on_wire,
+        draws_a_grasp=entry.draws / entry.grasps,
+        us_a_grasp=entry.nanoseconds / 1e3 / entry.grasps,
+        share=entry.nanoseconds / all_ns,
+    )

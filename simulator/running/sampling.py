@@ -1,0 +1,44 @@
+"""A few grasps from all over a scene, to measure what it costs."""
+
+from collections.abc import Sequence
+from time import process_time
+
+import numpy as np
+
+from ..pipeline.batch import Batch
+from ..pipeline.frames import at_a_time
+from ..pipeline.ledger import Ledger
+from ..pipeline.pipeline import Pipeline, compile_pipeline
+from ..planning.postures import Postures
+from ..scenes.scene import Scene
+from .session import Session, sessions
+
+_ROUNDS = 3
+
+
+def sample(plan: Sequence[Session], most: int) -> list[Batch]:
+    """Return batches of all conditions of one session, the middle one, at most about `most` repetitions in all."""
+    session = plan[len(plan) // 2]
+    share = max(most // len(session.trials), 1)
+    return [session.batch(place, np.arange(min(share, len(trials)))) for place, trials in enumerate(session.trials)]
+
+
+def best_us(scene: Scene, variants: Sequence[str | None], most: int = 128) -> list[float]:
+    """Return the microseconds of processor time a grasp of the scene without each of `variants` (None: all of it).
+
+    The same few grasps for each, in turn, several times over; the shortest time counts: what else the machine does only
+    adds to it.
+    """
+    plan = sessions(scene, Postures.of(scene))
+    pipelines = [compile_pipeline(scene, without) for without in variants]
+    most = min(at_a_time(pipeline.setting, most) for pipeline in pipelines)
+    times = [[_seconds(pipeline, plan, most) for pipeline in pipelines] for _ in range(_ROUNDS)]
+    grasps = sum(map(len, sample(plan, most)))
+    return [min(own) * 1e6 / grasps for own in zip(*times, strict=True)]
+
+
+def _seconds(pipeline: Pipeline, plan: Sequence[Session], most: int) -> float:
+    batches = sample(plan, most)
+    start = process_time()
+    pipeline.run(batches, Ledger())
+    return process_time() - start

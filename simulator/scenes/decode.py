@@ -1,0 +1,168 @@
+"""From a scene's TOML file to a Scene; what is wrong in it is told with file, line, key, and what to write instead."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+
+from ...compiler.recordings.names import fault, nearest
+from ...compiler.recordings.taxonomy import Taxonomy
+from ..errors import SceneError
+from ..pipeline import registry
+from ..pipeline.effect import EffectParameters
+from ..pipeline.ordering import Place as Ordered
+from ..pipeline.ordering import in_order
+from . import shipped
+from .catalogue import check_names, find_taxonomy, load_catalogue, objects_of
+from .population import Population, draw_subjects
+from .scene import Glove, Listed, Recording, Scene, SceneObject, Subject
+from .toml_source import Source, read_source
+from .toml_struct import as_list, as_table, check_finite, convert
+
+
+class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A scene as it is written: tables are decoded one by one."""
+
+    name: str | None = None
+    seed: Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]
+    taxonomy: str
+    objects: object
+    repetitions: Annotated[int, msgspec.Meta(ge=1, le=100_000)]
+    recording: object = {}
+    glove: object = {}
+    subjects: object = None
+    population: object = None
+    effects: object = {}
+    postures: str | None = None
+
+
+def load_scene(name_or_path: str | Path) -> Scene:
+    """Return the scene that is shipped under a name, or lies in a TOML file: what has a suffix or a folder is a file.
+
+    Imports the modules of the effects that it lists, and no others. Raises SceneError with file, line and key.
+    """
+    path = Path(name_or_path)
+    source = read_source(_file(path))
+    tables = source.tables()
+    check_finite(source, (), tables)
+    return _Decoder(source, convert(source, (), tables, _File), path.parent).scene(path.stem)
+
+
+def located(name_or_path: str | Path, fault: SceneError) -> SceneError:
+    """Return an error about a key of a scene with file and line added, where it says which key but not where.
+
+    That is what shows when the effects are put together; any other error comes back as it is.
+    """
+    key, _, reason = str(fault).partition(": ")
+    if not re.fullmatch(r"(effects|recording)(\.\w+)+", key):
+        return fault
+    return read_source(_file(Path(name_or_path))).error(tuple(key.split(".")), reason)
+
+
+def _file(path: Path) -> Traversable:
+    known = shipped()
+    if path.suffix or len(path.parts) > 1:
+        if not path.exists():
+            raise SceneError(f"there is no file {path}; scenes that are shipped go by name: {', '.join(known)}")
+        return path
+    if path.name not in known:
+        advice = "; a file of your own ends in .toml"
+        raise SceneError(f"no shipped scene is called {path.name!r}{nearest(path.name, list(known))}{advice}")
+    return known[path.name]
+
+
+@dataclass(frozen=True, slots=True)
+class _Decoder:
+    """A scene half way: `folder` is where its file lies."""
+
+    source: Source
+    file: _File
+    folder: Path
+
+    def scene(self, default_name: str) -> Scene:
+        """Return the whole scene."""
+        source, file = self.source, self.file
+        name = default_name if file.name is None else file.name
+        if reason := fault(name):
+            raise source.error(("name",), f"{name!r} {reason}")
+        taxonomy = find_taxonomy(source, file.taxonomy)
+        return Scene(
+            name=name,
+            seed=file.seed,
+            taxonomy=taxonomy.name,
+            objects=self._objects(taxonomy),
+            subjects=self._subjects(),
+            repetitions=file.repetitions,
+            recording=convert(source, ("recording",), file.recording, Recording),
+            glove=convert(source, ("glove",), file.glove, Glove),
+            effects=self._effects(),
+            postures=None if file.postures is None else self.folder / file.postures,
+        )
+
+    def _objects(self, taxonomy: Taxonomy) -> tuple[SceneObject, ...]:
+        name = self.file.objects
+        if not isinstance(name, str):
+            return objects_of(self.source, name, taxonomy)
+        try:
+            catalogue = load_catalogue(name)
+        except SceneError as reason:
+            raise self.source.error(("objects",), str(reason)) from reason
+        if catalogue.taxonomy != taxonomy.name:
+            fits = f"catalogue {name!r} is for taxonomy {catalogue.taxonomy!r}, not {taxonomy.name!r}"
+            raise self.source.error(("objects",), fits)
+        return catalogue.objects
+
+    def _subjects(self) -> tuple[Subject, ...]:
+        source, listed, population = self.source, self.file.subjects, self.file.population
+        if (listed is None) == (population is None):
+            reason = (
+                "is missing, and there are no [[subjects]]" if listed is None else "and [[subjects]] are both there"
+            )
+            raise source.error(("population",), f"{reason}: write one of the two")
+        if population is not None:
+            return draw_subjects(convert(source, ("population",), population, Population), self.file.seed)
+        tables = enumerate(as_list(source, ("subjects",), listed))
+        found = tuple(convert(source, ("subjects", number), table, Subject) for number, table in tables)
+        check_names(source, ("subjects",), [subject.name for subject in found])
+        return found
+
+    def _effects(self) -> tuple[Listed, ...]:
+        tables = dict(self._effect_tables())
+        listed = tuple(Listed(name, self._parameters(name, tables[name])) for name in registry.NAMES if name in tables)
+        places = [Ordered(registry.load(name).EFFECT, own=False, after=each.after) for name, each in listed]
+        try:
+            in_order(places)
+        except SceneError as reason:
+            raise self._placed(str(reason), list(tables)) from reason
+        return listed
+
+    def _placed(self, words: str, names: list[str]) -> SceneError:
+        """Return an error about the order of effects, with the line of the key or of the first effect that it names."""
+        where, _, what = words.partition(": ")
+        if where.startswith("effects."):
+            return self.source.error(tuple(where.split(".")), what)
+        first = min(names, key=lambda name: (name not in words, words.find(name)))
+        return self.source.error(("effects", *first.split(".")), words)
+
+    def _effect_tables(self) -> Iterator[tuple[str, object]]:
+        for group, value in as_table(self.source, ("effects",), self.file.effects).items():
+            members = as_table(self.source, ("effects", group), value)
+            if not members or not all(isinstance(member, dict) for member in members.values()):
+                self._check_effect(group, ("effects", group))
+            for name, table in members.items():
+                self._check_effect(f"{group}.{name}", ("effects", group, name))
+                yield f"{group}.{name}", table
+
+    def _check_effect(self, name: str, place: tuple[str, ...]) -> None:
+        if name not in registry.NAMES:
+            raise self.source.error(place, f"there is no effect {name!r}{nearest(name, registry.NAMES)}")
+        if len(place) != 3:
+            raise self.source.error(place, f"write the name without quotes: [effects.{name}]")
+
+    def _parameters(self, name: str, table: object) -> EffectParameters:
+        kind: type[EffectParameters] = registry.load(name).Parameters
+        return convert(self.source, ("effects", *name.split(".")), table, kind)

@@ -1,0 +1,147 @@
+"""A TOML file with its lines: what is wrong in it is told with its line and its keys."""
+
+import codecs
+import re
+import tomllib
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from importlib.resources.abc import Traversable
+
+from ..errors import SceneError
+
+# Where something stands: keys, and numbers in lists from 0.
+Place = tuple[str | int, ...]
+
+_TOKEN = re.compile(
+    r"""(?P<blank>[ \t\r]+|\#[^\n]*)|(?P<newline>\n)|(?P<mark>[][{}=,.])
+    |(?P<text>\"\"\"(?:\\.|[^\\])*?\"{3,5}|'''.*?'{3,5}|"(?:\\.|[^"\\])*"|'[^']*')|(?P<word>[^][\s{}=,."'\#]+)""",
+    re.VERBOSE | re.DOTALL,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """The text of a TOML file, and the name that messages call it by."""
+
+    name: str
+    text: str
+
+    def tables(self) -> dict[str, object]:
+        """Return what the file holds; raises SceneError with the line where it is no TOML."""
+        try:
+            return tomllib.loads(self.text)
+        # tomllib lets Python's own limits through: numbers of thousands of digits, lists a thousand deep.
+        except (ValueError, RecursionError) as reason:
+            raise SceneError(f"{self.name} is not valid TOML: {reason}") from reason
+
+    def error(self, place: Place, reason: str) -> SceneError:
+        """Return an error about what stands at `place`: "scene.toml, line 7: subjects[0].name: ..."."""
+        where = f"{spelled(place)}: " if place else ""
+        return SceneError(f"{self.name}, line {self.line(place)}: {where}{reason}")
+
+    def line(self, place: Place) -> int:
+        """Return the line of `place`, counted from 1, or of the innermost table round it that is there."""
+        lines = _Lines(list(_tokens(self.text))).walk()
+        return next(lines[place[:end]] for end in range(len(place), -1, -1) if place[:end] in lines)
+
+
+def read_source(file: Traversable) -> Source:
+    """Read a TOML file. Raises SceneError if it cannot be opened or is not UTF-8."""
+    try:
+        return Source(file.name, file.read_bytes().removeprefix(codecs.BOM_UTF8).decode())
+    except UnicodeDecodeError as reason:
+        before = reason.object[: reason.start].count(b"\n")
+        raise SceneError(f"{file.name}, line {before + 1}: the text is not UTF-8: save it as UTF-8") from reason
+    except OSError as reason:
+        raise SceneError(f"{file}: cannot be read: {reason.strerror}") from reason
+
+
+def spelled(place: Place) -> str:
+    """Return `place` in TOML's words: ("subjects", 0, "name") is "subjects[0].name"."""
+    return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in place).removeprefix(".")
+
+
+def _tokens(text: str) -> Iterator[tuple[str, int]]:
+    """Yield the pieces of valid TOML that are not blank, with their lines."""
+    line = 1
+    for found in _TOKEN.finditer(text):
+        if found.lastgroup != "blank":
+            yield found[0], line
+        line += found[0].count("\n")
+
+
+@dataclass(slots=True)
+class _Lines:
+    """Walks through the tokens of a valid TOML file and notes the line of every table, key and place in a list."""
+
+    tokens: list[tuple[str, int]]
+    lines: dict[Place, int] = field(default_factory=lambda: {(): 1})
+    counts: Counter[Place] = field(default_factory=Counter)  # of the tables under every [[header]] so far
+    next: int = 0
+
+    def walk(self) -> dict[Place, int]:
+        table: Place = ()
+        while self._here():
+            if self._passed("["):
+                table = self._header()
+            elif not self._passed("\n"):
+                self._pair(table)
+        return self.lines
+
+    def _here(self) -> str:
+        return self.tokens[self.next][0] if self.next < len(self.tokens) else ""
+
+    def _passed(self, *marks: str) -> bool:
+        passed = self._here() in marks
+        self.next += passed
+        return passed
+
+    def _header(self) -> Place:
+        """Pass `a.b]` or `[a.b]]`; return the table's place."""
+        line, many = self.tokens[self.next][1], self._passed("[")
+        place = self._key(())
+        if many:
+            self.counts[place] += 1
+            place = (*place, self.counts[place] - 1)
+        self.lines[place] = line
+        self.next += 1 + many
+        return place
+
+    def _pair(self, table: Place) -> None:
+        place = self._key(table)
+        self.next += 1  # the equals sign
+        self._value(place)
+
+    def _key(self, place: Place) -> Place:
+        """Pass a dotted key and note every table on its way; a list of tables on its way means the last one."""
+        while True:
+            token, line = self.tokens[self.next]
+            self.next += 1
+            place = (*place, _unquoted(token))
+            self.lines.setdefault(place, line)
+            if not self._passed("."):
+                return place
+            if place in self.counts:
+                place = (*place, self.counts[place] - 1)
+
+    def _value(self, place: Place) -> None:
+        if self._passed("["):
+            number = 0
+            while not self._passed("]"):
+                if not self._passed(",", "\n"):
+                    self.lines[(*place, number)] = self.tokens[self.next][1]
+                    self._value((*place, number))
+                    number += 1
+        elif self._passed("{"):
+            while not self._passed("}"):
+                if not self._passed(",", "\n"):
+                    self._pair(place)
+        else:
+            while self._here() not in (",", "]", "}", "\n", ""):
+                self.next += 1
+
+
+def _unquoted(key: str) -> str:
+    """Return what a bare or quoted key says."""
+    return next(iter(tomllib.loads(f"{key} = 0")))

@@ -1,0 +1,135 @@
+"""Tables of a TOML file as msgspec structs; what is wrong is told in TOML's words, with what to write instead."""
+
+import math
+import re
+from collections.abc import Collection, Iterator, Mapping
+from typing import TypeVar
+
+import msgspec
+
+from ...compiler.recordings.names import nearest
+from ..errors import SceneError
+from .toml_source import Place, Source
+
+S = TypeVar("S", bound=msgspec.Struct)
+
+_TYPES = {"float": "a number", "int": "a whole number", "str": "text", "bool": "true or false", "array": "a list"}
+_TYPES |= {"object": "a table"}
+_BOUNDS = {">=": "at least", "<=": "at most", ">": "above", "<": "below"}
+# What the last part of a key says about its value.
+_UNITS = {
+    "mm": "lengths are in millimetres",
+    "g": "masses are in grams",
+    "deg": "angles are in degrees",
+    "n": "forces are in newtons",
+    "ms": "times are in milliseconds",
+    "us": "times are in microseconds",
+    "s": "times are in seconds",
+    "hz": "rates are in hertz",
+}
+_OTHER_UNITS = {
+    "mm": ("m", "cm", "um", "inch", "in"),
+    "g": ("kg", "mg", "lb", "oz"),
+    "deg": ("rad", "mrad", "degrees"),
+    "n": ("mn", "kn", "gf", "kgf"),
+    "ms": ("s", "us"),
+    "us": ("s", "ms"),
+    "s": ("ms", "us", "min"),
+    "hz": ("khz", "mhz"),
+}
+
+
+def convert(source: Source, place: Place, table: object, kind: type[S]) -> S:
+    """Return `table`, which stands at `place` in `source`, as a struct. Raises SceneError about the first wrong key."""
+    keys = as_table(source, place, table)
+    if kind.__struct_config__.forbid_unknown_fields:
+        check_keys(source, place, keys, kind.__struct_encode_fields__)
+    try:
+        return msgspec.convert(keys, kind)
+    except msgspec.ValidationError as reason:
+        raise _worded(source, place, keys, kind, str(reason)) from reason
+
+
+def as_table(source: Source, place: Place, value: object) -> dict[str, object]:
+    """Return `value` if it is a table; raises SceneError."""
+    if isinstance(value, dict):
+        return value
+    raise source.error(place, f"must be a table, not {_shown(value)}")
+
+
+def as_list(source: Source, place: Place, value: object) -> list[object]:
+    """Return `value` if it is a list that holds something; raises SceneError."""
+    if isinstance(value, list) and value:
+        return value
+    raise source.error(place, f"must be a list of tables, not {_shown(value)}")
+
+
+def check_keys(source: Source, place: Place, table: Mapping[str, object], known: Collection[str]) -> None:
+    """Raise SceneError about the first key of `table` that is not among the `known` ones."""
+    for key in table:
+        if key not in known:
+            raise source.error((*place, key), _advice(key, known))
+
+
+def check_finite(source: Source, place: Place, value: object) -> None:
+    """Raise SceneError about the first number in `value`, or in anything it holds, that is not finite."""
+    if isinstance(value, float) and not math.isfinite(value):
+        raise source.error(place, f"must be a finite number, not {value}")
+    inside = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, item in inside:
+        check_finite(source, (*place, key), item)
+
+
+def _advice(key: str, known: Collection[str]) -> str:
+    """Return what to write instead of a key that is not known."""
+    stem, _, unit = key.rpartition("_")
+    same = [name for name in known if name.rpartition("_")[0] in (stem, key) and name.rpartition("_")[2] in _UNITS]
+    same.sort(key=lambda name: unit.lower() not in _OTHER_UNITS[name.rpartition("_")[2]])
+    if not same:
+        return f"there is no such key here{nearest(key, sorted(known))}"
+    return f"{_UNITS[same[0].rpartition('_')[2]]}: {same[0]}"
+
+
+def _worded(source: Source, place: Place, table: dict[str, object], kind: type[S], reason: str) -> SceneError:
+    """Return msgspec's complaint about `table` as an error that names the key."""
+    sentence, _, tail = reason.partition(" - at `$")
+    inner: Place = tuple(name or int(number) for name, number in re.findall(r"\.(\w+)|\[(\d+)\]", tail))
+    value: object = table
+    for key in inner:
+        value = value[key]  # type: ignore[index]
+    return source.error((*place, *inner), _sentence(sentence, value, kind, inner))
+
+
+def _sentence(reason: str, value: object, kind: type[S], inner: Place) -> str:
+    if found := re.fullmatch(r"Object missing required field `(.+)`", reason):
+        return f"the key {found[1]} is missing"
+    if found := re.fullmatch(r"Expected `(.+)`, got `.+`", reason):
+        # TOML has no null: what may be None is left out.
+        wanted = " or ".join(_TYPES.get(name, name) for name in found[1].split(" | ") if name != "null")
+        return f"must be {wanted}, not {_shown(value)}"
+    if found := re.fullmatch(r"Expected `.+` ([<>]=?) (.+)", reason):
+        bound = found[2] if found[2].lstrip("-").isdigit() else f"{float(found[2]):.15g}"
+        return f"must be {_BOUNDS[found[1]]} {bound}, not {value}"
+    if reason.startswith("Invalid enum value"):
+        choices = [choice for choice in _choices(kind, inner) if isinstance(choice, str)]
+        return f"{_shown(value)} is not among its values{nearest(str(value), choices)}"
+    return reason.replace("Expected `array`", "must be a list").replace("Number", "is a number")
+
+
+def _choices(kind: type[S], inner: Place) -> Iterator[object]:
+    """Yield what the field that `inner` begins with may be, where it must be one of a few."""
+    for field in msgspec.inspect.type_info(kind).fields:  # type: ignore[attr-defined]
+        if field.encode_name == inner[0]:
+            allowed = field.type
+            while isinstance(allowed, msgspec.inspect.VarTupleType):
+                allowed = allowed.item_type
+            yield from getattr(allowed, "values", ())
+
+
+def _shown(value: object) -> str:
+    """Return a value as it stands in TOML, or what kind of thing it is where that would be long."""
+    if isinstance(value, dict):
+        return "a table"
+    if isinstance(value, list):
+        return "a list" if value else "an empty list"
+    return str(value).lower() if isinstance(value, bool) else repr(value) if isinstance(value, str) else str(value)

@@ -1,0 +1,148 @@
+"""A hand's frames are rotations, its joints turn what hangs on them, and its thumb opposes."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from thenar.simulator.body.anthropometry import Size
+from thenar.simulator.body.hand import CAPSULES, DOF, LIMITS_DEG, Hand
+
+HAND = Hand(Size(185.0, 83.0))
+SIZES = st.builds(Size, length_mm=st.floats(150.0, 230.0), breadth_mm=st.floats(65.0, 105.0))
+ANGLES = arrays(np.float64, 20, elements=st.floats(0.0, 1.0)).map(
+    lambda share: np.radians(LIMITS_DEG[:, 0] + share * (LIMITS_DEG[:, 1] - LIMITS_DEG[:, 0]))
+)
+BENDS = st.integers(0, 19)
+STEP = 1e-6
+# Thumb abducted and flexed, index finger bent at the knuckle to meet it.
+OPPOSED_DEG = {
+    "thumb_cmc_abduction": 70.0, "thumb_cmc_flexion": 30.0, "index_abduction": -10.0, "index_mcp": 70.0,
+    "index_pip": 10.0, "index_dip": 10.0,
+}  # fmt: skip
+
+
+def posture(degrees: dict[str, float]) -> np.ndarray:
+    return np.radians([[degrees.get(joint, 0.0)] for joint in DOF])
+
+
+def digit_of(capsule: int) -> int:
+    return capsule // 3 if capsule < 15 else -1
+
+
+@given(SIZES, ANGLES)
+def test_frames_are_rotations(size: Size, angles: np.ndarray) -> None:
+    for frame in Hand(size).skeleton(angles[:, None]).frames[..., 0]:
+        assert frame.T @ frame == pytest.approx(np.eye(3), abs=1e-14)
+        assert np.linalg.det(frame) == pytest.approx(1.0, abs=1e-14)
+
+
+@given(ANGLES, BENDS)
+def test_a_joint_turns_the_skin_beyond_it_about_its_axis_and_moves_no_other(angles: np.ndarray, joint: int) -> None:
+    digit, number = divmod(joint, 4)
+    skeleton = HAND.skeleton(angles[:, None])
+    step = STEP * np.eye(20)[:, [joint]]
+    there, back = (HAND.spheres(HAND.skeleton(angles[:, None] + way))[..., 0] for way in (step, -step))
+    lever = HAND.spheres(skeleton)[..., 0] - skeleton.centres[digit, number, :, 0]
+    turned = np.cross(skeleton.axes[digit, number, :, 0], lever)
+    # The first two joints move all three segments, each of the others one fewer.
+    beyond = [digit_of(capsule) == digit and capsule % 3 >= number - 1 for capsule in HAND.sphere_capsules]
+    expected = np.where(np.array(beyond)[:, None], turned, 0.0)
+    assert (there - back) / (2 * STEP) == pytest.approx(expected, abs=1e-6)
+
+
+@given(ANGLES)
+def test_axes_are_of_unit_length_and_joints_lie_where_segments_begin(angles: np.ndarray) -> None:
+    skeleton = HAND.skeleton(angles[:, None])
+    assert np.linalg.norm(skeleton.axes, axis=2) == pytest.approx(1.0, abs=1e-14)
+    starts = skeleton.origins[:15].reshape(5, 3, 3, 1)
+    assert np.array_equal(skeleton.centres, starts[:, [0, 0, 1, 2]])
+
+
+@given(SIZES, ANGLES)
+def test_segments_follow_one_another_at_their_published_lengths(size: Size, angles: np.ndarray) -> None:
+    hand = Hand(size)
+    skeleton = hand.skeleton(angles[:, None])
+    starts = skeleton.origins[:15, :, 0].reshape(5, 3, 3)
+    apart = np.linalg.norm(np.diff(starts, axis=1), axis=2)
+    assert apart == pytest.approx(size.segments_mm()[:, :2], rel=1e-12)
+    along = skeleton.frames[:15, :, 0, 0].reshape(5, 3, 3)
+    assert np.diff(starts, axis=1) == pytest.approx(along[:, :2] * apart[..., None], rel=1e-9, abs=1e-9)
+    assert hand.lengths[:15] == pytest.approx(size.segments_mm().ravel(), rel=1e-15)
+
+
+@given(SIZES, ANGLES)
+def test_the_palm_stays(size: Size, angles: np.ndarray) -> None:
+    hand = Hand(size)
+    bent, flat = hand.skeleton(angles[:, None]), hand.skeleton(np.zeros((20, 1)))
+    assert np.array_equal(bent.frames[15:], flat.frames[15:])
+    assert np.array_equal(bent.origins[15:], flat.origins[15:])
+
+
+def test_a_flat_hand_points_distal_and_looks_to_the_palm() -> None:
+    skeleton = HAND.skeleton(np.zeros((20, 1)))
+    fingers = skeleton.frames[3:15, :, :, 0]
+    assert (fingers[:, 0, 0] > 0.98).all()
+    assert fingers[:, 2, 2] == pytest.approx(1.0)
+    tips = HAND.spheres(skeleton)[[13, 20, 27, 34], :, 0]
+    assert (np.diff(tips[:, 1]) < 0.0).all()  # index on the radial side
+
+
+@pytest.mark.parametrize("finger", ["index", "middle", "ring", "little"])
+def test_a_finger_bends_to_the_palm_and_abducts_to_the_radial_side(finger: str) -> None:
+    tip = 7 * ("thumb", "index", "middle", "ring", "little").index(finger) + 6
+    flat = HAND.spheres(HAND.skeleton(np.zeros((20, 1))))[tip, :, 0]
+    for joint in ("mcp", "pip", "dip"):
+        bent = HAND.spheres(HAND.skeleton(posture({f"{finger}_{joint}": 40.0})))[tip, :, 0]
+        assert bent[2] < flat[2]
+    aside = HAND.spheres(HAND.skeleton(posture({f"{finger}_abduction": 10.0})))[tip, :, 0]
+    assert aside[1] > flat[1]
+
+
+def test_the_thumb_opposes() -> None:
+    skeleton = HAND.skeleton(posture(OPPOSED_DEG))
+    thumb, index = (CAPSULES.index(name) for name in ("thumb_distal", "index_distal"))
+    tips = HAND.spheres(skeleton)[[6, 13], :, 0]
+    way = (tips[1] - tips[0]) / np.linalg.norm(tips[1] - tips[0])
+    thumb_pad, index_pad = (-skeleton.frames[capsule, :, 2, 0] for capsule in (thumb, index))
+    # Pads face each other, with a marble's room between them.
+    assert thumb_pad @ way > np.cos(np.radians(30.0))
+    assert index_pad @ -way > np.cos(np.radians(30.0))
+    assert thumb_pad @ index_pad < -0.65
+    room = np.linalg.norm(tips[1] - tips[0]) - HAND.radii[thumb] - HAND.radii[index]
+    assert 5.0 < room < 20.0
+
+
+def test_a_thumb_at_rest_does_not_oppose() -> None:
+    skeleton = HAND.skeleton(np.zeros((20, 1)))
+    thumb_pad, index_pad = (-skeleton.frames[CAPSULES.index(f"{d}_distal"), :, 2, 0] for d in ("thumb", "index"))
+    assert thumb_pad @ index_pad > 0.0
+
+
+def test_spheres_lie_on_the_axes_of_their_capsules() -> None:
+    skeleton = HAND.skeleton(posture(OPPOSED_DEG))
+    relative = HAND.spheres(skeleton) - skeleton.origins[HAND.sphere_capsules]
+    own = np.einsum("mxkn,mxn->mk", skeleton.frames[HAND.sphere_capsules], relative)
+    assert own[:, 0] == pytest.approx(HAND.sphere_offsets)
+    assert own[:, 1:] == pytest.approx(0.0, abs=1e-12)
+    assert (HAND.sphere_offsets <= HAND.lengths[HAND.sphere_capsules]).all()
+
+
+def test_a_hand_has_seven_spheres_a_digit_and_fifteen_in_the_palm() -> None:
+    counts = np.bincount(HAND.sphere_capsules, minlength=20)
+    assert counts.tolist() == [3, 2, 2] * 5 + [3] * 5
+
+
+@given(SIZES, ANGLES, st.sampled_from((2, 7, 64)), st.data())
+def test_a_hand_has_the_same_bits_alone_and_in_any_company(
+    size: Size, angles: np.ndarray, n: int, data: st.DataObject
+) -> None:
+    hand = Hand(size)
+    others = np.random.default_rng(data.draw(st.integers(0, 99))).uniform(-1.0, 1.0, (20, n))
+    place = data.draw(st.integers(0, n - 1))
+    others[:, place] = angles
+    alone, together = hand.skeleton(angles[:, None]), hand.skeleton(others)
+    for field in ("frames", "origins", "axes", "centres"):
+        assert np.array_equal(getattr(alone, field)[..., 0], getattr(together, field)[..., place])
+    assert np.array_equal(hand.spheres(alone)[..., 0], hand.spheres(together)[..., place])

@@ -1,0 +1,131 @@
+"""Forces on hand and object, against sums written out one by one."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from thenar.simulator.body.condition import Condition
+from thenar.simulator.body.hand import LIMITS_DEG
+from thenar.simulator.body.pose import Pose
+from thenar.simulator.contact.grip import STIFFNESS
+from thenar.simulator.contact.quasistatic.balance import HOLD_N_PER_MM, HOLD_NMM_PER_RAD, LIMIT_NMM_PER_RAD, Balance
+from thenar.simulator.contact.quasistatic.case import Case, Skin, command
+
+GRASPS = ("PoS", "PoH", "CMF", "PMF", "PE")
+
+
+@pytest.fixture(scope="module", params=GRASPS)
+def balance(
+    request: pytest.FixtureRequest,
+    by_grasp: dict[str, Condition],
+    make_case: Callable[..., Case],
+    skin: Skin,
+) -> Balance:
+    """Hands a little off where they were told to be, so that skin is both pressed and dragged."""
+    told = command([make_case(by_grasp[request.param], 4)])
+    draw = np.random.default_rng(7)
+    step = draw.normal(size=(6, 4)) * np.array([0.4] * 3 + [0.01] * 3)[:, None]
+    return Balance(told, skin, told.angles + 0.02 * draw.normal(size=(20, 4)), told.pose.moved(step))
+
+
+def moved(balance: Balance, angles: np.ndarray, step: np.ndarray, sticks: float = 1.0) -> Balance:
+    """Return the same hands and objects moved on by some angles (20, n) and step (6, n)."""
+    return Balance(balance.command, balance.skin, balance.angles + angles, balance.pose.moved(step), sticks)
+
+
+def test_some_skin_is_pressed_and_dragged(balance: Balance) -> None:
+    assert (balance.presses > 0.1).any(axis=0).all()
+    assert (np.linalg.norm(balance.dragged, axis=1)[balance.presses > 0.1] > 0.01).any()
+
+
+def test_the_object_bears_its_weight_and_the_opposite_of_what_the_skin_feels(balance: Balance) -> None:
+    skin_feels = sum(balance.forces[sphere] for sphere in range(50))
+    shift = balance.pose.position - balance.command.pose.position
+    expected = balance.command.weight - skin_feels - HOLD_N_PER_MM * shift
+    assert balance.on_object[:3] == pytest.approx(expected, abs=1e-9)
+
+
+def test_moments_on_the_object_are_those_of_the_same_forces_where_they_touch(balance: Balance) -> None:
+    touch = balance.levers + balance.pose.position
+    about = sum(np.cross(touch[s] - balance.pose.position, -balance.forces[s], axis=0) for s in range(50))
+    held = balance.on_object[3:] - about
+    # What is left is the soft spring that holds the object: small, and against its turn.
+    turned = Pose(balance.command.pose.position, balance.command.pose.rotation)
+    relative = np.einsum("ijn,kjn->ikn", balance.pose.rotation, turned.rotation)
+    axis = np.stack([relative[2, 1] - relative[1, 2], relative[0, 2] - relative[2, 0], relative[1, 0] - relative[0, 1]])
+    assert held == pytest.approx(-HOLD_NMM_PER_RAD * axis / 2, abs=1e-9)
+
+
+def test_joints_bear_the_moments_of_skin_against_springs_grip_and_limits(balance: Balance) -> None:
+    touch = balance.levers + balance.pose.position
+    skeleton, low, high = balance.skeleton, *np.radians(LIMITS_DEG.T)
+    for joint in range(20):
+        digit, number = divmod(joint, 4)
+        spring = STIFFNESS[joint] * (balance.command.angles[joint] - balance.angles[joint])
+        beyond = balance.angles[joint] - np.clip(balance.angles[joint], low[joint], high[joint])
+        expected = balance.command.torque[joint] + spring - LIMIT_NMM_PER_RAD * beyond
+        for sphere in range(7 * digit, 7 * digit + 7):
+            if balance.command.hand.sphere_capsules[sphere] % 3 >= number - 1:
+                lever = touch[sphere] - skeleton.centres[digit, number]
+                moment = np.cross(lever, balance.forces[sphere], axis=0)
+                expected = expected + np.einsum("xn,xn->n", skeleton.axes[digit, number], moment)
+        assert balance.on_joints[joint] == pytest.approx(expected, abs=1e-7)
+
+
+def test_residuals_are_what_skin_and_weight_leave_without_the_soft_spring(balance: Balance) -> None:
+    touch = balance.levers
+    force = balance.command.weight - sum(balance.forces[s] for s in range(50))
+    moment = -sum(np.cross(touch[s], balance.forces[s], axis=0) for s in range(50))
+    assert balance.residual_n == pytest.approx(np.linalg.norm(force, axis=0), rel=1e-9)
+    assert balance.residual_nmm == pytest.approx(np.linalg.norm(moment, axis=0), rel=1e-9)
+
+
+@pytest.mark.parametrize("sticks", [1.0, 2.0])
+def test_no_skin_is_dragged_harder_than_friction_allows(balance: Balance, sticks: float) -> None:
+    further = moved(balance, np.full((20, 4), 0.01), np.full((6, 4), 0.02), sticks)
+    across = np.einsum("mxn,mxn->mn", further.forces, further.normal)
+    sideways = np.linalg.norm(further.forces - across[:, None] * further.normal, axis=1)
+    assert across == pytest.approx(further.presses, abs=1e-9)
+    limit = sticks * balance.skin.friction * further.presses
+    assert (sideways <= limit * (1.0 + 1e-9) + 1e-9).all()
+    assert (sideways > 0.999 * limit)[further.presses > 0.1].any()  # and some of it slips
+
+
+def test_letting_go_what_slips_changes_no_force(balance: Balance) -> None:
+    let_go = replace(balance.command, object_points=balance.slipped())
+    after = Balance(let_go, balance.skin, balance.angles, balance.pose)
+    assert after.forces == pytest.approx(balance.forces, abs=1e-6)
+    assert after.on_joints == pytest.approx(balance.on_joints, abs=1e-4)
+
+
+def test_skin_off_the_object_forgets_what_it_stuck_to(balance: Balance) -> None:
+    let_go = replace(balance.command, object_points=balance.slipped())
+    after = Balance(let_go, balance.skin, balance.angles, balance.pose)
+    off = balance.presses == 0.0
+    assert off.any()
+    assert np.linalg.norm(after.dragged, axis=1)[off] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_without_friction_skin_only_presses(balance: Balance) -> None:
+    slippery = Balance(balance.command, replace(balance.skin, friction=0.0), balance.angles, balance.pose)
+    assert slippery.forces == pytest.approx(slippery.presses[:, None] * slippery.normal, abs=1e-9)
+
+
+def test_rest_is_where_nothing_is_left_over(balance: Balance) -> None:
+    force, moment = (np.linalg.norm(part, axis=0) for part in (balance.on_object[:3], balance.on_object[3:]))
+    assert not balance.at_rest.any()
+    assert balance.unrest == pytest.approx(
+        np.maximum(np.maximum(force, moment / 30.0), np.abs(balance.on_joints).max(axis=0) / 30.0)
+    )
+
+
+def test_forces_are_the_same_alone_and_in_company(balance: Balance) -> None:
+    for one in range(4):
+        index = np.array([one])
+        pose = Pose(balance.pose.position[:, index], balance.pose.rotation[..., index])
+        alone = Balance(balance.command.rows(index), balance.skin, balance.angles[:, index], pose)
+        for field in ("presses", "forces", "on_object", "on_joints", "residual_n", "unrest", "jacobian"):
+            assert np.array_equal(getattr(alone, field)[..., 0], getattr(balance, field)[..., one]), field
+        assert np.array_equal(alone.slipped()[..., 0], balance.slipped()[..., one])

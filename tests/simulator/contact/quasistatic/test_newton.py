@@ -1,0 +1,154 @@
+"""The stiffness matrix against finite differences of the forces.
+
+The matrix leaves out what would make it unsymmetric or indefinite: how dragged skin resists as it sinks in deeper, how
+points of contact wander, how edges and ends bend, and how levers turn with what they press (all in proportion to the
+pressing force, against skin's stiffness). It is held to the differences exactly where these vanish, and loosely on
+planned grasps.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from thenar.simulator.body.anthropometry import Size
+from thenar.simulator.body.condition import Condition, Held, Pad, Thing
+from thenar.simulator.body.hand import LIMITS_DEG, Hand
+from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
+from thenar.simulator.contact.quasistatic.balance import Balance
+from thenar.simulator.contact.quasistatic.case import Case, Skin, command
+from thenar.simulator.contact.quasistatic.newton import newton_step, stiffness
+
+HAND = Hand(Size(185.0, 83.0))
+HARD = Skin(press_n_per_mm=3.0, soft_mm=1e-4, drag_n_per_mm=1.5, friction=2.0)
+ROUND = (Sphere(60.0), Cylinder(50.0, 400.0), Box(60.0, 60.0, 30.0))
+
+
+def matrix(balance: Balance) -> np.ndarray:
+    """Return the whole matrix (26, 26) of the only repetition."""
+    joints, coupling, body = (block[..., 0] for block in stiffness(balance))
+    whole = np.zeros((26, 26))
+    for digit in range(5):
+        own = slice(4 * digit, 4 * digit + 4)
+        whole[own, own], whole[own, 20:], whole[20:, own] = joints[digit], coupling[digit], coupling[digit].T
+    whole[20:, 20:] = body
+    return whole
+
+
+def differences(balance: Balance, step: float = 1e-6) -> np.ndarray:
+    """Return minus the change of all forces (26, 26) with all unknowns, by central differences."""
+    columns = []
+    for unknown in range(26):
+        ends = []
+        for way in (step, -step):
+            change = np.zeros((26, 1))
+            change[unknown] = way
+            moved = Balance(
+                balance.command, balance.skin, balance.angles + change[:20], balance.pose.moved(change[20:]), 2.0
+            )
+            ends.append(np.concatenate([moved.on_joints, moved.on_object])[:, 0])
+        columns.append(-(ends[0] - ends[1]) / (2 * step))
+    return np.stack(columns, axis=1)
+
+
+def scaled(whole: np.ndarray, like: np.ndarray) -> np.ndarray:
+    """Return a matrix in units of the square roots of the diagonal of `like`."""
+    root = np.sqrt(np.diag(like))
+    return whole / root[:, None] / root[None]
+
+
+def touched(sphere: int, shape: Shape, angles: np.ndarray, way: np.ndarray, sunk: float, skin: Skin) -> Balance:
+    """Return a hand that meets an object with one sphere of skin, which sinks in by `sunk` mm on its side `way`."""
+    centre = HAND.spheres(HAND.skeleton(angles[:, None]))[sphere, :, 0]
+    # The object's own z looks back at the sphere, from wherever it is.
+    side = np.cross([0.3, 0.5, -0.8], -way)
+    side /= np.linalg.norm(side)
+    axes = np.stack([side, np.cross(-way, side), -way], axis=1)
+    depth = shape.extent_mm()[2] / 2 + HAND.sphere_radii[sphere] - sunk
+    pose = np.concatenate([centre + depth * way, Rotation.from_matrix(axes).as_rotvec()])
+    held = Held(np.degrees(angles), pose, (Pad(sphere, 1.0),), 0.0)
+    condition = Condition("A", HAND, "touch", Thing("thing", shape, 0.0), held)
+    told = command([Case(condition, angles[:, None], pose[:, None], np.zeros(1))])
+    return Balance(told, skin, told.angles, told.pose, 2.0)
+
+
+def touches(shape: Shape, sunk: float, skin: Skin) -> Iterator[Balance]:
+    """Yield hands in many postures that meet an object with one sphere of skin and with nothing else."""
+    draw = np.random.default_rng(3)
+    for sphere in draw.permutation(np.repeat(np.arange(50), 12)):
+        way = draw.normal(size=3) * [1.0, 1.0, 0.3] - [0.0, 0.0, 2.0]  # below the hand, where its skin is
+        balance = touched(sphere, shape, draw.uniform(0.05, 0.7, 20), way / np.linalg.norm(way), sunk, skin)
+        if (np.delete(balance.sunk[:, 0], sphere) < -0.01).all():
+            yield balance
+
+
+@pytest.mark.parametrize("shape", ROUND, ids=lambda shape: type(shape).__name__)
+def test_a_light_touch_is_resisted_exactly_as_differences_say(shape: Shape) -> None:
+    found = list(islice(touches(shape, 1e-3, HARD), 15))
+    assert len(found) >= 10
+    for balance in found:
+        ours = matrix(balance)
+        assert scaled(ours, ours) == pytest.approx(scaled(differences(balance, 1e-7), ours), abs=2e-3)
+
+
+@pytest.mark.parametrize("shape", ROUND, ids=lambda shape: type(shape).__name__)
+def test_shifting_an_object_is_resisted_exactly_even_where_its_surface_bends(shape: Shape) -> None:
+    found = list(islice(touches(shape, 2.0, HARD), 15))
+    assert len(found) >= 10
+    for balance in found:
+        assert matrix(balance)[20:23, 20:23] == pytest.approx(differences(balance)[20:23, 20:23], abs=1e-4)
+    straight = isinstance(shape, Box)
+    assert all((balance.bent > 0.0).any() != straight for balance in found)
+
+
+@pytest.mark.parametrize("scene", ["kamakura", "cutkosky"])
+def test_on_planned_grasps_the_matrix_is_near_the_differences(
+    scene: str, planned: dict[str, tuple[Condition, ...]], make_case: Callable[..., Case], skin: Skin
+) -> None:
+    off = []
+    for condition in planned[scene]:
+        case = make_case(condition, 1, share=0.0)
+        # Joints planned to their limits stand on a kink: a hair within, they do not.
+        within = np.clip(case.angles, *np.radians(LIMITS_DEG.T[..., None] + [[[0.1]], [[-0.1]]]))
+        told = command([replace(case, angles=within)])
+        balance = Balance(told, skin, told.angles, told.pose, 2.0)
+        found = matrix(balance)
+        off.append(np.linalg.norm(scaled(found - differences(balance), found), ord=2))
+    # Largest deviation in any direction, in units of the matrix itself.
+    assert np.median(off) < 0.05
+    assert max(off) < 0.3
+
+
+def test_the_matrix_is_positive_definite_on_planned_grasps(
+    planned: dict[str, tuple[Condition, ...]], make_case: Callable[..., Case], skin: Skin
+) -> None:
+    for condition in (*planned["kamakura"], *planned["cutkosky"]):
+        told = command([make_case(condition, 1)])
+        assert np.linalg.eigvalsh(matrix(Balance(told, skin, told.angles, told.pose)))[0] > 0.0
+
+
+def test_a_step_solves_the_matrix_or_a_part_of_it(
+    planned: dict[str, tuple[Condition, ...]], make_case: Callable[..., Case], skin: Skin
+) -> None:
+    for condition in planned["kamakura"]:
+        told = command([make_case(condition, 1)])
+        balance = Balance(told, skin, told.angles, told.pose)
+        whole = np.linalg.solve(matrix(balance), np.concatenate([balance.on_joints, balance.on_object])[:, 0])
+        step = newton_step(balance)[:, 0]
+        share = step @ whole / (whole @ whole)
+        assert 0.0 < share <= 1.0 + 1e-9
+        assert step == pytest.approx(share * whole, rel=1e-6, abs=1e-9 * np.abs(whole).max())
+
+
+def test_no_step_is_longer_than_joints_and_objects_may_move_at_once(
+    planned: dict[str, tuple[Condition, ...]], make_case: Callable[..., Case], skin: Skin
+) -> None:
+    for condition in planned["cutkosky"]:
+        told = command([make_case(condition, 8, share=3.0)])
+        step = np.abs(newton_step(Balance(told, skin, told.angles, told.pose)))
+        assert step[:20].max() <= 0.12 + 1e-12
+        assert step[20:23].max() <= 3.0 + 1e-12
+        assert step[23:].max() <= 0.12 + 1e-12

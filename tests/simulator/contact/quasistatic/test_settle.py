@@ -1,0 +1,205 @@
+"""Hands closing on objects: at rest everything is in balance, and each repetition is on its own."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from thenar.simulator.body.condition import Condition
+from thenar.simulator.body.shapes import Sphere
+from thenar.simulator.contact.grip import GRAVITY
+from thenar.simulator.contact.quasistatic import Case, Rest, Skin, close
+from thenar.simulator.contact.quasistatic.balance import HOLD_N_PER_MM
+
+MOST_STEPS = 40
+Cases = Callable[..., Case]
+Planned = dict[str, tuple[Condition, ...]]
+
+
+def heavier(condition: Condition, mass_kg: float) -> Condition:
+    return replace(condition, thing=replace(condition.thing, mass_kg=mass_kg))
+
+
+def pads_n(rest: Rest, condition: Condition) -> np.ndarray:
+    """Return what presses on the segments whose pads were told to press (n,)."""
+    capsules = condition.hand.sphere_capsules
+    told = {int(capsules[pad.sphere]) for pad in condition.held.pads}
+    total: np.ndarray = rest.presses[np.isin(capsules, sorted(told))].sum(axis=0)
+    return total
+
+
+def below_n(rest: Rest, condition: Condition) -> np.ndarray:
+    """Return what presses from below (n,): on the lower side of the object, where it looks down."""
+    centres = condition.hand.spheres(condition.hand.skeleton(rest.angles))
+    normal = rest.pose.distance(condition.thing.shape, centres)[1]
+    looks_down = np.einsum("mxn,x->mn", normal, condition.held.down) > 0.4
+    total: np.ndarray = np.where(looks_down, rest.presses, 0.0).sum(axis=0)
+    return total
+
+
+def same(one: Rest, other: Rest, place: int, first: int = 0) -> None:
+    """Assert that repetition `first` of one is repetition `place` of the other, bit for bit."""
+    for field in ("angles", "presses", "residual_n", "residual_nmm", "settled", "steps"):
+        assert np.array_equal(getattr(one, field)[..., first], getattr(other, field)[..., place]), field
+    assert np.array_equal(one.pose.position[:, first], other.pose.position[:, place])
+    assert np.array_equal(one.pose.rotation[..., first], other.pose.rotation[..., place])
+
+
+@pytest.fixture(scope="module")
+def every(planned: Planned, make_case: Cases, skin: Skin) -> list[tuple[Case, Rest]]:
+    """Every grasp type and object of both taxonomies, four repetitions each."""
+    cases = [make_case(condition, 4, seed) for scene in planned.values() for seed, condition in enumerate(scene)]
+    return list(zip(cases, close(cases, skin, MOST_STEPS), strict=True))
+
+
+def test_nearly_every_hand_comes_to_rest(every: list[tuple[Case, Rest]]) -> None:
+    settled = np.concatenate([rest.settled for _, rest in every])
+    assert settled.mean() > 0.97
+
+
+def test_skin_and_weight_balance_but_for_a_small_share_of_the_load(every: list[tuple[Case, Rest]]) -> None:
+    shares = []
+    for case, rest in every:
+        load = case.grip_n + case.condition.thing.mass_kg * GRAVITY
+        shares.append((rest.residual_n / load)[rest.settled])
+        # A moment counts over 30 mm, about the half of what is held.
+        assert (rest.residual_nmm / 30.0 / load)[rest.settled] == pytest.approx(0.0, abs=0.25), case.condition.grasp
+    found = np.concatenate(shares)
+    assert np.median(found) < 0.02
+    assert found.max() < 0.10
+
+
+def test_what_is_left_is_what_the_soft_spring_carries(every: list[tuple[Case, Rest]]) -> None:
+    for case, rest in every:
+        shift = np.linalg.norm(rest.pose.position - case.numbers[:3], axis=0)
+        within = np.abs(rest.residual_n - HOLD_N_PER_MM * shift)[rest.settled]
+        assert (within < 0.05 + 1e-9).all()  # what at rest may still be out of balance
+
+
+def test_pads_get_most_of_the_grip_in_pinches(by_grasp: dict[str, Condition], make_case: Cases, skin: Skin) -> None:
+    for grasp in ("Tip", "PMF", "CMF", "PE"):
+        case = make_case(by_grasp[grasp], 16)
+        (rest,) = close([case], skin, MOST_STEPS)
+        share = (pads_n(rest, case.condition) / case.grip_n)[rest.settled]
+        assert share.mean() > 0.6, grasp
+        assert share.max() < 1.4, grasp
+
+
+def test_without_friction_a_tip_grasp_is_under_pressed(
+    by_grasp: dict[str, Condition], make_case: Cases, skin: Skin
+) -> None:
+    case = make_case(by_grasp["Tip"], 16)
+    (sticking,) = close([case], skin, MOST_STEPS)
+    (slipping,) = close([case], replace(skin, friction=0.0), MOST_STEPS)
+    held, lost = (pads_n(rest, case.condition) for rest in (sticking, slipping))
+    assert held.mean() > 3.0 * lost.mean()
+
+
+def test_friction_carries_the_weight(by_grasp: dict[str, Condition], make_case: Cases, skin: Skin) -> None:
+    # PMF holds a glass upright from its sides: only friction keeps it from falling.
+    for grasp in ("PMF", "CMF", "PE"):
+        heavy = heavier(by_grasp[grasp], 0.3)
+        (sticking,) = close([make_case(heavy, 8, share=0.0)], skin, MOST_STEPS)
+        (slipping,) = close([make_case(heavy, 8, share=0.0)], replace(skin, friction=0.0), 100)
+        assert sticking.settled.all(), grasp
+        assert sticking.residual_n.max() < 0.15 * 0.3 * GRAVITY, grasp
+        sinks = [np.einsum("x,xn->n", heavy.held.down, r.pose.position - heavy.held.pose[:3, None]) for r in
+                 (sticking, slipping)]  # fmt: skip
+        assert sinks[0].max() < sinks[1].min(), grasp
+
+
+@pytest.mark.parametrize("grasp", ["PoH", "PMF", "CMF"])
+def test_a_heavier_object_presses_harder_on_what_is_below_it(
+    grasp: str, by_grasp: dict[str, Condition], make_case: Cases, skin: Skin
+) -> None:
+    below = []
+    for mass in (0.2, 0.5, 1.0):
+        condition = heavier(by_grasp[grasp], mass)
+        (rest,) = close([make_case(condition, 4, share=0.0)], skin, MOST_STEPS)
+        assert rest.settled.all()
+        below.append(below_n(rest, condition).mean())
+    assert np.diff(below).min() > 0.0
+
+
+def test_a_stronger_grip_presses_harder(by_grasp: dict[str, Condition], make_case: Cases, skin: Skin) -> None:
+    for grasp in ("PoS", "CMF", "Tip"):
+        case = make_case(by_grasp[grasp], 4, share=0.0)
+        levels = [replace(case, grip_n=case.grip_n * level) for level in (0.5, 1.0, 1.5)]
+        pressed = [pads_n(rest, case.condition).mean() for rest in close(levels, skin, MOST_STEPS)]
+        assert np.diff(pressed).min() > 0.0, grasp
+
+
+def test_a_hand_that_meets_nothing_and_presses_nothing_stays_as_told(
+    by_grasp: dict[str, Condition], make_case: Cases, skin: Skin
+) -> None:
+    case = make_case(heavier(by_grasp["CMF"], 0.0), 3, share=0.0)
+    clear = replace(case, numbers=case.numbers + np.array([500.0, 0, 0, 0, 0, 0])[:, None], grip_n=np.zeros(3))
+    (rest,) = close([clear], skin, MOST_STEPS)
+    assert rest.settled.all()
+    assert not rest.steps.any()
+    assert np.array_equal(rest.angles, clear.angles)
+    assert np.array_equal(rest.pose.position, clear.numbers[:3])
+    assert not rest.presses.any()
+    assert not rest.residual_n.any()
+
+
+def test_a_hand_that_presses_nothing_rests_on_a_weightless_object_as_its_joints_let_it(
+    by_grasp: dict[str, Condition], make_case: Cases, skin: Skin
+) -> None:
+    ball = replace(by_grasp["CMF"], thing=replace(by_grasp["CMF"].thing, shape=Sphere(1.0), mass_kg=0.0))
+    case = make_case(ball, 2, share=0.0)
+    (rest,) = close([replace(case, grip_n=np.zeros(2))], skin, MOST_STEPS)
+    assert rest.settled.all()
+    assert rest.angles == pytest.approx(case.angles, abs=0.05)
+
+
+def test_a_hand_that_is_not_given_the_steps_is_marked(every: list[tuple[Case, Rest]], skin: Skin) -> None:
+    cases = [case for case, _ in every][:8]
+    for most_steps in (1, 2):
+        for rest in close(cases, skin, most_steps):
+            assert (rest.steps[~rest.settled] == most_steps).all()
+            assert not rest.settled.any()
+
+
+def test_an_object_that_overlaps_the_whole_hand_is_marked_and_not_made_up(
+    by_grasp: dict[str, Condition], make_case: Cases, skin: Skin
+) -> None:
+    huge = replace(by_grasp["Tip"], thing=replace(by_grasp["Tip"].thing, shape=Sphere(1500.0), mass_kg=5.0))
+    (rest,) = close([make_case(huge, 4)], skin, MOST_STEPS)
+    assert not rest.settled.any()
+    assert (rest.steps == MOST_STEPS).all()
+    assert np.isfinite(rest.angles).all()
+    assert np.isfinite(rest.presses).all()
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 64])
+def test_a_repetition_comes_out_the_same_in_any_number(
+    n: int, by_grasp: dict[str, Condition], make_case: Cases, skin: Skin
+) -> None:
+    for grasp in ("PoS", "Tip"):
+        case = make_case(by_grasp[grasp], n, seed=5)
+        (together,) = close([case], skin, MOST_STEPS)
+        for one in range(min(n, 4)):
+            own = slice(one, one + 1)
+            alone = Case(case.condition, case.angles[:, own], case.numbers[:, own], case.grip_n[own])
+            same(close([alone], skin, MOST_STEPS)[0], together, one)
+
+
+def test_a_case_comes_out_the_same_in_any_company_and_order(every: list[tuple[Case, Rest]], skin: Skin) -> None:
+    some = [every[number] for number in (0, 11, 23, 30, 45, 59)]
+    for order in ((5, 3, 1), (0, 2), (4, 5, 0, 1, 2, 3)):
+        for number, rest in zip(order, close([some[k][0] for k in order], skin, MOST_STEPS), strict=True):
+            for repetition in range(4):
+                same(some[number][1], rest, repetition, repetition)
+
+
+def test_slow_company_does_not_change_who_is_at_rest(
+    by_grasp: dict[str, Condition], make_case: Cases, skin: Skin
+) -> None:
+    easy = make_case(by_grasp["CMF"], 2)
+    hard = make_case(by_grasp["Tip"], 2, share=6.0)
+    (alone,) = close([easy], skin, MOST_STEPS)
+    beside = close([hard, easy], skin, MOST_STEPS)[1]
+    for repetition in range(2):
+        same(alone, beside, repetition, repetition)

@@ -1,0 +1,75 @@
+"""The force on a capsule is shared among its switches by depth, and none is lost."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from thenar.simulator.body.anthropometry import Size
+from thenar.simulator.body.hand import CAPSULES, Hand
+from thenar.simulator.body.layout import Switches, murakami160
+from thenar.simulator.contact.split import split
+
+SWITCHES = Switches(Hand(Size(185.0, 83.0)), murakami160())
+N_SWITCHES = len(SWITCHES.capsules)
+# Many at the surface and outside, so that capsules of which no switch, one or all touch come up.
+DEPTHS_MM = st.sampled_from((-5.0, -1e-9, 0.0)) | st.floats(1e-15, 10.0)
+
+
+@st.composite
+def pressed(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray]:
+    n = draw(st.integers(1, 3))
+    depths = draw(arrays(np.float64, (N_SWITCHES, n), elements=DEPTHS_MM, fill=DEPTHS_MM))
+    forces = draw(arrays(np.float64, (len(CAPSULES), n), elements=st.floats(0.0, 100.0)))
+    return depths, forces
+
+
+@given(pressed())
+def test_no_force_is_lost_and_none_made(case: tuple[np.ndarray, np.ndarray]) -> None:
+    depths, forces = case
+    shared, between = split(SWITCHES, depths, forces)
+    assert shared.sum(axis=0) + between == pytest.approx(forces.sum(axis=0), rel=1e-12)
+    assert (shared >= 0.0).all()
+    assert (between >= 0.0).all()
+
+
+@given(pressed())
+def test_each_capsule_keeps_its_own_force(case: tuple[np.ndarray, np.ndarray]) -> None:
+    depths, forces = case
+    shared, _ = split(SWITCHES, depths, forces)
+    for capsule, force in enumerate(forces):
+        own = SWITCHES.capsules == capsule
+        touched = (depths[own] > 0.0).any(axis=0)
+        assert shared[own].sum(axis=0) == pytest.approx(np.where(touched, force, 0.0), rel=1e-12)
+
+
+@given(pressed())
+def test_within_a_capsule_force_is_in_proportion_to_depth(case: tuple[np.ndarray, np.ndarray]) -> None:
+    depths, forces = case
+    shared, _ = split(SWITCHES, depths, forces)
+    sunk = np.maximum(depths, 0.0)
+    for capsule in range(len(CAPSULES)):
+        own = SWITCHES.capsules == capsule
+        deepest, most = sunk[own].max(axis=0), shared[own].max(axis=0)
+        assert shared[own] * deepest == pytest.approx(sunk[own] * most, rel=1e-9, abs=1e-12)
+
+
+def test_a_hair_of_depth_still_takes_the_whole_force() -> None:
+    depths = np.full((N_SWITCHES, 1), -1.0)
+    depths[0] = 1e-15  # the least difference of two positions near 10 mm
+    forces = np.zeros((len(CAPSULES), 1))
+    forces[SWITCHES.capsules[0]] = 50.0
+    shared, between = split(SWITCHES, depths, forces)
+    assert shared[0, 0] == pytest.approx(50.0)
+    assert between[0] == 0.0
+
+
+@given(pressed())
+def test_a_grasp_is_split_the_same_alone_and_in_a_batch(case: tuple[np.ndarray, np.ndarray]) -> None:
+    depths, forces = case
+    shared, between = split(SWITCHES, depths, forces)
+    for one in range(depths.shape[1]):
+        alone = split(SWITCHES, depths[:, [one]], forces[:, [one]])
+        assert np.array_equal(alone[0][:, 0], shared[:, one])
+        assert alone[1][0] == between[one]

@@ -1,0 +1,57 @@
+"""When frames are scanned: always at the end of holding, whatever else."""
+
+from collections.abc import Callable
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.simulator.pipeline.effect import Setting
+from thenar.simulator.pipeline.frames import at_a_time, drawn_rows, frame_times, hold_frame
+
+PERIODS = st.integers(1_000, 30_000)
+TIMES = st.integers(0, 200_000)
+
+
+def test_without_time_there_is_the_frame_that_is_read_out_and_no_other(make_setting: Callable[..., Setting]) -> None:
+    setting = make_setting(timed=False)
+    assert frame_times(setting).tolist() == [setting.hold_us]
+    assert hold_frame(setting) == 0
+    assert drawn_rows(setting).tolist() == [0]
+
+
+@given(period=PERIODS, lead=TIMES, hold=TIMES, release=TIMES)
+def test_frames_are_a_period_apart_between_the_ends_and_one_is_at_the_end_of_holding(
+    make_setting: Callable[..., Setting], period: int, lead: int, hold: int, release: int
+) -> None:
+    setting = make_setting(timed=True, period_us=period, first_us=-lead, hold_us=hold, release_us=release)
+    times = frame_times(setting)
+    assert times[hold_frame(setting)] == hold
+    assert set(np.diff(times).tolist()) <= {period}
+    assert -lead <= times[0] < -lead + period
+    assert hold + release - period < times[-1] <= hold + release
+
+
+@given(period=PERIODS, lead=TIMES, hold=TIMES, release=TIMES)
+def test_every_frame_draws_a_row_of_its_own_and_the_one_read_out_the_first(
+    make_setting: Callable[..., Setting], period: int, lead: int, hold: int, release: int
+) -> None:
+    setting = make_setting(timed=True, period_us=period, first_us=-lead, hold_us=hold, release_us=release)
+    rows = drawn_rows(setting)
+    assert sorted(rows.tolist()) == list(range(len(frame_times(setting))))
+    assert rows[hold_frame(setting)] == 0
+
+
+@given(period=PERIODS, hold=st.integers(1, 60_000_000), few=st.integers(1, 1000), more=st.integers(0, 1000))
+def test_the_more_frames_the_fewer_repetitions_at_a_time_but_never_none(
+    make_setting: Callable[..., Setting], period: int, hold: int, few: int, more: int
+) -> None:
+    setting = make_setting(timed=True, period_us=period, hold_us=hold)
+    frames = len(frame_times(setting))
+    found = at_a_time(setting, few)
+    assert 1 <= found <= few
+    assert found == 1 or found * frames <= 50_000
+    # None is left out for whom there is room.
+    assert found == few or (found + 1) * frames > 50_000
+    assert found <= at_a_time(setting, few + more)
+    assert at_a_time(make_setting(timed=False, period_us=period, hold_us=hold), few) == few

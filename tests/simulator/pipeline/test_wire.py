@@ -1,0 +1,211 @@
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.drivers import scanner_frame as scanner
+from thenar.simulator.errors import SceneError
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.effect import Setting
+from thenar.simulator.pipeline.wire import RECEIVE, SEND
+from thenar.simulator.streams import Draw
+
+MakeBatch = Callable[..., Batch]
+MakeDraw = Callable[..., Draw]
+MakeSetting = Callable[..., Setting]
+
+FRAMES, STATE_BYTES, RECORD_BYTES = 5, 26, 20
+
+
+@pytest.fixture(scope="module")
+def make_sent(make_batch: MakeBatch, make_draw: MakeDraw, make_setting: MakeSetting) -> Callable[..., Batch]:
+    """Return a function of the frames' times: a batch of random frames, sent."""
+
+    def make(frame_us: np.ndarray, delay_us: np.ndarray | None = None, switches: int = 160) -> Batch:
+        batch, random = make_batch(range(len(frame_us))), np.random.default_rng(3)
+        batch.frame_us, batch.delay_us = frame_us, delay_us
+        batch.bits = random.random((*frame_us.shape, switches)) < 0.1
+        batch.raw = random.integers(1, 256, (*frame_us.shape, 18)).astype(np.uint8)
+        batch.settled = np.ones(len(batch), dtype=np.bool_)
+        SEND[1](make_setting(timed=True))(batch, make_draw("glove.send", batch))
+        return batch
+
+    return make
+
+
+@pytest.fixture(scope="module")
+def receive(make_draw: MakeDraw, make_setting: MakeSetting) -> Callable[[Batch], None]:
+    return lambda batch: RECEIVE[1](make_setting(timed=True))(batch, make_draw("glove.receive", batch))
+
+
+def every_10_ms(repetitions: int = 2) -> np.ndarray:
+    return np.tile(10_000 * np.arange(FRAMES), (repetitions, 1))
+
+
+def lose(batch: Batch, *places: tuple[int, int, int]) -> None:
+    arrives = batch.traffic.arrives.copy()
+    for place in places:
+        arrives[place] = False
+    batch.traffic = replace(batch.traffic, arrives=arrives)
+
+
+@pytest.mark.parametrize("switches", [160, 8, 9, 33])
+def test_an_undisturbed_line_changes_nothing(make_sent: Callable, receive: Callable, switches: int) -> None:
+    batch = make_sent(every_10_ms(), switches=switches)
+    bits, raw = batch.bits, batch.raw
+    receive(batch)
+    assert np.array_equal(batch.bits, bits)
+    assert np.array_equal(batch.raw, raw)
+    assert batch.lost is not None
+    assert not batch.lost.any()
+    assert batch.settled.all()
+
+
+def test_more_than_256_frames_still_match(make_sent: Callable, receive: Callable) -> None:
+    batch = make_sent(np.tile(10_000 * np.arange(300), (1, 1)))
+    bits = batch.bits
+    receive(batch)
+    assert np.array_equal(batch.bits, bits)
+
+
+def test_bytes_take_ten_bits_each_at_115200_baud_and_wait_for_the_scan_and_the_glove(make_sent: Callable) -> None:
+    batch = make_sent(every_10_ms(1), delay_us=np.full(160, 1500))
+    at_us = batch.traffic.at_us[0]
+    assert at_us.shape == (FRAMES, STATE_BYTES + RECORD_BYTES)
+    assert at_us[2, 0] == 20_000 + 1500 + 87
+    assert at_us[2, STATE_BYTES - 1] == 20_000 + 1500 + 2257
+    # 18 sensors, a quarter of a millisecond each, and 20 bytes.
+    assert at_us[2, -1] == 20_000 + 4500 + 1737
+
+
+def test_a_frame_waits_until_the_line_is_free(make_sent: Callable) -> None:
+    batch = make_sent(np.array([[0, 100, 200, 50_000, 50_001]]))
+    at_us = batch.traffic.at_us[0, :, :STATE_BYTES]
+    assert at_us[:, -1].tolist() == [2257, 2 * 2257, 3 * 2257, 52_257, 52_257 + 2257]
+    assert (np.diff(at_us.ravel()) >= 86).all()
+
+
+def test_what_is_lost_leaves_the_frame_before_in_place(make_sent: Callable, receive: Callable) -> None:
+    batch = make_sent(every_10_ms())
+    bits, raw = batch.bits, batch.raw
+    lose(batch, (0, 2, 5), (1, 3, STATE_BYTES + 4))
+    receive(batch)
+    assert batch.lost is not None
+    assert np.argwhere(batch.lost).tolist() == [[0, 2], [1, 3]]
+    expected = bits.copy()
+    expected[0, 2] = bits[0, 1]
+    assert np.array_equal(batch.bits, expected)
+    expected = raw.copy()
+    expected[1, 3] = raw[1, 2]
+    assert np.array_equal(batch.raw, expected)
+    assert batch.settled.all()
+
+
+def test_a_lost_end_costs_two_frames(make_sent: Callable, receive: Callable) -> None:
+    batch = make_sent(every_10_ms())
+    bits = batch.bits
+    lose(batch, (0, 1, STATE_BYTES - 1))
+    receive(batch)
+    assert batch.lost is not None
+    assert np.argwhere(batch.lost).tolist() == [[0, 1], [0, 2]]
+    assert np.array_equal(batch.bits[0, 1:3], bits[0, [0, 0]])
+
+
+def test_only_the_states_of_switches_are_taken_for_such(make_sent: Callable, receive: Callable) -> None:
+    batch = make_sent(every_10_ms(1))
+    bits = batch.bits
+    other = scanner.encode(scanner.Frame(scanner.STATE + 1, 3, bytes(20)))
+    data = batch.traffic.data.copy()
+    data[0, 3, :STATE_BYTES] = np.frombuffer(other, dtype=np.uint8)
+    batch.traffic = replace(batch.traffic, data=data)
+    receive(batch)
+    assert batch.lost is not None
+    assert np.flatnonzero(batch.lost[0]).tolist() == [3]
+    assert np.array_equal(batch.bits[0, 3], bits[0, 2])
+
+
+def test_a_record_in_which_the_glove_complains_is_not_taken(make_sent: Callable, receive: Callable) -> None:
+    """Of record 1 the end is lost, and of record 2 all but its last two sensors, which read 'es', and its end."""
+    batch = make_sent(every_10_ms(1))
+    raw = batch.raw
+    data = batch.traffic.data.copy()
+    data[0, 2, -3:-1] = list(b"es")
+    batch.traffic = replace(batch.traffic, data=data)
+    lose(batch, (0, 1, -1), *((0, 2, place) for place in range(STATE_BYTES, STATE_BYTES + RECORD_BYTES - 3)))
+    receive(batch)
+    assert batch.lost is not None
+    assert np.flatnonzero(batch.lost[0]).tolist() == [1, 2]
+    assert np.array_equal(batch.raw[0, 2], raw[0, 0])
+
+
+def test_before_the_first_frame_there_is_no_contact_and_the_first_joints_that_come(
+    make_sent: Callable, receive: Callable
+) -> None:
+    batch = make_sent(every_10_ms(1))
+    raw = batch.raw
+    lose(batch, (0, 0, 3), (0, 0, STATE_BYTES + 3), (0, 1, STATE_BYTES + 3))
+    receive(batch)
+    assert not batch.bits[0, 0].any()
+    assert np.array_equal(batch.raw[0, :3], raw[0, [2, 2, 2]])
+    assert batch.settled.all()
+
+
+@pytest.mark.parametrize("line", [slice(0, STATE_BYTES), slice(STATE_BYTES, None)])
+def test_a_repetition_to_which_a_line_brings_nothing_is_not_settled(
+    make_sent: Callable, receive: Callable, line: slice
+) -> None:
+    batch = make_sent(every_10_ms(3))
+    arrives = batch.traffic.arrives.copy()
+    arrives[1, :, line] = False
+    batch.traffic = replace(batch.traffic, arrives=arrives)
+    receive(batch)
+    assert batch.settled.tolist() == [True, False, True]
+    assert batch.lost is not None
+    assert batch.lost.tolist() == [[False] * FRAMES, [True] * FRAMES, [False] * FRAMES]
+
+
+@given(st.integers(0, 2**32))
+def test_whatever_arrives_is_a_frame_that_was_sent_and_never_a_later_one(
+    make_sent: Callable, receive: Callable, seed: int
+) -> None:
+    batch, random = make_sent(every_10_ms()), np.random.default_rng(seed)
+    bits = batch.bits
+    batch.traffic = replace(batch.traffic, arrives=random.random(batch.traffic.data.shape) > random.random() / 20)
+    receive(batch)
+    for repetition in range(len(bits)):
+        for frame in range(FRAMES):
+            sent = [np.zeros(160, bool), *bits[repetition, : frame + 1]]
+            assert any(np.array_equal(batch.bits[repetition, frame], one) for one in sent)
+
+
+@given(st.integers(0, 2**32))
+def test_a_repetition_is_received_the_same_alone(make_sent: Callable, receive: Callable, seed: int) -> None:
+    both, random = make_sent(every_10_ms()), np.random.default_rng(seed)
+    both.traffic = replace(both.traffic, arrives=random.random(both.traffic.data.shape) > 0.02)
+    alone = make_sent(every_10_ms(1))
+    second = (both.bits[1:], both.raw[1:], both.traffic)
+    receive(both)
+    alone.bits, alone.raw, traffic = second
+    alone.traffic = replace(traffic, data=traffic.data[1:], at_us=traffic.at_us[1:], arrives=traffic.arrives[1:])
+    receive(alone)
+    assert np.array_equal(alone.bits[0], both.bits[1])
+    assert np.array_equal(alone.raw[0], both.raw[1])
+    assert alone.lost is not None
+    assert both.lost is not None
+    assert np.array_equal(alone.lost[0], both.lost[1])
+
+
+def test_bytes_are_counted(make_sent: Callable, make_draw: MakeDraw, make_setting: MakeSetting) -> None:
+    batch = make_sent(every_10_ms(3))
+    draw = make_draw("glove.send", batch)
+    SEND[1](make_setting(timed=True))(batch, draw)
+    assert draw.draws.counts == {"bytes sent": 3 * FRAMES * (STATE_BYTES + RECORD_BYTES)}
+
+
+def test_frames_faster_than_the_line_are_refused(make_setting: MakeSetting) -> None:
+    with pytest.raises(SceneError, match=r"recording.rate_hz: 500 frames .* at most 160"):
+        SEND[1](make_setting(timed=True, period_us=2000))
+    SEND[1](make_setting(timed=True, period_us=6237))

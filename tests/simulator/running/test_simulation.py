@@ -1,0 +1,272 @@
+import subprocess
+import sys
+import tracemalloc
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from thenar.simulator import load_scene, simulate
+from thenar.simulator.effects.contact_quasistatic import Parameters
+from thenar.simulator.errors import SceneError
+from thenar.simulator.pipeline.ledger import Ledger
+from thenar.simulator.pipeline.pipeline import compile_pipeline
+from thenar.simulator.pipeline.registry import load
+from thenar.simulator.planning.postures import Postures
+from thenar.simulator.running.explain import explain
+from thenar.simulator.running.report import Report
+from thenar.simulator.running.session import sessions
+from thenar.simulator.running.simulation import Simulated
+from thenar.simulator.scenes.scene import Listed, Scene
+
+
+def scene_of(name: str, repetitions: int, types: tuple[str, ...] = (), **changes: object) -> Scene:
+    scene = load_scene(name)
+    objects = tuple(item for item in scene.objects if not types or item.grasp in types)
+    return msgspec.structs.replace(scene, repetitions=repetitions, objects=objects, **changes)
+
+
+def hasty(scene: Scene, most_steps: int) -> Scene:
+    """Return a scene whose contact model gives up early."""
+    listed = Listed("contact.quasistatic", Parameters(most_steps=most_steps))
+    return msgspec.structs.replace(scene, effects=(*scene.effects, listed))
+
+
+def without_times(report: Report) -> Report:
+    steps = tuple(
+        msgspec.structs.replace(each, seconds=0.0, us_a_grasp=0.0, share=0.0, calls=0) for each in report.steps
+    )
+    return msgspec.structs.replace(report, seconds=0.0, steps=steps)
+
+
+QUICK = scene_of("quick", 6, ("PoS", "Tpd", "Tip"))
+
+
+@pytest.fixture(scope="module")
+def quick() -> Simulated:
+    return simulate(QUICK, jobs=1, keep_unsettled=True)
+
+
+@pytest.mark.parametrize(("jobs", "block"), [(1, 1), (1, 7), (2, 1), (2, 7), (2, 64)])
+def test_any_number_of_processes_and_any_blocks_give_the_same_bytes(
+    quick: Simulated, jobs: int, block: int, tmp_path: Path
+) -> None:
+    quick.grasp_set.save(tmp_path / "one.grasps")
+    simulate(QUICK, jobs=jobs, block=block, keep_unsettled=True).grasp_set.save(tmp_path / "other.grasps")
+    assert (tmp_path / "other.grasps").read_bytes() == (tmp_path / "one.grasps").read_bytes()
+
+
+@pytest.mark.parametrize("name", ["faulty-glove", "continuous"])
+def test_scenes_in_time_and_on_the_wire_do_not_depend_on_blocks_either(name: str) -> None:
+    scene = scene_of(name, 3, ("PoH",))
+    whole = simulate(scene, jobs=1)
+    for block in (1, 2):
+        part = simulate(scene, jobs=1, block=block)
+        assert part.grasp_set.fingerprint() == whole.grasp_set.fingerprint()
+        # What is drawn once a batch is drawn more often in more batches; nothing else differs.
+        same = [msgspec.structs.replace(without_times(each.report), steps=()) for each in (part, whole)]
+        assert same[0] == same[1]
+
+
+def test_one_repetition_alone_is_as_in_the_whole_scene(quick: Simulated) -> None:
+    pipeline, made = compile_pipeline(QUICK), quick.grasp_set
+    for session in sessions(QUICK, Postures.of(QUICK)):
+        for place, condition in enumerate(session.conditions):
+            batch = session.batch(place, np.array([2]))
+            pipeline.run([batch], Ledger())
+            (row,) = np.flatnonzero((made.subjects == condition.subject) & (made.trials == batch.trials[0]))
+            np.testing.assert_array_equal(made.switches[row], batch.bits[0, 0])
+            angles = [joint.value(code) for joint, code in zip(made.joints, made.codes[row], strict=True)]
+            # Half a count of the subject's sensors (at most 1.4 degrees and an eighth more), half a step of the scale.
+            assert np.abs(angles - batch.sensors_deg[0, 0, :16]).max() < 1.4 * 1.125 / 2 + 0.25
+            assert (made.grasps[row], made.objects[row]) == (condition.grasp, condition.thing.name)
+
+
+def test_a_subject_alone_is_as_in_the_whole_scene(quick: Simulated) -> None:
+    alone = simulate(msgspec.structs.replace(QUICK, subjects=QUICK.subjects[1:]), jobs=1, keep_unsettled=True).grasp_set
+    rows = quick.grasp_set.rows(quick.grasp_set.subjects == QUICK.subjects[1].name)
+    assert alone.fingerprint() == rows.fingerprint()
+
+
+def test_the_order_of_subjects_changes_nothing_but_the_order_of_rows(quick: Simulated) -> None:
+    turned = simulate(msgspec.structs.replace(QUICK, subjects=QUICK.subjects[::-1]), jobs=1, keep_unsettled=True)
+    made = turned.grasp_set
+    back = np.concatenate([np.flatnonzero(made.subjects == subject.name) for subject in QUICK.subjects])
+    assert made.subjects[0] == QUICK.subjects[1].name
+    assert made.rows(back).fingerprint() == quick.grasp_set.fingerprint()
+
+
+def test_another_seed_makes_another_set(quick: Simulated) -> None:
+    other = simulate(msgspec.structs.replace(QUICK, seed=QUICK.seed + 1), jobs=1, keep_unsettled=True).grasp_set
+    assert (other.switches != quick.grasp_set.switches).any()
+    assert (other.codes != quick.grasp_set.codes).any()
+
+
+def test_the_more_frames_the_fewer_repetitions_are_simulated_at_a_time() -> None:
+    """10 001 frames each: four at a time, or the two batches of three that make at least four."""
+    jitter = Listed("frame.jitter", load("frame.jitter").Parameters())
+    recording = msgspec.structs.replace(QUICK.recording, rate_hz=10_000.0, hold_ms=1000.0)
+    scene = msgspec.structs.replace(QUICK, recording=recording, effects=(jitter,), subjects=QUICK.subjects[:1])
+    seen: list[int] = []
+    simulate(scene, jobs=1, keep_unsettled=True, progress=lambda done, total: seen.append(done))
+    assert seen == [6, 12, 18]
+    assert explain(scene, jobs=1).measured == 6
+
+
+def peak_bytes(scene: Scene) -> int:
+    tracemalloc.start()
+    simulate(scene, jobs=1, block=8)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return peak
+
+
+@pytest.mark.parametrize("name", ["quick", "faulty-glove"])
+def test_memory_grows_by_what_is_kept_of_a_repetition_and_no_more(name: str) -> None:
+    few, many = (scene_of(name, repetitions, ("PoS",)) for repetitions in (16, 64))
+    few, many = (
+        msgspec.structs.replace(scene, recording=msgspec.structs.replace(scene.recording, rows="last"))
+        for scene in (few, many)
+    )
+    simulate(few, jobs=1, block=8)  # what is loaded and cached once
+    # Two subjects: 96 repetitions more. A row is 61 bytes packed and some 300 unpacked with its labels; a repetition on
+    # its way through the pipeline takes more than 30 000.
+    assert peak_bytes(many) - peak_bytes(few) < 96 * 2000
+
+
+def test_the_set_is_labelled_with_everything_that_a_recording_has(quick: Simulated) -> None:
+    made = quick.grasp_set
+    assert (len(made), len(made.switch_names), len(made.joint_names)) == (36, 160, 16)
+    assert made.taxonomy.name == "kamakura14"
+    assert made.subjects.tolist() == ["A"] * 18 + ["C"] * 18
+    assert made.trials.tolist() == list(range(18)) * 2
+    assert {*made.grasps.tolist()} == {"PoS", "Tpd", "Tip"}
+    assert len({*made.objects.tolist()}) == 6
+
+
+def test_codes_are_on_one_scale_for_all_or_the_bare_bytes(quick: Simulated) -> None:
+    glove = msgspec.structs.replace(QUICK.glove, codes="raw")
+    raw = simulate(msgspec.structs.replace(QUICK, glove=glove), jobs=1, keep_unsettled=True).grasp_set
+    common = quick.grasp_set
+    assert raw.codes.max() <= 255
+    assert [joint.name for joint in raw.joints] == [joint.name for joint in common.joints]
+    assert common.joints[0].step == 0.5
+    # The same hands: the angles agree up to what the subject's calibration differs from the typical one.
+    by_raw, by_common = (
+        np.stack([joint.value(column) for joint, column in zip(made.joints, made.codes.T, strict=True)])
+        for made in (raw, common)
+    )
+    assert np.abs(by_raw - by_common).max() < 45.0
+    assert np.corrcoef(by_raw.ravel(), by_common.ravel())[0, 1] > 0.95
+
+
+def test_every_frame_is_a_row_when_the_scene_says_so() -> None:
+    scene = scene_of("continuous", 2, ("PoS", "Tip"))
+    made = simulate(scene, jobs=1, keep_unsettled=True)
+    frames = 1 + (300 + 500 + 200) // 10
+    assert len(made.grasp_set) == frames * 2 * 2 * 2
+    assert made.grasp_set.trials.tolist() == np.tile(np.repeat(np.arange(4), frames), 2).tolist()
+    one_each = msgspec.structs.replace(scene, recording=msgspec.structs.replace(scene.recording, rows="last"))
+    last = simulate(one_each, jobs=1, keep_unsettled=True)
+    held = frames - 1 - 200 // 10
+    read_out = made.grasp_set.rows(np.arange(held, len(made.grasp_set), frames))
+    assert read_out.fingerprint() == last.grasp_set.fingerprint()
+    # Reports tell of the frames that are read out, in both.
+    assert [each.switches_mean for each in made.report.grasps] == [each.switches_mean for each in last.report.grasps]
+
+
+def test_what_did_not_settle_is_left_out_and_named_unless_it_is_to_be_kept() -> None:
+    scene = hasty(QUICK, 12)
+    left_out, kept = simulate(scene, jobs=1), simulate(scene, jobs=1, keep_unsettled=True)
+    unsettled = left_out.report.unsettled
+    assert 0 < len(unsettled) < 36
+    assert unsettled == kept.report.unsettled
+    assert len(kept.grasp_set) == 36
+    gone = {(one.subject, one.trial, one.grasp, one.object) for one in unsettled}
+    made = kept.grasp_set
+    keys = zip(made.subjects.tolist(), made.trials.tolist(), made.grasps.tolist(), made.objects.tolist(), strict=True)
+    stay = np.array([key not in gone for key in keys])
+    assert made.rows(stay).fingerprint() == left_out.grasp_set.fingerprint()
+    assert [one.unsettled for one in left_out.report.grasps] == [one.unsettled for one in kept.report.grasps]
+    assert sum(one.unsettled for one in left_out.report.grasps) == len(unsettled)
+    assert not left_out.report.kept_unsettled
+    assert kept.report.kept_unsettled
+
+
+def test_a_scene_in_which_nothing_settles_is_an_error() -> None:
+    with pytest.raises(SceneError, match="none of its 36 repetitions can be trusted; of the first, the hand did not"):
+        simulate(hasty(QUICK, 1), jobs=1)
+
+
+def test_a_scene_of_which_no_byte_arrives_says_so_and_blames_no_hand() -> None:
+    lossy = Listed("wire.lost_bytes", load("wire.lost_bytes").Parameters(rate=0.999))
+    scene = msgspec.structs.replace(QUICK, effects=(*QUICK.effects, lossy))
+    with pytest.raises(SceneError, match="of the first, no frame arrived whole"):
+        simulate(scene, jobs=1)
+
+
+def test_the_report_says_what_came_out_and_that_it_is_simulated(quick: Simulated) -> None:
+    report = quick.report
+    assert report.simulated
+    assert (report.scene, report.seed, report.subjects, report.repetitions) == ("quick", 1, ("A", "C"), 36)
+    made = quick.grasp_set
+    for one in report.grasps:
+        own = made.switches[made.grasps == one.grasp]
+        closed = own.sum(axis=1)
+        if len(own):
+            assert (one.rows, one.repetitions) == (len(own), 12)
+            assert (one.switches_least, one.switches_most) == (closed.min(), closed.max())
+            assert one.switches_mean == pytest.approx(closed.mean())
+            assert one.patterns == len(np.unique(own, axis=0))
+            assert one.no_contact == np.count_nonzero(closed == 0)
+        else:
+            assert (one.rows, one.repetitions) == (0, 0)
+
+
+def test_the_cost_of_every_step_is_reported_and_the_shares_make_a_whole(quick: Simulated) -> None:
+    steps = quick.report.steps
+    assert [step.name for step in steps] == [stop.effect.name for stop in compile_pipeline(QUICK).stops]
+    assert all(step.grasps == 36 for step in steps)
+    assert sum(step.share for step in steps) == pytest.approx(1.0)
+    assert {step.name for step in steps if not step.own} == {listed.name for listed in QUICK.effects}
+    assert {step.name for step in steps if step.draws} == {listed.name for listed in QUICK.effects}
+
+
+def test_reports_of_several_processes_are_added_up(quick: Simulated) -> None:
+    assert without_times(simulate(QUICK, jobs=2, keep_unsettled=True).report) == without_times(quick.report)
+
+
+def test_an_effect_can_be_left_out() -> None:
+    less = msgspec.structs.replace(QUICK, effects=tuple(each for each in QUICK.effects if each.name != "hand.grip"))
+    one, other = simulate(QUICK, jobs=1, without="hand.grip"), simulate(less, jobs=1)
+    assert one.grasp_set.fingerprint() == other.grasp_set.fingerprint()
+    assert one.grasp_set.fingerprint() != simulate(QUICK, jobs=1).grasp_set.fingerprint()
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_progress_counts_repetitions_up_to_all_of_them(jobs: int) -> None:
+    seen: list[tuple[int, int]] = []
+    simulate(QUICK, jobs=jobs, block=2, progress=lambda done, total: seen.append((done, total)))
+    assert seen == sorted(seen)
+    assert seen[-1] == (36, 36)
+
+
+@pytest.mark.slow
+def test_two_hundred_hands_take_less_than_two_gibibytes_in_all() -> None:
+    program = (
+        "import resource\n"
+        "from joblib.externals.loky import get_reusable_executor\n"
+        "from thenar.simulator import load_scene, simulate\n"
+        "made = simulate(load_scene('crowd'), jobs=2)\n"
+        "get_reusable_executor().shutdown(wait=True)\n"
+        "who = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)\n"
+        "own, child = (resource.getrusage(each).ru_maxrss for each in who)\n"
+        "print(len(made.grasp_set) + len(made.report.unsettled), own, child)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    repetitions, own_kib, child_kib = map(int, done.stdout.split())
+    assert repetitions == 200 * 14 * 20
+    # RUSAGE_CHILDREN tells of the largest child that has ended: there were two workers, and Python's helper of theirs.
+    assert child_kib > 0
+    assert own_kib + 3 * child_kib < 2 * 1024 * 1024

@@ -1,0 +1,89 @@
+from collections import Counter
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.simulator.body.shapes import Sphere
+from thenar.simulator.pipeline.registry import load
+from thenar.simulator.scenes.scene import Recording, Scene, SceneObject, Subject
+
+MakeScene = Callable[..., Scene]
+
+
+def objects(grasps: list[str]) -> tuple[SceneObject, ...]:
+    ball = Sphere(diameter_mm=50.0)
+    return tuple(SceneObject(name=f"ball {n}", grasp=g, shape=ball, mass_g=80.0) for n, g in enumerate(grasps))
+
+
+@given(grasps=st.lists(st.sampled_from("abc"), min_size=1, max_size=12), repetitions=st.integers(1, 50))
+def test_every_grasp_type_gets_all_repetitions_and_its_objects_even_shares(grasps: list[str], repetitions: int) -> None:
+    scene = Scene(
+        name="x", seed=1, taxonomy="own", objects=objects(grasps), subjects=(), repetitions=repetitions, effects=()
+    )
+    shares = list(scene.shares())
+    assert [item for item, _ in shares] == list(scene.objects)
+    total: Counter[str] = Counter()
+    for item, count in shares:
+        total[item.grasp] += count
+    assert total == dict.fromkeys(grasps, repetitions)
+    for grasp in total:
+        counts = [count for item, count in shares if item.grasp == grasp]
+        assert counts == sorted(counts, reverse=True)
+        assert max(counts) - min(counts) <= 1
+
+
+def test_a_setting_has_times_in_microseconds_from_the_first_contact(make_scene: MakeScene) -> None:
+    scene = make_scene(recording=Recording(rate_hz=80.0, lead_ms=30.5, hold_ms=250.0, release_ms=40.0))
+    setting = scene.setting([])
+    assert (setting.period_us, setting.first_us, setting.hold_us, setting.release_us) == (
+        12_500,
+        -30_500,
+        250_000,
+        40_000,
+    )
+    assert (setting.seed, setting.threshold_n) == (scene.seed, scene.glove.threshold_n)
+
+
+def test_a_session_has_the_trials_of_one_subject(make_scene: MakeScene) -> None:
+    scene = make_scene(objects=objects(["PoS", "PoS", "Tip"]), repetitions=10)
+    assert scene.setting([]).session_trials == 20
+
+
+@pytest.mark.parametrize(
+    ("rows", "effects", "timed", "on_wire"),
+    [
+        ("last", [], False, False),
+        ("last", ["joint.noise"], False, False),
+        ("last", ["joint.noise", "frame.jitter"], True, False),
+        ("last", ["wire.lost_bytes"], False, True),
+        ("all", [], True, False),
+    ],
+)
+def test_frames_and_bytes_are_there_if_the_rows_or_an_effect_want_them(
+    make_scene: MakeScene, rows: str, effects: list[str], timed: bool, on_wire: bool
+) -> None:
+    setting = make_scene(recording=Recording(rows=rows)).setting(load(name).EFFECT for name in effects)  # type: ignore[arg-type]
+    assert (setting.timed, setting.on_wire) == (timed, on_wire)
+
+
+def test_equal_scenes_have_equal_hashes(make_scene: MakeScene) -> None:
+    one, other = (make_scene(["joint.noise", "port.dead"]) for _ in range(2))
+    assert one == other
+    assert hash(one) == hash(other)
+
+
+def test_an_object_is_a_thing_with_its_mass_in_kilograms() -> None:
+    thing = objects(["Tip"])[0].thing()
+    assert (thing.name, thing.shape, thing.mass_kg) == ("ball 0", Sphere(diameter_mm=50.0), 0.08)
+
+
+def test_a_subject_has_a_hand_of_their_size() -> None:
+    size = Subject(name="A", hand_length_mm=188.0, hand_breadth_mm=84.0).hand().size
+    assert (size.length_mm, size.breadth_mm) == (188.0, 84.0)
+
+
+def test_what_is_broader_than_every_hand_on_all_sides_is_no_object() -> None:
+    with pytest.raises(ValueError, match="no hand holds what is more than 200 mm across"):
+        SceneObject(name="globe", grasp="CMF", shape=Sphere(diameter_mm=300.0), mass_g=500.0)

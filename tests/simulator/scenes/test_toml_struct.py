@@ -1,0 +1,98 @@
+from typing import Annotated, Literal
+
+import msgspec
+import pytest
+
+from thenar.simulator.errors import SceneError
+from thenar.simulator.scenes.toml_source import Source
+from thenar.simulator.scenes.toml_struct import check_finite, convert
+
+
+class Thing(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    width_mm: Annotated[float, msgspec.Meta(gt=0.0, le=200.0)]
+    mass_g: Annotated[float, msgspec.Meta(ge=1.0)] = 5.0
+    sd_mm: float = 0.0
+    sd_deg: float = 0.0
+    hold_ms: float = 0.0
+    rate_hz: float = 1.0
+    count: Annotated[int, msgspec.Meta(le=2**63 - 1)] = 1
+    tags: tuple[str, ...] = ()
+    kind: Literal["last", "all"] = "last"
+    kinds: tuple[Literal["last", "all"], ...] = ()
+    maybe: tuple[int, ...] | None = None
+    few: Annotated[tuple[int, ...], msgspec.Meta(max_length=2)] = ()
+
+    def __post_init__(self) -> None:
+        if self.count == 13:
+            raise ValueError("`count` is unlucky")
+
+
+def complaint(text: str) -> str:
+    source = Source("a.toml", f"[thing]\n{text}\n")
+    with pytest.raises(SceneError) as caught:
+        convert(source, ("thing",), source.tables()["thing"], Thing)
+    return str(caught.value)
+
+
+def test_a_table_becomes_a_struct() -> None:
+    source = Source("a.toml", 'width_mm = 3\ntags = ["x"]\nkind = "all"')
+    assert convert(source, (), source.tables(), Thing) == Thing(width_mm=3.0, tags=("x",), kind="all")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "a.toml, line 1: thing: the key width_mm is missing"),
+        ("width_mm = -5", "a.toml, line 2: thing.width_mm: must be above 0, not -5"),
+        ("width_mm = 0", "a.toml, line 2: thing.width_mm: must be above 0, not 0"),
+        ("width_mm = 1e6", "a.toml, line 2: thing.width_mm: must be at most 200, not 1000000.0"),
+        ("width_mm = 1\ncount = 9223372036854775808", "thing.count: must be at most 9223372036854775807, not"),
+        ("width_mm = 1\nmass_g = 0.5", "a.toml, line 3: thing.mass_g: must be at least 1, not 0.5"),
+        ("width_mm = 'wide'", "a.toml, line 2: thing.width_mm: must be a number, not 'wide'"),
+        ("width_mm = true", "a.toml, line 2: thing.width_mm: must be a number, not true"),
+        ("width_mm = {}", "a.toml, line 2: thing.width_mm: must be a number, not a table"),
+        ("width_mm = 1\ncount = 1.5", "a.toml, line 3: thing.count: must be a whole number, not 1.5"),
+        ("width_mm = 1\ntags = 'x'", "a.toml, line 3: thing.tags: must be a list, not 'x'"),
+        ("width_mm = 1\ntags = [\n'x',\n3]", "a.toml, line 5: thing.tags[1]: must be text, not 3"),
+        ("width_mm = 1\ncount = 13", "a.toml, line 1: thing: `count` is unlucky"),
+        ("width_mm = 1\nmaybe = 1", "a.toml, line 3: thing.maybe: must be a list, not 1"),
+        ("width_mm = 1\nfew = [1, 2, 3]", "a.toml, line 3: thing.few: must be a list of length <= 2"),
+        ("width_mm = 1\nkind = 'al'", "thing.kind: 'al' is not among its values (did you mean 'all'?)"),
+        ("width_mm = 1\nkinds = ['all', 'x']", "thing.kinds[1]: 'x' is not among its values (there are: all, last)"),
+        (f"width_mm = 1{'0' * 400}", "a.toml, line 2: thing.width_mm: is a number out of range"),
+    ],
+)
+def test_a_wrong_value_is_named_with_its_line_and_what_it_must_be(text: str, message: str) -> None:
+    assert message in complaint(text)
+
+
+@pytest.mark.parametrize(
+    ("key", "advice"),
+    [
+        ("width_cm", "lengths are in millimetres: width_mm"),
+        ("width", "lengths are in millimetres: width_mm"),
+        ("mass_kg", "masses are in grams: mass_g"),
+        ("hold_s", "times are in milliseconds: hold_ms"),
+        ("rate_khz", "rates are in hertz: rate_hz"),
+        ("sd_rad", "angles are in degrees: sd_deg"),
+        ("sd_cm", "lengths are in millimetres: sd_mm"),
+    ],
+)
+def test_a_key_in_another_unit_is_told_the_unit(key: str, advice: str) -> None:
+    assert complaint(f"width_mm = 1\n{key} = 1") == f"a.toml, line 3: thing.{key}: {advice}"
+
+
+def test_an_unknown_key_is_told_the_nearest() -> None:
+    assert "line 2: thing.widht_mm: there is no such key here (did you mean 'width_mm'" in complaint("widht_mm = 1")
+
+
+@pytest.mark.parametrize("number", ["nan", "-nan", "inf", "-inf"])
+def test_a_number_that_is_not_finite_is_found_wherever_it_stands(number: str) -> None:
+    source = Source("a.toml", f"a = 1\n[[b]]\nc = [1,\n {number}]\n")
+    with pytest.raises(SceneError, match=r"line 4: b\[0\]\.c\[1\]: must be a finite number"):
+        check_finite(source, (), source.tables())
+
+
+def test_what_is_no_table_is_refused() -> None:
+    with pytest.raises(SceneError, match="line 1: thing: must be a table, not 3"):
+        convert(Source("a.toml", "thing = 3"), ("thing",), 3, Thing)
