@@ -1,6 +1,7 @@
 """What `thenar simulate` prints on the terminal."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.table import Table
 from rich.text import Text
@@ -9,8 +10,10 @@ from ..simulator.pipeline.pipeline import DEFAULT_CONTACT
 from ..simulator.pipeline.registry import CONTACTS
 from ..simulator.running.explain import Explanation
 from ..simulator.running.report import GraspReport, Report, StepReport
-from .ablation import Ablation, Change, Recognised, Variant
 from .common import err, out
+
+if TYPE_CHECKING:  # simulating needs no compiler; ablation does
+    from .ablation import Ablation, Change, Recognised, Variant
 
 _SHOWN = 10  # unsettled repetitions that are named one by one
 _OWN = "dim"  # how own steps look
@@ -149,7 +152,7 @@ def _expected(explanation: Explanation) -> str:
     )
 
 
-def print_ablation(ablation: Ablation) -> None:
+def print_ablation(ablation: "Ablation") -> None:
     """Print what each effect does to the recognition rates and to the time."""
     console = out()
     whole = ablation.variants[0]
@@ -172,19 +175,19 @@ def print_ablation(ablation: Ablation) -> None:
             console.print(f"without {variant.without}: {DEFAULT_CONTACT} closes the hands in its place")
 
 
-def _name(variant: Variant) -> str:
+def _name(variant: "Variant") -> str:
     return "(nothing)" if variant.without is None else variant.without
 
 
-def _cells(one: Recognised) -> tuple[str, str]:
+def _cells(one: "Recognised") -> tuple[str, str]:
     rate = one.rate
     return f"{100 * rate.mean:.1f} [{100 * rate.low:.1f}, {100 * rate.high:.1f}]", _change(one.change)
 
 
-def _change(change: Change | None) -> str:
+def _change(change: "Change | None") -> str:
     return "" if change is None else f"{100 * change.mean:+z.1f} [{100 * change.low:+z.1f}, {100 * change.high:+z.1f}]"
 
 
-def _times(variant: Variant, whole: Variant) -> tuple[str, str]:
+def _times(variant: "Variant", whole: "Variant") -> tuple[str, str]:
     change = "" if variant is whole else f"{variant.us_a_grasp - whole.us_a_grasp:+.0f}"
     return f"{variant.us_a_grasp:.0f}", change

@@ -41,7 +41,13 @@ ALLOWED = {
         "compiler.workers",
         "compiler.evaluation",
     ),
-    "simulator.body": ("compiler.elementary", "compiler.recordings", "simulator.streams", "simulator.body"),
+    "simulator.body": (
+        "compiler.elementary",
+        "compiler.recordings",
+        "simulator.streams",
+        "simulator.deviates",
+        "simulator.body",
+    ),
     "simulator.handmaps": (
         "drivers.errors",
         "compiler.elementary",

@@ -231,3 +231,21 @@ def test_an_interrupt_ends_with_130_and_leaves_the_old_set_alone(tmp_path: Path)
     assert (process.returncode, printed, complaints.strip()) == (130, "", "thenar: interrupted")
     assert old.read_bytes() == b"old"
     assert {path.name for path in tmp_path.iterdir()} == {"set.grasps", "ready"}
+
+
+WITH_THE_BASE_ALONE = """
+import sys
+for name in ("scipy", "sklearn", "matplotlib", "joblib", "mujoco"):
+    sys.modules[name] = None
+from thenar.cli import main
+sys.argv = ["thenar", "simulate", "quick", "-o", sys.argv[1], "--jobs", "1", "--repetitions", "2"]
+main()
+"""
+
+
+def test_one_process_needs_nothing_beyond_the_base_dependencies(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", WITH_THE_BASE_ALONE, str(tmp_path / "set.grasps")]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, done.stdout.splitlines()[0].partition(": ")[2].split(",")[0]) == (0, "56 rows"), (
+        done.stderr
+    )

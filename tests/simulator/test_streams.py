@@ -5,7 +5,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.streams import Draw, Draws, Numbers, Site
+from thenar.simulator.deviates import Numbers
+from thenar.simulator.streams import Draw, Draws, Site
 
 mpmath.mp.dps = 40
 NAME = st.text(alphabet="abc", max_size=3)
