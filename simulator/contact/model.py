@@ -49,6 +49,10 @@ class Load:
     grip_n: Floats
 
 
+# An object that slid so far was dropped: ours.
+SLID_OUT_MM = 20.0
+
+
 class ContactModel(Protocol):
     """Closes hands on objects."""
 
@@ -62,9 +66,17 @@ def load_of(batch: Batch) -> Load:
     return Load(batch.condition, batch.posture_deg, batch.pose, batch.grip_n)
 
 
+def slid_mm(batch: Batch) -> Floats:
+    """Return how far (n,) each object lies from where the hand was told to hold it."""
+    x, y, z = (batch.pose[:, :3] - batch.commanded_pose[:, :3]).T
+    return np.sqrt(x * x + y * y + z * z)
+
+
 def take(batch: Batch, contact: Contact) -> None:
-    """Let the hands of a batch rest as solved."""
+    """Let the hands of a batch rest as solved. A grasp whose object slid out of the hand has not settled: what holds it
+    then is no hand.
+    """
     batch.commanded_deg, batch.commanded_pose = batch.posture_deg, batch.pose
     batch.posture_deg, batch.pose, batch.forces_n = contact.posture_deg, contact.pose, contact.forces_n
-    batch.settled, batch.between_n = contact.settled, contact.between_n
+    batch.settled, batch.between_n = contact.settled & (slid_mm(batch) <= SLID_OUT_MM), contact.between_n
     batch.residual_n, batch.residual_nmm = contact.residual_n, contact.residual_nmm

@@ -16,6 +16,7 @@ from ..body.hand import DOF, LIMITS_DEG
 from ..errors import SceneError
 from ..pipeline.batch import Batch
 from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.frames import frame_times
 from ..streams import Draw
 
 Floats = NDArray[np.float64]
@@ -42,15 +43,18 @@ EFFECT = Effect(
 
 def prepare(parameters: Parameters, setting: Setting) -> Step:
     """Return the step that moves the angles of the frames before contact. Raises SceneError where there are none."""
-    if setting.first_us >= 0:
-        raise SceneError("effects.hand.transition: there is no time before contact; give the scene recording.lead_ms")
+    if not (frame_times(setting) < 0).any():
+        raise SceneError(
+            "effects.hand.transition: there is no frame before contact; give the scene a recording.lead_ms of at least "
+            f"one, {setting.period_us / 1e3:g} ms"
+        )
 
     def step(batch: Batch, draw: Draw) -> None:
         before = batch.frame_us < 0
         coming = before.any(axis=0)
         way = np.clip(1.0 - batch.frame_us[:, coming] / setting.first_us, 0.0, 1.0)
         angles = path(batch.previous_deg, batch.posture_deg, way, parameters.opening_deg)
-        felt = sensors_deg(angles.reshape(-1, len(DOF))).reshape(*way.shape, -1)
+        felt = sensors_deg(angles)
         moved = batch.sensors_deg.copy()
         moved[:, coming] = np.where(before[:, coming, None], felt, moved[:, coming])
         batch.sensors_deg = moved

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
+from ..contact.model import SLID_OUT_MM, slid_mm
 from ..pipeline.batch import Batch
 
 
@@ -64,5 +65,8 @@ def _unsettled(batch: Batch, row: int) -> Unsettled:
 def _why(batch: Batch, row: int) -> str:
     if batch.lost is not None and batch.lost[row].all():
         return "no frame arrived whole"
+    slid = slid_mm(batch)[row]
+    if slid > SLID_OUT_MM:
+        return f"the object slid {slid:.0f} mm, out of the hand"
     force, moment = batch.residual_n[row], batch.residual_nmm[row]
-    return f"the hand did not come to rest: {force:.3g} N and {moment:.3g} N mm on the object are not balanced"
+    return f"the hand did not come to rest; left on the object: {force:.3g} N, {moment:.3g} N mm"

@@ -89,6 +89,8 @@ class _Decoder:
         name = default_name if file.name is None else file.name
         if reason := fault(name):
             raise source.error(("name",), f"{name!r} {reason}")
+        if file.postures is not None and (not file.postures or "\0" in file.postures):
+            raise source.error(("postures",), f"no file is called {file.postures!r}")
         taxonomy = find_taxonomy(source, file.taxonomy)
         return Scene(
             name=name,

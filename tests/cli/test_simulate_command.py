@@ -92,7 +92,7 @@ def test_what_did_not_settle_is_warned_of_by_name(hasty: Path, tmp_path: Path, c
     assert warning.startswith(f"warning: {len(unsettled)} of 28 grasps cannot be trusted, and are left out of the set")
     for one in unsettled[:10]:
         place = f"subject {one['subject']}, {one['grasp']} with {one['object']}, repetition {one['repetition']}"
-        assert f"{place}: the hand did not come to rest" in warning
+        assert f"{place}: {one['why']}" in warning
     assert ("more, which --json names" in warning) == (len(unsettled) > 10)
     assert len(GraspSet.load(path)) == 28 - len(unsettled)
 
@@ -188,7 +188,7 @@ def test_a_bad_scene_is_one_sentence_with_file_and_line(tmp_path: Path, capsys: 
 @pytest.mark.parametrize(
     ("added", "sentence"),
     [
-        ("[effects.hand.transition]", "line 45: effects.hand.transition: there is no time before contact"),
+        ("[effects.hand.transition]", "line 45: effects.hand.transition: there is no frame before contact"),
         ("[effects.switch.stuck_open]\ncount = 161", "line 46: effects.switch.stuck_open.count: 161 switches cannot"),
     ],
 )

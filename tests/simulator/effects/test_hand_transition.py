@@ -102,5 +102,5 @@ def test_a_repetition_moves_the_same_alone(make_batch: MakeBatch, make_draw: Cal
 
 
 def test_a_scene_without_time_before_contact_is_refused(make_setting: Callable) -> None:
-    with pytest.raises(SceneError, match=r"hand\.transition: there is no time before contact.*lead_ms"):
+    with pytest.raises(SceneError, match=r"hand\.transition: there is no frame before contact.*lead_ms"):
         prepare(Parameters(), make_setting(timed=True, first_us=0))
