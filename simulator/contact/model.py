@@ -69,7 +69,8 @@ def load_of(batch: Batch) -> Load:
 def slid_mm(batch: Batch) -> Floats:
     """Return how far (n,) each object lies from where the hand was told to hold it."""
     x, y, z = (batch.pose[:, :3] - batch.commanded_pose[:, :3]).T
-    return np.sqrt(x * x + y * y + z * z)
+    distance: Floats = np.sqrt(x * x + y * y + z * z)
+    return distance
 
 
 def take(batch: Batch, contact: Contact) -> None:
