@@ -29,9 +29,9 @@ def command(scene: str, output: Path, anew: bool, jobs: int | None, as_json: boo
         thenar plan scene.toml -o postures.json
     """
     from ..simulator.planning.plan_scene import plan_scene
-    from ..simulator.scenes.decode import load_scene
+    from ..simulator.scenes.decode import load_scene, own_file
 
-    keep_apart(Path(scene), output)
+    keep_apart(own_file(scene), output)
     loaded = load_scene(scene)
     with progress(f"planning {loaded.name}") as report:
         postures, planned = plan_scene(loaded, jobs or -1, report, anew=anew)

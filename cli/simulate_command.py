@@ -57,10 +57,12 @@ def command(
     if scene is None:
         _list(as_json=as_json)
         return
+    from ..simulator.scenes.decode import own_file
+
     loaded = _load(scene, repetitions, seed, subjects)
     with _located(scene):
         if output is not None:
-            keep_apart(Path(scene), loaded.postures, output)
+            keep_apart(own_file(scene), loaded.postures, output)
             _simulate(loaded, output, jobs or -1, keep_unsettled=keep_unsettled, as_json=as_json)
         elif explain:
             _explain(loaded, jobs or -1, as_json=as_json)

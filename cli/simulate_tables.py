@@ -29,7 +29,7 @@ def print_report(report: Report, path: Path) -> None:
     console.print()
     console.print(_grasps(report))
     if report.lost_frames:
-        console.print(f"{report.lost_frames} frames did not arrive: their rows hold what arrived last")
+        console.print(f"{report.lost_frames} frames did not arrive; what is read then is what arrived last")
     console.print()
     console.print(_steps(report.steps))
     _warn_of_unsettled(report)

@@ -46,7 +46,8 @@ LIMITS_DEG = np.array(
 )
 
 # Where spheres of skin sit along each segment, over its length; the last one of a digit makes its round tip.
-_DISTAL, _MIDDLE, _PROXIMAL = (0.20, 0.62), (0.30, 0.80), (0.25, 0.55, 0.85)
+TIP_SPHERE = 0.62
+_DISTAL, _MIDDLE, _PROXIMAL = (0.20, TIP_SPHERE), (0.30, 0.80), (0.25, 0.55, 0.85)
 _SPHERES = ((_PROXIMAL, _MIDDLE, _DISTAL),) * 5
 _PALM_SPHERES = (0.30, 0.65, 0.97)
 # The palm's capsules: from (over hand length, breadth, breadth) to (the same), radius over breadth.

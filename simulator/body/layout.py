@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.elementary import sincos
-from .hand import CAPSULES, Hand, Skeleton
+from .hand import CAPSULES, TIP_SPHERE, Hand, Skeleton
 
 Floats = NDArray[np.float64]
 
@@ -51,7 +51,6 @@ _PLACES = {
     ),
     **{palm: tuple((a, r) for a in rows for r in (-22.0, 22.0)) for palm, rows in _PALM_ROWS.items()},
 }
-_TIP_SPHERE = 0.62  # where the sphere of the round tip sits (hand.py)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +95,7 @@ class Switches:
         length, radius = self.hand.lengths[self.capsules], self.hand.radii[self.capsules] + STANDS_OUT_MM
         sine, cosine = sincos(around)
         on_tip = along < 0.0
-        x = np.where(on_tip, _TIP_SPHERE * length + radius * sine, along * length)
+        x = np.where(on_tip, TIP_SPHERE * length + radius * sine, along * length)
         return np.stack([x, np.where(on_tip, 0.0, radius * sine), -radius * cosine], axis=1)
 
     def tops(self, skeleton: Skeleton) -> Floats:

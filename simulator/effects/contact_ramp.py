@@ -38,8 +38,11 @@ EFFECT = Effect(
     name="contact.ramp",
     summary="the grip grows, and switches close one by one",
     stage="switch",
-    reads=("commanded_deg", "commanded_pose", "grip_n", "forces_n", "thresholds_n", "settled", "on_us", "off_us"),
-    writes=("on_us", "off_us", "settled"),
+    reads=(
+        *("commanded_deg", "commanded_pose", "grip_n", "forces_n", "thresholds_n"),
+        *("settled", "residual_n", "residual_nmm", "on_us", "off_us"),
+    ),
+    writes=("on_us", "off_us", "settled", "residual_n", "residual_nmm"),
     timed=True,
 )
 
@@ -72,14 +75,20 @@ def _loads(batch: Batch, levels: int) -> list[Load]:
 
 
 def _time(batch: Batch, grown: Sequence[Contact], rise_us: float) -> None:
-    """Enter when the switches of a batch close and open, from the contacts at the levels below the full grip."""
+    """Enter when the switches of a batch close and open, from the contacts at the levels below the full grip.
+
+    A repetition that does not settle at one of them has not settled, and is told by what was left there.
+    """
     forces = np.array([np.zeros_like(batch.forces_n), *(one.forces_n for one in grown), batch.forces_n])
     up_us, down_us = crossings(forces, batch.thresholds_n, rise_us / (len(grown) + 1))
     lets_go = (batch.off_us != NEVER) & (up_us != NEVER) & (down_us == NEVER)
     # Backwards from where the hand lets go, the force that first closed a switch is the last to keep it closed.
     batch.off_us = np.where(lets_go, batch.off_us + np.where(lets_go, round(rise_us) - up_us, 0), down_us)
     batch.on_us = up_us
-    batch.settled = np.logical_and.reduce([batch.settled, *(one.settled for one in grown)])
+    for one in grown:
+        batch.settled = batch.settled & one.settled
+        batch.residual_n = np.where(one.settled, batch.residual_n, np.maximum(batch.residual_n, one.residual_n))
+        batch.residual_nmm = np.where(one.settled, batch.residual_nmm, np.maximum(batch.residual_nmm, one.residual_nmm))
 
 
 def crossings(forces_n: Floats, thresholds_n: Floats, level_us: float) -> tuple[Integers, Integers]:

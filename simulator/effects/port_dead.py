@@ -15,6 +15,7 @@ from ..errors import SceneError
 from ..pipeline import ports
 from ..pipeline.batch import Batch
 from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.stuck import drawn
 from ..streams import Draw
 
 Bits = NDArray[np.bool_]
@@ -64,4 +65,4 @@ def _chooser(parameters: Parameters, there: int) -> Callable[[Draw], Bits]:
     count = parameters.count or 1
     if count > there:
         raise SceneError(f"effects.port.dead.count: {count} ports cannot be dead: the glove has {there}")
-    return lambda draw: np.isin(np.arange(there), np.argsort(draw.per_glove(there).uniform(), kind="stable")[:count])
+    return lambda draw: drawn(draw, there, count)

@@ -1,4 +1,4 @@
-"""Which switches of a glove are stuck: those that a scene names, or so many, drawn for the glove."""
+"""What of a glove is faulty: the switches that a scene names as stuck, or so many of its parts, drawn for the glove."""
 
 from collections.abc import Callable
 from typing import Annotated
@@ -41,7 +41,13 @@ def chooser(effect: str, parameters: StuckParameters) -> Callable[[Draw], Bits]:
     count = parameters.count or 1
     if count > len(names):
         raise SceneError(f"effects.{effect}.count: {count} switches cannot be stuck: the glove has {len(names)}")
-    return lambda draw: np.argsort(np.argsort(draw.per_glove(len(names)).uniform(), kind="stable")) < count
+    return lambda draw: drawn(draw, len(names), count)
+
+
+def drawn(draw: Draw, there: int, count: int) -> Bits:
+    """Return which `count` of the glove's parts (there,) are drawn: those of the least uniform numbers."""
+    least = np.argsort(draw.per_glove(there).uniform(), kind="stable")[:count]
+    return np.isin(np.arange(there), least)
 
 
 def _number(effect: str, switch: int | str, names: list[str]) -> int:

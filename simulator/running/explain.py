@@ -1,17 +1,14 @@
 """What simulating a scene will do and cost, before it is done: the steps, and each one's time on a few grasps."""
 
-from collections.abc import Sequence
-
 import msgspec
 
 from ...compiler.workers import workers_of
 from ..pipeline.frames import at_a_time
 from ..pipeline.ledger import Entry, Ledger
 from ..pipeline.pipeline import Pipeline, Stop, compile_pipeline
-from ..planning.postures import Postures
 from ..scenes.scene import Scene
-from .sampling import sample
-from .session import Session, conditions_of, session_of
+from .sampling import middle_session, sample
+from .session import Session
 
 # So many grasps are measured, fewer where each has many frames.
 _MEASURED = 256
@@ -65,14 +62,11 @@ def explain(scene: Scene, jobs: int = -1) -> Explanation:
     Raises SceneError if the scene cannot be simulated.
     """
     pipeline = compile_pipeline(scene)
-    postures = Postures.of(scene)
-    conditions = [conditions_of(scene, subject, postures) for subject in scene.subjects]
-    # One session is enough: of all of them, an order alone can take minutes.
-    plan = [session_of(scene, conditions[len(conditions) // 2])]
-    ledger = _measured(pipeline, plan)
+    session = middle_session(scene)
+    ledger = _measured(pipeline, session)
     first = ledger.entries[pipeline.stops[0].effect.name]
     steps = tuple(_step(stop, ledger.entries[stop.effect.name], ledger.nanoseconds) for stop in pipeline.stops)
-    repetitions, workers = len(plan[0].before) * len(conditions), workers_of(jobs)
+    repetitions, workers = len(session.before) * len(scene.subjects), workers_of(jobs)
     us_a_grasp = sum(step.us_a_grasp for step in steps)
     return Explanation(
         scene=scene.name,
@@ -88,11 +82,11 @@ def explain(scene: Scene, jobs: int = -1) -> Explanation:
     )
 
 
-def _measured(pipeline: Pipeline, plan: Sequence[Session]) -> Ledger:
-    """Return what some repetitions of all conditions of one session cost."""
-    pipeline.run(sample(plan, 1)[:1], Ledger())  # what is done once, such as importing
+def _measured(pipeline: Pipeline, session: Session) -> Ledger:
+    """Return what some repetitions of all conditions of a session cost."""
+    pipeline.run(sample(session, 1)[:1], Ledger())  # what is done once, such as importing
     ledger = Ledger()
-    pipeline.run(sample(plan, at_a_time(pipeline.setting, _MEASURED)), ledger)
+    pipeline.run(sample(session, at_a_time(pipeline.setting, _MEASURED)), ledger)
     return ledger
 
 

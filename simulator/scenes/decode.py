@@ -63,9 +63,15 @@ def located(name_or_path: str | Path, fault: SceneError) -> SceneError:
     return read_source(_file(Path(name_or_path))).error(tuple(key.split(".")), reason)
 
 
+def own_file(name_or_path: str | Path) -> Path | None:
+    """Return the file of the user's own that a scene is; None where it is a shipped one's name."""
+    path = Path(name_or_path)
+    return path if path.suffix or len(path.parts) > 1 else None
+
+
 def _file(path: Path) -> Traversable:
     known = shipped()
-    if path.suffix or len(path.parts) > 1:
+    if own_file(path):
         if not path.exists():
             raise SceneError(f"there is no file {path}; scenes that are shipped go by name: {', '.join(known)}")
         return path

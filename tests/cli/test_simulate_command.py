@@ -249,3 +249,9 @@ def test_one_process_needs_nothing_beyond_the_base_dependencies(tmp_path: Path) 
     assert (done.returncode, done.stdout.splitlines()[0].partition(": ")[2].split(",")[0]) == (0, "54 rows"), (
         done.stderr
     )
+
+
+def test_a_shipped_scenes_name_is_no_file_that_could_be_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(["simulate", "quick", *SMALL, "-o", "quick"]) == 0
+    assert len(GraspSet.load(tmp_path / "quick")) > 20

@@ -28,7 +28,7 @@ class Press:
         n = np.zeros(len(grip_n))
         settled = grip_n >= self.settles_n
         forces = self.forces(grip_n[:, None] + 0.0 * posture_deg[:, :1] + 0.0 * pose[:, :1])
-        return Contact(posture_deg, pose, forces, np.zeros((len(n), 20)), n, settled, n, n, 3 * len(n))
+        return Contact(posture_deg, pose, forces, np.zeros((len(n), 20)), n, settled, grip_n, 30 * grip_n, 3 * len(n))
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +41,7 @@ def ramped(make_batch: Callable, make_draw: Callable, make_setting: Callable) ->
         batch.grip_n = np.array([10.0, 20.0])
         batch.forces_n = model.forces(batch.grip_n[:, None])
         batch.settled = np.ones(2, dtype=np.bool_)
+        batch.residual_n, batch.residual_nmm = np.full(2, 0.25), np.full(2, 7.5)
         batch.thresholds_n = np.ones(batch.forces_n.shape[1])
         closed = batch.forces_n > 1.0
         batch.on_us = np.where(closed, 0, NEVER)
@@ -97,7 +98,10 @@ def test_the_model_is_solved_at_all_levels_but_the_full_one(
 
 
 def test_what_does_not_settle_on_the_way_is_marked(ramped: Callable) -> None:
-    assert ramped(Press(lambda grip: grip, settles_n=1.5)).settled.tolist() == [False, True]
+    batch = ramped(Press(lambda grip: grip, settles_n=1.5))
+    assert batch.settled.tolist() == [False, True]
+    # What was left at 1 N, where the first gave up; the second keeps what was left at its full grip.
+    assert (batch.residual_n.tolist(), batch.residual_nmm.tolist()) == ([1.0, 0.25], [30.0, 7.5])
 
 
 @given(st.integers(0, 2**32), st.integers(1, 12))

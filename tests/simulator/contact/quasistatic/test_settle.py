@@ -38,7 +38,7 @@ def below_n(rest: Rest, condition: Condition) -> np.ndarray:
     return total
 
 
-def same(one: Rest, other: Rest, place: int, first: int = 0) -> None:
+def assert_same(one: Rest, other: Rest, place: int, first: int = 0) -> None:
     """Assert that repetition `first` of one is repetition `place` of the other, bit for bit."""
     for field in ("angles", "presses", "residual_n", "residual_nmm", "settled", "steps"):
         assert np.array_equal(getattr(one, field)[..., first], getattr(other, field)[..., place]), field
@@ -183,7 +183,7 @@ def test_a_repetition_comes_out_the_same_in_any_number(
         for one in range(min(n, 4)):
             own = slice(one, one + 1)
             alone = Case(case.condition, case.angles[:, own], case.numbers[:, own], case.grip_n[own])
-            same(close([alone], skin, MOST_STEPS)[0], together, one)
+            assert_same(close([alone], skin, MOST_STEPS)[0], together, one)
 
 
 def test_a_case_comes_out_the_same_in_any_company_and_order(every: list[tuple[Case, Rest]], skin: Skin) -> None:
@@ -191,7 +191,7 @@ def test_a_case_comes_out_the_same_in_any_company_and_order(every: list[tuple[Ca
     for order in ((5, 3, 1), (0, 2), (4, 5, 0, 1, 2, 3)):
         for number, rest in zip(order, close([some[k][0] for k in order], skin, MOST_STEPS), strict=True):
             for repetition in range(4):
-                same(some[number][1], rest, repetition, repetition)
+                assert_same(some[number][1], rest, repetition, repetition)
 
 
 def test_slow_company_does_not_change_who_is_at_rest(
@@ -202,4 +202,4 @@ def test_slow_company_does_not_change_who_is_at_rest(
     (alone,) = close([easy], skin, MOST_STEPS)
     beside = close([hard, easy], skin, MOST_STEPS)[1]
     for repetition in range(2):
-        same(alone, beside, repetition, repetition)
+        assert_same(alone, beside, repetition, repetition)
