@@ -1,7 +1,7 @@
 """Primitive objects: how far points are from their surface, and which way is out.
 
 Points are in the object's own axes, millimetres, many objects last: (m, 3, n). Distances are negative inside. Normals
-are of unit length; only in the very middle of a ball or bar, where no way out is nearer, they are zero.
+are of unit length everywhere: in the very middle of a ball or bar, where all ways out are as near, one is chosen.
 """
 
 from typing import Annotated
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Length = Annotated[float, msgspec.Meta(gt=0.0, le=2000.0)]
 
-_TINY = 1e-12
+# Nearer than this, squares lose their bits, and which way is out is no matter of distance any more.
+_NEAREST_MM = 1e-150
 
 
 class Sphere(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="sphere", tag_field="shape"):
@@ -24,7 +25,8 @@ class Sphere(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="spher
     def distance(self, points: Floats) -> tuple[Floats, Floats]:
         """Return signed distances (m, n) and unit outward normals (m, 3, n)."""
         from_centre = _norm(points)
-        return from_centre - self.diameter_mm / 2, points / from_centre[:, None]
+        chosen = np.array([1.0, 0.0, 0.0])[:, None]
+        return from_centre - self.diameter_mm / 2, _unit(points, from_centre[:, None], chosen)
 
     def curvature(self, points: Floats) -> Floats:
         """Return how fast the normal turns (m, n) per mm that a point moves sideways, in any direction."""
@@ -48,19 +50,18 @@ class Cylinder(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="cyl
     def distance(self, points: Floats) -> tuple[Floats, Floats]:
         """Return signed distances (m, n) and unit outward normals (m, 3, n)."""
         x, y, z = points[:, 0], points[:, 1], points[:, 2]
-        radius = np.sqrt(y * y + z * z) + _TINY
+        radius = np.sqrt(y * y + z * z)
         side = radius - (self.diameter_mm / 2 - self.edge_mm)
         end = np.abs(x) - (self.length_mm / 2 - self.edge_mm)
         across, along = _corner(np.stack([side, end]))
         distance = _rounded(np.stack([side, end])) - self.edge_mm
-        return distance, np.stack(
-            [along * np.where(x < 0.0, -1.0, 1.0), across * y / radius, across * z / radius], axis=1
-        )
+        outward = _unit(np.stack([y, z]), radius, np.array([1.0, 0.0])[:, None, None])
+        return distance, np.stack([along * np.where(x < 0.0, -1.0, 1.0), *(across * outward)], axis=1)
 
     def curvature(self, points: Floats) -> Floats:
         """Return how fast the normal turns (m, n) per mm that a point moves across the bar; not at all at its ends."""
         x, y, z = points[:, 0], points[:, 1], points[:, 2]
-        radius = np.sqrt(y * y + z * z) + _TINY
+        radius = np.sqrt(y * y + z * z)
         return np.where(np.abs(x) < self.length_mm / 2, 1.0 / np.maximum(radius, 1.0), 0.0)
 
     def extent_mm(self) -> tuple[float, float, float]:
@@ -100,13 +101,21 @@ Shape = Sphere | Cylinder | Box
 
 
 def _check_edge(edge_mm: float, *sides_mm: float) -> None:
-    if 2 * edge_mm > min(sides_mm):
+    if edge_mm > min(sides_mm) / 2:
         raise ValueError(f"`edge_mm` {edge_mm} rounds off more than the object has: at most {min(sides_mm) / 2}")
 
 
 def _norm(points: Floats) -> Floats:
     x, y, z = points[:, 0], points[:, 1], points[:, 2]
-    return np.sqrt(x * x + y * y + z * z) + _TINY
+    distance: Floats = np.sqrt(x * x + y * y + z * z)
+    return distance
+
+
+def _unit(vectors: Floats, length: Floats, chosen: Floats) -> Floats:
+    """Return vectors over their length, and what was `chosen` where they have none."""
+    clear = length > _NEAREST_MM
+    unit: Floats = np.where(clear, vectors / np.where(clear, length, 1.0), chosen)
+    return unit
 
 
 def _rounded(beyond: Floats) -> Floats:
@@ -125,7 +134,5 @@ def _corner(beyond: Floats) -> Floats:
     total = outside[0] * outside[0]
     for side in outside[1:]:
         total = total + side * side
-    length = np.sqrt(total)
     nearest = np.arange(len(beyond))[:, None, None] == beyond.argmax(axis=0)
-    gradient: Floats = np.where(length > 0.0, outside / np.maximum(length, _TINY), nearest.astype(np.float64))
-    return gradient
+    return _unit(outside, np.sqrt(total), nearest.astype(np.float64))

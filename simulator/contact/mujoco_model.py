@@ -27,6 +27,8 @@ MM, N_MM = 1e-3, 1e-3  # one millimetre in metres, one newton millimetre in newt
 # What the dynamics need and rest does not know: rotor inertia of the joints (kg m2), density of the fingers (kg/m3),
 # and the least mass (kg) and moment of inertia (kg m2) of an object. The springs on them are then slow enough for 5 ms.
 _ARMATURE, _DENSITY, _LEAST_MASS, _LEAST_INERTIA = 2e-4, 1000.0, 0.1, 2e-4
+# MuJoCo refuses what has next to no size (m) or mass (kg, kg m2): so much has everything, far below what is felt.
+_LEAST_SIZE, _LEAST_PART = 1e-9, 1e-12
 # Share of a contact that MuJoCo's solver takes as a hard constraint; the skin is the rest.
 _IMPEDANCE = 0.9
 # MuJoCo's friction creeps, the less the higher this ratio: at 1 nothing sticks for as long as a grasp takes to settle.
@@ -41,6 +43,7 @@ def build(hand: Hand, thing: Thing, parameters: "Parameters") -> mujoco.MjModel:
     """
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
+    spec.compiler.boundmass = spec.compiler.boundinertia = _LEAST_PART
     spec.option.timestep = parameters.dt_ms / 1e3
     spec.option.gravity = [0.0, 0.0, 0.0]
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
@@ -141,8 +144,8 @@ def _critical(stiffness: float, inertia: float) -> float:
 
 
 def _geom(shape: Shape) -> tuple[mujoco.mjtGeom, Floats, list[float]]:
-    """Return kind, half sizes in metres and turn of the primitive; rounded edges are left sharp."""
-    half = np.array(shape.extent_mm()) / 2 * MM
+    """Return kind, half sizes in metres (none is 0) and turn of the primitive; rounded edges are left sharp."""
+    half = np.maximum(np.array(shape.extent_mm()) / 2 * MM, _LEAST_SIZE)
     straight = [1.0, 0.0, 0.0, 0.0]
     match shape:
         case Sphere():

@@ -27,6 +27,7 @@ def split(switches: Switches, depths: Floats, forces: Floats) -> tuple[Floats, F
         own = np.flatnonzero(switches.capsules == capsule)
         total = add_up(sunk[own])
         touched = total > 0.0
-        shared[own] = sunk[own] * np.where(touched, forces[capsule] / np.where(touched, total, 1.0), 0.0)
+        # Depth over depth first: force over a hair of depth would overflow.
+        shared[own] = sunk[own] / np.where(touched, total, 1.0) * forces[capsule]
         between += np.where(touched, 0.0, forces[capsule])
     return shared, between

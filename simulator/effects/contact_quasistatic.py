@@ -12,7 +12,7 @@ from ..body.hand import CAPSULES, Hand
 from ..body.layout import Switches, murakami160
 from ..body.pose import rotation_vector
 from ..contact.model import Contact, ContactModel, Load
-from ..contact.quasistatic import Case, Rest, Skin, close
+from ..contact.quasistatic import USUAL, Case, Pace, Rest, Skin, close
 from ..contact.split import split
 from ..pipeline.effect import Effect, EffectParameters, Setting
 
@@ -51,12 +51,16 @@ EFFECT = Effect(
 )
 
 
-class _Quasistatic:
-    def __init__(self, parameters: Parameters) -> None:
+class Quasistatic:
+    """The contact model of hands and objects at rest."""
+
+    def __init__(self, parameters: Parameters, pace: Pace = USUAL) -> None:
+        self.pace = pace
         self.skin = Skin(parameters.press_n_per_mm, parameters.soft_mm, parameters.drag_n_per_mm, parameters.friction)
         self.reach_mm, self.most_steps = parameters.reach_mm, parameters.most_steps
 
     def solve(self, loads: Sequence[Load]) -> list[Contact]:
+        """Return how the hands rest (contact.ContactModel)."""
         solved: list[Contact] = []
         for _, same_hand in groupby(loads, key=lambda load: load.condition.hand.size):
             for together in _bundles(list(same_hand)):
@@ -64,7 +68,7 @@ class _Quasistatic:
                     Case(load.condition, load.posture_deg.T * (np.pi / 180.0), load.pose.T, load.grip_n)
                     for load in together
                 ]
-                rests = close(cases, self.skin, self.most_steps)
+                rests = close(cases, self.skin, self.most_steps, self.pace)
                 solved += [self._contact(load, rest) for load, rest in zip(together, rests, strict=True)]
         return solved
 
@@ -106,4 +110,4 @@ def _bundles(loads: list[Load]) -> list[list[Load]]:
 
 def model(parameters: Parameters, setting: Setting) -> ContactModel:
     """Return the contact model."""
-    return _Quasistatic(parameters)
+    return Quasistatic(parameters)

@@ -100,17 +100,21 @@ def crossings(forces_n: Floats, thresholds_n: Floats, level_us: float) -> tuple[
     closed = forces_n > thresholds_n
     levels = len(closed) - 1
     first, last = closed.argmax(axis=0), levels - closed[::-1].argmax(axis=0)
-    up = _between(forces_n, thresholds_n, np.maximum(first - 1, 0)) * level_us
+    up = np.where(first > 0, _between(forces_n, thresholds_n, np.maximum(first - 1, 0)) * level_us, 0.0)
     down = _between(forces_n, thresholds_n, np.minimum(last, levels - 1)) * level_us
     ever: Bits = np.logical_or.reduce(closed)
-    return _times(np.maximum(up, 0.0), ever), _times(down, np.greater(ever, closed[-1]))
+    return _times(up, ever), _times(down, np.greater(ever, closed[-1]))
 
 
 def _between(forces_n: Floats, thresholds_n: Floats, level: NDArray[np.intp]) -> Floats:
-    """Return at which level, and what part of the way to the next, force passes the threshold."""
+    """Return at which level, and what part of the way to the next, force passes the threshold; the level where it does
+    not: what is left to a threshold over hardly any change would overflow.
+    """
     here = np.take_along_axis(forces_n, level[None], axis=0)[0]
     change = np.take_along_axis(forces_n, level[None] + 1, axis=0)[0] - here
-    levels: Floats = level + (thresholds_n - here) / np.where(change == 0.0, 1.0, change)
+    left = thresholds_n - here
+    passes = (np.abs(left) <= np.abs(change)) & (change != 0.0)
+    levels: Floats = level + np.where(passes, left, 0.0) / np.where(passes, change, 1.0)
     return levels
 
 

@@ -167,7 +167,20 @@ def _between(entry: Entry, low: HeldAt, high: HeldAt, length: float, grip_n: flo
     part = (length - low.length_mm) / span if span else 0.0
     posture, pose, shares = (
         np.array(a) * (1.0 - part) + np.array(b) * part
-        for a, b in ((low.posture_deg, high.posture_deg), (low.pose, high.pose), (low.shares, high.shares))
+        for a, b in ((low.posture_deg, high.posture_deg), (low.pose, _near(low, high)), (low.shares, high.shares))
     )
     pads = tuple(Pad(sphere, float(share)) for sphere, share in zip(entry.spheres, shares, strict=True))
     return Held(posture, pose, pads, grip_n, np.array(entry.down))
+
+
+def _near(low: HeldAt, high: HeldAt) -> tuple[float, ...]:
+    """Return the pose at `high`, its turn the other way round where that is nearer to that at `low`: which of the two
+    a turn of some 180 degrees comes as is a matter of rounding, and half way between them there is no turn at all.
+    """
+    turn = np.array(high.pose[3:])
+    angle = float(np.sqrt(np.add.reduce(turn * turn)))
+    if angle == 0.0:
+        return high.pose
+    other = turn * (1.0 - 2.0 * np.pi / angle)
+    here, there = (np.add.reduce((way - low.pose[3:]) ** 2) for way in (turn, other))
+    return high.pose if here <= there else (*high.pose[:3], *other.tolist())

@@ -1,14 +1,16 @@
 """Random numbers by draw site."""
 
-import mpmath
+from fractions import Fraction
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from thenar.reference.intervals import normal_quantile
+from thenar.reference.numbers import distance
 from thenar.simulator.deviates import Numbers
 from thenar.simulator.streams import Draw, Draws, Site
 
-mpmath.mp.dps = 40
 NAME = st.text(alphabet="abc", max_size=3)
 
 
@@ -98,18 +100,15 @@ WORDS = st.integers(0, 2**64 - 1)
 def test_a_uniform_number_lies_strictly_between_nought_and_one_where_its_word_says(word: int) -> None:
     (number,) = Numbers(np.array([word], dtype=np.uint64)).uniform()
     assert 0.0 < number < 1.0
-    assert abs(mpmath.mpf(float(number)) - mpmath.mpf(word) / 2**64) <= mpmath.mpf(2) ** -52
+    assert abs(Fraction(float(number)) - Fraction(word, 2**64)) <= Fraction(1, 2**52)
 
 
 @given(WORDS)
 def test_a_normal_number_is_the_quantile_of_the_uniform_one(word: int) -> None:
     numbers = Numbers(np.array([word], dtype=np.uint64))
-    got, p = mpmath.mpf(float(numbers.normal()[0])), mpmath.mpf(float(numbers.uniform()[0]))
-    # How far its distribution function is off, over its slope, is how far the number is: one Newton step. The tail is
-    # taken from the near end, which keeps its digits. AS 241 is good to about 1e-16; a dozen roundings come on top.
-    near = min(p, 1 - p)
-    off = (mpmath.ncdf(-abs(got)) - near) / mpmath.npdf(got)
-    assert abs(off) <= 1e-15 * max(abs(got), mpmath.mpf("1e-3"))
+    truth = normal_quantile(float(numbers.uniform()[0]))
+    # AS 241 is good to about 1e-16 of the number; a dozen roundings come on top.
+    assert distance(float(numbers.normal()[0]), truth) <= 1e-15 * max(abs(float(truth)), 1e-3)
 
 
 def test_normal_numbers_are_symmetric() -> None:

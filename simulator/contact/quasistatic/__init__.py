@@ -14,12 +14,14 @@ object (6 x 6). All sums run in one fixed order: a repetition comes out the same
     surface.py    distance and normal of many objects of several shapes at once
     balance.py    all forces at one guess, and how far they are from balance
     newton.py     how they change, and the Newton step
+    pace.py       what counts as rest, and how much of a step is taken at once
     settle.py     steps until every repetition is at rest
 
 Arrays: 5 digits, 7 spheres of skin a digit, 15 of the palm, 50 in all, n repetitions last.
 """
 
 from .case import Case, Skin
+from .pace import USUAL, Pace
 from .settle import Rest, close
 
-__all__ = ["Case", "Rest", "Skin", "close"]
+__all__ = ["USUAL", "Case", "Pace", "Rest", "Skin", "close"]

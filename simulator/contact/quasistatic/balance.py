@@ -10,6 +10,7 @@ from ...body.hand import LIMITS_DEG
 from ...body.pose import Pose
 from ..grip import STIFFNESS
 from .case import Command, Skin
+from .pace import Pace
 from .vectors import cross, dot, length, turn, turned
 
 Floats = NDArray[np.float64]
@@ -18,7 +19,6 @@ Bits = NDArray[np.bool_]
 DIGIT_SPHERES = 35
 LIMIT_NMM_PER_RAD = 20000.0  # of a joint beyond its range
 HOLD_N_PER_MM, HOLD_NMM_PER_RAD = 0.05, 100.0  # the soft spring on the object
-_AT_REST_N, _AT_REST_NMM = 0.05, 3.0
 _LEVER_MM = 30.0  # what a moment is held against a force by
 _LOW, _HIGH = (LIMITS_DEG.T[side, :, None] * (np.pi / 180.0) for side in (0, 1))
 # Which joints (4) move each of a digit's spheres of skin (7): three on its first segment, two on each of the others.
@@ -33,6 +33,7 @@ class Balance:
     dragged (50, 3, n)    how far each is dragged sideways, mm
     kept (50, n)          how much of that friction bears, 1 where it sticks
     drag (50, n)          N per mm of `dragged`: less where it slips, so that no force exceeds `sticks` times Coulomb's
+    drags, forces (50, 3, n)   of friction, and in all, on each sphere of skin, N
     bent (50, n)          how much less it resists sideways for the surface bends under it, N per mm
     levers (50, 3, n)     where each touches, from the object's middle
     jacobian (5, 7, 4, 3, n)   how the skin of the digits moves with their joints, mm per radian
@@ -50,11 +51,12 @@ class Balance:
         self.presses, self.press_stiffness = skin.press(self.sunk)
         self.levers = centres - np.minimum(distance, hand.sphere_radii[:, None])[:, None] * self.normal - pose.position
         self.dragged = self._dragged()
-        drag = self.press_stiffness * (skin.drag_n_per_mm / skin.press_n_per_mm)
+        drag = skin.drag(self.sunk)
         self.kept = self._kept(drag)
         self.drag = drag * np.minimum(sticks * self.kept, 1.0)
         self.bent = np.minimum(self.presses * curvature, 0.9 * self.drag)
-        self.forces = self.presses[:, None] * self.normal - self.drag[:, None] * self.dragged
+        self.drags = -self.drag[:, None] * self.dragged
+        self.forces = self.presses[:, None] * self.normal + self.drags
         self._on_object()
         self._on_joints()
 
@@ -108,9 +110,8 @@ class Balance:
         joints: Floats = np.abs(self.on_joints).max(axis=0)
         return np.maximum(np.maximum(force, moment / _LEVER_MM), joints / _LEVER_MM)
 
-    @cached_property
-    def at_rest(self) -> Bits:
-        """Which repetitions (n,) have come to rest."""
+    def at_rest(self, pace: Pace) -> Bits:
+        """Return which repetitions (n,) have come to rest; none that holds a NaN."""
         force, moment = length(self.on_object[:3]), length(self.on_object[3:])
         joints: Floats = np.abs(self.on_joints).max(axis=0)
-        return (force < _AT_REST_N) & (moment < _AT_REST_NMM) & (joints < _AT_REST_NMM)
+        return (force < pace.rest_n) & (moment < pace.rest_nmm) & (joints < pace.rest_nmm)

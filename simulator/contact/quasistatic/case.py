@@ -36,6 +36,10 @@ class Skin:
         stiffness = self.press_n_per_mm * soft / self.soft_mm
         return stiffness * (deep - soft / 2.0), stiffness
 
+    def drag(self, sunk: Floats) -> Floats:
+        """Return the stiffness sideways of spheres that sink in by `sunk` mm: it grows over the first `soft_mm` too."""
+        return self.drag_n_per_mm * np.minimum(np.maximum(sunk, 0.0), self.soft_mm) / self.soft_mm
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Case:

@@ -10,6 +10,7 @@ from ...body.pose import Pose
 from .balance import Balance
 from .case import Case, Command, Skin, command
 from .newton import newton_step
+from .pace import USUAL, Pace
 
 Floats = NDArray[np.float64]
 Bits = NDArray[np.bool_]
@@ -30,7 +31,8 @@ _HALF_FROM = 24
 class Rest:
     """Where n hands came to rest.
 
-    angles (20, n) in radians, pose, presses (50, n) in N on the spheres of skin
+    angles (20, n) in radians, pose
+    presses (50, n), drags (50, 3, n)  on the spheres of skin in N: along the normals, and of friction
     residual_n, residual_nmm (n,)  force and moment on the object that skin and weight leave unbalanced
     settled (n,)                   False where the forces never came into balance
     steps   (n,)                   Newton steps taken
@@ -39,6 +41,7 @@ class Rest:
     angles: Floats
     pose: Pose
     presses: Floats
+    drags: Floats
     residual_n: Floats
     residual_nmm: Floats
     settled: Bits
@@ -50,17 +53,17 @@ class Rest:
         n = told.angles.shape[1]
         pose = Pose(told.pose.position.copy(), told.pose.rotation.copy())
         spheres = len(told.hand.sphere_capsules)
-        none = np.zeros(n)
-        return cls(
-            told.angles.copy(), pose, np.zeros((spheres, n)), none, none.copy(), none > 0.0, np.zeros(n, dtype=np.int64)
-        )
+        nowhere, none = np.zeros((spheres, n)), np.zeros(n)
+        drags, steps = np.zeros((spheres, 3, n)), np.zeros(n, dtype=np.int64)
+        return cls(told.angles.copy(), pose, nowhere, drags, none, none.copy(), none > 0.0, steps)
 
-    def note(self, which: Indices, balance: Balance, count: int) -> None:
-        """Enter where repetitions `which` are after `count` steps."""
+    def note(self, which: Indices, balance: Balance, at_rest: Bits, count: int) -> None:
+        """Enter where repetitions `which` are after `count` steps, and whether they are at rest."""
         self.angles[:, which], self.presses[:, which] = balance.angles, balance.presses
+        self.drags[..., which] = balance.drags
         self.pose.position[:, which], self.pose.rotation[..., which] = balance.pose.position, balance.pose.rotation
         self.residual_n[which], self.residual_nmm[which] = balance.residual_n, balance.residual_nmm
-        self.settled[which], self.steps[which] = balance.at_rest, count
+        self.settled[which], self.steps[which] = at_rest, count
 
     def part(self, first: int, last: int) -> "Rest":
         """Return the rest of repetitions first to last - 1."""
@@ -69,6 +72,7 @@ class Rest:
             self.angles[:, own],
             Pose(self.pose.position[:, own], self.pose.rotation[..., own]),
             self.presses[:, own],
+            self.drags[..., own],
             self.residual_n[own],
             self.residual_nmm[own],
             self.settled[own],
@@ -76,21 +80,22 @@ class Rest:
         )
 
 
-def close(cases: Sequence[Case], skin: Skin, most_steps: int) -> list[Rest]:
+def close(cases: Sequence[Case], skin: Skin, most_steps: int, pace: Pace = USUAL) -> list[Rest]:
     """Return how the hands of `cases`, all of one size, come to rest, a Rest a case."""
     told = command(cases)
     rest, walk = Rest.of(told), _Walk.start(told)
     left = np.arange(told.angles.shape[1])
-    for count in range(most_steps + 1):
-        balance = Balance(told, skin, walk.angles, walk.pose, 1.0 if count < _SEARCH else _STICKS)
-        slipping = count in _SLIP_STEPS
+    for count in range(most_steps * pace.parts + 1):
+        whole = count // pace.parts
+        balance = Balance(told, skin, walk.angles, walk.pose, 1.0 if whole < _SEARCH else _STICKS)
+        slipping, at_rest = whole in _SLIP_STEPS, balance.at_rest(pace)
         if slipping:
             told = replace(told, object_points=balance.slipped())
-        rest.note(left, balance, count)
-        going = np.flatnonzero(~balance.at_rest)
-        if not going.size or count == most_steps:
+        rest.note(left, balance, at_rest, count)
+        going = np.flatnonzero(~at_rest)
+        if not going.size or whole == most_steps:
             break
-        walk = walk.onward(balance, going, 0.5 if count >= _HALF_FROM else 1.0, always=slipping)
+        walk = walk.onward(balance, going, (0.5 if whole >= _HALF_FROM else 1.0) / pace.parts, always=slipping)
         if going.size < left.size:
             left, told = left[going], told.rows(going)
     ends = np.cumsum([len(case.grip_n) for case in cases])

@@ -96,12 +96,29 @@ def test_inside_the_distance_is_how_far_the_nearest_side_is(shape: Shape) -> Non
     assert at(shape, out[deep])[0] == pytest.approx(0.0, abs=1e-8)
 
 
-@given(SHAPES, POINTS)
-def test_normals_are_of_unit_length(shape: Shape, point: np.ndarray) -> None:
-    assume(np.linalg.norm(point) > 1e-3 and np.hypot(point[1], point[2]) > 1e-3)
-    gap = np.linalg.norm(point - nearest_in_core(shape, point))
-    assume(not 0.0 < gap < 1e-3)
-    assert np.linalg.norm(at(shape, point[None])[1]) == pytest.approx(1.0, abs=1e-8)
+@given(SHAPES, POINTS, st.booleans(), st.sampled_from((0.0, 5e-324, 1e-200, 1e-155, 1e-149, 1e-15, 1e-12, 1e-9, 1e-3)))
+def test_normals_are_of_unit_length_a_hair_off_the_core_too(
+    shape: Shape, point: np.ndarray, off_the_core: bool, hair: float
+) -> None:
+    if off_the_core:
+        point = nearest_in_core(shape, point) + hair * np.sign(point)
+    assert np.linalg.norm(at(shape, point[None])[1]) == pytest.approx(1.0, abs=1e-15)
+
+
+@pytest.mark.parametrize("hair", [0.0, 5e-324, 1e-200, 1e-13])
+@pytest.mark.parametrize(
+    "shape", [Sphere(8.0), Cylinder(8.0, 90.0), Box(9.0, 9.0, 9.0, 4.5)], ids=["ball", "bar", "die"]
+)
+def test_in_the_very_middle_one_way_out_is_chosen(shape: Shape, hair: float) -> None:
+    distance, normal = at(shape, np.array([[hair, hair, -hair]]))
+    assert distance[0] == pytest.approx(-min(shape.extent_mm()) / 2, abs=1e-12)
+    assert np.linalg.norm(normal[0]) == pytest.approx(1.0, abs=1e-15)
+
+
+def test_a_disk_thinner_than_any_place_is_told_apart_presses_as_one_that_is_not() -> None:
+    above = np.array([[6e-15, 3.0, 4.0]])
+    ways = [at(Cylinder(40.0, thin, 0.0), above)[1][0] for thin in (5e-324, 1e-16, 1e-15, 1e-14)]
+    assert np.allclose(ways, [[1.0, 0.0, 0.0]] * 4, atol=1e-15)
 
 
 @pytest.mark.parametrize("shape", [Cylinder(100.0, 10.0), Box(100.0, 100.0, 10.0, 0.0)], ids=["disk", "card"])
@@ -200,3 +217,8 @@ def test_an_edge_rounder_than_the_object_is_refused_with_what_is_possible() -> N
         Box(20.0, 10.0, 5.0, 3.0)
     with pytest.raises(ValueError, match=r"at most 2\.0"):
         Cylinder(4.0, 100.0, 2.1)
+
+
+def test_half_of_the_smallest_sizes_may_be_rounded_off_too() -> None:
+    for size in (5e-324, 1.5e-323, 1e-310):
+        assert Box(size, size, size, size / 2).edge_mm == size / 2

@@ -65,6 +65,18 @@ def test_a_hair_of_depth_still_takes_the_whole_force() -> None:
     assert between[0] == 0.0
 
 
+@given(st.sampled_from((5e-324, 1e-310, 1e-300)), st.sampled_from((5e-324, 1.0, 1e300)))
+def test_depths_too_small_to_divide_a_force_by_share_it_all_the_same(depth: float, force: float) -> None:
+    depths = np.full((N_SWITCHES, 1), -1.0)
+    depths[:2] = depth
+    forces = np.zeros((len(CAPSULES), 1))
+    forces[SWITCHES.capsules[0]] = force
+    shared, between = split(SWITCHES, depths, forces)
+    assert shared[:2].sum() == pytest.approx(force, rel=1e-15)
+    assert shared[0, 0] == shared[1, 0] or force == 5e-324
+    assert not between.any()
+
+
 @given(pressed())
 def test_a_grasp_is_split_the_same_alone_and_in_a_batch(case: tuple[np.ndarray, np.ndarray]) -> None:
     depths, forces = case

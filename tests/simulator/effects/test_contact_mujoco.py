@@ -17,10 +17,12 @@ from hypothesis.extra.numpy import arrays
 from thenar.simulator.body.anthropometry import Size
 from thenar.simulator.body.condition import Condition, Held, Pad, Thing
 from thenar.simulator.body.hand import CAPSULES, DOF, LIMITS_DEG, Hand
+from thenar.simulator.body.layout import murakami160
 from thenar.simulator.body.pose import Pose
 from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
 from thenar.simulator.contact.grip import GRAVITY, STIFFNESS, torques
 from thenar.simulator.contact.model import Contact, Load
+from thenar.simulator.contact.mujoco_grasp import MujocoContact
 from thenar.simulator.contact.mujoco_model import build
 from thenar.simulator.effects.contact_mujoco import Parameters, model
 from thenar.simulator.pipeline.effect import Setting
@@ -249,6 +251,35 @@ def test_a_hand_that_still_moves_is_reported_though_its_object_rests(solve: Call
     assert (solve(condition, steps=6).residual_n < 0.05).all()
     assert not solve(condition, steps=6).settled.any()
     assert solve(condition, steps=60).settled.all()
+
+
+def test_an_object_that_still_moves_is_reported_though_all_forces_on_it_balance() -> None:
+    # So soft a hold hardly damps: what was pushed once turns on.
+    condition = holding(mass_kg=0.3)
+    load = Load(condition, *told(condition, 12))
+    now, then = (
+        MujocoContact(Parameters(weld_n_per_m=20.0, weld_nm_per_rad=0.005, steps=steps), murakami160()).solve([load])[0]
+        for steps in (200, 202)
+    )
+    # In 10 ms it turns by 0.001 rad at 0.1 rad/s, and slides by 0.03 mm at 3 mm/s.
+    moving = (np.abs(now.pose - then.pose) > [0.06, 0.06, 0.06, 0.002, 0.002, 0.002]).any(axis=1)
+    assert (moving & (now.residual_n < 0.1 + 0.02 * now.capsules_n.sum(axis=1))).any()
+    assert not now.settled[moving].any()
+
+
+@pytest.mark.parametrize("size", [5e-324, 1e-12, 1e-9])
+def test_objects_of_next_to_no_size_are_something_to_mujoco(solve: Callable[..., Contact], size: float) -> None:
+    for shape in (Sphere(size), Cylinder(40.0, size, 0.0), Box(80.0, 50.0, size, 0.0)):
+        found = solve(holding(shape), 1)
+        assert np.isfinite(found.capsules_n).all()
+        assert np.isfinite(found.residual_n).all()
+
+
+def test_a_hand_of_a_hundredth_is_built_and_one_of_full_size_stays_as_it_is() -> None:
+    small, whole = (build(Hand(Size(185.0 * s, 83.0 * s)), holding().thing, Parameters()) for s in (0.01, 1.0))
+    assert small.body_mass[1:].min() >= 1e-12
+    assert whole.body_mass[1:16].min() > 1e-3
+    assert whole.body_inertia[1:16].min() > 1e-8
 
 
 def test_the_longest_step_a_scene_may_ask_for_is_too_long_for_the_stiffest_skin(solve: Callable[..., Contact]) -> None:

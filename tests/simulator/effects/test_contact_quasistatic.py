@@ -155,6 +155,21 @@ def test_neither_loads_nor_conditions_are_changed(conditions: list[Condition], d
         assert np.array_equal(getattr(told, field), getattr(before, field))
 
 
+@pytest.mark.parametrize("press_n_per_mm", [5e-324, 1000.0])
+@pytest.mark.parametrize("soft_mm", [5e-324, 5.0])
+@pytest.mark.parametrize("drag_n_per_mm", [5e-324, 1000.0])
+def test_skins_at_the_ends_of_what_may_be_asked_for_come_to_numbers(
+    conditions: list[Condition],
+    make_setting: Callable[..., Setting],
+    press_n_per_mm: float,
+    soft_mm: float,
+    drag_n_per_mm: float,
+) -> None:
+    skin = Parameters(press_n_per_mm=press_n_per_mm, soft_mm=soft_mm, drag_n_per_mm=drag_n_per_mm)
+    for contact in model(skin, make_setting()).solve([load(condition, 1) for condition in conditions[:3]]):
+        assert all(np.isfinite(getattr(contact, field)).all() for field in FIELDS)
+
+
 def test_it_conflicts_with_the_other_model_and_declares_what_it_writes() -> None:
     assert EFFECT.conflicts == ("contact.mujoco",)
     assert EFFECT.stage == "contact"

@@ -120,6 +120,25 @@ def test_at_every_level_switches_are_as_their_forces_say_unless_they_flicker(see
     assert (reads >= closed).all()
 
 
+@given(st.integers(0, 2**32))
+def test_forces_that_hardly_change_overflow_nothing(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    forces = draw.choice([0.0, 5e-324, 1e-310, 1e-300, 0.5, 2.0], (5, 2, 30))
+    forces[0] = 0.0
+    on, off = crossings(forces, np.full(30, 1.0), 1000.0)
+    closed = forces > 1.0
+    assert np.array_equal(on != NEVER, closed.any(axis=0))
+    assert np.array_equal(off != NEVER, closed.any(axis=0) & ~closed[-1])
+    first = closed.argmax(axis=0)
+    ever = closed.any(axis=0)
+    assert ((1000 * (first - 1) <= on) & (on <= 1000 * first))[ever].all()
+
+
+def test_what_is_closed_from_the_first_level_on_closes_at_once() -> None:
+    on, off = crossings(np.array([[[2.0]], [[1.0]], [[0.0]]]), np.array([0.5]), 1000.0)
+    assert (on.tolist(), off.tolist()) == ([[0]], [[1500]])
+
+
 def test_a_grip_that_is_not_full_when_the_row_is_read_is_refused(make_setting: Callable) -> None:
     with pytest.raises(SceneError, match=r"contact\.ramp: .* rise_ms = 300 is longer than recording\.hold_ms = 250"):
         prepare(Parameters(rise_ms=300.0), make_setting(hold_us=250_000), Press(lambda grip: grip))

@@ -7,6 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from thenar.simulator.body.pose import rotation
 from thenar.simulator.body.shapes import Shape, Sphere
 from thenar.simulator.errors import PlanError, SceneError
 from thenar.simulator.planning.object_plan import Work, plan_object
@@ -28,7 +29,13 @@ def hand(length_mm: float) -> Subject:
 
 
 def figures(entry: Entry) -> np.ndarray:
-    return np.array([[*held.posture_deg, *held.pose] for held in entry.held])
+    """Return postures and poses, turns as matrices: half a turn is the same either way round."""
+    return np.array(
+        [
+            [*held.posture_deg, *held.pose[:3], *rotation(np.array(held.pose[3:])[:, None]).ravel()]
+            for held in entry.held
+        ]
+    )
 
 
 PEA, BEAN = thing("pea", "Tip", Sphere(7.5)), thing("bean", "Tip", Sphere(11.5))

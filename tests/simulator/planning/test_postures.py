@@ -7,12 +7,14 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from thenar.simulator.body.anthropometry import Size
 from thenar.simulator.body.condition import Held, Thing
 from thenar.simulator.body.hand import Hand
+from thenar.simulator.body.pose import rotation
 from thenar.simulator.contact.grip import GRAVITY
 from thenar.simulator.errors import SceneError
 from thenar.simulator.planning.postures import FRICTION, Entry, Postures
@@ -55,6 +57,36 @@ def test_between_two_lengths_it_lies_between_theirs_by_plain_arithmetic(entry: E
 @given(st.sampled_from(ENTRIES), st.floats(150.0, 224.999))
 def test_hands_of_nearly_the_same_length_hold_a_thing_nearly_alike(entry: Entry, length: float) -> None:
     assert np.abs(numbers(held(entry, length + 0.001)) - numbers(held(entry, length))).max() < 0.01
+
+
+@given(
+    st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda axis: np.linalg.norm(axis) > 0.1),
+    st.floats(-0.01, 0.01),
+    st.floats(-0.01, 0.01),
+)
+def test_between_two_poses_of_half_a_turn_lies_half_a_turn_whichever_way_round_each_came(
+    axis: tuple[float, ...], more: float, less: float
+) -> None:
+    unit = np.array(axis) / np.linalg.norm(axis)
+    low, high, *others = PIN.held
+    turns = [replace(one, pose=(*one.pose[:3], *turn.tolist())) for one, turn in
+             ((low, (np.pi - more) * unit), (high, (less - np.pi) * unit))]  # fmt: skip
+    entry = replace(PIN, held=(*turns, *others))
+    middle = held(entry, (low.length_mm + high.length_mm) / 2.0).pose[3:]
+    expected = rotation((np.pi + (less - more) / 2.0) * unit[:, None])
+    assert rotation(middle[:, None]) == pytest.approx(expected, abs=1e-12)
+
+
+@given(*[st.tuples(*[st.floats(-3.0, 3.0)] * 3)] * 2)
+@example((-2.64, 0.0, 0.0), (0.5, 0.0, 0.0))
+@example((3.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+def test_at_a_planned_length_things_are_turned_as_planned_whatever_the_length_before(
+    before: tuple[float, ...], planned: tuple[float, ...]
+) -> None:
+    low, high, *others = PIN.held
+    turned = [replace(one, pose=(*one.pose[:3], *turn)) for one, turn in ((low, before), (high, planned))]
+    got = held(replace(PIN, held=(*turned, *others)), high.length_mm).pose[3:]
+    assert rotation(got[:, None]) == pytest.approx(rotation(np.array(planned)[:, None]), abs=1e-12)
 
 
 def test_what_comes_with_a_posture_is_its_entrys() -> None:

@@ -12,6 +12,7 @@ from thenar.simulator.body.pose import Pose
 from thenar.simulator.contact.grip import STIFFNESS
 from thenar.simulator.contact.quasistatic.balance import HOLD_N_PER_MM, HOLD_NMM_PER_RAD, LIMIT_NMM_PER_RAD, Balance
 from thenar.simulator.contact.quasistatic.case import Case, Skin, command
+from thenar.simulator.contact.quasistatic.pace import Pace
 
 GRASPS = ("PoS", "PoH", "CMF", "PMF", "PE")
 
@@ -115,7 +116,7 @@ def test_without_friction_skin_only_presses(balance: Balance) -> None:
 
 def test_rest_is_where_nothing_is_left_over(balance: Balance) -> None:
     force, moment = (np.linalg.norm(part, axis=0) for part in (balance.on_object[:3], balance.on_object[3:]))
-    assert not balance.at_rest.any()
+    assert not balance.at_rest(Pace()).any()
     assert balance.unrest == pytest.approx(
         np.maximum(np.maximum(force, moment / 30.0), np.abs(balance.on_joints).max(axis=0) / 30.0)
     )

@@ -9,7 +9,7 @@ import pytest
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.shapes import Sphere
 from thenar.simulator.contact.grip import GRAVITY
-from thenar.simulator.contact.quasistatic import Case, Rest, Skin, close
+from thenar.simulator.contact.quasistatic import USUAL, Case, Pace, Rest, Skin, close
 from thenar.simulator.contact.quasistatic.balance import HOLD_N_PER_MM
 
 MOST_STEPS = 40
@@ -160,6 +160,27 @@ def test_a_hand_that_is_not_given_the_steps_is_marked(every: list[tuple[Case, Re
         for rest in close(cases, skin, most_steps):
             assert (rest.steps[~rest.settled] == most_steps).all()
             assert not rest.settled.any()
+
+
+def test_steps_in_parts_are_counted_by_the_part_and_given_as_many_more(
+    every: list[tuple[Case, Rest]], skin: Skin
+) -> None:
+    cases = [case for case, _ in every][:8]
+    for rest in close(cases, skin, 2, Pace(parts=3)):
+        assert (rest.steps[~rest.settled] == 6).all()
+        assert not rest.settled.any()
+    whole, parts = (
+        np.concatenate([rest.steps for rest in close(cases, skin, MOST_STEPS, pace)]) for pace in (USUAL, Pace(parts=2))
+    )
+    assert np.median(parts) > np.median(whole)
+
+
+def test_a_stricter_rest_is_reached_and_leaves_less(every: list[tuple[Case, Rest]], skin: Skin) -> None:
+    cases, strict = [case for case, _ in every], Pace(USUAL.rest_n / 100, USUAL.rest_nmm / 100)
+    for case, rest in zip(cases, close(cases, skin, MOST_STEPS, strict), strict=True):
+        shift = rest.pose.position - case.numbers[:3]
+        held = HOLD_N_PER_MM * np.sqrt((shift * shift).sum(axis=0))
+        assert (np.abs(rest.residual_n - held)[rest.settled] < strict.rest_n).all()
 
 
 def test_an_object_that_overlaps_the_whole_hand_is_marked_and_not_made_up(
