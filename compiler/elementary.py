@@ -76,12 +76,30 @@ def log(x: Floats) -> Floats:
     return (f - s * (f - square * series)) + exponent * _LN2_LOW + exponent * _LN2_HIGH
 
 
+def _log_of_one_and(x: Floats) -> Floats:
+    """Return ln(1 + x) for x >= 0, any shape: what 1 + x rounds away is found exactly, and adds its share of it."""
+    whole = 1.0 + x
+    return log(whole) + (x - (whole - 1.0)) / whole
+
+
 def add_up(rows: Floats) -> Floats:
     """Return the sum over axis 0 of (K, n), added strictly in order of the rows."""
     total: Floats = rows[0].copy()
     for row in rows[1:]:
         total += row
     return total
+
+
+def add_exactly(total: Floats, carry: Floats, term: Floats) -> tuple[Floats, Floats]:
+    """Add `term` to a sum held in two parts, any shape, and return both: what `total` rounds away goes to `carry`.
+
+    The rounding error of an addition is itself a double, which six operations find (Knuth, TAOCP 2, 4.2.2, theorem B).
+    So total + carry is within one rounding of the true sum, and n^2 * 2^-106 of the magnitudes: 10,000 terms drift no
+    further than ten do.
+    """
+    longer = total + term
+    added = longer - total
+    return longer, carry + ((total - (longer - added)) + (term - added))
 
 
 def softmax(scores: Floats) -> Floats:
@@ -95,13 +113,17 @@ def softmax_and_loss(scores: Floats, labels: NDArray[np.intp], weights: Floats |
     """Return P (K, n) and the weighted mean of -ln P(label) for scores (K, n), labels and weights (n,); None: all 1.
 
     Its sums are correctly rounded (fsum), and it is taken from the scores, not from P: the loss of a class that is next
-    to certain keeps its bits.
+    to certain is ln(1 + what the others have of its share), which keeps its bits however small it is.
     """
     top = scores.max(axis=0)
     shares = exp(scores - top)
     total = add_up(shares)
+    own = labels, np.arange(labels.size)
+    mine, gap = shares[own], top - scores[own]
+    shares[own] = 0.0
+    losses = np.where(gap == 0.0, _log_of_one_and(add_up(shares)), log(total) + gap)
+    shares[own] = mine
     shares /= total
-    losses = log(total) + (top - scores[labels, np.arange(labels.size)])
     if weights is None:
         return shares, math.fsum(losses.tolist()) / labels.size
     return shares, math.fsum((losses * weights).tolist()) / math.fsum(weights.tolist())

@@ -9,11 +9,15 @@ from typing import TypeVar
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
 
+# More processes are asked for by a slip only, and would take the machine with them.
+MOST_JOBS = 1024
+
 
 def in_workers(work: Callable[[Task], Answer], tasks: Iterable[Task], jobs: int) -> Iterator[Answer]:
     """Yield the answers in the order in which they come.
 
-    jobs  worker processes, as joblib counts them: -1 for all cores, 1 for this process alone. A worker runs one thread.
+    jobs  worker processes, as joblib counts them: -1 for all cores, 1 for this process alone; no more than MOST_JOBS.
+          A worker runs one thread.
 
     Raises BrokenExecutor if a worker is killed or cannot start, and whatever the work raises.
     """
@@ -23,7 +27,7 @@ def in_workers(work: Callable[[Task], Answer], tasks: Iterable[Task], jobs: int)
     from joblib import Parallel, delayed, parallel_config
 
     with parallel_config(backend="loky", inner_max_num_threads=1):
-        workers = Parallel(n_jobs=jobs, return_as="generator_unordered")
+        workers = Parallel(n_jobs=min(jobs, MOST_JOBS), return_as="generator_unordered")
         try:
             with _interrupts_held():
                 answers = workers(delayed(work)(task) for task in tasks)
@@ -40,7 +44,7 @@ def workers_of(jobs: int) -> int:
         return 1
     from joblib import effective_n_jobs
 
-    return int(effective_n_jobs(jobs))
+    return int(effective_n_jobs(min(jobs, MOST_JOBS)))
 
 
 @contextmanager

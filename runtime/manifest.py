@@ -35,8 +35,8 @@ class Source(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     simulated: str = ""
 
 
-class Options(Struct, frozen=True, forbid_unknown_fields=True):
-    """Every option of `thenar compile`."""
+class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """Every option of `thenar compile`; a tolerance is left out where there is none."""
 
     prune: Count
     rounds: Count
@@ -44,6 +44,7 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True):
     shrinkage: float
     folds: Count
     seed: int
+    tolerance: float | None = None
 
 
 class Switch(Struct, frozen=True, forbid_unknown_fields=True):
@@ -96,11 +97,16 @@ class Recognised(Struct, frozen=True, forbid_unknown_fields=True):
         return self.correct / self.total
 
 
-class Manifest(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The content of `build.json`."""
+class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True):
+    """The content of `build.json`.
 
-    schema: int = SCHEMA
-    checksum: str = ""
+    stopped_after    rounds after which the tolerance ended the training; left out if it did not
+    zero_gain_nodes  decisions of the placement's tree at which no switch gained anything alone; left out if there are
+                     none
+    """
+
+    schema: int
+    checksum: str
     thenar: str
     tables_sha256: Digest
     ensemble_sha256: Digest
@@ -111,6 +117,8 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     joints: tuple[Calibration, ...]
     proof: Proof
     rates: tuple[Recognised, ...]
+    stopped_after: Count = 0
+    zero_gain_nodes: Count = 0
 
 
 class _Version(Struct, frozen=True):

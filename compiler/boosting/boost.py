@@ -4,6 +4,7 @@ Where Weka's own answer hangs on rounding, thenar goes on in a stable way instea
 (exactsums), a branch of next to no weight counts as empty, and no branch answers with more than z_max.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...drivers.errors import ThenarError
-from ..elementary import softmax_and_loss
+from ..elementary import add_exactly, softmax_and_loss
 from .binning import bin_columns
 from .stumpfit import Targets, fit_stumps
 from .stumps import Stumps, centred
@@ -20,6 +21,8 @@ Floats = NDArray[np.float64]
 
 # Ties are counted on the grid in units that grow with the square of z_max: far above this, all stumps would tie.
 LARGEST_Z_MAX = 100.0
+# Far below this, the scores of a hundred rounds would all lie within what counts as a tie (stumps.TIE).
+SMALLEST_SHRINKAGE = 1e-6
 
 
 class BoostingError(ThenarError, ValueError):
@@ -51,24 +54,24 @@ def boost(
     Stops early where the mean log-likelihood changes by less than `tolerance` in a round (Weka's -L; None: never), or
     where no column varies. `on_round(done, rounds)` is called after every round. Raises BoostingError.
     """
-    _check_options(rounds, shrinkage, z_max)
+    _check_options(rounds, shrinkage, z_max, tolerance)
     _check_rows(X, labels, n_classes, weights)
     if weights is not None:
         # By a power of two, which changes no answer: now sums of huge weights stay finite, and of tiny ones exact.
         weights = np.ldexp(weights, -np.frexp(weights.max())[1])
     binned = bin_columns(X)
     member = labels == np.arange(n_classes)[:, np.newaxis]
-    scores = np.zeros((n_classes, len(X)))
+    scores = carry = np.zeros((n_classes, len(X)))
     probability, loss = softmax_and_loss(scores, labels, weights)
     losses = [loss]
     fitted: list[tuple[NDArray[np.int32], Floats, Floats]] = []
     stopped = False
     while len(fitted) < rounds and binned.groups and not stopped:
-        stumps = fit_stumps(binned, _targets(probability, member, z_max, weights), z_max)
+        stumps = fit_stumps(binned, working_targets(probability, member, z_max, weights), z_max)
         # Not the answers: of a million rows they would be a hundred megabytes a round.
         fitted.append((stumps.columns, stumps.thresholds, stumps.values))
-        scores += centred(stumps.answers, shrinkage)
-        probability, loss = softmax_and_loss(scores, labels, weights)
+        scores, carry = add_exactly(scores, carry, centred(stumps.answers, shrinkage))
+        probability, loss = softmax_and_loss(scores + carry, labels, weights)
         losses.append(loss)
         stopped = tolerance is not None and abs(losses[-2] - losses[-1]) < tolerance
         if on_round is not None:
@@ -76,14 +79,23 @@ def boost(
     return _stack(fitted, X.shape[1], n_classes, shrinkage), History(tuple(losses), stopped)
 
 
-def _targets(probability: Floats, member: NDArray[np.bool_], z_max: float, row_weights: Floats | None) -> Targets:
-    """Return weights and working responses for P (K, n): z = 1/P or -1/(1 - P) within +-z_max, w z = Y - P."""
+def working_targets(
+    probability: Floats, member: NDArray[np.bool_], z_max: float, row_weights: Floats | None
+) -> Targets:
+    """Return the weights and working responses for P (K, n), put on grids."""
+    return Targets(*weights_and_responses(probability, member, z_max, row_weights))
+
+
+def weights_and_responses(
+    probability: Floats, member: NDArray[np.bool_], z_max: float, row_weights: Floats | None
+) -> tuple[Floats, Floats]:
+    """Return w and w z (K, n) for P (K, n): z = 1/P or -1/(1 - P) within +-z_max, w z = Y - P."""
     complement = 1.0 - probability
     own = np.where(member, probability, complement)
     other = np.where(member, complement, probability)  # |Y - P|
     sizes = other if row_weights is None else other * row_weights
     # |z| = min(1/own, z_max), so w = |Y - P| / |z| = |Y - P| * max(own, 1/z_max): no division, and never by zero.
-    return Targets(sizes * np.maximum(own, 1.0 / z_max), np.where(member, sizes, -sizes))
+    return sizes * np.maximum(own, 1.0 / z_max), np.where(member, sizes, -sizes)
 
 
 def _stack(
@@ -99,13 +111,17 @@ def _stack(
     )
 
 
-def _check_options(rounds: int, shrinkage: float, z_max: float) -> None:
+def _check_options(rounds: int, shrinkage: float, z_max: float, tolerance: float | None) -> None:
     if rounds < 1:
         raise BoostingError(f"rounds={rounds} must be at least 1")
-    if not 0 < shrinkage <= 1:
-        raise BoostingError(f"shrinkage={shrinkage} must be above 0 and at most 1")
+    if not SMALLEST_SHRINKAGE <= shrinkage <= 1:
+        raise BoostingError(f"shrinkage={shrinkage} must be at least {SMALLEST_SHRINKAGE:g} and at most 1")
     if not 1 < z_max <= LARGEST_Z_MAX:
         raise BoostingError(f"z_max={z_max} must be above 1 and at most {LARGEST_Z_MAX:g}")
+    if tolerance is not None and not 0 <= tolerance < math.inf:
+        raise BoostingError(
+            f"tolerance={tolerance} must be a change of the loss, at least 0; without one, training never stops early"
+        )
 
 
 def _check_rows(X: NDArray[np.generic], labels: NDArray[np.intp], n_classes: int, weights: Floats | None) -> None:

@@ -26,7 +26,7 @@ class LogitBoostClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc
     Parameters
     ----------
     rounds : number of boosting rounds; each fits one stump a class (the paper: 100).
-    shrinkage : factor on every stump's answer, in (0, 1] (Weka's -H).
+    shrinkage : factor on every stump's answer, in [1e-6, 1] (Weka's -H).
     z_max : clamp of the working response and of every stump's answer, in (1, 100] (Weka 3.6: the constant 3).
     tolerance : stop where the mean log-likelihood changes by less than this in a round (Weka's -L); None never stops.
     classes : labels that exist even where y lacks some of them (a fold without a rare class); None: those in y.

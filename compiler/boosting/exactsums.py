@@ -24,20 +24,16 @@ class OnGrid:
     units: Floats  # (K, n) integers whose magnitudes sum to at most 2^52 a row and, unless all are 0, to 2^50 at least
     exponents: NDArray[np.int32]  # (K,)
 
-    def values(self) -> Floats:
-        """Return the numbers (K, n) that the units stand for."""
-        values: Floats = np.ldexp(self.units, -self.exponents[:, np.newaxis])
-        return values
-
-    def branch_sums(self, left: Floats, missing: Floats | None) -> Floats:
+    def branch_sums(self, left: Floats, missing: Floats | None, base: NDArray[np.int32]) -> Floats:
         """Return the sums (3, K) over the rows left of, right of and missing in a split; members are 0 or 1, (K, n).
 
-        The right sum is a difference, and exact all the same: all three are whole units.
+        In units of 2^-base, base (K,): of the class's own grid, so that numbers next to the smallest doubles keep their
+        bits. The right sum is a difference, and exact all the same: all three are whole units.
         """
         in_left = np.einsum("kn,kn->k", self.units, left)
         in_missing = np.zeros_like(in_left) if missing is None else np.einsum("kn,kn->k", self.units, missing)
         branches = np.array([in_left, self.units.sum(axis=1) - in_left - in_missing, in_missing])
-        sums: Floats = np.ldexp(branches, -self.exponents)
+        sums: Floats = np.ldexp(branches, base - self.exponents)
         return sums
 
 

@@ -17,9 +17,10 @@ from .exactsums import on_grids
 Floats = NDArray[np.float64]
 Place = tuple[TwoValued | ManyValued, int, int]  # group of columns, position in it, split
 
-# A branch with less than this many grid units of weight is empty. The class's total has 2^50 to 2^51 units, so this is
-# a share of 2e-12 to 4e-12: below it a branch's mean would be made of what the grid rounded away.
-EMPTY_UNITS = 2.0**12
+# A branch with less than this share of its class's weight is empty: at most 2^13 of the 2^50 to 2^51 units that the
+# class has on the grid, below which its mean would be made of what the grid rounded away. A share, and not a number of
+# units, so that a set and the same set three times over agree.
+EMPTY_SHARE = 2.0**-38
 
 
 class Targets:
@@ -31,9 +32,15 @@ class Targets:
         self.responses, self._fine_responses = on_grids(responses)
 
     def branch_sums(self, left: Floats, missing: Floats | None) -> tuple[Floats, Floats]:
-        """Return sum w and sum w z (3, K) over the rows left, right and missing, each within two roundings."""
-        weight = self.weights.branch_sums(left, missing) + self._fine_weights.branch_sums(left, missing)
-        response = self.responses.branch_sums(left, missing) + self._fine_responses.branch_sums(left, missing)
+        """Return sum w and sum w z (3, K) over the rows left, right and missing, in grid units of the weights.
+
+        Each is within two roundings of what the grids hold.
+        """
+        base = self.weights.exponents
+        weight, response = (
+            coarse.branch_sums(left, missing, base) + fine.branch_sums(left, missing, base)
+            for coarse, fine in ((self.weights, self._fine_weights), (self.responses, self._fine_responses))
+        )
         return weight, response
 
 
@@ -77,7 +84,9 @@ def _tie_bound(targets: Targets, z_max: float) -> Floats:
     the roundings of the squares and quotients themselves. Units are those of `_explained`.
     """
     n = targets.weights.units.shape[1]
-    unit = np.ldexp(1.0, targets.responses.exponents - targets.weights.exponents)
+    # Without weight nothing is explained, and this unit may be more than a double holds.
+    apart = np.where(targets.weights.units.any(axis=1), targets.responses.exponents - targets.weights.exponents, 0)
+    unit = np.ldexp(1.0, apart)
     bound: Floats = (2.0 * z_max * unit + (z_max * unit) ** 2) * n + 64.0
     return bound
 
@@ -104,20 +113,22 @@ def _explained(sums: SplitSums, totals: Floats, n_classes: int) -> Floats:
     right = totals - sums.left
     if sums.missing is not None:
         right -= sums.missing
-    parts = _share(sums.left, n_classes)
-    parts += _share(right, n_classes)
+    # Nothing is explained of a class without weight, of which at most responses have not underflown.
+    least = np.where(totals[:n_classes] > 0, totals[:n_classes] * EMPTY_SHARE, np.inf)
+    parts = _share(sums.left, least)
+    parts += _share(right, least)
     if sums.missing is not None:
-        parts += _share(sums.missing, n_classes)
+        parts += _share(sums.missing, least)
     if sums.valid is not None:
         parts[~sums.valid] = -np.inf
     return parts
 
 
-def _share(sums: Floats, n_classes: int) -> Floats:
-    weight, response = sums[..., :n_classes], sums[..., n_classes:]
-    # Below EMPTY_UNITS this is less than the branch explains, and next to nothing.
+def _share(sums: Floats, least: Floats) -> Floats:
+    weight, response = sums[..., : least.size], sums[..., least.size :]
+    # Below the least weight that counts this is less than the branch explains, and next to nothing.
     part: Floats = response * response
-    part /= np.maximum(weight, EMPTY_UNITS)
+    part /= np.maximum(weight, least)
     return part
 
 
@@ -127,8 +138,9 @@ def _branch_values(
     """Return (K, 3): the weighted mean response of every branch; an empty one gets the mean of all rows."""
     absent = None if missing is None else missing.astype(np.float64)
     weight, response = targets.branch_sums(left.astype(np.float64), absent)
-    empty = weight < np.ldexp(EMPTY_UNITS, -targets.weights.exponents)
-    weight = np.where(empty, weight.sum(axis=0), weight)
+    total = weight.sum(axis=0)
+    empty = weight < total * EMPTY_SHARE
+    weight = np.where(empty, total, weight)
     response = np.where(empty, response.sum(axis=0), response)
     values = np.divide(response, weight, out=np.zeros_like(response), where=weight > 0)
     clamped: Floats = np.clip(values, -z_max, z_max).T

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..elementary import add_up
+from ..elementary import add_exactly, add_up
 
 Floats = NDArray[np.float64]
 
@@ -47,14 +47,14 @@ class Stumps:
         """Yield the scores F (n, K) after each round, for inputs (n, n_inputs); every array yielded is a new one."""
         if X.ndim != 2 or X.shape[1] != self.n_inputs:
             raise ValueError(f"inputs have shape {X.shape}, the ensemble expects (n, {self.n_inputs})")
-        scores = np.zeros((self.n_classes, len(X)))
+        scores = carry = np.zeros((self.n_classes, len(X)))
         for columns, thresholds, values in zip(self.columns, self.thresholds, self.values, strict=True):
             inputs = X[:, columns].T.astype(np.float64)
             left, right, missing = values.T[:, :, np.newaxis]
             answers = np.where(inputs <= thresholds[:, np.newaxis], left, right)
             answers = np.where(np.isnan(inputs), missing, answers)
-            scores = scores + centred(answers, self.shrinkage)
-            yield scores.T
+            scores, carry = add_exactly(scores, carry, centred(answers, self.shrinkage))
+            yield (scores + carry).T
 
     def scores(self, X: NDArray[np.generic]) -> Floats:
         """Return the scores F (n, K) of inputs (n, n_inputs)."""
@@ -68,6 +68,8 @@ def centred(answers: Floats, shrinkage: float) -> Floats:
     """Return what a round adds to F (K, n) for its stumps' answers (K, n): LogitBoost's symmetric step.
 
     f_j = (K - 1)/K * (g_j - mean_k g_k) with g = shrinkage * answer (Friedman, Hastie, Tibshirani 2000, algorithm 6).
+    The mean over classes is zero but for rounding: K + 6 units of 2^-53 of the largest |g|, so that M rounds leave a
+    mean of at most M (K + 6) 2^-53 z_max: 1.3e-10 after 10,000 rounds of 33 classes, an eighth of TIE.
     """
     k = len(answers)
     g = answers * shrinkage

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, TABLES_NAME
 from ...runtime.manifest import (
+    SCHEMA,
     Calibration,
     Inputs,
     Manifest,
@@ -37,11 +38,14 @@ WIDTH = 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BuildReport:
-    """Where the build is, and what its `build.json` says of it."""
+    """Where the build is, what its `build.json` says of it, and the one grasp type that it gives all rows, if it does:
+    then the inputs tell nothing that stumps, which add up, can tell.
+    """
 
     folder: Path
     manifest: Manifest
     tables_bytes: int
+    only_answer: str | None
 
 
 def compile_build(
@@ -52,18 +56,21 @@ def compile_build(
     rounds: int = 100,
     inputs: Inputs = "both",
     shrinkage: float = 1.0,
+    tolerance: float | None = None,
     folds: int = 4,
     seed: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> BuildReport:
     """Choose the placement, train, collapse, quantise, prove, and write the build `folder`, whole or not at all.
 
-    prune is the paper's S, inputs which of switches and joints to use, folds and seed cut the cross-validation whose
-    rate goes into the build (0 folds: none). progress(done, total) is called as work is done. The same recordings and
-    options give the same bytes. Raises CompileError, or what placement and boosting raise of their options.
+    prune is the paper's S, inputs which of switches and joints to use; a round that changes the mean loss by less than
+    tolerance is the last; folds and seed cut the cross-validation whose rate goes into the build (0 folds: none).
+    progress(done, total) is called as work is done. The same recordings and options give the same bytes. Raises
+    CompileError, or what placement and boosting raise of their options.
     """
     target = check_target(Path(folder))
-    options = Options(prune, rounds, inputs, float(shrinkage), folds, seed)
+    least = None if tolerance is None else float(tolerance)
+    options = Options(prune, rounds, inputs, float(shrinkage), folds, seed, least)
     material = material_of(grasp_set, options)
     if folds:
         check_cut(len(grasp_set), folds, "rows")
@@ -77,6 +84,8 @@ def compile_build(
         rates.append(cross_validated(material, options, steps.fold_done))
     tables, ensemble = tables_to_bytes(integers), ensemble_to_bytes(trained.stumps)
     manifest = Manifest(
+        schema=SCHEMA,
+        checksum="",
         thenar=version("thenar"),
         tables_sha256=hashlib.sha256(tables).hexdigest(),
         ensemble_sha256=hashlib.sha256(ensemble).hexdigest(),
@@ -87,10 +96,14 @@ def compile_build(
         joints=_joints(grasp_set) if inputs != "switches" else (),
         proof=_proof(integers, comparison),
         rates=tuple(rates),
+        stopped_after=trained.stumps.n_rounds if trained.stopped_early else 0,
+        zero_gain_nodes=trained.zero_gain_nodes,
     )
     described = manifest_to_bytes(manifest)
     publish({TABLES_NAME: tables, ENSEMBLE_NAME: ensemble, MANIFEST_NAME: described}, target)
-    return BuildReport(target, manifest_from_bytes(described), len(tables))
+    answers = np.unique(comparison.deployed)
+    only_answer = material.grasps[answers[0]] if len(answers) == 1 else None
+    return BuildReport(target, manifest_from_bytes(described), len(tables), only_answer)
 
 
 class _Steps:

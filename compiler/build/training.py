@@ -32,11 +32,15 @@ class Material:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trained:
-    """The kept switches in the order in which they were chosen, what each brought (bits), and the ensemble."""
+    """The kept switches in the order in which they were chosen, what each brought (bits), and at how many decisions of
+    their tree none gained anything alone; the ensemble, and whether the tolerance ended its training.
+    """
 
     columns: tuple[int, ...]
     gains: tuple[float, ...]
+    zero_gain_nodes: int
     stumps: Stumps
+    stopped_early: bool
 
     def kept(self, material: Material) -> NDArray[np.bool_]:
         """Return the kept switches (n, kept) of `material`."""
@@ -62,22 +66,20 @@ def material_of(grasp_set: GraspSet, options: Options) -> Material:
 
 def train(material: Material, options: Options, report: Report | None = None) -> Trained:
     """Choose the switches and boost on them and the joints. Raises CompileError if no input tells grasps apart."""
-    columns: tuple[int, ...] = ()
-    gains: tuple[float, ...] = ()
-    if material.switches.shape[1]:
-        tree = grow_id3(material.switches, material.labels, min_samples=options.prune)
-        columns, gains = tuple(map(int, tree.inputs)), tuple(map(float, tree.gains))
+    tree = grow_id3(material.switches, material.labels, min_samples=options.prune)
+    columns = tree.inputs
     if not columns and not material.codes.shape[1]:
         raise CompileError("no switch is worth keeping: lower --prune, or record switches that differ between grasps")
     X = np.hstack([material.switches[:, list(columns)], material.codes])
-    stumps, _ = boost(
+    stumps, history = boost(
         X,
         material.labels,
         len(material.grasps),
         rounds=options.rounds,
         shrinkage=options.shrinkage,
+        tolerance=options.tolerance,
         on_round=report,
     )
     if not stumps.n_rounds:
         raise CompileError("no input differs between rows: there is nothing to tell grasp types apart by")
-    return Trained(columns, gains, stumps)
+    return Trained(columns, tree.gains, tree.n_zero_gain, stumps, history.stopped_early)

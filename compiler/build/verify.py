@@ -1,4 +1,4 @@
-"""`verify_build`: is what runs what was trained, on every row of these recordings?"""
+"""`verify_build`: is what runs what was trained, on every row of these recordings and in the worst frame there is?"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -9,9 +9,13 @@ from numpy.typing import NDArray
 
 from ...runtime.build import ENSEMBLE_NAME, Build, read_member
 from ...runtime.errors import BuildError
-from ..boosting.stumps import Stumps
+from ...runtime.tables import LIMIT
+from ..boosting.stumps import TIE, Stumps
 from ..recordings.graspset import GraspSet
+from ..tables.collapse import collapse
 from ..tables.compare import Comparison, compare
+from ..tables.furthest import furthest
+from ..tables.worstcase import Rounding
 from .ensemble import MAX_BYTES, ensemble_from_bytes
 from .errors import CompileError
 from .select import select_inputs
@@ -27,11 +31,39 @@ class ChangedRow(Struct, frozen=True):
     margin: float
 
 
+class WorstCase(Struct, frozen=True, kw_only=True):
+    """What integers can do at worst, in steps, exactly and over every frame there is, recorded or not.
+
+    In the frame `closed` (names of kept switches) and `codes`, the lead of grasp type `leader` over `rival` loses most.
+    A margin above safe_margin keeps its grasp type: true of `covered` rows, of which `covered_changed` change all the
+    same. `reach` is the furthest that a sum gets from zero, in any order, whole or with inputs missing: for `reaching`.
+    """
+
+    leader: str
+    rival: str
+    loss: float
+    bound: float
+    closed: tuple[str, ...]
+    codes: tuple[int, ...]
+    safe_margin: float
+    covered: int
+    covered_changed: int
+    reaching: str
+    reach: int
+    limit: int = LIMIT
+
+    @property
+    def holds(self) -> bool:
+        """Whether no lead can lose more than the bound, and no covered row changes."""
+        return self.loss <= self.bound and not self.covered_changed
+
+
 class Verification(Struct, frozen=True, kw_only=True):
     """What verification found on `rows` rows; differences beside the bounds that they must keep.
 
     collapse_* compare the ensemble with the float tables, in units of score; integer_* the float tables with the
     integers, in steps. covered counts rows whose margin exceeds safe_margin, covered_changed those of them that change.
+    worst looks beyond the rows.
     """
 
     same_recordings: bool
@@ -45,6 +77,7 @@ class Verification(Struct, frozen=True, kw_only=True):
     covered_changed: int
     correct_ensemble: int
     correct_integers: int
+    worst: WorstCase
     changed: tuple[ChangedRow, ...]
     holds: bool
 
@@ -52,7 +85,7 @@ class Verification(Struct, frozen=True, kw_only=True):
 def verify_build(
     folder: str | Path, grasp_set: GraspSet, progress: Callable[[int, int], None] | None = None
 ) -> Verification:
-    """Compare ensemble, float tables and integer tables on every row of `grasp_set`, compiled from or not.
+    """Compare ensemble, float tables and integer tables on every row of `grasp_set`, compiled from or not, and beyond.
 
     Columns are found by name. Raises BuildError or SealError for a folder that is no sound build, CompileError for
     recordings that lack its inputs.
@@ -63,6 +96,7 @@ def verify_build(
     stumps = _load_ensemble(Path(folder), build)
     bits, codes = select_inputs(grasp_set, build.manifest)
     comparison = compare(stumps, build.tables, bits, codes, progress)
+    worst = _worst(stumps, build, comparison)
     grasps = np.array(build.grasps)
     return Verification(
         same_recordings=grasp_set.fingerprint() == build.manifest.source.fingerprint,
@@ -76,8 +110,9 @@ def verify_build(
         covered_changed=int(np.count_nonzero(comparison.covered[comparison.changed])),
         correct_ensemble=int(np.count_nonzero(grasps[comparison.trained] == grasp_set.grasps)),
         correct_integers=int(np.count_nonzero(grasps[comparison.deployed] == grasp_set.grasps)),
+        worst=worst,
         changed=_changed(comparison, grasps, grasp_set),
-        holds=comparison.holds,
+        holds=comparison.holds and worst.holds,
     )
 
 
@@ -88,6 +123,28 @@ def _load_ensemble(folder: Path, build: Build) -> Stumps:
     if (stumps.n_inputs, stumps.n_classes) != (inputs, build.tables.n_classes):
         raise BuildError(f"{path} is the ensemble of another build: compile the build again")
     return stumps
+
+
+def _worst(stumps: Stumps, build: Build, comparison: Comparison) -> WorstCase:
+    integers = build.tables
+    rounding = Rounding(collapse(stumps, integers.n_switches), integers)
+    frame, furthest_sum = rounding.worst_of_all(), furthest(integers)
+    safe = float(rounding.safe_margin())
+    # Scores that the ensemble takes for tied are decided by the number of the class.
+    covered = comparison.margins > max(safe, TIE * integers.scale) + 2 * comparison.slack
+    return WorstCase(
+        leader=build.grasps[frame.leader],
+        rival=build.grasps[frame.rival],
+        loss=float(frame.loss),
+        bound=comparison.safe_margin + 2 * comparison.slack,
+        closed=tuple(s.name for s, bit in zip(build.manifest.switches, frame.bits.tolist(), strict=True) if bit),
+        codes=tuple(frame.codes.tolist()),
+        safe_margin=safe,
+        covered=int(np.count_nonzero(covered)),
+        covered_changed=int(np.count_nonzero(covered[comparison.changed])),
+        reaching=build.grasps[furthest_sum.grasp],
+        reach=furthest_sum.total,
+    )
 
 
 def _changed(comparison: Comparison, grasps: NDArray[np.str_], grasp_set: GraspSet) -> tuple[ChangedRow, ...]:

@@ -40,17 +40,23 @@ class Training:
 def predictions(X: Inputs, labels: Labels, fit: Fit, training: Training) -> Labels:
     """Return the labels given to the fold's test rows; X (n, d), labels (n,).
 
-    Without columns nothing can be told apart: every row gets the most frequent label of the training rows (the lowest
-    of several), which is the rate to beat.
+    Where the fit is blind, every row gets the most frequent label of the training rows (the lowest of several), which
+    is the rate to beat.
     """
     grasps = np.array(fit.grasps, dtype=np.intp)
     trained = np.searchsorted(grasps, labels[fit.fold.train])
-    if not fit.columns:
+    if is_blind(X, fit):
         return np.full(len(fit.fold.test), grasps[np.bincount(trained).argmax()])
     part = X[:, fit.columns]
     inputs = part[fit.fold.train]
     stumps, _ = boost(inputs, trained, len(grasps), rounds=training.rounds, shrinkage=training.shrinkage)
     return grasps[winners(stumps.scores(part[fit.fold.test]))]
+
+
+def is_blind(X: Inputs, fit: Fit) -> bool:
+    """Return whether a fit has no column that varies among its training rows of X (n, d): nothing to tell apart by."""
+    rows = fit.fold.train
+    return not any((X[rows, column] != X[rows[0], column]).any() for column in fit.columns)
 
 
 def run_fits(

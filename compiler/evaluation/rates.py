@@ -1,6 +1,7 @@
 """Recognition rates and their 95 % intervals."""
 
 from dataclasses import dataclass
+from math import fsum, sqrt
 from statistics import fmean, stdev
 from typing import Self
 
@@ -64,9 +65,10 @@ class Average:
     def of(cls, rates: tuple[Rate, ...]) -> Self:
         """Return the average of one or more rates."""
         mean = fmean(rate.mean for rate in rates)
-        below = sum((rate.mean - rate.low) ** 2 for rate in rates) ** 0.5 / len(rates)
-        above = sum((rate.high - rate.mean) ** 2 for rate in rates) ** 0.5 / len(rates)
-        return cls(mean, mean - below, mean + above)
+        # Not by `hypot`, whose last bit depends on the Python that runs.
+        below = sqrt(fsum((rate.mean - rate.low) ** 2 for rate in rates)) / len(rates)
+        above = sqrt(fsum((rate.high - rate.mean) ** 2 for rate in rates)) / len(rates)
+        return cls(mean, *_hull(mean, [(mean - below, mean + above)]))
 
 
 def _wilson(p: float, n: int) -> tuple[float, float]:

@@ -8,7 +8,7 @@ from ..recordings.graspset import GraspSet
 from .compositions import inputs
 from .concerns import concerns
 from .errors import EvaluationError
-from .fits import Progress, Training, run_fits
+from .fits import Progress, Training, is_blind, run_fits
 from .placements import Placements
 from .plan import Planner, TableName
 from .populations import Population, Scheme, populations
@@ -83,9 +83,11 @@ def evaluate(
     protocols = [protocol for protocol in PROTOCOLS if protocol.name in options.protocols]
     plans = [planner.table(name, each) for name, reason in reasons.items() if reason is None for each in protocols]
     fits = [fit for plan in plans for row in plan.rows for cell in row.cells for fit in cell.fits]
-    predictions = run_fits(inputs(chosen), chosen.labels, fits, Training(options.rounds), jobs, progress)
+    X = inputs(chosen)
+    predictions = run_fits(X, chosen.labels, fits, Training(options.rounds), jobs, progress)
     grasps = tuple(np.unique(chosen.labels).tolist())
-    reader = Reader(chosen.labels, grasps, len(chosen.switch_names), predictions)
+    blind = frozenset(fit for fit in predictions if is_blind(X, fit))
+    reader = Reader(chosen.labels, grasps, len(chosen.switch_names), predictions, blind)
     return Study(
         fingerprint=grasp_set.fingerprint(),
         rows=len(chosen),

@@ -36,7 +36,7 @@ class Cell:
     """The rate of one row of a table on one population.
 
     switches   how many switches the classifiers had         draws  spread of the rates of random draws; else None
-    no_inputs  fits without any input: they answer the most frequent grasp type of their training rows
+    no_inputs  fits without any input that varies: they answer the most frequent grasp type of their training rows
     confusion  (K, K) counts over all repeats, row: true, column: recognised, K as in Study.grasps; None but for
                compositions
     """
@@ -71,12 +71,15 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Reader:
-    """Reads rates off predictions: the true labels (n,), the labels that occur, and the number of switches."""
+    """Reads rates off predictions: the true labels (n,), the labels that occur, the number of switches, and which fits
+    were blind.
+    """
 
     labels: Labels
     grasps: tuple[int, ...]
     n_switches: int
     predictions: Predictions
+    blind: frozenset[Fit]
 
     def table(self, plan: TablePlan) -> Table:
         """Return the table of a plan."""
@@ -90,9 +93,9 @@ class Reader:
         repeats = len(plan.part.repeats)
         rate = Rate.of(correct, plan.part.total, repeats if len(correct) > repeats else 1)
         counts = [sum(column < self.n_switches for column in fit.columns) for fit in plan.fits]
-        empty = sum(not fit.columns for fit in plan.fits)
+        blind = sum(fit in self.blind for fit in plan.fits)
         confusion = self._confusion(plan.fits) if confusing else None
-        return Cell(rate, Spread.of(counts), empty, _draws(rate, repeats), confusion)
+        return Cell(rate, Spread.of(counts), blind, _draws(rate, repeats), confusion)
 
     def _row(self, plan: RowPlan, *, confusing: bool) -> Row:
         cells = tuple(self.cell(cell, confusing=confusing) for cell in plan.cells)

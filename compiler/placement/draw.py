@@ -48,7 +48,8 @@ def _compose(axes: "Axes", tree: Tree, names: Sequence[str], class_names: Sequen
         if node.input is None:
             words, box = f"{class_names[node.majority]}\n{max(node.counts)}/{node.size}", ("round", "#e3efda")
         else:
-            words, box = f"{names[node.input]}\n{node.gain:.3f}", ("square", "#dae3f3")
+            gain = "no gain" if node.gains_nothing else f"{node.gain:.3g}"
+            words, box = f"{names[node.input]}\n{gain}", ("square", "#dae3f3")
         frame = {"boxstyle": box[0], "facecolor": box[1], "edgecolor": "0.5"}
         axes.text(x, y, words, ha="center", va="center", bbox=frame, zorder=3)
 

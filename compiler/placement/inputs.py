@@ -1,5 +1,6 @@
 """Checks of what the user hands over: a matrix of inputs and one label for each of its rows."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -50,17 +51,25 @@ def _refuse_wide(matrix: npt.NDArray[Any]) -> None:
 def check_labels(y: npt.ArrayLike, n_rows: int) -> tuple[npt.NDArray[Any], npt.NDArray[np.intp]]:
     """Return the sorted classes (K,) of y and the class number of each row (n,).
 
-    Raises PlacementError if y is empty, does not have one label for each row, holds NaN or cannot be sorted.
+    Raises PlacementError if y is empty, does not have one label for each row, holds NaN or infinity, or cannot be
+    sorted.
     """
     labels = np.asarray(y)
     if labels.shape != (n_rows,):
         raise PlacementError(f"y has shape {labels.shape}, one label for each of the {n_rows} rows of X is needed")
     if not n_rows:
         raise PlacementError("there are no rows: a placement is learnt from at least one labelled grasp")
-    if labels.dtype.kind == "f" and np.isnan(labels).any():
-        raise PlacementError(f"y is NaN in row {int(np.argmax(np.isnan(labels)))}: every row needs a label")
+    if (strange := _not_finite(labels)).any():
+        row = int(strange.argmax())
+        raise PlacementError(f"y is {labels[row]} in row {row}: every row needs a label")
     try:
         classes, numbers = np.unique(labels, return_inverse=True)
     except TypeError as mixed:
         raise PlacementError(f"the labels in y cannot be sorted ({mixed}): use text or numbers, not both") from None
     return classes, numbers
+
+
+def _not_finite(labels: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+    if labels.dtype.kind == "O":
+        return np.array([isinstance(label, float) and not math.isfinite(label) for label in labels.tolist()])
+    return ~np.isfinite(labels) if labels.dtype.kind == "f" else np.zeros(len(labels), np.bool_)

@@ -26,13 +26,18 @@ class Chosen(msgspec.Struct, frozen=True):
 
 
 class Placement(msgspec.Struct, frozen=True):
-    """What `thenar place` finds: the switches in order, and how the tree came out."""
+    """What `thenar place` finds: the switches in order, and how the tree came out.
+
+    zero_gain_nodes   decisions at which no switch gains anything alone: the lowest-numbered that varies is asked
+    undecided_leaves  leaves of several grasp types whose rows agree in every switch
+    """
 
     switches: tuple[Chosen, ...]
     n_switches: int
     kept_share: float
     entropy_bits: float
     zero_gain_nodes: int
+    undecided_leaves: int
     decision_nodes: int
     leaves: int
     depth: int
@@ -67,6 +72,7 @@ def place(grasp_set: "GraspSet", prune: int = 0) -> tuple[Placement, Tree]:
         kept_share=len(chosen) / n_switches,
         entropy_bits=entropy,
         zero_gain_nodes=tree.n_zero_gain,
+        undecided_leaves=tree.n_undecided,
         decision_nodes=decisions,
         leaves=tree.n_leaves,
         depth=tree.depth,

@@ -40,7 +40,8 @@ def names_for(tree: "Tree", names: Sequence[str], class_names: Sequence[str]) ->
 def node_text(node: "Node", names: Sequence[str], class_names: Sequence[str]) -> str:
     """Return one node in words."""
     if node.input is not None:
-        return f"{names[node.input]}?  {node.size} rows, gain {node.gain:.4g} bits"
+        gain = "no input gains anything alone" if node.gains_nothing else f"gain {node.gain:.4g} bits"
+        return f"{names[node.input]}?  {node.size} rows, {gain}"
     most = max(node.counts)
     return f"{class_names[node.majority]}  {most if most == node.size else f'{most} of {node.size}'} rows"
 
@@ -53,6 +54,15 @@ def _summary(tree: "Tree") -> str:
     )
     if tree.n_zero_gain:
         said += (
-            f"; at {tree.n_zero_gain} nodes no input gains anything alone, the lowest-numbered varying one was taken"
+            f"; at {count_of(tree.n_zero_gain, 'node')} no input gains anything alone, the lowest-numbered varying one "
+            "was taken"
         )
+    if tree.n_undecided:
+        leaves = count_of(tree.n_undecided, "leaf", "leaves")
+        said += f"; at {leaves} rows of several classes agree in every input"
     return said
+
+
+def count_of(number: int, one: str, many: str = "") -> str:
+    """Return "1 node" or "2 nodes"; `many` where it is not `one` with an s."""
+    return f"{number} {one if number == 1 else many or one + 's'}"

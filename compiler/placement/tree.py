@@ -40,6 +40,16 @@ class Node(msgspec.Struct, frozen=True):
         """Class number of most rows; the lowest of them if several have most."""
         return self.counts.index(max(self.counts))
 
+    @property
+    def gains_nothing(self) -> bool:
+        """Whether this is a decision at which no input gains anything by itself."""
+        return self.input is not None and self.gain == 0
+
+    @property
+    def is_mixed_leaf(self) -> bool:
+        """Whether this is a leaf of rows of several classes."""
+        return self.input is None and max(self.counts) < self.size
+
 
 class Tree(msgspec.Struct, frozen=True, dict=True):
     """An ID3 tree over `n_inputs` inputs: `nodes` in preorder, `classes` in ascending order, pruned by `min_samples`.
@@ -113,7 +123,12 @@ class Tree(msgspec.Struct, frozen=True, dict=True):
     @property
     def n_zero_gain(self) -> int:
         """Number of decision nodes at which no input gains anything by itself, as in XOR."""
-        return sum(node.input is not None and node.gain == 0 for node in self.nodes)
+        return sum(node.gains_nothing for node in self.nodes)
+
+    @property
+    def n_undecided(self) -> int:
+        """Number of leaves of several classes whose rows agree in every input; pruned ones are none of them."""
+        return sum(node.is_mixed_leaf and node.size >= self.min_samples for node in self.nodes)
 
     def predict(self, X: npt.ArrayLike) -> npt.NDArray[Any]:
         """Return the label (n,) of each row of X (n, n_inputs); a value not met in growing gets the node's majority."""

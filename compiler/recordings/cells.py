@@ -1,5 +1,6 @@
 """Cells of a table as numbers, bits or names; what is missing and what is wrong is marked, not raised."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
@@ -58,16 +59,25 @@ def codes(column: Column) -> Parsed[np.float64]:
 def names(column: Column) -> Parsed[np.str_]:
     """Read `column` as names without outer blanks; missing: empty and ?, wrong: with control characters.
 
-    Whole numbers read as such: 3, not 3.0.
+    Numbers are names too, but for NaN, which is missing, and infinity, which is wrong. Whole ones read as such: 3, not
+    3.0.
     """
     if isinstance(column, np.ndarray):
-        texts = ["" if np.isnan(cell) else np.format_float_positional(cell, trim="-") for cell in column]
+        texts = list(map(_name_of_number, column.tolist()))
+        faulty = {text for text in texts if text.endswith("inf")}
     else:
         texts = [cell.strip() for cell in column]
-    # Looked up as str: an array of them would lose NULs at their ends.
-    faulty = {text for text in {*texts} - MISSING_NAMES if fault(text)}
+        # Looked up as str: an array of them would lose NULs at their ends.
+        faulty = {text for text in {*texts} - MISSING_NAMES if fault(text)}
     missing, wrong = (np.array([text in found for text in texts], np.bool_) for found in (MISSING_NAMES, faulty))
     return Parsed(np.array(texts, np.str_), missing, wrong)
+
+
+def _name_of_number(number: float) -> str:
+    if math.isnan(number):
+        return ""
+    # Adding zero makes -0.0 the 0.0 that it equals.
+    return np.format_float_positional(number + 0.0, trim="-")
 
 
 def _parsed(values: NDArray[np.float64], column: Column) -> Parsed[np.float64]:

@@ -42,12 +42,14 @@ def code_joint(
         cause = "check origin and calibration" if (codes < 0).any() else "take a coarser grid"
         raise TableError(f"joint {name!r}: {list_rows(rows[outside])} would get codes outside 0..{CODES - 1}: {cause}")
     errors = np.zeros(1) if entry.codes else np.abs(joint.value(codes) - values)
+    step = abs(joint.step)
     cost = CodingCost(
         joint=name,
         unit=joint.unit,
-        step=abs(joint.step),
+        step=step,
         largest_error=float(errors.max()),
-        rms_error=math.sqrt(float(np.mean(errors**2))),
+        # In steps, whose squares are neither too large nor too small for a double.
+        rms_error=math.sqrt(float(np.mean((errors / step) ** 2))) * step,
         distinct_before=len(np.unique(values)),
         distinct_after=len(np.unique(codes)),
     )

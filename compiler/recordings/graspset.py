@@ -1,7 +1,6 @@
 """`GraspSet`: labelled grasps, as everything else in the compiler takes them."""
 
 import hashlib
-import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Self
@@ -15,6 +14,8 @@ from .names import check_names
 from .taxonomy import Taxonomy
 
 CODES = 65536
+# So far from the ends of the doubles that spans and margins of values stay finite, and that steps keep all their bits.
+LARGEST_VALUE = 1e300
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +23,8 @@ class Joint:
     """One joint of the glove: its name, and what its integer codes mean in `unit`, by two points of a straight line.
 
     Codes are what is trained on and recognised; values are for people. Raises RecordingError if the two points are no
-    line, or if neighbouring codes would be closer than a billionth of the largest value.
+    line, or if neighbouring codes would be closer than a billionth of the largest value; values lie within +-1e300, and
+    steps are above 1e-300.
     """
 
     name: str
@@ -40,7 +42,7 @@ class Joint:
                 f"joint {self.name} is calibrated at codes {self.code_a} and {self.code_b}: take two of 0..{CODES - 1}"
             )
         largest = max(abs(self.value_a + (code - self.code_a) * self.step) for code in (0, CODES - 1))
-        if not math.isfinite(largest) or not abs(self.step) > 1e-9 * largest:
+        if not (largest <= LARGEST_VALUE and abs(self.step) > max(1e-9 * largest, 1 / LARGEST_VALUE)):
             raise RecordingError(
                 f"joint {self.name} is calibrated to {self.value_a} and {self.value_b} {self.unit}: "
                 "its codes cannot be told apart; take a coarser grid or points further apart"

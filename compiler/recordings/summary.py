@@ -24,12 +24,12 @@ class SwitchUse(msgspec.Struct, frozen=True):
 
 
 class JointRange(msgspec.Struct, frozen=True):
-    """Least and largest value of a joint in its unit, and how many distinct codes it takes."""
+    """Least and largest value of a joint in its unit, None in a set without rows; how many distinct codes it takes."""
 
     name: str
     unit: str
-    least: float
-    largest: float
+    least: float | None
+    largest: float | None
     codes: int
 
 
@@ -90,6 +90,8 @@ def _switches(grasp_set: GraspSet) -> tuple[SwitchUse, ...]:
 def _joints(grasp_set: GraspSet) -> tuple[JointRange, ...]:
     ranges = []
     for joint, codes in zip(grasp_set.joints, grasp_set.codes.T, strict=True):
-        ends = joint.value([codes.min(initial=65535), codes.max(initial=0)])
-        ranges.append(JointRange(joint.name, joint.unit, float(ends.min()), float(ends.max()), len(np.unique(codes))))
+        taken = np.unique(codes)
+        ends: list[float] = joint.value(taken[[0, -1]]).tolist() if taken.size else []
+        least, largest = min(ends, default=None), max(ends, default=None)
+        ranges.append(JointRange(joint.name, joint.unit, least, largest, len(taken)))
     return tuple(ranges)

@@ -134,5 +134,7 @@ def _column(name: str, array: NDArray[np.generic]) -> Column:
     if array.dtype.kind == "U":
         return [str(cell) for cell in array.tolist()]
     if array.dtype.kind in "biuf":
-        return array.astype(np.float64)
+        # What is too large for a double becomes infinite, and is refused with its row where it is read.
+        with np.errstate(over="ignore"):
+            return array.astype(np.float64)
     raise TableError(f"array {name!r} holds {array.dtype}: neither numbers nor text")

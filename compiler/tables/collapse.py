@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..boosting.stumps import Stumps, centred
+from ..elementary import add_exactly
 
 HIGHEST_CODE = 65535
 
@@ -49,7 +50,8 @@ class ScoreTables:
 def collapse(stumps: Stumps, n_switches: int) -> ScoreTables:
     """Return the score tables of an ensemble over [kept switches | joint codes], the first `n_switches` being switches.
 
-    Equal to `stumps.scores` on bits and codes 0..65535 up to the rounding of sums (1e-12 of what is summed).
+    Equal to `stumps.scores` on bits and codes 0..65535 up to the rounding of sums (1e-12 of what is summed), however
+    many rounds there are: all that an input adds is summed with compensation, and rounded once.
     """
     left, right = _answers(stumps, 0), _answers(stumps, 1)
     columns, floors = stumps.columns.ravel(), np.floor(stumps.thresholds.ravel())
@@ -61,8 +63,8 @@ def collapse(stumps: Stumps, n_switches: int) -> ScoreTables:
         if column < n_switches:
             opened = np.where(floors[mine, np.newaxis] >= 0, left[mine], right[mine])
             closed = np.where(floors[mine, np.newaxis] >= 1, left[mine], right[mine])
-            bias += _total(opened)
-            switch_rows[column] = _total(closed - opened)
+            bias += _sums(opened, [len(mine)])[0].sum(axis=0)
+            switch_rows[column] = _sums(closed - opened, [len(mine)])[0].sum(axis=0)
         else:
             steps, rows = _joint(floors[mine], left[mine], right[mine])
             thresholds.append(steps)
@@ -79,13 +81,23 @@ def _answers(stumps: Stumps, branch: int) -> Floats:
 
 def _joint(floors: Floats, left: Floats, right: Floats) -> tuple[NDArray[np.uint16], Floats]:
     """Return (thresholds (T,), rows (T + 1, K)) of one joint's stumps; a threshold beyond the codes needs no bin."""
+    order = np.argsort(floors, kind="stable")
     steps = np.unique(floors[(floors >= 0) & (floors < HIGHEST_CODE)])
     # The smallest code of each bin stands for all of its codes: no floor lies between them.
-    smallest = np.append(0.0, steps + 1)
-    rows = np.stack([_total(np.where((code <= floors)[:, np.newaxis], left, right)) for code in smallest])
-    return steps.astype(np.uint16), rows
+    passed = np.searchsorted(floors[order], np.append(0.0, steps + 1)).tolist()
+    answer_right = _sums(right[order], passed)
+    answer_left = _sums(left[order[::-1]], [len(order) - n for n in reversed(passed)])[::-1]
+    high, low = add_exactly(answer_right[:, 0], answer_right[:, 1], answer_left[:, 0])
+    return steps.astype(np.uint16), high + (low + answer_left[:, 1])
 
 
-def _total(rows: Floats) -> Floats:
-    """Return the sum (K,) of rows (n, K), added one after the other: the same bits on every machine."""
-    return np.add.accumulate(rows, axis=0)[-1] if len(rows) else np.zeros(rows.shape[1])
+def _sums(rows: Floats, stops: list[int]) -> Floats:
+    """Return the sums of the first n of rows (N, K) for each n in `stops`, ascending, in two parts: (stops, 2, K)."""
+    total = carry = np.zeros(rows.shape[1])
+    sums, done = [], 0
+    for stop in stops:
+        for row in rows[done:stop]:
+            total, carry = add_exactly(total, carry, row)
+        sums.append((total, carry))
+        done = stop
+    return np.array(sums)

@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 from ...runtime.scorer import LANE_OFFSET, Scorer
 from ...runtime.tables import IntegerTables
 from ..boosting.stumps import Stumps, winners
-from .collapse import Floats, collapse
+from .collapse import Floats, ScoreTables, collapse
 
 COLLAPSE_TOLERANCE = 1e-12  # of the sum of the magnitudes that are added up
-SLACK_STEPS = 1e-6  # what doubles may lose while scores of some 1e4 steps are scaled and compared
 
 Flags = NDArray[np.bool_]
 Labels = NDArray[np.intp]
@@ -22,15 +21,16 @@ Labels = NDArray[np.intp]
 class Comparison:
     """What became of n rows on the way from the ensemble to integers.
 
-    collapse_difference and its bound are in units of score, integer_difference and its bound in steps. trained and
-    deployed (n,) are the classes by the ensemble and by the integers, covered (n,) the rows whose float margin is
-    beyond doubt.
+    collapse_difference and its bound are in units of score, integer_difference, its bound and what doubles may lose
+    besides, the slack, in steps. trained and deployed (n,) are the classes by the ensemble and by the integers, covered
+    (n,) the rows whose float margin is beyond doubt.
     """
 
     collapse_difference: float
     collapse_bound: float
     integer_difference: float
     integer_bound: float
+    slack: float
     safe_margin: float
     trained: Labels
     deployed: Labels
@@ -46,13 +46,25 @@ class Comparison:
     def holds(self) -> bool:
         """Whether both differences are within their bounds and no covered row changes class."""
         collapsed = self.collapse_difference <= self.collapse_bound
-        rounded = self.integer_difference <= self.integer_bound + SLACK_STEPS
+        rounded = self.integer_difference <= self.integer_bound + self.slack
         return collapsed and rounded and not self.covered[self.changed].any()
 
 
 def rounding_error(n_inputs: int) -> float:
     """Return the most steps that rounding can move a score: half for the bias, half for the row of each input."""
     return (n_inputs + 1) / 2
+
+
+def float_slack(tables: ScoreTables, scale: float) -> float:
+    """Return the most steps that doubles can move a score besides, on the way to integers and while it is compared.
+
+    With n inputs, j of them joints, u = 2^-53 and S the sum of the largest magnitudes of all rows, scale * u * S times
+    j for the bias that `balance` sums up, 2 for its rows, each at most twice as large as before, 3 for scaling these
+    and the bias, n for adding up the scores compared with and 1 for scaling them; and 2 for products of u.
+    """
+    rows = [tables.bias, *tables.switch_rows, *tables.joint_rows]
+    largest = sum(float(np.abs(row).max()) for row in rows)
+    return (tables.n_inputs + len(tables.joint_rows) + 8) * 2.0**-53 * largest * scale
 
 
 def compare(
@@ -70,18 +82,19 @@ def compare(
     steps = by_tables * integers.scale
     best_two = np.sort(steps, axis=1)[:, -2:]
     margins = best_two[:, 1] - best_two[:, 0]
-    error = rounding_error(tables.n_inputs)
-    magnitudes = 2 * stumps.shrinkage * np.abs(stumps.values[:, :, :2]).max(axis=(1, 2), initial=0).sum()
+    error, slack = rounding_error(tables.n_inputs), float_slack(tables, integers.scale)
+    magnitudes = 2 * stumps.shrinkage * np.abs(stumps.values[:, :, :2]).max(axis=(1, 2)).sum()
     return Comparison(
         collapse_difference=float(np.abs(by_stumps - by_tables).max()),
         collapse_bound=COLLAPSE_TOLERANCE * float(magnitudes),
         integer_difference=float(np.abs(steps - by_integers).max()),
         integer_bound=error,
+        slack=slack,
         safe_margin=2 * error,
         trained=winners(by_stumps),
         deployed=by_integers.argmax(axis=1),
         margins=margins,
-        covered=margins > 2 * error + SLACK_STEPS,
+        covered=margins > 2 * (error + slack),
     )
 
 

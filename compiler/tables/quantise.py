@@ -32,11 +32,11 @@ def quantise(tables: ScoreTables, bits: NDArray[np.bool_], codes: NDArray[np.uin
     switch_means = _rounded(balanced.switch_rows * _mean(bits.astype(np.int64))[:, np.newaxis], scale)
     thresholds, joint_rows, joint_means = [], [], []
     for column, steps, rows in zip(codes.T, balanced.thresholds, balanced.joint_rows, strict=True):
-        mean = _rounded(_mean(rows[np.searchsorted(steps, column)]), scale)
         merged_steps, merged_rows = _merged(steps, _rounded(rows, scale))
         thresholds.append(merged_steps)
         joint_rows.append(merged_rows)
-        # A mean computed in floating point may round to just outside of what it is the mean of.
+        # A mean computed in floating point may round to just outside of what it is the mean of, and so of int16.
+        mean = np.rint(_mean(rows[np.searchsorted(steps, column)]) * scale)
         joint_means.append(np.clip(mean, merged_rows.min(axis=0), merged_rows.max(axis=0)))
     return IntegerTables(
         bias=_rounded(balanced.bias, scale),

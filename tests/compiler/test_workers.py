@@ -4,7 +4,7 @@ from concurrent.futures import BrokenExecutor
 
 import pytest
 
-from thenar.compiler.workers import in_workers, workers_of
+from thenar.compiler.workers import MOST_JOBS, in_workers, workers_of
 
 
 def squared_where(number: int) -> tuple[int, int]:
@@ -45,3 +45,8 @@ def test_a_worker_that_is_killed_is_an_error_and_the_next_work_has_new_ones() ->
 def test_as_many_processes_work_as_are_asked_for() -> None:
     assert (workers_of(1), workers_of(3)) == (1, 3)
     assert workers_of(-1) >= 1
+
+
+def test_a_slip_of_the_finger_does_not_start_a_million_processes() -> None:
+    assert workers_of(10**30) == MOST_JOBS
+    assert list(in_workers(squared_where, [], 10**30)) == []

@@ -9,6 +9,7 @@ import pytest
 
 from thenar.runtime.build import MANIFEST_NAME, TABLES_NAME, Build
 from thenar.runtime.manifest import (
+    SCHEMA,
     Calibration,
     Manifest,
     Options,
@@ -45,6 +46,8 @@ def _make_tables(seed: int = 0, classes: int = 5, switches: int = 9, joints: int
 def _describe(tables: IntegerTables) -> Manifest:
     data = tables_to_bytes(tables)
     return Manifest(
+        schema=SCHEMA,
+        checksum="",
         thenar="0.1.0",
         tables_sha256=hashlib.sha256(data).hexdigest(),
         ensemble_sha256="0" * 64,

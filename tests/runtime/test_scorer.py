@@ -106,3 +106,25 @@ def test_masks_that_do_not_fit_are_refused(make_tables: MakeTables) -> None:
     scorer = Scorer(make_tables())
     with pytest.raises(FrameError, match="lost joints"):
         scorer.lanes_without(np.zeros(9, bool), [0, 0, 0], np.zeros(9, bool), np.zeros(2, bool))
+
+
+@pytest.mark.parametrize(
+    ("lost_bits", "lost_codes", "reason"),
+    [
+        (np.zeros(8, bool), np.zeros(3, bool), r"^a frame with lost switches of shape \(8,\), the build has 9$"),
+        (np.zeros(9, bool), np.zeros(4, bool), r"^a frame with lost joints of shape \(4,\), the build has 3$"),
+        ([3] + [0] * 8, np.zeros(3, bool), "^lost switches are 0 or 1, this frame has 3$"),
+    ],
+)
+def test_a_mask_that_does_not_fit_is_named(
+    make_tables: MakeTables, lost_bits: ArrayLike, lost_codes: ArrayLike, reason: str
+) -> None:
+    with pytest.raises(FrameError, match=reason):
+        Scorer(make_tables()).lanes_without(np.zeros(9, bool), [0, 0, 0], lost_bits, lost_codes)
+
+
+def test_the_highest_code_there_is_is_a_code(make_tables: MakeTables) -> None:
+    scorer, bits = Scorer(make_tables()), np.zeros(9, bool)
+    assert scorer.lanes(bits, [65535, 0, 0]) == scorer.lanes(bits, np.array([65535, 0, 0], np.uint16))
+    with pytest.raises(FrameError, match="this frame has 65536"):
+        scorer.lanes(bits, [65535, 65536, 0])

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from thenar.runtime import tables as module
 from thenar.runtime.errors import BuildError, SealError, ThenarError
 from thenar.runtime.sealed import seal
 from thenar.runtime.tables import KIND, MAX_BYTES, IntegerTables, tables_from_bytes, tables_to_bytes
@@ -167,3 +168,55 @@ def test_the_bound_counts_what_stands_in_for_missing_inputs(make_tables: MakeTab
     means[:2, 2] = 30_000
     with pytest.raises(BuildError, match="could overflow"):
         replace(tables, **{kind: means})
+
+
+def test_counts_without_the_thresholds_counts_they_announce_are_refused(make_tables: MakeTables) -> None:
+    for length in (15, 16, 21):
+        with pytest.raises(BuildError, match=f"{length} bytes of content"):
+            tables_from_bytes(seal(KIND, 1, bytes(_payload(make_tables())[:length])))
+
+
+def test_a_file_that_is_no_table_is_named() -> None:
+    with pytest.raises(SealError, match=r"^glove/tables"):
+        tables_from_bytes(b"something else altogether, long enough to have had a seal", "glove/tables")
+
+
+def test_a_file_may_be_as_large_as_the_largest_allowed(
+    make_tables: MakeTables, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = make_tables()
+    data = tables_to_bytes(made)
+    monkeypatch.setattr(module, "MAX_BYTES", len(data))
+    assert tables_to_bytes(tables_from_bytes(data)) == data
+    monkeypatch.setattr(module, "MAX_BYTES", len(data) - 1)
+    with pytest.raises(BuildError, match=f"at most {len(data) - 1}"):
+        tables_from_bytes(data)
+    with pytest.raises(BuildError, match="keep fewer inputs"):
+        tables_to_bytes(made)
+
+
+@pytest.mark.parametrize("name", ["bias", "switch_rows", "switch_means", "joint_means"])
+def test_an_array_of_another_type_is_named(make_tables: MakeTables, name: str) -> None:
+    made = make_tables()
+    with pytest.raises(BuildError, match=f"^{name} is int32 "):
+        replace(made, **{name: getattr(made, name).astype(np.int32)})
+
+
+@pytest.mark.parametrize("steps", [[3, 3, 9], [3, 9, 9], [5, 9, 7], [9, 5, 7]])
+def test_equal_or_falling_thresholds_are_refused_wherever_they_stand(steps: list[int]) -> None:
+    rows, none = np.zeros((4, 2), np.int16), np.zeros((0, 2), np.int16)
+    with pytest.raises(BuildError, match="not strictly increasing"):
+        IntegerTables(rows[0], none, (np.array(steps, np.uint16),), (rows,), none, rows[:1], 1.0)
+
+
+@pytest.mark.parametrize(("classes", "switches", "joints"), [(2, 0, 0), (1024, 0, 0), (2, 4096, 0), (2, 0, 256)])
+def test_as_many_as_documented_are_read(classes: int, switches: int, joints: int) -> None:
+    def rows(n: int) -> np.ndarray:
+        return np.zeros((n, classes), np.int16)
+
+    none = np.zeros(0, np.uint16)
+    made = IntegerTables(
+        rows(1)[0], rows(switches), (none,) * joints, (rows(1),) * joints, rows(switches), rows(joints), 1.0
+    )
+    again = tables_from_bytes(tables_to_bytes(made))
+    assert (again.n_classes, again.n_switches, again.n_joints) == (classes, switches, joints)

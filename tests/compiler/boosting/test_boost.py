@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thenar.compiler.boosting.boost import BoostingError, boost
+from thenar.compiler.boosting.boost import LARGEST_Z_MAX, SMALLEST_SHRINKAGE, BoostingError, boost
 from thenar.compiler.boosting.stumps import winners
-from thenar.compiler.elementary import softmax
+from thenar.compiler.elementary import softmax, softmax_and_loss
 
 
 def grasps(seed: int, n: int = 60, bits: int = 6, joints: int = 2, classes: int = 3) -> tuple[np.ndarray, np.ndarray]:
@@ -132,10 +132,14 @@ def test_the_tolerance_stops_early_and_says_so() -> None:
     [
         ({"rounds": 0}, "rounds=0"),
         ({"shrinkage": 0.0}, "shrinkage=0.0"),
+        ({"shrinkage": 5e-324}, "shrinkage=5e-324"),
         ({"shrinkage": 1.5}, "shrinkage=1.5"),
         ({"z_max": 1.0}, "z_max=1.0"),
         ({"z_max": 100.5}, "z_max=100.5"),
         ({"z_max": float("nan")}, "z_max=nan"),
+        ({"tolerance": -1e-3}, "tolerance=-0.001"),
+        ({"tolerance": float("nan")}, "tolerance=nan"),
+        ({"tolerance": float("inf")}, "tolerance=inf"),
         ({"n_classes": 2}, "labels run from 0 to 2"),
         ({"weights": np.zeros(60)}, "row weights"),
         ({"weights": -np.ones(60)}, "row weights"),
@@ -213,3 +217,56 @@ def test_memory_does_not_grow_by_the_rows_in_every_round() -> None:
 
     a_round_of_answers = 3 * len(X) * 8
     assert peak(105) - peak(5) < 5 * a_round_of_answers
+
+
+def test_a_row_that_weighs_nothing_says_nothing() -> None:
+    X, labels = np.array([[0], [1], [0], [1]]), np.array([0, 1, 1, 0])
+    stumps, history = boost(X, labels, 2, rounds=20, weights=np.array([1.0, 1.0, 0.0, 0.0]))
+    alone, same = boost(X[:2], labels[:2], 2, rounds=20)
+    assert winners(stumps.scores(X)).tolist() == [0, 1, 0, 1]
+    assert stumps.values == pytest.approx(alone.values, rel=1e-12, abs=0)
+    assert history.losses == pytest.approx(same.losses, rel=1e-12, abs=0)
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+def test_every_loss_is_the_loss_of_the_scores_after_that_round(weighted: bool) -> None:
+    X, labels = grasps(9)
+    weights = np.random.default_rng(9).random(len(X)) if weighted else None
+    stumps, history = boost(X, labels, 3, rounds=200, weights=weights)
+    stages = [np.zeros((len(X), 3)), *stumps.staged_scores(X)]
+    # Bit for bit: what trains and what scores adds the same numbers in the same order.
+    assert history.losses == tuple(softmax_and_loss(scores.T, labels, weights)[1] for scores in stages)
+
+
+def test_without_a_number_of_rounds_there_are_a_hundred_and_each_is_told() -> None:
+    X, labels = grasps(3)
+    told: list[tuple[int, int]] = []
+    stumps, _ = boost(X, labels, 3, on_round=lambda *done: told.append(done))
+    assert stumps.n_rounds == 100
+    assert told == [(done, 100) for done in range(1, 101)]
+
+
+def test_a_tolerance_of_nothing_never_stops() -> None:
+    X, labels = np.array([[0], [1], [0], [1]]), np.array([0, 1, 1, 0])
+    stumps, history = boost(X, labels, 2, rounds=5, tolerance=0.0)
+    assert len(set(history.losses)) == 1
+    assert (stumps.n_rounds, history.stopped_early) == (5, False)
+
+
+@pytest.mark.parametrize("options", [{"rounds": 1}, {"shrinkage": SMALLEST_SHRINKAGE}, {"z_max": LARGEST_Z_MAX}])
+def test_options_at_the_end_of_their_range_are_taken(options: dict[str, Any]) -> None:
+    X, labels = grasps(2)
+    assert boost(X, labels, 3, **{"rounds": 2, **options})[0].n_rounds >= 1
+
+
+@pytest.mark.parametrize("shape", [(6,), (6, 1, 1), (0, 3), (5, 1)])
+def test_inputs_that_are_no_table_of_the_labels_rows_are_refused(shape: tuple[int, ...]) -> None:
+    with pytest.raises(BoostingError, match="must be"):
+        boost(np.zeros(shape), np.zeros(6 if shape[0] else 0, np.intp), 2)
+
+
+def test_an_ensemble_without_rounds_has_the_types_of_one_with() -> None:
+    none, some = (boost(X, np.array([0, 1, 0]), 2, rounds=1)[0] for X in (np.zeros((3, 1)), np.arange(3)[:, None]))
+    assert none.columns.shape == (0, 2)
+    for name in ("columns", "thresholds", "values"):
+        assert getattr(none, name).dtype == getattr(some, name).dtype

@@ -87,6 +87,13 @@ def test_a_branch_of_next_to_no_weight_answers_with_the_mean_and_not_with_residu
     np.testing.assert_allclose(fitted.values, [[1.25, 1.25, 1.25]], rtol=1e-12)
 
 
+def test_a_class_of_which_only_responses_have_not_underflown_answers_nothing() -> None:
+    X = np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    fitted = fit_stumps(bin_columns(X), Targets(np.zeros((1, 3)), np.array([[5e-324, -5e-324, 0.0]])), Z_MAX)
+    assert fitted.columns[0] == 0
+    assert not fitted.values.any()
+
+
 def test_complementary_and_duplicate_columns_tie_and_the_lowest_wins() -> None:
     rng = np.random.default_rng(3)
     bit = rng.integers(0, 2, size=200).astype(np.float64)
@@ -127,6 +134,35 @@ def test_splits_of_equal_sums_tie_and_the_lowest_wins(seed: int) -> None:
 def test_a_light_branch_keeps_the_bits_that_the_coarse_grid_drops() -> None:
     weights = np.array([[1e-9 / 3, 0.7, 0.3]])
     left = np.array([[1.0, 0.0, 0.0]])
-    weight, response = Targets(weights, weights * 1.3).branch_sums(left, None)
+    targets = Targets(weights, weights * 1.3)
+    weight, response = np.ldexp(targets.branch_sums(left, None), -targets.weights.exponents)
     np.testing.assert_allclose(weight[0], weights[:, 0], rtol=1e-15)
     np.testing.assert_allclose(response[0], weights[:, 0] * 1.3, rtol=1e-15)
+
+
+@pytest.mark.parametrize("decades", [-323, -320, -308, -300, 300])
+def test_the_values_of_branches_do_not_depend_on_how_small_all_weights_are(decades: int) -> None:
+    left = np.array([[1.0, 1.0, 0.0, 0.0]])
+    shares = np.array([[1.0, 3.0, 2.0, 2.0]])
+    weights = shares * 10.0**decades
+    weight, response = Targets(weights, weights * np.array([1.0, -1.0, 2.0, 3.0])).branch_sums(left, None)
+    exact = [(weights[0, 0] - weights[0, 1]) / (weights[0, :2].sum()), 2.5]
+    np.testing.assert_allclose(response[:2, 0] / weight[:2, 0], exact, rtol=1e-15)
+
+
+@pytest.mark.parametrize(("bits", "value"), [(38, 2.0), (39, -1.0)])
+def test_a_branch_of_exactly_the_least_share_is_not_empty(bits: int, value: float) -> None:
+    share = 2.0**-bits
+    weights = np.array([[share, 0.5 - share, 0.5]])
+    targets = Targets(weights, weights * [[2.0, -1.0, -1.0]])
+    fitted = fit_stumps(bin_columns(np.array([[0.0], [1.0], [1.0]])), targets, Z_MAX)
+    # An empty one answers with the mean of all, which is next to -1.
+    assert fitted.values[0, 0] == pytest.approx(value, abs=1e-9)
+
+
+@pytest.mark.parametrize("responses", [0.0, 5e-324])
+def test_a_class_without_weight_answers_nothing_and_harms_no_other(responses: float) -> None:
+    weights = np.array([[0.25, 0.25, 0.5], [0.0, 0.0, 0.0]])
+    targets = Targets(weights, np.array([[0.25, 0.25, -0.5], [responses, 0.0, responses]]))
+    fitted = fit_stumps(bin_columns(np.array([[0.0], [0.0], [1.0]])), targets, Z_MAX)
+    assert fitted.values.tolist() == [[1.0, -1.0, 0.0], [0.0, 0.0, 0.0]]

@@ -127,6 +127,12 @@ def test_same_recordings_and_options_give_the_same_bytes(make_set: Make, tmp_pat
     assert _bytes(tmp_path / "one") == _bytes(tmp_path / "two")
 
 
+def test_a_whole_number_is_the_same_option_as_its_double(grasp_set: GraspSet, tmp_path: Path) -> None:
+    compile_build(grasp_set, tmp_path / "whole", rounds=1, folds=0, shrinkage=1, tolerance=0)
+    compile_build(grasp_set, tmp_path / "double", rounds=1, folds=0, shrinkage=1.0, tolerance=0.0)
+    assert _bytes(tmp_path / "whole") == _bytes(tmp_path / "double")
+
+
 @pytest.mark.parametrize("environment", [("1", "0"), ("2", "77")])
 def test_threads_and_hash_seed_change_no_byte(
     grasp_set: GraspSet, tmp_path: Path, environment: tuple[str, str]
@@ -174,3 +180,13 @@ def test_a_fold_that_keeps_no_switch_is_named(grasp_set: GraspSet, tmp_path: Pat
     assert compile_build(grasp_set, tmp_path / "build", folds=0, **options).manifest.switches
     with pytest.raises(CompileError, match="in fold 1: no switch is worth keeping"):
         compile_build(grasp_set, tmp_path / "build", folds=4, **options)
+
+
+def test_decisions_without_a_gain_are_in_the_build_and_none_are_left_out(grasp_set: GraspSet, tmp_path: Path) -> None:
+    bits = np.array([[0, 0], [0, 1], [1, 0], [1, 1]], bool)
+    rows = grasp_set.rows([0, 1, 1, 0])
+    exclusive_or = replace(rows, switches=bits, switch_names=("a", "b"))
+    assert compile_build(exclusive_or, tmp_path / "xor", rounds=2, folds=0).manifest.zero_gain_nodes == 1
+    assert '"zero_gain_nodes": 1' in (tmp_path / "xor" / "build.json").read_text()
+    assert compile_build(grasp_set, tmp_path / "other", rounds=2, folds=0).manifest.zero_gain_nodes == 0
+    assert "zero_gain_nodes" not in (tmp_path / "other" / "build.json").read_text()

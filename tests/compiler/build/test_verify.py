@@ -8,11 +8,13 @@ import pytest
 from msgspec.structs import replace as replace_fields
 
 from thenar.compiler import GraspSet, compile_build
+from thenar.compiler.build.ensemble import ensemble_from_bytes
 from thenar.compiler.build.errors import CompileError
 from thenar.compiler.build.verify import verify_build
-from thenar.runtime import BuildError
+from thenar.compiler.tables.collapse import collapse
+from thenar.runtime import Build, BuildError
 from thenar.runtime.manifest import manifest_from_bytes, manifest_to_bytes
-from thenar.runtime.tables import tables_from_bytes, tables_to_bytes
+from thenar.runtime.tables import IntegerTables, tables_from_bytes, tables_to_bytes
 
 Make = Callable[..., GraspSet]
 
@@ -28,7 +30,11 @@ def _silence(folder: Path, joints: int) -> None:
     tables = tables_from_bytes((folder / "tables.bin").read_bytes())
     rows = tuple(rows * (number >= joints) for number, rows in enumerate(tables.joint_rows))
     silent = replace(tables, joint_rows=tuple(row.astype(np.int16) for row in rows), joint_means=0 * tables.joint_means)
-    data = tables_to_bytes(silent)
+    _seal(folder, silent)
+
+
+def _seal(folder: Path, tables: IntegerTables) -> None:
+    data = tables_to_bytes(tables)
     manifest = manifest_from_bytes((folder / "build.json").read_bytes())
     (folder / "tables.bin").write_bytes(data)
     described = replace_fields(manifest, tables_sha256=hashlib.sha256(data).hexdigest())
@@ -44,6 +50,38 @@ def test_a_build_holds_on_the_recordings_it_was_made_from(folder: Path, grasp_se
     assert 0 < found.integer_difference <= found.integer_bound == proof.error
     assert (found.covered, len(found.changed)) == (proof.covered, proof.changed)
     assert found.covered_changed == 0
+
+
+def test_the_worst_frame_is_told_whether_recorded_or_not(folder: Path, grasp_set: GraspSet) -> None:
+    worst = verify_build(folder, grasp_set).worst
+    build = Build.load(folder)
+    bits = [switch.name in worst.closed for switch in build.manifest.switches]
+    stumps = ensemble_from_bytes((folder / "ensemble.bin").read_bytes())
+    exact = collapse(stumps, len(bits)).scores(np.array([bits]), np.array([worst.codes], np.uint16))[0]
+    leader, rival = build.grasps.index(worst.leader), build.grasps.index(worst.rival)
+    deployed = build.scores(bits, np.array(worst.codes, np.uint16))
+    lost = (exact[leader] - exact[rival]) * build.tables.scale - (deployed[leader] - deployed[rival])
+    assert lost == pytest.approx(worst.loss, abs=1e-9)
+    assert 0 < worst.loss < worst.bound
+    assert worst.bound == pytest.approx(build.manifest.proof.safe_margin, abs=1e-9)
+    assert worst.loss - 1 <= worst.safe_margin <= worst.loss
+    assert worst.covered >= build.manifest.proof.covered
+    assert worst.covered_changed == 0
+    assert abs(worst.reach) == build.manifest.proof.bound == build.tables.bound <= worst.limit == 32767
+
+
+def test_a_fault_that_no_recorded_row_shows_does_not_hold(folder: Path, grasp_set: GraspSet) -> None:
+    # A bin above all codes that were recorded.
+    tables = tables_from_bytes((folder / "tables.bin").read_bytes())
+    assert grasp_set.codes.max() < 300
+    rows = np.vstack([tables.joint_rows[0], tables.joint_rows[0][-1:] + np.array([-30, 0, 0, 0], np.int16)])
+    thresholds = (np.append(tables.thresholds[0], np.uint16(300)), *tables.thresholds[1:])
+    _seal(folder, replace(tables, thresholds=thresholds, joint_rows=(rows, *tables.joint_rows[1:])))
+    found = verify_build(folder, grasp_set)
+    assert found.integer_difference <= found.integer_bound
+    assert found.worst.loss > found.worst.bound
+    assert found.worst.codes[0] == 301
+    assert not found.holds
 
 
 def test_other_recordings_with_their_columns_in_another_order_will_do(folder: Path, make_set: Make) -> None:

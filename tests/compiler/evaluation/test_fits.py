@@ -5,7 +5,7 @@ import pytest
 
 from thenar.compiler import LogitBoostClassifier
 from thenar.compiler.evaluation.compositions import inputs
-from thenar.compiler.evaluation.fits import Fit, Training, predictions, run_fits
+from thenar.compiler.evaluation.fits import Fit, Training, is_blind, predictions, run_fits
 from thenar.compiler.evaluation.folds import Fold, weka_folds
 from thenar.compiler.recordings.graspset import GraspSet
 
@@ -65,3 +65,15 @@ def test_any_number_of_workers_gives_the_same(fits: tuple[GraspSet, list[Fit]]) 
 def test_nothing_to_do_is_done_at_once(make_grasps: Make) -> None:
     grasps = make_grasps()
     assert run_fits(inputs(grasps), grasps.labels, [], QUICK, jobs=2) == {}
+
+
+def test_where_no_input_varies_the_most_frequent_training_label_is_answered(make_grasps: Make) -> None:
+    grasps = make_grasps()
+    rows = np.concatenate([np.flatnonzero(grasps.labels == 2)[:5], np.flatnonzero(grasps.labels == 1)[:4]])
+    X = inputs(grasps).copy()
+    X[rows, :2] = 7, 65535
+    fit = Fit(Fold(rows, np.arange(6), "1"), (0, 1), (0, 1, 2, 3))
+    assert is_blind(X, fit)
+    assert predictions(X, grasps.labels, fit, QUICK).tolist() == [2] * 6
+    X[rows[-1], 1] = 0
+    assert not is_blind(X, fit)

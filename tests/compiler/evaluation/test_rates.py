@@ -1,9 +1,13 @@
 import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
+from mpmath import mpf
+from scipy.special import stdtrit
 from scipy.stats import binomtest, t
 
 from thenar.compiler.evaluation.rates import Average, Rate
+from thenar.reference.intervals import student_quantile
+from thenar.reference.numbers import ulps
 
 totals = st.integers(1, 2000)
 
@@ -94,3 +98,17 @@ def test_the_average_of_k_equal_rates_is_root_k_times_surer(case: tuple[tuple[in
 
 def test_every_rate_weighs_the_same_in_an_average_whatever_its_rows() -> None:
     assert Average.of((Rate.of((10,), 10), Rate.of((0,), 1000))).mean == 0.5
+
+
+@given(st.lists(st.tuples(st.integers(0, 23), st.integers(0, 23)), min_size=1, max_size=8))
+@example([(0, 14), (23, 23), (23, 23), (23, 23), (23, 23)])
+def test_an_average_stays_within_0_to_1_and_around_its_mean(correct: list[tuple[int, int]]) -> None:
+    average = Average.of(tuple(Rate.of(counts, 23) for counts in correct))
+    assert 0 <= average.low <= average.mean <= average.high <= 1
+
+
+@pytest.mark.parametrize("freedom", range(1, 51))
+def test_the_quantile_of_students_t_is_scipys_within_a_few_ulp(freedom: int) -> None:
+    # 21 at 6 degrees of freedom, which a percentage never shows; the case of the statistics relies on 4 up to 3.
+    off = ulps(float(stdtrit(freedom, 0.975)), student_quantile(freedom, mpf(0.975)))
+    assert off <= (4 if freedom <= 3 else 32)

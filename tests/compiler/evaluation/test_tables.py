@@ -20,7 +20,7 @@ ANSWERS = {
     SECOND[0]: np.array([2, 2, 2]),
     SECOND[1]: np.array([2, 2, 5]),
 }
-READER = Reader(LABELS, (2, 5), 3, ANSWERS)
+READER = Reader(LABELS, (2, 5), 3, ANSWERS, frozenset({SECOND[1]}))
 CELL = CellPlan(PART, (FIRST, SECOND))
 
 

@@ -44,3 +44,12 @@ def test_another_kind_of_file_is_refused(tree: Tree, tmp_path: Path) -> None:
 def test_a_dollar_in_a_name_is_a_dollar(tmp_path: Path) -> None:
     draw_tree(grow_id3([[0], [1]], [0, 1]), tmp_path / "tree.svg", [r"$\left{$"], ["$a$", "b"])
     assert r"<!-- $\left{$" in (tmp_path / "tree.svg").read_text()
+
+
+def test_a_decision_without_a_gain_says_so_and_a_small_gain_is_one(tmp_path: Path) -> None:
+    draw_tree(grow_id3([[0, 0], [0, 1], [1, 0], [1, 1]], [0, 1, 1, 0]), tmp_path / "tree.svg")
+    picture = (tmp_path / "tree.svg").read_text()
+    assert picture.count("<!-- no gain -->") == 1
+    X = np.arange(2000)[:, np.newaxis] < 1000
+    draw_tree(grow_id3(X, np.arange(2000) % 1000 < 500 + X[:, 0]), tmp_path / "small.svg")
+    assert "<!-- 7.21e-07 -->" in (tmp_path / "small.svg").read_text()

@@ -170,7 +170,7 @@ def test_exclusive_or_is_solved_and_said() -> None:
     assert tree.inputs == (0, 1)
     assert tree.gains == (0.0, 1.0)
     assert tree.n_zero_gain == 1
-    assert "at 1 nodes no input gains anything alone" in tree.text()
+    assert "at 1 node no input gains anything alone" in tree.text()
 
 
 def test_a_mixed_leaf_answers_with_the_majority_and_a_tie_with_the_lowest_class() -> None:

@@ -26,7 +26,9 @@ def test_what_is_no_matrix_of_whole_numbers_is_refused_where_it_is(X: object, re
     ("y", "reason"),
     [
         ([0], r"y has shape \(1,\), one label for each of the 2 rows"),
-        ([0.0, np.nan], "y is NaN in row 1"),
+        ([0.0, np.nan], "y is nan in row 1"),
+        ([0.0, -np.inf], "y is -inf in row 1"),
+        (np.array([1.0, np.nan], object), "y is nan in row 1"),
         (np.array([1, "a"], dtype=object), "cannot be sorted"),
     ],
 )

@@ -88,3 +88,19 @@ def test_a_stored_tree_that_is_not_sound_is_refused(tree: Tree, number: int, nod
 def test_a_document_that_is_no_tree_is_refused(document: bytes) -> None:
     with pytest.raises(PlacementError, match="this is no stored tree"):
         Tree.from_json(document)
+
+
+def test_a_decision_without_a_gain_says_so_where_it_stands() -> None:
+    lines = grow_id3([[0, 0], [0, 1], [1, 0], [1, 1]], ["even", "odd", "odd", "even"]).text().splitlines()
+    assert lines[0] == "x0?  4 rows, no input gains anything alone"
+    assert lines[-1].endswith("at 1 node no input gains anything alone, the lowest-numbered varying one was taken")
+
+
+def test_leaves_that_no_input_parts_are_counted_and_said_and_pruned_ones_are_not() -> None:
+    X, y = [[0], [0], [1], [1], [1]], ["a", "b", "a", "b", "a"]
+    tree = grow_id3(X, y)
+    assert tree.n_undecided == 2
+    assert tree.text().splitlines()[-1].endswith("at 2 leaves rows of several classes agree in every input")
+    assert grow_id3(X, y, min_samples=3).n_undecided == 1
+    assert grow_id3([[0], [1]], ["a", "b"], min_samples=3).n_undecided == 0
+    assert "agree" not in grow_id3([[0], [1]], ["a", "b"]).text()

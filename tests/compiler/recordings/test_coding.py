@@ -1,3 +1,5 @@
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -69,3 +71,11 @@ def test_values_beyond_the_codes_are_refused_with_their_rows(entry: JointColumns
 def test_values_beyond_all_counting_are_refused_as_well(values: list[float], grid: float) -> None:
     with pytest.raises((TableError, RecordingError), match="take a coarser grid"):
         code_joint("j", JointColumns(("j",), grid=grid), np.array(values), np.arange(2))
+
+
+@pytest.mark.parametrize("size", [1e-200, 1e-9, 1.0, 1e200])
+def test_the_cost_of_coding_is_told_in_any_unit(size: float) -> None:
+    values = np.array([0.0, 1.25, 2.5, 7.75]) * size
+    _, _, cost = code_joint("j", JointColumns(("j",), grid=size), values, rows(values))
+    assert cost.largest_error == pytest.approx(0.5 * size)
+    assert cost.rms_error == pytest.approx(size * math.sqrt((0.25**2 + 0.5**2 + 0.25**2) / 4))

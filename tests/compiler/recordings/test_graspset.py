@@ -128,6 +128,9 @@ def test_code_is_the_inverse_of_value(data: st.DataObject, grasp_sets: st.Search
         ((0, 1.0, 5, 1.0), "cannot be told apart"),
         ((0, 1.0, 5, float("nan")), "cannot be told apart"),
         ((0, -1e308, 1, 1e308), "cannot be told apart"),
+        ((0, -8e307, 65535, 8e307), "cannot be told apart"),
+        ((0, 0.0, 1, 5e-324), "cannot be told apart"),
+        ((0, 0.0, 65535, 1e-296), "cannot be told apart"),
         ((0, 1e12, 1, 1e12 + 1), "cannot be told apart"),
     ],
 )

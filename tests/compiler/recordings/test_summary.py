@@ -34,11 +34,12 @@ def test_counts_add_up_for_any_set(data: st.DataObject, grasp_sets: st.SearchStr
         assert sum(count.rows for count in counts) == len(grasp_set)
     assert len(summary.grasps) + len(summary.absent) == len(grasp_set.taxonomy.types)
     assert 0 < summary.balance <= 1
-    for joint, codes in zip(summary.joints, grasp_set.codes.T, strict=True):
-        assert joint.codes == len(np.unique(codes))
-        assert joint.least <= joint.largest
+    for joint, told, codes in zip(grasp_set.joints, summary.joints, grasp_set.codes.T, strict=True):
+        assert told.codes == len(np.unique(codes))
+        assert (told.least, told.largest) == (joint.value(codes).min(), joint.value(codes).max())
 
 
 def test_a_set_without_rows_has_a_summary(small: GraspSet) -> None:
     summary = summarise(small.rows([]))
     assert (summary.rows, summary.grasps, summary.balance, summary.separability) == (0, (), 0.0, ())
+    assert {(joint.least, joint.largest, joint.codes) for joint in summary.joints} == {(None, None, 0)}

@@ -1,11 +1,12 @@
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.boosting.stumps import Stumps
-from thenar.compiler.tables.collapse import collapse
+from thenar.compiler.tables.collapse import _answers, _joint, collapse
 
 MakeStumps = Callable[..., Stumps]
 MakeRows = Callable[..., tuple[np.ndarray, np.ndarray]]
@@ -95,3 +96,27 @@ def test_scores_are_added_row_after_row_and_not_as_the_machine_likes(make_stumps
         for row in tables.switch_rows[frame]:
             expected = expected + row
         assert scores.tobytes() == expected.tobytes()
+
+
+@pytest.mark.parametrize(("switches", "joints"), [(5, 3), (7, 3), (6, 2), (6, 4)])
+def test_frames_of_other_inputs_are_not_scored(
+    make_stumps: MakeStumps, make_rows: MakeRows, switches: int, joints: int
+) -> None:
+    tables = collapse(make_stumps(), 6)
+    with pytest.raises(ValueError, match="zip"):
+        tables.scores(*make_rows(switches=switches, joints=joints))
+
+
+def test_thresholds_are_codes(make_stumps: MakeStumps) -> None:
+    assert [steps.dtype for steps in collapse(make_stumps(), 6).thresholds] == [np.uint16] * 3
+
+
+def test_answers_at_one_threshold_are_added_in_the_order_of_the_rounds() -> None:
+    # However sorting treats equal thresholds: some processors' fastest way does not keep their order.
+    random = np.random.default_rng(8)
+    rounds = 400
+    thresholds = np.array(random.integers(0, 3, (rounds, 2)) + 0.5, np.float64)
+    stumps = Stumps(1, np.zeros((rounds, 2), np.int32), thresholds, random.normal(0, 1e3, (rounds, 2, 3)), 1.0)
+    order = np.argsort(thresholds.ravel(), kind="mergesort")
+    by_threshold = _joint(np.floor(thresholds.ravel())[order], _answers(stumps, 0)[order], _answers(stumps, 1)[order])
+    assert collapse(stumps, 0).joint_rows[0].tobytes() == by_threshold[1].tobytes()

@@ -1,0 +1,74 @@
+"""How far a sum of integer rows can get, and the frame and order of summation that get it there."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...runtime.tables import IntegerTables
+from .collapse import HIGHEST_CODE
+
+OPEN, CLOSED, LOST = 0, 1, -1
+_SIGNS = 1, -1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Furthest:
+    """A frame, perhaps with inputs missing, whose rows added in this `order` get further from zero than any other's.
+
+    The first `n_terms` of them give class `grasp` the partial sum `total`; the others lead back. order (1 + s + j,)
+    numbers the terms: 0 the bias, then switches, then joints. bits (s,) and codes (j,) with the masks of what is
+    missing, as the runtime takes them; `terms` (1 + s + j, K) are the rows themselves, in the order of their numbers.
+    """
+
+    grasp: int
+    total: int
+    n_terms: int
+    order: NDArray[np.intp]
+    terms: NDArray[np.int16]
+    bits: NDArray[np.bool_]
+    codes: NDArray[np.uint16]
+    lost_switches: NDArray[np.bool_]
+    lost_joints: NDArray[np.bool_]
+
+
+def furthest(tables: IntegerTables, *, missing: bool = True) -> Furthest:
+    """Return what reaches `tables.bound`; without `missing`, the furthest that frames get of which all can be read.
+
+    A bin that no code falls into, above a threshold of 65535, counts for the bound but for no frame; `collapse` makes
+    none.
+    """
+    choices = list(_choices(tables, missing))
+    reached = np.stack([sum(np.maximum(sign * rows, 0).max(axis=0) for _, rows in choices) for sign in _SIGNS])
+    way, grasp = map(int, np.unravel_index(reached.argmax(), reached.shape))
+    sign = _SIGNS[way]
+    picked = [int(np.argmax(sign * rows[:, grasp])) for _, rows in choices]
+    values = np.array([values[pick] for (values, _), pick in zip(choices, picked, strict=True)])
+    terms = np.stack([rows[pick] for (_, rows), pick in zip(choices, picked, strict=True)])
+    onward = sign * terms[:, grasp] > 0
+    order = np.concatenate([np.flatnonzero(onward), np.flatnonzero(~onward)])
+    switches, joints = values[1 : 1 + tables.n_switches], values[1 + tables.n_switches :]
+    return Furthest(
+        grasp=grasp,
+        total=int(terms[onward, grasp].sum()),
+        n_terms=int(np.count_nonzero(onward)),
+        order=order,
+        terms=terms.astype(np.int16),
+        bits=switches == CLOSED,
+        codes=np.maximum(joints, 0).astype(np.uint16),
+        lost_switches=switches == LOST,
+        lost_joints=joints == LOST,
+    )
+
+
+def _choices(tables: IntegerTables, missing: bool) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Yield what bias, switches and joints can say, (c,), and the rows for it, (c, K). Missing comes last."""
+    last = slice(None if missing else -1)
+    yield np.zeros(1, np.int64), tables.bias[np.newaxis].astype(np.int64)
+    for row, mean in zip(tables.switch_rows, tables.switch_means, strict=True):
+        yield np.array([OPEN, CLOSED, LOST])[last], np.stack([0 * row, row, mean])[last].astype(np.int64)
+    for thresholds, rows, mean in zip(tables.thresholds, tables.joint_rows, tables.joint_means, strict=True):
+        codes = np.concatenate([[0], thresholds.astype(np.int64) + 1])
+        codes = codes[codes <= HIGHEST_CODE]
+        yield np.append(codes, LOST)[last], np.vstack([rows[: len(codes)], mean])[last].astype(np.int64)

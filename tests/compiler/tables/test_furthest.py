@@ -1,0 +1,81 @@
+from dataclasses import replace
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from thenar.compiler.tables.furthest import furthest
+from thenar.runtime.scorer import LANE_OFFSET, Scorer
+from thenar.runtime.tables import IntegerTables
+from thenar.stability.inputs.hard_tables import every_frame, whole_numbers
+
+tables = st.builds(
+    whole_numbers,
+    st.integers(0, 10_000),
+    st.integers(2, 5),
+    st.integers(0, 5),
+    st.lists(st.integers(1, 4), max_size=2).map(tuple),
+    st.sampled_from([1, 10, 1000]),
+)
+
+
+@given(tables)
+def test_the_first_terms_reach_the_bound_and_no_running_sum_leaves_it(tables: IntegerTables) -> None:
+    found = furthest(tables)
+    running = np.cumsum(found.terms[found.order, found.grasp].astype(int))
+    assert abs(found.total) == tables.bound
+    assert (running[found.n_terms - 1] if found.n_terms else 0) == found.total
+    assert np.abs(running).max() <= tables.bound
+
+
+@given(tables)
+def test_its_frame_scores_as_its_terms_add_up(tables: IntegerTables) -> None:
+    found = furthest(tables)
+    lanes = Scorer(tables).lanes_without(found.bits, found.codes, found.lost_switches, found.lost_joints)
+    assert (np.array(lanes) - LANE_OFFSET).tolist() == found.terms.sum(axis=0, dtype=int).tolist()
+    assert sorted(found.order) == list(range(len(found.terms)))
+
+
+@settings(deadline=None, max_examples=40)
+@given(tables)
+def test_without_gaps_it_is_the_furthest_of_all_whole_frames(tables: IntegerTables) -> None:
+    found = furthest(tables, missing=False)
+    assert not found.lost_switches.any()
+    assert not found.lost_joints.any()
+    furthest_of_all = 0
+    for bits, codes in every_frame(tables):
+        rows = [tables.bias, *tables.switch_rows[list(bits)]]
+        joints = zip(tables.thresholds, tables.joint_rows, codes, strict=True)
+        terms = np.array([*rows, *(of[int((steps < code).sum())] for steps, of, code in joints)], int)
+        furthest_of_all = max(furthest_of_all, *np.maximum(terms, 0).sum(axis=0), *np.maximum(-terms, 0).sum(axis=0))
+    assert abs(found.total) == furthest_of_all
+
+
+def test_a_missing_input_is_named_where_only_its_mean_gets_there() -> None:
+    silent = whole_numbers(0, 2, 1, (2,), 0)
+    far = replace(silent, switch_means=np.array([[7, 0]], np.int16), joint_means=np.array([[9, 0]], np.int16))
+    found = furthest(far)
+    assert (found.total, found.lost_switches.tolist(), found.lost_joints.tolist()) == (16, [True], [True])
+    assert furthest(far, missing=False).total == 0
+
+
+def test_a_bin_that_no_code_falls_into_is_in_no_frame() -> None:
+    silent = whole_numbers(0, 2, 0, (2,), 0)
+    rows = np.array([[3, 0], [9, 0]], np.int16)
+    found = furthest(replace(silent, thresholds=(np.array([65535], np.uint16),), joint_rows=(rows,)))
+    assert (found.total, found.codes.tolist()) == (3, [0])
+
+
+def test_a_bin_is_shown_by_its_lowest_code_up_to_the_highest_there_is() -> None:
+    silent = whole_numbers(0, 2, 0, (3,), 0)
+    for bin_, code in enumerate((0, 10, 65535)):
+        rows = np.zeros((3, 2), np.int16)
+        rows[bin_] = 5, 0
+        found = furthest(replace(silent, thresholds=(np.array([9, 65534], np.uint16),), joint_rows=(rows,)))
+        assert (found.total, found.codes.tolist()) == (5, [code])
+
+
+def test_it_is_told_in_the_numbers_that_the_runtime_takes() -> None:
+    found = furthest(whole_numbers(0, 2, 1, (2,), 10))
+    told = (found.terms, found.bits, found.codes, found.lost_switches, found.lost_joints)
+    assert [array.dtype for array in told] == [np.int16, np.bool_, np.uint16, np.bool_, np.bool_]

@@ -1,0 +1,171 @@
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from itertools import permutations, product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from thenar.compiler.boosting.stumps import Stumps
+from thenar.compiler.tables.collapse import ScoreTables, collapse
+from thenar.compiler.tables.compare import float_slack, rounding_error
+from thenar.compiler.tables.quantise import quantise
+from thenar.compiler.tables.worstcase import Rounding
+from thenar.runtime.tables import IntegerTables
+
+MakeStumps = Callable[..., Stumps]
+MakeRows = Callable[..., tuple[np.ndarray, np.ndarray]]
+Ran = tuple[list[Fraction], list[int]]
+
+widths = st.sampled_from([4, 5, 6, 8, 16])
+
+
+def _score(of: ScoreTables | IntegerTables, bits: tuple[bool, ...], codes: tuple[int, ...]) -> list[Fraction]:
+    rows = [of.bias, *of.switch_rows[np.array(bits, bool)]]
+    for steps, bins, code in zip(of.thresholds, list(of.joint_rows), codes, strict=True):
+        rows.append(np.asarray(bins)[int((steps < code).sum())])
+    return [sum(map(Fraction, column), Fraction(0)) for column in np.stack(rows).T.tolist()]
+
+
+def _run(tables: ScoreTables, integers: IntegerTables, bits: tuple[bool, ...], codes: tuple[int, ...]) -> Ran:
+    """Return the scores of a frame in steps: exact ones and integers."""
+    exact, deployed = _score(tables, bits, codes), _score(integers, bits, codes)
+    return [score * Fraction(integers.scale) for score in exact], [int(score) for score in deployed]
+
+
+def _every_run(tables: ScoreTables, integers: IntegerTables) -> Iterator[Ran]:
+    codes = [sorted({0, 65535, *(int(t) for t in steps), *(int(t) + 1 for t in steps)}) for steps in tables.thresholds]
+    for bits in product((False, True), repeat=len(tables.switch_rows)):
+        for frame in product(*codes):
+            yield _run(tables, integers, bits, frame)
+
+
+def _lost(run: Ran, leader: int, rival: int) -> Fraction:
+    exact, deployed = run
+    return (exact[leader] - exact[rival]) - (deployed[leader] - deployed[rival])
+
+
+def _small(make_stumps: MakeStumps, make_rows: MakeRows, seed: int, width: int) -> tuple[ScoreTables, IntegerTables]:
+    tables = collapse(make_stumps(seed, rounds=4, classes=3, switches=3, joints=2), 3)
+    return tables, quantise(tables, *make_rows(seed, switches=3, joints=2), width)
+
+
+@settings(deadline=None, max_examples=40)
+@given(seed=st.integers(0, 10_000), width=widths)
+def test_of_all_frames_none_loses_more_and_the_witness_as_much(
+    make_stumps: MakeStumps, make_rows: MakeRows, seed: int, width: int
+) -> None:
+    tables, integers = _small(make_stumps, make_rows, seed, width)
+    rounding, runs = Rounding(tables, integers), list(_every_run(tables, integers))
+    for pair in permutations(range(3), 2):
+        frame = rounding.worst(*pair)
+        assert (frame.leader, frame.rival) == pair
+        assert frame.loss == max(_lost(run, *pair) for run in runs)
+        assert frame.loss == _lost(_run(tables, integers, tuple(frame.bits), tuple(frame.codes.tolist())), *pair)
+    assert rounding.worst_of_all().loss == max(rounding.worst(*pair).loss for pair in permutations(range(3), 2))
+
+
+@settings(deadline=None, max_examples=40)
+@given(seed=st.integers(0, 10_000), width=st.sampled_from([4, 5, 6]))
+def test_no_frame_with_more_than_the_safe_margin_changes_class(
+    make_stumps: MakeStumps, make_rows: MakeRows, seed: int, width: int
+) -> None:
+    tables, integers = _small(make_stumps, make_rows, seed, width)
+    safe = Rounding(tables, integers).safe_margin()
+    for exact, deployed in _every_run(tables, integers):
+        if exact.index(max(exact)) != deployed.index(max(deployed)):
+            assert max(exact) - sorted(exact)[-2] <= safe
+
+
+@given(seed=st.integers(0, 10_000), width=widths)
+def test_the_worst_is_within_what_counting_inputs_promises(
+    make_stumps: MakeStumps, make_rows: MakeRows, seed: int, width: int
+) -> None:
+    tables = collapse(make_stumps(seed), 6)
+    integers = quantise(tables, *make_rows(seed), width)
+    rounding = Rounding(tables, integers)
+    loss = rounding.worst_of_all().loss
+    assert 0 <= loss <= 2 * (rounding_error(tables.n_inputs) + float_slack(tables, integers.scale))
+    assert loss - 1 <= rounding.safe_margin() <= loss
+
+
+def _switches(bias: list[float], rows: list[list[float]], steps: list[int], whole: list[list[int]]) -> Rounding:
+    none = np.zeros((0, len(bias)), np.int16)
+    switch_rows = np.array(whole, np.int16).reshape(-1, len(bias))
+    tables = ScoreTables(np.array(bias), np.array(rows).reshape(-1, len(bias)), (), ())
+    return Rounding(
+        tables, IntegerTables(np.array(steps, np.int16), switch_rows, (), (), 0 * switch_rows, none, scale=2.0)
+    )
+
+
+def test_the_switch_is_closed_where_that_costs_the_lead() -> None:
+    rounding = _switches([0.0, 0.0], [[0.2, 0.0], [-0.2, 0.0]], [0, 0], [[0, 0], [0, 0]])
+    worst = rounding.worst(0, 1)
+    assert worst.bits.tolist() == [True, False]
+    assert worst.loss == Fraction(0.2) * 2
+    assert rounding.worst(1, 0).bits.tolist() == [False, True]
+
+
+@pytest.mark.parametrize(("leader", "safe"), [(0, "0"), (1, "3/4")])
+def test_a_rival_of_the_lower_number_wins_ties_and_the_other_must_be_better_by_a_step(leader: int, safe: str) -> None:
+    bias = [0.0, 0.0]
+    bias[leader] = 0.375  # at 2 steps a unit, 3/4 of a step, of which nothing is left
+    rounding = _switches(bias, [], [0, 0], [])
+    assert rounding.worst(leader, 1 - leader).loss == Fraction(3, 4)
+    assert rounding.worst(1 - leader, leader).loss == -Fraction(3, 4)
+    assert rounding.safe_margin() == Fraction(safe)
+
+
+def test_bins_that_rounding_has_merged_are_still_told_apart() -> None:
+    rows = np.array([[0.0, 0.0], [0.25, 0.0], [3.0, 0.0]])
+    tables = ScoreTables(np.zeros(2), np.zeros((0, 2)), (np.array([10, 20], np.uint16),), (rows,))
+    none = np.zeros((0, 2), np.int16)
+    whole = np.array([[0, 0], [3, 0]], np.int16)
+    integers = IntegerTables(none.sum(axis=0, dtype=np.int16), none, (np.array([20], np.uint16),), (whole,), none,
+                             np.zeros((1, 2), np.int16), 1.0)  # fmt: skip
+    worst = Rounding(tables, integers).worst(0, 1)
+    assert (worst.codes.tolist(), worst.loss) == ([11], Fraction(1, 4))
+
+
+def test_a_bin_that_no_code_falls_into_is_no_frame() -> None:
+    rows = np.array([[0.0, 0.0], [0.25, 0.0]])
+    tables = ScoreTables(np.zeros(2), np.zeros((0, 2)), (np.array([65535], np.uint16),), (rows,))
+    none = np.zeros((0, 2), np.int16)
+    means = np.zeros((1, 2), np.int16)
+    integers = IntegerTables(np.zeros(2, np.int16), none, (np.array([], np.uint16),), (means,), none, means, 1.0)
+    assert Rounding(tables, integers).worst_of_all().loss == 0
+
+
+def test_scores_down_to_the_smallest_doubles_are_compared_exactly() -> None:
+    tiny = 5e-324
+    rounding = _switches([0.0, 0.0], [[tiny, 0.0]], [0, 0], [[0, 0]])
+    assert rounding.worst(0, 1).loss == Fraction(tiny) * 2
+    assert rounding.worst(1, 0).loss == 0
+    assert rounding.safe_margin() == 0
+
+
+def test_a_frame_is_told_in_the_numbers_that_the_runtime_takes(make_stumps: MakeStumps, make_rows: MakeRows) -> None:
+    tables = collapse(make_stumps(), 6)
+    worst = Rounding(tables, quantise(tables, *make_rows())).worst_of_all()
+    assert [array.dtype for array in (worst.bits, worst.codes)] == [np.bool_, np.uint16]
+
+
+@pytest.mark.parametrize(("bin_", "code"), [(0, 0), (1, 1), (2, 65535)])
+def test_the_first_code_and_the_last_may_have_a_bin_of_their_own(bin_: int, code: int) -> None:
+    rows = np.zeros((3, 2))
+    rows[bin_, 0] = 0.25
+    steps, none = (np.array([0, 65534], np.uint16),), np.zeros((0, 2), np.int16)
+    whole = (np.zeros((3, 2), np.int16),)
+    integers = IntegerTables(np.zeros(2, np.int16), none, steps, whole, none, np.zeros((1, 2), np.int16), 1.0)
+    worst = Rounding(ScoreTables(np.zeros(2), np.zeros((0, 2)), steps, (rows,)), integers).worst(0, 1)
+    assert (worst.codes.tolist(), worst.loss) == ([code], Fraction(1, 4))
+
+
+@pytest.mark.parametrize(("switches", "joints"), [(5, 3), (7, 3), (6, 2), (6, 4)])
+def test_integers_of_other_inputs_are_not_compared(
+    make_stumps: MakeStumps, make_rows: MakeRows, switches: int, joints: int
+) -> None:
+    others = collapse(make_stumps(switches=switches, joints=joints), switches)
+    with pytest.raises(ValueError, match="zip"):
+        Rounding(collapse(make_stumps(), 6), quantise(others, *make_rows(switches=switches, joints=joints)))
