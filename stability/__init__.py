@@ -1,0 +1,1 @@
+"""The hard cases: what could go wrong with the numbers, the truth each is held against, and the error."""

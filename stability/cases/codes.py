@@ -1,0 +1,167 @@
+"""Codes at the ends of their range, neighbours, and what floating-point degrees become on the way in."""
+
+import csv
+import math
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiler.boosting.binning import midpoints
+from ...compiler.boosting.boost import boost
+from ...compiler.recordings.columns import Columns, JointColumns
+from ...compiler.recordings.errors import TableError
+from ...compiler.recordings.graspset import GraspSet
+from ...compiler.recordings.importer import ImportReport, import_table
+from ...compiler.recordings.table import read_table
+from ...compiler.tables.collapse import HIGHEST_CODE, collapse
+from ..finding import Case, Finding, Worst
+from ..inputs.hard_cells import HARD_DEGREES, HARD_DOUBLES, NO_BITS, NO_CODES, NO_FLOATS, NO_NUMBERS, NO_TRIALS
+
+CASE = Case(
+    title="Codes and degrees at their ends",
+    danger="a threshold falls on the wrong side of a code, or what is no number becomes one in silence",
+)
+
+EVERY_CODE = np.arange(HIGHEST_CODE + 1)
+
+
+def findings(full: bool) -> Iterator[Finding]:
+    """Part neighbouring values, send every code through stumps and tables, and import what is hard to import."""
+    yield _midpoints(200 if full else 20)
+    yield _every_code(60 if full else 6)
+    yield from _coded()
+    yield _refused()
+
+
+def _midpoints(draws: int) -> Finding:
+    """A threshold between neighbours parts them, half an ulp from their middle at most: one rounding."""
+    off = Worst("thresholds between neighbouring doubles", "fractions", 0.5, "ulp")
+    random = np.random.default_rng(4)
+    lists = [np.array(HARD_DOUBLES)]
+    lists += [np.unique(random.standard_normal(50) * 10.0 ** random.integers(-320, 300, 50)) for _ in range(draws)]
+    for values in lists:
+        found_between = zip(pairwise(values.tolist()), midpoints(values).tolist(), strict=True)
+        for (low, high), found in found_between:
+            middle = (Fraction(low) + Fraction(high)) / 2
+            error = abs(Fraction(found) - middle) / Fraction(math.ulp(float(middle)))
+            off.see(float(error) if low <= found < high else math.inf, f"between {low!r} and {high!r}")
+    return off.finding()
+
+
+def hard_codes(seed: int) -> tuple[NDArray[np.uint16], NDArray[np.intp]]:
+    """Return codes (n, 6) and labels (n,): ends only, neighbours at both ends, all equal, two 1 apart, and all over."""
+    random = np.random.default_rng(seed)
+    labels = np.arange(48) % 3
+    within = int(random.integers(1, HIGHEST_CODE - 1))
+    columns = [
+        random.choice([0, HIGHEST_CODE], 48),
+        random.choice([0, 1, HIGHEST_CODE - 1, HIGHEST_CODE], 48),
+        np.full(48, HIGHEST_CODE),
+        within + (labels == 1),
+        random.choice([0, 1], 48),
+        random.integers(0, HIGHEST_CODE + 1, 48),
+    ]
+    return np.stack(columns, axis=1).astype(np.uint16), labels
+
+
+def _every_code(sets: int) -> Finding:
+    """A bin of the tables holds exactly the codes that every stump of its joint sends the same way."""
+    wrong = Worst("codes that tables put on another side than stumps do", "every code there is", 0, "codes")
+    for seed in range(sets):
+        codes, labels = hard_codes(seed)
+        stumps, _ = boost(codes, labels, 3, rounds=20)
+        for column, steps in enumerate(collapse(stumps, 0).thresholds):
+            # Compared as whole numbers: a double holds each code.
+            used = stumps.thresholds[stumps.columns == column]
+            changes = {int((threshold >= EVERY_CODE).sum()) for threshold in used} - {0, len(EVERY_CODE)}
+            misplaced = changes ^ {int(step) + 1 for step in steps}
+            wrong.see(len(misplaced), f"set {seed}, joint {column}", tried=len(EVERY_CODE))
+    return wrong.finding()
+
+
+def _coded() -> Iterator[Finding]:
+    """A value is at most half a step from what its code means, and a value that a code means gets that code again.
+
+    Half a step, and what rounding adds: the origin, the difference, the quotient and the code's value each lose 2^-53
+    of at most 1e9 steps (more than that `Joint` refuses) to 65536: 4.5e-7 of a step.
+    """
+    off = Worst("degrees, beside what their codes mean", "fractions", 0.5 + 4.5e-7, "steps")
+    told = Worst("largest coding error, beside the one that import reports", "fractions", 4.5e-7, "steps")
+    again = Worst("codes that do not come back from their own value", "the code itself", 0, "codes")
+    for values, grid in HARD_DEGREES:
+        grasp_set, report = _imported(values, grid)
+        joint, codes = grasp_set.joints[0], grasp_set.codes[:, 0]
+        origin, step = Fraction(joint.value_a), Fraction(joint.value_b - joint.value_a) / (joint.code_b - joint.code_a)
+        errors = [
+            abs(Fraction(value) - origin - (int(code) - joint.code_a) * step) / step
+            for value, code in zip(values, codes, strict=True)
+        ]
+        what = f"{values[0]!r} and on, grid {grid:g}"
+        off.see(float(max(errors)), what, tried=len(values))
+        told.see(float(abs(max(errors) - Fraction(report.coding[0].largest_error) / step)), what)
+        again.see(int((joint.code(joint.value(EVERY_CODE)) != EVERY_CODE).sum()), what, tried=len(EVERY_CODE))
+    yield off.finding()
+    yield told.finding()
+    yield again.finding()
+
+
+def _imported(values: Sequence[float], grid: float) -> tuple[GraspSet, ImportReport]:
+    rows = [["a", "1", repr(value)] for value in values]
+    with TemporaryDirectory() as folder:
+        table = _csv(Path(folder), rows)
+        return import_table(read_table(table), _columns(JointColumns(("joint",), grid=grid)))
+
+
+def _columns(joint: JointColumns, trial: str | None = None) -> Columns:
+    return Columns(label="grasp", trial=trial, switches=("switch",), joints=(joint,))
+
+
+def _csv(folder: Path, rows: Sequence[Sequence[str]], heads: Sequence[str] = ("grasp", "switch", "joint")) -> Path:
+    path = folder / "table.csv"
+    with path.open("w", newline="") as file:
+        csv.writer(file).writerows([heads, *rows])
+    return path
+
+
+def _refused() -> Finding:
+    """What is no number, code, bit or trial is refused, and its row and column are named."""
+    named = Worst("bad cells not refused with row and column", "the cell's row and column", 0, "cells")
+    with TemporaryDirectory() as name:
+        for what, complaint, where in _complaints(Path(name)):
+            named.see(where not in complaint, f"{what}: {complaint}")
+    return named.finding()
+
+
+def _complaints(folder: Path) -> Iterator[tuple[str, str, str]]:
+    """Yield what the cell is, what importing it says, and the place that this has to name."""
+    heads = ("grasp", "switch", "joint", "trial")
+    degrees, codes = JointColumns(("joint",)), JointColumns(("joint",), codes=True)
+    for column, entry, cells in (
+        ("joint", degrees, NO_NUMBERS),
+        ("joint", codes, NO_CODES),
+        ("switch", degrees, NO_BITS),
+        ("trial", degrees, NO_TRIALS),
+    ):
+        for cell in cells:
+            good = dict.fromkeys(heads, "1")
+            rows = [list((good | bad).values()) for bad in ({}, {}, {column: cell}, {})]
+            path = _csv(folder, rows, heads)
+            yield f"{column} {cell!r} as text", _complaint(path, entry), f"row 4 {column!r} ({cell!r})"
+    for column in heads:
+        for number in NO_FLOATS:
+            arrays = {head: np.array([1.0, 1.0, number if head == column else 1.0, 1.0]) for head in heads}
+            np.savez(folder / "table.npz", **arrays)  # type: ignore[arg-type]  # typeshed takes arrays for flags
+            yield f"{column} {number}", _complaint(folder / "table.npz", degrees), f"row 3 {column!r} ('{number}')"
+
+
+def _complaint(path: Path, entry: JointColumns) -> str:
+    try:
+        import_table(read_table(path), _columns(entry, trial="trial"))
+    except TableError as complaint:
+        return str(complaint)
+    return "it is imported"

@@ -1,0 +1,130 @@
+"""The same frame with different grasps, one class a million times the other, labels that are noise.
+
+Whatever learns from frames can do no better than the share of each class among the rows of a frame: that is the truth
+here, and the entropy that it leaves is the least loss there is. Where one switch parts the frames, stumps can reach
+both; so boosting must come to rest on them, but for rounding. The case `separable` says when the loss falls on the way.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ...compiler.boosting.boost import boost
+from ...compiler.boosting.stumps import winners
+from ...reference.logistic import mean_loss
+from ...reference.numbers import distance
+from ..checks.class_rounds import see_round
+from ..checks.counted import entropy_left, idle_loss, resting_error
+from ..checks.rounds import loss_rounding, moments, rise_rounding
+from ..finding import Case, Finding, Worst
+from ..inputs.hard_data import HardSet, contradictory, imbalanced, noisy, repeated
+
+CASE = Case(
+    title="Contradictions",
+    danger="frames that belong to several classes make boosting swing; one row among 10^6 is rounded away",
+)
+REFERENCE = "60 digits"
+
+
+def findings(full: bool) -> Iterator[Finding]:
+    """Yield where boosting comes to rest on contradictory frames, what repetition changes, and what noise does."""
+    yield from _rest(frames(full), 2_000 if full else 120)
+    yield _ties()
+    yield _repetition((10**4, 10**6) if full else (10**4,))
+    yield from _noise(1_000 if full else 40)
+
+
+def frames(full: bool) -> Iterator[HardSet]:
+    """Yield sets of two frames that one switch parts, with the classes' counts on each."""
+    for power in range(1, 8) if full else (1, 6, 7):
+        yield imbalanced(10**power)
+        yield contradictory([[1, 10**power], [10**power, 3]])
+    for percent in (0, 10, 20, 30, 40, 50, 60):
+        yield contradictory([[100 - percent, percent], [percent + 1, 99 - percent]])
+    yield contradictory([[1, 2, 3], [3, 2, 1]])
+    yield contradictory([[10**7, 1, 1], [1, 10**6, 10**3]])
+    rng = np.random.default_rng(1)
+    for classes in (4, 14, 33) if full else (4,):
+        yield contradictory(rng.integers(1, 100, (2, classes)).tolist())
+
+
+def _rest(sets: Iterator[HardSet], rounds: int) -> Iterator[Finding]:
+    """Yield how far P is off the shares of the counts in the end, and losses off the entropy that is left."""
+    shares = Worst("P of a class on a contradictory frame, in the end", "shares of the counts", 1.0, "x rounding")
+    losses = Worst("the loss in the end", "the entropy left, 60 digits", 1.0, "x rounding")
+    for hard in sets:
+        stumps, history = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds, weights=hard.weights)
+        *_, last = moments(hard, stumps)
+        shares.see(resting_error(hard, last), hard.name, last.shares.size)
+        least = entropy_left(hard)
+        allowed = loss_rounding(hard.n_classes, float(least)) + idle_loss(hard, last)
+        losses.see(distance(history.losses[-1], least) / allowed, hard.name)
+    yield from (shares.finding(), losses.finding())
+
+
+def _ties() -> Finding:
+    """Classes of equal counts on a frame: the one of the lowest number is answered, as the rule of ties has it."""
+    worst = Worst("equal counts go to the lowest class", "the rule itself", 0.0, "frames")
+    for counts in (
+        [[1, 1], [2, 2]],
+        [[2, 2, 1], [1, 2, 2]],
+        [[10**7, 10**7, 1], [1, 10**6, 10**6]],
+        [[7] * 5, [9] * 5],
+    ):
+        hard = contradictory(counts)
+        stumps, _ = boost(hard.X, hard.labels, hard.n_classes, rounds=100, weights=hard.weights)
+        answers = winners(stumps.scores(np.array([[0], [1]]))).tolist()
+        for answer, row in zip(answers, counts, strict=True):
+            worst.see(float(answer != row.index(max(row))), hard.name)
+    return worst.finding()
+
+
+def _repetition(ratios: tuple[int, ...]) -> Finding:
+    """Rows that are really there as often as they weigh come to rest on the same shares."""
+    worst = Worst("P where rows are really repeated", "shares of the counts", 1.0, "x rounding")
+    for ratio in ratios:
+        hard = repeated(imbalanced(ratio))
+        stumps, _ = boost(hard.X, hard.labels, 2, rounds=60)
+        frames = imbalanced(ratio)
+        *_, last = moments(frames, stumps)
+        worst.see(resting_error(frames, last), hard.name, len(hard.labels))
+    return worst.finding()
+
+
+def _noise(rounds: int) -> Iterator[Finding]:
+    """Sets of 16 frames, 0 to 60 % of labels drawn anew: rounds, losses, and that the loss falls where it must."""
+    chosen = Worst("stumps chosen under label noise", REFERENCE, 1.0, "x rounding")
+    answers = Worst("answers of branches under label noise", REFERENCE, 1.0, "x rounding")
+    told = Worst("losses under label noise", REFERENCE, 1.0, "x rounding")
+    below = Worst("losses are above the entropy left", REFERENCE, 0.0, "rounds")
+    rises = Worst("rise of the loss, where it must fall", "convexity", 1.0, "x rounding")
+    for hard, shrinkage in noisy_sets():
+        stumps, history = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds, shrinkage=shrinkage)
+        _see_losses(hard, history.losses, below)
+        before = None
+        for number, moment in enumerate(moments(hard, stumps)):
+            at = f"{hard.name}, round {number}"
+            if number % (rounds // 2) == 1:
+                see_round(hard, stumps, number, moment.scores, 3.0, chosen, answers)
+                truth = mean_loss(moment.scores.T.tolist(), hard.labels.tolist())
+                told.see(distance(moment.loss, truth) / loss_rounding(hard.n_classes, float(truth)), at)
+            if before is not None and shrinkage * (hard.n_classes - 1) <= 1:
+                rise = max(0.0, moment.loss - before.loss)
+                rises.see(rise / rise_rounding(hard.n_classes, before, moment), at)
+            before = moment
+    yield from (worst.finding() for worst in (chosen, answers, told, below, rises))
+
+
+def noisy_sets() -> Iterator[tuple[HardSet, float]]:
+    """Yield sets of 16 frames, and the shrinkage to train them with: at 1/(K - 1) or below the loss must fall."""
+    for percent in (0, 10, 20, 30, 40, 50, 60):
+        for classes, shrinkage in ((2, 1.0), (5, 0.25), (5, 1.0)):
+            hard = noisy(classes, 60, percent / 100, seed=percent)
+            yield replace(hard, X=hard.X[:, :4], n_switches=4), shrinkage
+
+
+def _see_losses(hard: HardSet, losses: tuple[float, ...], below: Worst) -> None:
+    least = float(entropy_left(hard))
+    allowed = least - loss_rounding(hard.n_classes, least)
+    below.see(float(sum(loss < allowed for loss in losses)), hard.name, len(losses))

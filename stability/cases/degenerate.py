@@ -1,0 +1,179 @@
+"""One row, column or class, a class with one row or none, as many classes as rows, no switch kept."""
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from mpmath import mpf
+from numpy.typing import NDArray
+
+from ...compiler.boosting.boost import boost
+from ...compiler.boosting.stumps import Stumps, winners
+from ...compiler.build.compile import compile_build
+from ...compiler.elementary import softmax
+from ...compiler.evaluation.study import Options, evaluate
+from ...compiler.placement.placement import place
+from ...compiler.recordings.graspset import GraspSet
+from ...drivers.errors import ThenarError
+from ...reference.numbers import precisely, ulps
+from ...runtime.build import Build
+from ..finding import Case, Finding, Worst
+from ..inputs.small_sets import make_set, one_hot
+
+CASE = Case(
+    title="Degenerate sets",
+    danger="a set with next to nothing in it ends in a warning, a traceback, or an answer that is wrong in silence",
+)
+
+# The answer is sum P / sum P (1 - P), with one P throughout: it keeps the rounding of P in 1 - P, no more than one of
+# 1 - P, then that of 1 - P itself, of the product, of either sum (two each, on its two grids) and of the quotient: 8
+# times 2^-53 of the answer, each less than an ulp. Clamped, 1/3 stands for P there, and the roundings are 7.
+_VALUE_ULPS = 8
+
+_FRAMES = [[0, 0], [0, 1], [1, 0], [1, 1]]
+_ONE_ROW = make_set(["a"], [[1, 0]], [[3]])
+_ONE_CLASS = make_set(["a"] * 8, _FRAMES * 2, [[3], [4], [5], [6]] * 2)
+_CONSTANT = make_set(["a"] + ["b"] * 11, [[1, 1]] * 12, [[65535]] * 12)
+
+# Sets whose rows a sum of stumps can tell apart, and does.
+SOLVABLE = {
+    "two rows": make_set(["a", "b"], [[1, 0], [0, 1]]),
+    "one switch": make_set(["a", "b"] * 4, [[0], [1]] * 4),
+    "one joint": make_set(["a", "b"] * 4, codes=[[7], [8]] * 4),
+    "a class of one row": make_set(["a"] * 6 + ["b"] * 5 + ["c"], [[0, 0]] * 6 + [[0, 1]] * 5 + [[1, 0]]),
+    "a type without rows": make_set(["a", "b"] * 4, [[0, 1], [1, 1]] * 4, types=["a", "b", "c"]),
+    "no switch that varies": make_set(["a", "b"] * 4, [[1, 0]] * 8, [[200], [100]] * 4),
+    "2 types of one row each": one_hot(2),
+    "9 types of one row each": one_hot(9),
+    "33 types of one row each": one_hot(33),
+}
+
+
+def findings(full: bool) -> Iterator[Finding]:
+    """Build, place and evaluate such sets, and hold the first round's values against their closed forms."""
+    yield _recognised()
+    yield _refused()
+    yield _one_class(50 if full else 10)
+    classes = range(2, 34) if full else (2, 3, 4, 7, 33)
+    yield from _first_round(classes)
+    yield _never_answered(classes, 200 if full else 20)
+    yield _nothing_to_see()
+
+
+def _recognised() -> Finding:
+    """A build of a set that can be told apart recognises every row of it."""
+    rows = Worst("rows that a build made of them does not recognise", "their labels", 0, "rows")
+    for name, grasp_set in SOLVABLE.items():
+        with TemporaryDirectory() as folder:
+            built = compile_build(grasp_set, Path(folder) / "build", rounds=20, folds=0)
+            build = Build.load(built.folder)
+        kept = [switch.column for switch in built.manifest.switches]
+        frames = zip(grasp_set.switches[:, kept], grasp_set.codes, grasp_set.grasps, strict=True)
+        wrong = sum(build.classify(bits, codes) != grasp for bits, codes, grasp in frames)
+        rows.see(wrong, name, tried=len(grasp_set))
+    return rows.finding()
+
+
+def _refused() -> Finding:
+    """What has no answer ends in a sentence for people."""
+    fewer = "1 rows cannot be cut into 4 folds"
+    asked: list[tuple[str, Callable[[Path], object], str]] = [
+        ("build of one row", lambda f: compile_build(_ONE_ROW, f), "hold 1 grasp type"),
+        ("build of one class", lambda f: compile_build(_ONE_CLASS, f), "hold 1 grasp type"),
+        ("build of no row", lambda f: compile_build(_ONE_ROW.rows([]), f), "hold 0 grasp type"),
+        ("build of constants", lambda f: compile_build(_CONSTANT, f), "no input differs between rows"),
+        ("build of no switch", lambda f: compile_build(_CONSTANT, f, inputs="switches"), "no switch is worth keeping"),
+        ("build in folds of one", lambda f: compile_build(SOLVABLE["two rows"], f, folds=1), "leave nothing to train"),
+        ("build in more folds than rows", lambda f: compile_build(SOLVABLE["two rows"], f), "cannot be cut"),
+        ("a fold that sees one row", lambda f: compile_build(SOLVABLE["two rows"], f, folds=2), "in fold 1"),
+        ("placement of no row", lambda _: place(_ONE_ROW.rows([])), "there are no rows"),
+        ("placement of no switch", lambda _: place(SOLVABLE["one joint"]), "no switches to place"),
+        ("rates of no row", lambda _: evaluate(_ONE_ROW.rows([])), "the set has no rows"),
+        ("rates of one row", lambda _: evaluate(_ONE_ROW), fewer),
+        ("rates without the one subject", lambda _: evaluate(_ONE_CLASS, Options(scheme="subject")), "two or more"),
+    ]
+    found = Worst("impossible requests not refused with the sentence that fits", "the sentence", 0, "answers")
+    for what, question, sentence in asked:
+        with TemporaryDirectory() as folder:
+            found.see(sentence not in _complaint(question, Path(folder) / "build"), what)
+    return found.finding()
+
+
+def _complaint(question: Callable[[Path], object], folder: Path) -> str:
+    try:
+        question(folder)
+    except ThenarError as complaint:
+        return str(complaint)
+    return "it answers"
+
+
+def _one_class(rounds: int) -> Finding:
+    """Of one class every share is 1 and every loss 0, however long it is boosted, exactly."""
+    off = Worst("share, score and loss of the only class", "1, 0 and 0", 0, "score")
+    for grasp_set in (_ONE_ROW, _ONE_CLASS):
+        X = np.hstack([grasp_set.switches, grasp_set.codes])
+        stumps, history = boost(X, grasp_set.labels, 1, rounds=rounds)
+        scores = stumps.scores(X)
+        shares = softmax(np.ascontiguousarray(scores.T))
+        error = max(float(np.abs(shares - 1).max()), float(np.abs(scores).max()), *history.losses)
+        off.see(error, f"{len(X)} rows", tried=len(history.losses))
+    return off.finding()
+
+
+def _first_round(classes: Sequence[int]) -> Iterator[Finding]:
+    """At the start all K shares are 1/K: a row of its own answers K, clamped to 3, others -K/(K - 1)."""
+    own = Worst("first answers, as many classes as rows", "min(K, 3) and -K/(K - 1)", _VALUE_ULPS, "ulp")
+    empty = Worst("first answers of a class without rows", "-K/(K - 1)", _VALUE_ULPS, "ulp")
+    for k in classes:
+        stumps, _ = boost(np.eye(k), np.arange(k), k, rounds=1)
+        # Of two classes, both ask for the first column: the row that is one's own lies right of it, or left.
+        low, high = np.sort(stumps.values[0, :, :2], axis=1).T
+        own.see(max(_error(low, _others(k)), _error(high, mpf(min(k, 3)))), f"{k} classes", tried=2 * k)
+        stumps = _without_the_last(k, 1)
+        empty.see(_error(stumps.values[0, -1], _others(k)), f"{k} classes", tried=3)
+    yield own.finding()
+    yield empty.finding()
+
+
+@precisely()
+def _others(k: int) -> mpf:
+    return -mpf(k) / (k - 1)
+
+
+def _error(values: NDArray[np.float64], truth: mpf) -> float:
+    return max(ulps(value, truth) for value in values.tolist())
+
+
+def _without_the_last(k: int, rounds: int) -> Stumps:
+    """Train k classes of which the last has no row."""
+    labels = np.arange(4 * k) % (k - 1)
+    X = np.stack([labels, np.arange(4 * k) % 3], axis=1)
+    return boost(X, labels, k, rounds=rounds)[0]
+
+
+def _never_answered(classes: Sequence[int], rounds: int) -> Finding:
+    """A class without rows is never the answer, on frames that were never seen as well."""
+    answers = Worst("frames that a class without rows wins", "every frame there is", 0, "frames")
+    for k in classes:
+        frames = np.array([[code, other] for code in range(-1, k + 1) for other in range(-1, 4)])
+        scores = _without_the_last(k, rounds).scores(frames)
+        answers.see(int((winners(scores) == k - 1).sum()), f"{k} classes", tried=len(frames))
+    return answers.finding()
+
+
+def _nothing_to_see() -> Finding:
+    """Where no input varies, the most frequent grasp type is answered, in every table of the evaluation."""
+    study = evaluate(_CONSTANT, Options(rounds=2, repeats=1), jobs=1)
+    off = Worst("rows recognised where no input varies: off by", "the commonest type's rows", 0, "rows")
+    for table in study.tables:
+        for row in table.rows:
+            for cell in row.cells:
+                # 11 of the 12 rows are of type b, and in any 9 of them it is the most frequent.
+                off.see(max(abs(correct - 11) for correct in cell.rate.correct), f"{table.name} {row.name}")
+    return off.finding()
+
+
+def all_sets() -> dict[str, GraspSet]:
+    """Return every set of this case by its name: the tests send them through the commands."""
+    return {"one row": _ONE_ROW, "one class": _ONE_CLASS, "constants": _CONSTANT, **SOLVABLE}

@@ -1,0 +1,165 @@
+"""Entropy, information gain, and the choice of the best input, for counts up to 10^9 and more."""
+
+from collections.abc import Iterator
+
+import mpmath
+import numpy as np
+from mpmath import mpf
+from numpy.typing import NDArray
+
+from ...compiler.placement.cooccurrence import Cooccurrence
+from ...compiler.placement.gain import best_position, compare_scores, entropy_bits, gain_bits
+from ...reference import information as truth
+from ...reference.numbers import precisely
+from ..checks.roundings import ROUNDING, part_of
+from ..finding import Case, Finding, Worst
+from ..inputs.hard_counts import BitSet, Counts, bit_set, close_pairs, equal_pairs, hand_made, node_of, random_table
+
+CASE = Case(
+    title="Information gain",
+    danger="a gain that rounding made decides which switch is kept; a gain of one count in 10^9 is taken for none",
+)
+REFERENCE = "60 digits"
+WHOLE_NUMBERS = "products of whole numbers"
+
+Pair = tuple[int, int | None]  # a bit, and what is given
+
+
+def findings(full: bool) -> Iterator[Finding]:
+    """Yield errors of gains and entropies, and how many choices between inputs go wrong."""
+    rng, more = np.random.default_rng(2), 10 if full else 1
+    tables = [*hand_made(), *(random_table(rng) for _ in range(150 * more))]
+    yield gains_of(tables)
+    yield entropies_of(tables)
+    yield _nothing(rng, 50 * more)
+    pairs = [*equal_pairs(), *close_pairs(rng, 60 * more)]
+    yield comparisons_of(pairs)
+    yield choices_of(pairs)
+    bits = [bit_set(rng) for _ in range(4 * more)]
+    yield given_of(bits)
+    yield given_comparisons_of(bits, rng)
+
+
+def _n_log_n(counts: list[int]) -> mpf:
+    return mpmath.fsum(m * mpmath.log(m) for m in counts if m)
+
+
+def gains_of(tables: list[Counts]) -> Finding:
+    """Hold gains of tables (K, values) against the reference."""
+    # A term m ln m is off by 5 roundings: a logarithm within 2 ulp counts for 4, the product for one. They are summed
+    # exactly and rounded once, and divided by n ln 2, a product of a constant: 4 roundings of the gain itself.
+    worst = Worst("gain", REFERENCE, 1.0, "x rounding")
+    for table in tables:
+        n, got, gain = int(table.sum()), gain_bits(table), truth.gain_bits(table.tolist())
+        counts = [*table.ravel().tolist(), *table.sum(axis=0).tolist(), *table.sum(axis=1).tolist(), n]
+        with precisely():
+            allowed = ROUNDING * (5 * _n_log_n(counts) / (n * mpmath.log(2)) + 4 * gain)
+            worst.see(part_of(got, gain, allowed), f"of {n} rows")
+    return worst.finding()
+
+
+def entropies_of(tables: list[Counts]) -> Finding:
+    """Hold entropies of the classes of tables (K, values) against the reference."""
+    # As for the gain, of terms m ln m of the classes and of all rows.
+    worst = Worst("entropy", REFERENCE, 1.0, "x rounding")
+    for table in tables:
+        totals = table.sum(axis=1).tolist()
+        n, got, entropy = sum(totals), entropy_bits(totals), truth.entropy_bits(totals)
+        with precisely():
+            allowed = ROUNDING * (5 * _n_log_n([*totals, n]) / (n * mpmath.log(2)) + 4 * entropy)
+            worst.see(part_of(got, entropy, allowed), f"of {n} rows")
+    return worst.finding()
+
+
+def _nothing(rng: np.random.Generator, n: int) -> Finding:
+    """An input that is independent of the class gains exactly 0; with one row more somewhere, more than 0."""
+    worst = Worst("a gain of exactly nothing", "the rule itself", 0.0, "gains")
+    wrong = 0
+    for _ in range(n):
+        classes, values = rng.integers(1, 30_000, 3), rng.integers(1, 30_000, 2)
+        independent = np.outer(classes, values)
+        wrong += gain_bits(independent) != 0.0
+        independent[0, 0] += 1
+        wrong += not gain_bits(independent) > 0.0
+    worst.see(float(wrong), tried=2 * n)
+    return worst.finding()
+
+
+def comparisons_of(pairs: list[tuple[Counts, Counts]]) -> Finding:
+    """Count comparisons of two gains that go wrong."""
+    worst = Worst("which of two gains is greater", WHOLE_NUMBERS, 0.0, "answers")
+    wrong = [compare_scores(a, b) != truth.compare_gains(a.tolist(), b.tolist()) for a, b in pairs]
+    worst.see(float(sum(wrong)), tried=len(pairs))
+    return worst.finding()
+
+
+def choices_of(pairs: list[tuple[Counts, Counts]]) -> Finding:
+    """Return how often the best of three inputs is another, in whichever order they stand; equal ones: the lowest."""
+    worst = Worst("which input is kept", WHOLE_NUMBERS, 0.0, "answers")
+    wrong = 0
+    for one, other in pairs:
+        for tables in ((one, other, one), (other, one, other)):
+            greater = truth.compare_gains(tables[1].tolist(), tables[0].tolist()) > 0
+            wrong += best_position(node_of(*tables), np.arange(3)) != int(greater)
+            wrong += best_position(node_of(*tables), np.array([2, 1, 0])) != (1 if greater else 2)
+    worst.see(float(wrong), tried=4 * len(pairs))
+    return worst.finding()
+
+
+def _tables(X: NDArray[np.bool_], labels: NDArray[np.intp], bit: int, given: int | None) -> list[truth.Table]:
+    """Return the counts (K, 2) of classes at the values of `bit`, a table for each value of what is given."""
+    condition = np.zeros(len(X), bool) if given is None else X[:, given]
+    classes = range(int(labels.max()) + 1)
+    return [
+        [[int(((labels == c) & (X[:, bit] == v) & (condition == g)).sum()) for v in (False, True)] for c in classes]
+        for g in (False, True)
+    ]
+
+
+def given_of(sets: list[BitSet]) -> Finding:
+    """Hold what bits tell of the class, alone and given another, against the reference."""
+    worst = Worst("what a bit tells, given another", REFERENCE, 1.0, "x rounding")
+    for X, labels, classes in sets:
+        counted = Cooccurrence(X, labels, classes)
+        for given in (None, 0, 3):
+            for bit, got in enumerate(counted.information(given).tolist()):
+                tables = _tables(X, labels, bit, given)
+                gain = truth.conditional_gain_bits(tables)
+                with precisely():
+                    nats = gain * len(X) * mpmath.log(2)
+                    worst.see(part_of(got, nats, _given_error(tables)), f"{len(X)} rows, {classes} classes")
+    return worst.finding()
+
+
+def _given_error(tables: list[truth.Table]) -> mpf:
+    """Bound the error of n I(class; bit | given), of four sums of terms m ln m.
+
+    A term is off by 9 roundings, 8 of them for a logarithm within 4 ulp, whichever numpy has; a sum of T rounds T - 1
+    times, and its three additions to the others once each.
+    """
+    cells = [m for table in tables for row in table for m in row]
+    columns = [sum(column) for table in tables for column in zip(*table, strict=True)]
+    rows = [sum(row) for table in tables for row in table]
+    totals = [sum(map(sum, table)) for table in tables]
+    return ROUNDING * mpmath.fsum((len(counts) + 11) * _n_log_n(counts) for counts in (cells, columns, rows, totals))
+
+
+def given_comparisons_of(sets: list[BitSet], rng: np.random.Generator) -> Finding:
+    """Count comparisons of what two bits tell that go wrong, both alone or given another."""
+    worst = Worst("which of two bits tells more, given others", WHOLE_NUMBERS, 0.0, "answers")
+    for X, labels, classes in sets:
+        counted = Cooccurrence(X, labels, classes)
+        wrong = 0
+        # Each of the first three pairs tells the same, of terms in another order: opposites, and one bit xor another.
+        pairs: list[Pair] = [(0, None), (0, None), (0, 3), *_pairs(rng, X.shape[1])]
+        others: list[Pair] = [(1, None), (2, None), (4, 3), *_pairs(rng, X.shape[1])]
+        for one, other in zip(pairs, others, strict=True):
+            sign = truth.compare_conditional_gains(_tables(X, labels, *one), _tables(X, labels, *other))
+            wrong += counted.sign(one, other) != sign
+        worst.see(float(wrong), tried=len(pairs))
+    return worst.finding()
+
+
+def _pairs(rng: np.random.Generator, bits: int) -> Iterator[Pair]:
+    for bit, given in rng.integers(0, [bits, bits + 1], (9, 2)).tolist():
+        yield bit, None if given == bits else given

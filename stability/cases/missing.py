@@ -1,0 +1,156 @@
+"""Ports that do not answer and joints that fall silent; mean rows stand in for them."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiler.tables.collapse import HIGHEST_CODE
+from ...reference.numbers import precisely
+from ...runtime.recognizer import Frame, Recognizer
+from ...runtime.scorer import LANE_OFFSET
+from ..checks.exact_means import ExactMeans
+from ..checks.lost_inputs import Loss, changes, every_loss, worst_frames
+from ..checks.ties import first_best
+from ..finding import Case, Finding, Worst
+from ..inputs.hard_tables import Bits, Codes
+from ..inputs.small_build import SmallBuild, small_build, small_set
+
+CASE = Case(
+    title="Missing ports and silent joints",
+    danger="with means in place of what is missing a score strays further than proved, or nobody is told",
+)
+
+_SUBSETS = "every subset of ports and joints"
+
+
+class Lost(NamedTuple):
+    """What is lost, and n frames: bits (n, s), codes (n, j), and their scores (n, K) without it."""
+
+    loss: Loss
+    bits: Bits
+    codes: Codes
+    scores: NDArray[np.int64]
+
+
+def findings(full: bool) -> Iterator[Finding]:
+    """Lose every subset of joints and of ports, of 8 and of 16 switches, in recorded and in the worst frames."""
+    small, recorded = _small(full), 24 if full else 8
+    hard = list(worst_frames(small.build.tables))
+    bits = np.vstack([small.bits[:recorded], *(of_frame for of_frame, _ in hard)])
+    codes = np.vstack([small.codes[:recorded], *(of_frame for _, of_frame in hard)])
+    losses = [loss for width in (8, 16) for loss in every_loss(small.build, width)]
+    cases = [Lost(loss, bits, codes, _scores(small, loss, bits, codes)) for loss in losses]
+    yield _means(small)
+    yield from _exactly(small, cases)
+    yield _integers(small, cases)
+    yield _sums(small, cases)
+    yield from _told(small, cases)
+
+
+def _small(full: bool) -> SmallBuild:
+    if full:
+        return small_build(small_set(8, rows=150, switches=48, joints=4, types=5, noise=0.15), rounds=40)
+    return small_build(small_set(8, rows=100, switches=32, joints=2, types=4, noise=0.1), rounds=20)
+
+
+def _scores(small: SmallBuild, loss: Loss, bits: Bits, codes: Codes) -> NDArray[np.int64]:
+    frames = zip(bits, codes, strict=True)
+    lanes = [small.build.lanes_without(*frame, loss.switches, loss.joints) for frame in frames]
+    return np.array(lanes) - LANE_OFFSET
+
+
+def _means(small: SmallBuild) -> Finding:
+    """Hold what each mean adds beyond each row of its input against the exact difference."""
+    tables, exact = small.build.tables, ExactMeans(small)
+    # Half a step for the mean and for the row; what doubles lose is as in _float_slack, all of it in one input.
+    worst = Worst("mean rows, beside every row", "exact means, 60 digits", 1 + 2 * _float_slack(small), "steps")
+    columns = [*([0, 1] for _ in range(tables.n_switches)), *([0, *(steps + 1)] for steps in small.tables.thresholds)]
+    for number, (values, truths) in enumerate(zip(columns, exact.changes(), strict=True)):
+        got = changes(tables, 1)[number]
+        joint = number - tables.n_switches
+        bins = values if joint < 0 else np.searchsorted(tables.thresholds[joint], values)
+        for row, truth in zip(got[bins].tolist(), truths, strict=True):
+            with precisely():
+                worst.see(float(max(abs(a - b) for a, b in zip(row, truth, strict=True))), f"input {number}", len(row))
+    return worst.finding()
+
+
+def _exactly(small: SmallBuild, cases: list[Lost]) -> Iterator[Finding]:
+    """Hold scores against the exact ones with exact means, and against those of the whole frame."""
+    # Half a step for the bias and for what each input says, be it a row or a mean.
+    rounding = (small.tables.n_inputs + 1) / 2 + _float_slack(small)
+    means = Worst(f"scores, {_SUBSETS} lost", "exact means, 60 digits", rounding, "steps")
+    proved = Worst(f"what losing {_SUBSETS} changes", "the whole frame, 60 digits", 1, "of the proved bound")
+    exact, nothing = ExactMeans(small), cases[0].loss
+    frames = list(zip(cases[0].bits.tolist(), cases[0].codes.tolist(), strict=True))
+    whole = [exact.scores(*frame, nothing) for frame in frames]
+    for case in cases:
+        with precisely():
+            allowed = [most + rounding for most in exact.most(case.loss)]
+            for frame, of_whole, got in zip(frames, whole, case.scores.tolist(), strict=True):
+                truth = exact.scores(*frame, case.loss)
+                means.see(float(max(abs(a - b) for a, b in zip(truth, got, strict=True))), case.loss.name)
+                shares = (abs(a - b) / most for a, b, most in zip(of_whole, got, allowed, strict=True))
+                proved.see(float(max(shares)), case.loss.name)
+    yield means.finding()
+    yield proved.finding()
+
+
+def _float_slack(small: SmallBuild) -> float:
+    """Return the most steps that doubles can move a score on the way to integers and to their means.
+
+    Counted as in compare.float_slack: with S the sum of the largest magnitudes of all rows, 2^-53 S times the number of
+    joints for the bias that balancing sums up, 2 for balanced rows, at most twice as large as before, 2 for the bias,
+    scaled, and 6 for means of such rows, which are summed, divided and scaled.
+    """
+    tables = small.tables
+    largest = sum(float(np.abs(row).max()) for row in [tables.bias, *tables.switch_rows, *tables.joint_rows])
+    return (len(tables.joint_rows) + 10) * 2.0**-53 * largest * small.build.tables.scale
+
+
+def _integers(small: SmallBuild, cases: list[Lost]) -> Finding:
+    """Among integers nothing is rounded: the worst frames must change by the bound itself, and no frame by more."""
+    worst = Worst(f"most that losing {_SUBSETS} changes", "the bound itself, in integers", 0, "steps")
+    whole = cases[0].scores
+    for case in cases:
+        for sign in (1, -1):
+            most = [change.max(axis=0) for change in changes(small.build.tables, sign)]
+            bound = np.sum([m for m, lost in zip(most, case.loss.inputs, strict=True) if lost], axis=0, initial=0)
+            found = (sign * (case.scores - whole)).max(axis=0)
+            worst.see(float(np.abs(found - bound).max()), case.loss.name, len(whole))
+    return worst.finding()
+
+
+def _sums(small: SmallBuild, cases: list[Lost]) -> Finding:
+    """No running sum, in the order of the inputs, may leave what the build says is its bound."""
+    tables = small.build.tables
+    worst = Worst(f"running sums, {_SUBSETS} lost", "the build's bound, at most 32767", tables.bound, "steps")
+    for case in cases:
+        switches = case.bits.T[:, :, np.newaxis] * tables.switch_rows[:, np.newaxis].astype(np.int64)
+        switches[case.loss.switches] = tables.switch_means[case.loss.switches, np.newaxis]
+        pairs = zip(tables.thresholds, tables.joint_rows, case.codes.T, strict=True)
+        joints = np.stack([rows[np.searchsorted(steps, codes)] for steps, rows, codes in pairs]).astype(np.int64)
+        joints[case.loss.joints] = tables.joint_means[case.loss.joints, np.newaxis]
+        running = tables.bias + np.cumsum(np.concatenate([switches, joints]), axis=0)
+        # What does not add up to the scores that run would be the running sum of something else.
+        differs = not np.array_equal(running[-1], case.scores)
+        worst.see(float("inf") if differs else float(np.abs(running).max()), case.loss.name, len(case.bits))
+    return worst.finding()
+
+
+def _told(small: SmallBuild, cases: list[Lost]) -> Iterator[Finding]:
+    degraded = Worst("frames called degraded", "those that lost a kept switch or a joint", 0, "frames")
+    unread = Worst("answers that hang on what a lost input reads", "the answer without it", 0, "frames")
+    recognizer, grasps = Recognizer(small.build), small.build.grasps
+    for case in cases:
+        lost = case.loss.switches, case.loss.joints
+        for bits, codes, scores in zip(case.bits, case.codes, case.scores.tolist(), strict=True):
+            found = recognizer.recognise(Frame(0, bits, codes, *lost))
+            right = found.degraded == bool(case.loss.inputs.any()) and found.grasp == grasps[first_best(scores)]
+            degraded.see(float(not right), case.loss.name)
+            other = Frame(0, bits ^ case.loss.switches, np.where(case.loss.joints, HIGHEST_CODE - codes, codes), *lost)
+            unread.see(float(recognizer.recognise(other) != found), case.loss.name)
+    yield degraded.finding()
+    yield unread.finding()

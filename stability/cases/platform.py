@@ -1,0 +1,165 @@
+"""Another number of threads, another processor, another Python, another numpy.
+
+Every setting is a process of its own: these are read once, when libraries are loaded. They do change numbers: each
+finding says in how many of its settings numpy's and Python's own exp and matrix products gave other bits than here.
+"""
+
+import os
+import platform
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+
+from ..checks.built_bytes import Built
+from ..finding import Case, Finding
+from ..pythons import made
+
+CASE = Case(
+    title="The platform",
+    danger="the same recordings give another build where threads, the processor's instructions or the Python differ",
+)
+
+# What may have been set around us, and would make settings less different than they look.
+_OURS = (
+    "OPENBLAS_NUM_THREADS",
+    "OMP_NUM_THREADS",
+    "OPENBLAS_CORETYPE",
+    "NPY_DISABLE_CPU_FEATURES",
+    "PYTHONHASHSEED",
+    "GLIBC_TUNABLES",
+)
+
+# OpenBLAS's kernels by the processors they need, each of which runs those before it; no numpy runs on older ones than
+# Nehalem. ARM's have one in common.
+_X86_KERNELS = ("Nehalem", "Sandybridge", "Haswell", "SkylakeX")
+_ARM_KERNELS = ("ARMV8",)
+# glibc's exp, log, sin and pow have variants for fused multiply-add and AVX2; without them the plain ones run.
+_PLAIN_LIBM = "glibc.cpu.hwcaps=-AVX512F,-AVX2,-FMA,-FMA4"
+
+
+class Setting(NamedTuple):
+    """A process to be: what is asked of its environment, in which Python."""
+
+    name: str
+    environment: tuple[tuple[str, str], ...] = ()
+    python: Path = Path(sys.executable)
+
+
+class Ran(NamedTuple):
+    """What became of it: what it made, or how it ended without."""
+
+    name: str
+    built: Built | None
+    ending: str = ""
+
+
+AS_IT_IS = Setting("as it is")
+
+
+def findings(full: bool) -> Iterator[Finding]:
+    """Hold the files of every setting against those that this Python makes as it is."""
+    here = run(AS_IT_IS, full)
+    if here.built is None:
+        yield _failed(here)
+        return
+    for check, settings in _settings(here.built, full):
+        yield held(check, here.built, [run(setting, full) for setting in settings])
+    for python in made() if full else ():
+        yield _in_python(here.built, python)
+
+
+def _settings(here: Built, full: bool) -> Iterator[tuple[str, list[Setting]]]:
+    """Yield (what is looked at, its settings)."""
+    if not full:
+        yield "threads, kernels, SIMD, libm, hash order", [plainest(here), _threads(2)]
+        return
+    yield "BLAS threads 1 and 2", [_threads(1), _threads(2)]
+    yield "BLAS kernels", [_set("OPENBLAS_CORETYPE", kernel) for kernel in _kernels(here)]
+    yield "numpy's SIMD limited", _limited(here)
+    yield "libm without FMA and AVX2", [_set("GLIBC_TUNABLES", _PLAIN_LIBM)]
+    yield "hash order", [_set("PYTHONHASHSEED", seed) for seed in ("0", "1", "4294967295")]
+    yield "all of these at once", [plainest(here)]
+
+
+def _in_python(here: Built, python: Path) -> Finding:
+    """Hold another Python against this one: as it is, and with its own libraries at their plainest."""
+    there = run(AS_IT_IS._replace(python=python), full=True)
+    if there.built is None:
+        return _failed(there)
+    limited = plainest(there.built)._replace(python=python)
+    check = f"Python {there.built.python} with numpy {there.built.numpy}"
+    return held(check, here, [there, run(limited, full=True)])
+
+
+def _failed(ran: Ran) -> Finding:
+    return Finding("a build as it is", "a process that ends well", 1, 0, "processes", 1, ran.ending)
+
+
+def held(check: str, here: Built, others: list[Ran]) -> Finding:
+    """Count the files that differ from this process's. Bound 0: there is no rounding between the bytes of two files."""
+    wrong = [(ran, _differing(here, ran.built)) for ran in others]
+    moved = sum(ran.built is not None and ran.built.plain != here.plain for ran in others)
+    return Finding(
+        check=check,
+        reference=f"bytes of a plain run (numpy's own exp or products differ in {moved} of {len(others)})",
+        error=sum(len(files) for _, files in wrong),
+        bound=0,
+        unit="files",
+        tried=len(others) * len(here.files),
+        worst="; ".join(f"{ran.name}: {ran.ending or ', '.join(files)}" for ran, files in wrong if files),
+    )
+
+
+def _differing(here: Built, other: Built | None) -> list[str]:
+    """Return the names of the files that the other process made differently, or not at all."""
+    there = dict(other.files) if other is not None else {}
+    return [name for name, digest in here.files if there.get(name) != digest]
+
+
+def _threads(count: int) -> Setting:
+    return _set("OPENBLAS_NUM_THREADS", str(count))
+
+
+def _set(name: str, value: str) -> Setting:
+    return Setting(f"{name}={value}", ((name, value),))
+
+
+def _kernels(built: Built) -> tuple[str, ...]:
+    """Return the kernels that this processor runs for certain: those older than what OpenBLAS chose by itself."""
+    if platform.machine().lower() not in ("x86_64", "amd64"):
+        return _ARM_KERNELS
+    chosen = {kernel.partition(" ")[0] for kernel in built.kernels}
+    newest = max((_X86_KERNELS.index(kernel) for kernel in chosen if kernel in _X86_KERNELS), default=0)
+    return _X86_KERNELS[: newest + 1]
+
+
+def _limited(built: Built) -> list[Setting]:
+    """Return settings that take numpy's instruction sets away from the newest on, until none is left."""
+    return [_set("NPY_DISABLE_CPU_FEATURES", " ".join(built.simd[kept:])) for kept in range(len(built.simd))]
+
+
+def plainest(built: Built) -> Setting:
+    """Return the setting of the oldest kernels and the fewest instructions, one thread, another order of hashes."""
+    environment = {
+        "OPENBLAS_NUM_THREADS": "1",
+        "OPENBLAS_CORETYPE": _kernels(built)[0],
+        "NPY_DISABLE_CPU_FEATURES": " ".join(built.simd),
+        "GLIBC_TUNABLES": _PLAIN_LIBM,
+        "PYTHONHASHSEED": "1",
+    }
+    return Setting("plainest", tuple(environment.items()))
+
+
+def run(setting: Setting, full: bool) -> Ran:
+    """Build in a process of this setting."""
+    environment = {name: value for name, value in os.environ.items() if name not in _OURS} | dict(setting.environment)
+    command = [str(setting.python), "-P", "-m", "thenar.stability.checks.built_bytes", *(["--large"] if full else [])]
+    ran = subprocess.run(command, env=environment, capture_output=True, check=False)
+    if ran.returncode:
+        words = ran.stderr.decode(errors="replace").strip().rpartition("\n")[2]
+        return Ran(setting.name, None, f"{setting.python} ended with {ran.returncode} {words}".strip())
+    return Ran(setting.name, msgspec.json.decode(ran.stdout, type=Built))

@@ -1,0 +1,189 @@
+"""From ensembles of thousands of rounds to score tables and whole steps."""
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+
+import mpmath
+import numpy as np
+from mpmath import mpf
+from numpy.typing import NDArray
+
+from ...compiler.boosting.stumps import Stumps
+from ...compiler.tables.balance import balance
+from ...compiler.tables.collapse import ScoreTables, collapse
+from ...compiler.tables.quantise import quantise
+from ...reference import ensembles as truth
+from ...reference import tables
+from ...reference.numbers import precisely
+from ..checks.roundings import ROUNDING, SMALLEST, part_of
+from ..finding import Case, Finding, Worst
+from ..inputs.hard_ensembles import SWITCHES, ensembles, frames
+from ..inputs.hard_tables import half_a_step_off
+
+CASE = Case(
+    title="Score tables",
+    danger="scores drift over thousands of rounds, tables say something else than the stumps they are made of",
+)
+REFERENCE = "60 digits"
+X_ROUNDING = "x rounding"
+
+Floats = NDArray[np.float64]
+
+
+def findings(full: bool) -> Iterator[Finding]:
+    """Yield errors of scores, of tables, of balanced tables and of whole steps."""
+    rng = np.random.default_rng(6)
+    hard = list(ensembles(rng, 3 if full else 2, 10_000 if full else 1000))
+    bits, codes = frames(rng, 12 if full else 4)
+    yield from scores_of(hard, bits, codes)
+    yield from tables_of(hard)
+    yield table_scores_of(hard, bits, codes)
+    yield balanced_of(hard)
+    yield from whole_steps_of(rng, hard)
+
+
+def scores_of(hard: list[tuple[str, Stumps]], bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> Iterator[Finding]:
+    """Hold the ensembles' scores of frames against the reference."""
+    # Of a step (K - 1)/K (g - mean g) the following round, by 2^-53 of so many times the largest |g|: shrinkage 2, here
+    # and in the mean, partial sums over K (K + 1)/2, mean 1, difference 2, all times (K - 1)/K, and the last two
+    # operations 2 ((K - 1)/K)^2 each; for every K > 1 that is below K + 4. Rounds are added with compensation, so that
+    # their sum rounds once.
+    worst = Worst("scores of thousands of rounds", REFERENCE, 1.0, X_ROUNDING)
+    mean = Worst("mean of the scores of all classes", "zero", 1.0, X_ROUNDING)
+    X = np.hstack([bits, codes])
+    for name, stumps in hard:
+        at, K = f"{stumps.n_rounds} rounds, {stumps.n_classes} classes: {name}", stumps.n_classes
+        columns, thresholds, values = stumps.columns.tolist(), stumps.thresholds.tolist(), stumps.values.tolist()
+        largest = mpmath.fsum(np.abs(stumps.values).max(axis=(1, 2)).tolist()) * stumps.shrinkage
+        for row, got in zip(X.tolist(), stumps.scores(X).tolist(), strict=True):
+            exact = truth.scores(columns, thresholds, values, stumps.shrinkage, row)
+            with precisely():
+                steps = (K + 4) * (ROUNDING * largest + stumps.n_rounds * SMALLEST)
+                for ours, true in zip(got, exact, strict=True):
+                    worst.see(part_of(ours, true, steps + ROUNDING * abs(true)), at)
+                mean.see(float(abs(mpmath.fsum(got)) / K / (steps + ROUNDING * max(map(abs, exact)))), at)
+    yield from (worst.finding(), mean.finding())
+
+
+def _exact_tables(stumps: Stumps) -> tuple[list[mpf], list[list[mpf]], list[tables.Joint]]:
+    columns, thresholds, values = stumps.columns.tolist(), stumps.thresholds.tolist(), stumps.values.tolist()
+    return tables.score_tables(columns, thresholds, values, stumps.shrinkage, stumps.n_inputs, SWITCHES)
+
+
+def _sizes(stumps: Stumps) -> Floats:
+    """Return the sum over an input's stumps of the magnitudes that they add left and right, (n_inputs, K)."""
+    K = stumps.n_classes
+    spread = stumps.shrinkage * (K - 1) / K * np.abs(np.eye(K) - 1 / K)
+    sizes = np.zeros((stumps.n_inputs, K))
+    np.add.at(sizes, stumps.columns, np.abs(stumps.values[:, :, :2]).sum(axis=2)[:, :, np.newaxis] * spread)
+    return sizes
+
+
+def tables_of(hard: list[tuple[str, Stumps]]) -> Iterator[Finding]:
+    """Hold the tables of ensembles against the reference."""
+    # A stump's part g - mean g, of one g that is not 0, rounds 5 times; a switch's closed less opened once more. They
+    # are summed with compensation, and rounded once; the bias is a sum over the switches.
+    rows = Worst("rows of score tables", REFERENCE, 1.0, X_ROUNDING)
+    thresholds = Worst("thresholds of score tables", "whole numbers", 0.0, "joints")
+    for name, stumps in hard:
+        at = f"{stumps.n_rounds} rounds, {stumps.n_classes} classes: {name}"
+        ours, (bias, switch_rows, joints) = collapse(stumps, SWITCHES), _exact_tables(stumps)
+        sizes, tiny = _sizes(stumps), 6 * stumps.n_rounds * stumps.n_classes * SMALLEST
+        parts = [(ours.bias, bias, (6 + SWITCHES) * sizes[:SWITCHES].sum(axis=0))]
+        parts += [(a, b, 6 * size) for a, b, size in zip(ours.switch_rows, switch_rows, sizes, strict=False)]
+        for (steps, exact), codes, table, size in zip(
+            joints, ours.thresholds, ours.joint_rows, sizes[SWITCHES:], strict=True
+        ):
+            thresholds.see(float(codes.tolist() != steps), at)
+            parts += [(a, b, 5 * size) for a, b in zip(table, exact, strict=True)]
+        for row, exact_row, counted in parts:
+            for got, true, units in zip(row.tolist(), exact_row, counted.tolist(), strict=True):
+                with precisely():
+                    rows.see(part_of(got, true, ROUNDING * (units + abs(true)) + tiny), at)
+    yield from (rows.finding(), thresholds.finding())
+
+
+def table_scores_of(hard: list[tuple[str, Stumps]], bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> Finding:
+    """Hold the scores that tables give to frames against the reference, given the tables."""
+    # A row an input is added to the bias: one rounding each, of a partial sum.
+    worst = Worst("scores from tables", REFERENCE, 1.0, X_ROUNDING)
+    for name, stumps in hard:
+        ours = collapse(stumps, SWITCHES)
+        size = np.abs(ours.bias) + sum(
+            np.abs(rows).max(axis=0) for rows in (*ours.switch_rows[:, np.newaxis], *ours.joint_rows)
+        )
+        thresholds, joints = ([part.tolist() for part in parts] for parts in (ours.thresholds, ours.joint_rows))
+        frames_and_scores = zip(bits.tolist(), codes.tolist(), ours.scores(bits, codes).tolist(), strict=True)
+        for closed, of_joints, got in frames_and_scores:
+            exact = tables.table_scores(
+                ours.bias.tolist(), ours.switch_rows.tolist(), thresholds, joints, closed, of_joints
+            )
+            for a, b, magnitude in zip(got, exact, size.tolist(), strict=True):
+                with precisely():
+                    worst.see(part_of(a, b, ours.n_inputs * ROUNDING * mpf(magnitude)), name)
+    return worst.finding()
+
+
+def balanced_of(hard: list[tuple[str, Stumps]]) -> Finding:
+    """Hold balanced tables against the reference, given those they are made of."""
+    # With j joints and M = |bias| + what rows reach: the bias that is wanted away rounds j + 1 times, the share of a
+    # span j + 3 times, its product, sum and difference 3 times; the new bias is a sum of j of those and the old one.
+    worst = Worst("balanced tables", REFERENCE, 1.0, X_ROUNDING)
+    for name, stumps in hard:
+        before = collapse(stumps, SWITCHES)
+        after, j = balance(before), len(before.joint_rows)
+        bias, joints = tables.balanced(before.bias.tolist(), [rows.tolist() for rows in before.joint_rows])
+        reach = sum(np.abs(rows).max(axis=0) + np.ptp(rows, axis=0) for rows in before.joint_rows)
+        M = (np.abs(before.bias) + reach).tolist()
+        pairs = [(after.bias.tolist(), bias, 3 * j + 7)]
+        for ours, exact in zip(after.joint_rows, joints, strict=True):
+            pairs += [(a, b, 2 * j + 7) for a, b in zip(ours.tolist(), exact, strict=True)]
+        for row, exact_row, times in pairs:
+            for got, true, size in zip(row, exact_row, M, strict=True):
+                with precisely():
+                    worst.see(part_of(got, true, times * (ROUNDING * mpf(size) + SMALLEST)), name)
+    return worst.finding()
+
+
+def whole_steps_of(rng: np.random.Generator, hard: list[tuple[str, Stumps]]) -> Iterator[Finding]:
+    """Look at the rounding to whole steps, of rows and of their means."""
+    # Rounding is by half a step; the product before it by 2^-53 of 32767 steps; what stands in for a missing input is a
+    # mean, whose sum, quotient and product with a row round as well: 4 such roundings.
+    rows = Worst("rows in whole steps", "fractions", 0.5 + 32767 * 2.0**-53, "steps")
+    means = Worst("rows for missing inputs, in whole steps", REFERENCE, 0.5 + 4 * 32767 * 2.0**-53, "steps")
+    halves = Worst("half steps, half to even", "fractions", 0.0, "steps")
+    for _, stumps in hard:
+        bits, codes = frames(rng, 57)
+        ours = balance(collapse(stumps, SWITCHES))
+        integers = quantise(ours, bits, codes)
+        scale = Fraction(integers.scale)
+        for got, row in zip((integers.bias, *integers.switch_rows), (ours.bias, *ours.switch_rows), strict=True):
+            for whole, exact in zip(got.tolist(), row.tolist(), strict=True):
+                rows.see(float(abs(whole - Fraction(exact) * scale)))
+        for whole, mean in _means(ours, integers.switch_means, integers.joint_means, bits, codes):
+            with precisely():
+                means.see(float(abs(whole - mean * mpf(integers.scale))))
+    for limit in (127, 2047, 32767):
+        edge = half_a_step_off(5, limit)
+        integers = quantise(edge, np.ones((1, 5), bool), np.zeros((1, 0), np.uint16), limit.bit_length() + 1)
+        exact = [tables.steps(x, integers.scale) for x in np.vstack([edge.bias, edge.switch_rows]).ravel().tolist()]
+        got = np.vstack([integers.bias, integers.switch_rows]).ravel().tolist()
+        halves.see(float(sum(a != b for a, b in zip(got, exact, strict=True))), tried=len(exact))
+    yield from (rows.finding(), means.finding(), halves.finding())
+
+
+def _means(
+    of: ScoreTables,
+    switches: NDArray[np.int16],
+    joints: NDArray[np.int16],
+    bits: NDArray[np.bool_],
+    codes: NDArray[np.uint16],
+) -> Iterator[tuple[int, mpf]]:
+    """Yield what stands in for a missing input in whole steps, and what it is the mean of in units of score."""
+    exact: list[Sequence[mpf]] = [
+        tables.mean_switch(*pair) for pair in zip(of.switch_rows.tolist(), bits.T.tolist(), strict=True)
+    ]
+    for steps, rows, column in zip(of.thresholds, of.joint_rows, codes.T, strict=True):
+        exact.append(tables.mean_row(steps.tolist(), rows.tolist(), column.tolist()))
+    for got, row in zip((*switches.tolist(), *joints.tolist()), exact, strict=True):
+        yield from zip(got, row, strict=True)

@@ -1,0 +1,182 @@
+"""Classes that can be parted perfectly, boosted long after they are.
+
+When does the loss fall? Friedman's step moves F_k by (K - 1)/K g_k in all classes at once, g_k one Newton step of class
+k against the rest. The loss is convex, so that the step raises it no more than the mean of K steps (K - 1) g_k, each of
+one class alone. With K = 2, and with a shrinkage of 1/(K - 1) or less, these are Newton steps or shorter; and under the
+clamp of 3 (up to 4) such a step never overshoots, whatever the rows (tests/stability/cases/test_separable.py holds the
+inequality). So on any data at all the loss of two classes falls, and that of more under such a shrinkage. With more
+classes and a shrinkage of 1 it falls where each class has a stump of its own that parts it perfectly: its members rise,
+all others sink. In between LogitBoost itself can rise: two classes of many declared are the clearest case, where their
+difference moves by almost two Newton steps. There the loss that is told is held against 60 digits instead.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...compiler.boosting.boost import History, boost
+from ...compiler.boosting.stumps import Stumps, winners
+from ...compiler.tables.collapse import collapse
+from ...compiler.tables.quantise import quantise
+from ...reference.logistic import mean_loss
+from ...reference.numbers import distance
+from ...reference.tables import table_scores
+from ...runtime.tables import LIMIT, IntegerTables
+from ..checks.integer_sums import largest_sum
+from ..checks.roundings import ROUNDING, loss_error, part_of
+from ..checks.rounds import Moment, loss_rounding, moments, rise_rounding
+from ..finding import Case, Finding, Worst
+from ..inputs.hard_data import HardSet, intervals, separable, words
+from ..inputs.hard_tables import rows_of
+
+CASE = Case(
+    title="Separable classes",
+    danger="P goes to 0 and 1, 1/P to infinity, weights to 0; training creeps on, and tables overflow",
+)
+
+
+def findings(full: bool) -> Iterator[Finding]:
+    """Yield what boosting does to sets of 2 to 33 classes in 10,000 rounds, in 300 quickly."""
+    classes = (2, 3, 6, 14, 33)
+    falling = [separable(k) for k in classes] + [intervals(2), words(2)]
+    others = [make(k) for make in (intervals, words) for k in (classes[2:] if full else (14,))]
+    between = [separable(k) for k in range(2, 34) if k not in classes] if full else []
+    rounds = 10_000 if full else 300
+    runs = [(hard, rounds, True) for hard in falling] + [(hard, rounds, False) for hard in others]
+    yield from _trained(runs + [(hard, 300, True) for hard in between])
+    yield from _stopped([*falling[-4:], *others, *between])
+    yield _told(_rising(60 if full else 12))
+
+
+def _trained(runs: list[tuple[HardSet, int, bool]]) -> Iterator[Finding]:
+    """Train sets for so many rounds, some of whose loss can only fall, and look at every round and at what comes of it.
+
+    At 60 digits, after 1, 2, 4, 8 and so on.
+    """
+    outside = Worst("P, w, w z and answers finite and in range", "the rules themselves", 0.0, "rounds")
+    # A share rounds once; K - 1 additions lie under it.
+    sums = Worst("shares of a row add up to 1", "exact sums", 1.0, "x rounding")
+    rises = Worst("rise of the loss, where it must fall", "convexity", 1.0, "x rounding")
+    told = Worst("losses told of a round that are not the ensemble's", "the ensemble", 0.0, "losses")
+    losses = Worst("losses, however small", "60 digits", 1.0, "x rounding")
+    overflow = Worst("largest sum of the integer tables, any order", "all rows' extremes", LIMIT, "steps")
+    wrong = Worst("frames not named right by ensemble and integers", "their labels", 0.0, "frames")
+    for hard, rounds, must_fall in runs:
+        stumps, history = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds)
+        before: Moment | None = None
+        for number, moment in enumerate(moments(hard, stumps)):
+            at = f"{hard.name}, round {number}"
+            outside.see(float(not _in_range(hard, moment)), at)
+            sums.see(_sum_error(moment), at)
+            told.see(float(moment.loss != history.losses[number]), at)
+            if before is not None and must_fall:
+                rises.see(_rise(hard, before, moment), at)
+            if number & (number - 1) == 0:
+                losses.see(_loss_error(hard, moment), at)
+            before = moment
+        outside.see(float(not (np.abs(stumps.values) <= 3.0).all()), hard.name)
+        _see_tables(hard, stumps, overflow, wrong)
+    yield from (worst.finding() for worst in (outside, sums, rises, told, losses, overflow, wrong))
+
+
+def _in_range(hard: HardSet, moment: Moment) -> bool:
+    """Whether 0 <= P <= 1; 0 <= w <= 1/3, the largest of (1 - p) max(p, 1/3); |w z| = |Y - P|; a settled row has none.
+
+    1/3, |Y - P| and their product round once each.
+    """
+    shares, weights, responses = moment.shares, moment.weights, moment.responses
+    settled = hard.member & (shares == 1.0)
+    return bool(
+        np.isfinite(moment.scores).all()
+        and ((shares >= 0) & (shares <= 1)).all()
+        and ((weights >= 0) & (weights <= (1 + 3 * ROUNDING) / 3)).all()
+        and np.array_equal(np.abs(responses), np.where(hard.member, 1.0 - shares, shares))
+        and not weights[settled].any()
+    )
+
+
+def _sum_error(moment: Moment) -> float:
+    """Return |sum of P - 1| of the worst row, in units of 2 K roundings."""
+    shares = moment.shares
+    # P = e/S: S, a sum of K numbers, rounds K - 1 times and the quotient once; the sum taken here K - 1 times again.
+    return float(np.abs(shares.sum(axis=0) - 1.0).max() / (2 * len(shares) * ROUNDING))
+
+
+def _rise(hard: HardSet, before: Moment, after: Moment) -> float:
+    return max(0.0, after.loss - before.loss) / rise_rounding(hard.n_classes, before, after)
+
+
+def _loss_error(hard: HardSet, moment: Moment) -> float:
+    rows, labels = moment.scores.T.tolist(), hard.labels.tolist()
+    return part_of(moment.loss, mean_loss(rows, labels), loss_error(rows, labels, [1.0] * len(labels)))
+
+
+def _see_tables(hard: HardSet, stumps: Stumps, overflow: Worst, wrong: Worst) -> None:
+    for rounds in (1, 10, stumps.n_rounds):
+        integers = quantise(collapse(stumps.first(rounds), hard.n_switches), hard.bits, hard.codes)
+        overflow.see(largest_sum(rows_of(integers)), f"{hard.name}, {rounds} rounds")
+    steps = [_steps(integers, row) for row in hard.X.tolist()]
+    by_stumps = winners(stumps.scores(hard.X))
+    for label, row, winner in zip(hard.labels.tolist(), steps, by_stumps.tolist(), strict=True):
+        wrong.see(float(not label == winner == row.index(max(row))), hard.name)
+
+
+def _steps(tables: IntegerTables, row: list[int]) -> list[int]:
+    """Return the integer scores (K,) of one frame, as the definition has them."""
+    n, (bias, *switches) = len(tables.switch_rows), rows_of(tables)
+    thresholds = [steps.tolist() for steps in tables.thresholds]
+    switch_rows = [of_closed for (of_closed,) in switches[:n]]
+    scores = table_scores(bias[0], switch_rows, thresholds, switches[n:], list(map(bool, row[:n])), row[n:])
+    return list(map(int, scores))
+
+
+def _stopped(sets: list[HardSet]) -> Iterator[Finding]:
+    """The tolerance ends training in the first round that changes the loss by less, keeps it, and is told."""
+    worst = Worst("trainings that the tolerance ends in another round", "the losses without it", 0.0, "trainings")
+    for hard in sets:
+        long, history = boost(hard.X, hard.labels, hard.n_classes, rounds=100)
+        changes = np.abs(np.diff(history.losses))
+        for tolerance in (0.0, 1e-12, 1e-6, 1e-3):
+            stumps, short = boost(hard.X, hard.labels, hard.n_classes, rounds=100, tolerance=tolerance)
+            small = np.flatnonzero(changes < tolerance)
+            due = int(small[0]) + 1 if small.size else 100
+            holds = stumps.n_rounds == due and short.stopped_early == bool(small.size)
+            holds &= short.losses == history.losses[: due + 1] and _same(stumps, long.first(due))
+            worst.see(float(not holds), f"{hard.name}, tolerance {tolerance:g}")
+    yield worst.finding()
+
+
+def _same(one: Stumps, other: Stumps) -> bool:
+    return one.values.tobytes() == other.values.tobytes() and one.columns.tobytes() == other.columns.tobytes()
+
+
+def _rising(n: int) -> Iterator[tuple[HardSet, Stumps, History]]:
+    """Yield trainings of two classes of 12 to 33 declared, separable and on few frames, whose loss rises somewhere."""
+    rng = np.random.default_rng(1)
+    while n:
+        X = np.unique(rng.integers(0, 5, (12, 2)), axis=0)
+        labels = rng.integers(0, 2, len(X))
+        hard = HardSet("two classes of many", X, labels, int(rng.integers(12, 34)), 0)
+        if np.ptp(X, axis=0).any():
+            stumps, history = boost(X, labels, hard.n_classes, rounds=40)
+            if (np.diff(history.losses) > 1e-6).any():
+                n -= 1
+                yield hard, stumps, history
+
+
+def _told(trainings: Iterator[tuple[HardSet, Stumps, History]]) -> Finding:
+    """Where the loss does rise, the rise is true: before and after it the loss is that of the scores."""
+    worst = Worst("the loss, where it may rise (2 classes, many declared)", "60 digits", 1.0, "x rounding")
+    for hard, stumps, history in trainings:
+        scores = [np.zeros((len(hard.X), hard.n_classes)), *stumps.staged_scores(hard.X)]
+        for number in _around(history):
+            truth = mean_loss(scores[number].tolist(), hard.labels.tolist())
+            error = distance(history.losses[number], truth)
+            worst.see(error / loss_rounding(hard.n_classes, float(truth)), f"{hard.n_classes} classes, round {number}")
+    return worst.finding()
+
+
+def _around(history: History) -> list[int]:
+    """Return the rounds before and after the largest rise."""
+    rise = int(np.diff(history.losses).argmax())
+    return [rise, rise + 1]

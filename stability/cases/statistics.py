@@ -1,0 +1,170 @@
+"""Intervals at rates 0 and 1, classes smaller than the folds, subjects that lack a class."""
+
+from collections.abc import Iterator
+from itertools import product
+
+import numpy as np
+from mpmath import mpf
+
+from ...compiler.evaluation.folds import Fold, weka_folds
+from ...compiler.evaluation.rates import Average, Rate
+from ...compiler.evaluation.study import Options, evaluate
+from ...reference.intervals import Interval, student, student_quantile, wilson
+from ...reference.numbers import distance, precisely
+from ..checks.roundings import ROUNDING
+from ..finding import Case, Finding, Worst
+from ..inputs.lopsided import differs, guessed_untrained, lopsided, parts_of, tested_labels
+
+CASE = Case(
+    title="Rates and folds at their ends",
+    danger="an interval leaves 0 to 1 or has no width, or a row is tested twice, never, or by what it trained",
+)
+
+# Wilson's ends are (centre -+ reach) / shrink, where neither centre nor reach exceeds shrink, so that an error in them
+# weighs no more than one in the end. Roundings, of relative size 2^-53: centre 5 (the rate, z^2 twice, quotient, sum),
+# reach 9 (those of two terms under a root that halves them, the root, the product), shrink 4, difference, quotient.
+WILSON_BOUND = (5 + 9 + 4 + 2) * ROUNDING
+# Student's reach is t s / sqrt n: scipy's t is off by 4 ulp for up to 3 degrees of freedom (8 roundings; a test of the
+# rates holds it), the rest by 4.
+STUDENT_ROUNDINGS = 8 + 4
+_SIXTY = "60 digits"
+_TOTALS = (1, 2, 3, 5, 12, 33, 100, 999, 65536, 10**6, 10**9, 10**12)
+
+
+def findings(full: bool) -> Iterator[Finding]:
+    """Hold intervals against 60 digits, and folds and evaluations against what must be true of every one."""
+    yield from _wilson(range(1, 150) if full else range(1, 40))
+    yield from _repeated(4 if full else 3)
+    yield from _averages(300 if full else 30)
+    yield from _folds(400 if full else 60)
+    yield from _evaluations()
+
+
+def _wilson(totals: range) -> Iterator[Finding]:
+    """One repeat: of every count up to some, and next to both ends of large ones."""
+    off = Worst("ends of Wilson's interval", _SIXTY, WILSON_BOUND, "rate")
+    odd = Worst("rates of 0 and 1 whose interval does not end there, or has no width", "the rule itself", 0, "rates")
+    counts = [(correct, total) for total in totals for correct in range(total + 1)]
+    counts += [(correct, n) for n in _TOTALS for correct in {0, 1, n // 2, n - 1, n}]
+    for correct, total in counts:
+        rate = Rate.of((correct,), total)
+        off.see(_apart(rate, wilson(correct, total)), f"{correct} of {total}")
+        if correct in (0, total):
+            ends = rate.low == 0 if correct == 0 else rate.high == 1
+            odd.see(not (ends and rate.low < rate.high), f"{correct} of {total}")
+    yield off.finding()
+    yield odd.finding()
+
+
+def _repeated(repeats: int) -> Iterator[Finding]:
+    """Several repeats: the smallest interval around Wilson's and Student's, cut off at 0 and 1.
+
+    A rate's own rounding moves the deviations by 2^-53 each, so the reach by t sqrt(n / (n - 1)) / sqrt n of that.
+    """
+    worst_t = float(student_quantile(1, mpf("0.975")))
+    bound = WILSON_BOUND + (STUDENT_ROUNDINGS * worst_t + 2 * worst_t) * ROUNDING
+    off = Worst("ends of the interval of repeats", _SIXTY, bound, "rate")
+    outside = Worst("intervals that leave 0 to 1, or their own mean", "the rule itself", 0, "rates")
+    for n in range(2, repeats + 1):
+        for total in (1, 2, 7, 1000):
+            for correct in product(sorted({0, 1, total // 2, total - 1, total}), repeat=n):
+                rate = Rate.of(correct, total)
+                off.see(_apart(rate, _hull(correct, total)), f"{correct} of {total}")
+                outside.see(not 0 <= rate.low <= rate.mean <= rate.high <= 1, f"{correct} of {total}")
+    yield off.finding()
+    yield outside.finding()
+
+
+@precisely()
+def _hull(correct: tuple[int, ...], total: int) -> Interval:
+    mean = mpf(sum(correct)) / len(correct)
+    both = wilson(mean, total), student([mpf(count) / total for count in correct])
+    return max(min(low for low, _ in both), mpf(0)), min(max(high for _, high in both), mpf(1))
+
+
+def _apart(found: Rate | Average, truth: Interval) -> float:
+    return max(distance(found.low, truth[0]), distance(found.high, truth[1]))
+
+
+def _averages(draws: int) -> Iterator[Finding]:
+    """Of subjects, those at 0 and at 1 among them: mean -+ the root of the sum of squares of their reaches, over k.
+
+    Roundings of 2^-53: the mean 2, each reach 1, the root 2, the quotient 1, the end 1; none of them exceeds 1.
+    """
+    off = Worst("ends of the interval of an average", _SIXTY, 7 * ROUNDING, "rate")
+    outside = Worst("averages whose interval leaves 0 to 1, or their mean", "the rule itself", 0, "averages")
+    for pairs, total in _subjects(draws):
+        rates = tuple(Rate.of(tuple(pair), total) for pair in pairs)
+        average = Average.of(rates)
+        off.see(_apart(average, _mover(rates)), f"{pairs} of {total}")
+        outside.see(not 0 <= average.low <= average.mean <= average.high <= 1, f"{pairs} of {total}")
+    yield off.finding()
+    yield outside.finding()
+
+
+def _subjects(draws: int) -> Iterator[tuple[list[list[int]], int]]:
+    """Yield what subjects recognised in two repeats each, of how many."""
+    # Plain doubles end this one's interval at 1.0000000000000002.
+    yield [[0, 14], *[[23, 23]] * 4], 23
+    random = np.random.default_rng(10)
+    for number in range(draws):
+        total = int(random.choice([1, 2, 12, 23, 1000]))
+        # A third are at 0 and a third at 1, but for one whose repeats disagree.
+        least, most = ((0, 0), (total, total), (0, total))[number % 3]
+        pairs = random.integers(least, most + 1, (random.integers(1, 9), 2))
+        pairs[0] = 0, random.integers(0, total + 1)
+        yield pairs.tolist(), total
+
+
+@precisely()
+def _mover(rates: tuple[Rate, ...]) -> Interval:
+    k = len(rates)
+    means, lows, highs = (
+        [mpf(each) for each in column] for column in zip(*((r.mean, r.low, r.high) for r in rates), strict=True)
+    )
+    below = sum((m - low) ** 2 for m, low in zip(means, lows, strict=True)) ** mpf("0.5") / k
+    above = sum((high - m) ** 2 for m, high in zip(means, highs, strict=True)) ** mpf("0.5") / k
+    mean = sum(means) / k
+    return max(mean - below, mpf(0)), min(mean + above, mpf(1))
+
+
+def _folds(draws: int) -> Iterator[Finding]:
+    """Classes from one row upwards: every row is tested once and trained where it is not, each class spread evenly."""
+    lost = Worst("rows not tested once, or trained where they are tested", "the rule itself", 0, "rows")
+    uneven = Worst("classes in one fold by two rows more than in another", "the rule itself", 0, "classes")
+    random = np.random.default_rng(11)
+    for draw in range(draws):
+        labels = np.repeat(np.arange(6), random.integers(1, [1 + 1, 2, 3, 9, 20, 60]))
+        labels = labels[random.permutation(len(labels))]
+        n_folds = int(random.integers(2, min(len(labels), 12) + 1))
+        folds = weka_folds(labels, n_folds, draw)
+        what = f"draw {draw}: {np.bincount(labels).tolist()} in {n_folds}"
+        lost.see(_misused(folds, len(labels)), what, tried=len(labels))
+        shares = np.array([np.bincount(labels[fold.test], minlength=6) for fold in folds])
+        uneven.see(int((np.ptp(shares, axis=0) > 1).sum()), what, tried=6)
+    yield lost.finding()
+    yield uneven.finding()
+
+
+def _misused(folds: list[Fold], rows: int) -> int:
+    tested = np.bincount(np.concatenate([fold.test for fold in folds]), minlength=rows)
+    both = sum(len(np.intersect1d(fold.train, fold.test)) for fold in folds)
+    left = sum(rows - len(np.union1d(fold.train, fold.test)) for fold in folds)
+    return int((tested != 1).sum()) + both + left
+
+
+def _evaluations() -> Iterator[Finding]:
+    """Rows counted once each; a class is never answered by a fold that was not trained on it, and that is said."""
+    miscounted = Worst("confusion matrices whose rows are not those tested", "the set's rows", 0, "matrices")
+    guessed = Worst("rows taken for a class that their fold was not trained on", "the set's rows", 0, "rows")
+    silent = Worst("sets evaluated in silence on types not trained on", "a warning of it", 0, "sets")
+    for name, (grasp_set, scheme) in lopsided().items():
+        study = evaluate(grasp_set, Options(scheme=scheme, rounds=10, repeats=2, tables=("compositions",)), jobs=1)
+        rows = [row.cells for table in study.tables for row in table.rows]
+        tested = [tested_labels(grasp_set, part) for part in parts_of(grasp_set, scheme)]
+        miscounted.see(sum(sum(map(differs, cells, tested)) for cells in rows), name, tried=len(rows) * len(tested))
+        guessed.see(guessed_untrained(grasp_set, scheme), name, tried=len(grasp_set))
+        silent.see(not any("they cannot be recognised" in warning for warning in study.warnings), name)
+    yield miscounted.finding()
+    yield guessed.finding()
+    yield silent.finding()

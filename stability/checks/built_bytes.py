@@ -1,0 +1,83 @@
+"""What must come out the same on every platform, as digests: a simulated set, and the build that is compiled of it.
+
+Run as a program in another process or another Python, it prints what it made there and with which libraries.
+"""
+
+import hashlib
+import math
+import platform
+import sys
+import warnings
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import msgspec
+import numpy as np
+from threadpoolctl import threadpool_info
+
+from ...compiler.build.compile import compile_build
+from ...runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, TABLES_NAME
+from ...simulator.running.simulation import simulate
+from ...simulator.scenes.decode import load_scene
+
+SCENE = "quick"  # 160 switches, 16 joints, 14 grasp types, two hands
+SMALL = 3, 20, 2  # repetitions, rounds, folds: about half a second
+LARGE = 24, 200, 4  # twice what the shipped scene and `thenar compile` take by themselves
+
+
+class Built(msgspec.Struct, frozen=True):
+    """What a process made.
+
+    python, numpy  their versions             kernels  the BLAS libraries' kernels and threads: "Haswell x2"
+    simd           numpy's instruction sets above its baseline that are in use
+    files          (name, SHA-256) of each file made
+    plain          SHA-256 of what plain exp and matrix products answer there: what we may not build on
+    """
+
+    python: str
+    numpy: str
+    kernels: tuple[str, ...]
+    simd: tuple[str, ...]
+    files: tuple[tuple[str, str], ...]
+    plain: str
+
+
+def build(*, large: bool) -> Built:
+    """Simulate a set, compile it, and return the digests of the files. Warnings are errors."""
+    with warnings.catch_warnings(), TemporaryDirectory() as folder:
+        warnings.simplefilter("error")
+        files = _files(Path(folder), *(LARGE if large else SMALL))
+    simd = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
+    return Built(
+        python=platform.python_version(),
+        numpy=np.__version__,
+        kernels=tuple(f"{blas['architecture']} x{blas['num_threads']}" for blas in threadpool_info()),
+        simd=tuple(simd),
+        files=files,
+        plain=_digest(_plain()),
+    )
+
+
+def _files(folder: Path, repetitions: int, rounds: int, folds: int) -> tuple[tuple[str, str], ...]:
+    scene = msgspec.structs.replace(load_scene(SCENE), repetitions=repetitions)
+    found = simulate(scene, jobs=1).grasp_set
+    recorded = folder / "set.grasps"
+    found.save(recorded)
+    made = compile_build(found, folder / "build", rounds=rounds, folds=folds).folder
+    files = recorded, *(made / name for name in (MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME))
+    return tuple((file.name, _digest(file.read_bytes())) for file in files)
+
+
+def _plain() -> bytes:
+    """Return numbers that numpy, the BLAS and libm compute by the processor: a matrix product, and exp two ways."""
+    numbers = (np.arange(300 * 500) % 99_991 / 33_331.0).reshape(300, 500)
+    products = numbers @ numbers.T / 10_000
+    return np.exp(products).tobytes() + np.array([math.exp(number) for number in numbers.flat]).tobytes()
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+if __name__ == "__main__":
+    sys.stdout.buffer.write(msgspec.json.encode(build(large="--large" in sys.argv[1:])))

@@ -1,0 +1,108 @@
+"""Sums of int16 rows: how far they get, and whether the largest tables add up right."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiler.tables.furthest import furthest
+from ...runtime.scorer import LANE_OFFSET, Scorer
+from ...runtime.tables import (
+    LIMIT,
+    MAX_CLASSES,
+    MAX_JOINTS,
+    MAX_SWITCHES,
+    IntegerTables,
+    tables_from_bytes,
+    tables_to_bytes,
+)
+from ..finding import Finding, Worst
+from ..inputs.hard_tables import whole_numbers
+
+
+def largest_sum(inputs: Iterable[Sequence[Sequence[float]]]) -> float:
+    """Return the largest magnitude that rows (K,), at most one of each input, reach in a class, in any order of adding.
+
+    So that is the largest on the way to any sum as well.
+    """
+    reached = 0.0
+    for sign in (1, -1):
+        tops = [[max(0, *(sign * step for step in column)) for column in zip(*rows, strict=True)] for rows in inputs]
+        reached = max(reached, *(sum(column) for column in zip(*tops, strict=True)))
+    return reached
+
+
+def furthest_sums(seeds: range) -> Finding:
+    """Is the bound of the sums reached, and by no frame exceeded? All frames, whole and with inputs missing."""
+    worst = Worst("furthest sum, and the frame and order that reach it", "every frame and gap there is", 0, "steps")
+    for seed in seeds:
+        for most in (1, 90, 3000):
+            tables = whole_numbers(seed, 3, 3, (3, 2), most)
+            found, every = furthest(tables), _every_sum(tables)
+            running = np.cumsum(found.terms[found.order, found.grasp].astype(np.int64))
+            reached = int(running[found.n_terms - 1]) if found.n_terms else 0
+            scored = Scorer(tables).lanes_without(found.bits, found.codes, found.lost_switches, found.lost_joints)
+            for got, truth in (
+                (tables.bound, every),
+                (abs(found.total), every),
+                (abs(reached), every),
+                (int(np.abs(running).max()), every),
+                (scored[found.grasp] - LANE_OFFSET, int(running[-1])),
+            ):
+                worst.see(abs(got - truth), f"draw {seed}, rows up to {most}")
+    return worst.finding()
+
+
+def largest(full: bool) -> Finding:
+    """Hold the scores of the largest tables against sums of 64 bits."""
+    worst = Worst("scores by the largest tables a file can hold", "sums of 64 bits", 0, "scores")
+    random = np.random.default_rng(7)
+    sizes: list[tuple[int, int, tuple[int, ...]]] = [
+        (2, MAX_SWITCHES, ()),
+        (2, 0, (65536,)),
+        (MAX_CLASSES, 0, (31,) * 250),
+        (2, MAX_SWITCHES, (6,) * MAX_JOINTS),
+    ]
+    if full:
+        sizes.append((MAX_CLASSES, MAX_SWITCHES - 1, ()))
+    for classes, switches, bins in sizes:
+        tables = tables_from_bytes(tables_to_bytes(_filled(whole_numbers(7, classes, switches, bins, 6))))
+        bits = random.random(switches) < 0.5
+        codes = random.integers(0, 65536, len(bins)).astype(np.uint16)
+        rows = [tables.bias.astype(np.int64), tables.switch_rows[bits].sum(axis=0, dtype=np.int64)]
+        joints = zip(tables.thresholds, tables.joint_rows, codes, strict=True)
+        rows += [steps[np.searchsorted(thresholds, code)].astype(np.int64) for thresholds, steps, code in joints]
+        scores = np.array(Scorer(tables).lanes(bits, codes)) - LANE_OFFSET
+        differ = int(np.count_nonzero(scores != np.sum(rows, axis=0))) + int(tables.bound != LIMIT)
+        worst.see(differ, f"{classes} classes, {switches} switches, {sum(bins)} bins", classes)
+    return worst.finding()
+
+
+def _filled(tables: IntegerTables) -> IntegerTables:
+    """Return the tables with a bias that takes the furthest of all sums to 32767."""
+    silent = replace(tables, bias=0 * tables.bias)
+    found = furthest(silent)
+    bias = tables.bias * 0
+    bias[found.grasp] = np.sign(found.total) * (LIMIT - abs(found.total))
+    return replace(tables, bias=bias)
+
+
+def _every_sum(tables: IntegerTables) -> int:
+    """Return the furthest that any frame, whole or with inputs missing, gets from zero, in the order that is worst."""
+    choices = [[tables.bias.tolist()]]
+    choices += [[[0] * tables.n_classes, row, mean] for row, mean in _listed(tables.switch_rows, tables.switch_means)]
+    choices += [
+        [*rows.tolist(), mean.tolist()] for rows, mean in zip(tables.joint_rows, tables.joint_means, strict=True)
+    ]
+    furthest_of_all = 0
+    for terms in product(*choices):
+        for column in zip(*terms, strict=True):
+            onward = sum(value for value in column if value > 0)
+            furthest_of_all = max(furthest_of_all, onward, onward - sum(column))
+    return furthest_of_all
+
+
+def _listed(*arrays: NDArray[np.int16]) -> Iterator[tuple[list[int], ...]]:
+    return zip(*(array.tolist() for array in arrays), strict=True)

@@ -1,0 +1,174 @@
+"""What comes of grasps that are hard to bring to rest, from both contact models."""
+
+from collections.abc import Callable, Iterator, Sequence
+from importlib.util import find_spec
+from math import fsum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...simulator.body.layout import Switches, murakami160
+from ...simulator.body.pose import Pose
+from ...simulator.contact.model import Contact, ContactModel, Load
+from ...simulator.contact.quasistatic import USUAL, Skin, close
+from ...simulator.effects import contact_mujoco, contact_quasistatic
+from ...simulator.pipeline.effect import Setting
+from ..finding import Finding, Worst
+from . import timed
+from .balance import left_of
+from .grasps import BAR, HAND, Grasp, case_of, hard, held, otherwise
+from .skin import press_error_n
+from .surfaces import MOST_SWITCHES
+
+Floats = NDArray[np.float64]
+
+REFERENCE = "60 digits"
+RULE = "the rule itself"
+_STATE = ("posture_deg", "pose", "forces_n", "capsules_n", "between_n")
+_FIELDS = (*_STATE, "residual_n", "residual_nmm")
+# No effect of a scene matters to a contact model.
+_SETTING = Setting(1, 1, 1.0, 10_000, 0, 500_000, 0, timed=False, on_wire=False)
+_USUAL, _TIMED = contact_quasistatic.Parameters(), contact_mujoco.Parameters()
+SKIN = Skin(_USUAL.press_n_per_mm, _USUAL.soft_mm, _USUAL.drag_n_per_mm, _USUAL.friction)
+# Skin and friction at the ends of what a scene may ask for.
+_QUASISTATIC = tuple(
+    contact_quasistatic.Parameters(press_n_per_mm=press, soft_mm=soft, drag_n_per_mm=drag, friction=friction)
+    for press, soft, drag, friction in (
+        (5e-324, 5.0, 1000.0, 2.0),
+        (1000.0, 5e-324, 1e-300, 0.0),
+        (1000.0, 5.0, 1000.0, 2.0),
+        (1e-12, 1e-12, 1e-12, 1e-12),
+    )
+)
+_MUJOCO = tuple(
+    contact_mujoco.Parameters(dt_ms=ms, friction=friction, skin_n_per_mm=skin, weld_n_per_m=slide, weld_nm_per_rad=turn)
+    for ms, friction, skin, slide, turn in (
+        (5e-324, 5e-324, 5e-324, 5e-324, 5e-324),
+        (10.0, 10.0, 20.0, 20_000.0, 20.0),
+        (10.0, 10.0, 20.0, 3000.0, 5e-324),
+        (5.0, 0.8, 1e-12, 5e-324, 5.0),
+    )
+)
+
+
+def models() -> dict[str, Callable[..., ContactModel]]:
+    """Return both contact models' makers by name; MuJoCo's where it is installed."""
+    makers: dict[str, Callable[..., ContactModel]] = {
+        "quasistatic": lambda given=_USUAL: contact_quasistatic.model(given, _SETTING)
+    }
+    if find_spec("mujoco") is not None:
+        makers["mujoco"] = lambda given=_TIMED: contact_mujoco.model(given, _SETTING)
+    return makers
+
+
+def findings(full: bool) -> Iterator[Finding]:
+    """Yield what is not a number or not honest, what does not balance, and what should not matter and does."""
+    grasps = list(hard(full))
+    for name, make in models().items():
+        yield _numbers(name, make, grasps)
+        yield _nothing(name, make())
+        yield _on_the_surface(name, make, full)
+    yield from _balanced(grasps[:: 1 if full else 4])
+    if "mujoco" in models():
+        yield from timed.findings(models()["mujoco"], full)
+
+
+def _numbers(name: str, make: Callable[..., ContactModel], grasps: Sequence[Grasp]) -> Finding:
+    """Count answers that are not finite, or say of what is not that it has settled; with all skins."""
+    wrong = Worst(f"{name}: finite, or not settled", RULE, 0.0, "answers")
+    ends = {"quasistatic": _QUASISTATIC, "mujoco": _MUJOCO}[name]
+    for model, tried in ((make(), grasps), *((make(given), grasps[::8]) for given in ends)):
+        for grasp, contact in zip(tried, model.solve([each.load for each in tried]), strict=True):
+            wrong.see(float(not is_honest(contact)), grasp.name)
+    return wrong.finding()
+
+
+def is_honest(contact: Contact) -> bool:
+    """Return whether all that is returned is finite; of what is given up, the residual may be infinite."""
+    known = all(np.isfinite(getattr(contact, field)).all() for field in _STATE)
+    residuals = np.isfinite(contact.residual_n) & np.isfinite(contact.residual_nmm)
+    return bool(known and (residuals | ~contact.settled).all())
+
+
+def _nothing(name: str, model: ContactModel) -> Finding:
+    """Count answers that differ though nothing does: an object of no mass has no weight, whichever way is down (for
+    quasistatic that is all; in MuJoCo the least mass of an object stands for its inertia); nor has one of the smallest
+    mass; no grip is no pads, and the smallest one is next to none.
+    """
+    wrong = Worst(f"{name}: no mass, no grip", RULE, 0.0, "answers")
+    grasps = {grasp.name: grasp.load for grasp in hard(full=False)}
+    weightless, gripless = grasps["0 kg"], grasps["a grip of 0 N"]
+    pairs = (
+        ("down is up", weightless, otherwise(weightless, down=-weightless.condition.held.down)),
+        ("down is ahead", weightless, otherwise(weightless, down=np.array([1.0, 0.0, 0.0]))),
+        ("the smallest mass", weightless, grasps[f"{5e-324:g} kg"]),
+        ("no pads", gripless, otherwise(gripless, pads=())),
+        ("the smallest grip", gripless, grasps[f"a grip of {5e-324:g} N"]),
+    )
+    for what, one, other in pairs:
+        first, second = model.solve([one, other])
+        wrong.see(float(not _same(first, second)), what)
+    return wrong.finding()
+
+
+def _on_the_surface(name: str, make: Callable[..., ContactModel], full: bool) -> Finding:
+    """Hold what switches bear of what segments do where the glove reaches just as far as a switch is off, or a hair on.
+
+    A segment's switches share its force but for k + 1 roundings of it, k the most on one segment (contact_surfaces).
+    """
+    lost = Worst(f"{name}: switches exactly on the surface", "exact sums", MOST_SWITCHES + 1.0, "x 2^-53 of the force")
+    grasp = held()
+    (rest,) = make().solve([grasp.load])
+    switches = Switches(HAND, murakami160())
+    tops = switches.tops(HAND.skeleton(rest.posture_deg.T * (np.pi / 180.0)))
+    gaps = Pose.of(rest.pose.T).distance(BAR, tops)[0][:, 0]
+    near = np.flatnonzero((gaps > 0.0) & (gaps < 4.0) & (rest.capsules_n[0, switches.capsules] > 0.0))
+    usual = type(_USUAL) if name == "quasistatic" else type(_TIMED)
+    for switch in near[:: 1 if full else 8].tolist():
+        for reach_mm in (float(gaps[switch]), float(np.nextafter(gaps[switch], 9.0))):
+            (found,) = make(usual(reach_mm=reach_mm)).solve([grasp.load])
+            borne = fsum([*found.forces_n[0].tolist(), float(found.between_n[0]), *(-found.capsules_n[0]).tolist()])
+            lost.see(abs(borne) / fsum(found.capsules_n[0].tolist()) * 2.0**53, switches.layout[switch].name)
+    return lost.finding()
+
+
+def _same(one: Contact, other: Contact) -> bool:
+    return all(np.array_equal(getattr(one, field), getattr(other, field)) for field in _FIELDS)
+
+
+def _balanced(grasps: Sequence[Grasp]) -> Iterator[Finding]:
+    """Hold every grasp that quasistatic calls settled against the balance of forces at 60 digits.
+
+    At rest less than USUAL.rest_n and rest_nmm may be left. What was computed of it is off by some `press_error_n`,
+    5e-12 N, on each of 50 spheres, at arms of 200 mm: by less than a millionth of either. The residual is off by less
+    than if the errors of all that touch pointed the same way.
+    """
+    forces = Worst("quasistatic at rest: force on the object", REFERENCE, USUAL.rest_n * (1 + 1e-6), "N")
+    moments = Worst("quasistatic at rest: moment on the object", REFERENCE, USUAL.rest_nmm * (1 + 1e-6), "N mm")
+    joints = Worst("quasistatic at rest: moment on a joint", REFERENCE, USUAL.rest_nmm * (1 + 1e-6), "N mm")
+    residuals = Worst("quasistatic: forces that it says are left", REFERENCE, 1.0, "of the bound")
+    presses = Worst("quasistatic: force on a sphere of skin", REFERENCE, 1.0, "of the bound")
+    cones = Worst("quasistatic: friction outside its cone", REFERENCE, 0.0, "spheres of skin")
+    for name, load in grasps:
+        case = case_of(load)
+        (rest,) = close([case], SKIN, _USUAL.most_steps)
+        if not rest.settled[0] or not _is_told(load):
+            continue
+        left = left_of(case, rest, SKIN, 0)
+        forces.see(left.force_n, name)
+        moments.see(left.moment_nmm, name)
+        joints.see(left.joints_nmm, name)
+        press_error = press_error_n(case, SKIN, float(rest.presses.max()))
+        presses.see(left.press_n / press_error, name)
+        touching = max(int(np.count_nonzero(rest.presses)), 1)
+        residuals.see(abs(float(rest.residual_n[0]) - left.residual_n) / (touching * press_error), name)
+        cones.see(float(left.outside), name)
+    yield from (worst.finding() for worst in (forces, moments, joints, residuals, presses, cones))
+
+
+def _is_told(load: Load) -> bool:
+    """Return whether every pad is told where to press: in the very middle of an object any way is as good."""
+    hand = load.condition.hand
+    pads = [pad.sphere for pad in load.condition.held.pads]
+    away = hand.spheres(hand.skeleton(np.radians(load.posture_deg.T)))[pads, :, 0] - load.pose[0, :3]
+    return bool((np.abs(away).max(axis=1, initial=0.0) > 1e-9).all())

@@ -1,0 +1,161 @@
+"""Surfaces, turns and the sharing of force where they are hard: at middles, creases, half turns, hairs of depth."""
+
+from collections import Counter
+from collections.abc import Iterator
+from itertools import product
+
+import mpmath
+import numpy as np
+from mpmath import mpf
+from numpy.typing import NDArray
+
+from ...reference.linear import turn
+from ...reference.numbers import precisely
+from ...simulator.body.hand import CAPSULES
+from ...simulator.body.layout import Switches, murakami160
+from ...simulator.body.pose import rotation, rotation_vector
+from ...simulator.body.shapes import Box, Cylinder, Shape, Sphere
+from ...simulator.contact.split import split
+from ..checks.roundings import ROUNDING
+from ..finding import Finding, Worst
+from .grasps import HAND
+from .posed import surface
+from .vectors import length, matrix, plus
+
+Floats = NDArray[np.float64]
+
+REFERENCE = "60 digits"
+# On any one segment of the glove.
+MOST_SWITCHES = max(Counter(patch.capsule for patch in murakami160()).values())
+_TINY = (5e-324, 1e-200, 1e-155, 1e-149, 1e-15, 1e-12, 1e-9)
+_THIN = 5e-324
+_LOST_MM = mpf(10) ** -150  # of what is smaller, the squares underflow
+_BARS = ((_THIN, 1.0, 0.0), (40.0, _THIN, 0.0), (40.0, 120.0, 0.5), (2000.0, 2000.0, 900.0))
+_BOXES = ((80.0, 50.0, _THIN, 0.0), (9.0, 9.0, 9.0, 4.5), (200.0, 200.0, 10.0, 0.0))
+SHAPES: tuple[Shape, ...] = (
+    *(Sphere(size) for size in (_THIN, 1e-9, 8.0, 2000.0)),
+    *(Cylinder(*sizes) for sizes in _BARS),
+    *(Box(*sizes) for sizes in _BOXES),
+)
+
+
+def findings(full: bool) -> Iterator[Finding]:
+    """Yield errors of distances and normals, of turns, and of forces shared."""
+    rng, more = np.random.default_rng(12), 10 if full else 1
+    yield from _surfaces(rng, 20 * more)
+    yield from _turns(rng, 20 * more)
+    yield _shares(rng, 4 * more)
+
+
+def points(shape: Shape, rng: np.random.Generator, n: int) -> Floats:
+    """Return points (m, 3): the middle, faces, edges and corners, each also a hair off, and n around."""
+    half = np.array(shape.extent_mm()) / 2
+    corners = np.array(list(product((-1.0, 0.0, 1.0), repeat=3))) * half
+    core = corners * (1.0 - getattr(shape, "edge_mm", 0.0) / np.maximum(half, 1e-300))
+    hairs = np.array([hair * axis for hair in _TINY for axis in (*np.eye(3), -np.eye(3)[2], np.ones(3))])
+    off = rng.choice(_TINY, (len(corners), 3)) * rng.choice([-1.0, 1.0], (len(corners), 3))
+    around = rng.normal(size=(n, 3)) * (half + 10.0)
+    return np.concatenate([corners, core, np.nextafter(corners, np.inf), core + off, hairs, around])
+
+
+@precisely()
+def _surfaces(rng: np.random.Generator, n: int) -> list[Finding]:
+    """Hold distances and normals against the truth.
+
+    A side's place is halved exactly, rounds once less its edge, and what lies beyond it once more: 2 roundings of the
+    size; so does the last difference. Of a corner, squares, at most two sums and the root round by 3, the radius of a
+    bar by 2.5 before: 9 roundings of what the point's place and the object's size add up to; and less than 1e-150 mm.
+
+    A normal is a quotient by such a root, of relative error 2.5 and 1 for itself; that of a bar is the product of two:
+    8 roundings of its length. Its direction is besides off by 4 roundings of that size, of two sides, over how far the
+    place is from the core that the edge is wrapped round.
+    """
+    distances = Worst("distance from a surface", REFERENCE, 9.0, "x 2^-53 of the size")
+    normals = Worst("length of normals", REFERENCE, 8.0, "x 2^-53")
+    ways = Worst("direction of normals", REFERENCE, 1.0, "of the bound")
+    for shape in SHAPES:
+        places = points(shape, rng, n)
+        found, out = shape.distance(places[..., None])
+        size = mpmath.fsum(shape.extent_mm())
+        for place, distance, normal in zip(places.tolist(), found[:, 0].tolist(), out[..., 0].tolist(), strict=True):
+            scale = size + mpmath.fsum(abs(mpf(x)) for x in place)
+            truth, way = surface(shape, place)
+            doubt = max(abs(mpf(distance) - truth) - _LOST_MM, mpf(0))
+            distances.see(float(doubt / (ROUNDING * scale)), f"{shape} at {place}")
+            normals.see(float(abs(length([mpf(x) for x in normal]) - 1) / ROUNDING), f"{shape} at {place}")
+            gap = truth + (mpf(shape.diameter_mm) / 2 if isinstance(shape, Sphere) else mpf(shape.edge_mm))
+            if gap > 2 * _LOST_MM:
+                inexact = 0 if isinstance(shape, Sphere) else 4 * size / gap
+                off = length(plus([mpf(x) for x in normal], way, -1))
+                ways.see(float(off / (ROUNDING * (8 + inexact))), f"{shape} at {place}")
+    return [worst.finding() for worst in (distances, normals, ways)]
+
+
+def vectors(rng: np.random.Generator, n: int) -> Floats:
+    """Return rotation vectors (m, 3) up to half a turn: none, hairs, half turns and next to them, and n drawn."""
+    axes = np.concatenate([np.eye(3), -np.eye(3), rng.normal(size=(max(n // 4, 3), 3))])
+    axes /= np.sqrt(np.add.reduce(axes * axes, axis=1))[:, None]
+    angles = (0.0, 5e-324, 1e-160, 1e-150, 9.9e-9, 1.01e-8, 1e-4, np.pi / 2, np.pi - 1e-8, np.nextafter(np.pi, 0.0))
+    drawn = rng.normal(size=(n, 3))
+    return np.concatenate([*(axes * angle for angle in angles), drawn])
+
+
+@precisely()
+def _turns(rng: np.random.Generator, n: int) -> list[Finding]:
+    """Hold rotation matrices against the truth, and what their rotation vectors turn by.
+
+    The angle a <= pi is off by 2.5 roundings of itself, 8; sine and cosine add 2 ulp, so each is off by 10. The sine's
+    part of an element counts 10 and 4 for its quotient and product. 1 - cos a rounds once: 11; over a^2 and by two
+    parts of the vector that is at most 2, with 6 roundings of its own: 11 + 12. The last sum makes 1 of at most 2 more:
+    40 altogether.
+
+    A rotation vector follows from sums of such elements. Of all four ways to its quaternion the one taken has a largest
+    part of at least 1/2, so that with an error of 40 and 4 roundings in each element none of its parts is off by over
+    4 * 44 / (4 * 1/2) = 88; its angle, and so each element turned by it, by twice that, and the 40.
+    """
+    matrices = Worst("rotation matrices", REFERENCE, 40.0, "x 2^-53")
+    back = Worst("rotation vectors, turned again", REFERENCE, 216.0, "x 2^-53")
+    made = vectors(rng, n)
+    found = rotation(made.T)
+    again = rotation_vector(found).T
+    for k, (there, once_more) in enumerate(zip(made.tolist(), again.tolist(), strict=True)):
+        truth = _turned(there)
+        at = f"{there}"
+        matrices.see(_apart(matrix(found[..., k].tolist()), truth), at)
+        back.see(_apart(_turned(once_more), truth), at)
+    return [matrices.finding(), back.finding()]
+
+
+def _turned(vector: list[float]) -> list[list[mpf]]:
+    angle = length([mpf(x) for x in vector])
+    return turn(vector, angle) if angle else turn((1, 0, 0), 0)
+
+
+def _apart(one: list[list[mpf]], other: list[list[mpf]]) -> float:
+    return float(max(abs(a - b) for x, y in zip(one, other, strict=True) for a, b in zip(x, y, strict=True)) / ROUNDING)
+
+
+@precisely()
+def _shares(rng: np.random.Generator, n: int) -> Finding:
+    """Hold what a segment's switches bear, and what falls between them, against what it bears.
+
+    With k switches the sum of depths rounds k - 1 times, each quotient and product once: k + 1 roundings of the force,
+    but for halves of the smallest double.
+    """
+    switches = Switches(HAND, murakami160())
+    worst = Worst("forces shared by switches", REFERENCE, MOST_SWITCHES + 1.0, "x 2^-53 of the force")
+    depths = rng.choice([-5.0, 0.0, -0.0, *_TINY, 0.3, 2.0], (len(switches.capsules), n))
+    forces = rng.choice([0.0, 5e-324, 1e-300, 0.7, 50.0, 1e300], (len(CAPSULES), n))
+    shared, between = split(switches, depths, forces)
+    for k in range(n):
+        fallen = mpf(0)
+        for capsule in range(len(CAPSULES)):
+            own = switches.capsules == capsule
+            force, borne = mpf(forces[capsule, k]), mpmath.fsum(mpf(x) for x in shared[own, k].tolist())
+            fallen += force if not (depths[own, k] > 0.0).any() else 0
+            if (depths[own, k] > 0.0).any():
+                doubt = max(abs(borne - force) - MOST_SWITCHES * mpf(2) ** -1074, mpf(0))
+                worst.see(float(doubt / (ROUNDING * force)) if force else float(borne != 0), f"{CAPSULES[capsule]}")
+        lost = abs(mpf(between[k]) - fallen)
+        worst.see(float(lost / (ROUNDING * fallen)) if fallen else float(lost), "between them")
+    return worst.finding()

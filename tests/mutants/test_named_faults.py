@@ -1,0 +1,178 @@
+"""Faults to fear most, by name: each is made in a throw-away copy, where the tests named beside it must catch it.
+
+`make mutants` makes thousands without choosing; these are chosen, among them what a mutation tool does not think of.
+"""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+STAGE = Path(__file__).with_name("stage.py")
+
+
+class Fault(NamedTuple):
+    """In `file`, `sound` reads `broken`; the tests in `caught_by` notice."""
+
+    name: str
+    file: str
+    sound: str
+    broken: str
+    caught_by: str
+
+
+FAULTS = (
+    Fault(
+        "the working response has the other sign",
+        "compiler/boosting/boost.py",
+        "np.where(member, sizes, -sizes)",
+        "np.where(member, -sizes, sizes)",
+        "tests/compiler/boosting/test_boost.py",
+    ),
+    Fault(
+        "working responses are not clamped",
+        "compiler/boosting/boost.py",
+        "sizes * np.maximum(own, 1.0 / z_max)",
+        "sizes * own",
+        "tests/stability/cases/test_targets.py",
+    ),
+    Fault(
+        "branches answer with more than z_max",
+        "compiler/boosting/stumpfit.py",
+        "np.clip(values, -z_max, z_max).T",
+        "values.T",
+        "tests/stability/cases/test_stumpfits.py",
+    ),
+    Fault(
+        "an empty branch counts as one of next to no weight",
+        "compiler/boosting/stumpfit.py",
+        "EMPTY_SHARE = 2.0**-38",
+        "EMPTY_SHARE = 0.0",
+        "tests/compiler/boosting/test_stumpfit.py",
+    ),
+    Fault(
+        "the grid of sums is four times too fine",
+        "compiler/boosting/exactsums.py",
+        "SUM_BITS = 52",
+        "SUM_BITS = 54",
+        "tests/compiler/boosting/test_exactsums.py",
+    ),
+    Fault(
+        "weights and responses are summed in single precision",
+        "compiler/boosting/exactsums.py",
+        "units = np.rint(scaled)",
+        "units = np.rint(scaled).astype(np.float32).astype(np.float64)",
+        "tests/compiler/boosting/test_exactsums.py",
+    ),
+    Fault(
+        "the centring factor (K - 1)/K is missing",
+        "compiler/boosting/stumps.py",
+        "(g - add_up(g) / k) * (k - 1) / k",
+        "g - add_up(g) / k",
+        "tests/stability/cases/test_scoretables.py",
+    ),
+    Fault(
+        "of tied classes the ensemble takes the last",
+        "compiler/boosting/stumps.py",
+        "(scores >= scores.max(axis=1, keepdims=True) - TIE).argmax(axis=1)",
+        "scores.shape[1] - 1 - (scores >= scores.max(axis=1, keepdims=True) - TIE)[:, ::-1].argmax(axis=1)",
+        "tests/compiler/boosting/test_stumps.py",
+    ),
+    Fault(
+        "of tied classes the build takes the last",
+        "runtime/build.py",
+        "self.grasps[lanes.index(max(lanes))]",
+        "self.grasps[len(lanes) - 1 - lanes[::-1].index(max(lanes))]",
+        "tests/runtime/test_build.py",
+    ),
+    Fault(
+        "gains that floating point cannot tell apart are not compared exactly",
+        "compiler/placement/gain.py",
+        "return _exact_best(node, close[np.argsort(columns[close])])",
+        "return int(scores.argmax())",
+        "tests/compiler/placement/test_gain.py",
+    ),
+    Fault(
+        "exp is taken of scores as they are, not less the greatest",
+        "compiler/elementary.py",
+        "shares = exp(scores - top)",
+        "shares = exp(scores)",
+        "tests/compiler/test_elementary.py",
+    ),
+    Fault(
+        "a code at a threshold goes right, in the float tables",
+        "compiler/tables/collapse.py",
+        "rows[np.searchsorted(thresholds, column)]",
+        'rows[np.searchsorted(thresholds, column, side="right")]',
+        "tests/compiler/tables/test_collapse.py",
+    ),
+    Fault(
+        "a code at a threshold goes right, in the build",
+        "runtime/scorer.py",
+        "bins = map(bisect_left, self._thresholds",
+        "bins = map(__import__('bisect').bisect_right, self._thresholds",
+        "tests/runtime/test_scorer.py",
+    ),
+    Fault(
+        "halves are rounded up, not to even",
+        "compiler/tables/quantise.py",
+        "return np.rint(rows * scale).astype(np.int16)",
+        "return np.floor(rows * scale + 0.5).astype(np.int16)",
+        "tests/compiler/tables/test_quantise.py",
+    ),
+    Fault(
+        "tables that could overflow are loaded",
+        "runtime/tables.py",
+        "if self.bound > LIMIT:",
+        "if self.bound > 2 * LIMIT:",
+        "tests/runtime/test_tables.py",
+    ),
+    Fault(
+        "mean rows are left out of the overflow bound",
+        "runtime/tables.py",
+        "np.stack([tables.switch_rows, tables.switch_means])",
+        "np.stack([tables.switch_rows, tables.switch_rows])",
+        "tests/runtime/test_tables.py",
+    ),
+)
+
+
+@pytest.fixture(scope="module")
+def staged(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("staged")
+    subprocess.run([sys.executable, STAGE, folder], check=True)
+    return folder
+
+
+def run(staged: Path, *tests: str) -> "subprocess.CompletedProcess[str]":
+    # No bytecode: what is as long as before and written within the same second would not be compiled again.
+    paths = os.pathsep.join(map(str, (staged, staged / "tests" / "mutants")))
+    environment = {**os.environ, "PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1"}
+    options = ["-x", "-q", "-pquick_verdict", "-pno:cacheprovider", "-m", "not slow", "--tb=no"]
+    command = [sys.executable, "-m", "pytest", *options, *tests]
+    return subprocess.run(command, cwd=staged, env=environment, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.slow
+def test_in_a_sound_copy_the_tests_pass(staged: Path) -> None:
+    passed = run(staged, *sorted({fault.caught_by for fault in FAULTS}))
+    assert passed.returncode == 0, passed.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", FAULTS, ids=[fault.name for fault in FAULTS])
+def test_it_is_caught(staged: Path, fault: Fault) -> None:
+    file = staged / "thenar" / fault.file
+    text = file.read_text()
+    assert text.count(fault.sound) == 1, f"{fault.file} no longer says {fault.sound!r}, or says it twice"
+    file.write_text(text.replace(fault.sound, fault.broken))
+    try:
+        ran = run(staged, fault.caught_by)
+    finally:
+        file.write_text(text)
+    assert ran.returncode == 1, ran.stdout  # 1: tests failed; anything else: they did not run
+    assert " failed" in ran.stdout
+    assert " error" not in ran.stdout.splitlines()[-1]

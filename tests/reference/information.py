@@ -1,0 +1,99 @@
+"""Entropy and information gain of whole counts; which of two gains is the greater, without doubt.
+
+H(C) = -sum_c p_c lg p_c and I(C; V) = sum_cv p_cv lg (p_cv / (p_c p_v)), of which a term is exactly 0 where class and
+value are independent (Shannon 1948).
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
+
+import mpmath
+from mpmath import mpf
+
+from .numbers import DIGITS, precisely
+
+Table = Sequence[Sequence[int]]  # rows: classes, columns: values
+
+
+@precisely()
+def entropy_bits(counts: Sequence[int]) -> mpf:
+    """Return H, in bits, of what occurs `counts` times."""
+    n = sum(counts)
+    return mpmath.fsum(-mpf(m) / n * mpmath.log(mpf(m) / n, 2) for m in counts if m)
+
+
+@precisely()
+def gain_bits(table: Table) -> mpf:
+    """Return I(class; value), in bits."""
+    n = sum(map(sum, table))
+    sizes = [sum(column) for column in zip(*table, strict=True)]
+    return mpmath.fsum(
+        mpf(m) / n * mpmath.log(mpf(m * n) / (sum(row) * size), 2)
+        for row in table
+        for m, size in zip(row, sizes, strict=True)
+        if m
+    )
+
+
+def conditional_gain_bits(tables: Sequence[Table]) -> mpf:
+    """Return I(class; value | given), in bits, of a table for every value of what is given."""
+    sizes = [sum(map(sum, table)) for table in tables]
+    gains = [(size, gain_bits(table)) for size, table in zip(sizes, tables, strict=True) if size]
+    with precisely():
+        return mpmath.fsum(size * gain for size, gain in gains) / sum(sizes)
+
+
+def compare_gains(one: Table, other: Table) -> int:
+    """Return the sign of gain(one) - gain(other)."""
+    return compare_conditional_gains([one], [other])
+
+
+def compare_conditional_gains(one: Sequence[Table], other: Sequence[Table]) -> int:
+    """Return the sign of the difference of two gains given something, a table for each of its values."""
+    sizes = [sum(m for table in tables for row in table for m in row) for tables in (one, other)]
+    multiples: Counter[int] = Counter()
+    for tables, times in ((one, sizes[1]), (other, -sizes[0])):
+        for sign, m in (term for table in tables for term in _terms(table)):
+            multiples[m] += sign * times * m
+    return sign_of_log_sum(multiples)
+
+
+def _terms(table: Table) -> Iterator[tuple[int, int]]:
+    """Yield sign and m of the terms m ln m of n I(C; V) = f(n) + sum f(n_cv) - sum f(n_c) - sum f(n_v)."""
+    yield 1, sum(map(sum, table))
+    yield from ((1, m) for row in table for m in row)
+    yield from ((-1, sum(row)) for row in table)
+    yield from ((-1, sum(column)) for column in zip(*table, strict=True))
+
+
+def sign_of_log_sum(multiples: Mapping[int, int]) -> int:
+    """Return the sign of the sum over m of multiples[m] ln m: 0 if no prime is left over, else at digits enough."""
+    primes: Counter[int] = Counter()
+    for m, times in multiples.items():
+        for prime, power in factors(m) if m > 1 and times else ():
+            primes[prime] += times * power
+    if not any(primes.values()):
+        return 0
+    digits = DIGITS
+    while True:
+        with mpmath.workdps(digits):
+            terms = [times * mpmath.log(prime) for prime, times in primes.items()]
+            total, size = mpmath.fsum(terms), mpmath.fsum(map(abs, terms))
+            if abs(total) > size * mpf(10) ** (10 - digits):
+                return int(mpmath.sign(total))
+        digits *= 2
+
+
+@lru_cache(maxsize=1 << 16)
+def factors(number: int) -> tuple[tuple[int, int], ...]:
+    """Return the primes of number > 1 and their powers, by trial division."""
+    found: Counter[int] = Counter()
+    divisor = 2
+    while divisor * divisor <= number:
+        while number % divisor == 0:
+            number //= divisor
+            found[divisor] += 1
+        divisor += 1 + divisor % 2
+    found[number] += number > 1
+    return tuple((prime, power) for prime, power in found.items() if power)

@@ -1,0 +1,155 @@
+"""Every degenerate set through every command: an answer or a sentence, never a warning or a traceback."""
+
+import io
+import json
+import sys
+import warnings
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from thenar.cli import run
+from thenar.compiler.boosting.boost import boost
+from thenar.compiler.boosting.stumps import winners
+from thenar.stability.cases import degenerate
+from thenar.stability.inputs.lopsided import lopsided
+from thenar.stability.inputs.small_sets import parity
+
+SETS = {
+    **degenerate.all_sets(),
+    "no row": degenerate.SOLVABLE["a class of one row"].rows([]),
+    "XOR": parity(2),
+    **{name: grasp_set for name, (grasp_set, _) in lopsided().items()},
+}
+SOLVED = set(degenerate.SOLVABLE)
+TRAINABLE = SOLVED | {"XOR", *lopsided()}
+
+
+def command(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str, str]:
+    """Run `thenar` here, warnings being errors, and return its exit code, output and complaints."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        code = run(list(map(str, words)))
+    said = capsys.readouterr()
+    assert code in (0, 2)
+    assert (code == 2) == said.err.startswith("thenar: ")
+    return code, said.out, said.err
+
+
+@pytest.fixture(params=SETS)
+def name(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture
+def path(name: str, tmp_path: Path) -> Path:
+    SETS[name].save(tmp_path / "set.grasps")
+    return tmp_path / "set.grasps"
+
+
+def test_info_tells_what_is_there(name: str, path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = command(capsys, "info", path)
+    assert code == 0
+    assert f"{len(SETS[name])} grasps of {len(np.unique(SETS[name].labels))} types" in out
+    summary = json.loads(command(capsys, "info", path, "--json")[1])
+    assert summary["rows"] == len(SETS[name])
+    code, _, complaint = command(capsys, "info", path, "--plot", path.with_suffix(".svg"))
+    assert (code, complaint) == ((0, "") if len(SETS[name]) else (2, "thenar: a set without rows cannot be drawn\n"))
+
+
+def test_place_chooses_or_says_why_not(name: str, path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, complaint = command(capsys, "place", path, "--tree", "--draw", path.with_suffix(".png"))
+    if not SETS[name].switch_names or not len(SETS[name]):
+        assert code == 2
+        assert "no switches to place" in complaint or "there are no rows" in complaint
+    elif " 0 of " in out or out.startswith("0 of "):
+        assert "one grasp type" in out or "agree in every switch" in out
+
+
+@pytest.mark.parametrize("cut", [[], ["--by", "subject"], ["--by", "object"], ["--by", "block", "--folds", "2"]])
+def test_evaluate_gives_rates_or_a_reason(
+    name: str, path: Path, cut: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = path.with_suffix(".json")
+    code, _, _ = command(capsys, "evaluate", path, *cut, "--rounds", 2, "--repeats", 2, "--jobs", 1, "-o", out)
+    if code == 0:
+        for table in json.loads(out.read_bytes())["tables"]:
+            for row in table["rows"]:
+                assert 0 <= row["average"]["low"] <= row["average"]["mean"] <= row["average"]["high"] <= 1
+
+
+@pytest.mark.parametrize("folds", [0, 2])
+def test_a_build_is_made_verified_and_run_or_refused(
+    name: str, path: Path, folds: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    build = path.parent / "build"
+    code, _, complaint = command(capsys, "compile", path, "-o", build, "--rounds", 20, "--folds", folds)
+    assert code == 0 or (folds and "in fold 1" in complaint) or name not in TRAINABLE
+    if code:
+        assert not build.exists()
+        return
+    assert command(capsys, "verify", build, path)[1].rstrip().endswith("holds")
+    lines = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", SimpleNamespace(buffer=lines))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert run(["run", str(build), "--replay", str(path)]) == 0
+    found = [json.loads(line) for line in lines.getvalue().splitlines()]
+    assert len(found) == len(SETS[name])
+    if name in SOLVED:
+        assert all(line["grasp"] == line["recorded"] for line in found)
+
+
+def test_an_exclusive_or_is_placed_told_and_built_without_a_word_too_few(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "xor.grasps"
+    parity(2).save(path)
+    tree, table = command(capsys, "place", path, "--tree")[1].split("Placement", 1)
+    assert "s0?  4 rows, no input gains anything alone" in tree
+    assert "2 of 2 switches" in table
+    assert "at 1 of the decisions no switch gains anything alone" in table
+    command(capsys, "compile", path, "-o", tmp_path / "build", "--folds", 0)
+    assert json.loads((tmp_path / "build" / "build.json").read_bytes())["zero_gain_nodes"] == 1
+
+
+def test_degrees_by_an_unheard_of_unit_are_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "columns.toml").write_text('label = "grasp"\n[[joints]]\ncolumns = ["j"]\ngrid = 1e200\n')
+    (tmp_path / "table.csv").write_text("grasp,j\na,-3e203\nb,1.4e200\n")
+    given = (tmp_path / "table.csv", "-o", tmp_path / "set.grasps", "--columns", tmp_path / "columns.toml")
+    assert command(capsys, "import", *given)[0] == 0
+    assert command(capsys, "info", tmp_path / "set.grasps", "--plot", tmp_path / "set.png")[0] == 0
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(1, 5), st.integers(1, 4), st.integers(1, 3), st.data())
+def test_boosting_anything_small_is_finite_and_answers_a_class_that_has_rows(
+    rows: int, classes: int, columns: int, data: st.DataObject
+) -> None:
+    labels = np.array(data.draw(st.lists(st.integers(0, classes - 1), min_size=rows, max_size=rows)))
+    values = st.sampled_from([0.0, 1.0, -0.0, 5e-324, 65535.0, 1e308, -1e308, float("nan")])
+    X = np.array(data.draw(st.lists(values, min_size=rows * columns, max_size=rows * columns))).reshape(rows, columns)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        stumps, history = boost(X, labels, classes, rounds=30)
+        scores = stumps.scores(X)
+    assert np.isfinite(scores).all()
+    assert np.isfinite(history.losses).all()
+    if stumps.n_rounds:
+        assert set(winners(scores)) <= set(labels)
+
+
+def test_a_set_is_what_its_name_says() -> None:
+    sets = degenerate.all_sets()
+    assert len(sets["one row"]) == 1
+    assert len(np.unique(sets["one class"].labels)) == 1
+    assert min(np.bincount(sets["a class of one row"].labels)) == 1
+    assert len(sets["a type without rows"].taxonomy.types) > len(np.unique(sets["a type without rows"].labels))
+    assert len(np.unique(sets["33 types of one row each"].labels)) == len(sets["33 types of one row each"]) == 33
+    assert (sets["one switch"].switches.shape[1], sets["one switch"].codes.shape[1]) == (1, 0)
+    assert (sets["one joint"].switches.shape[1], sets["one joint"].codes.shape[1]) == (0, 1)
+    assert (sets["no switch that varies"].switches == sets["no switch that varies"].switches[0]).all()

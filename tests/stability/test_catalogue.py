@@ -1,0 +1,40 @@
+"""Every case of the catalogue holds: quickly in `make test`, in full in `make test-slow`."""
+
+import pkgutil
+
+import msgspec
+import pytest
+
+from thenar.stability import cases
+from thenar.stability.catalogue import NAMES, load
+from thenar.stability.report import CaseReport, run_case
+
+
+def test_every_case_in_the_folder_is_in_the_catalogue_once() -> None:
+    assert sorted(NAMES) == sorted(module.name for module in pkgutil.iter_modules(cases.__path__))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_case_says_what_it_is_and_what_could_go_wrong_in_a_sentence_each(name: str) -> None:
+    about = load(name).CASE
+    assert about.title
+    assert about.danger
+    assert "\n" not in about.title + about.danger
+
+
+def _holds(found: CaseReport) -> None:
+    assert found.failure is None
+    assert msgspec.json.decode(msgspec.json.encode(found), type=CaseReport) == found
+    assert not [check.finding for check in found.checks if not check.holds]
+    assert found.holds
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_case_holds_quickly(name: str) -> None:
+    _holds(run_case(name, full=False))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_a_case_holds_in_full(name: str) -> None:
+    _holds(run_case(name, full=True))
