@@ -7,9 +7,9 @@ OUT    := out
 # The scene that `make demo` simulates: a shipped one by its name, or a file.
 SCENE ?= quick
 
-PACKAGES := cli compiler drivers firmware_templates runtime simulator
+PACKAGES := cli compiler drivers firmware_templates reference runtime simulator stability
 
-.PHONY: help demo test test-slow test-all lint format types bench docs check clean
+.PHONY: help demo test test-slow test-all pythons mutants lint format types bench docs check clean
 
 help:           ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 16
@@ -17,7 +17,7 @@ help:           ## list the targets
 $(VENV)/installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
-	$(BIN)/python -m pip install --quiet --editable ".[compiler,sim]" --group dev
+	$(BIN)/python -m pip install --quiet --editable ".[compiler,sim,stability]" --group dev
 	touch $@
 
 demo: $(VENV)/installed  ## simulate, draw, evaluate, compile, verify, run: SCENE=quick
@@ -35,10 +35,20 @@ demo: $(VENV)/installed  ## simulate, draw, evaluate, compile, verify, run: SCEN
 test: $(VENV)/installed  ## the tests, under ten minutes on two cores
 	$(BIN)/python -m pytest -m "not slow" -n auto
 
-test-slow: $(VENV)/installed  ## the slower checks: real Weka, fuzzing, real recordings at full length
+test-slow: $(VENV)/installed pythons  ## the slower checks: real Weka, fuzzing, real recordings at full length
 	$(BIN)/python -m pytest -m slow -n auto
 
 test-all: test test-slow  ## both
+
+pythons: $(VENV)/installed  ## .venv-3.x with thenar for every other Python of this machine (PATH, pyenv)
+	@others=$$($(BIN)/python -m thenar.stability.pythons) && echo "$$others" | while read -r version python; do \
+	    test -z "$$version" || $(MAKE) --no-print-directory OTHER="$$python" ".venv-$$version/installed" || exit 1; done
+
+.venv-3.%/installed: pyproject.toml
+	$(OTHER) -m venv .venv-3.$*
+	.venv-3.$*/bin/python -m pip install --quiet --upgrade "pip>=25.1"
+	.venv-3.$*/bin/python -m pip install --quiet --editable ".[compiler]"
+	touch $@
 
 lint: $(VENV)/installed  ## ruff: rules and formatting
 	$(BIN)/ruff check .
@@ -54,11 +64,21 @@ types: $(VENV)/installed  ## mypy --strict on an installed copy
 	$(BIN)/python -m pip install --quiet --no-deps --target .types .
 	rm -rf build
 	$(BIN)/mypy $(foreach package,$(PACKAGES),-p thenar.$(package))
-	MYPYPATH=.types:benchmarks $(BIN)/mypy --explicit-package-bases tests benchmarks
+	MYPYPATH=.types:benchmarks:tests/mutants $(BIN)/mypy --explicit-package-bases tests benchmarks
 
 $(VENV)/bench: $(VENV)/installed
 	$(BIN)/python -m pip install --quiet --group bench
 	touch $@
+
+$(VENV)/mutants: $(VENV)/installed
+	$(BIN)/python -m pip install --quiet --group mutants
+	touch $@
+
+mutants: $(VENV)/mutants  ## small deliberate faults in the numerical modules: how many do the tests catch?
+	rm -rf .mutants
+	$(BIN)/python tests/mutants/stage.py .mutants
+	cd .mutants && env -u THENAR_REQUIRE_ALL PYTHONHASHSEED=0 PYTHONPATH=$(CURDIR)/tests/mutants ../$(BIN)/mutmut run
+	cd .mutants && ../$(BIN)/python ../tests/mutants/report.py ../docs/mutants.md
 
 bench: $(VENV)/bench  ## the benchmarks, as ratios against a peer or a bound in the same run
 	$(BIN)/python benchmarks/id3.py
@@ -72,4 +92,4 @@ docs: $(VENV)/installed  ## the documentation as a site in site/, offline
 check: lint types test  ## what a commit should pass
 
 clean:          ## remove everything that the targets make
-	rm -rf $(VENV) $(OUT) .types build site *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .venv-3.* $(OUT) .types .mutants build site *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,6 +1,6 @@
 """The command `thenar`: thin, and light until a sub-command is called.
 
-Exit codes: 0 done, 1 a check that did not hold (`verify`), 2 a mistake that the user can mend, 130 Ctrl-C.
+Exit codes: 0 done, 1 a check that did not hold (`verify`, `stability`), 2 a mistake that the user can mend, 130 Ctrl-C.
 """
 
 import sys

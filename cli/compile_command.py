@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import any_path, existing_file, json_flag, out, print_json, progress
+from .common import any_path, err, existing_file, json_flag, out, print_json, progress
 
 if TYPE_CHECKING:
     from ..compiler.build.compile import BuildReport
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     help="What to use.",
 )
 @click.option("--shrinkage", type=float, default=1.0, show_default=True, help="Share of each round that is kept.")
+@click.option("--tolerance", type=float, help="Stop after a round that changes the mean loss by less than this.")
 @click.option("--folds", type=int, default=4, show_default=True, help="Folds of the rate in build.json; 0 for none.")
 @click.option("--seed", type=int, default=1, show_default=True, help="Seed of the folds.")
 @json_flag
@@ -37,6 +38,7 @@ def command(
     rounds: int,
     inputs: "Inputs",
     shrinkage: float,
+    tolerance: float | None,
     folds: int,
     seed: int,
     as_json: bool,
@@ -61,9 +63,15 @@ def command(
             rounds=rounds,
             inputs=inputs,
             shrinkage=shrinkage,
+            tolerance=tolerance,
             folds=folds,
             seed=seed,
             progress=report,
+        )
+    if made.only_answer is not None:
+        err().print(
+            f"warning: the build recognises every row as {made.only_answer}: no input tells grasp types apart by "
+            "itself, and stumps look at one at a time"
         )
     if as_json:
         print_json(made.manifest)
@@ -80,6 +88,16 @@ def _print(made: "BuildReport", folder: Path) -> None:
     )
     if manifest.switches:
         console.print(f"switches: {', '.join(switch.name for switch in manifest.switches)}", soft_wrap=True)
+    if manifest.stopped_after:
+        console.print(
+            f"stopped after {manifest.stopped_after} of {manifest.options.rounds} rounds: the last changed the mean "
+            f"loss by less than {manifest.options.tolerance:g}"
+        )
+    if manifest.zero_gain_nodes:
+        console.print(
+            f"at {manifest.zero_gain_nodes} of the placement's decisions no switch gains anything alone: "
+            "the lowest-numbered one that varies was taken"
+        )
     for rate in manifest.rates:
         how = "on the rows trained on" if rate.protocol == "training" else f"in {rate.folds} folds, placement and all"
         console.print(f"recognised {how}: {rate.correct} of {rate.total} ({rate.rate:.1%})")

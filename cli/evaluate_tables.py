@@ -30,7 +30,9 @@ def print_study(study: Study, *, confusion: bool) -> None:
         console.print(Text(f"{_TITLES[table.name]}: {table.protocol} protocol", "bold"))
         console.print(_grid(table))
         if any(cell.no_inputs for row in table.rows for cell in row.cells):
-            console.print(f"{_NO_INPUTS} some folds had no input: there, the most frequent grasp type is answered")
+            console.print(
+                f"{_NO_INPUTS} in some folds no input varied: there, the most frequent grasp type is answered"
+            )
     console.print()
     for missing in study.left_out:
         console.print(f"no table of {missing.name}: {missing.reason}")

@@ -12,7 +12,13 @@ import click
 
 from ..drivers.errors import ThenarError
 
-COMMANDS = ("simulate", "plan", "import", "export", "info", "place", "draw", "evaluate", "compile", "verify", "run")
+COMMANDS = (
+    *("simulate", "plan", "import", "export", "info", "place", "draw", "evaluate", "compile", "verify", "run"),
+    "stability",
+)
+
+# Packages that another extra than `compiler` brings.
+_EXTRAS = {"mpmath": "stability", "jinja2": "stability"}
 
 
 class _LazyGroup(click.Group):
@@ -59,7 +65,8 @@ def run_group(arguments: Sequence[str]) -> int:
     except MemoryError as lack:
         return _complain(f"not enough memory ({lack}): take fewer rows or columns")
     except ModuleNotFoundError as lack:
-        return _complain(f"{lack.name} is not installed: pip install 'thenar[compiler]'")
+        extra = _EXTRAS.get(lack.name or "", "compiler")
+        return _complain(f"{lack.name} is not installed: pip install 'thenar[{extra}]'")
     except (KeyboardInterrupt, click.Abort):
         click.echo("thenar: interrupted", err=True)
         return 130

@@ -84,7 +84,8 @@ def _print_joints(summary: "Summary") -> None:
         return
     table = Table("joint", "unit", "least", "largest", "distinct codes", title="Joints")
     for joint in summary.joints:
-        table.add_row(joint.name, joint.unit, f"{joint.least:g}", f"{joint.largest:g}", str(joint.codes))
+        ends = ("-" if end is None else f"{end:g}" for end in (joint.least, joint.largest))
+        table.add_row(joint.name, joint.unit, *ends, str(joint.codes))
     out().print(table)
 
 

@@ -1,5 +1,6 @@
 """`thenar place`: which switches to keep."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -75,8 +76,23 @@ def _print(placement: "Placement") -> None:
         f"{placement.gain_bits:.3f} of {placement.entropy_bits:.3f} bits; the tree has {placement.decision_nodes} "
         f"decisions, {placement.leaves} leaves, depth {placement.depth}{pruned}"
     )
+    for remark in _remarks(placement):
+        click.echo(remark)
+
+
+def _remarks(placement: "Placement") -> Iterator[str]:
+    """Yield what should not pass in silence: why nothing was decided, or decided without a gain."""
+    if placement.entropy_bits == 0:
+        yield "all rows are of one grasp type: there is nothing to tell apart"
+    elif placement.rows < placement.prune:
+        yield f"no decision was made: the {placement.rows} rows are fewer than S = {placement.prune}"
     if placement.zero_gain_nodes:
-        click.echo(
+        yield (
             f"at {placement.zero_gain_nodes} of the decisions no switch gains anything alone: "
             "the lowest-numbered one that varies was taken"
+        )
+    if placement.undecided_leaves:
+        yield (
+            f"at {placement.undecided_leaves} of the leaves rows of several grasp types agree in every switch: "
+            "no switch tells them apart"
         )

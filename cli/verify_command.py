@@ -8,7 +8,9 @@ import click
 from .common import existing_file, existing_folder, json_flag, out, print_json, progress
 
 if TYPE_CHECKING:
-    from ..compiler.build.verify import Verification
+    from rich.console import Console
+
+    from ..compiler.build.verify import Verification, WorstCase
 
 _SHOWN = 20
 
@@ -19,6 +21,8 @@ _SHOWN = 20
 @json_flag
 def command(build: Path, recordings: Path, as_json: bool) -> int:
     """Send every row through ensemble, float tables and integer tables, and hold the differences against their bounds.
+
+    The worst that integers can do is not looked for among the rows: it is worked out, over every frame there is.
 
     Exits with 1 if a bound does not hold. The recordings need not be those that the build was compiled from.
 
@@ -53,6 +57,7 @@ def _print(found: "Verification") -> None:
     console.print(
         f"margin above {found.safe_margin:g} steps: {found.covered} rows, of which {found.covered_changed} change class"
     )
+    _print_worst(console, found.worst)
     console.print(f"recognised: {found.correct_ensemble} by the ensemble, {found.correct_integers} by the integers")
     console.print(f"rows that change class: {len(found.changed)}")
     for row in found.changed[:_SHOWN]:
@@ -61,3 +66,19 @@ def _print(found: "Verification") -> None:
     if len(found.changed) > _SHOWN:
         console.print(f"  and {len(found.changed) - _SHOWN} more: --json lists them all")
     console.print("holds" if found.holds else "DOES NOT HOLD: compile the build again")
+
+
+def _print_worst(console: "Console", worst: "WorstCase") -> None:
+    frame = f"{len(worst.closed)} switches closed, codes {' '.join(map(str, worst.codes)) or 'none'}"
+    console.print(
+        f"worst frame there is: {worst.leader} loses {worst.loss:.3f} steps of its lead over {worst.rival}, "
+        f"allowed {worst.bound:.3f} ({frame})"
+    )
+    console.print(
+        f"margin above {worst.safe_margin:.3f} steps, all that the worst frames ask for: "
+        f"{worst.covered} rows, of which {worst.covered_changed} change class"
+    )
+    console.print(
+        "furthest sum there is, whole or with inputs missing: "
+        f"{worst.reach} for {worst.reaching}, allowed {worst.limit}"
+    )

@@ -43,6 +43,11 @@ def weka() -> Callable[..., str]:
 
 
 @pytest.fixture(scope="session")
+def c_compiler() -> str:
+    return need_tool("cc")
+
+
+@pytest.fixture(scope="session")
 def weka_data() -> Path:
     return need(SHARED_DATA / "weka")
 

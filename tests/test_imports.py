@@ -1,13 +1,15 @@
 """Imports run one way between the rooms of the house (docs/architecture.md), read off the sources."""
 
 import ast
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("cli", "compiler", "drivers", "firmware_templates", "runtime", "simulator")
+PACKAGES = ("cli", "compiler", "drivers", "firmware_templates", "reference", "runtime", "simulator", "stability")
+FOLDERS = {package: ROOT / package for package in PACKAGES} | {"reference": ROOT / "tests" / "reference"}
 
 # What modules whose name starts with the key may import of ours; the longest key that fits counts.
 ALLOWED = {
@@ -30,7 +32,7 @@ ALLOWED = {
         "compiler.pictures",
     ),
     "compiler.boosting": ("runtime", "drivers.errors", "compiler.boosting", "compiler.elementary"),
-    "compiler.tables": ("runtime", "drivers.errors", "compiler.boosting", "compiler.tables"),
+    "compiler.tables": ("runtime", "drivers.errors", "compiler.boosting", "compiler.elementary", "compiler.tables"),
     "compiler.evaluation": (
         "runtime",
         "drivers.errors",
@@ -65,17 +67,20 @@ ALLOWED = {
         "compiler.workers",
         "simulator",
     ),
-    "cli": PACKAGES,
+    "reference": ("reference",),
+    "stability": ("compiler", "drivers", "reference", "runtime", "simulator", "stability"),
+    "cli": tuple(package for package in PACKAGES if package != "reference"),
 }
 
-# Third-party packages of the extras `compiler` and `sim`, which a board does not have.
-WORKSTATION_ONLY = {"sklearn", "scipy", "matplotlib", "joblib", "mujoco", "threadpoolctl"}
+# Third-party packages of the extras `compiler`, `sim` and `stability`, which a board does not have.
+WORKSTATION_ONLY = {"sklearn", "scipy", "matplotlib", "joblib", "mujoco", "threadpoolctl", "mpmath", "jinja2"}
 
 
 def modules() -> Iterator[tuple[str, ast.Module]]:
     for package in PACKAGES:
-        for path in sorted((ROOT / package).rglob("*.py")):
-            name = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+        for path in sorted(FOLDERS[package].rglob("*.py")):
+            parts = path.relative_to(FOLDERS[package]).with_suffix("").parts
+            name = ".".join([package, *parts]).removesuffix(".__init__")
             yield name, ast.parse(path.read_text())
 
 
@@ -89,7 +94,8 @@ def resolve(name: str, is_package: bool, node: ast.ImportFrom) -> str:
 
 
 def imports(name: str, tree: ast.Module) -> Iterator[str]:
-    is_package = (ROOT / Path(*name.split(".")) / "__init__.py").exists()
+    package, *inner = name.split(".")
+    is_package = (FOLDERS[package] / Path(*inner) / "__init__.py").exists()
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -114,6 +120,16 @@ def test_the_boards_side_names_no_workstation_package_at_the_top(name: str, tree
         return
     top = ast.Module([node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)], [])
     assert not WORKSTATION_ONLY & {imported.split(".")[0] for imported in imports(name, top)}
+
+
+def test_the_reference_is_written_from_the_formulas_and_nothing_else() -> None:
+    named = {
+        imported.split(".")[0]
+        for name, tree in modules()
+        if fits(name, ("reference",))
+        for imported in imports(name, tree)
+    }
+    assert named - {"reference"} <= {"mpmath", *sys.stdlib_module_names}
 
 
 def test_the_sources_are_found_at_all() -> None:

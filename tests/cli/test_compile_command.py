@@ -1,7 +1,12 @@
 import json
 import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
+
+from thenar.compiler import GraspSet
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
 
@@ -9,6 +14,7 @@ Thenar = Callable[..., subprocess.CompletedProcess[str]]
 def test_compile_writes_a_build_and_says_what_it_is(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
     done = thenar("compile", set_file, "-o", tmp_path / "build", "--rounds", 10)
     assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
     assert "3 grasp types from" in done.stdout
     assert "of 6 switches and 2 joints" in done.stdout
     assert "in 4 folds, placement and all:" in done.stdout
@@ -36,7 +42,41 @@ def test_help_has_an_example(thenar: Thenar) -> None:
 
 
 def test_every_option_reaches_the_build(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
-    options = {"prune": 2, "rounds": 3, "inputs": "both", "shrinkage": 0.5, "folds": 2, "seed": 7}
+    options = {"prune": 2, "rounds": 3, "inputs": "both", "shrinkage": 0.5, "folds": 2, "seed": 7, "tolerance": 1e-9}
     given = [word for name, value in options.items() for word in (f"--{name}", value)]
     done = thenar("compile", set_file, "-o", tmp_path / "build", *given, "--json")
     assert json.loads(done.stdout)["options"] == options
+
+
+def test_a_tolerance_ends_the_training_and_the_build_says_so(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+    given = ("compile", set_file, "-o", tmp_path / "build", "--rounds", 500, "--tolerance", 0.01, "--folds", 0)
+    done = thenar(*given)
+    rounds = json.loads((tmp_path / "build" / "build.json").read_bytes())["stopped_after"]
+    assert 1 < rounds < 500
+    assert f"stopped after {rounds} of 500 rounds: the last changed the mean loss by less than 0.01" in done.stdout
+    assert thenar(*given[:-1], "--tolerance", "nan").returncode == 2
+
+
+def test_a_training_that_no_tolerance_ends_says_nothing_of_it(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+    done = thenar("compile", set_file, "-o", tmp_path / "build", "--rounds", 3, "--folds", 0)
+    assert "stopped" not in done.stdout
+    document = json.loads((tmp_path / "build" / "build.json").read_bytes())
+    assert "stopped_after" not in document
+    assert "tolerance" not in document["options"]
+
+
+def test_a_build_that_answers_one_grasp_type_only_says_so(thenar: Thenar, small_set: GraspSet, tmp_path: Path) -> None:
+    either, other = np.arange(60) % 2 == 1, np.arange(60) // 2 % 2 == 1
+    exclusive_or = replace(
+        small_set,
+        switches=np.column_stack([either, other]),
+        switch_names=("s0", "s1"),
+        codes=small_set.codes[:, :0],
+        joints=(),
+        grasps=np.where(either ^ other, "cup", "rod"),
+    )
+    exclusive_or.save(tmp_path / "xor.grasps")
+    done = thenar("compile", tmp_path / "xor.grasps", "-o", tmp_path / "build", "--folds", 0)
+    assert done.returncode == 0
+    assert "warning: the build recognises every row as" in " ".join(done.stderr.split())
+    assert "of the placement's decisions no switch gains anything alone" in done.stdout

@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -85,3 +86,28 @@ def test_a_mistake_is_one_sentence_and_code_two(
 ) -> None:
     assert run(["place", str(set_file), *options]) == 2
     assert reason in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("grasps", "options", "remark"),
+    [
+        (["cup", "cup"], [], "all rows are of one grasp type: there is nothing to tell apart"),
+        (["cup", "pen"], ["--prune", "3"], "no decision was made: the 2 rows are fewer than S = 3"),
+        (["cup", "pen"], [], "at 1 of the leaves rows of several grasp types agree in every switch"),
+    ],
+)
+def test_a_placement_of_no_switch_says_why(
+    small_set: GraspSet,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    grasps: list[str],
+    options: list[str],
+    remark: str,
+) -> None:
+    two = replace(small_set.rows([0, 0]), grasps=np.array(grasps))
+    two.save(tmp_path / "two.grasps")
+    assert run(["place", str(tmp_path / "two.grasps"), *options]) == 0
+    said = capsys.readouterr().out
+    assert "0 of 6 switches" in said
+    assert remark in said
+    assert sum(words in said for words in ("one grasp type:", "no decision was made", "agree in every switch")) == 1

@@ -30,6 +30,25 @@ def test_a_sound_build_holds(thenar: Thenar, set_file: Path, build_folder: Path)
     assert done.stdout.endswith("holds\n")
 
 
+def test_the_worst_of_all_frames_is_printed_beside_its_bounds(
+    thenar: Thenar, set_file: Path, build_folder: Path
+) -> None:
+    lines = thenar("verify", build_folder, set_file).stdout.splitlines()
+    worst = json.loads(thenar("verify", build_folder, set_file, "--json").stdout)["worst"]
+    codes = " ".join(map(str, worst["codes"]))
+    assert (
+        f"worst frame there is: {worst['leader']} loses {worst['loss']:.3f} steps of its lead over {worst['rival']}, "
+        f"allowed {worst['bound']:.3f} ({len(worst['closed'])} switches closed, codes {codes})"
+    ) in lines
+    assert (
+        f"margin above {worst['safe_margin']:.3f} steps, all that the worst frames ask for: "
+        f"{worst['covered']} rows, of which 0 change class"
+    ) in lines
+    assert (
+        f"furthest sum there is, whole or with inputs missing: {worst['reach']} for {worst['reaching']}, allowed 32767"
+    ) in lines
+
+
 def test_a_broken_bound_exits_with_1_and_lists_rows(thenar: Thenar, set_file: Path, build_folder: Path) -> None:
     _silence_joints(build_folder)
     done = thenar("verify", build_folder, set_file)

@@ -1,0 +1,175 @@
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from thenar.cli import run
+from thenar.stability import cases, catalogue
+from thenar.stability.catalogue import NAMES
+
+Thenar = Callable[..., subprocess.CompletedProcess[str]]
+
+CASE = """
+from thenar.stability.finding import Case, Finding
+CASE = Case("a {name} case", "the {name} danger")
+def findings(full):
+    yield Finding("sums", "the rule itself", {error}, 1.0, "ulp", 3, "the {name} row")
+"""
+RAISING = CASE + "    raise ArithmeticError('lost')\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder of cases in place of the shipped catalogue: a sound one, one beyond its bound, one that raises."""
+    folder = tmp_path / "cases"
+    folder.mkdir()
+    (folder / "sound.py").write_text(CASE.format(name="sound", error=0.5))
+    (folder / "exceeding.py").write_text(CASE.format(name="exceeding", error=1.5))
+    (folder / "raising.py").write_text(RAISING.format(name="raising", error=0.5))
+    monkeypatch.setattr(cases, "__path__", [str(folder)])
+    monkeypatch.setattr(catalogue, "NAMES", ("sound", "exceeding", "raising"))
+    yield folder
+    for name in catalogue.NAMES:
+        sys.modules.pop(f"{cases.__name__}.{name}", None)
+
+
+@pytest.fixture
+def here(folder: Path, capsys: pytest.CaptureFixture[str]) -> Thenar:
+    """Run `thenar stability` in this process, on the cases of `folder`."""
+
+    def run_here(*arguments: str) -> "subprocess.CompletedProcess[str]":
+        code = run(["stability", "--jobs", "1", *arguments])
+        return subprocess.CompletedProcess(arguments, code, *capsys.readouterr())
+
+    return run_here
+
+
+def test_the_list_names_every_case_with_what_could_go_wrong(thenar: Thenar) -> None:
+    listed = json.loads(thenar("stability", "--list", "--json").stdout)
+    assert tuple(case["name"] for case in listed) == NAMES
+    assert all(case["title"] and case["danger"] for case in listed)
+
+
+def test_a_case_of_another_name_is_refused_with_the_nearest(thenar: Thenar) -> None:
+    done = thenar("stability", "seperable")
+    assert done.returncode == 2
+    assert "there is no case 'seperable' (did you mean 'separable'" in done.stderr
+
+
+def test_a_page_into_a_folder_that_is_not_there_is_refused_before_any_work(thenar: Thenar, tmp_path: Path) -> None:
+    done = thenar("stability", "-o", tmp_path / "no" / "page.html")
+    assert done.returncode == 2
+    assert "make it first" in done.stderr
+
+
+def test_listing_runs_nothing(thenar: Thenar, tmp_path: Path) -> None:
+    assert "--list only lists" in thenar("stability", "--list", "-o", tmp_path / "page.html").stderr
+
+
+def test_cases_that_hold_exit_with_0_and_print_error_bound_and_verdict(here: Thenar) -> None:
+    done = here("sound")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "What could go wrong: the sound danger" in done.stdout
+    assert ["sums", "the", "rule", "itself", "3", "0.5", "1", "ulp", "holds"] in map(
+        str.split, done.stdout.splitlines()
+    )
+    assert done.stdout.splitlines()[-1] == "1 case quickly, 1 check on 3 inputs: all hold"
+
+
+def test_a_bound_that_does_not_hold_exits_with_1_and_says_where(here: Thenar) -> None:
+    done = here("sound", "exceeding")
+    assert done.returncode == 1
+    assert done.stdout.splitlines()[-2] == (
+        "exceeding: sums: 1.5 ulp against a bound of 1 ulp; worst: the exceeding row"
+    )
+    assert done.stdout.splitlines()[-1] == "2 cases quickly, 2 checks on 6 inputs: NOT all hold, see exceeding"
+
+
+def test_a_case_that_raises_is_a_line_and_hides_no_other(here: Thenar) -> None:
+    done = here("raising", "sound")
+    assert done.returncode == 1
+    assert "FAILED: ArithmeticError in raising.py, line 6: lost" in done.stdout
+    assert "Traceback" not in done.stdout + done.stderr
+    assert "a sound case" in done.stdout
+
+
+def test_json_holds_every_number_and_the_verdicts(here: Thenar) -> None:
+    done = here("exceeding", "sound", "--json")
+    report = json.loads(done.stdout)
+    assert (done.returncode, report["holds"], report["full"], report["beside"]) == (1, False, False, None)
+    assert [(case["name"], case["holds"]) for case in report["cases"]] == [("sound", True), ("exceeding", False)]
+    assert report["cases"][1]["checks"][0]["finding"]["error"] == 1.5
+
+
+def test_no_word_no_number_and_no_verdict_is_cut_on_a_narrow_terminal(
+    here: Thenar, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    check = "intervals of compensated averages that leave 0 to 1, or their own mean, in the worst of all"
+    finding = f"yield Finding({check!r}, 'products of whole numbers', 2.4375e-16, 2.2214e-15, 'x rounding', 235929)"
+    (folder / "sound.py").write_text(CASE.format(name="sound", error=0.5) + f"    {finding}\n")
+    for name, value in {"COLUMNS": "60", "FORCE_COLOR": "1", "NO_COLOR": "1", "TERM": "xterm"}.items():
+        monkeypatch.setenv(name, value)
+    plain = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", here("sound").stdout)
+    assert max(map(len, plain.splitlines())) <= 60
+    words = {word for line in plain.splitlines() for word in line.split()}
+    assert "\u2026" not in plain
+    assert words >= {*check.split(), "against", "numbers", "235,929", "2.44e-16", "2.22e-15", "rounding", "verdict"}
+
+
+def test_without_java_the_table_says_what_was_not_run(
+    here: Thenar, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert "not run: java or Weka is not installed" in here().stdout
+
+
+@pytest.mark.slow
+def test_the_page_is_the_same_on_one_core_and_two_and_holds_three_pictures(thenar: Thenar, tmp_path: Path) -> None:
+    pages = [tmp_path / "one.html", tmp_path / "two.html"]
+    for path, jobs in zip(pages, (1, 2), strict=True):
+        done = thenar("stability", "elementary", "-o", path, "--jobs", jobs)
+        assert (done.returncode, done.stderr) == (0, "")
+    one, two = (path.read_text() for path in pages)
+    assert one == two
+    assert one.count("<figure>") == 3
+    assert 'id="elementary"' in one
+
+
+@pytest.mark.parametrize("missing", ["mpmath", "jinja2"])
+def test_a_missing_package_is_one_sentence_with_what_to_install(missing: str, tmp_path: Path) -> None:
+    program = f"import sys; sys.modules[{missing!r}] = None; from thenar.cli import run; sys.exit(run(sys.argv[1:]))"
+    command = [sys.executable, "-c", program, "stability", "-o", str(tmp_path / "page.html")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == f"thenar: {missing} is not installed: pip install 'thenar[stability]'\n"
+
+
+def test_a_reader_that_goes_away_ends_it_in_silence() -> None:
+    command = f"{sys.executable} -m thenar.cli stability --list | head -1"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+
+
+def test_ctrl_c_exits_with_130_and_leaves_nothing(folder: Path, tmp_path: Path) -> None:
+    ready = tmp_path / "ready"
+    endless = CASE.format(name="endless", error=0.5) + f"    open({str(ready)!r}, 'w').close()\n    while True: pass\n"
+    (folder / "endless.py").write_text(endless)
+    program = (
+        "import sys; from thenar.stability import cases, catalogue; from thenar.cli import run; "
+        f"cases.__path__ = [{str(folder)!r}]; catalogue.NAMES = ('endless',); sys.exit(run(sys.argv[1:]))"
+    )
+    command = [sys.executable, "-c", program, "stability", "--jobs", "1", "-o", str(tmp_path / "page.html")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        while not ready.exists():
+            assert process.poll() is None
+            os.sched_yield()
+        process.send_signal(signal.SIGINT)
+        stdout, stderr = process.communicate(timeout=60)
+    assert (process.returncode, stdout, stderr.strip()) == (130, "", "thenar: interrupted")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cases", "ready"]
