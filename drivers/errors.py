@@ -7,3 +7,11 @@ Leaves derive from `ThenarError` and from the nearest builtin, so that `except V
 
 class ThenarError(Exception):
     """Something the user can mend. The message says what was wrong, where, and what to do; the command exits with 2."""
+
+
+class DeviceError(ThenarError, OSError):
+    """A device cannot be opened, is gone, or does not answer as it must. Closing and opening it again may help."""
+
+
+class SettingError(ThenarError, ValueError):
+    """Something that a device cannot do was asked of it: no other try will help."""

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -26,7 +27,8 @@ def test_a_record_of_18_sensors_is_20_bytes() -> None:
 def test_what_is_encoded_is_decoded(record: Record) -> None:
     decoder = Decoder()
     assert decoder.feed(encode(record)) == [record]
-    assert decoder.counts == Counts(records=1, faults=int(record.fault is not None))
+    fault = record.fault
+    assert decoder.counts == Counts(records=1, too_fast=int(fault == "too fast"), unplugged=int(fault == "unplugged"))
 
 
 @given(st.lists(st.integers(1, 255), min_size=22, max_size=22).map(bytes))
@@ -60,7 +62,7 @@ def test_a_lost_byte_costs_one_record(values: bytes, place: int) -> None:
     encoded = encode(Record(values))
     decoder = Decoder()
     assert decoder.feed(encoded[:place] + encoded[place + 1 :] + encode(OPEN_HAND)) == [OPEN_HAND]
-    assert decoder.counts.wrong_start + decoder.counts.wrong_length == 1
+    assert decoder.counts.wrong_start + decoder.counts.wrong_length == decoder.counts.resyncs == 1
 
 
 @given(VALUES)
@@ -94,3 +96,36 @@ def test_what_is_no_record_is_counted_by_what_was_wrong() -> None:
 def test_a_zero_among_the_sensors_is_refused() -> None:
     with pytest.raises(ValueError, match="sensor 2 is 0"):
         encode(Record(bytes([7, 7, 0, 7])))
+
+
+@given(RECORDS, st.integers(128, 255))
+def test_a_status_byte_comes_behind_the_sensors_and_before_a_fault(record: Record, status: int) -> None:
+    with_status = replace(record, status=status)
+    wire = encode(with_status)
+    assert wire[SENSORS + 1] == status
+    assert wire[: SENSORS + 1] + wire[SENSORS + 2 :] == encode(record)
+    assert Decoder(status=True).feed(wire) == [with_status]
+
+
+@given(VALUES, st.integers(128, 255))
+def test_whoever_expects_a_status_byte_takes_no_record_without_one_nor_the_other_way(values: bytes, on: int) -> None:
+    without, with_it = Record(values), Record(values, status=on)
+    expecting, plain = Decoder(status=True), Decoder()
+    assert expecting.feed(encode(without)) == plain.feed(encode(with_it)) == []
+    assert expecting.counts == plain.counts == Counts(wrong_length=1)
+
+
+@given(st.lists(st.one_of(RECORDS.map(encode), st.binary(max_size=60))), st.sampled_from([18, 22]), st.booleans())
+def test_no_record_is_longer_or_shorter_than_the_glove_has_sensors(
+    parts: list[bytes], sensors: int, status: bool
+) -> None:
+    decoder = Decoder(sensors, status=status)
+    for record in decoder.feed(b"".join(parts)):
+        assert len(record.sensors) == sensors
+        assert (record.status is not None) == status
+        assert encode(record) in b"".join(parts)
+
+
+def test_a_status_of_nought_is_refused() -> None:
+    with pytest.raises(ValueError, match="status byte of 0"):
+        encode(Record(bytes([7]), status=0))

@@ -1,0 +1,82 @@
+"""What a CyberGlove's bytes mean on one hand: two points of each sensor's straight line, in a TOML file.
+
+    subject = "anna"
+    unit = "deg"
+    sensor = [
+        { name = "index_mpj", raw_a = 96, value_a = 0.0, raw_b = 161, value_b = 90.0 },
+    ]
+
+Two points say what an offset and a gain only say together with the order in which they are applied.
+"""
+
+from math import isfinite
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import msgspec
+
+from .errors import SettingError
+
+Raw = Annotated[int, msgspec.Meta(ge=1, le=255)]
+Name = Annotated[str, msgspec.Meta(min_length=1)]
+
+
+class SensorCalibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The straight line of one sensor: raw byte (1 to 255) and value at each of two points.
+
+    Raises SettingError if the two points are at one byte or a value is no number.
+    """
+
+    name: Name
+    raw_a: Raw
+    value_a: float
+    raw_b: Raw
+    value_b: float
+
+    def __post_init__(self) -> None:
+        if self.raw_a == self.raw_b:
+            raise SettingError(f"{self.name}: raw_a and raw_b are both {self.raw_a}, which makes no line")
+        if not (isfinite(self.value_a) and isfinite(self.value_b)):
+            raise SettingError(f"{self.name}: value_a and value_b must be finite numbers")
+
+    def value(self, raw: float) -> float:
+        """Return the value at a raw byte."""
+        return self.value_a + (raw - self.raw_a) * ((self.value_b - self.value_a) / (self.raw_b - self.raw_a))
+
+
+class GloveCalibration(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, rename={"sensors": "sensor"}
+):
+    """The lines of a glove's sensors, each named once, in any order. Raises SettingError if one is named twice."""
+
+    subject: str = ""
+    unit: Literal["deg"] = "deg"
+    sensors: tuple[SensorCalibration, ...]
+
+    def __post_init__(self) -> None:
+        names = [sensor.name for sensor in self.sensors]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise SettingError(f"sensor {twice} is calibrated twice: keep one")
+
+    def to_toml(self) -> str:
+        """Return the calibration as the text of its file; numbers keep every digit."""
+        return msgspec.toml.encode(self).decode("utf-8")
+
+    @classmethod
+    def of_toml(cls, text: str) -> Self:
+        """Return the calibration in the text of a file. Raises SettingError if there is none in it."""
+        try:
+            return msgspec.toml.decode(text, type=cls)
+        except (msgspec.MsgspecError, ValueError) as reason:
+            raise SettingError(f"no calibration: {reason}") from reason
+
+
+def load_calibration(path: Path) -> GloveCalibration:
+    """Return the calibration in a file. Raises SettingError, which names the file, if there is none in it."""
+    try:
+        return GloveCalibration.of_toml(path.read_text("utf-8"))
+    except OSError as reason:
+        raise SettingError(f"{path}: the calibration cannot be read: {reason.strerror}") from reason
+    except (SettingError, UnicodeDecodeError) as reason:
+        raise SettingError(f"{path}: {reason}; `thenar calibrate` writes such files") from reason

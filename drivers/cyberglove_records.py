@@ -1,0 +1,84 @@
+"""Records as they come in from a CyberGlove that is set up, streamed or polled, each with its time."""
+
+from collections import deque
+from time import monotonic, monotonic_ns
+
+from .cyberglove_commands import POLL, STREAM
+from .cyberglove_frame import OVERHEAD, Counts, Decoder, Record
+from .cyberglove_setup import GloveInfo, Wanted
+from .cyberglove_timing import sending_us, told_us
+from .errors import DeviceError
+from .serial_line import SerialLine
+
+# When a poll is taken for lost: a record takes 27 ms at 9600 baud, an FTDI adapter adds 16.
+_POLLED_S = 0.2
+# When a glove is taken for dead, which streams or answers no more.
+_SILENT_S = 1.0
+_SILENT_PERIODS = 4
+
+Timed = tuple[int, Record]
+
+
+class Records:
+    """Reads records from `line`, streamed, or polled as often as wanted. `counts` goes on where it is."""
+
+    def __init__(self, line: SerialLine, info: GloveInfo, wanted: Wanted, counts: Counts) -> None:
+        self._line, self._info, self._counts = line, info, counts
+        self._poll, self._period_s = wanted.poll, told_us(wanted.words) / 1e6
+        self._silent_s = max(_SILENT_S, _SILENT_PERIODS * info.period_us / 1e6)
+        self._record_us = round(sending_us(info.sensors + OVERHEAD + info.status, info.baud))
+        self.start()
+
+    def start(self) -> None:
+        """Begin, or begin again after the box was asked for something else."""
+        self._decoder = Decoder(self._info.sensors, self._counts, self._info.status)
+        self._ready: deque[Timed] = deque()
+        self._quiet_from = self._due = self._poll_at = monotonic()
+        self._asked = False
+        if not self._poll:
+            self._line.write(STREAM)
+
+    def read(self, timeout_s: float) -> Timed | None:
+        """Return the oldest record not yet returned and when it was in, in microseconds of the monotonic clock.
+
+        None if none is in by the timeout. Raises DeviceError when the line is gone, or no record came for a second
+        (or for four periods, where these are longer).
+        """
+        end = monotonic() + timeout_s
+        while not self._ready:
+            self._ask()
+            now = monotonic()
+            self._receive(min(end, self._quiet_from + self._silent_s, self._next_poll()) - now)
+            if not self._ready and now >= end:
+                return None
+        return self._ready.popleft()
+
+    def _ask(self) -> None:
+        now = monotonic()
+        if not self._poll or now < self._poll_at:
+            return
+        self._line.write(POLL)
+        if not self._asked:
+            self._asked, self._quiet_from = True, now
+        self._poll_at = now + _POLLED_S
+        self._due = max(self._due + self._period_s, now)
+
+    def _next_poll(self) -> float:
+        return self._poll_at if self._poll else float("inf")
+
+    def _receive(self, seconds: float) -> None:
+        records = self._decoder.feed(self._line.read(max(0.0, seconds)))
+        now_us = monotonic_ns() // 1000
+        if records:
+            # None of them can have come later than the ones behind it left room for on the wire.
+            behind = range(len(records) - 1, -1, -1)
+            self._ready.extend((now_us - n * self._record_us, one) for n, one in zip(behind, records, strict=True))
+            self._quiet_from, self._asked, self._poll_at = now_us / 1e6, False, self._due
+        elif monotonic() - self._quiet_from > self._silent_s and self._is_expected():
+            raise DeviceError(
+                f"{self._line.url}: the CyberGlove has sent no record for {self._silent_s:g} s: check its power and"
+                " the cable"
+            )
+
+    def _is_expected(self) -> bool:
+        return self._asked or not self._poll

@@ -1,0 +1,98 @@
+"""Debouncing: a press is reported as soon as it is read, a release once the contact has rested.
+
+A snap-action switch bounces for up to 3 ms when it closes and 8 ms when it opens (Panasonic EVQPL; other tact switches
+10 ms). Presses are eager, with a lockout; releases are deferred, as is usual where a press must not wait (QMK's
+`asym_eager_defer_pk`). All switches go through together as bits of one integer; those that change together share their
+timers.
+"""
+
+from .errors import SettingError
+
+Mask = int
+
+
+class Debouncer:
+    """Which switches are closed, of what is read of them.
+
+    press_lockout_us  for so long after a press, readings of the switch are ignored
+    release_us        a switch opens once it was read open for so long without a closed reading in between; a release
+                      is not put off to a scan that comes later than that anyway, so where more than half of it lies
+                      between scans, it takes less than two of them. What would be bounce of that opening, within
+                      release_us, is ignored.
+
+    Raises SettingError where a time is negative.
+    """
+
+    def __init__(self, press_lockout_us: int = 5_000, release_us: int = 10_000) -> None:
+        if press_lockout_us < 0 or release_us < 0:
+            raise SettingError(f"debounce times are 0 or more, not {press_lockout_us} us and {release_us} us")
+        self.press_lockout_us, self.release_us = press_lockout_us, release_us
+        self._closed: Mask = 0
+        self._time: int | None = None
+        self._period: int | None = None
+        # Ignored until a time; being read open since a time: disjoint, and each switch in one group at most.
+        self._locks: list[tuple[int, Mask]] = []
+        self._openings: list[tuple[int, Mask]] = []
+
+    def update(self, time_us: int, closed: Mask, known: Mask) -> Mask:
+        """Return which switches are closed, now that those in `known` were read at `time_us`, `closed` among them.
+
+        Switches that were not read keep their state, and their times run on. Time that goes back stands still.
+        """
+        now = self._advance(time_us)
+        free = known & ~self._locked(now) if self._locks else known
+        pressed = closed & free & ~self._closed
+        opened = ~closed & free & self._closed
+        if opened or self._openings:
+            self._closed &= ~self._released(now, opened, closed & free)
+        if pressed:
+            self._closed |= pressed
+            self._lock(now, now + self.press_lockout_us, pressed)
+        return self._closed
+
+    def _advance(self, time_us: int) -> int:
+        """Note the time, and how soon the next reading may come: after the shortest of the recent periods."""
+        if self._time is None:
+            self._time = time_us
+        interval = max(0, time_us - self._time)
+        self._time += interval
+        if self._period is None or interval <= self._period:
+            self._period = interval or self._period
+        else:
+            self._period = min(interval, self._period + (self._period >> 2) + 1)
+        return self._time
+
+    def _locked(self, now: int) -> Mask:
+        self._locks = [lock for lock in self._locks if lock[0] > now]
+        locked = 0
+        for _, mask in self._locks:
+            locked |= mask
+        return locked
+
+    def _lock(self, now: int, until: int, mask: Mask) -> None:
+        if until > now:
+            self._locks.append((until, mask))
+
+    def _released(self, now: int, opened: Mask, closed: Mask) -> Mask:
+        """Return which of the switches that are read open have rested long enough; their bounce is locked out."""
+        released, begun, openings = 0, opened, []
+        for since, group in self._openings:
+            begun &= ~group
+            going = self._go(now, since, group & opened)
+            released |= going
+            if rest := group & ~closed & ~going:
+                openings.append((since, rest))
+        if begun:
+            going = self._go(now, now, begun)
+            released |= going
+            if rest := begun & ~going:
+                openings.append((now, rest))
+        self._openings = openings
+        return released
+
+    def _go(self, now: int, since: int, group: Mask) -> Mask:
+        """Return `group` if the reading after this one would come too late for its release, else none of it."""
+        if not group or now + (self._period or 0) < since + self.release_us:
+            return 0
+        self._lock(now, since + self.release_us, group)
+        return group

@@ -1,0 +1,162 @@
+"""An emulated CyberGlove at the end of a serial line: it answers, is polled and streams as fast as a real one may.
+
+    with PtyLine(Path("glove")) as line, EmulatedCyberGlove(line) as glove:
+        glove.set(bytes(range(60, 78)))
+
+What a bad cable does is the line's business (`PtyLine.damage`, `.unplug`, `.send` for what nobody asked for).
+"""
+
+from collections import deque
+from threading import Condition, Thread
+from time import monotonic
+from types import TracebackType
+from typing import Self
+
+from ..cyberglove_timing import TICKS_HZ, digitising_us, shortest_us, told_us
+from .cyberglove_box import Action, CyberGloveBox, Doubts
+from .cyberglove_state import GloveState
+from .pty_line import PtyLine
+
+_RESTART_S = 1.75  # from the vendor's manual, as ViSTA quotes it
+
+
+class EmulatedCyberGlove:
+    """A glove of 18 or 22 sensors on `line`, in a thread of its own.
+
+    text       what ?i shall say
+    not_ready  how many times ?G shall say 1 before it says 3
+    doubts     how it shall behave where the sources disagree
+
+    What is done to it takes effect with the next record. Raises SettingError for another number of sensors.
+    """
+
+    def __init__(
+        self,
+        line: PtyLine,
+        *,
+        sensors: int = 18,
+        text: str = "CyberGlove, emulated",
+        not_ready: int = 0,
+        doubts: Doubts | None = None,
+    ) -> None:
+        self._line = line
+        self._state = GloveState(sensors, not_ready)
+        self._box = CyberGloveBox(self._state, text, doubts or Doubts())
+        self._changed = Condition()
+        self._heard: deque[bytes] = deque()
+        self._closing = False
+        self._started = monotonic()
+        self._next = 0.0
+        self.records = 0
+        self._thread = Thread(target=self._run, name="emulated CyberGlove", daemon=True)
+        self._thread.start()
+        line.receive = self._receive
+
+    def set(self, sensors: bytes) -> None:
+        """Let the sensors have these values, one byte of 1 to 255 a sensor. Raises SettingError if they cannot."""
+        self._state.set(sensors)
+
+    @property
+    def plugged(self) -> bool:
+        """Whether the glove hangs on its box; without it, records end in 'eg'."""
+        return self._state.plugged
+
+    @plugged.setter
+    def plugged(self, plugged: bool) -> None:
+        self._state.plugged = plugged
+
+    @property
+    def streaming(self) -> bool:
+        """Whether it streams."""
+        return self._box.streaming
+
+    @property
+    def light(self) -> bool:
+        """Whether the light at the wrist is on."""
+        return self._state.is_on("L")
+
+    def turn_switch(self, on: bool) -> None:
+        """Turn the switch at the wrist; the light follows, as long as the box was not told otherwise."""
+        self._state.turn_switch(on)
+
+    def close(self) -> None:
+        """Fall silent and hear no more. The line stays."""
+        self._line.receive = None
+        with self._changed:
+            self._closing = True
+            self._changed.notify()
+        self._thread.join()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+    def _receive(self, data: bytes) -> None:
+        with self._changed:
+            self._heard.append(data)
+            self._changed.notify()
+
+    def _run(self) -> None:
+        while not self._closing:
+            if self._box.streaming:
+                self._stream()
+            for data in self._heard_until(self._next if self._box.streaming else None):
+                self._hear(data)
+
+    def _heard_until(self, end: float | None) -> list[bytes]:
+        """Return what has come in, as soon as something has; nothing at the end, or when closing."""
+        with self._changed:
+            left = None if end is None else max(0.0, end - monotonic())
+            self._changed.wait_for(lambda: self._heard or self._closing, left)
+            heard = list(self._heard)
+            self._heard.clear()
+        return heard
+
+    def _hear(self, data: bytes) -> None:
+        was_streaming = self._box.streaming
+        for reply in self._box.feed(data):
+            if isinstance(reply, bytes):
+                self._line.send(reply)
+            else:
+                self._act(reply)
+        if self._box.streaming and not was_streaming:
+            self._next = monotonic() + digitising_us(self._count(), self._state.is_on("F")) / 1e6
+
+    def _act(self, action: Action) -> None:
+        if action is Action.RESTARTED:
+            self._wait(_RESTART_S)
+            self._heard.clear()
+            return
+        self._wait(digitising_us(self._count(), self._state.is_on("F")) / 1e6)
+        as_text = action is Action.POLLED_AS_TEXT
+        self._send(self._box.polled_as_text() if as_text else self._state.record(streamed=False, ticks=self._ticks()))
+
+    def _stream(self) -> None:
+        """Send a record when it is due, and say when the next is: by the told period or the shortest there can be."""
+        if monotonic() < self._next:
+            return
+        settings = self._state.settings
+        words = int.from_bytes(settings["T"][:2], "big"), int.from_bytes(settings["T"][2:], "big")
+        told = told_us(words)
+        shortest = shortest_us(
+            self._count(), self._line.baud, status=self._state.is_on("U"), filtered=self._state.is_on("F")
+        )
+        self._send(self._state.record(streamed=True, too_fast=0 < told < shortest, ticks=self._ticks()))
+        # A host too busy to wake this thread in time is not repaid with a burst.
+        self._next = max(self._next + max(told, shortest) / 1e6, monotonic())
+
+    def _send(self, record: bytes) -> None:
+        self.records += 1
+        self._line.send(record)
+
+    def _wait(self, seconds: float) -> None:
+        with self._changed:
+            self._changed.wait_for(lambda: self._closing, seconds)
+
+    def _count(self) -> int:
+        return self._state.settings["N"][0]
+
+    def _ticks(self) -> int:
+        return int((monotonic() - self._started) * TICKS_HZ)

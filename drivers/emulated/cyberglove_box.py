@@ -1,0 +1,172 @@
+"""The box of an emulated CyberGlove: bytes of commands in, answers out. It knows no time and no line."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from ..cyberglove_commands import POLL, RESTART, SET, STOP, STREAM
+from .cyberglove_state import GloveState
+
+_REINITIALISE = b"\x09"  # Ctrl-I
+_TEXT_END = b"\r\n\0"
+_LONGEST_TEXT = 64
+_ALL_ACTUATORS = 255
+
+
+class Action(Enum):
+    """What only somebody with a clock can do."""
+
+    POLLED = "a record is asked for"
+    POLLED_AS_TEXT = "a record is asked for in the text dialect"
+    RESTARTED = "the box is silent until it has restarted"
+
+
+@dataclass(frozen=True, slots=True)
+class Doubts:
+    """What the sources disagree on, or do not say, as this glove has it.
+
+    error_echo   whether an error answer begins with the command's echo
+    stop_echo    whether a Ctrl-C is answered by itself and a NUL
+    stray_nul    whether a NUL follows a text answer
+    """
+
+    error_echo: bool = True
+    stop_echo: bool = False
+    stray_nul: bool = False
+
+
+class CyberGloveBox:
+    """Understands the commands of `docs/cyberglove.md`, in both dialects. While it streams, nothing but a Ctrl-C."""
+
+    def __init__(self, state: GloveState, text: str, doubts: Doubts) -> None:
+        self.state, self.text, self.doubts = state, text, doubts
+        self.streaming = False
+        self._pending = b""
+
+    def feed(self, data: bytes) -> list[bytes | Action]:
+        """Return what `data` brings about, in order: bytes to send at once, and what takes time."""
+        self._pending += data
+        out: list[bytes | Action] = []
+        while self._pending:
+            used = self._streaming(out) if self.streaming else self._command(out)
+            if not used:
+                break
+            self._pending = self._pending[used:]
+        return out
+
+    def _streaming(self, out: list[bytes | Action]) -> int:
+        if self._pending.startswith(STOP):
+            return self._stop(out)
+        return 1  # commands are lost on a box that streams
+
+    def _command(self, out: list[bytes | Action]) -> int:
+        """Carry out the first command that is pending; return its length, 0 while it is not complete."""
+        first = self._pending[:1]
+        if first in (STOP, RESTART, _REINITIALISE):
+            return self._control(first, out)
+        if first in b"\r\n \0":
+            return 1
+        if first == b"?":
+            return self._query(out)
+        return self._text(first, out) if first.islower() else self._binary(first, out)
+
+    def _control(self, first: bytes, out: list[bytes | Action]) -> int:
+        if first == STOP:
+            return self._stop(out)
+        if first == RESTART:
+            self.state.reset()
+            out.append(Action.RESTARTED)
+        out.append(first + _TEXT_END)
+        return 1
+
+    def _stop(self, out: list[bytes | Action]) -> int:
+        self.streaming = False
+        if self.doubts.stop_echo:
+            out.append(STOP + b"\0")
+        return 1
+
+    def _query(self, out: list[bytes | Action]) -> int:
+        echo = self._pending[:2]
+        if len(echo) < 2:
+            return 0
+        letter = echo[1:].decode("latin-1")
+        values = self.state.answer(letter.upper())
+        if letter == "i":
+            self._say_text(echo + self.text.encode("ascii"), out)
+        elif values is None:
+            out.append(self._error(echo, b"?"))
+        elif letter.isupper():
+            out.append(echo + values + b"\0")
+        else:
+            self._say_text(b" ".join([echo, _decimals(letter, values)]), out)
+        return 2
+
+    def _binary(self, first: bytes, out: list[bytes | Action]) -> int:
+        letter = first.decode("latin-1")
+        if first in (POLL, STREAM):
+            self.streaming = first == STREAM
+            out += [] if self.streaming else [Action.POLLED]
+            return 1
+        size = self._size(letter)
+        if size is None:
+            out.append(self._error(first, b"?"))
+            return 1
+        if len(self._pending) < size:
+            return 0
+        is_set = letter in "AC" or self.state.apply(letter, self._pending[1:size])
+        out.append(first + b"\0" if is_set else self._error(first, b"n"))
+        return size
+
+    def _size(self, letter: str) -> int | None:
+        """Return the length of the binary command of this letter, None if there is none."""
+        second = self._pending[1:2]
+        if letter == "A":  # actuators: places and amplitudes, or all six amplitudes
+            return 2 + (6 if second == bytes([_ALL_ACTUATORS]) else 2 * int.from_bytes(second, "big"))
+        if letter == "C":  # all offsets and gains of the hardware, or one of them
+            return 2 + 2 * (self.state.settings["N"][0] if second == b"A" else 1)
+        return 1 + SET[letter] if letter in SET else None
+
+    def _text(self, first: bytes, out: list[bytes | Action]) -> int:
+        if first == POLL.lower():
+            out.append(Action.POLLED_AS_TEXT)
+            return 1
+        line, end, _ = self._pending.partition(b"\r")
+        if not end and len(line) < _LONGEST_TEXT:
+            return 0
+        letter = first.decode("latin-1").upper()
+        values = _numbers(letter, line[1:])
+        if letter not in SET:
+            out.append(self._error(first, b"?"))
+        elif values is None or not self.state.apply(letter, values):
+            out.append(self._error(first, b"n"))
+        else:
+            self._say_text(first, out)
+        return len(line) + len(end)
+
+    def polled_as_text(self) -> bytes:
+        """Return a record in the text dialect: letter and decimal numbers."""
+        return b" ".join([b"g", *(b"%d" % value for value in self.state.sent())]) + _TEXT_END
+
+    def _say_text(self, text: bytes, out: list[bytes | Action]) -> None:
+        out.append(text + _TEXT_END + b"\0" * self.doubts.stray_nul)
+
+    def _error(self, echo: bytes, kind: bytes) -> bytes:
+        return echo * self.doubts.error_echo + b"e" + kind + b"\0"
+
+
+def _decimals(letter: str, values: bytes) -> bytes:
+    """Return values as text; the period's and the versions' are words."""
+    size = 2 if letter in "tv" else 1
+    places = range(0, len(values), size)
+    return b" ".join(b"%d" % int.from_bytes(values[place : place + size], "big") for place in places)
+
+
+def _numbers(letter: str, text: bytes) -> bytes | None:
+    """Return the values that decimal numbers stand for, None if they are not the right ones."""
+    size = 2 if letter == "T" else 1
+    words = text.split()
+    if len(words) * size != SET.get(letter) or not all(word.isdigit() and len(word) <= 5 for word in words):
+        return None
+    numbers = [int(word) for word in words]
+    if any(number >> 8 * size for number in numbers):
+        return None
+    return b"".join(number.to_bytes(size, "big") for number in numbers)

@@ -1,0 +1,205 @@
+"""Emulated expanders on real device nodes: an unchanged driver opens /dev/i2c-N and meets them there.
+
+umockdev (Debian packages umockdev, gir1.2-umockdev-1.0, python3-gi) intercepts a client's system calls, so the client
+must be a process of its own, started with `EmulatedI2c.environment`; kernel modules and privileges are not needed.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from tempfile import TemporaryFile
+from types import TracebackType
+from typing import Any, Literal, Self
+
+from ..errors import DeviceError, SettingError
+from .i2c_models import MODELS
+
+_PYTHON = "/usr/bin/python3"
+_INSTALL = "install the packages umockdev, gir1.2-umockdev-1.0 and python3-gi (Debian, Ubuntu)"
+
+AdapterKind = Literal["any", "bcm2835", "designware", "i2c-gpio", "smbus-only"]
+
+
+@dataclass(frozen=True, slots=True)
+class EmulatedChip:
+    """A chip in its place: straight on the bus, or on a channel of the TCA9548A at address `mux`."""
+
+    kind: str
+    address: int
+    mux: int | None = None
+    channel: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class EmulatedBus:
+    """A bus at `device` (/dev/i2c-N); `paced`: each transfer takes as long as its SCL periods at `clock_hz`."""
+
+    device: str
+    clock_hz: int
+    adapter: AdapterKind
+    chips: tuple[EmulatedChip, ...]
+    paced: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Traffic:
+    """Bytes that went to and from one place, addresses included; `register` where the chip has registers."""
+
+    address: int
+    mux: int | None
+    channel: int | None
+    register: int | None
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class WireCounters:
+    """What a bus has seen: ioctl calls, transfers (each ended by a STOP), SCL periods, and bytes by place."""
+
+    calls: int
+    transfers: int
+    scl_periods: int
+    traffic: tuple[Traffic, ...]
+
+    @property
+    def total_bytes(self) -> int:
+        """Bytes on the wire, addresses included."""
+        return sum(place.count for place in self.traffic)
+
+
+class EmulatedI2c:
+    """The buses of a glove, served by a process of its own. Chips are numbered as they stand in their bus.
+
+    A client sees them if it runs with `environment`. Pins start high. Raises DeviceError, naming what to install, where
+    umockdev is missing, and SettingError for a chip that cannot be emulated.
+    """
+
+    def __init__(self, buses: Sequence[EmulatedBus]) -> None:
+        unknown = sorted({chip.kind for bus in buses for chip in bus.chips} - set(MODELS))
+        if unknown:
+            raise SettingError(f"cannot emulate {', '.join(unknown)}; what can be emulated: {', '.join(MODELS)}")
+        wrapper = shutil.which("umockdev-wrapper")
+        if wrapper is None:
+            raise DeviceError(f"the program umockdev-wrapper is missing: {_INSTALL}")
+        self._levels = [[(1 << 24) - 1 for _ in bus.chips] for bus in buses]
+        self._errors = TemporaryFile("w+")  # noqa: SIM115 - it lives as long as the server; a pipe would fill up
+        self._server = subprocess.Popen(
+            [wrapper, _PYTHON, "-m", "drivers.emulated.i2c_server"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._errors,
+            text=True,
+            start_new_session=True,  # Ctrl-C is for us; the server ends when its stdin does
+            env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+        )
+        root = self._tell([asdict(bus) for bus in buses])
+        self.environment = {"UMOCKDEV_DIR": str(root), "LD_PRELOAD": "libumockdev-preload.so.0"}
+
+    def set_levels(self, bus: int, chip: int, levels: int) -> None:
+        """Set the pins of one chip: bit p is pin p; 1 is high, or open where the chip has a pull-up."""
+        self._levels[bus][chip] = levels
+        self.set_all(self._levels)
+
+    def set_all(self, levels: Sequence[Sequence[int]]) -> None:
+        """Set the pins of all chips of all buses at one time."""
+        self._levels = [list(values) for values in levels]
+        self._tell(["levels", self._levels])
+
+    def counters(self, bus: int) -> WireCounters:
+        """Return what the bus has seen since the start."""
+        seen = self._tell(["counters", bus])
+        traffic = tuple(Traffic(*place) for place in seen.pop("traffic"))
+        return WireCounters(**seen, traffic=traffic)
+
+    def fail(
+        self, bus: int, code: int, *, address: int | None = None, times: int | None = None, batches: bool = False
+    ) -> None:
+        """Let transfers end with errno `code`: to one address or all, so many times or until healed, batches alone."""
+        self._fault(bus, "error", code, address, times, batches)
+
+    def remove(self, bus: int, chip: int) -> None:
+        """Let a chip acknowledge nothing any more; `heal` brings it back as it was left."""
+        self._fault(bus, "absent", chip, True)
+
+    def bring_back(self, bus: int, chip: int) -> None:
+        """End `remove` of this chip alone."""
+        self._fault(bus, "absent", chip, False)
+
+    def remove_mux(self, bus: int, mux: int) -> None:
+        """Let a mux acknowledge nothing any more, and nothing behind it."""
+        self._fault(bus, "absent_mux", mux)
+
+    def replace(self, bus: int, chip: int, kind: str) -> None:
+        """Put a new chip of another kind in the place of a chip."""
+        self._fault(bus, "become", chip, kind)
+
+    def reset(self, bus: int, chip: int) -> None:
+        """Let a power glitch bring a chip back to its defaults."""
+        self._fault(bus, "reset", chip)
+
+    def poke(self, bus: int, chip: int, register: int, value: int) -> None:
+        """Write a register behind the client's back."""
+        self._fault(bus, "poke", chip, register, value)
+
+    def poke_mux(self, bus: int, mux: int, control: int) -> None:
+        """Change a mux's control register: 0 is what a reset of it does."""
+        self._fault(bus, "poke_mux", mux, control)
+
+    def claim(self, bus: int, address: int) -> None:
+        """Let a driver of the kernel hold an address: I2C_SLAVE answers EBUSY."""
+        self._fault(bus, "claim", address)
+
+    def hold_sda(self, bus: int, transfers: int | None = None) -> None:
+        """Hold SDA low until healed, or until so many transfers have clocked it free."""
+        self._fault(bus, "stick", transfers)
+
+    def heal(self, bus: int) -> None:
+        """End all of the above that lasts."""
+        self._fault(bus, "heal")
+
+    def unplug(self, bus: int) -> None:
+        """Take the adapter away: its node is gone, and who has it open is told ENODEV."""
+        self._tell(["unplug", bus])
+
+    def replug(self, bus: int) -> None:
+        """Bring it back."""
+        self._tell(["plug", bus])
+
+    def close(self) -> None:
+        """End the server and its device nodes."""
+        if self._server.poll() is None:
+            self._server.communicate(timeout=10)
+        self._errors.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _fault(self, bus: int, name: str, *arguments: Any) -> None:
+        self._tell(["fault", bus, name, arguments])
+
+    def _tell(self, line: Any) -> Any:
+        assert self._server.stdin is not None
+        assert self._server.stdout is not None
+        with suppress(BrokenPipeError):
+            self._server.stdin.write(json.dumps(line) + "\n")
+            self._server.stdin.flush()
+        answer = self._server.stdout.readline()
+        if not answer:
+            raise DeviceError(f"the emulated I2C buses have ended ({self._last_words()}): {_INSTALL}")
+        return json.loads(answer)
+
+    def _last_words(self) -> str:
+        with suppress(BrokenPipeError):
+            self._server.communicate(timeout=10)
+        self._errors.seek(0)
+        return self._errors.read().strip().rpartition("\n")[2]

@@ -1,0 +1,224 @@
+"""Serves emulated I2C buses as device nodes through umockdev; spoken to in JSON lines on stdin and stdout.
+
+Started as `umockdev-wrapper /usr/bin/python3 -m drivers.emulated.i2c_server`: it needs the system's Python, which has
+PyGObject, and no other package. Each line in is [verb, arguments...] of `Server`; each line out is the answer.
+"""
+
+import errno
+import json
+import struct
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import gi
+
+gi.require_version("UMockdev", "1.0")
+from gi.repository import UMockdev  # noqa: E402
+
+from .i2c_adapter import I2C_BLOCK, Adapter, Fault  # noqa: E402
+from .i2c_wire import Message, Station, Wire  # noqa: E402
+
+I2C_SLAVE, I2C_SLAVE_FORCE, I2C_FUNCS, I2C_RDWR, I2C_SMBUS = 0x703, 0x706, 0x705, 0x707, 0x720
+_READS = 0x0001
+_MESSAGE = struct.Struct("=HHHxxQ")
+# A sleep this much shorter than the wait, then a spin: sleeping alone ends late by as much.
+_SPIN_S = 100e-6
+
+
+class Node:
+    """One /dev/i2c-N. The handler runs in umockdev's thread; `lock` keeps it apart from the commands."""
+
+    def __init__(self, testbed: Any, device: str, adapter: Adapter, paced: bool) -> None:
+        self.adapter, self._paced = adapter, paced
+        self.lock = threading.Lock()
+        self._addresses: dict[int, int] = {}
+        self._clients: set[int] = set()  # who has opened the node since it is there
+        self._strangers: set[int] = set()  # who had it open when it went away
+        self._handler = UMockdev.IoctlBase()
+        self._handler.connect("handle-ioctl", self._on_ioctl)
+        self._handler.connect("client-vanished", self._forget)
+        name = device.removeprefix("/dev/")
+        sysfs = f"/devices/platform/{name}.i2c/{name}/i2c-dev/{name}"
+        number = f"E: MAJOR=89\nE: MINOR={name.rpartition('-')[2]}\n"
+        testbed.add_from_string(f"P: {sysfs}\nN: {name}\nE: SUBSYSTEM=i2c-dev\nE: DEVNAME={device}\n{number}")
+        testbed.attach_ioctl(device, self._handler)
+        self._path = Path(testbed.get_root_dir() + device)
+        self._away = self._path.with_name(f".{name}")
+
+    def unplug(self) -> None:
+        """Remove the node; who has it open is told ENODEV from now on."""
+        if not self._away.is_symlink():
+            self._path.rename(self._away)
+        self._strangers |= self._clients
+        self._clients.clear()
+
+    def plug(self) -> None:
+        """Bring the node back, for who opens it now."""
+        if self._away.is_symlink():
+            self._away.rename(self._path)
+
+    def _on_ioctl(self, _: Any, client: Any) -> bool:
+        start = time.monotonic()
+        wire = self.adapter.wire
+        answer = (-1, errno.EIO)  # whatever happens here: who is not answered waits for ever
+        try:
+            with self.lock:
+                before = wire.scl_periods, wire.transfers
+                answer = self._answer(client)
+                took_s = wire.duration_s(wire.scl_periods - before[0], wire.transfers - before[1])
+            if self._paced:
+                _wait_until(start + took_s)
+        finally:
+            client.complete(*answer)
+        return True
+
+    def _answer(self, client: Any) -> tuple[int, int]:
+        try:
+            self._admit(hash(client))
+            return self._do(client), 0
+        except OSError as error:
+            return -1, error.errno or errno.EIO
+
+    def _forget(self, _: Any, client: Any) -> None:
+        with self.lock:
+            self._clients.discard(hash(client))
+            self._strangers.discard(hash(client))
+
+    def _admit(self, client: int) -> None:
+        if client in self._strangers:
+            raise OSError(errno.ENODEV, "unplugged")
+        self._clients.add(client)
+
+    def _do(self, client: Any) -> int:
+        request, arg = client.get_request(), client.get_arg()
+        self.adapter.calls += 1
+        if request in (I2C_SLAVE, I2C_SLAVE_FORCE):
+            address = struct.unpack("L", bytes(arg.retrieve()))[0] & 0x7F
+            if request == I2C_SLAVE:
+                self.adapter.slave(address)
+            self._addresses[hash(client)] = address
+            return 0
+        if request == I2C_FUNCS:
+            arg.resolve(0, 8).update(0, struct.pack("L", self.adapter.funcs))
+            return 0
+        if request == I2C_RDWR:
+            return self._rdwr(arg.resolve(0, 16))
+        if request == I2C_SMBUS:
+            return self._smbus(arg.resolve(0, 16), self._addresses.get(hash(client), 0))
+        raise OSError(errno.ENOTTY, "no such request")
+
+    def _rdwr(self, data: Any) -> int:
+        _, count = struct.unpack_from("=QI", bytes(data.retrieve()))
+        if count > 42:
+            raise OSError(errno.EINVAL, "too many messages")
+        table = data.resolve(0, _MESSAGE.size * count)
+        messages, buffers = [], []
+        for number, (address, flags, length, _) in enumerate(_MESSAGE.iter_unpack(bytes(table.retrieve()))):
+            buffer = table.resolve(_MESSAGE.size * number + 8, length)
+            if flags & _READS:
+                messages.append(Message(address, None, length))
+                buffers.append((number, buffer))
+            else:
+                messages.append(Message(address, bytes(buffer.retrieve())))
+        answers = self.adapter.rdwr(messages)
+        for number, buffer in buffers:
+            buffer.update(0, answers[number])
+        return int(count)
+
+    def _smbus(self, data: Any, address: int) -> int:
+        reads, command, size = struct.unpack_from("=BBxxI", bytes(data.retrieve()))
+        pointer = data.resolve(8, 34) if size else None
+        content = bytes(pointer.retrieve()) if pointer is not None else b""
+        block = content[1 : 1 + content[0]] if size == I2C_BLOCK else content[: max(0, size - 1)]
+        answer = self.adapter.smbus(address, bool(reads), command, size, block)
+        if reads and pointer is not None:
+            pointer.update(1 if size == I2C_BLOCK else 0, answer)
+        return 0
+
+
+class Server:
+    """What the lines on stdin may ask for; a chip is its number on its bus."""
+
+    def __init__(self, testbed: Any, buses: list[dict[str, Any]]) -> None:
+        self._nodes = [
+            Node(
+                testbed,
+                bus["device"],
+                Adapter(Wire([Station(**chip) for chip in bus["chips"]], bus["clock_hz"]), bus["adapter"]),
+                bus["paced"],
+            )
+            for bus in buses
+        ]
+
+    def levels(self, every: list[list[int]]) -> None:
+        """Set the pins of all chips of all buses."""
+        for node, values in zip(self._nodes, every, strict=True):
+            with node.lock:
+                for station, value in zip(node.adapter.wire.stations, values, strict=True):
+                    station.device.levels = value
+
+    def unplug(self, bus: int) -> None:
+        """Take the adapter away."""
+        with self._nodes[bus].lock:
+            self._nodes[bus].unplug()
+
+    def plug(self, bus: int) -> None:
+        """Bring it back."""
+        with self._nodes[bus].lock:
+            self._nodes[bus].plug()
+
+    def fault(self, bus: int, name: str, arguments: list[Any]) -> None:
+        """Let something go wrong: see `i2c.EmulatedI2c`, which has a method for each of them."""
+        node = self._nodes[bus]
+        with node.lock:
+            _FAULTS[name](node.adapter, *arguments)
+
+    def counters(self, bus: int) -> dict[str, Any]:
+        """Tell what went over the wire."""
+        node = self._nodes[bus]
+        with node.lock:
+            wire = node.adapter.wire
+            return {
+                "calls": node.adapter.calls,
+                "transfers": wire.transfers,
+                "scl_periods": wire.scl_periods,
+                "traffic": [(*place, count) for place, count in wire.traffic.items()],
+            }
+
+
+_FAULTS: dict[str, Callable[..., None]] = {
+    "error": lambda adapter, *fault: adapter.faults.append(Fault(*fault)),
+    "absent": lambda adapter, chip, absent: setattr(adapter.wire.stations[chip], "absent", absent),
+    "absent_mux": lambda adapter, mux: adapter.wire.absent_muxes.add(mux),
+    "become": lambda adapter, chip, kind: adapter.wire.stations[chip].become(kind),
+    "reset": lambda adapter, chip: adapter.wire.stations[chip].device.reset(),
+    "poke": lambda adapter, chip, register, value: adapter.wire.stations[chip].device.poke(register, value),
+    "poke_mux": lambda adapter, mux, value: adapter.wire.muxes[mux].poke(0, value),
+    "claim": lambda adapter, address: adapter.claimed.add(address),
+    "stick": Adapter.stick,
+    "heal": Adapter.heal,
+}
+
+
+def _wait_until(moment: float) -> None:
+    while (left := moment - time.monotonic()) > 0:
+        if left > _SPIN_S:
+            time.sleep(left - _SPIN_S)
+
+
+def main() -> None:
+    """Read the buses from the first line, say where the testbed is, and do as every further line says."""
+    testbed = UMockdev.Testbed.new()
+    server = Server(testbed, json.loads(sys.stdin.readline()))
+    print(json.dumps(testbed.get_root_dir()), flush=True)
+    for line in sys.stdin:
+        verb, *arguments = json.loads(line)
+        print(json.dumps(getattr(server, verb)(*arguments)), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,155 @@
+"""A device node /dev/i2c-N: transfers as the kernel takes them, by I2C messages or, where it must be, by SMBus."""
+
+import errno
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fcntl import ioctl
+from typing import TYPE_CHECKING
+
+from ..errors import DeviceError
+
+if TYPE_CHECKING:
+    from smbus2 import SMBus, i2c_msg
+
+MOST_MESSAGES = 42
+_FUNC_I2C = 0x00000001
+_I2C_SLAVE = 0x0703
+
+# The specification keeps 1111 1XX for other uses: no chip acknowledges this address.
+NOBODY = 0x7F
+
+Run = Callable[[], list[bytes]]
+
+
+@dataclass(frozen=True, slots=True)
+class Query:
+    """A command to write, where there is one, and how many bytes to read then, without a STOP in between."""
+
+    address: int
+    command: bytes
+    length: int
+
+    @property
+    def messages(self) -> int:
+        """How many I2C messages this takes."""
+        return 2 if self.command else 1
+
+
+class Node:
+    """The open node. Errors of transfers are OSErrors as the adapter gives them; `transfers` counts the ioctl calls.
+
+    plain_i2c says whether I2C messages are used, or SMBus transfers in their place.
+    One thread at a time: the buffers of prepared transfers are used again and again.
+    """
+
+    def __init__(self, device: str) -> None:
+        self.device = device
+        self.transfers = 0
+        self.plain_i2c = True
+        self._bus: SMBus | None = None
+
+    @property
+    def offers_i2c(self) -> bool:
+        """Whether the adapter says that it takes I2C messages."""
+        return self._bus is not None and bool(self._bus.funcs & _FUNC_I2C)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether transfers are possible."""
+        return self._bus is not None and self._bus.fd is not None
+
+    def open(self) -> None:
+        """Open the node, anew if it was open: what was prepared stays good. Raises DeviceError with what to check."""
+        from smbus2 import SMBus
+
+        self.close()
+        bus = self._bus = self._bus or SMBus()
+        try:
+            bus.open(self.device)
+        except OSError as error:
+            bus.close()
+            raise DeviceError(f"{self.device} cannot be opened: {_cause(error)}") from None
+
+    def close(self) -> None:
+        """Close the node; there are no transfers until it is opened again."""
+        if self._bus is not None:
+            self._bus.close()
+
+    def claim(self, address: int) -> None:
+        """Ask for an address. Raises OSError EBUSY where a driver of the kernel has it."""
+        bus = self._ready()
+        assert bus.fd is not None
+        ioctl(bus.fd, _I2C_SLAVE, address)
+        bus.address = None  # smbus2 remembers whom it asked for last
+
+    def write(self, address: int, data: bytes) -> None:
+        """Write bytes in one transfer."""
+        bus = self._ready()
+        self.transfers += 1
+        if self.plain_i2c:
+            from smbus2 import i2c_msg
+
+            bus.i2c_rdwr(i2c_msg.write(address, data))
+        elif len(data) == 1:
+            bus.write_byte(address, data[0])
+        else:
+            bus.write_i2c_block_data(address, data[0], list(data[1:]))
+
+    def query(self, query: Query) -> bytes:
+        """Write and read in one transfer."""
+        return self.prepare((query,))()[0]
+
+    def prepare(self, queries: Sequence[Query]) -> Run:
+        """Return what does all queries in one transfer and returns their answers; SMBus takes one query alone."""
+        bus = self._ready()
+        if not self.plain_i2c:
+            (query,) = queries
+            return lambda: [self._by_smbus(bus, query)]
+        messages: list[i2c_msg] = []
+        answers: list[i2c_msg] = []
+        for query in queries:
+            _append(query, messages, answers)
+
+        def run() -> list[bytes]:
+            self.transfers += 1
+            bus.i2c_rdwr(*messages)
+            return [bytes(answer) for answer in answers]
+
+        return run
+
+    def _ready(self) -> "SMBus":
+        if self._bus is None or not self.is_open:
+            raise OSError(errno.EBADF, f"{self.device} is not open")
+        return self._bus
+
+    def _by_smbus(self, bus: "SMBus", query: Query) -> bytes:
+        self.transfers += 1
+        if not query.command:
+            if query.length == 1:
+                return bytes((bus.read_byte(query.address),))
+            raise OSError(errno.EOPNOTSUPP, "SMBus reads one byte at most without a command")
+        command = query.command[0]
+        if query.length == 1:
+            return bytes((bus.read_byte_data(query.address, command),))
+        if query.length == 2:
+            return bus.read_word_data(query.address, command).to_bytes(2, "little")
+        return bytes(bus.read_i2c_block_data(query.address, command, query.length))
+
+
+def _append(query: Query, messages: "list[i2c_msg]", answers: "list[i2c_msg]") -> None:
+    from smbus2 import i2c_msg
+
+    if query.command:
+        messages.append(i2c_msg.write(query.address, query.command))
+    answer = i2c_msg.read(query.address, query.length)
+    messages.append(answer)
+    answers.append(answer)
+
+
+def _cause(error: OSError) -> str:
+    if error.errno in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
+        return "there is no such bus; is the adapter plugged in, is I2C switched on, is the module i2c-dev loaded?"
+    if error.errno in (errno.EACCES, errno.EPERM):
+        return "you may not; is your user in the group i2c?"
+    return f"{os.strerror(error.errno or errno.EIO)}; is it an I2C device?"

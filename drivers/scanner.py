@@ -1,0 +1,197 @@
+"""The switch-scanner board on a serial line: what it says, as sets of closed keys with their times."""
+
+from collections import deque
+from time import monotonic
+from types import TracebackType
+from typing import Self
+
+from .board_keys import BoardKeys
+from .board_times import BoardTimes
+from .errors import DeviceError
+from .scanner_frame import Counts, Frame
+from .scanner_link import Received, ScannerLink
+from .scanner_messages import (
+    Faults,
+    FromBoard,
+    GetState,
+    Hello,
+    SetDebounce,
+    SetRate,
+    ToBoard,
+    from_board,
+)
+from .scanner_payload import MessageError
+from .scanner_reading import ScannerCounts, ScannerReading
+
+# Opening the port of an Arduino resets it, and its boot loader answers nobody for up to two seconds.
+_BOOT_S = 3.0
+_GREETING_S = 0.3
+_ASK_AGAIN_S = 0.1
+
+
+class Scanner:
+    """A scanner board at `url`, anything that pySerial opens; boards with USB of their own ignore `baud`.
+
+    `open`, then `read` again and again; both raise DeviceError when the board is gone or is not what it was, after
+    which opening it again is the way back. For one thread.
+
+    hello   what the board last said of itself
+    faults  what it last said of its own troubles; None: nothing yet
+    """
+
+    def __init__(self, url: str, baud: int = 115200) -> None:
+        self.url, self.baud = url, baud
+        self._link: ScannerLink | None = None
+        self._forget()
+
+    def _forget(self) -> None:
+        self.hello: Hello | None = None
+        self.faults: Faults | None = None
+        self._received = Counts()
+        self._keys = BoardKeys()
+        self._times = BoardTimes()
+        self._waiting: deque[Received] = deque()
+        self._misfits = self._asked = 0
+        self._ask_at = 0.0
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+    def open(self) -> Hello:
+        """Find the board. Raises DeviceError if none answers within three seconds, or one that speaks otherwise."""
+        self.close()
+        self._forget()
+        self._link = ScannerLink(self.url, self.baud)
+        self._received = self._link.counts
+        try:
+            self.hello = self._greet(self._link)
+        except DeviceError:
+            self.close()
+            raise
+        return self.hello
+
+    @property
+    def counts(self) -> ScannerCounts:
+        """What came in since the board was last opened."""
+        seen = self._received
+        received = seen.frames, seen.damaged, seen.short, seen.overlong
+        return ScannerCounts(*received, self._keys.gaps, self._misfits, self._asked, self._times.pings)
+
+    def read(self, timeout_s: float) -> ScannerReading | None:
+        """Return the next reading, None if there was none in time. Raises DeviceError."""
+        link, end = self._open_link(), monotonic() + timeout_s
+        reading = self._next()
+        while reading is None:
+            left = end - monotonic()
+            self._ask_for_state()
+            self._waiting.extend(link.receive(max(0.0, min(left, _ASK_AGAIN_S))))
+            reading = self._next()
+            if left <= 0:
+                break
+        return reading
+
+    def set_rate(self, scan_us: int, state_us: int, heartbeat_us: int) -> None:
+        """Ask for other periods, as in Hello; once the answer was read, `hello` says what came of it."""
+        self._send(SetRate(scan_us, state_us, heartbeat_us))
+
+    def set_debounce(self, press_us: int, release_us: int) -> None:
+        """Ask for debouncing on the board, as in Hello; answered as `set_rate` is."""
+        self._send(SetDebounce(press_us, release_us))
+
+    def close(self) -> None:
+        """Close the line. Does no harm twice."""
+        link, self._link = self._link, None
+        if link is not None:
+            link.close()
+
+    def _open_link(self) -> ScannerLink:
+        if self._link is None:
+            raise DeviceError(f"{self.url}: the scanner board is not open")
+        return self._link
+
+    def _send(self, message: ToBoard) -> None:
+        self._open_link().send(message)
+
+    def _greet(self, link: ScannerLink) -> Hello:
+        end, ping_at = monotonic() + _BOOT_S, 0.0
+        while (now := monotonic()) < end:
+            if now >= ping_at:
+                self._send(self._times.ping())
+                ping_at = now + _GREETING_S
+            self._waiting.extend(link.receive(max(0.0, ping_at - now)))
+            while self._waiting:
+                came_us, received = self._waiting.popleft()
+                if received is not None and received.kind == Hello.KIND:
+                    return self._meet(received, came_us)
+        raise DeviceError(
+            f"{self.url}: no scanner board answered at {self.baud} baud in {_BOOT_S:g} s ({link.received_bytes} bytes"
+            f" came, {link.counts.frames} sound frames): check port, baud rate, power, and the board's firmware"
+        )
+
+    def _meet(self, received: Frame, came_us: int) -> Hello:
+        try:
+            hello = Hello.read(received.payload)
+        except MessageError as error:
+            raise DeviceError(f"{self.url}: {error}") from error
+        self._keys = BoardKeys(hello.rows, hello.columns, hello.flags, received.sequence)
+        self._times.stamp(hello, came_us)
+        return hello
+
+    def _next(self) -> ScannerReading | None:
+        """Return the first reading of what waits."""
+        while self._waiting:
+            if (reading := self._take(*self._waiting.popleft())) is not None:
+                return reading
+        return None
+
+    def _take(self, came_us: int, received: Frame | None) -> ScannerReading | None:
+        """Return what came in as a reading, if it says something new: keys as they are, or that they are unknown."""
+        keys = self._keys
+        was_trusted = keys.trusted
+        message = self._message(received)
+        time_us = self._times.stamp(message, came_us)
+        if self._times.doubtful(came_us):
+            self._send(self._times.ping())
+        if isinstance(message, Hello):
+            self._same(message)
+        elif isinstance(message, Faults):
+            self.faults = message
+        elif message is not None:
+            keys.heard(message)
+            if keys.trusted:
+                return ScannerReading(time_us, keys.closed & keys.known, keys.known)
+        return ScannerReading(time_us, 0, 0) if was_trusted and not keys.trusted else None
+
+    def _message(self, received: Frame | None) -> FromBoard | None:
+        """Return what a frame says, None if it says nothing; then an event may have been lost."""
+        if received is not None:
+            self._keys.numbered(received.sequence)
+            try:
+                return from_board(received, self._keys.keys)
+            except MessageError:
+                self._misfits += 1
+        self._keys.lost()
+        return None
+
+    def _same(self, hello: Hello) -> None:
+        known = self.hello or hello
+        if (hello.board, hello.rows, hello.columns, hello.flags) != (
+            known.board,
+            known.rows,
+            known.columns,
+            known.flags,
+        ):
+            raise DeviceError(f"{self.url}: another scanner board answers than was opened: open it again")
+        self.hello = hello
+
+    def _ask_for_state(self) -> None:
+        """Ask for a full bitmap if there is none to be trusted, and again if none came."""
+        now = monotonic()
+        if not self._keys.trusted and now >= self._ask_at:
+            self._ask_at = now + _ASK_AGAIN_S
+            self._asked += 1
+            self._send(GetState())

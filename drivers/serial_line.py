@@ -1,0 +1,129 @@
+"""A serial line, whatever carries it: a port, a pty, or what pySerial's URLs name (socket://, rfc2217://, spy://).
+
+8 data bits, no parity, one stop bit, no handshake; DTR and RTS stay as opening leaves them. Nothing here waits without
+a limit, and whatever pySerial or the kernel says of a line that is gone becomes a `DeviceError`.
+"""
+
+import errno
+import select
+from time import monotonic
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from .errors import DeviceError, SettingError
+
+if TYPE_CHECKING:
+    from serial import Serial
+
+_CHUNK = 4096
+# A line takes a command of a few bytes at once; one that has not within this time takes none any more.
+_WRITE_TIMEOUT_S = 1.0
+# A port without a file descriptor is asked again this often: its reading may be that much late in giving up.
+_SLICE_S = 0.005
+
+_ADVICE = {
+    errno.ENOENT: "there is no such port: is the cable plugged in? `ls /dev/serial/by-id` shows what is",
+    errno.EACCES: "no permission: add yourself to the port's group (`sudo usermod -aG dialout $USER`), log in again",
+    errno.EAGAIN: "another program has it open: close that first",
+    errno.EBUSY: "another program has it open: close that first",
+    errno.EISDIR: "is a folder, no serial port",
+}
+
+
+class SerialLine:
+    """An open serial line. Closing it twice does no harm; a context manager closes it at its end.
+
+    One thread may read while another writes.
+    """
+
+    def __init__(self, url: str, baud: int) -> None:
+        """Open `url`, for this program alone where the system can see to that.
+
+        Raises DeviceError if that fails, SettingError for a baud rate below 1.
+        """
+        if baud < 1:
+            raise SettingError(f"{url}: a baud rate is at least 1, not {baud}")
+        self.url, self.baud = url, baud
+        self._port = _opened(url, baud)
+        self._sliced = not _has_descriptor(self._port)
+        if self._sliced:
+            self._port.timeout = _SLICE_S
+        _lower_latency(self._port)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+    def read(self, timeout_s: float) -> bytes:
+        """Return what has come in, after waiting for something until the timeout: b"" if nothing came.
+
+        Raises DeviceError when the line is gone, as soon as that shows.
+        """
+        try:
+            return self._in_slices(timeout_s) if self._sliced else self._when_ready(timeout_s)
+        except (OSError, TypeError, ValueError) as reason:  # the latter two: closed meanwhile by another thread
+            raise self._gone(reason) from reason
+
+    def write(self, data: bytes) -> None:
+        """Send `data`. Raises DeviceError when the line is gone, or has taken nothing for a second."""
+        try:
+            self._port.write(data)
+        except (OSError, TypeError, ValueError) as reason:
+            raise self._gone(reason) from reason
+
+    def drain(self, seconds: float) -> bytes:
+        """Read for so long and return what came, to be thrown away. Raises DeviceError as `read` does."""
+        end, drained = monotonic() + seconds, b""
+        while (left := end - monotonic()) > 0:
+            drained = (drained + self.read(left))[-_CHUNK:]
+        return drained
+
+    def close(self) -> None:
+        """Close the line; what was written is given to the system already."""
+        self._port.close()
+
+    def _when_ready(self, timeout_s: float) -> bytes:
+        ready, _, _ = select.select([self._port.fileno()], [], [], max(0.0, timeout_s))
+        return self._port.read(_CHUNK) if ready else b""
+
+    def _in_slices(self, timeout_s: float) -> bytes:
+        end = monotonic() + timeout_s
+        # pySerial waits for the one byte at most a slice; what came with it is there then.
+        while not (first := self._port.read(1)):
+            if monotonic() >= end:
+                return b""
+        waiting = min(self._port.in_waiting, _CHUNK)
+        return first + (self._port.read(waiting) if waiting else b"")
+
+    def _gone(self, reason: Exception) -> DeviceError:
+        return DeviceError(f"{self.url}: the serial line is gone ({reason}): check cable and power")
+
+
+def _opened(url: str, baud: int) -> "Serial":
+    from serial import serial_for_url
+
+    # pySerial knows no write timeout there; that connection's own is 5 s.
+    write_timeout = None if url.lower().startswith("rfc2217:") else _WRITE_TIMEOUT_S
+    try:
+        return serial_for_url(url, baud, timeout=0, write_timeout=write_timeout, exclusive=True)
+    except Exception as reason:  # termios.error is no OSError, and every kind of URL raises errors of its own
+        advice = _ADVICE.get(getattr(reason, "errno", None) or 0, f"cannot be opened at {baud} baud ({reason})")
+        raise DeviceError(f"{url}: {advice}") from reason
+
+
+def _has_descriptor(port: "Serial") -> bool:
+    try:
+        port.fileno()
+    except OSError:  # io.UnsupportedOperation
+        return False
+    return True
+
+
+def _lower_latency(port: "Serial") -> None:
+    """Ask an FTDI adapter not to wait 16 ms for more bytes before it hands over what it has."""
+    try:
+        port.set_low_latency_mode(True)
+    except (AttributeError, NotImplementedError, OSError, ValueError):
+        return  # another kind of port: nothing lost

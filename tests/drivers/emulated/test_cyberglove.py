@@ -1,0 +1,107 @@
+from collections.abc import Iterator
+from pathlib import Path
+from time import monotonic
+
+import pytest
+
+from thenar.drivers.cyberglove_commands import query, setting
+from thenar.drivers.cyberglove_dialogue import Dialogue
+from thenar.drivers.cyberglove_frame import Decoder, Fault, Record
+from thenar.drivers.cyberglove_timing import period_words, shortest_us
+from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
+from thenar.drivers.emulated.pty_line import PtyLine
+from thenar.drivers.serial_line import SerialLine
+
+SOON_S = 10.0
+VALUES = bytes(range(60, 78))
+
+
+@pytest.fixture
+def line(tmp_path: Path) -> Iterator[PtyLine]:
+    with PtyLine(tmp_path / "glove") as line:
+        yield line
+
+
+@pytest.fixture
+def client(line: PtyLine) -> Iterator[SerialLine]:
+    with SerialLine(str(line.link), 115_200) as client:
+        yield client
+
+
+def records(client: SerialLine, count: int, decoder: Decoder | None = None) -> list[Record]:
+    """Return as many records as asked for, fewer if they take too long."""
+    decoder, found, end = decoder or Decoder(), list[Record](), monotonic() + SOON_S
+    while len(found) < count and (left := end - monotonic()) > 0:
+        found += decoder.feed(client.read(left))
+    return found
+
+
+def asked_for(client: SerialLine, rate_hz: float | None) -> None:
+    words = b"".join(word.to_bytes(2, "big") for word in period_words(rate_hz))
+    Dialogue(client).ask(setting("T", words))
+
+
+def test_it_streams_no_faster_than_box_and_line_allow(line: PtyLine, client: SerialLine) -> None:
+    with EmulatedCyberGlove(line):
+        began = monotonic()
+        client.write(b"S")
+        found = records(client, 50)
+        # Half a byte's time of grace is the line's.
+        assert monotonic() - began >= 50 * shortest_us(18, 115_200) / 1e6 - 1e-4
+    assert {record.fault for record in found} == {None}
+
+
+def test_it_streams_at_the_period_that_it_is_told(line: PtyLine, client: SerialLine) -> None:
+    with EmulatedCyberGlove(line):
+        asked_for(client, 100)
+        began = monotonic()
+        client.write(b"S")
+        found = records(client, 20)
+        assert monotonic() - began >= 19 / 100
+    assert {record.fault for record in found} == {None}
+
+
+def test_asked_for_more_than_it_can_it_says_so_in_every_record(line: PtyLine, client: SerialLine) -> None:
+    with EmulatedCyberGlove(line) as glove:
+        glove.set(VALUES)
+        asked_for(client, 200)
+        client.write(b"S")
+        assert records(client, 3)[:3] == [Record(VALUES, fault="too fast")] * 3
+
+
+def test_what_is_done_to_the_glove_shows_in_its_records(line: PtyLine, client: SerialLine) -> None:
+    decoder = Decoder(22, status=True)
+    with EmulatedCyberGlove(line, sensors=22) as glove:
+        Dialogue(client).ask(setting("U", b"\1"))
+        for number in range(5):
+            values = bytes([100 + number] * 22)
+            glove.set(values)
+            glove.plugged = number != 3
+            glove.turn_switch(number == 4)
+            client.write(b"G")
+            fault: Fault | None = "unplugged" if number == 3 else None
+            status = 0x80 | (number != 3) | 0x06 * (number == 4)
+            assert records(client, 1, decoder) == [Record(values, streamed=False, fault=fault, status=status)]
+        assert glove.light
+        assert glove.records == 5
+
+
+def test_after_a_restart_it_answers_when_it_is_ready(line: PtyLine, client: SerialLine) -> None:
+    with EmulatedCyberGlove(line):
+        began = monotonic()
+        client.write(b"\x12")
+        assert client.read(SOON_S)[:1] == b"\x12"
+        assert 1.75 <= monotonic() - began < SOON_S
+        client.drain(0.05)
+        assert Dialogue(client).ask(query("G")) == b"\x03"
+
+
+def test_closed_it_sends_nothing_and_the_line_stays(line: PtyLine, client: SerialLine) -> None:
+    with EmulatedCyberGlove(line) as glove:
+        client.write(b"S")
+        assert records(client, 1)
+        assert glove.streaming
+    client.drain(0.05)
+    assert client.read(0.05) == b""
+    line.send(b"still there")
+    assert client.read(SOON_S)

@@ -1,0 +1,97 @@
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from thenar.drivers.emulated.i2c import EmulatedBus, EmulatedChip, EmulatedI2c
+from thenar.drivers.errors import DeviceError, SettingError
+
+MCP = EmulatedChip("mcp23017", 0x20)
+
+TIMED_READS = """
+from time import monotonic
+from smbus2 import SMBus, i2c_msg
+with SMBus("/dev/i2c-3") as bus:
+    pair = i2c_msg.write(0x20, [0x12]), i2c_msg.read(0x20, 2)
+    start = monotonic()
+    for _ in range(100):
+        bus.i2c_rdwr(*pair)
+    print(monotonic() - start)
+"""
+
+
+@pytest.fixture
+def umockdev() -> None:
+    if shutil.which("umockdev-wrapper") is None:
+        (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)(
+            "program umockdev-wrapper is missing"
+        )
+
+
+def client(emulated: EmulatedI2c, *command: str) -> str:
+    environment = {**os.environ, **emulated.environment}
+    return subprocess.run(command, env=environment, check=True, capture_output=True, text=True, timeout=30).stdout
+
+
+@pytest.mark.usefixtures("umockdev")
+def test_a_transfer_takes_at_least_as_long_as_on_a_wire() -> None:
+    with EmulatedI2c([EmulatedBus("/dev/i2c-3", 100_000, "any", (MCP,))]) as emulated:
+        took_s = float(client(emulated, sys.executable, "-c", TIMED_READS))
+        seen = emulated.counters(0)
+    assert seen.scl_periods == 100 * 48
+    assert took_s >= 100 * (48 / 100_000 + 4.7e-6)
+
+
+@pytest.mark.usefixtures("umockdev")
+def test_several_buses_are_served_at_a_time_each_with_its_own_chips() -> None:
+    buses = [
+        EmulatedBus("/dev/i2c-3", 400_000, "any", (MCP,), paced=False),
+        EmulatedBus("/dev/i2c-5", 100_000, "smbus-only", (EmulatedChip("pcf8574", 0x20),), paced=False),
+    ]
+    read = "from smbus2 import SMBus; print(SMBus('/dev/i2c-3').read_byte(0x20), SMBus('/dev/i2c-5').read_byte(0x20))"
+    with EmulatedI2c(buses) as emulated:
+        emulated.set_all([[0x0000], [0x5A]])
+        assert client(emulated, sys.executable, "-c", read).split() == ["255", str(0x5A)]  # IODIRA, and the pins
+        assert [emulated.counters(bus).total_bytes for bus in range(2)] == [2, 2]
+
+
+@pytest.mark.usefixtures("umockdev")
+def test_programs_that_know_nothing_of_thenar_meet_the_chips_too() -> None:
+    program = shutil.which("i2cget")
+    if program is None:
+        pytest.skip("program i2cget is missing")
+    with EmulatedI2c([EmulatedBus("/dev/i2c-3", 400_000, "any", (MCP,), paced=False)]) as emulated:
+        assert client(emulated, program, "-y", "3", "0x20", "0x00").strip() == "0xff"
+
+
+@pytest.mark.usefixtures("umockdev")
+def test_nothing_stays_behind_when_it_is_closed() -> None:
+    emulated = EmulatedI2c([EmulatedBus("/dev/i2c-3", 400_000, "any", (MCP,))])
+    folder = Path(emulated.environment["UMOCKDEV_DIR"])
+    assert (folder / "dev" / "i2c-3").is_symlink()
+    emulated.close()
+    emulated.close()
+    assert not folder.exists()
+
+
+@pytest.mark.usefixtures("umockdev")
+def test_a_server_that_ended_says_why() -> None:
+    emulated = EmulatedI2c([EmulatedBus("/dev/i2c-3", 400_000, "any", (MCP,))])
+    with pytest.raises(DeviceError, match=r"the emulated I2C buses have ended.*IndexError"):
+        emulated.reset(0, 7)
+    emulated.close()
+
+
+def test_a_machine_without_umockdev_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(DeviceError, match="umockdev-wrapper is missing: install the packages umockdev"):
+        EmulatedI2c([])
+
+
+def test_a_chip_that_cannot_be_emulated_is_refused_by_name() -> None:
+    bus = EmulatedBus("/dev/i2c-3", 400_000, "any", (EmulatedChip("mcp23s17", 0x20),))
+    with pytest.raises(SettingError, match="cannot emulate mcp23s17; what can be emulated: mcp23017"):
+        EmulatedI2c([bus])

@@ -1,0 +1,193 @@
+import os
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from queue import Queue
+from time import monotonic
+
+import pytest
+import serial
+
+from thenar.drivers.emulated.pty_line import PtyLine
+from thenar.drivers.errors import DeviceError
+
+EVERY_BYTE = bytes(range(256))
+
+
+@pytest.fixture
+def link(tmp_path: Path) -> Path:
+    return tmp_path / "port"
+
+
+@pytest.fixture
+def line(link: Path) -> Iterator[PtyLine]:
+    with PtyLine(link, 1_000_000) as line:
+        yield line
+
+
+def opened(link: Path, baud: int = 115200) -> serial.Serial:
+    return serial.serial_for_url(str(link), baud, timeout=5, exclusive=True)
+
+
+def test_every_byte_passes_both_ways(line: PtyLine, link: Path) -> None:
+    heard: Queue[bytes] = Queue()
+    line.receive = heard.put
+    with opened(link) as port:
+        line.send(EVERY_BYTE)
+        assert port.read(256) == EVERY_BYTE
+        port.write(EVERY_BYTE)
+        received = b""
+        while len(received) < 256:
+            received += heard.get(timeout=5)
+        assert received == EVERY_BYTE
+    assert line.sent_bytes == 256
+
+
+@pytest.mark.parametrize("baud", [9600, 38_400, 115_200])
+def test_bytes_take_the_time_that_the_wire_takes(link: Path, baud: int) -> None:
+    length = baud // 100  # a tenth of a second
+    with PtyLine(link, baud) as line, opened(link, baud) as port:
+        began = monotonic()
+        for _ in range(10):
+            line.send(b"x" * (length // 10))
+        assert len(port.read(length // 10 * 10)) == length // 10 * 10
+        assert 0.09 < monotonic() - began < 0.5
+
+
+def test_what_the_client_says_is_heard_as_late_as_from_a_wire(link: Path) -> None:
+    heard: Queue[float] = Queue()
+    with PtyLine(link, 1200) as line, opened(link) as port:
+        line.receive = lambda _: heard.put(monotonic())
+        began = monotonic()
+        port.write(b"x" * 12)
+        assert heard.get(timeout=5) - began >= 0.1
+
+
+def test_without_pace_bytes_take_no_time_of_their_own(link: Path) -> None:
+    with PtyLine(link, 300, paced=False) as line, opened(link) as port:
+        began = monotonic()
+        line.send(b"x" * 3000)
+        assert len(port.read(3000)) == 3000
+        assert monotonic() - began < 10  # at 300 baud: 100 s
+
+
+def test_an_unplugged_port_dies_under_its_client_and_its_link_is_gone(line: PtyLine, link: Path) -> None:
+    with opened(link) as port:
+        line.unplug()
+        assert not line.plugged
+        assert not link.is_symlink()
+        with pytest.raises(serial.SerialException):
+            port.read(1)
+        with pytest.raises(serial.SerialException):
+            port.write(b"x")
+    line.send(b"into the air")
+    assert line.dropped_messages == 1
+
+
+def test_a_reader_that_waits_when_the_port_is_unplugged_is_woken(line: PtyLine, link: Path) -> None:
+    outcome: Queue[Exception | bytes] = Queue()
+    waiting = threading.Event()
+
+    def read(port: serial.Serial) -> None:
+        waiting.set()
+        try:
+            outcome.put(port.read(1))
+        except serial.SerialException as error:
+            outcome.put(error)
+
+    with opened(link) as port:
+        reader = threading.Thread(target=read, args=(port,))
+        reader.start()
+        waiting.wait(5)
+        line.unplug()
+        assert isinstance(outcome.get(timeout=4), serial.SerialException)
+        reader.join()
+
+
+def test_a_replugged_port_stands_under_the_same_link_and_forgets_what_waited(link: Path) -> None:
+    with PtyLine(link, 600) as line:
+        line.send(b"o" * 60)  # takes a second
+        line.send(b"l" * 60)
+        for _ in range(3):
+            line.unplug()
+            line.replug()
+        line.replug()
+        assert line.plugged
+        with opened(link) as port:
+            line.send(b"new")
+            assert port.read(3) == b"new"
+
+
+def test_it_may_be_unplugged_and_replugged_from_what_receives(line: PtyLine, link: Path) -> None:
+    done = threading.Event()
+
+    def receive(data: bytes) -> None:
+        line.unplug()
+        line.replug()
+        done.set()
+
+    line.receive = receive
+    with opened(link) as port:
+        port.write(b"x")
+        assert done.wait(5)
+    with opened(link) as port:
+        line.send(b"again")
+        assert port.read(5) == b"again"
+
+
+def test_a_client_that_closes_leaves_the_port_to_the_next(line: PtyLine, link: Path) -> None:
+    for _ in range(3):
+        with opened(link) as port:
+            line.send(b"here")
+            assert port.read(4) == b"here"
+
+
+def test_with_nobody_listening_nothing_blocks_and_the_oldest_is_dropped_whole(link: Path) -> None:
+    """The kernel keeps some, the line 4096 bytes: a client that comes late finds whole messages, the newest at last."""
+    messages = [b"%07d\0" % number for number in range(30_000)]
+    with PtyLine(link, paced=False) as line:
+        for message in messages:
+            line.send(message)
+        assert line.dropped_messages > 0
+        descriptor = os.open(link, os.O_RDWR | os.O_NOCTTY)
+        read = b""
+        while not read.endswith(messages[-1]):
+            read += os.read(descriptor, 4096)
+        os.close(descriptor)
+    found = [int(piece) for piece in read.split(b"\0")[:-1]]
+    assert found == sorted(set(found))
+    assert len(read) % 8 == 0
+    assert len(found) + line.dropped_messages == len(messages)
+
+
+def test_a_link_that_an_earlier_run_left_is_taken_over(line: PtyLine, link: Path) -> None:
+    with PtyLine(link) as second, opened(link) as port:
+        second.send(b"second")
+        assert port.read(6) == b"second"
+        line.close()  # the link is not the first line's any more
+        assert link.is_symlink()
+
+
+@pytest.mark.parametrize("kind", ["a file", "a link to another port"])
+def test_what_is_no_emulated_port_is_not_replaced(link: Path, kind: str) -> None:
+    if kind == "a file":
+        link.write_text("mine")
+    else:
+        link.symlink_to("/dev/null")
+    with pytest.raises(DeviceError, match="exists and is no emulated port"):
+        PtyLine(link)
+    assert link.exists()
+
+
+def test_a_place_where_no_link_can_be_made_is_named(tmp_path: Path) -> None:
+    with pytest.raises(DeviceError, match=r"no/such/port: no port can be linked there: No such file"):
+        PtyLine(tmp_path / "no" / "such" / "port")
+
+
+def test_closing_leaves_no_thread_no_link_and_no_descriptor(link: Path) -> None:
+    PtyLine(link).close()
+    before = len(list(Path("/proc/self/fd").iterdir())), threading.active_count()
+    for _ in range(5):
+        PtyLine(link).close()
+    assert (len(list(Path("/proc/self/fd").iterdir())), threading.active_count()) == before
+    assert list(link.parent.iterdir()) == []

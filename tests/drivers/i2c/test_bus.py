@@ -1,0 +1,170 @@
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from thenar.drivers.errors import DeviceError, SettingError
+from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead
+from thenar.drivers.i2c.registry import CHIPS
+
+MakeRig = Callable[..., Any]
+NEVER_CHECKED = 3600.0
+RECOVERY_S = 3.0  # a second until the next try, and what a loaded machine adds
+
+EVERY_KIND = [
+    ("mcp23017", 0x20),
+    ("mcp23008", 0x21),
+    ("tca6424a", 0x22),
+    ("pcf8574", 0x23),
+    ("pcf8575", 0x24),
+    ("pca9555", 0x25),
+    ("tca9555", 0x26),
+    ("pcf8574a", 0x38),
+]
+WHOLE = ["AB", "GPIO", "012", "P", "P", "01", "01", "P"]
+LEVELS = [0xA57E | 0x8080, 0xD3, 0x5AC396, 0x6D, 0x3CE1, 0x9B2D, 0x72C4, 0x1F]
+
+
+@pytest.mark.parametrize("adapter", ["any", "i2c-gpio", "designware", "bcm2835"])
+def test_every_kind_is_read_pin_by_pin_through_the_kernels_interface(rig: MakeRig, adapter: str) -> None:
+    glove = rig(*EVERY_KIND, adapter=adapter)
+    glove.emulated.set_all([LEVELS])
+    glove.client.ask("prepare", list(enumerate(WHOLE)))
+    assert glove.client.ask("read") == LEVELS
+    assert all(chip.present and not chip.errors for chip in glove.client.state().chips)
+
+
+def test_an_adapter_without_i2c_messages_reads_what_smbus_can(rig: MakeRig) -> None:
+    """SMBus has no way to read two bytes without a command: a PCF8575 is out of its reach, and is said to be."""
+    glove = rig(*EVERY_KIND, adapter="smbus-only")
+    glove.emulated.set_all([LEVELS])
+    glove.client.ask("prepare", list(enumerate(WHOLE)))
+    assert glove.client.ask("read") == [*LEVELS[:4], None, *LEVELS[5:]]
+    assert "use another adapter" in glove.client.state().chips[4].last_error
+
+
+# Transfers of one scan: three MCP23017 of which one is read by both ports apart, then two chips on two mux channels.
+MIXED = [
+    ("mcp23017", 0x20),
+    ("mcp23017", 0x21),
+    ("mcp23017", 0x22),
+    ("mcp23017", 0x24, 0x70, 1),
+    ("pca9555", 0x24, 0x70, 6),
+]
+PORTS = [(0, "A"), (0, "B"), (1, "AB"), (2, "B"), (3, "AB"), (4, "01")]
+
+
+@pytest.mark.parametrize(
+    ("adapter", "way", "transfers"),
+    [
+        ("any", "all ports that no mux is switched between, in one transfer", 1 + 2 + 2),
+        ("i2c-gpio", "all ports that no mux is switched between, in one transfer", 1 + 2 + 2),
+        ("designware", "all ports of a chip in one transfer", 3 + 2 + 2),
+        ("bcm2835", "a transfer for every port", 4 + 2 + 2),
+        ("smbus-only", "an SMBus transfer for every port", 4 + 2 + 2),
+    ],
+)
+def test_the_best_batch_that_the_adapter_takes_is_found_and_used(
+    rig: MakeRig, adapter: str, way: str, transfers: int
+) -> None:
+    glove = rig(*MIXED, adapter=adapter, check_every_s=NEVER_CHECKED)
+    glove.client.ask("prepare", PORTS)
+    glove.client.ask("read")
+    before = glove.emulated.counters(0)
+    assert None not in glove.client.ask("read")
+    after = glove.emulated.counters(0)
+    assert glove.client.state().way == way
+    assert after.transfers - before.transfers == transfers
+    if adapter != "smbus-only":  # which is told the address by a call of its own
+        assert after.calls - before.calls == transfers
+
+
+@pytest.mark.parametrize("adapter", ["any", "designware", "bcm2835", "smbus-only"])
+def test_a_scan_puts_its_readings_and_selects_on_the_wire_and_nothing_else(rig: MakeRig, adapter: str) -> None:
+    glove = rig(*MIXED, adapter=adapter, check_every_s=NEVER_CHECKED)
+    ports = [
+        (0, "B"),
+        (2, "AB"),
+        (3, "A"),
+        (4, "01"),
+    ]  # chip 1, and ports A of chip 0 and B of chip 3, are not selected
+    glove.client.ask("prepare", ports)
+    glove.client.ask("read")
+    before = glove.traffic()
+    scans = 5
+    for _ in range(scans):
+        glove.client.ask("read")
+    seen = {place: count - before.get(place, 0) for place, count in glove.traffic().items()}
+    assert {place: count / scans for place, count in seen.items() if count} == {
+        (0x20, None, None, 0x13): 4,
+        (0x22, None, None, 0x12): 5,
+        (0x70, None, None, None): 2 + 2,
+        (0x24, 0x70, 1, 0x12): 4,
+        (0x24, 0x70, 6, 0x00): 5,
+    }
+
+
+def test_unselected_chips_are_checked_but_no_port_of_theirs_is_ever_read(rig: MakeRig) -> None:
+    glove = rig(*MIXED, check_every_s=0.02)
+    glove.client.ask("prepare", [(1, "A")])
+    glove.client.ask("read_until", [], 0.5)
+    ports = {(place[0], place[3]) for place in glove.traffic() if place[3] in (0x12, 0x13) and place[0] != 0x24}
+    assert ports == {(0x21, 0x12)}
+
+
+def test_a_channel_is_selected_only_when_it_changes(rig: MakeRig) -> None:
+    glove = rig(("mcp23017", 0x20, 0x70, 3), ("mcp23017", 0x21, 0x70, 3), check_every_s=NEVER_CHECKED)
+    glove.client.ask("prepare", [(0, "A"), (1, "A")])
+    glove.client.ask("read")
+    before = glove.traffic()
+    glove.client.ask("read")
+    assert glove.traffic()[0x70, None, None, None] == before[0x70, None, None, None]
+
+
+def test_chips_of_one_address_behind_two_muxes_are_kept_apart(rig: MakeRig) -> None:
+    glove = rig(("mcp23017", 0x20, 0x70, 3), ("mcp23017", 0x20, 0x71, 3), ("mcp23017", 0x20, 0x71, 4))
+    levels = [0x80F1, 0x9F80, 0xC0D3]
+    glove.emulated.set_all([levels])
+    glove.client.ask("prepare", [(1, "AB"), (0, "AB"), (2, "AB"), (1, "AB")])
+    assert glove.client.ask("read") == [levels[1], levels[0], levels[2], levels[1]]
+
+
+def test_more_ports_than_the_kernel_takes_messages_are_read_in_two_transfers(rig: MakeRig) -> None:
+    glove = rig(*(("mcp23017", 0x20 + n) for n in range(8)), check_every_s=NEVER_CHECKED)
+    ports = [(chip, port) for chip in range(8) for port in ("A", "B", "AB")]  # 24 ports, 48 messages
+    glove.client.ask("prepare", ports)
+    before = glove.emulated.counters(0).calls
+    assert None not in glove.client.ask("read")
+    assert glove.emulated.counters(0).calls - before == 2
+
+
+def test_two_chips_that_would_answer_at_one_address_are_refused() -> None:
+    def at(mux: int | None = None, channel: int | None = None) -> ChipAt:
+        return ChipAt(CHIPS["mcp23017"](0x20), frozenset({0}), mux, channel)
+
+    for chips in ([at(), at()], [at(), at(0x70, 1)], [at(0x70, 1), at(0x70, 1)]):
+        with pytest.raises(SettingError, match="two chips would answer at 0x20"):
+            I2cBus("/dev/i2c-7", chips)
+    for place in ((0x60, 1), (0x70, 8), (0x70, None), (None, 1)):
+        with pytest.raises(SettingError, match="a tca9548a is at 0x70 to 0x77"):
+            I2cBus("/dev/i2c-7", [at(*place)])
+
+
+def test_a_bus_that_is_not_there_or_is_no_bus_says_what_to_check(tmp_path: Any) -> None:
+    with pytest.raises(DeviceError, match=r"/dev/i2c-99 cannot be opened: there is no such bus.*plugged in"):
+        I2cBus("/dev/i2c-99", []).open()
+    with pytest.raises(DeviceError, match="is it an I2C device"):
+        I2cBus("/dev/null", []).open()
+
+
+def test_a_bus_that_was_not_opened_or_was_closed_says_so(rig: MakeRig) -> None:
+    chip = CHIPS["mcp23017"](0x20)
+    scan = I2cBus("/dev/i2c-7", [ChipAt(chip, frozenset())]).prepare([PortRead(0, chip.readings[0])])
+    with pytest.raises(DeviceError, match="is not open"):
+        scan.read()
+    glove = rig(("mcp23017", 0x20))
+    glove.client.ask("prepare", [(0, "A")])
+    glove.client.ask("close")
+    assert "is not open" in glove.client.fails("read")
+    glove.client.ask("open")
+    assert glove.client.ask("read") == [0xFF]

@@ -1,0 +1,515 @@
+import os
+import socket
+import termios
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from itertools import product
+from pathlib import Path
+from random import Random
+from time import monotonic, monotonic_ns
+
+import pytest
+
+from thenar.drivers.cyberglove import CyberGlove
+from thenar.drivers.cyberglove_frame import Record
+from thenar.drivers.cyberglove_sensors import MASK_18, MASK_22, SENSORS_18, SENSORS_22
+from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
+from thenar.drivers.emulated.cyberglove_box import CyberGloveBox, Doubts
+from thenar.drivers.emulated.cyberglove_state import GloveState
+from thenar.drivers.emulated.pty_line import PtyLine
+from thenar.drivers.errors import DeviceError, SettingError
+from thenar.drivers.serial_line import SerialLine
+
+SOON_S = 10.0
+VALUES = {18: bytes(range(60, 78)), 22: bytes(range(80, 102))}
+DOUBTS = [Doubts(*choice) for choice in product([False, True], repeat=3)]
+
+
+@pytest.fixture
+def line(tmp_path: Path) -> Iterator[PtyLine]:
+    with PtyLine(tmp_path / "glove") as line:
+        yield line
+
+
+def read(glove: CyberGlove, wanted: Callable[[Record], bool] = lambda record: True) -> Record:
+    """Return the next record that is wanted."""
+    end = monotonic() + SOON_S
+    while (left := end - monotonic()) > 0:
+        timed = glove.read(left)
+        if timed is not None and wanted(timed[1]):
+            return timed[1]
+    pytest.fail("no such record came")
+
+
+@pytest.mark.parametrize("sensors", [18, 22])
+@pytest.mark.parametrize("mode", ["stream", "poll"])
+def test_a_glove_is_found_and_read(line: PtyLine, sensors: int, mode: str) -> None:
+    with EmulatedCyberGlove(line, sensors=sensors, text="CyberGlove 2.4") as emulated:
+        emulated.set(VALUES[sensors])
+        glove = CyberGlove(str(line.link), mode="poll" if mode == "poll" else "stream")
+        info = glove.open()
+        assert (info.sensors, info.baud, info.right_hand) == (sensors, 115_200, True)
+        assert info.names == {18: SENSORS_18, 22: SENSORS_22}[sensors]
+        assert info.mask == {18: MASK_18, 22: MASK_22}[sensors]
+        assert info.text == "CyberGlove 2.4"
+        assert info.status
+        assert info.notes == ()
+        for _ in range(5):
+            assert read(glove) == Record(VALUES[sensors], streamed=mode == "stream", status=0x81)
+        assert emulated.streaming == (mode == "stream")
+        glove.close()
+
+
+@pytest.mark.parametrize("doubts", DOUBTS, ids=str)
+@pytest.mark.parametrize("status", [False, True])
+def test_whichever_of_the_doubtful_is_true_the_glove_is_read(line: PtyLine, doubts: Doubts, status: bool) -> None:
+    with EmulatedCyberGlove(line, doubts=doubts) as emulated, CyberGlove(str(line.link), status=status) as glove:
+        emulated.set(VALUES[18])
+        assert read(glove, lambda record: record.sensors == VALUES[18]).status == (0x81 if status else None)
+        assert glove.ask("U") == bytes([status])
+        assert glove.counts.resyncs == 0
+
+
+def test_every_query_of_the_box_can_be_asked_while_it_streams(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line), CyberGlove(str(line.link), rate_hz=100) as glove:
+        assert glove.ask("T") == b"\x04\x80\x00\x01"
+        assert read(glove)
+        assert glove.ask("M") == MASK_18
+        assert glove.ask("G") == b"\x03"
+        assert read(glove)
+        with pytest.raises(SettingError, match=r"no query \?Z"):
+            glove.ask("Z")
+        assert read(glove)
+        assert glove.counts.resyncs == 0
+
+
+def test_times_are_when_records_came_and_no_later_than_now(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line), CyberGlove(str(line.link)) as glove:
+        opened_us = monotonic_ns() // 1000
+        times: list[int] = []
+        while len(times) < 20:
+            timed = glove.read(SOON_S)
+            assert timed is not None
+            assert timed[0] <= monotonic_ns() // 1000
+            times.append(timed[0])
+    assert times == sorted(times)
+    assert times[0] > opened_us - 1_000_000
+
+
+def test_records_that_come_in_one_chunk_are_apart_by_their_time_on_the_line(tmp_path: Path) -> None:
+    record, link = b"S" + VALUES[18] + b"\x81\0", tmp_path / "glove"
+    with PtyLine(link, paced=False) as line, EmulatedCyberGlove(line), CyberGlove(str(link), rate_hz=0.1) as glove:
+        read(glove)
+        line.send(record * 3)
+        times = [timed[0] for _ in range(3) if (timed := glove.read(SOON_S)) is not None]
+    assert [times[1] - times[0], times[2] - times[1]] == [round(21 * 10 * 1e6 / 115_200)] * 2
+
+
+@pytest.mark.parametrize("rate_hz", [None, 100.0])
+def test_polls_keep_to_the_rate(line: PtyLine, rate_hz: float | None) -> None:
+    with EmulatedCyberGlove(line) as emulated, CyberGlove(str(line.link), mode="poll", rate_hz=rate_hz) as glove:
+        began = monotonic()
+        for _ in range(20):
+            read(glove)
+        assert monotonic() - began >= 19 * (0.01 if rate_hz else 0.0063)
+        assert emulated.records == 20
+
+
+def test_a_lost_poll_is_asked_again(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line) as emulated, CyberGlove(str(line.link), mode="poll") as glove:
+        read(glove)
+        lost = iter([b""])
+        line.damage = lambda message: next(lost, message)
+        read(glove)
+        assert emulated.records == 3
+
+
+def test_light_and_switch(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line) as emulated, CyberGlove(str(line.link)) as glove:
+        seen = []
+        for on in (True, False):
+            glove.light(on)
+            seen.append((emulated.light, read(glove).status))
+        assert seen == [(True, 0x85), (False, 0x81)]
+        for on in (False, True):
+            emulated.turn_switch(on)
+            assert glove.switch() == on
+        assert read(glove).status == 0x87
+
+
+def test_a_glove_that_is_unplugged_and_plugged_in_again_says_so(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line) as emulated, CyberGlove(str(line.link)) as glove:
+        emulated.plugged = False
+        assert read(glove, lambda record: record.fault is not None) == Record(
+            bytes([100] * 18), True, "unplugged", 0x80
+        )
+        emulated.plugged = True
+        read(glove, lambda record: record.fault is None)
+        assert glove.counts.unplugged >= 1
+
+
+def test_a_rate_that_is_too_fast_is_noted_and_tried(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line):
+        glove = CyberGlove(str(line.link), rate_hz=400)
+        (note,) = glove.open().notes
+        assert "400 records a second are asked for, and box and line should manage 158" in note
+        assert read(glove).fault == "too fast"
+        assert glove.counts.too_fast >= 1
+        glove.close()
+    for rate_hz in (0.0, -5.0, float("nan")):
+        with pytest.raises(SettingError):
+            CyberGlove("x", rate_hz=rate_hz)
+
+
+@pytest.mark.parametrize("not_ready", [1, 3])
+def test_a_box_that_is_not_ready_yet_is_waited_for(line: PtyLine, not_ready: int) -> None:
+    with EmulatedCyberGlove(line, not_ready=not_ready) as emulated:
+        emulated.set(VALUES[18])
+        glove = CyberGlove(str(line.link))
+        assert glove.open().notes == ()
+        assert read(glove).sensors == VALUES[18]
+        glove.close()
+
+
+def test_a_box_that_never_is_ready_is_read_with_a_note(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line) as emulated:
+        emulated.plugged = False
+        glove = CyberGlove(str(line.link))
+        (note,) = glove.open().notes
+        assert "?G says 1, not 3" in note
+        assert read(glove).fault == "unplugged"
+        emulated.plugged = True
+        assert read(glove, lambda record: record.fault is None)
+        glove.close()
+
+
+def test_a_stream_left_on_is_stopped_and_set_up_anew(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line) as emulated:
+        emulated.set(VALUES[18])
+        with SerialLine(str(line.link), 115_200) as crashed:
+            crashed.write(b"D\1S")
+            assert crashed.read(SOON_S)
+        assert emulated.streaming
+        with CyberGlove(str(line.link)) as glove:
+            assert read(glove).sensors == VALUES[18]
+            assert glove.ask("D") == b"\0"
+            assert glove.counts.resyncs == 0
+
+
+def altered(line: PtyLine, sent: bytes, heard: bytes) -> list[bytes]:
+    """Let the box hear something else, the first time that it is sent this; return what it is sent, as it comes."""
+    hear, all_sent = line.receive, list[bytes]()
+    assert hear is not None
+
+    def receive(data: bytes) -> None:
+        hear(heard if data == sent and data not in all_sent else data)
+        all_sent.append(data)
+
+    line.receive = receive
+    return all_sent
+
+
+def test_a_stream_left_on_costs_no_question_twice(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line):
+        sent = altered(line, b"", b"")
+        with SerialLine(str(line.link), 115_200) as crashed:
+            crashed.write(b"S")
+            assert crashed.read(SOON_S)
+        with CyberGlove(str(line.link)) as glove:
+            assert read(glove)
+        # ?G finds the box, and then tells whether it is ready.
+        assert [sent.count(question) for question in (b"?G", b"?N", b"?M", b"?i")] == [2, 1, 1, 1]
+
+
+@pytest.mark.parametrize(
+    ("sent", "heard"), [(b"\x03", b""), (b"?G", b"S"), (b"?N", b"S"), (b"?M", b"?Z"), (b"?N", b"")]
+)
+def test_what_the_box_mishears_is_sent_again(line: PtyLine, sent: bytes, heard: bytes) -> None:
+    with EmulatedCyberGlove(line) as emulated:
+        emulated.set(VALUES[18])
+        with SerialLine(str(line.link), 115_200) as crashed:
+            crashed.write(b"S")
+            assert crashed.read(SOON_S)
+        altered(line, sent, heard)
+        with CyberGlove(str(line.link)) as glove:
+            assert read(glove) == Record(VALUES[18], status=0x81)
+
+
+def test_a_question_in_the_middle_of_a_record_costs_no_record_behind_it(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line), CyberGlove(str(line.link), rate_hz=0.1) as glove:
+        read(glove)
+        line.send(b"S" + VALUES[18][:5])
+        assert glove.read(0.05) is None
+        assert glove.ask("G") == b"\x03"
+        line.send(b"S" + VALUES[18] + b"\x81\0")
+        read(glove, lambda record: record.sensors == VALUES[18])
+        assert glove.counts.resyncs == 0
+
+
+def test_a_command_left_half_sent_is_overcome(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line):
+        with SerialLine(str(line.link), 115_200) as crashed:
+            crashed.write(b"T\1")
+        with CyberGlove(str(line.link)) as glove:
+            assert read(glove)
+
+
+def test_garbage_at_power_up_is_overcome(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line):
+        line.send(bytes(range(256)) * 2 + b"?G?G\xff\0")
+        with CyberGlove(str(line.link)) as glove:
+            assert read(glove)
+            assert glove.counts.resyncs == 0
+
+
+@pytest.mark.parametrize(
+    "harm",
+    [
+        lambda message: message[1:],
+        lambda message: message[:-1],
+        lambda message: message[:5] + b"\x07" + message[5:],
+        lambda message: message[:5] + b"\0" + message[6:],
+        lambda message: b"\0" * 300,
+        lambda message: b"\x55" * 3000,
+    ],
+    ids=["cut", "end lost", "inserted", "flipped to nul", "nul flood", "endless"],
+)
+def test_a_bad_cable_gives_no_false_record_and_the_next_good_one_is_read(
+    line: PtyLine, harm: Callable[[bytes], bytes]
+) -> None:
+    harmed: list[bytes] = []
+
+    def damage(message: bytes) -> bytes:
+        if len(harmed) >= 3:
+            return message
+        harmed.append(message)
+        return harm(message)
+
+    with EmulatedCyberGlove(line) as emulated, CyberGlove(str(line.link)) as glove:
+        emulated.set(VALUES[18])
+        read(glove, lambda record: record.sensors == VALUES[18])
+        line.damage = damage
+        for _ in range(20):
+            assert read(glove) == Record(VALUES[18], status=0x81)
+        assert len(harmed) == 3
+
+
+@pytest.mark.parametrize("lost", range(6))
+def test_any_answer_may_get_lost_while_it_is_set_up(line: PtyLine, lost: int) -> None:
+    answers = iter(range(100))
+    line.damage = lambda message: b"" if next(answers) == lost else message
+    with EmulatedCyberGlove(line), CyberGlove(str(line.link)) as glove:
+        assert read(glove)
+
+
+def test_a_pulled_plug_is_seen_at_once_and_the_glove_opened_again_after_it(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line) as emulated:
+        emulated.set(VALUES[18])
+        glove = CyberGlove(str(line.link))
+        glove.open()
+        read(glove)
+        line.unplug()
+        began = monotonic()
+        with pytest.raises(DeviceError, match="gone"):
+            read(glove, lambda record: False)
+        assert monotonic() - began < 1.0
+        with pytest.raises(DeviceError, match="no such port"):
+            glove.open()
+        counted = glove.counts.records
+        line.replug()
+        glove.open()
+        assert read(glove).sensors == VALUES[18]
+        assert glove.counts.records > counted
+        glove.close()
+
+
+@pytest.mark.parametrize("mode", ["stream", "poll"])
+def test_a_glove_that_falls_silent_is_taken_for_dead_after_a_second(line: PtyLine, mode: str) -> None:
+    emulated = EmulatedCyberGlove(line)
+    with CyberGlove(str(line.link), mode="poll" if mode == "poll" else "stream") as glove:
+        read(glove)
+        emulated.close()
+        began = monotonic()
+        with pytest.raises(DeviceError, match=r"no record for 1 s: check its power"):
+            read(glove, lambda record: False)
+        assert 0.9 < monotonic() - began < SOON_S / 2
+
+
+def test_nobody_there_is_told_with_what_to_check(line: PtyLine) -> None:
+    with pytest.raises(DeviceError, match=r"no CyberGlove answers \?G at 115200 baud: check its power"):
+        CyberGlove(str(line.link)).open()
+    with pytest.raises(DeviceError, match="no CyberGlove answers at 115200, 38400, 19200, 9600 baud"):
+        CyberGlove(str(line.link), baud=None).open()
+
+
+def test_somebody_else_who_never_stops_is_no_glove(line: PtyLine) -> None:
+    def endless(message: bytes) -> bytes:
+        line.send(message)
+        return message
+
+    line.damage = endless
+    line.send(b"x" * 100)
+    with pytest.raises(DeviceError, match="keeps sending after a Ctrl-C at 115200 baud: is it a CyberGlove"):
+        CyberGlove(str(line.link)).open()
+
+
+def at_rate(line: PtyLine, hear: Callable[[bytes], None], speed: int) -> Callable[[bytes], None]:
+    """Let only a client of the right baud rate be heard: a pty carries any."""
+
+    def receive(data: bytes) -> None:
+        descriptor = os.open(line.link, os.O_RDWR | os.O_NOCTTY)
+        try:
+            if termios.tcgetattr(descriptor)[4] == speed:
+                hear(data)
+        finally:
+            os.close(descriptor)
+
+    return receive
+
+
+@pytest.mark.parametrize(("baud", "speed"), [(115_200, termios.B115200), (9600, termios.B9600)])
+def test_the_baud_rate_is_found(tmp_path: Path, baud: int, speed: int) -> None:
+    with PtyLine(tmp_path / "glove", baud) as line, EmulatedCyberGlove(line):
+        assert line.receive is not None
+        line.receive = at_rate(line, line.receive, speed)
+        glove = CyberGlove(str(line.link), baud=None)
+        assert glove.open().baud == baud
+        assert read(glove)
+        glove.close()
+
+
+def test_a_glove_of_another_number_of_sensors_than_said_is_refused(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line, sensors=22), pytest.raises(DeviceError, match="sends 22 sensors, not 18"):
+        CyberGlove(str(line.link), sensors=18).open()
+
+
+def test_a_glove_that_another_program_masked_is_refused_with_the_reason(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line):
+        with SerialLine(str(line.link), 115_200) as other:
+            other.write(b"M\3\0\0")
+            assert other.read(SOON_S)
+        with pytest.raises(DeviceError, match="sends 2 sensors, neither 18 nor 22: another program masked some"):
+            CyberGlove(str(line.link)).open()
+
+
+def answering(line: PtyLine, answers: dict[bytes, bytes]) -> None:
+    """Let a box of few words be at the end of the line; what it does not know it answers with an error."""
+    line.receive = lambda data: None if data in (b"\x03", b"S") else line.send(answers.get(data, b"e?\0"))
+
+
+def test_an_old_box_of_few_commands_is_read_without_its_status(line: PtyLine) -> None:
+    period = {b"T\0\0\0\0": b"T\0"}
+    answering(line, {b"?G": b"?G\3\0", b"?S": b"?S\x12\0", **period})
+    glove = CyberGlove(str(line.link))
+    info = glove.open()
+    assert (info.sensors, info.names, info.mask) == (18, SENSORS_18, b"")
+    assert (info.right_hand, info.text, info.status) == (None, "", False)
+    assert "no status byte" in info.notes[0]
+    line.send(b"S" + VALUES[18] + b"\0")
+    assert read(glove) == Record(VALUES[18])
+    glove.close()
+    answering(line, {b"?G": b"?G\3\0", **period})
+    with pytest.raises(DeviceError, match="does not say how many sensors"):
+        glove.open()
+    assert CyberGlove(str(line.link), sensors=22).open().names == SENSORS_22
+
+
+def test_a_box_that_is_neither_initialised_nor_has_a_glove_is_refused(line: PtyLine) -> None:
+    answering(line, {b"?G": b"?G\0\0"})
+    with pytest.raises(DeviceError, match="neither initialised nor has it a glove"):
+        CyberGlove(str(line.link)).open()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_whatever_a_box_answers_it_is_a_glove_or_an_error_of_ours(tmp_path: Path, seed: int) -> None:
+    random = Random(seed)
+    box = CyberGloveBox(GloveState(18, 0), "CyberGlove", Doubts())
+
+    with PtyLine(tmp_path / "glove", paced=False) as line:
+
+        def garbled(data: bytes) -> None:
+            said = b"".join(part for part in box.feed(data) if isinstance(part, bytes))
+            place = random.randrange(len(said) + 1)
+            start, end = said[:place], said[place:]
+            line.send(random.choice([said, start, said + said, start + random.randbytes(3) + end]))
+
+        line.receive = garbled
+        found = opened(CyberGlove(str(line.link)))
+    assert found == "18 sensors" or str(line.link) in found
+
+
+def opened(glove: CyberGlove) -> str:
+    """Return what comes of opening a glove, in words."""
+    try:
+        return f"{glove.open().sensors} sensors"
+    except DeviceError as told:
+        return str(told)
+    finally:
+        glove.close()
+
+
+def test_a_flood_that_never_ends_is_given_up_in_time() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(SOON_S)
+        flooding = threading.Thread(target=lambda: flooded(server))
+        flooding.start()
+        began = monotonic()
+        with pytest.raises(DeviceError):
+            CyberGlove(f"socket://127.0.0.1:{server.getsockname()[1]}").open()
+        assert monotonic() - began < SOON_S
+        flooding.join(SOON_S)
+    assert not flooding.is_alive()
+
+
+def flooded(server: socket.socket) -> None:
+    """Send NULs to the first client until it goes."""
+    client, _ = server.accept()
+    with client, suppress(OSError):
+        client.settimeout(SOON_S)
+        while True:
+            client.sendall(bytes(100_000))
+
+
+def test_a_closed_glove_says_so_and_streams_no_more(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line) as emulated:
+        glove = CyberGlove(str(line.link))
+        glove.open()
+        read(glove)
+        glove.close()
+        glove.close()
+        with pytest.raises(DeviceError, match="not open"):
+            glove.read(0.0)
+        with SerialLine(str(line.link), 115_200) as after:
+            after.drain(0.1)
+            assert after.read(0.05) == b""
+        assert not emulated.streaming
+
+
+def test_a_glove_behind_tcp_is_read(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line) as emulated, SerialLine(str(line.link), 115_200) as port:
+        emulated.set(VALUES[18])
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            server.settimeout(SOON_S)
+            bridge = threading.Thread(target=lambda: bridged(server, port))
+            bridge.start()
+            with CyberGlove(f"socket://127.0.0.1:{server.getsockname()[1]}") as glove:
+                assert read(glove) == Record(VALUES[18], status=0x81)
+            bridge.join(SOON_S)
+        assert not bridge.is_alive()
+
+
+def bridged(server: socket.socket, port: SerialLine) -> None:
+    """Carry bytes between the first client of `server` and `port` until the client goes."""
+    client, _ = server.accept()
+    with client:
+        client.settimeout(0.005)
+        while True:
+            try:
+                data = client.recv(100)
+            except TimeoutError:
+                client.sendall(port.read(0.0))
+                continue
+            if not data:
+                return
+            port.write(data)

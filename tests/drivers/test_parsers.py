@@ -1,0 +1,193 @@
+"""What holds for everything that reads bytes from a line, whatever the bytes: no errors of others, no look ahead, no
+growth, and back in step within one frame of any damage.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.drivers import cyberglove_frame, scanner_frame
+from thenar.drivers.cyberglove_commands import ANSWERED, INFORMATION, SET, Answer, Command, find_answer, query, setting
+from thenar.drivers.cyberglove_frame import Record
+from thenar.drivers.emulated.cyberglove_box import CyberGloveBox, Doubts
+from thenar.drivers.emulated.cyberglove_state import GloveState
+from thenar.drivers.scanner_messages import FromBoard, Heartbeat, State, frame, from_board
+from thenar.drivers.scanner_payload import MessageError
+
+KEYS = 40
+Feed = Callable[[bytes], list[Any]]
+
+
+@dataclass(frozen=True)
+class Parser:
+    """make returns what is fed, and what tells how many bytes it holds back; frames are sound examples."""
+
+    make: Callable[[], tuple[Feed, Callable[[], int]]]
+    frames: tuple[bytes, ...]
+    holds: int
+
+
+def glove(sensors: int, status: bool) -> Parser:
+    def make() -> tuple[Feed, Callable[[], int]]:
+        decoder = cyberglove_frame.Decoder(sensors, status=status)
+        return decoder.feed, lambda: len(decoder._pieces._rest)
+
+    byte = 0x83 if status else None
+    records = [Record(bytes([value] * sensors), value % 2 == 0, None, byte) for value in (1, 71, 83, 101, 255)]
+    records += [Record(b"S" * sensors, True, fault, byte) for fault in ("too fast", "unplugged")]
+    return Parser(make, tuple(map(cyberglove_frame.encode, records)), sensors + 5)
+
+
+def scanner(read: Callable[[scanner_frame.Frame], Any]) -> Parser:
+    def make() -> tuple[Feed, Callable[[], int]]:
+        decoder = scanner_frame.Decoder()
+        return (
+            lambda chunk: [read(received) for received in decoder.feed(chunk)],
+            lambda: len(decoder._pieces._rest),
+        )
+
+    every = (1 << KEYS) - 1
+    messages: list[FromBoard] = [State(0, KEYS), State(every, KEYS), Heartbeat(0, 0, KEYS)]
+    messages.append(Heartbeat(2**32 - 1, every, KEYS))
+    frames = tuple(scanner_frame.encode(frame(message, number)) for number, message in enumerate(messages))
+    return Parser(make, frames, scanner_frame.MAX_PAYLOAD + scanner_frame.OVERHEAD)
+
+
+def message_or_misfit(received: scanner_frame.Frame) -> Any:
+    try:
+        return from_board(received, KEYS)
+    except MessageError as error:
+        return str(error)
+
+
+PARSERS = {
+    "glove of 18": glove(18, status=False),
+    "glove of 22 with status": glove(22, status=True),
+    "scanner frames": scanner(lambda received: received),
+    "scanner messages": scanner(message_or_misfit),
+}
+NAMES = st.sampled_from(sorted(PARSERS))
+
+
+@st.composite
+def streams(draw: st.DrawFn) -> tuple[Parser, bytes]:
+    """Return a parser and a stream of sound frames, cut ones, changed ones, and noise."""
+    parser = PARSERS[draw(NAMES)]
+    sound = st.sampled_from(parser.frames)
+    cut = st.builds(lambda whole, at: whole[at % len(whole) :], sound, st.integers(0, 300))
+    short = st.builds(lambda whole, at: whole[: at % len(whole)], sound, st.integers(0, 300))
+    changed = st.builds(
+        lambda whole, at, by: whole[: at % len(whole)] + bytes([by]) + whole[at % len(whole) + 1 :],
+        sound,
+        st.integers(0, 300),
+        st.integers(0, 255),
+    )
+    noise = st.binary(max_size=60) | st.integers(1, 600).map(bytes) | st.integers(1, 600).map(lambda n: b"S" * n)
+    return parser, b"".join(draw(st.lists(st.one_of(sound, sound, cut, short, changed, noise), max_size=12)))
+
+
+@given(streams())
+def test_no_frame_is_told_before_its_end_is_in_and_none_later(case: tuple[Parser, bytes]) -> None:
+    """Fed byte by byte, all that comes, comes with a zero; and it is what comes out at once."""
+    parser, stream = case
+    feed, _ = parser.make()
+    told: list[Any] = []
+    for byte in stream:
+        found = feed(bytes([byte]))
+        assert not found or byte == 0
+        assert len(found) <= 1
+        told += found
+    at_once, _ = parser.make()
+    assert at_once(stream) == told
+
+
+@given(streams(), streams())
+def test_what_follows_changes_nothing_of_what_came_before(
+    one: tuple[Parser, bytes], other: tuple[Parser, bytes]
+) -> None:
+    parser, stream = one
+    feed, _ = parser.make()
+    alone = feed(stream)
+    feed, _ = parser.make()
+    assert feed(stream + other[1])[: len(alone)] == alone
+
+
+@given(streams())
+def test_after_any_damage_the_second_sound_frame_is_told(case: tuple[Parser, bytes]) -> None:
+    """The first may be eaten by what stands unfinished before it."""
+    parser, stream = case
+    for sound in parser.frames:
+        feed, _ = parser.make()
+        feed(stream)
+        feed(sound)
+        expected, _ = parser.make()
+        assert feed(sound) == expected(sound)
+
+
+@pytest.mark.parametrize("name", sorted(PARSERS))
+@pytest.mark.parametrize("byte", [0, 1, ord("S"), 255])
+def test_a_megabyte_of_one_byte_holds_no_memory_and_little_time(name: str, byte: int) -> None:
+    feed, held = PARSERS[name].make()
+    began = perf_counter()
+    for size in (1, 7, 255, 4096, 100_000, 1_000_000):
+        assert feed(bytes([byte]) * size) == []
+        assert held() <= PARSERS[name].holds
+    assert perf_counter() - began < 2
+
+
+COMMANDS = st.sampled_from(
+    [query(letter) for letter in ANSWERED]
+    + [setting(letter, bytes(size)) for letter, size in SET.items()]
+    + [INFORMATION]
+)
+REPLIES = st.lists(
+    st.sampled_from([b"\0", b"?", b"e", b"s", b"g", b"S", b"G", b"M", b"T", b"?G", b"?T\1\0\1", b"\r\n\0", b"\x03"])
+    | st.binary(max_size=9),
+    max_size=60,
+).map(b"".join)
+
+
+@given(COMMANDS, REPLIES, st.booleans())
+def test_an_answer_has_the_length_it_must_have_and_stands_in_what_came(
+    command: Command, received: bytes, last: bool
+) -> None:
+    answer = find_answer(command, received, last=last)
+    if answer is None or answer.error is not None:
+        return
+    assert command.values is None or len(answer.values) == command.values
+    assert command.echo + answer.values + (b"\r\n\0" if command.values is None else b"\0") in received
+
+
+@given(COMMANDS, REPLIES, REPLIES)
+def test_an_answer_that_is_whole_is_not_changed_by_what_follows(
+    command: Command, received: bytes, following: bytes
+) -> None:
+    answer = find_answer(command, received)
+    if answer is not None:
+        assert find_answer(command, received + following) == answer
+
+
+@given(st.sampled_from(sorted(ANSWERED)), st.binary(min_size=6, max_size=6), st.lists(st.binary(max_size=40)))
+def test_an_answer_is_found_behind_any_frames_that_are_not_its_own(
+    letter: str, values: bytes, rests: list[bytes]
+) -> None:
+    """Rests of a stream, of whatever bytes: no echo of the question is among them, and no error."""
+    command = query(letter)
+    clean = b"".join(rest.replace(b"?", b"!").replace(b"e", b"f") + b"\0" for rest in rests)
+    sound = command.echo + values[: command.values] + b"\0"
+    assert find_answer(command, clean + sound) == Answer(values[: command.values])
+
+
+@given(st.lists(st.binary(max_size=200) | REPLIES, max_size=20), st.builds(Doubts, st.booleans(), st.booleans()))
+def test_an_emulated_glove_takes_any_bytes_and_still_stops(chunks: list[bytes], doubts: Doubts) -> None:
+    box = CyberGloveBox(GloveState(18, 0), "CyberGlove", doubts)
+    for chunk in chunks:
+        box.feed(chunk)
+        assert len(box._pending) < 600
+    box.feed(b"\x03" * 600)
+    assert box.feed(b"?S") == [b"?S\x12\0"]

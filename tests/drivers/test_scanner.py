@@ -1,0 +1,365 @@
+import re
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from itertools import pairwise
+from pathlib import Path
+from queue import Queue
+from time import monotonic, monotonic_ns
+
+import numpy as np
+import pytest
+
+from thenar.drivers import scanner_frame
+from thenar.drivers.emulated.pty_line import PtyLine
+from thenar.drivers.emulated.scanner import EmulatedScanner
+from thenar.drivers.emulated.scanner_board import ScannerBoard
+from thenar.drivers.errors import DeviceError
+from thenar.drivers.scanner import Scanner
+from thenar.drivers.scanner_messages import Event, FromBoard, Heartbeat, Hello, State, frame
+from thenar.drivers.scanner_reading import ScannerReading
+
+KEYS = 160
+EVERY = (1 << KEYS) - 1
+BAUD = 1_000_000
+LONG_S = 5.0
+
+
+@pytest.fixture
+def line(tmp_path: Path) -> Iterator[PtyLine]:
+    with PtyLine(tmp_path / "board", BAUD) as line:
+        yield line
+
+
+@pytest.fixture
+def start(line: PtyLine) -> Iterator[Callable[..., EmulatedScanner]]:
+    """Return what starts a board on the line, with ScannerBoard's settings."""
+    with ExitStack() as stack:
+
+        def start(rows: int = 1, columns: int = KEYS, **settings: int) -> EmulatedScanner:
+            board = ScannerBoard(rows, columns, **settings)  # type: ignore[arg-type]
+            return stack.enter_context(EmulatedScanner(line, rows * columns, board=board))
+
+        yield start
+
+
+def driver(line: PtyLine) -> Scanner:
+    return Scanner(str(line.link), BAUD)
+
+
+def now_us() -> int:
+    return monotonic_ns() // 1000
+
+
+def until(scanner: Scanner, wanted: Callable[[ScannerReading], bool]) -> ScannerReading:
+    """Return the first reading that is wanted."""
+    end = monotonic() + LONG_S
+    while monotonic() < end:
+        if (reading := scanner.read(0.5)) is not None and wanted(reading):
+            return reading
+    raise AssertionError(f"it never came: {scanner.counts}")
+
+
+def sent(message: FromBoard, number: int) -> bytes:
+    return scanner_frame.encode(frame(message, number))
+
+
+def test_it_finds_the_board_and_its_keys(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:
+    board = start(2, 20)
+    board.set(0b1011)
+    with driver(line) as scanner:
+        assert scanner.hello is not None
+        assert (scanner.hello.rows, scanner.hello.columns, scanner.hello.keys) == (2, 20, 40)
+        reading = until(scanner, lambda reading: reading.closed == 0b1011)
+        assert reading.known == (1 << 40) - 1
+
+
+@pytest.mark.parametrize("state_us", [0, 2000])
+def test_every_set_of_keys_comes_through_whole_and_in_order(
+    line: PtyLine, start: Callable[..., EmulatedScanner], state_us: int
+) -> None:
+    board, random = start(state_us=state_us, heartbeat_us=20_000), np.random.default_rng(3)
+    with driver(line) as scanner:
+        for _ in range(30):
+            closed = int.from_bytes(random.bytes(KEYS // 8), "little")
+            began = now_us()
+            board.set(closed)
+            reading = until(scanner, lambda reading, closed=closed: reading.closed == closed)  # type: ignore[misc]
+            assert reading.known == EVERY
+            assert began <= reading.time_us + 2000 <= now_us() + 2000
+        assert scanner.counts.gaps == 0
+
+
+def test_times_go_forward_and_are_never_later_than_now(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:
+    start(state_us=1000, heartbeat_us=5000, clock_us=2**32 - 100_000)
+    with driver(line) as scanner:
+        times = []
+        for _ in range(200):
+            reading = until(scanner, lambda _: True)
+            assert reading.time_us <= now_us()
+            times.append(reading.time_us)
+        assert times == sorted(times)
+        assert times[-1] - times[0] > 100_000
+
+
+def test_a_silent_board_times_out_in_time(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:
+    start(heartbeat_us=0)
+    with driver(line) as scanner:
+        while scanner.read(0.25) is not None:
+            pass  # what it said at boot, and what it was asked for
+        began = monotonic()
+        assert scanner.read(0.25) is None
+        assert 0.25 <= monotonic() - began < 1.0
+        assert scanner.read(0.0) is None
+
+
+def test_a_lost_event_is_known_to_be_lost_and_asked_for(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:
+    """Without heartbeats, which would heal it anyway: the next event shows the gap, GET_STATE fills it."""
+    board = start(heartbeat_us=0)
+    with driver(line) as scanner:
+        until(scanner, lambda reading: reading.known == EVERY)
+        line.damage = lambda _: b""
+        board.set(0b1)
+        board.set(0b11)
+        gone = threading.Event()
+        line.damage = lambda _: (gone.set(), b"")[1]  # type: ignore[func-returns-value]
+        board.set(0b111)
+        assert gone.wait(LONG_S)
+        line.damage = None
+        board.set(0b1111)
+        doubtful = until(scanner, lambda _: True)
+        assert (doubtful.known, doubtful.closed) == (0, 0)
+        healed = until(scanner, lambda reading: reading.known == EVERY)
+        assert healed.closed == 0b1111
+        assert scanner.counts.gaps >= 1
+        assert scanner.counts.asked >= 2
+
+
+def test_a_damaged_frame_is_not_trusted_away_before_the_next_one_comes(
+    line: PtyLine, start: Callable[..., EmulatedScanner]
+) -> None:
+    board = start(heartbeat_us=0)
+    with driver(line) as scanner:
+        until(scanner, lambda reading: reading.known == EVERY)
+        line.damage = lambda message: bytes([message[0], message[1] ^ 4]) + message[2:]
+        board.set(0b1)
+        assert until(scanner, lambda _: True).known == 0
+        line.damage = None
+        assert until(scanner, lambda reading: reading.known == EVERY).closed == 0b1
+        assert scanner.counts.damaged >= 1
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_through_a_bad_cable_nothing_is_believed_that_is_not_so(
+    line: PtyLine, start: Callable[..., EmulatedScanner], seed: int
+) -> None:
+    """One message in three is cut, swallowed, changed, doubled or grown; only true sets of keys are ever known."""
+    board, random = start(heartbeat_us=3000), np.random.default_rng(seed)
+
+    def cable(message: bytes) -> bytes:
+        kind, place = int(random.integers(15)), int(random.integers(len(message)))
+        changed = bytes([message[place] ^ int(random.integers(1, 256))])
+        worse = [b"", message[:place], message[:place] + changed + message[place + 1 :], message[place:] * 2]
+        return (*worse, bytes(int(random.integers(1, 50))) + message)[kind] if kind < 5 else message
+
+    truths = [0b1 << n | 0b1 << n + 80 for n in range(40)]
+    line.damage = cable
+    with driver(line) as scanner:
+        for before, truth in pairwise([0, *truths]):
+
+            def arrived(reading: ScannerReading, before: int = before, truth: int = truth) -> bool:
+                # The keys of one scan are told one by one: any of the changes may still be on its way.
+                assert reading.closed & ~(truth | before) == 0
+                assert reading.known in (0, EVERY)
+                return (reading.known, reading.closed) == (EVERY, truth)
+
+            board.set(truth)
+            until(scanner, arrived)
+        counts = scanner.counts
+        assert counts.damaged + counts.short + counts.gaps > 0
+        line.damage = None
+        began = monotonic()
+        board.set(EVERY)
+        until(scanner, lambda reading: reading.closed == EVERY)
+        assert monotonic() - began < 1.0
+
+
+def test_a_board_that_restarts_is_followed(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:
+    board = start(heartbeat_us=10_000)
+    with driver(line) as scanner:
+        board.set(0b101)
+        until(scanner, lambda reading: reading.closed == 0b101)
+        board.reboot()
+        reading = until(scanner, lambda reading: reading.known == 0 or scanner.counts.gaps > 0)
+        assert reading.time_us <= now_us()
+        board.set(0b111)
+        reading = until(scanner, lambda reading: reading.closed == 0b111)
+        assert now_us() - 2_000_000 < reading.time_us <= now_us()
+
+
+def test_another_board_in_its_place_is_an_error(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:
+    board = start()
+    with driver(line) as scanner:
+        board.reboot(ScannerBoard(1, 8, board=2))
+        with pytest.raises(DeviceError, match="another scanner board answers"):
+            until(scanner, lambda _: False)
+
+
+def test_keys_that_may_be_ghosts_are_not_known(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:
+    board = start(3, 4, diodes=False)
+    with driver(line) as scanner:
+        board.set(0b0100_0001_0011)
+        reading = until(scanner, lambda reading: reading.closed == 0b0100_0000_0000)
+        assert reading.known == 0b1111_1100_1100
+
+
+def test_settings_are_answered_by_a_hello(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:
+    start()
+    with driver(line) as scanner:
+        scanner.set_rate(500, 2000, 100_000)
+        scanner.set_debounce(5000, 10_000)
+        until(scanner, lambda _: scanner.hello is not None and scanner.hello.release_us == 10_000)
+        assert scanner.hello is not None
+        assert (scanner.hello.scan_us, scanner.hello.state_us, scanner.hello.heartbeat_us) == (500, 2000, 100_000)
+        assert scanner.hello.press_us == 5000
+
+
+def test_the_troubles_of_the_board_are_heard(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:
+    board = start(heartbeat_us=10_000)
+    with driver(line) as scanner:
+        board.board.overruns = 3
+        until(scanner, lambda _: scanner.faults is not None and scanner.faults.overruns == 3)
+
+
+def test_unplugged_is_an_error_and_opening_again_the_way_back(
+    line: PtyLine, start: Callable[..., EmulatedScanner]
+) -> None:
+    board = start(heartbeat_us=10_000)
+    with driver(line) as scanner:
+        until(scanner, lambda reading: reading.known == EVERY)
+        line.unplug()
+        with pytest.raises(DeviceError, match=re.escape(str(line.link))):
+            until(scanner, lambda _: False)
+        with pytest.raises(DeviceError, match="there is no such port"):
+            scanner.open()
+        line.replug()
+        board.reboot()
+        scanner.open()
+        board.set(0b1)
+        until(scanner, lambda reading: reading.closed == 0b1)
+
+
+def test_a_line_without_a_board_is_an_error_that_says_what_came(line: PtyLine) -> None:
+    line.receive = lambda _: line.send(b"login: \0")
+    with pytest.raises(
+        DeviceError, match=r"no scanner board answered at 1000000 baud in 3 s \(\d+ bytes came, 0 sound"
+    ):
+        Scanner(str(line.link), BAUD).open()
+
+
+def test_a_board_of_another_protocol_is_an_error_that_says_so(line: PtyLine) -> None:
+    hello = Hello(2, 0, 0, 1, 1, 0, 0, 1, KEYS, 1000, 0, 0, 0, 0, 0)
+    line.receive = lambda _: line.send(sent(hello, 0))
+    with pytest.raises(DeviceError, match=r"board: the board speaks protocol 2"):
+        Scanner(str(line.link), BAUD).open()
+
+
+def test_a_board_that_is_not_open_cannot_be_read(tmp_path: Path) -> None:
+    scanner = Scanner(str(tmp_path / "nothing"))
+    scanner.close()
+    with pytest.raises(DeviceError, match="is not open"):
+        scanner.read(0)
+    assert scanner.counts.frames == 0
+
+
+class Scripted:
+    """A board that says what it is told to, when it is told to, and notes what it is asked."""
+
+    def __init__(self, line: PtyLine) -> None:
+        self.line, self.number, self.asked = line, 0, Queue[scanner_frame.Frame]()
+        self.answers_pings = True
+        self._decoder = scanner_frame.Decoder()
+        line.receive = self._receive
+
+    def say(self, message: FromBoard) -> None:
+        self.line.send(sent(message, self.number))
+        self.number += 1
+
+    def hello(self, token: int, time_us: int) -> Hello:
+        return Hello(1, 0, token, 1, 1, 0, 0, 1, KEYS, 1000, 0, 0, 0, 0, time_us % 2**32)
+
+    def _receive(self, data: bytes) -> None:
+        for received in self._decoder.feed(data):
+            self.asked.put(received)
+            if received.kind == 0x14 and self.answers_pings:
+                self.say(self.hello(int.from_bytes(received.payload, "little"), 0))
+
+
+def test_a_backlog_keeps_its_age_and_states_share_that_of_the_frame_before(line: PtyLine) -> None:
+    """A host that was held up for a second reads what was sent then: it must not take it for new."""
+    board = Scripted(line)
+    with driver(line) as scanner:
+        opened_us = now_us()
+        board.say(Heartbeat(0, 0, KEYS))
+        until(scanner, lambda _: True)
+        board.answers_pings = False
+        # The board's clock says that only 10 ms passed since the HELLO; it is more by now, so this is late.
+        threading.Event().wait(1.1)
+        board.say(Heartbeat(10_000, 0b1, KEYS))
+        board.say(State(0b11, KEYS))
+        beat = until(scanner, lambda reading: reading.closed == 0b1)
+        state = until(scanner, lambda reading: reading.closed == 0b11)
+        assert beat.time_us < opened_us + 50_000
+        assert state.time_us - beat.time_us < 100_000
+        assert scanner.counts.pings == 2  # at the opening; and because it is so late
+
+
+def test_the_state_is_asked_for_again_while_it_does_not_come(line: PtyLine) -> None:
+    board = Scripted(line)
+    with driver(line) as scanner:
+        assert scanner.read(0.5) is None
+        assert 3 <= scanner.counts.asked <= 6
+    asked = [board.asked.get(timeout=LONG_S).kind for _ in range(1 + 3)]
+    assert asked == [0x14, 0x13, 0x13, 0x13]
+
+
+def test_an_event_out_of_range_is_a_misfit_and_the_state_is_asked_for(line: PtyLine) -> None:
+    board = Scripted(line)
+    with driver(line) as scanner:
+        board.say(Heartbeat(0, 0b1, KEYS))
+        assert until(scanner, lambda _: True).known == EVERY
+        board.say(Event(0, KEYS, 1))
+        assert until(scanner, lambda _: True).known == 0
+        assert scanner.counts.misfits == 1
+        scanner.read(0.3)
+        kinds: list[int] = []
+        while kinds.count(0x13) < 2:  # once after opening, once now
+            kinds.append(board.asked.get(timeout=LONG_S).kind)
+
+
+def test_a_flood_of_zeros_or_of_noise_ends_no_later_than_asked(tmp_path: Path) -> None:
+    noise = np.random.default_rng(1).bytes(4000)
+    with PtyLine(tmp_path / "board", paced=False) as line:
+        board = Scripted(line)
+        with driver(line) as scanner:
+            stop = threading.Event()
+
+            def flood() -> None:
+                while not stop.is_set():
+                    line.send(bytes(4000))
+                    line.send(noise)
+
+            flooding = threading.Thread(target=flood)
+            flooding.start()
+            try:
+                began = monotonic()
+                while monotonic() - began < 0.5:
+                    scanner.read(0.05)
+                assert monotonic() - began < 1.5
+                assert scanner.counts.frames < 5
+            finally:
+                stop.set()
+                flooding.join()
+            line.send(b"\0")
+            board.say(Heartbeat(1, 0b10, KEYS))
+            until(scanner, lambda reading: reading.closed == 0b10)

@@ -1,0 +1,218 @@
+import os
+import pty
+import socket
+import threading
+import tty
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from time import monotonic
+
+import pytest
+import serial
+import serial.rfc2217
+
+from thenar.drivers.emulated.pty_line import PtyLine
+from thenar.drivers.errors import DeviceError, SettingError
+from thenar.drivers.serial_line import SerialLine
+
+EVERY_BYTE = bytes(range(256))
+SOON_S = 5.0
+
+
+def read_exactly(line: SerialLine, size: int) -> bytes:
+    data, end = b"", monotonic() + SOON_S
+    while len(data) < size and monotonic() < end:
+        data += line.read(end - monotonic())
+    return data
+
+
+class EchoLine(PtyLine):
+    """A port that sends back what it is sent."""
+
+    def __init__(self, link: Path) -> None:
+        super().__init__(link, paced=False)
+        self.receive = self.send
+
+
+@pytest.fixture
+def echo(tmp_path: Path) -> Iterator[EchoLine]:
+    with EchoLine(tmp_path / "port") as line:
+        yield line
+
+
+def test_every_byte_passes_both_ways(echo: EchoLine) -> None:
+    with SerialLine(str(echo.link), 115_200) as line:
+        line.write(EVERY_BYTE)
+        assert read_exactly(line, 256) == EVERY_BYTE
+
+
+@pytest.mark.parametrize("url", ["port", "loop://"])
+def test_reading_gives_up_at_its_timeout(echo: EchoLine, url: str) -> None:
+    with SerialLine(str(echo.link) if url == "port" else url, 115_200) as line:
+        began = monotonic()
+        assert line.read(0.05) == b""
+        assert 0.05 <= monotonic() - began < SOON_S
+        assert line.read(0.0) == line.read(-1.0) == b""
+
+
+def test_what_has_no_descriptor_is_read_as_well() -> None:
+    with SerialLine("loop://", 115_200) as line:
+        line.write(EVERY_BYTE)
+        assert read_exactly(line, 256) == EVERY_BYTE
+
+
+def test_draining_takes_its_time_and_returns_what_came(echo: EchoLine) -> None:
+    with SerialLine(str(echo.link), 115_200) as line:
+        line.write(b"old")
+        began = monotonic()
+        assert line.drain(0.1) == b"old"
+        assert monotonic() - began >= 0.1
+
+
+def test_a_port_that_is_not_there_is_named_with_what_to_check(tmp_path: Path) -> None:
+    with pytest.raises(DeviceError, match=r"/none: there is no such port: .*plugged in") as raised:
+        SerialLine(str(tmp_path / "none"), 115_200)
+    assert isinstance(raised.value, OSError)
+
+
+def test_a_folder_a_file_and_nonsense_are_no_ports(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"")
+    odd = [str(tmp_path), str(tmp_path / "file"), "", "a\0b", "telnet://x", "socket://127.0.0.1", "rfc2217://?x=y"]
+    for url in odd:
+        with pytest.raises(DeviceError):
+            SerialLine(url, 115_200)
+
+
+def test_a_baud_rate_of_nought_would_hang_up_and_is_refused(echo: EchoLine) -> None:
+    with pytest.raises(SettingError, match="at least 1, not 0"):
+        SerialLine(str(echo.link), 0)
+
+
+def test_a_port_in_use_is_not_shared(echo: EchoLine) -> None:
+    with SerialLine(str(echo.link), 115_200), pytest.raises(DeviceError, match="another program has it open"):
+        SerialLine(str(echo.link), 115_200)
+    SerialLine(str(echo.link), 115_200).close()
+
+
+def test_a_pulled_plug_ends_a_reading_at_once(echo: EchoLine) -> None:
+    with SerialLine(str(echo.link), 115_200) as line:
+        pulling = threading.Timer(0.05, echo.unplug)
+        pulling.start()
+        began = monotonic()
+        with pytest.raises(DeviceError, match=r"port: the serial line is gone .*check cable"):
+            line.read(60.0)
+        assert monotonic() - began < SOON_S
+        pulling.join()
+        with pytest.raises(DeviceError):
+            line.write(b"x")
+
+
+def test_a_closed_line_says_so_and_may_be_closed_again(echo: EchoLine) -> None:
+    line = SerialLine(str(echo.link), 115_200)
+    line.close()
+    line.close()
+    with pytest.raises(DeviceError):
+        line.read(1.0)
+    with pytest.raises(DeviceError):
+        line.write(b"x")
+
+
+def test_a_line_that_takes_nothing_does_not_hold_up_who_writes() -> None:
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    try:
+        with SerialLine(os.ttyname(slave), 115_200) as line:
+            began = monotonic()
+            with pytest.raises(DeviceError, match="timeout"):
+                line.write(bytes(1_000_000))
+            assert monotonic() - began < SOON_S
+    finally:
+        os.close(master)
+        os.close(slave)
+
+
+def test_a_tcp_socket_is_a_line_until_its_peer_goes() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(SOON_S)
+        with SerialLine(f"socket://127.0.0.1:{server.getsockname()[1]}", 115_200) as line:
+            peer, _ = server.accept()
+            with peer:
+                peer.settimeout(SOON_S)
+                line.write(EVERY_BYTE)
+                assert peer.recv(256) == EVERY_BYTE
+                peer.sendall(EVERY_BYTE)
+                assert read_exactly(line, 256) == EVERY_BYTE
+            with pytest.raises(DeviceError, match="socket disconnected"):
+                line.read(SOON_S)
+
+
+def test_nobody_listening_is_told_as_such() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    with pytest.raises(DeviceError, match="refused"):
+        SerialLine(f"socket://127.0.0.1:{port}", 115_200)
+
+
+class PlainSerial(serial.Serial):
+    """A pty has no modem lines, which the redirector reads and sets."""
+
+    cts = dsr = True
+    ri = cd = False
+    dtr = rts = property(lambda _: True, lambda _, value: None)
+
+
+class Redirector:
+    """pySerial's own RFC 2217 server around a port, for one client (its example rfc2217_server.py)."""
+
+    def __init__(self, port: str, client: socket.socket) -> None:
+        self.port = PlainSerial(port, timeout=0.05)
+        self.client = client
+        self.lock = threading.Lock()
+        self.manager = serial.rfc2217.PortManager(self.port, self)  # type: ignore[arg-type]  # the stubs are wrong
+        self.running = True
+        self.threads = [threading.Thread(target=way) for way in (self.to_client, self.to_port)]
+        for thread in self.threads:
+            thread.start()
+
+    def write(self, data: bytes) -> None:
+        with self.lock:
+            self.client.sendall(data)
+
+    def to_client(self) -> None:
+        while self.running:
+            if data := self.port.read(self.port.in_waiting or 1):
+                self.write(b"".join(self.manager.escape(data)))
+
+    def to_port(self) -> None:
+        while data := self.client.recv(1024):
+            self.port.write(b"".join(self.manager.filter(data)))
+        self.running = False
+
+    def close(self) -> None:
+        for thread in self.threads:
+            thread.join(SOON_S)
+        self.port.close()
+        self.client.close()
+
+
+@contextmanager
+def redirected(port: Path) -> Iterator[str]:
+    """Yield the URL under which one client finds `port`."""
+    served: list[Redirector] = []
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(SOON_S)
+        accepting = threading.Thread(target=lambda: served.append(Redirector(str(port), server.accept()[0])))
+        accepting.start()
+        yield f"rfc2217://127.0.0.1:{server.getsockname()[1]}"
+        accepting.join(SOON_S)
+        for redirector in served:
+            redirector.close()
+
+
+@pytest.mark.filterwarnings("ignore:set(Daemon|Name).* is deprecated:DeprecationWarning")
+def test_a_port_behind_rfc_2217_is_a_line(echo: EchoLine) -> None:
+    with redirected(echo.link) as url, SerialLine(url, 38_400) as line:
+        line.write(EVERY_BYTE)
+        assert read_exactly(line, 256) == EVERY_BYTE
+        assert line.read(0.01) == b""
