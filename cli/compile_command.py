@@ -5,11 +5,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import any_path, err, existing_file, json_flag, out, print_json, progress
+from ..drivers.i2c.registry import CHIPS
+from .common import any_path, err, existing_file, json_flag, keep_apart, out, output_file, print_json, progress
+from .scan_tables import print_scan
 
 if TYPE_CHECKING:
     from ..compiler.build.compile import BuildReport
-    from ..runtime.manifest import Inputs
+    from ..runtime.manifest import Inputs, Manifest
+
+_CHIP = "mcp23017"
+_BOARD = "board"
 
 
 @click.command("compile")
@@ -30,6 +35,14 @@ if TYPE_CHECKING:
 @click.option("--tolerance", type=float, help="Stop after a round that changes the mean loss by less than this.")
 @click.option("--folds", type=int, default=4, show_default=True, help="Folds of the rate in build.json; 0 for none.")
 @click.option("--seed", type=int, default=1, show_default=True, help="Seed of the folds.")
+@click.option("--glove", type=existing_file, help="A glove.toml: add the scan map of its wiring to the build.")
+@click.option("--propose", type=output_file, help="Write a glove.toml for the kept switches: on the fewest ports.")
+@click.option(
+    "--chip",
+    type=click.Choice([*CHIPS, _BOARD]),
+    help="The port expander to propose, or a switch-scanner board.  [default: mcp23017]",
+)
+@click.option("--overwrite", is_flag=True, help="Let --propose replace a file that is there.")
 @json_flag
 def command(
     recordings: Path,
@@ -41,19 +54,29 @@ def command(
     tolerance: float | None,
     folds: int,
     seed: int,
+    glove: Path | None,
+    propose: Path | None,
+    chip: str | None,
+    overwrite: bool,
     as_json: bool,
 ) -> None:
     """Choose the switches, train, and write integer tables with their proof.
 
-    The folder holds build.json, tables.bin and ensemble.bin. The same recordings and options give the same bytes.
+    The folder holds build.json, tables.bin and ensemble.bin, and with --glove scan.json. The same recordings, options
+    and wiring give the same bytes.
 
     \b
     Example:
         thenar compile set.grasps -o build/ --prune 13
+        thenar compile set.grasps -o build/ --glove glove.toml
     """
     from ..compiler.build.compile import compile_build
     from ..compiler.recordings.graspset import GraspSet
+    from ..runtime.harness.loading import load_harness
 
+    _check_proposal(glove, propose, chip, overwrite)
+    keep_apart(recordings, glove, propose)
+    harness = None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
     with progress("compiling") as report:
         made = compile_build(
@@ -66,6 +89,7 @@ def command(
             tolerance=tolerance,
             folds=folds,
             seed=seed,
+            harness=harness,
             progress=report,
         )
     if made.only_answer is not None:
@@ -73,10 +97,45 @@ def command(
             f"warning: the build recognises every row as {made.only_answer}: no input tells grasp types apart by "
             "itself, and stumps look at one at a time"
         )
+    if propose is not None:
+        _propose(made.manifest, propose, chip or _CHIP)
     if as_json:
         print_json(made.manifest)
+        return
+    _print(made, output)
+    if harness is not None and made.scan is not None:
+        print_scan(made.scan, harness)
+    if propose is not None:
+        out().print(
+            f"{propose}: a harness for the kept switches; wire the glove so, then compile with --glove {propose}"
+        )
+
+
+def _check_proposal(glove: Path | None, propose: Path | None, chip: str | None, overwrite: bool) -> None:
+    """Refuse before the training what could not be done after it."""
+    if propose is None:
+        if chip is not None or overwrite:
+            raise click.UsageError("--chip and --overwrite say how to --propose a harness: name the file to write.")
+        return
+    if glove is not None:
+        raise click.UsageError("--glove reads a wiring, --propose writes a new one: give one of them.")
+    if propose.exists() and not overwrite:
+        raise click.UsageError(f"{propose} is there already: name another file, or add --overwrite.")
+
+
+def _propose(manifest: "Manifest", path: Path, chip: str) -> None:
+    from ..runtime.files import write_atomically
+    from ..runtime.harness.wiring import GloveWiring
+    from ..runtime.harness.writing import harness_to_toml
+    from ..runtime.scanning.propose import propose_board, propose_harness
+
+    names = [switch.name for switch in manifest.switches]
+    glove = GloveWiring(port="/dev/ttyUSB0") if manifest.joints else None
+    if chip == _BOARD:
+        harness = propose_board(names, name=path.stem, cyberglove=glove)
     else:
-        _print(made, output)
+        harness = propose_harness(names, chip, name=path.stem, cyberglove=glove)
+    write_atomically(path, harness_to_toml(harness).encode())
 
 
 def _print(made: "BuildReport", folder: Path) -> None:

@@ -58,6 +58,11 @@ def _print(found: "Verification") -> None:
         f"margin above {found.safe_margin:g} steps: {found.covered} rows, of which {found.covered_changed} change class"
     )
     _print_worst(console, found.worst)
+    if found.scan is not None:
+        console.print(
+            f"scan map: {found.scan.mean_read:.2f} of {found.scan.ports} ports read on average until a row is decided; "
+            f"rows that change class by that: {found.scan.changed}"
+        )
     console.print(f"recognised: {found.correct_ensemble} by the ensemble, {found.correct_integers} by the integers")
     console.print(f"rows that change class: {len(found.changed)}")
     for row in found.changed[:_SHOWN]:

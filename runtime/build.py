@@ -1,4 +1,4 @@
-"""A build folder, loaded: `build.json` says what the tables mean, `tables.bin` holds them."""
+"""A build folder, loaded: `build.json` says what the tables mean, `tables.bin` holds them, `scan.json` how to read."""
 
 import hashlib
 from os import PathLike
@@ -11,23 +11,26 @@ from . import manifest as manifest_file
 from . import tables as tables_file
 from .errors import BuildError
 from .manifest import Manifest, manifest_from_bytes
+from .scanning import scanmap as scan_file
+from .scanning.scanmap import ScanMap, check_switches, scanmap_from_bytes
 from .scorer import LANE_OFFSET, Scorer
 from .tables import IntegerTables, tables_from_bytes
 
-MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME = "build.json", "tables.bin", "ensemble.bin"
+MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME, SCAN_NAME = "build.json", "tables.bin", "ensemble.bin", "scan.json"
 
 
 class Build:
     """A recogniser for single frames, integer arithmetic only.
 
     A frame is `bits` (s,), the kept switches in the order of `manifest.switches`, and `codes` (j,), the joints in the
-    order of `manifest.joints`. Of equal scores the first grasp type wins.
+    order of `manifest.joints`. Of equal scores the first grasp type wins. `scan` is how to read the kept switches, None
+    where the build was compiled for no harness.
     """
 
-    __slots__ = ("_scorer", "grasps", "manifest", "tables")
+    __slots__ = ("_scorer", "grasps", "manifest", "scan", "tables")
 
-    def __init__(self, manifest: Manifest, tables: IntegerTables) -> None:
-        """Put together what belongs together. Raises BuildError if the two describe different builds."""
+    def __init__(self, manifest: Manifest, tables: IntegerTables, scan: ScanMap | None = None) -> None:
+        """Put together what belongs together. Raises BuildError if they describe different builds."""
         named = len(manifest.grasps), len(manifest.switches), len(manifest.joints)
         held = tables.n_classes, tables.n_switches, tables.n_joints
         if named != held:
@@ -35,8 +38,11 @@ class Build:
                 f"{MANIFEST_NAME} names {named[0]} grasp types, {named[1]} switches and {named[2]} joints, "
                 f"{TABLES_NAME} holds {held[0]}, {held[1]} and {held[2]}: compile the build again"
             )
+        if scan is not None:
+            check_switches(scan, tables.n_switches)
         self.manifest = manifest
         self.tables = tables
+        self.scan = scan
         self.grasps = manifest.grasps
         self._scorer = Scorer(tables)
 
@@ -51,7 +57,7 @@ class Build:
         manifest = load_manifest(where)
         path = where / TABLES_NAME
         data = read_member(path, tables_file.MAX_BYTES, manifest.tables_sha256)
-        return cls(manifest, tables_from_bytes(data, str(path)))
+        return cls(manifest, tables_from_bytes(data, str(path)), _load_scan(where, manifest))
 
     def lanes(self, bits: ArrayLike, codes: ArrayLike) -> tuple[int, ...]:
         """Return the scores of one frame as K plain integers, all 2^15 too high: enough to compare them."""
@@ -77,6 +83,13 @@ def load_manifest(folder: Path) -> Manifest:
     """Return what the `build.json` in `folder` says. Raises BuildError."""
     path = folder / MANIFEST_NAME
     return manifest_from_bytes(read_member(path, manifest_file.MAX_BYTES), str(path))
+
+
+def _load_scan(folder: Path, manifest: Manifest) -> ScanMap | None:
+    if manifest.scan_sha256 is None:
+        return None
+    path = folder / SCAN_NAME
+    return scanmap_from_bytes(read_member(path, scan_file.MAX_BYTES, manifest.scan_sha256), str(path))
 
 
 def read_member(path: Path, largest: int, sha256: str | None = None) -> bytes:

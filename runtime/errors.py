@@ -1,8 +1,8 @@
-"""What can go wrong between a build folder and a recognised grasp."""
+"""What can go wrong between a build folder, a glove and a recognised grasp."""
 
 from ..drivers.errors import ThenarError
 
-__all__ = ["BuildError", "FrameError", "SealError", "ThenarError"]
+__all__ = ["BuildError", "FrameError", "HarnessError", "SealError", "ThenarError"]
 
 
 class SealError(ThenarError, ValueError):
@@ -15,3 +15,7 @@ class BuildError(ThenarError, ValueError):
 
 class FrameError(ThenarError, ValueError):
     """A frame does not fit the build: wrong number of switches or joints, or a code outside its range."""
+
+
+class HarnessError(ThenarError, ValueError):
+    """A harness cannot be as its file says, or does not fit the build; the message names file, line and key."""

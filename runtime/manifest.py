@@ -103,6 +103,7 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     stopped_after    rounds after which the tolerance ended the training; left out if it did not
     zero_gain_nodes  decisions of the placement's tree at which no switch gained anything alone; left out if there are
                      none
+    scan_sha256      of scan.json; left out where the build was compiled for no harness
     """
 
     schema: int
@@ -119,6 +120,7 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     rates: tuple[Recognised, ...]
     stopped_after: Count = 0
     zero_gain_nodes: Count = 0
+    scan_sha256: Digest | None = None
 
 
 class _Version(Struct, frozen=True):

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, TABLES_NAME
+from ...runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME
+from ...runtime.harness.wiring import Harness
 from ...runtime.manifest import (
     SCHEMA,
     Calibration,
@@ -22,6 +23,8 @@ from ...runtime.manifest import (
     manifest_from_bytes,
     manifest_to_bytes,
 )
+from ...runtime.scanning.plan import plan_scan
+from ...runtime.scanning.scanmap import ScanMap, scanmap_to_bytes
 from ...runtime.tables import IntegerTables, tables_to_bytes
 from ..evaluation.folds import check_cut
 from ..recordings.graspset import GraspSet
@@ -38,14 +41,16 @@ WIDTH = 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BuildReport:
-    """Where the build is, what its `build.json` says of it, and the one grasp type that it gives all rows, if it does:
-    then the inputs tell nothing that stumps, which add up, can tell.
+    """Where the build is, what its `build.json` says of it, how to read the harness it was compiled for, if it was for
+    one, and the one grasp type that it gives all rows, if it does: then the inputs tell nothing that stumps, which add
+    up, can tell.
     """
 
     folder: Path
     manifest: Manifest
     tables_bytes: int
     only_answer: str | None
+    scan: ScanMap | None = None
 
 
 def compile_build(
@@ -59,14 +64,16 @@ def compile_build(
     tolerance: float | None = None,
     folds: int = 4,
     seed: int = 1,
+    harness: Harness | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> BuildReport:
     """Choose the placement, train, collapse, quantise, prove, and write the build `folder`, whole or not at all.
 
     prune is the paper's S, inputs which of switches and joints to use; a round that changes the mean loss by less than
     tolerance is the last; folds and seed cut the cross-validation whose rate goes into the build (0 folds: none).
-    progress(done, total) is called as work is done. The same recordings and options give the same bytes. Raises
-    CompileError, or what placement and boosting raise of their options.
+    With a harness, the build says how to read its switches there. progress(done, total) is called as work is done. The
+    same recordings, options and harness give the same bytes. Raises CompileError, HarnessError if the harness lacks a
+    kept switch, or what placement and boosting raise of their options.
     """
     target = check_target(Path(folder))
     least = None if tolerance is None else float(tolerance)
@@ -78,32 +85,39 @@ def compile_build(
     trained = train(material, options, steps.round_done)
     bits = trained.kept(material)
     integers = quantise(collapse(trained.stumps, len(trained.columns)), bits, material.codes, WIDTH)
+    switches = _switches(grasp_set, trained)
+    names = [switch.name for switch in switches]
+    scan = None if harness is None else plan_scan(names, integers, harness, bits, material.codes)
     comparison = compare(trained.stumps, integers, bits, material.codes)
     rates = [_training_rate(comparison, material, options)]
     if folds:
         rates.append(cross_validated(material, options, steps.fold_done))
-    tables, ensemble = tables_to_bytes(integers), ensemble_to_bytes(trained.stumps)
+    files = {TABLES_NAME: tables_to_bytes(integers), ENSEMBLE_NAME: ensemble_to_bytes(trained.stumps)}
+    if scan is not None:
+        files[SCAN_NAME] = scanmap_to_bytes(scan)
+    digests = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
     manifest = Manifest(
         schema=SCHEMA,
         checksum="",
         thenar=version("thenar"),
-        tables_sha256=hashlib.sha256(tables).hexdigest(),
-        ensemble_sha256=hashlib.sha256(ensemble).hexdigest(),
+        tables_sha256=digests[TABLES_NAME],
+        ensemble_sha256=digests[ENSEMBLE_NAME],
         source=_source(grasp_set),
         options=options,
         grasps=material.grasps,
-        switches=_switches(grasp_set, trained),
+        switches=switches,
         joints=_joints(grasp_set) if inputs != "switches" else (),
         proof=_proof(integers, comparison),
         rates=tuple(rates),
         stopped_after=trained.stumps.n_rounds if trained.stopped_early else 0,
         zero_gain_nodes=trained.zero_gain_nodes,
+        scan_sha256=digests.get(SCAN_NAME),
     )
     described = manifest_to_bytes(manifest)
-    publish({TABLES_NAME: tables, ENSEMBLE_NAME: ensemble, MANIFEST_NAME: described}, target)
+    publish({**files, MANIFEST_NAME: described}, target)
     answers = np.unique(comparison.deployed)
     only_answer = material.grasps[answers[0]] if len(answers) == 1 else None
-    return BuildReport(target, manifest_from_bytes(described), len(tables), only_answer)
+    return BuildReport(target, manifest_from_bytes(described), len(files[TABLES_NAME]), only_answer, scan)
 
 
 class _Steps:

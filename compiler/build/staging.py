@@ -6,11 +6,12 @@ import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
-from ...runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, TABLES_NAME
+from ...runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME
 from ...runtime.files import sync_folder, write_atomically
 from .errors import CompileError
 
-MEMBERS = frozenset({MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME})
+# The last one is only there in a build that was compiled for a harness.
+MEMBERS = frozenset({MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME, SCAN_NAME})
 
 
 def check_target(folder: Path) -> Path:

@@ -18,6 +18,7 @@ from ..tables.furthest import furthest
 from ..tables.worstcase import Rounding
 from .ensemble import MAX_BYTES, ensemble_from_bytes
 from .errors import CompileError
+from .scanned import ScanCheck, check_scan
 from .select import select_inputs
 
 
@@ -63,7 +64,7 @@ class Verification(Struct, frozen=True, kw_only=True):
 
     collapse_* compare the ensemble with the float tables, in units of score; integer_* the float tables with the
     integers, in steps. covered counts rows whose margin exceeds safe_margin, covered_changed those of them that change.
-    worst looks beyond the rows.
+    worst looks beyond the rows; scan is there if the build says how to read a harness.
     """
 
     same_recordings: bool
@@ -79,6 +80,7 @@ class Verification(Struct, frozen=True, kw_only=True):
     correct_integers: int
     worst: WorstCase
     changed: tuple[ChangedRow, ...]
+    scan: ScanCheck | None
     holds: bool
 
 
@@ -97,6 +99,7 @@ def verify_build(
     bits, codes = select_inputs(grasp_set, build.manifest)
     comparison = compare(stumps, build.tables, bits, codes, progress)
     worst = _worst(stumps, build, comparison)
+    scan = None if build.scan is None else check_scan(build.scan, build.tables, bits, codes, comparison.deployed)
     grasps = np.array(build.grasps)
     return Verification(
         same_recordings=grasp_set.fingerprint() == build.manifest.source.fingerprint,
@@ -112,7 +115,8 @@ def verify_build(
         correct_integers=int(np.count_nonzero(grasps[comparison.deployed] == grasp_set.grasps)),
         worst=worst,
         changed=_changed(comparison, grasps, grasp_set),
-        holds=comparison.holds and worst.holds,
+        scan=scan,
+        holds=comparison.holds and worst.holds and not (scan and scan.changed),
     )
 
 

@@ -63,12 +63,13 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
         trials=readings.trials,
     )
     warnings = (*dropped, *aliases, *find_oddities(grasp_set, readings.rows))
-    return grasp_set, _report(table.what, grasp_set, tuple(cost for _, _, cost in joints), warnings)
+    return grasp_set, report_of(table.what, grasp_set, tuple(cost for _, _, cost in joints), warnings)
 
 
-def _report(
+def report_of(
     what: str, grasp_set: GraspSet, coding: tuple[CodingCost, ...], warnings: tuple[Finding, ...]
 ) -> ImportReport:
+    """Return what is to be said of `grasp_set`, which was imported from `what`."""
     return ImportReport(
         table=what,
         rows=len(grasp_set),

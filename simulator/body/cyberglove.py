@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.recordings.graspset import Joint
+from ...drivers.cyberglove_sensors import SENSORS_18
 from ..streams import Draw, Draws, Site
 from .anthropometry import FAN_DEG
 from .hand import DOF
@@ -18,27 +19,8 @@ from .hand import DOF
 Floats = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 
-# The order of the 18-sensor glove on the wire.
-SENSORS = (
-    "thumb_rotation",
-    "thumb_mpj",
-    "thumb_ij",
-    "thumb_abduction",
-    "index_mpj",
-    "index_pij",
-    "middle_mpj",
-    "middle_pij",
-    "middle_index_abduction",
-    "ring_mpj",
-    "ring_pij",
-    "ring_middle_abduction",
-    "little_mpj",
-    "little_pij",
-    "little_ring_abduction",
-    "palm_arch",
-    "wrist_pitch",
-    "wrist_yaw",
-)
+# In wire order.
+SENSORS = SENSORS_18
 # The paper uses all but the wrist.
 USED = 16
 

@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.recordings.names import nearest
+from ...runtime.toml_source import Place, Source, read_source
+from ...runtime.toml_struct import as_table, check_finite, convert
 from ..body.anthropometry import DIGITS, Size
 from ..body.hand import CAPSULES, LIMITS_DEG, Hand
-from ..scenes.toml_source import Place, Source, read_source
-from ..scenes.toml_struct import as_table, check_finite, convert
+from ..errors import SceneError
 
 Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -67,7 +68,7 @@ class _Table(msgspec.Struct, frozen=True):
 
 def load_prehensions(file: Traversable) -> dict[str, Prehension]:
     """Return the grasp types in the `[types.*]` of a table, by name. Raises SceneError with file, line and key."""
-    source = read_source(file)
+    source = read_source(file, SceneError)
     tables = source.tables()
     check_finite(source, (), tables)
     types = as_table(source, ("types",), convert(source, (), tables, _Table).types)

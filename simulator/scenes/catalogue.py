@@ -12,11 +12,11 @@ import msgspec
 from ...compiler.recordings.errors import RecordingError
 from ...compiler.recordings.names import fault, list_names, nearest
 from ...compiler.recordings.taxonomy import Taxonomy, published
+from ...runtime.toml_source import Place, Source, read_source
+from ...runtime.toml_struct import as_list, as_table, check_finite, check_keys, convert
 from ..body.shapes import Shape
 from ..errors import SceneError
 from .scene import SceneObject
-from .toml_source import Place, Source, read_source
-from .toml_struct import as_list, as_table, check_finite, check_keys, convert
 
 _SHAPES: dict[str, type[Shape]] = {str(shape.__struct_config__.tag): shape for shape in get_args(Shape)}
 _OF_ANY_SHAPE = SceneObject.__struct_encode_fields__
@@ -39,7 +39,7 @@ class _File(msgspec.Struct, frozen=True):
 def load_catalogue(name_or_path: str | Path) -> Catalogue:
     """Read the catalogue that is shipped under a name, or lies in a file. Raises SceneError with file, line and key."""
     file = name_or_path if isinstance(name_or_path, Path) else _shipped(name_or_path)
-    source = read_source(file)
+    source = read_source(file, SceneError)
     tables = source.tables()
     check_finite(source, (), tables)
     found = convert(source, (), tables, _File)

@@ -11,7 +11,9 @@ import msgspec
 
 from ...compiler.recordings.names import fault, nearest
 from ...compiler.recordings.taxonomy import Taxonomy
-from ..errors import SceneError
+from ...runtime.toml_source import Source, read_source
+from ...runtime.toml_struct import as_list, as_table, check_finite, convert
+from ..errors import SceneError, ThenarError
 from ..pipeline import registry
 from ..pipeline.effect import EffectParameters
 from ..pipeline.ordering import Place as Ordered
@@ -20,8 +22,6 @@ from . import shipped
 from .catalogue import check_names, find_taxonomy, load_catalogue, objects_of
 from .population import Population, draw_subjects
 from .scene import Glove, Listed, Recording, Scene, SceneObject, Subject
-from .toml_source import Source, read_source
-from .toml_struct import as_list, as_table, check_finite, convert
 
 
 class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -46,13 +46,13 @@ def load_scene(name_or_path: str | Path) -> Scene:
     Imports the modules of the effects that it lists, and no others. Raises SceneError with file, line and key.
     """
     path = Path(name_or_path)
-    source = read_source(_file(path))
+    source = read_source(_file(path), SceneError)
     tables = source.tables()
     check_finite(source, (), tables)
     return _Decoder(source, convert(source, (), tables, _File), path.parent).scene(path.stem)
 
 
-def located(name_or_path: str | Path, fault: SceneError) -> SceneError:
+def located(name_or_path: str | Path, fault: SceneError) -> ThenarError:
     """Return an error about a key of a scene with file and line added, where it says which key but not where.
 
     That is what shows when the effects are put together; any other error comes back as it is.
@@ -60,7 +60,7 @@ def located(name_or_path: str | Path, fault: SceneError) -> SceneError:
     key, _, reason = str(fault).partition(": ")
     if not re.fullmatch(r"(effects|recording)(\.\w+)+", key):
         return fault
-    return read_source(_file(Path(name_or_path))).error(tuple(key.split(".")), reason)
+    return read_source(_file(Path(name_or_path)), SceneError).error(tuple(key.split(".")), reason)
 
 
 def own_file(name_or_path: str | Path) -> Path | None:
@@ -148,7 +148,7 @@ class _Decoder:
             raise self._placed(str(reason), list(tables)) from reason
         return listed
 
-    def _placed(self, words: str, names: list[str]) -> SceneError:
+    def _placed(self, words: str, names: list[str]) -> ThenarError:
         """Return an error about the order of effects, with the line of the key or of the first effect that it names."""
         where, _, what = words.partition(": ")
         if where.startswith("effects."):

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler.recordings.errors import RecordingError
-from thenar.compiler.recordings.names import check_names, list_names, list_rows, nearest
+from thenar.compiler.recordings.names import check_names, list_rows
 
 
 @pytest.mark.parametrize(
@@ -23,14 +23,6 @@ def test_equal_names_are_refused() -> None:
         check_names("switch", ["a", "b", "a"])
 
 
-def test_near_names_are_suggested_or_else_the_first_there_are() -> None:
-    assert nearest("subjct", ["subject", "object"]).startswith(" (did you mean 'subject'")
-    assert nearest("zzz", ["subject", "object"]) == " (there are: subject, object)"
-
-
-def test_long_lists_are_cut_and_counted() -> None:
-    assert list_names(["a", "b"]) == "a, b"
-    assert list_names([*"abcdefg"]) == "a, b, c, d, e and 2 more"
-    assert list_names([*"abcde"], 12) == "a, b, c, d, e and 7 more"
+def test_rows_are_counted_like_names() -> None:
     assert list_rows(np.array([4])) == "row 4"
     assert list_rows(np.array([4, 9])) == "rows 4, 9"

@@ -1,20 +1,26 @@
-"""Tables of a TOML file as msgspec structs; what is wrong is told in TOML's words, with what to write instead."""
+"""Tables of a TOML file as msgspec structs; what is wrong is told in TOML's words, with what to write instead.
+
+Whatever is raised here is the error of the source that is read.
+"""
 
 import math
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from typing import TypeVar
 
 import msgspec
+from msgspec import inspect
 
-from ...compiler.recordings.names import nearest
-from ..errors import SceneError
+from .errors import ThenarError
+from .names import list_names, nearest
 from .toml_source import Place, Source
 
 S = TypeVar("S", bound=msgspec.Struct)
 
 _TYPES = {"float": "a number", "int": "a whole number", "str": "text", "bool": "true or false", "array": "a list"}
 _TYPES |= {"object": "a table"}
+# What msgspec calls what a TOML file can hold.
+_KINDS = {float: "float", int: "int", str: "str", bool: "bool", list: "array", dict: "object"}
 _BOUNDS = {">=": "at least", "<=": "at most", ">": "above", "<": "below"}
 # What the last part of a key says about its value.
 _UNITS = {
@@ -40,7 +46,7 @@ _OTHER_UNITS = {
 
 
 def convert(source: Source, place: Place, table: object, kind: type[S]) -> S:
-    """Return `table`, which stands at `place` in `source`, as a struct. Raises SceneError about the first wrong key."""
+    """Return `table`, which stands at `place` in `source`, as a struct. Raises about the first wrong key."""
     keys = as_table(source, place, table)
     if kind.__struct_config__.forbid_unknown_fields:
         check_keys(source, place, keys, kind.__struct_encode_fields__)
@@ -51,28 +57,28 @@ def convert(source: Source, place: Place, table: object, kind: type[S]) -> S:
 
 
 def as_table(source: Source, place: Place, value: object) -> dict[str, object]:
-    """Return `value` if it is a table; raises SceneError."""
+    """Return `value` if it is a table; raises otherwise."""
     if isinstance(value, dict):
         return value
     raise source.error(place, f"must be a table, not {_shown(value)}")
 
 
 def as_list(source: Source, place: Place, value: object) -> list[object]:
-    """Return `value` if it is a list that holds something; raises SceneError."""
+    """Return `value` if it is a list that holds something; raises otherwise."""
     if isinstance(value, list) and value:
         return value
     raise source.error(place, f"must be a list of tables, not {_shown(value)}")
 
 
 def check_keys(source: Source, place: Place, table: Mapping[str, object], known: Collection[str]) -> None:
-    """Raise SceneError about the first key of `table` that is not among the `known` ones."""
+    """Raise about the first key of `table` that is not among the `known` ones."""
     for key in table:
         if key not in known:
             raise source.error((*place, key), _advice(key, known))
 
 
 def check_finite(source: Source, place: Place, value: object) -> None:
-    """Raise SceneError about the first number in `value`, or in anything it holds, that is not finite."""
+    """Raise about the first number in `value`, or in anything it holds, that is not finite."""
     if isinstance(value, float) and not math.isfinite(value):
         raise source.error(place, f"must be a finite number, not {value}")
     inside = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
@@ -90,14 +96,33 @@ def _advice(key: str, known: Collection[str]) -> str:
     return f"{_UNITS[same[0].rpartition('_')[2]]}: {same[0]}"
 
 
-def _worded(source: Source, place: Place, table: dict[str, object], kind: type[S], reason: str) -> SceneError:
+def _worded(source: Source, place: Place, table: dict[str, object], kind: type[S], reason: str) -> ThenarError:
     """Return msgspec's complaint about `table` as an error that names the key."""
-    sentence, _, tail = reason.partition(" - at `$")
-    inner: Place = tuple(name or int(number) for name, number in re.findall(r"\.(\w+)|\[(\d+)\]", tail))
-    value: object = table
-    for key in inner:
-        value = value[key]  # type: ignore[index]
+    sentence, _, path = reason.partition(" - at `$")
+    inner, value = _followed(path, table, sentence)
+    if found := re.fullmatch(r"Object contains unknown field `(.+)`", sentence):
+        known = [
+            field.encode_name for member in _members(_type_at(kind, inner)) for field in getattr(member, "fields", ())
+        ]
+        return source.error((*place, *inner, found[1]), _advice(found[1], known))
     return source.error((*place, *inner), _sentence(sentence, value, kind, inner))
+
+
+def _followed(path: str, table: object, sentence: str) -> tuple[Place, object]:
+    """Return where a path of msgspec's leads, and what stands there; which key of a dict it means, it does not say."""
+    inner: Place = ()
+    value = table
+    for name, number in re.findall(r"\.(\w+)|\[(\d+|\.{3})\]", path):
+        key = name or (_first_of(value, sentence) if number == "..." else int(number))
+        inner, value = (*inner, key), value[key]  # type: ignore[index]
+    return inner, value
+
+
+def _first_of(table: object, sentence: str) -> str:
+    """Return the key of the first value in `table` that is of the kind that msgspec says it got."""
+    got = sentence.partition(", got ")[2].strip("`")
+    pairs: list[tuple[str, object]] = list(table.items()) if isinstance(table, dict) else []
+    return next((key for key, value in pairs if _KINDS.get(type(value)) == got), pairs[0][0])
 
 
 def _sentence(reason: str, value: object, kind: type[S], inner: Place) -> str:
@@ -111,19 +136,33 @@ def _sentence(reason: str, value: object, kind: type[S], inner: Place) -> str:
         bound = found[2] if found[2].lstrip("-").isdigit() else f"{float(found[2]):.15g}"
         return f"must be {_BOUNDS[found[1]]} {bound}, not {value}"
     if reason.startswith("Invalid enum value"):
-        choices = [choice for choice in _choices(kind, inner) if isinstance(choice, str)]
-        return f"{_shown(value)} is not among its values{nearest(str(value), choices)}"
-    return reason.replace("Expected `array`", "must be a list").replace("Number", "is a number")
+        choices = [
+            str(choice) for member in _members(_type_at(kind, inner)) for choice in getattr(member, "values", ())
+        ]
+        near = nearest(value, choices) if isinstance(value, str) else f" (there are: {list_names(choices)})"
+        return f"{_shown(value)} is not among its values{near}"
+    if found := re.fullmatch(r"Expected `(.+)` of (length .+)", reason):
+        return f"must be {_TYPES.get(found[1], found[1])} of {found[2]}"
+    return reason.replace("Number", "is a number")
 
 
-def _choices(kind: type[S], inner: Place) -> Iterator[object]:
-    """Yield what the field that `inner` begins with may be, where it must be one of a few."""
-    for field in msgspec.inspect.type_info(kind).fields:  # type: ignore[attr-defined]
-        if field.encode_name == inner[0]:
-            allowed = field.type
-            while isinstance(allowed, msgspec.inspect.VarTupleType):
-                allowed = allowed.item_type
-            yield from getattr(allowed, "values", ())
+def _type_at(kind: type[S], inner: Place) -> inspect.Type:
+    """Return what must stand at `inner` of a table that becomes a `kind`."""
+    found = inspect.type_info(kind)
+    for key in inner:
+        for member in _members(found):
+            if isinstance(member, inspect.StructType):
+                found = next(field.type for field in member.fields if field.encode_name == key)
+            elif isinstance(member, inspect.VarTupleType):
+                found = member.item_type
+            elif isinstance(member, inspect.DictType):
+                found = member.value_type
+    return found
+
+
+def _members(allowed: inspect.Type) -> tuple[inspect.Type, ...]:
+    """Return the types of which a value may be one."""
+    return allowed.types if isinstance(allowed, inspect.UnionType) else (allowed,)
 
 
 def _shown(value: object) -> str:

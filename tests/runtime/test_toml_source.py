@@ -8,9 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.errors import SceneError
+from thenar.runtime.errors import ThenarError
+from thenar.runtime.toml_source import Place, Source, read_source, spelled
 from thenar.simulator.scenes import shipped
-from thenar.simulator.scenes.toml_source import Place, Source, read_source, spelled
+
+
+class OwnError(ThenarError, ValueError):
+    pass
+
 
 AWKWARD = '''\
 # [not.a.table]
@@ -66,20 +71,20 @@ def places(value: object, here: Place = ()) -> Iterator[Place]:
     ids=str,
 )
 def test_a_key_has_the_line_on_which_it_stands(place: Place, line: int) -> None:
-    assert Source("a.toml", AWKWARD).line(place) == line
-    assert Source("a.toml", AWKWARD.replace("\n", "\r\n")).line(place) == line
+    assert Source("a.toml", AWKWARD, OwnError).line(place) == line
+    assert Source("a.toml", AWKWARD.replace("\n", "\r\n"), OwnError).line(place) == line
 
 
 @pytest.mark.parametrize("text", [AWKWARD, *(file.read_text() for file in shipped().values())])
 def test_everything_that_a_file_holds_has_a_line_of_its_own_and_its_last_key_stands_on_it(text: str) -> None:
-    source = Source("a.toml", text)
+    source = Source("a.toml", text, OwnError)
     for place in places(tomllib.loads(text)):
         if place and isinstance(place[-1], str):
             assert place[-1] in text.splitlines()[source.line(place) - 1]
 
 
 def test_what_is_not_there_has_the_line_of_the_table_that_lacks_it() -> None:
-    source = Source("a.toml", AWKWARD)
+    source = Source("a.toml", AWKWARD, OwnError)
     assert source.line(("subjects", 1, "hand_length_mm")) == 16
     assert source.line(("nothing", 3, "at all")) == 1
 
@@ -91,14 +96,14 @@ keys = st.text(min_size=1, max_size=8).filter(lambda key: key.isprintable())
 def test_quoted_keys_of_any_letters_are_found(names: list[str], blanks: int) -> None:
     quoted = ['"' + name.replace("\\", "\\\\").replace('"', '\\"') + '"' for name in names]
     text = "".join(f"{name} = {{{name} = 1}}\n" + "\n" * blanks for name in quoted)
-    source = Source("a.toml", text)
+    source = Source("a.toml", text, OwnError)
     assert set(source.tables()) == set(names)
     for number, name in enumerate(names):
         assert source.line((name, name)) == 1 + number * (1 + blanks)
 
 
 def test_an_error_names_file_line_and_keys() -> None:
-    error = Source("a.toml", AWKWARD).error(("subjects", 1, "na me"), "is no name")
+    error = Source("a.toml", AWKWARD, OwnError).error(("subjects", 1, "na me"), "is no name")
     assert str(error) == "a.toml, line 17: subjects[1].na me: is no name"
     assert spelled(("effects", "joint", "noise", "after", 0)) == "effects.joint.noise.after[0]"
 
@@ -115,24 +120,24 @@ def test_an_error_names_file_line_and_keys() -> None:
     ids=["no value", "twice", "cut off", "endless number", "endless list"],
 )
 def test_what_is_no_toml_is_refused_with_the_reason(text: str, reason: str) -> None:
-    with pytest.raises(SceneError, match=reason) as caught:
-        Source("a.toml", text).tables()
+    with pytest.raises(OwnError, match=reason) as caught:
+        Source("a.toml", text, OwnError).tables()
     assert str(caught.value).startswith("a.toml is not valid TOML: ")
 
 
 def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path: Path) -> None:
     path = tmp_path / "a.toml"
     path.write_bytes(b"\xef\xbb\xbfa = 1\n")
-    assert read_source(path) == Source("a.toml", "a = 1\n")
+    assert read_source(path, OwnError) == Source("a.toml", "a = 1\n", OwnError)
 
 
 def test_text_that_is_not_utf8_is_refused_with_its_line(tmp_path: Path) -> None:
     path = tmp_path / "a.toml"
     path.write_bytes("a = 1\nname = 'Stra\u00dfe'\n".encode("latin-1"))
-    with pytest.raises(SceneError, match=r"a\.toml, line 2: the text is not UTF-8"):
-        read_source(path)
+    with pytest.raises(OwnError, match=r"a\.toml, line 2: the text is not UTF-8"):
+        read_source(path, OwnError)
 
 
 def test_a_folder_is_refused_as_what_cannot_be_read(tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match="cannot be read: Is a directory"):
-        read_source(tmp_path)
+    with pytest.raises(OwnError, match="cannot be read: Is a directory"):
+        read_source(tmp_path, OwnError)

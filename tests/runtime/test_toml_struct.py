@@ -3,9 +3,13 @@ from typing import Annotated, Literal
 import msgspec
 import pytest
 
-from thenar.simulator.errors import SceneError
-from thenar.simulator.scenes.toml_source import Source
-from thenar.simulator.scenes.toml_struct import check_finite, convert
+from thenar.runtime.errors import ThenarError
+from thenar.runtime.toml_source import Source
+from thenar.runtime.toml_struct import check_finite, convert
+
+
+class OwnError(ThenarError, ValueError):
+    pass
 
 
 class Thing(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -27,15 +31,27 @@ class Thing(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             raise ValueError("`count` is unlucky")
 
 
+class Inner(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    width_mm: float = 1.0
+    side: Literal["left", "right"] | None = None
+    count: Literal[18, 22] | None = None
+    names: dict[str, str] = {}
+
+
+class Outer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    inner: tuple[Inner, ...] = msgspec.field(default=(), name="in")
+    one: Inner | None = None
+
+
 def complaint(text: str) -> str:
-    source = Source("a.toml", f"[thing]\n{text}\n")
-    with pytest.raises(SceneError) as caught:
+    source = Source("a.toml", f"[thing]\n{text}\n", OwnError)
+    with pytest.raises(OwnError) as caught:
         convert(source, ("thing",), source.tables()["thing"], Thing)
     return str(caught.value)
 
 
 def test_a_table_becomes_a_struct() -> None:
-    source = Source("a.toml", 'width_mm = 3\ntags = ["x"]\nkind = "all"')
+    source = Source("a.toml", 'width_mm = 3\ntags = ["x"]\nkind = "all"', OwnError)
     assert convert(source, (), source.tables(), Thing) == Thing(width_mm=3.0, tags=("x",), kind="all")
 
 
@@ -88,11 +104,30 @@ def test_an_unknown_key_is_told_the_nearest() -> None:
 
 @pytest.mark.parametrize("number", ["nan", "-nan", "inf", "-inf"])
 def test_a_number_that_is_not_finite_is_found_wherever_it_stands(number: str) -> None:
-    source = Source("a.toml", f"a = 1\n[[b]]\nc = [1,\n {number}]\n")
-    with pytest.raises(SceneError, match=r"line 4: b\[0\]\.c\[1\]: must be a finite number"):
+    source = Source("a.toml", f"a = 1\n[[b]]\nc = [1,\n {number}]\n", OwnError)
+    with pytest.raises(OwnError, match=r"line 4: b\[0\]\.c\[1\]: must be a finite number"):
         check_finite(source, (), source.tables())
 
 
 def test_what_is_no_table_is_refused() -> None:
-    with pytest.raises(SceneError, match="line 1: thing: must be a table, not 3"):
-        convert(Source("a.toml", "thing = 3"), ("thing",), 3, Thing)
+    with pytest.raises(OwnError, match="line 1: thing: must be a table, not 3"):
+        convert(Source("a.toml", "thing = 3", OwnError), ("thing",), 3, Thing)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[[in]]\n[[in]]\nwidht_mm = 1", "line 3: in[1].widht_mm: there is no such key here (did you mean 'width_mm'"),
+        ("[[in]]\nwidth_cm = 1", "line 2: in[0].width_cm: lengths are in millimetres: width_mm"),
+        ("[one]\nside = 'lefd'", "line 2: one.side: 'lefd' is not among its values (did you mean 'left'"),
+        ("[one]\ncount = 31", "line 2: one.count: 31 is not among its values (there are: 18, 22)"),
+        ("[one]\nnames = { a = 'x', b = 3 }", "line 2: one.names.b: must be text, not 3"),
+        ("[one.names]\na = 'x'\nb = []", "line 3: one.names.b: must be text, not an empty list"),
+        ("[one]\n[xyz]", "line 2: xyz: there is no such key here (there are: in, one)"),
+    ],
+)
+def test_a_wrong_key_or_value_of_an_inner_table_is_named_likewise(text: str, message: str) -> None:
+    source = Source("a.toml", text, OwnError)
+    with pytest.raises(OwnError) as caught:
+        convert(source, (), source.tables(), Outer)
+    assert message in str(caught.value)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from importlib.resources.abc import Traversable
 
-from ..errors import SceneError
+from .errors import ThenarError
 
 # Where something stands: keys, and numbers in lists from 0.
 Place = tuple[str | int, ...]
@@ -22,23 +22,24 @@ _TOKEN = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """The text of a TOML file, and the name that messages call it by."""
+    """The text of a TOML file, the name that messages call it by, and the kind of error that it raises."""
 
     name: str
     text: str
+    raises: type[ThenarError]
 
     def tables(self) -> dict[str, object]:
-        """Return what the file holds; raises SceneError with the line where it is no TOML."""
+        """Return what the file holds; raises its error, with the line, where it is no TOML."""
         try:
             return tomllib.loads(self.text)
         # tomllib lets Python's own limits through: numbers of thousands of digits, lists a thousand deep.
         except (ValueError, RecursionError) as reason:
-            raise SceneError(f"{self.name} is not valid TOML: {reason}") from reason
+            raise self.raises(f"{self.name} is not valid TOML: {reason}") from reason
 
-    def error(self, place: Place, reason: str) -> SceneError:
+    def error(self, place: Place, reason: str) -> ThenarError:
         """Return an error about what stands at `place`: "scene.toml, line 7: subjects[0].name: ..."."""
         where = f"{spelled(place)}: " if place else ""
-        return SceneError(f"{self.name}, line {self.line(place)}: {where}{reason}")
+        return self.raises(f"{self.name}, line {self.line(place)}: {where}{reason}")
 
     def line(self, place: Place) -> int:
         """Return the line of `place`, counted from 1, or of the innermost table round it that is there."""
@@ -46,15 +47,15 @@ class Source:
         return next(lines[place[:end]] for end in range(len(place), -1, -1) if place[:end] in lines)
 
 
-def read_source(file: Traversable) -> Source:
-    """Read a TOML file. Raises SceneError if it cannot be opened or is not UTF-8."""
+def read_source(file: Traversable, raises: type[ThenarError]) -> Source:
+    """Read a TOML file. Raises an error of the kind `raises` if it cannot be opened or is not UTF-8."""
     try:
-        return Source(file.name, file.read_bytes().removeprefix(codecs.BOM_UTF8).decode())
+        return Source(file.name, file.read_bytes().removeprefix(codecs.BOM_UTF8).decode(), raises)
     except UnicodeDecodeError as reason:
         before = reason.object[: reason.start].count(b"\n")
-        raise SceneError(f"{file.name}, line {before + 1}: the text is not UTF-8: save it as UTF-8") from reason
+        raise raises(f"{file.name}, line {before + 1}: the text is not UTF-8: save it as UTF-8") from reason
     except OSError as reason:
-        raise SceneError(f"{file}: cannot be read: {reason.strerror}") from reason
+        raise raises(f"{file}: cannot be read: {reason.strerror}") from reason
 
 
 def spelled(place: Place) -> str:

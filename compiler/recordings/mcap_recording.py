@@ -1,0 +1,192 @@
+"""Recordings of guided collections (MCAP) into a `GraspSet`: a row for every trial that was accepted.
+
+A row is what the devices had delivered last when the grasp was captured. The CyberGlove's sensors but the wrist's,
+which the paper does not use either, become joints: raw bytes where the glove was not calibrated, half degrees on one
+scale for all subjects where it was.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...runtime.live.frames import GloveFrame, Mask, SwitchFrame
+from ...runtime.recording.reader import Reader
+from ...runtime.recording.session import Collection, Label, Session
+from .coding import CodingCost, code_joint
+from .columns import Calibration, JointColumns
+from .errors import TableError
+from .findings import Finding, find_oddities
+from .graspset import GraspSet, Joint
+from .importer import ImportReport, report_of
+from .names import SHOWN, list_rows
+from .taxonomy import Taxonomy
+
+WRIST = ("wrist_pitch", "wrist_yaw")
+# Half degrees, the paper's resolution, from further down than a calibrated hand reaches.
+_HALF_DEGREES = Calibration(code_a=0, value_a=-250.0, code_b=1000, value_b=250.0)
+_BYTES = Calibration(code_a=1, value_a=1.0, code_b=255, value_b=255.0)
+
+
+@dataclass(frozen=True, slots=True)
+class _Grasp:
+    """An accepted trial and the frames that were captured."""
+
+    label: Label
+    switches: SwitchFrame | None
+    glove: GloveFrame | None
+
+    def whole(self, session: Session) -> bool:
+        """Return whether everything that the session records was read."""
+        read = self.switches is not None and not self.switches.lost | self.switches.unread
+        return (read or not session.switches) and (self.glove is not None or not session.sensors)
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """What one session brought."""
+
+    what: str
+    session: Session
+    collection: Collection
+    grasps: tuple[_Grasp, ...]
+
+
+def import_recordings(paths: Sequence[Path]) -> tuple[GraspSet, ImportReport]:
+    """Import the accepted trials of recordings of one glove and one taxonomy; subjects may differ.
+
+    Raises McapError, TableError or RecordingError naming the file; OSError as it comes.
+    """
+    parts: list[_Part] = []
+    findings: list[Finding] = []
+    for path in paths:
+        reader = Reader(path)
+        parts += _parts(reader)
+        findings += _state(reader)
+    what = ", ".join(path.name for path in paths)
+    _check_alike(parts)
+    grasps = [(part, grasp) for part in parts for grasp in part.grasps if grasp.whole(part.session)]
+    findings += _left_out(parts)
+    if not grasps:
+        raise TableError(f"{what}: no trial was accepted; `thenar record` makes recordings with labelled trials")
+    grasp_set, costs = _joined(grasps)
+    return grasp_set, report_of(what, grasp_set, costs, (*findings, *find_oddities(grasp_set, grasp_set.trials)))
+
+
+def _parts(reader: Reader) -> Iterator[_Part]:
+    """Yield every session with trials; those without are not labelled and bring nothing."""
+    grasps: list[_Grasp] = []
+    for session, grasp in _accepted(reader):
+        if grasp is not None:
+            grasps.append(grasp)
+        elif session.collection is not None and grasps:
+            yield _Part(reader.path.name, session, session.collection, tuple(grasps))
+            grasps = []
+
+
+def _accepted(reader: Reader) -> Iterator[tuple[Session, _Grasp | None]]:
+    """Yield the accepted grasps, each with its session, and (session, None) at every session's end."""
+    switches: SwitchFrame | None = None
+    glove: GloveFrame | None = None
+    captured: _Grasp | None = None
+    session = reader.session
+    for entry in reader:
+        if isinstance(entry, Session):
+            yield session, None
+            session, switches, glove, captured = entry, None, None, None
+        elif isinstance(entry, SwitchFrame):
+            switches = entry
+        elif isinstance(entry, GloveFrame):
+            glove = entry
+        elif isinstance(entry, Label):
+            if entry.event == "accepted" and captured is not None and captured.label.trial == entry.trial:
+                yield session, captured
+            captured = _Grasp(entry, switches, glove) if entry.event == "captured" else None
+    yield session, None
+
+
+def _state(reader: Reader) -> Iterator[Finding]:
+    name, end = reader.path.name, reader.end
+    if end is not None and not end.closed and end.whole < end.size:
+        message = f"{name} is whole up to byte {end.whole} of {end.size}, the rest was left out: {end.reason}"
+        yield Finding("cut recordings", 1, message)
+    if reader.altered:
+        message = f"{name} is altered: the checksum of its data does not match, so some frame is not as it was recorded"
+        yield Finding("altered recordings", 1, message)
+
+
+def _left_out(parts: Sequence[_Part]) -> Iterator[Finding]:
+    trials = [grasp.label.trial for part in parts for grasp in part.grasps if not grasp.whole(part.session)]
+    if trials:
+        message = f"{len(trials)} trials in which not everything was read were left out: {list_rows(np.array(trials))}"
+        yield Finding("dropped rows", len(trials), message, tuple(trials[:SHOWN]))
+
+
+def _check_alike(parts: Sequence[_Part]) -> None:
+    for part in parts[1:]:
+        for thing, first, other in (
+            ("switches", parts[0].session.switches, part.session.switches),
+            ("sensors", parts[0].session.sensors, part.session.sensors),
+            ("taxonomy", _taxonomy(parts[0]), _taxonomy(part)),
+            ("unit of the joints", _unit(parts[0].session), _unit(part.session)),
+        ):
+            if first != other:
+                raise TableError(
+                    f"{part.what} and {parts[0].what} differ in {thing}: import them into sets of their own"
+                )
+
+
+def _taxonomy(part: _Part) -> Taxonomy:
+    return Taxonomy(part.collection.taxonomy, part.collection.types)
+
+
+def _unit(session: Session) -> str:
+    return "raw" if session.calibration is None else session.calibration.unit
+
+
+def _joined(grasps: Sequence[tuple[_Part, _Grasp]]) -> tuple[GraspSet, tuple[CodingCost, ...]]:
+    first = grasps[0][0]
+    trials = np.array([grasp.label.trial for _, grasp in grasps], np.int64)
+    joints = [_joint(name, grasps, trials) for name in first.session.sensors if name not in WRIST]
+    labels = [grasp.label for _, grasp in grasps]
+    closed = [0 if grasp.switches is None else grasp.switches.closed for _, grasp in grasps]
+    grasp_set = GraspSet(
+        switches=_bits(closed, len(first.session.switches)),
+        switch_names=first.session.switches,
+        codes=np.stack([codes for codes, _, _ in joints], axis=1) if joints else np.zeros((len(grasps), 0), np.uint16),
+        joints=tuple(joint for _, joint, _ in joints),
+        grasps=np.array([label.grasp for label in labels]),
+        taxonomy=_taxonomy(first),
+        subjects=np.array([label.subject for label in labels]),
+        objects=np.array([label.object for label in labels]),
+        trials=trials,
+    )
+    return grasp_set, tuple(cost for _, _, cost in joints)
+
+
+def _bits(masks: Sequence[Mask], switches: int) -> NDArray[np.bool_]:
+    return np.array([[mask >> place & 1 for place in range(switches)] for mask in masks], np.bool_)
+
+
+def _joint(
+    name: str, grasps: Sequence[tuple[_Part, _Grasp]], trials: NDArray[np.int64]
+) -> tuple[NDArray[np.uint16], Joint, CodingCost]:
+    unit = _unit(grasps[0][0].session)
+    calibrated = grasps[0][0].session.calibration is not None
+    values = np.array([_value(name, part, grasp) for part, grasp in grasps], np.float64)
+    scale = _HALF_DEGREES if calibrated else _BYTES
+    return code_joint(name, JointColumns((name,), unit, codes=not calibrated, calibration=scale), values, trials)
+
+
+def _value(name: str, part: _Part, grasp: _Grasp) -> float:
+    assert grasp.glove is not None
+    raw = grasp.glove.sensors[part.session.sensors.index(name)]
+    calibration = part.session.calibration
+    if calibration is None:
+        return raw
+    line = next((line for line in calibration.sensors if line.name == name), None)
+    if line is None:
+        raise TableError(f"{part.what}: its calibration has no sensor {name!r}: `thenar calibrate` makes a whole one")
+    return line.value(raw)

@@ -1,0 +1,49 @@
+"""`objects.toml`: which objects each grasp type is collected with; a key a grasp type, its value a list of objects.
+
+    PoS = ["bottle", "broom"]
+    Tip = ["pin", "bead"]
+
+The paper gave each type two objects of different volume.
+"""
+
+from pathlib import Path
+
+from ...runtime.recording.session import Task
+from ...runtime.toml_source import Source, read_source
+from .errors import ColumnsError, RecordingError
+from .names import check_names
+from .taxonomy import Taxonomy, own, published
+
+# What a grasp type is collected with where no object is named.
+ANY = "any"
+
+
+def collected(taxonomy: str, objects: Path | None) -> tuple[Taxonomy, tuple[Task, ...]]:
+    """Return the taxonomy of this name and what is to be collected of it: what `objects` lists, or every type.
+
+    "own" is the user's own taxonomy: the types that `objects` lists, in its order. Raises RecordingError, or
+    ColumnsError naming file, line and key.
+    """
+    if objects is None:
+        types = published(taxonomy)
+        return types, tuple(Task(grasp, (ANY,)) for grasp in types.types)
+    source = read_source(objects, ColumnsError)
+    tables = source.tables()
+    if len(tables) < 2:
+        raise ColumnsError(f"{objects.name} names {len(tables)} grasp types: a collection takes two at least")
+    types = own(tables) if taxonomy == "own" else published(taxonomy)
+    tasks = tuple(_task(source, types, key, value) for key, value in tables.items())
+    for number, task in enumerate(tasks):
+        if task.grasp in (before.grasp for before in tasks[:number]):
+            raise source.error((list(tables)[number],), f"is {task.grasp}, which is there already: list it once")
+    return types, tasks
+
+
+def _task(source: Source, taxonomy: Taxonomy, key: str, value: object) -> Task:
+    try:
+        if not isinstance(value, list) or not value or not all(isinstance(name, str) for name in value):
+            raise RecordingError("must be a list of the names of objects, at least one")
+        check_names("object", value)
+        return Task(taxonomy.require(key), tuple(value))
+    except RecordingError as wrong:
+        raise source.error((key,), str(wrong)) from None

@@ -1,0 +1,45 @@
+"""From `glove.toml` to a Harness; what is wrong in it is told with file, line, key, and what to do."""
+
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from ..errors import HarnessError
+from ..toml_source import Source, read_source
+from ..toml_struct import check_finite, convert
+from .checks import faults
+from .wiring import Harness
+
+
+def load_harness(path: str | Path) -> Harness:
+    """Return the harness in a TOML file; its name, where it has none, is the file's.
+
+    The path of the calibration comes back absolute. Raises HarnessError with file, line and key.
+    """
+    file = Path(path)
+    return _calibrated(_harness_of(read_source(file, HarnessError), file.stem), file.parent)
+
+
+def parse_harness(text: str, name: str) -> Harness:
+    """Return the harness that `text`, which messages call `name`, is; its calibration's path as it stands there.
+
+    Raises HarnessError as `load_harness` does.
+    """
+    return _harness_of(Source(name, text, HarnessError), name)
+
+
+def _harness_of(source: Source, name: str) -> Harness:
+    tables = source.tables()
+    check_finite(source, (), tables)
+    harness = convert(source, (), {"name": name} | tables, Harness)
+    for place, reason in faults(harness):
+        raise source.error(place, reason)
+    return harness
+
+
+def _calibrated(harness: Harness, folder: Path) -> Harness:
+    """Return the harness with the path of its calibration counted from `folder`."""
+    glove = harness.cyberglove
+    if glove is None or glove.calibration is None:
+        return harness
+    return replace(harness, cyberglove=replace(glove, calibration=str(folder.resolve() / glove.calibration)))

@@ -1,0 +1,133 @@
+"""What a glove is wired to: serial lines and buses, and which switch hangs on which pin or key.
+
+The structs are the tables of `glove.toml`, field by field; a harness that was loaded has been found sound.
+"""
+
+import hashlib
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta, Struct, field
+
+from ...drivers.i2c.chip import Chip
+from ...drivers.i2c.registry import CHIPS
+
+Text = Annotated[str, Meta(min_length=1)]
+Baud = Annotated[int, Meta(ge=1, le=12_000_000)]
+Milliseconds = Annotated[float, Meta(ge=0.0, le=1000.0)]
+
+
+class _Table(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
+    """A table of `glove.toml`: what has its default is left out when it is written."""
+
+
+class GloveWiring(_Table, frozen=True):
+    """The CyberGlove: its port (anything that pyserial opens), and how it is asked.
+
+    baud         "auto" tries the usual ones
+    rate_hz      None: as fast as it can
+    sensors      None: the glove is asked
+    calibration  path of its calibration; relative paths in a file count from that file's folder
+    joints       our names of the wire's sensors, in wire order, where a build calls them otherwise than the driver
+    """
+
+    port: Text
+    baud: Baud | Literal["auto"] = 115_200
+    mode: Literal["stream", "poll"] = "stream"
+    rate_hz: Annotated[float, Meta(gt=0.0, le=1000.0)] | None = None
+    sensors: Literal[18, 22] | None = None
+    calibration: Text | None = None
+    joints: tuple[str, ...] = ()
+
+
+class ScannerWiring(_Table, frozen=True):
+    """A switch-scanner board: key k of the board is switches[k], "" where there is none."""
+
+    port: Text
+    switches: Annotated[tuple[str, ...], Meta(max_length=2000)]
+    baud: Baud = 1_000_000
+
+
+class MuxChannel(_Table, frozen=True):
+    """A place behind a TCA9548A."""
+
+    address: Annotated[int, Meta(ge=0x70, le=0x77)]
+    channel: Annotated[int, Meta(ge=0, le=7)]
+
+
+class ChipWiring(_Table, frozen=True):
+    """A port expander: its kind (a key of CHIPS), where it is, and the switch on each of its pins.
+
+    closed says at what level of its pin a switch is closed: "low" where it pulls its pin down.
+    """
+
+    kind: str
+    address: int
+    mux: MuxChannel | None = None
+    pins: dict[str, str] = {}
+    closed: Literal["low", "high"] = "low"
+
+    @property
+    def chip(self) -> Chip:
+        """What the driver knows of such a chip."""
+        return CHIPS[self.kind](self.address)
+
+    @property
+    def numbered_pins(self) -> dict[int, str]:
+        """The switches by the numbers of their pins, in the order of the numbers."""
+        names = CHIPS[self.kind].pins
+        return {number: self.pins[name] for number, name in enumerate(names) if name in self.pins}
+
+    @property
+    def place(self) -> str:
+        """How messages call it: "mcp23017 at 0x20" or "mcp23017 at 0x20 behind channel 2 of 0x70"."""
+        behind = f" behind channel {self.mux.channel} of 0x{self.mux.address:02X}" if self.mux else ""
+        return f"{self.kind} at 0x{self.address:02X}{behind}"
+
+
+class BusWiring(_Table, frozen=True):
+    """An I2C bus and the chips on it."""
+
+    device: Text
+    clock_hz: Annotated[int, Meta(ge=1000, le=1_700_000)] = 100_000
+    chips: tuple[ChipWiring, ...] = field(default=(), name="chip")
+
+
+class Debounce(_Table, frozen=True):
+    """How switches are debounced: a press counts at once and locks out further edges, a release must last."""
+
+    enabled: bool = True
+    press_lockout_ms: Milliseconds = 5.0
+    release_ms: Milliseconds = 10.0
+
+
+class Harness(_Table, frozen=True):
+    """A glove's wiring."""
+
+    name: Text
+    cyberglove: GloveWiring | None = None
+    scanners: tuple[ScannerWiring, ...] = field(default=(), name="scanner")
+    buses: tuple[BusWiring, ...] = field(default=(), name="bus")
+    debounce: Debounce = Debounce()
+
+    @property
+    def switches(self) -> tuple[str, ...]:
+        """The names of all switches that are wired: the boards', then the chips', pin by pin."""
+        keys = (name for scanner in self.scanners for name in scanner.switches if name)
+        return (*keys, *(name for bus in self.buses for chip in bus.chips for name in chip.numbered_pins.values()))
+
+    @property
+    def fingerprint(self) -> str:
+        """SHA-256, in hex, of which switch is where: of chips, pins and keys in their order.
+
+        Ports, device files and clocks may change without it: a map of the switches stays right then.
+        """
+        return hashlib.sha256(msgspec.json.encode(list(self._where()))).hexdigest()
+
+    def _where(self) -> Iterator[object]:
+        yield [scanner.switches for scanner in self.scanners]
+        for bus in self.buses:
+            yield [
+                (chip.kind, chip.address, chip.mux, chip.closed, list(chip.numbered_pins.items())) for chip in bus.chips
+            ]

@@ -1,0 +1,84 @@
+"""A harness for a new reduced glove: the kept switches on the fewest ports, and the fewest bytes on the bus."""
+
+from collections.abc import Iterator, Sequence
+from itertools import islice
+
+from ...drivers.i2c import tca9548a
+from ...drivers.i2c.chip import Chip
+from ...drivers.i2c.registry import CHIPS
+from ..errors import HarnessError
+from ..harness.wiring import BusWiring, ChipWiring, GloveWiring, Harness, MuxChannel, ScannerWiring
+from ..names import nearest
+
+# What every board's I2C does, and most chips; slower where the chip is.
+CLOCK_HZ = 400_000
+
+
+def propose_harness(
+    switch_names: Sequence[str],
+    kind: str = "mcp23017",
+    *,
+    name: str = "proposed",
+    device: str = "/dev/i2c-1",
+    cyberglove: GloveWiring | None = None,
+) -> Harness:
+    """Return a harness with all the switches on chips of one kind on one bus, the first names on the first chips.
+
+    Each chip is read in one transaction, as few as the kind allows, and of as few the shortest on the wire. Chips
+    beyond the kind's addresses go behind a TCA9548A, those that come first stay before it. Raises HarnessError if there
+    is no such kind, or no room for so many switches.
+    """
+    if kind not in CHIPS:
+        raise HarnessError(f"there is no chip {kind!r}{nearest(kind, list(CHIPS))}")
+    chip = CHIPS[kind]
+    inputs = _inputs(chip)
+    left = iter(switch_names)
+    # Pins are taken in their order, so that the last chip's are on as few ports as will do.
+    chips = tuple(
+        ChipWiring(kind=kind, address=address, mux=mux, pins=dict(zip(inputs, islice(left, len(inputs)), strict=False)))
+        for address, mux in _places(chip, -(-len(switch_names) // len(inputs)))
+    )
+    bus = BusWiring(device=device, clock_hz=min(CLOCK_HZ, chip.clock_hz), chips=chips)
+    return Harness(name=name, cyberglove=cyberglove, buses=(bus,) if chips else ())
+
+
+def propose_board(
+    switch_names: Sequence[str],
+    *,
+    name: str = "proposed",
+    port: str = "/dev/ttyACM0",
+    cyberglove: GloveWiring | None = None,
+) -> Harness:
+    """Return a harness with all the switches on one scanner board, a key each, in their order."""
+    board = ScannerWiring(port=port, switches=tuple(switch_names))
+    return Harness(name=name, cyberglove=cyberglove, scanners=(board,) if switch_names else ())
+
+
+def _inputs(chip: type[Chip]) -> list[str]:
+    """Return the names of the pins that one transaction can show and that may be inputs."""
+    whole = max(chip.readings, key=lambda reading: reading.length)
+    return [name for name in (chip.pins[pin] for pin in whole.pins if pin >= 0) if name not in chip.not_inputs]
+
+
+def _places(chip: type[Chip], count: int) -> list[tuple[int, MuxChannel | None]]:
+    """Return an address for each of `count` chips, and a channel for those behind the mux: few channels, and of the
+    addresses as many before the mux as these channels allow.
+    """
+    addresses = len(chip.addresses)
+    if count <= addresses:
+        return [(address, None) for address in islice(chip.addresses, count)]
+    channels = -(-count // addresses)
+    if channels > len(tca9548a.CHANNELS):
+        raise HarnessError(
+            f"{count} {chip.kind} for so many switches, one bus has room for {len(tca9548a.CHANNELS) * addresses}: "
+            "choose a chip with more pins, or share the switches between buses by hand"
+        )
+    before = (channels * addresses - count) // (channels - 1)
+    return list(islice(_behind(chip, before, channels), count))
+
+
+def _behind(chip: type[Chip], before: int, channels: int) -> Iterator[tuple[int, MuxChannel | None]]:
+    yield from ((address, None) for address in chip.addresses[:before])
+    for channel in range(channels):
+        for address in chip.addresses[before:]:
+            yield address, MuxChannel(address=tca9548a.ADDRESSES[0], channel=channel)

@@ -1,0 +1,103 @@
+"""The scan map: which transactions read the kept switches, in which order; `scan.json` of a build.
+
+It names chips by their place in the harness that it was made for, whose fingerprint it holds. Its bytes are canonical:
+fields in the order of the structs below, indented by two, one newline at the end. `build.json` holds their SHA-256.
+"""
+
+from typing import Annotated, TypeVar
+
+import msgspec
+from msgspec import Meta, Struct
+
+from ..errors import BuildError
+
+SCHEMA = 1
+MAX_BYTES = 4 << 20
+
+Number = Annotated[int, Meta(ge=0, le=65535)]
+# A bit of an answer, or a key of a board, and the number of the build's switch that it shows.
+Pair = tuple[Number, Number]
+_T = TypeVar("_T")
+
+
+class Port(Struct, frozen=True, forbid_unknown_fields=True):
+    """One transaction: the reading of this name of chip `chip` of bus `bus`.
+
+    switches holds (bit of the answer, number of the build's switch) pairs; closed_high says that a bit of 1 is a closed
+    switch, as against one of 0.
+    """
+
+    bus: Number
+    chip: Number
+    reading: Annotated[str, Meta(min_length=1)]
+    switches: Annotated[tuple[Pair, ...], Meta(min_length=1)]
+    closed_high: bool
+
+
+class ScanMap(Struct, frozen=True, forbid_unknown_fields=True):
+    """What to read of a glove, ports in the order in which to read them.
+
+    scanners holds, for every board of the harness, (key, number of the build's switch) pairs.
+    """
+
+    schema: int
+    harness: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
+    ports: tuple[Port, ...]
+    scanners: tuple[tuple[Pair, ...], ...]
+
+    @property
+    def switches(self) -> tuple[int, ...]:
+        """The numbers of the build's switches that are read: the boards' first, then port by port."""
+        sources = (*self.scanners, *(port.switches for port in self.ports))
+        return tuple(switch for pairs in sources for _, switch in pairs)
+
+
+class _Version(Struct, frozen=True):
+    schema: int
+
+
+def scanmap_to_bytes(scan: ScanMap) -> bytes:
+    """Return the content of `scan.json`."""
+    return msgspec.json.format(msgspec.json.encode(scan), indent=2) + b"\n"
+
+
+def scanmap_from_bytes(data: bytes, what: str = "scan.json") -> ScanMap:
+    """Return the scan map of a `scan.json`, which messages call `what`.
+
+    Raises BuildError if it is oversized, no such document, of a newer schema, not canonical, or reads a thing twice.
+    """
+    if len(data) > MAX_BYTES:
+        raise BuildError(f"{what} has {len(data)} bytes, a scan map has at most {MAX_BYTES}")
+    schema = _decode(data, _Version, what).schema
+    if schema > SCHEMA:
+        raise BuildError(f"{what} has schema {schema}, this thenar reads up to {SCHEMA}: update thenar")
+    if schema < 1:
+        raise BuildError(f"{what} has schema {schema}, the first was 1: it is not of a build")
+    scan = _decode(data, ScanMap, what)
+    if data != scanmap_to_bytes(scan):
+        raise BuildError(f"{what} is altered: these are not the bytes that thenar writes; compile the build again")
+    _check_once(scan, what)
+    return scan
+
+
+def check_switches(scan: ScanMap, switches: int, what: str = "scan.json") -> None:
+    """Raise BuildError unless `scan` reads each of a build's so many switches once, and nothing else."""
+    if sorted(scan.switches) != list(range(switches)):
+        raise BuildError(f"{what} does not read each of the {switches} kept switches once: compile the build again")
+
+
+def _check_once(scan: ScanMap, what: str) -> None:
+    readings = [(port.bus, port.chip, port.reading) for port in scan.ports]
+    if len(set(readings)) < len(readings):
+        raise BuildError(f"{what} reads a port twice: compile the build again")
+    sources = (*scan.scanners, *(port.switches for port in scan.ports))
+    for numbers in (scan.switches, *(tuple(bit for bit, _ in pairs) for pairs in sources)):
+        if len(set(numbers)) < len(numbers):
+            raise BuildError(f"{what} reads a bit or a switch twice: compile the build again")
+
+
+def _decode(data: bytes, kind: type[_T], what: str) -> _T:
+    try:
+        return msgspec.json.decode(data, type=kind)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as wrong:
+        raise BuildError(f"{what} is not a build's: {wrong}") from None

@@ -1,0 +1,118 @@
+"""`thenar compile` for a harness, and the harness that it proposes."""
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+from thenar.compiler import GraspSet
+from thenar.runtime import Build
+from thenar.runtime.harness.loading import load_harness
+from thenar.runtime.harness.writing import harness_to_toml
+from thenar.runtime.scanning.propose import propose_harness
+
+Thenar = Callable[..., subprocess.CompletedProcess[str]]
+FEW = ("--rounds", 3, "--folds", 0)
+
+
+def test_a_proposed_harness_is_loaded_and_reads_every_kept_switch_in_one_go(
+    thenar: Thenar, set_file: Path, tmp_path: Path
+) -> None:
+    build, glove = tmp_path / "build", tmp_path / "glove.toml"
+    done = thenar("compile", set_file, "-o", build, *FEW, "--propose", glove)
+    assert done.returncode == 0, done.stderr
+    assert f"{glove}: a harness for the kept switches; wire the glove so" in " ".join(done.stdout.split())
+    assert Build.load(build).scan is None
+    harness = load_harness(glove)
+    kept = tuple(switch.name for switch in Build.load(build).manifest.switches)
+    assert (harness.name, harness.switches) == ("glove", kept)
+    assert harness.cyberglove is not None
+
+    done = thenar("compile", set_file, "-o", build, *FEW, "--glove", glove)
+    assert done.returncode == 0, done.stderr
+    scan = Build.load(build).scan
+    assert scan is not None
+    assert len(scan.ports) == 1
+    assert "mcp23017 at 0x20" in done.stdout
+    assert "a whole scan: 1 transaction, 98.8 us on the wire, 100.0% of the 98.8 us" in " ".join(done.stdout.split())
+    verified = thenar("verify", build, set_file)
+    assert verified.returncode == 0
+    assert "scan map: 1.00 of 1 ports read on average until a row is decided" in " ".join(verified.stdout.split())
+
+
+def test_the_map_is_printed_chip_by_chip_with_its_share_of_all_that_is_wired(
+    thenar: Thenar, set_file: Path, small_set: GraspSet, tmp_path: Path
+) -> None:
+    names = [*small_set.switch_names, *(f"more {number}" for number in range(50))]
+    glove = tmp_path / "full.toml"
+    glove.write_text(harness_to_toml(propose_harness(names)))
+    done = thenar("compile", set_file, "-o", tmp_path / "build", *FEW, "--glove", glove)
+    assert done.returncode == 0, done.stderr
+    assert "/dev/i2c-1" in done.stdout
+    assert "20.4% of the 485.2 us for all 56 wired switches" in " ".join(done.stdout.split())
+
+
+def test_a_board_is_proposed_with_a_key_for_every_kept_switch(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+    build, glove = tmp_path / "build", tmp_path / "glove.toml"
+    done = thenar("compile", set_file, "-o", build, *FEW, "--propose", glove, "--chip", "board")
+    assert done.returncode == 0, done.stderr
+    harness = load_harness(glove)
+    kept = tuple(switch.name for switch in Build.load(build).manifest.switches)
+    assert [board.switches for board in harness.scanners] == [kept]
+    assert not harness.buses
+
+
+def test_boards_are_told_with_their_keys(thenar: Thenar, set_file: Path, small_set: GraspSet, tmp_path: Path) -> None:
+    glove = tmp_path / "board.toml"
+    keys = ", ".join(f'"{name}"' for name in small_set.switch_names)
+    glove.write_text(f'[[scanner]]\nport = "/dev/ttyACM0"\nswitches = [{keys}, "", "spare"]\n')
+    done = thenar("compile", set_file, "-o", tmp_path / "build", *FEW, "--glove", glove)
+    assert done.returncode == 0, done.stderr
+    kept = len(Build.load(tmp_path / "build").manifest.switches)
+    assert f"board /dev/ttyACM0: {kept} kept switches of 8 keys, 70 us a bitmap" in " ".join(done.stdout.split())
+
+
+def test_a_file_is_replaced_only_if_asked(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+    glove = tmp_path / "glove.toml"
+    glove.write_text("mine")
+    given = ("compile", set_file, "-o", tmp_path / "build", *FEW, "--propose", glove, "--chip", "pcf8574")
+    done = thenar(*given)
+    assert done.returncode == 2
+    assert "is there already: name another file, or add --overwrite" in " ".join(done.stderr.split())
+    assert glove.read_text() == "mine"
+    assert not (tmp_path / "build").exists()
+    assert thenar(*given, "--overwrite").returncode == 0
+    assert load_harness(glove).buses[0].chips[0].kind == "pcf8574"
+
+
+def test_options_that_do_not_go_together_are_refused(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+    build, glove = ("compile", set_file, "-o", tmp_path / "build"), tmp_path / "glove.toml"
+    glove.write_text("")
+    refused = [
+        (("--glove", glove, "--propose", tmp_path / "new.toml"), "give one of them"),
+        (("--chip", "mcp23017"), "say how to --propose a harness"),
+        (("--overwrite",), "say how to --propose a harness"),
+        (("--propose", tmp_path / "new.toml", "--chip", "mcp23018"), "'mcp23018' is not one of"),
+        (("--glove", tmp_path / "nowhere.toml"), "does not exist"),
+    ]
+    for options, words in refused:
+        done = thenar(*build, *options)
+        assert done.returncode == 2
+        assert words in " ".join(done.stderr.split())
+        assert "Traceback" not in done.stderr
+    assert not (tmp_path / "build").exists()
+
+
+def test_a_wrong_harness_is_told_before_the_training(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+    glove = tmp_path / "glove.toml"
+    glove.write_text('[[bus]]\ndevice = "d"\n[[bus.chip]]\nkind = "mcp23017"\naddress = 0x20\npins = { GPA7 = "s1" }\n')
+    done = thenar("compile", set_file, "-o", tmp_path / "build", "--glove", glove)
+    assert done.returncode == 2
+    assert "glove.toml, line 6: bus[0].chip[0].pins.GPA7: must not be an input" in done.stderr
+
+
+def test_a_harness_without_the_kept_switches_is_told_which(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+    glove = tmp_path / "glove.toml"
+    glove.write_text("")
+    done = thenar("compile", set_file, "-o", tmp_path / "build", *FEW, "--glove", glove)
+    assert done.returncode == 2
+    assert "harness 'glove' has no pin or key for s" in done.stderr

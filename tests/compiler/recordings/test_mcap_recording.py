@@ -1,0 +1,228 @@
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from thenar.compiler.recordings.errors import TableError
+from thenar.compiler.recordings.graspset import Joint
+from thenar.compiler.recordings.mcap_recording import import_recordings
+from thenar.compiler.recordings.taxonomy import KAMAKURA_14
+from thenar.drivers.calibration import GloveCalibration, SensorCalibration
+from thenar.runtime.live.codes import CodeTables
+from thenar.runtime.live.frames import GloveFrame, SwitchFrame
+from thenar.runtime.manifest import Calibration
+from thenar.runtime.recording.errors import McapError
+from thenar.runtime.recording.session import Collection, Label, Session, Task
+from thenar.runtime.recording.trials import read_journal
+from thenar.runtime.recording.writer import Recorder
+
+SENSORS = ("thumb_mpj", "index_mpj", "wrist_pitch", "wrist_yaw")
+CALIBRATION = GloveCalibration(
+    subject="A",
+    sensors=tuple(SensorCalibration(name, 50, 0.0, 150, 61.3) for name in SENSORS),
+)
+COLLECTION = Collection(
+    "A", "kamakura14", KAMAKURA_14.types, (Task("PoS", ("jar",)), Task("Tip", ("pin",))), repetitions=3, seed=0
+)
+SESSION = Session(thenar="1", switches=("s1", "s2", "s3"), sensors=SENSORS, collection=COLLECTION)
+
+Trial = tuple[str, int, int, bytes]
+Write = Callable[..., Path]
+
+
+def do(
+    recorder: Recorder, time_us: int, what: str, trial: int, closed: int = 0, sensors: bytes = b"\x01\x02\x03\x04"
+) -> None:
+    """One event of a trial; a capture after the frames that it is of, and before others."""
+    subject = recorder.session.collection.subject  # type: ignore[union-attr]
+    grasp, thing = ("PoS", "jar") if trial % 2 else ("Tip", "pin")
+    if what == "captured":
+        if recorder.session.switches:
+            recorder.switches(SwitchFrame(time_us, closed))
+        if recorder.session.sensors:
+            recorder.glove(GloveFrame(time_us, sensors))
+    recorder.label(Label(time_us, what, trial, grasp, subject, thing))  # type: ignore[arg-type]
+    if recorder.session.switches:
+        recorder.switches(SwitchFrame(time_us, 0b111))
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    def make(name: str = "a.mcap", session: Session = SESSION, trials: Sequence[int] = (1, 2, 3)) -> Path:
+        with Recorder(tmp_path / name, session) as recorder:
+            for trial in trials:
+                do(recorder, trial, "captured", trial, closed=trial, sensors=bytes((100 + trial, 200, 1, 255)))
+                do(recorder, trial, "accepted", trial)
+        return recorder.path
+
+    return make
+
+
+def test_every_accepted_trial_is_a_row_of_what_was_captured(write: Write) -> None:
+    grasp_set, report = import_recordings([write()])
+    assert grasp_set.switches.tolist() == [[1, 0, 0], [0, 1, 0], [1, 1, 0]]
+    assert grasp_set.codes.tolist() == [[101, 200], [102, 200], [103, 200]]
+    assert grasp_set.grasps.tolist() == ["PoS", "Tip", "PoS"]
+    assert grasp_set.objects.tolist() == ["jar", "pin", "jar"]
+    assert grasp_set.subjects.tolist() == ["A"] * 3
+    assert grasp_set.trials.tolist() == [1, 2, 3]
+    assert grasp_set.taxonomy == KAMAKURA_14
+    assert grasp_set.joints == tuple(Joint(name, "raw", 1, 1.0, 255, 255.0) for name in SENSORS[:2])
+    assert (report.table, report.rows, report.joints) == ("a.mcap", 3, 2)
+
+
+def test_what_was_redone_or_never_judged_is_no_row(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "a.mcap", SESSION) as recorder:
+        do(recorder, 1, "captured", 1, closed=1)
+        do(recorder, 2, "redone", 1)
+        do(recorder, 3, "captured", 1, closed=2)
+        do(recorder, 4, "accepted", 1)
+        do(recorder, 5, "captured", 2)
+        do(recorder, 6, "captured", 3, closed=1)
+        do(recorder, 7, "accepted", 3)
+        do(recorder, 8, "accepted", 3)
+        do(recorder, 9, "captured", 4)
+        do(recorder, 10, "accepted", 5)
+    grasp_set, _ = import_recordings([recorder.path])
+    assert grasp_set.trials.tolist() == [1, 3]
+    assert grasp_set.switches.tolist() == [[0, 1, 0], [1, 0, 0]]
+
+
+def test_a_collection_that_was_resumed_is_one_set(write: Write) -> None:
+    path = write()
+    os.truncate(path, path.stat().st_size - 7)
+    with Recorder(path, SESSION, tail=read_journal(path).tail) as recorder:
+        do(recorder, 1, "accepted", 5)
+        do(recorder, 2, "captured", 4, closed=0b100)
+        do(recorder, 3, "accepted", 4)
+    grasp_set, report = import_recordings([path])
+    assert grasp_set.trials.tolist() == [1, 2, 3, 4]
+    assert not [warning for warning in report.warnings if "cut" in warning.kind]
+
+
+def test_nothing_of_one_session_is_captured_in_the_next(write: Write) -> None:
+    path = write()
+    with Recorder(path, SESSION, tail=read_journal(path).tail) as recorder:
+        recorder.label(Label(1, "captured", 4, "Tip", "A", "pin"))
+        recorder.label(Label(1, "accepted", 4, "Tip", "A", "pin"))
+    grasp_set, report = import_recordings([path])
+    assert grasp_set.trials.tolist() == [1, 2, 3]
+    assert "dropped rows" in [warning.kind for warning in report.warnings]
+
+
+@given(st.lists(st.integers(1, 255), min_size=2, max_size=20))
+def test_a_calibrated_glove_has_the_codes_that_the_live_recogniser_gives_it(
+    tmp_path_factory: pytest.TempPathFactory, raws: list[int]
+) -> None:
+    session = replace(SESSION, calibration=CALIBRATION)
+    with Recorder(tmp_path_factory.mktemp("mcap") / "a.mcap", session) as recorder:
+        for trial, raw in enumerate(raws, start=1):
+            do(recorder, trial, "captured", trial, sensors=bytes((raw, raw, 1, 1)))
+            do(recorder, trial, "accepted", trial)
+    grasp_set, report = import_recordings([recorder.path])
+    joints = [
+        Calibration(number, joint.name, joint.unit, joint.code_a, joint.value_a, joint.code_b, joint.value_b)
+        for number, joint in enumerate(grasp_set.joints)
+    ]
+    live = CodeTables(joints, SENSORS, CALIBRATION)
+    assert grasp_set.codes.tolist() == [live.codes(bytes((raw, raw, 1, 1))) for raw in raws]
+    assert {(joint.unit, joint.step) for joint in grasp_set.joints} == {("deg", 0.5)}
+    assert all(cost.largest_error <= 0.25 + 1e-9 for cost in report.coding)
+
+
+def test_subjects_of_their_own_recordings_become_one_set(write: Write) -> None:
+    ben = replace(SESSION, collection=replace(COLLECTION, subject="ben"))
+    grasp_set, report = import_recordings([write(), write("b.mcap", ben, trials=(1, 2))])
+    assert grasp_set.subjects.tolist() == ["A", "A", "A", "ben", "ben"]
+    assert (report.table, report.subjects) == ("a.mcap, b.mcap", 2)
+
+
+@pytest.mark.parametrize(
+    ("other", "said"),
+    [
+        (replace(SESSION, switches=("s1", "s2", "s9")), "differ in switches"),
+        (replace(SESSION, sensors=("a", *SENSORS[1:])), "differ in sensors"),
+        (replace(SESSION, calibration=CALIBRATION), "differ in unit of the joints"),
+        (
+            replace(SESSION, collection=replace(COLLECTION, taxonomy="own", types=("PoS", "Tip"))),
+            "differ in taxonomy",
+        ),
+    ],
+)
+def test_recordings_of_different_gloves_are_not_mixed(write: Write, other: Session, said: str) -> None:
+    with pytest.raises(TableError, match=rf"b\.mcap and a\.mcap {said}"):
+        import_recordings([write(), write("b.mcap", other)])
+
+
+def test_a_row_that_misses_a_switch_is_left_out_and_told(tmp_path: Path, write: Write) -> None:
+    with Recorder(tmp_path / "lost.mcap", SESSION) as recorder:
+        recorder.switches(SwitchFrame(1, 0, lost=0b100))
+        recorder.glove(GloveFrame(1, b"1234"))
+        recorder.label(Label(1, "captured", 7, "PoS", "A", "jar"))
+        recorder.label(Label(1, "accepted", 7, "PoS", "A", "jar"))
+        do(recorder, 2, "captured", 8)
+        do(recorder, 2, "accepted", 8)
+    grasp_set, report = import_recordings([recorder.path])
+    assert grasp_set.trials.tolist() == [8]
+    assert [warning.message for warning in report.warnings if warning.kind == "dropped rows"] == [
+        "1 trials in which not everything was read were left out: row 7"
+    ]
+
+
+@pytest.mark.parametrize("bare", [replace(SESSION, switches=()), replace(SESSION, sensors=())])
+def test_switches_alone_and_a_glove_alone_are_sets_too(write: Write, bare: Session) -> None:
+    grasp_set, _ = import_recordings([write(session=bare)])
+    assert len(grasp_set) == 3
+    assert grasp_set.switch_names == bare.switches
+    assert grasp_set.joint_names == bare.sensors[:2]
+
+
+def test_a_cut_recording_is_imported_up_to_its_last_whole_message_and_told(write: Write) -> None:
+    path = write()
+    size = path.stat().st_size
+    end = path.read_bytes().rindex(b'"accepted"')
+    os.truncate(path, end)
+    grasp_set, report = import_recordings([path])
+    assert grasp_set.trials.tolist() == [1, 2]
+    [told] = [warning for warning in report.warnings if warning.kind == "cut recordings"]
+    assert told.message.startswith("a.mcap is whole up to byte ")
+    assert f" of {end}, the rest was left out: a record claims " in told.message
+    assert size > end
+
+
+def test_an_altered_recording_is_told(write: Write) -> None:
+    path = write()
+    data = path.read_bytes()
+    path.write_bytes(data.replace(b'"time_us":3,"event":"captured"', b'"time_us":4,"event":"captured"'))
+    _, report = import_recordings([path])
+    assert "altered recordings" in [warning.kind for warning in report.warnings]
+
+
+def test_a_recording_without_trials_says_what_makes_some(write: Write) -> None:
+    for session, trials in ((replace(SESSION, collection=None), ()), (SESSION, ())):
+        path = write(f"{len(str(session))}.mcap", session, trials)
+        with pytest.raises(TableError, match="no trial was accepted; `thenar record` makes"):
+            import_recordings([path])
+
+
+def test_a_calibration_that_lacks_a_sensor_is_named(write: Write) -> None:
+    lacking = GloveCalibration(sensors=CALIBRATION.sensors[:1])
+    with pytest.raises(TableError, match=r"a\.mcap: its calibration has no sensor 'index_mpj'"):
+        import_recordings([write(session=replace(SESSION, calibration=lacking))])
+
+
+def test_what_is_no_recording_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(b"cbuiltins\neval\n")
+    with pytest.raises(McapError, match=r"a\.mcap does not begin as"):
+        import_recordings([path])
+
+
+def test_codes_are_16_bit_numbers(write: Write) -> None:
+    grasp_set, _ = import_recordings([write()])
+    assert grasp_set.codes.dtype == np.uint16

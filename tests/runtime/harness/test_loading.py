@@ -1,0 +1,238 @@
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from thenar.drivers.errors import ThenarError
+from thenar.drivers.i2c import registry
+from thenar.drivers.i2c.pcf8574 import Pcf8574
+from thenar.runtime.errors import HarnessError
+from thenar.runtime.harness import checks, wiring
+from thenar.runtime.harness.loading import load_harness, parse_harness
+from thenar.runtime.harness.wiring import Debounce, GloveWiring, Harness, MuxChannel, ScannerWiring
+
+Load = Callable[[str], Harness]
+BUS = '[[bus]]\ndevice = "/dev/i2c-1"\n'
+CHIP = '[[bus.chip]]\nkind = "mcp23017"\naddress = 0x20\n'
+
+
+def complaint(load: Load, text: str) -> str:
+    with pytest.raises(HarnessError) as caught:
+        load(text)
+    return str(caught.value)
+
+
+def test_every_table_of_the_file_arrives(load: Load, full_text: str, tmp_path: Path) -> None:
+    harness = load(full_text)
+    calibration = str(tmp_path / "anna.toml")
+    glove = GloveWiring(port="/dev/ttyUSB0", baud="auto", rate_hz=100.0, sensors=18, calibration=calibration)
+    assert (harness.name, harness.cyberglove) == ("bench", glove)
+    assert harness.scanners == (ScannerWiring(port="/dev/ttyACM0", switches=("s100", "", "s102")),)
+    (bus,) = harness.buses
+    assert (bus.device, bus.clock_hz, len(bus.chips)) == ("/dev/i2c-1", 400_000, 3)
+    assert bus.chips[0].numbered_pins == {0: "s001", 11: "s014"}
+    assert (bus.chips[1].mux, bus.chips[1].closed) == (MuxChannel(address=0x70, channel=2), "high")
+    assert harness.debounce == Debounce(press_lockout_ms=4.0)
+    assert harness.switches == ("s100", "s102", "s001", "s014", "s020", "s021", "s030")
+
+
+def test_an_empty_file_is_a_glove_with_nothing_on_it_named_after_the_file(load: Load) -> None:
+    assert load("") == Harness(name="glove")
+
+
+def test_text_that_was_kept_elsewhere_is_read_likewise_its_calibration_as_it_stands(full_text: str) -> None:
+    glove = parse_harness(full_text, "a.mcap").cyberglove
+    assert glove is not None
+    assert glove.calibration == "anna.toml"
+    with pytest.raises(HarnessError, match=r"a\.mcap, line 1: nam: there is no such key"):
+        parse_harness("nam = 1", "a.mcap")
+
+
+def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> None:
+    glove = load('[cyberglove]\nport = "x"\ncalibration = "/somewhere/anna.toml"').cyberglove
+    assert glove is not None
+    assert glove.calibration == "/somewhere/anna.toml"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[cyberglove]\n", "line 1: cyberglove: the key port is missing"),
+        ("[cyberglove]\nport = ''", "line 2: cyberglove.port: must be text of length >= 1"),
+        ("[cyberglove]\nport = 'x'\nbaud = 'fast'", "line 3: cyberglove.baud: 'fast' is not among its values (did"),
+        ("[cyberglove]\nport = 'x'\nbaud = 0", "line 3: cyberglove.baud: must be at least 1, not 0"),
+        ("[cyberglove]\nport = 'x'\nsensors = 20", "line 3: cyberglove.sensors: 20 is not among its values"),
+        ("[cyberglove]\nport = 'x'\nrate_khz = 1", "line 3: cyberglove.rate_khz: rates are in hertz: rate_hz"),
+        ("[cyberglove]\nport = 'x'\nrate_hz = nan", "line 3: cyberglove.rate_hz: must be a finite number"),
+        (
+            "[cyberglove]\nport = 'x'\njoints = ['a']",
+            "line 3: cyberglove.joints: 1 names for 18 or 22 sensors: name every one, in wire order",
+        ),
+        (
+            f"[cyberglove]\nport = 'x'\nsensors = 22\njoints = {['', 'a'] * 9}",
+            "cyberglove.joints: 18 names for 22 sensors",
+        ),
+        (
+            f"[cyberglove]\nport = 'x'\njoints = {['', 'a'] * 9}",
+            "line 3: cyberglove.joints[3]: sensor 'a' is cyberglove.joints[1] already",
+        ),
+        ("[[scaner]]", "line 1: scaner: there is no such key here (did you mean 'scanner'?)"),
+        ("[[scanner]]\nport = 'x'", "line 1: scanner[0]: the key switches is missing"),
+        (
+            "[[scanner]]\nport = 'x'\nswitches = ['a', '', '', 'a']",
+            "line 3: scanner[0].switches[3]: switch 'a' is scanner[0].switches[0] already: a switch has one place",
+        ),
+        (
+            "[[scanner]]\nport = 'x'\nswitches = [' a']",
+            "scanner[0].switches[0]: ' a' is no name of a switch: it begins",
+        ),
+        (
+            "[cyberglove]\nport = 'x'\n[[scanner]]\nport = 'x'\nswitches = []",
+            "line 4: scanner[0].port: x is cyberglove.port already: one device, one entry",
+        ),
+        (BUS + BUS, "line 4: bus[1].device: /dev/i2c-1 is bus[0].device already"),
+        (BUS + "clock_hz = 5", "line 3: bus[0].clock_hz: must be at least 1000, not 5"),
+        ("bus = 3", "line 1: bus: must be a list, not 3"),
+        ("[bus]", "line 1: bus: must be a list, not a table"),
+    ],
+)
+def test_what_is_wrong_with_a_line_or_bus_is_told_with_its_place(load: Load, text: str, message: str) -> None:
+    assert message in complaint(load, text)
+
+
+@pytest.mark.parametrize(
+    ("chip", "message"),
+    [
+        ("kind = 'mcp23018'", "line 4: bus[0].chip[0].kind: there is no chip 'mcp23018' (did you mean 'mcp23017'"),
+        (
+            "kind = 'mcp23017'\naddress = 0x28",
+            "line 5: bus[0].chip[0].address: a mcp23017 answers at 0x20 to 0x27, not",
+        ),
+        ("kind = 'mcp23017'\naddress = -1", "line 5: bus[0].chip[0].address: a mcp23017 answers at 0x20 to 0x27, not"),
+        ("pins = { GPA8 = 's' }", "bus[0].chip[0].pins.GPA8: a mcp23017 has no pin 'GPA8' (did you mean 'GPA7'"),
+        ("pins = { GPA7 = 's' }", "bus[0].chip[0].pins.GPA7: must not be an input: since revision D of its data sheet"),
+        ("pins = { GPB7 = 's' }", "bus[0].chip[0].pins.GPB7: must not be an input"),
+        ("kind = 'mcp23008'\npins = { GP7 = 's' }", "bus[0].chip[0].pins.GP7: must not be an input"),
+        ("pins = { GPA0 = '' }", "bus[0].chip[0].pins.GPA0: '' is no name of a switch: it is empty"),
+        ("pins = { GPA0 = 3 }", "bus[0].chip[0].pins.GPA0: must be text, not 3"),
+        ("pins = { GPA0 = 'a', GPA0 = 'b' }", "glove.toml is not valid TOML: "),
+        (
+            "pins = { GPA0 = 'a', GPA1 = 'a' }",
+            "bus[0].chip[0].pins.GPA1: switch 'a' is bus[0].chip[0].pins.GPA0 already: a switch has one place",
+        ),
+        ("closed = 'lo'", "bus[0].chip[0].closed: 'lo' is not among its values (did you mean 'low'"),
+        ("mux = { address = 0x78, channel = 0 }", "bus[0].chip[0].mux.address: must be at most 119, not 120"),
+        ("mux = { address = 0x70, channel = 8 }", "bus[0].chip[0].mux.channel: must be at most 7, not 8"),
+        ("mux = { address = 0x70 }", "bus[0].chip[0].mux: the key channel is missing"),
+    ],
+)
+def test_what_is_wrong_with_a_chip_is_told_with_its_place(load: Load, chip: str, message: str) -> None:
+    given = "" if "kind" in chip else "kind = 'mcp23017'\n"
+    placed = "" if "address = " in chip.partition("mux")[0] else "address = 0x20\n"
+    assert message in complaint(load, f"{BUS}[[bus.chip]]\n{given}{chip}\n{placed}")
+
+
+def place(address: int, channel: int | None, mux: int = 0x70) -> str:
+    behind = "" if channel is None else f"mux = {{ address = {mux}, channel = {channel} }}\n"
+    return f"[[bus.chip]]\nkind = 'pca9555'\naddress = {address}\n{behind}"
+
+
+@pytest.mark.parametrize(
+    ("places", "clash"),
+    [
+        (((0x20, None), (0x20, None)), True),
+        (((0x20, None), (0x21, None)), False),
+        (((0x20, 1), (0x20, 1)), True),
+        (((0x20, 1), (0x20, 2)), False),
+        (((0x20, None), (0x20, 2)), True),
+        (((0x20, 2), (0x20, None)), True),
+        (((0x20, 2), (0x21, None), (0x20, 3)), False),
+    ],
+)
+def test_two_chips_that_would_answer_together_are_refused(
+    load: Load, places: tuple[tuple[int, int | None], ...], clash: bool
+) -> None:
+    text = BUS + "".join(place(*each) for each in places)
+    if clash:
+        assert "bus[0].chip[1].address: 0x20 is the address of bus[0].chip[0] too: both answer" in complaint(load, text)
+    else:
+        load(text)
+
+
+def test_a_chip_at_the_address_of_a_mux_is_refused(load: Load, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Odd(Pcf8574):
+        kind = "odd"
+        addresses = range(0x70, 0x71)
+        __slots__ = ()
+
+    kinds = {**registry.CHIPS, "odd": Odd}
+    for module in (checks, wiring):
+        monkeypatch.setattr(module, "CHIPS", kinds)
+    text = BUS + "[[bus.chip]]\nkind = 'odd'\naddress = 0x70\n" + place(0x20, 0)
+    assert "bus[0].chip[0].address: 0x70 is the address of a mux on this bus too" in complaint(load, text)
+
+
+@pytest.mark.parametrize(
+    ("kind", "mux", "clock_hz", "named"),
+    [
+        ("pcf8574", "", 100_001, "pcf8574: at most 100000"),
+        ("pcf8574", "", 100_000, ""),
+        ("pca9555", "", 400_001, "pca9555: at most 400000"),
+        ("mcp23017", "", 1_700_000, ""),
+        ("mcp23017", "mux = { address = 0x71, channel = 0 }", 1_000_000, "TCA9548A: at most 400000"),
+    ],
+)
+def test_a_clock_beyond_what_a_chip_is_made_for_is_refused(
+    load: Load, kind: str, mux: str, clock_hz: int, named: str
+) -> None:
+    text = f"{BUS}clock_hz = {clock_hz}\n[[bus.chip]]\nkind = '{kind}'\naddress = 0x20\n{mux}"
+    if named:
+        assert f"line 3: bus[0].clock_hz: {clock_hz} Hz is too fast for the {named}" in complaint(load, text)
+    else:
+        load(text)
+
+
+def test_a_switch_on_a_board_and_on_a_chip_is_refused(load: Load) -> None:
+    text = "[[scanner]]\nport = 'x'\nswitches = ['s1']\n" + BUS + CHIP + "pins.GPA0 = 's1'"
+    assert "bus[0].chip[0].pins.GPA0: switch 's1' is scanner[0].switches[0] already" in complaint(load, text)
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(HarnessError, match=r"nowhere\.toml: cannot be read"):
+        load_harness(tmp_path / "nowhere.toml")
+
+
+def test_a_harness_error_is_one_of_ours_and_a_value_error() -> None:
+    assert issubclass(HarnessError, ThenarError)
+    assert issubclass(HarnessError, ValueError)
+
+
+def test_the_fingerprint_is_of_what_hangs_where_and_of_nothing_else(load: Load, full_text: str) -> None:
+    harness = load(full_text)
+    (bus,) = harness.buses
+    (board,) = harness.scanners
+    elsewhere = replace(
+        harness,
+        name="other",
+        cyberglove=None,
+        scanners=(replace(board, port="/dev/ttyACM7", baud=115_200),),
+        buses=(replace(bus, device="/dev/i2c-3", clock_hz=100_000),),
+        debounce=Debounce(enabled=False),
+    )
+    assert elsewhere.fingerprint == harness.fingerprint
+    chip = bus.chips[0]
+    others = [
+        replace(chip, address=0x21),
+        replace(chip, closed="high"),
+        replace(chip, mux=MuxChannel(address=0x70, channel=0)),
+        replace(chip, pins={"GPA0": "s001", "GPB4": "s014"}),
+        replace(chip, pins={"GPA0": "s014", "GPB3": "s001"}),
+    ]
+    changed = [replace(harness, buses=(replace(bus, chips=(other, *bus.chips[1:])),)) for other in others]
+    changed.append(replace(harness, scanners=(replace(board, switches=("s102", "", "s100")),)))
+    prints = {harness.fingerprint, *(other.fingerprint for other in changed)}
+    assert len(prints) == 1 + len(changed)
+    reordered = replace(chip, pins={"GPB3": "s014", "GPA0": "s001"})
+    same = replace(harness, buses=(replace(bus, chips=(reordered, *bus.chips[1:])),))
+    assert same.fingerprint == harness.fingerprint

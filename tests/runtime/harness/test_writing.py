@@ -1,0 +1,74 @@
+from collections.abc import Callable
+
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from thenar.drivers.i2c.registry import CHIPS
+from thenar.runtime.harness.checks import faults
+from thenar.runtime.harness.wiring import (
+    BusWiring,
+    ChipWiring,
+    Debounce,
+    GloveWiring,
+    Harness,
+    MuxChannel,
+    ScannerWiring,
+)
+from thenar.runtime.harness.writing import harness_to_toml
+
+Load = Callable[[str], Harness]
+
+names = st.text(st.characters(exclude_categories=("Cc", "Cs")), min_size=1, max_size=6).filter(
+    lambda name: name.strip() == name and name != "?"
+)
+
+
+@st.composite
+def harnesses(draw: st.DrawFn) -> Harness:
+    """Sound harnesses: chips of any kind, each behind a channel of its own if behind any."""
+    left = iter(draw(st.lists(names, min_size=30, max_size=30, unique=True)))
+    chips = []
+    for address in draw(st.lists(st.integers(0, 7), max_size=3, unique=True)):
+        kind = CHIPS[draw(st.sampled_from(sorted(CHIPS)))]
+        usable = [pin for pin in kind.pins if pin not in kind.not_inputs]
+        pins = draw(st.lists(st.sampled_from(usable), max_size=5, unique=True))
+        mux = draw(st.none() | st.builds(MuxChannel, address=st.just(0x73), channel=st.just(address)))
+        chips.append(
+            ChipWiring(
+                kind=kind.kind,
+                address=kind.addresses[address % len(kind.addresses)],
+                mux=mux,
+                pins={pin: next(left) for pin in pins},
+                closed=draw(st.sampled_from(["low", "high"])),
+            )
+        )
+    board = ScannerWiring(port="p", switches=("", *(next(left) for _ in range(draw(st.integers(0, 4))))))
+    glove = st.builds(
+        GloveWiring,
+        port=names,
+        baud=st.just("auto") | st.integers(1, 10**6),
+        mode=st.sampled_from(["stream", "poll"]),
+        rate_hz=st.none() | st.floats(0.1, 900.0),
+        sensors=st.sampled_from([None, 18, 22]),
+        calibration=st.none() | st.just("/a/b.toml"),
+    )
+    return Harness(
+        name=draw(st.text(min_size=1).filter(str.isprintable)),
+        cyberglove=draw(st.none() | glove),
+        scanners=(board,),
+        buses=(BusWiring(device="/dev/i2c-1", chips=tuple(chips)),),
+        debounce=Debounce(enabled=draw(st.booleans()), release_ms=draw(st.floats(0.0, 1000.0))),
+    )
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(harness=harnesses())
+def test_what_is_written_is_read_again(load: Load, harness: Harness) -> None:
+    if not list(faults(harness)):
+        assert load(harness_to_toml(harness)) == harness
+
+
+def test_addresses_are_written_as_they_are_spoken_of(load: Load, full_text: str) -> None:
+    text = harness_to_toml(load(full_text))
+    assert "address = 0x20\n" in text
+    assert "address = 0x70\nchannel = 2\n" in text

@@ -1,0 +1,96 @@
+import contextlib
+import json
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.runtime.errors import BuildError
+from thenar.runtime.scanning.scanmap import (
+    MAX_BYTES,
+    SCHEMA,
+    Port,
+    ScanMap,
+    check_switches,
+    scanmap_from_bytes,
+    scanmap_to_bytes,
+)
+
+SCAN = ScanMap(
+    SCHEMA,
+    "0" * 64,
+    (Port(0, 1, "AB", ((0, 2), (9, 0)), False), Port(0, 0, "A", ((3, 4),), True)),
+    (((0, 1), (5, 3)), ()),
+)
+
+
+def test_a_map_is_read_as_it_was_written() -> None:
+    data = scanmap_to_bytes(SCAN)
+    assert data.endswith(b"}\n")
+    assert scanmap_from_bytes(data) == SCAN
+    assert SCAN.switches == (1, 3, 2, 0, 4)
+
+
+def changed(**fields: Any) -> bytes:
+    document = json.loads(scanmap_to_bytes(SCAN))
+    return json.dumps(document | fields, indent=2).encode() + b"\n"
+
+
+PORT = {"bus": 0, "chip": 1, "reading": "AB", "switches": [[0, 2]], "closed_high": False}
+
+
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        (b"", "is not a build's"),
+        (b"[]", "is not a build's"),
+        (b"[" * 2000, "is not a build's"),
+        (b"\xff\xfe", "is not a build's"),
+        (changed(schema=2), "has schema 2, this thenar reads up to 1: update thenar"),
+        (changed(schema=0), "has schema 0, the first was 1"),
+        (changed(harness="x"), "is not a build's: .*harness"),
+        (changed(more=1), "unknown field `more`"),
+        (changed(ports=[PORT | {"bus": -1}]), "is not a build's: .*bus"),
+        (changed(ports=[PORT | {"switches": []}]), "is not a build's: .*switches"),
+        (changed(ports=[PORT | {"closed_high": 1}]), "is not a build's: .*closed_high"),
+        (scanmap_to_bytes(SCAN) + b"\n", "is altered"),
+        (json.dumps(json.loads(scanmap_to_bytes(SCAN))).encode(), "is altered"),
+        (b" " * (MAX_BYTES + 1), f"has {MAX_BYTES + 1} bytes, a scan map has at most"),
+    ],
+)
+def test_what_is_no_map_is_refused_by_name(data: bytes, reason: str) -> None:
+    with pytest.raises(BuildError, match=rf"^here\.json .*{reason}"):
+        scanmap_from_bytes(data, "here.json")
+
+
+@pytest.mark.parametrize(
+    "scan",
+    [
+        ScanMap(1, "0" * 64, (Port(0, 0, "A", ((0, 0),), False), Port(0, 0, "A", ((1, 1),), False)), ()),
+        ScanMap(1, "0" * 64, (Port(0, 0, "A", ((0, 0), (0, 1)), False),), ()),
+        ScanMap(1, "0" * 64, (Port(0, 0, "A", ((0, 0), (1, 0)), False),), ()),
+        ScanMap(1, "0" * 64, (Port(0, 0, "A", ((0, 0),), False),), (((3, 0),),)),
+        ScanMap(1, "0" * 64, (), (((3, 0), (3, 1)),)),
+    ],
+)
+def test_a_map_that_reads_a_thing_twice_is_refused(scan: ScanMap) -> None:
+    with pytest.raises(BuildError, match="twice: compile the build again"):
+        scanmap_from_bytes(scanmap_to_bytes(scan))
+
+
+@pytest.mark.parametrize("switches", [4, 6])
+def test_a_map_of_other_switches_than_the_builds_is_refused(switches: int) -> None:
+    check_switches(SCAN, 5)
+    with pytest.raises(BuildError, match=f"does not read each of the {switches} kept switches once"):
+        check_switches(SCAN, switches)
+
+
+@given(position=st.integers(0, len(scanmap_to_bytes(SCAN)) - 1), value=st.integers(0, 255))
+def test_a_damaged_map_raises_nothing_but_our_own_errors(position: int, value: int) -> None:
+    data = bytearray(scanmap_to_bytes(SCAN))
+    data[position] = value
+    if bytes(data) != scanmap_to_bytes(SCAN):
+        with contextlib.suppress(BuildError):
+            # Another digit of a fingerprint or a bit is a map, too: only build.json's checksum knows better.
+            assert scanmap_from_bytes(bytes(data)) != SCAN

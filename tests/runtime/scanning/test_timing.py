@@ -1,0 +1,125 @@
+"""The wire's arithmetic, against figures worked out by hand from the chips' data sheets."""
+
+from collections.abc import Callable
+
+import pytest
+from msgspec.structs import replace
+
+from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.scanner_frame import encode
+from thenar.drivers.scanner_messages import State, frame
+from thenar.runtime.harness.wiring import BusWiring, ChipWiring, GloveWiring, Harness, MuxChannel, ScannerWiring
+from thenar.runtime.scanning.timing import free_us, glove_us, port_us, scan_us, scanner_us, select_us
+from thenar.runtime.scanning.whole import whole_scan
+
+EightChips = Callable[..., Harness]
+
+
+@pytest.mark.parametrize(
+    ("kind", "reading", "at_100_khz", "at_400_khz", "at_1_mhz"),
+    [
+        ("pcf8574", "P", 200.0, 50.0, 20.0),
+        ("pcf8575", "P", 290.0, 72.5, 29.0),
+        ("mcp23008", "GPIO", 390.0, 97.5, 39.0),
+        ("mcp23017", "AB", 480.0, 120.0, 48.0),
+        ("pca9555", "01", 480.0, 120.0, 48.0),
+        ("tca6424a", "012", 570.0, 142.5, 57.0),
+    ],
+)
+def test_a_reading_takes_its_scl_periods_and_the_bus_free_time(
+    kind: str, reading: str, at_100_khz: float, at_400_khz: float, at_1_mhz: float
+) -> None:
+    found = next(each for each in CHIPS[kind].readings if each.name == reading)
+    for clock_hz, us, free in ((100_000, at_100_khz, 4.7), (400_000, at_400_khz, 1.3), (1_000_000, at_1_mhz, 0.5)):
+        assert free_us(clock_hz) == free
+        assert port_us(found, clock_hz) == pytest.approx(us + free)
+
+
+def test_selecting_a_channel_takes_twenty_scl_periods() -> None:
+    assert select_us(100_000) == pytest.approx(204.7)
+    assert select_us(400_000) == pytest.approx(51.3)
+
+
+def test_eight_chips_take_what_the_sum_says(eight_chips: EightChips) -> None:
+    harness = eight_chips()
+    time = scan_us(whole_scan(harness, harness.switches), harness, ioctl_us=50.0)
+    assert time.us == pytest.approx(8 * (120.0 + 1.3 + 50.0))
+    assert time.us == time.full_us
+    assert time.share == 1.0
+    assert [chip.switches for chip in time.chips] == [14] * 8
+    assert (time.selects, time.select_us) == (0, 0.0)
+
+
+def test_a_few_kept_switches_take_their_share_of_all_that_are_wired(eight_chips: EightChips) -> None:
+    harness = eight_chips()
+    time = scan_us(whole_scan(harness, ["s0", "s1", "s20", "s27"]), harness)
+    first, second = time.chips
+    assert (first.place, first.device, first.readings) == ("mcp23017 at 0x20", "/dev/i2c-1", ("A",))
+    assert (second.chip, second.readings, second.switches) == (1, ("AB",), 2)
+    assert first.us == pytest.approx(97.5 + 1.3)
+    assert second.us == pytest.approx(120.0 + 1.3)
+    assert time.share == pytest.approx((98.8 + 121.3) / (8 * 121.3))
+
+
+def behind(*places: tuple[int, int] | None) -> Harness:
+    chips = tuple(
+        ChipWiring(
+            kind="pca9555",
+            address=0x20 + number,
+            mux=None if place is None else MuxChannel(address=place[0], channel=place[1]),
+            pins={"P00": f"s{number}"},
+        )
+        for number, place in enumerate(places)
+    )
+    return Harness(name="x", buses=(BusWiring(device="d", clock_hz=400_000, chips=chips),))
+
+
+@pytest.mark.parametrize(
+    ("places", "selects"),
+    [
+        ((None, None), 0),
+        ((None, (0x70, 1)), 0),
+        (((0x70, 1), (0x70, 1)), 0),
+        (((0x70, 1), None, (0x70, 2)), 2),
+        (((0x70, 1), (0x70, 2), (0x70, 1)), 2),
+        (((0x70, 1), (0x71, 1)), 4),
+        (((0x70, 1), (0x70, 2), (0x71, 1)), 5),
+    ],
+)
+def test_channels_are_selected_once_a_scan_and_another_mux_is_left_first(
+    places: tuple[tuple[int, int] | None, ...], selects: int
+) -> None:
+    harness = behind(*places)
+    time = scan_us(whole_scan(harness, harness.switches), harness, ioctl_us=10.0)
+    assert time.selects == selects
+    assert time.select_us == pytest.approx(selects * (51.3 + 10.0))
+    assert time.us == pytest.approx(selects * 61.3 + len(places) * (97.5 + 1.3 + 10.0))
+
+
+def test_each_bus_has_its_own_clock() -> None:
+    (bus,) = behind(None).buses
+    slow = replace(bus, device="e", clock_hz=100_000, chips=(replace(bus.chips[0], pins={"P00": "t"}),))
+    harness = Harness(name="x", buses=(bus, slow))
+    time = scan_us(whole_scan(harness, harness.switches), harness)
+    assert [(chip.bus, chip.device) for chip in time.chips] == [(0, "d"), (1, "e")]
+    assert [chip.us for chip in time.chips] == pytest.approx([98.8, 394.7])
+
+
+def test_nothing_to_read_takes_no_time() -> None:
+    harness = Harness(name="x")
+    time = scan_us(whole_scan(harness, ()), harness)
+    assert (time.us, time.full_us, time.share, time.chips) == (0.0, 0.0, 0.0, ())
+
+
+@pytest.mark.parametrize("keys", [1, 8, 9, 64, 160])
+def test_a_bitmap_takes_what_its_bytes_take(keys: int) -> None:
+    size = len(encode(frame(State(closed=1, keys=keys), 0)))
+    scanner = ScannerWiring(port="p", switches=("",) * keys, baud=115_200)
+    assert scanner_us(scanner) == pytest.approx(size * 10 / 115_200 * 1e6)
+
+
+def test_a_cyberglove_is_as_fast_as_its_line_and_its_digitising_allow() -> None:
+    glove = GloveWiring(port="p", baud=38_400)
+    assert glove_us(glove, 18) == pytest.approx(18 * 250.0 + 21 * 10 / 38_400 * 1e6)
+    auto = GloveWiring(port="p", baud="auto")
+    assert glove_us(auto, 22) == pytest.approx(22 * 250.0 + 25 * 10 / 115_200 * 1e6)

@@ -1,0 +1,88 @@
+"""The fewest transactions, and of as few the shortest: against all sets of readings that there are."""
+
+from collections.abc import Callable
+from itertools import combinations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.drivers.i2c.registry import CHIPS
+from thenar.runtime.harness.checks import faults
+from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
+from thenar.runtime.scanning.timing import port_us, reading_of
+from thenar.runtime.scanning.transactions import cover, ports_of
+
+Harnesses = Callable[..., st.SearchStrategy[Harness]]
+_KINDS = sorted(CHIPS)
+
+
+@given(data=st.data())
+def test_no_set_of_readings_is_smaller_or_as_small_and_shorter(harnesses: Harnesses, data: st.DataObject) -> None:
+    harness = data.draw(harnesses())
+    assert not list(faults(harness))
+    wanted = data.draw(st.sets(st.sampled_from(harness.switches))) if harness.switches else set()
+    wired = [(bus, chip) for bus in harness.buses for chip in bus.chips]
+    on_chips = wanted & {name for _, chip in wired for name in chip.pins.values()}
+    # Every reading of every chip: what it takes, and the switches that it shows.
+    readings = [
+        (
+            port_us(reading, bus.clock_hz),
+            {chip.numbered_pins[pin] for pin in reading.pins if pin in chip.numbered_pins},
+        )
+        for bus, chip in wired
+        for reading in chip.chip.readings
+    ]
+    best = min(
+        (count, sum(us for us, _ in some))
+        for count in range(len(readings) + 1)
+        for some in combinations(readings, count)
+        if on_chips <= set[str]().union(*(shown for _, shown in some))
+    )
+    names = sorted(wanted)
+    ports = ports_of(harness, {name: number for number, name in enumerate(names)})
+    us = sum(port_us(reading_of(port, harness), harness.buses[port.bus].clock_hz) for port in ports)
+    assert (len(ports), us) == pytest.approx(best)
+    # Each wanted switch is read once, from the pin that it hangs on; no transaction is without one.
+    read = [(port, bit, names[number]) for port in ports for bit, number in port.switches]
+    assert sorted(name for _, _, name in read) == sorted(on_chips)
+    assert all(port.switches for port in ports)
+    for port, bit, name in read:
+        chip = harness.buses[port.bus].chips[port.chip]
+        assert chip.numbered_pins[reading_of(port, harness).pins[bit]] == name
+        assert port.closed_high == (chip.closed == "high")
+
+
+@pytest.mark.parametrize(
+    ("kind", "pins", "readings"),
+    [
+        ("mcp23017", [], []),
+        ("mcp23017", [0, 6], ["A"]),
+        ("mcp23017", [8], ["B"]),
+        ("mcp23017", [0, 8], ["AB"]),
+        ("pcf8575", [15], ["P"]),
+        ("tca6424a", [0, 8], ["01"]),
+        ("tca6424a", [8, 16], ["12"]),
+        ("tca6424a", [0, 16], ["012"]),
+    ],
+)
+def test_a_port_without_a_wanted_switch_is_left_alone_where_that_costs_no_transaction(
+    kind: str, pins: list[int], readings: list[str]
+) -> None:
+    chip = CHIPS[kind](CHIPS[kind].addresses[0])
+    assert [reading.name for reading in cover(chip, pins)] == readings
+
+
+@pytest.mark.parametrize("kind", _KINDS)
+def test_every_input_of_every_kind_is_shown_by_a_reading(kind: str) -> None:
+    chip = CHIPS[kind](CHIPS[kind].addresses[0])
+    for pin, name in enumerate(chip.pins):
+        if name not in chip.not_inputs:
+            assert len(cover(chip, [pin])) == 1
+
+
+def test_a_switch_that_nobody_asks_for_costs_nothing() -> None:
+    chip = ChipWiring(kind="mcp23017", address=0x20, pins={"GPA0": "s0", "GPB0": "s1"})
+    harness = Harness(name="x", buses=(BusWiring(device="d", chips=(chip,)),))
+    assert [port.reading for port in ports_of(harness, {"s1": 0})] == ["B"]
+    assert ports_of(harness, {}) == ()

@@ -1,0 +1,70 @@
+"""The scan map of a build folder: vouched for by build.json, or not there at all."""
+
+import hashlib
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from thenar.runtime.build import MANIFEST_NAME, SCAN_NAME, Build
+from thenar.runtime.errors import BuildError
+from thenar.runtime.manifest import manifest_from_bytes, manifest_to_bytes
+from thenar.runtime.scanning.scanmap import SCHEMA, Port, ScanMap, scanmap_to_bytes
+
+SCAN = ScanMap(SCHEMA, "0" * 64, (Port(0, 0, "AB", tuple((bit, bit) for bit in range(9)), False),), ())
+
+
+def add(folder: Path, scan: ScanMap) -> Path:
+    path = folder / SCAN_NAME
+    path.write_bytes(scanmap_to_bytes(scan))
+    manifest = manifest_from_bytes((folder / MANIFEST_NAME).read_bytes())
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    (folder / MANIFEST_NAME).write_bytes(manifest_to_bytes(replace(manifest, scan_sha256=digest)))
+    return path
+
+
+def test_a_build_for_no_harness_has_no_map_and_its_manifest_says_nothing_of_one(folder: Path) -> None:
+    assert Build.load(folder).scan is None
+    assert b"scan" not in (folder / MANIFEST_NAME).read_bytes()
+
+
+def test_a_build_for_a_harness_has_its_map(folder: Path) -> None:
+    add(folder, SCAN)
+    assert Build.load(folder).scan == SCAN
+
+
+def test_a_map_that_is_not_there_is_named(folder: Path) -> None:
+    add(folder, SCAN).unlink()
+    with pytest.raises(BuildError, match=r"scan\.json cannot be read: No such file"):
+        Build.load(folder)
+
+
+def test_a_map_of_another_build_is_refused(folder: Path) -> None:
+    add(folder, SCAN).write_bytes(scanmap_to_bytes(replace(SCAN, harness="1" * 64)))
+    with pytest.raises(BuildError, match=r"scan\.json is not the one that build\.json describes"):
+        Build.load(folder)
+
+
+def test_a_map_that_nobody_vouches_for_is_not_looked_at(folder: Path) -> None:
+    (folder / SCAN_NAME).write_bytes(b"anything")
+    assert Build.load(folder).scan is None
+
+
+def test_a_map_of_other_switches_is_refused_even_if_vouched_for(folder: Path) -> None:
+    add(folder, replace(SCAN, ports=(Port(0, 0, "A", ((0, 0),), False),)))
+    with pytest.raises(BuildError, match="does not read each of the 9 kept switches once"):
+        Build.load(folder)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_a_mutated_map_is_refused_by_name(folder: Path, data: st.DataObject) -> None:
+    path = add(folder, SCAN)
+    bad = bytearray(path.read_bytes())
+    bad[data.draw(st.integers(0, len(bad) - 1))] ^= data.draw(st.integers(1, 255))
+    path.write_bytes(bytes(bad[: data.draw(st.integers(0, len(bad)))]))
+    with pytest.raises(BuildError, match=r"scan\.json"):
+        Build.load(folder)
+    add(folder, SCAN)

@@ -1,0 +1,91 @@
+"""docs/harness.md: its examples are loaded, its keys and defaults are the structs', its times are the arithmetic's."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from thenar.drivers.i2c.registry import CHIPS
+from thenar.runtime.errors import HarnessError
+from thenar.runtime.harness.loading import load_harness
+from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Debounce, GloveWiring, Harness, ScannerWiring
+from thenar.runtime.scanning import order, plan
+from thenar.runtime.scanning.timing import port_us, select_us
+
+PAGE = (Path(__file__).parents[1] / "docs" / "harness.md").read_text(encoding="utf-8")
+EXAMPLES = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+TABLES: dict[str, type[msgspec.Struct]] = {
+    "": Harness,
+    "`[cyberglove]`": GloveWiring,
+    "`[[scanner]]`": ScannerWiring,
+    "`[[bus]]`": BusWiring,
+    "`[[bus.chip]]`": ChipWiring,
+    "`[debounce]`": Debounce,
+}
+
+
+def rows(heading: str) -> list[list[str]]:
+    """Return the cells of the table whose heading begins with `heading`."""
+    lines = PAGE[PAGE.index(f"\n| {heading}") + 1 :].split("\n\n")[0].splitlines()
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
+
+
+@pytest.mark.parametrize("number", range(len(EXAMPLES)))
+def test_every_example_is_a_sound_harness(number: int, tmp_path: Path) -> None:
+    path = tmp_path / "glove.toml"
+    path.write_text(EXAMPLES[number], encoding="utf-8")
+    assert load_harness(path).switches
+
+
+def test_there_are_examples() -> None:
+    assert len(EXAMPLES) == 3
+
+
+def documented() -> Iterator[tuple[str, str, str]]:
+    table = ""
+    for heading, key, default, _ in rows("table | key"):
+        table = heading or table
+        yield table, key.strip("`"), default
+
+
+def test_every_key_is_there_with_its_default() -> None:
+    found = list(documented())
+    nested = {"cyberglove", "scanner", "bus", "chip", "debounce"}
+    for table, kind in TABLES.items():
+        keys = {field.encode_name: field for field in msgspec.structs.fields(kind) if field.encode_name not in nested}
+        assert sorted(key for where, key, _ in found if where == table) == sorted(keys)
+        for where, key, default in found:
+            if where == table and keys[key].default not in (msgspec.NODEFAULT, None, ()):
+                assert default == msgspec.json.encode(keys[key].default).decode().removesuffix(".0")
+
+
+def test_every_kind_of_chip_is_named() -> None:
+    (kinds,) = (text for _, key, _, text in rows("table | key") if key == "`kind`")
+    assert set(re.findall(r"`(\w+)`", kinds)) == set(CHIPS)
+
+
+def test_the_times_are_those_of_the_arithmetic() -> None:
+    times = {(int(size), int(periods)): us for _, size, periods, us in rows("transaction | bytes")}
+    readings = [reading for chip in CHIPS.values() for reading in chip.readings]
+    known = {(reading.wire_bytes, reading.scl_periods): port_us(reading, 400_000) for reading in readings}
+    for place, us in times.items():
+        assert us == f"{known[place]:.1f}"
+    assert f"{select_us(400_000):.1f}" == "51.3"
+
+
+def test_the_limits_of_the_search_are_those_of_the_code() -> None:
+    assert f"Up to {order.EXACT} ports" in PAGE
+    assert f"Of more than {plan.FRAMES} rows, {plan.FRAMES} evenly spaced" in PAGE
+
+
+def test_the_error_shown_is_the_error_raised(tmp_path: Path) -> None:
+    (shown,) = re.findall(r"^    (glove\.toml, line .*) \.\.\.$", PAGE, re.MULTILINE)
+    path = tmp_path / "glove.toml"
+    path.write_text(
+        "\n" * 7 + '[[bus]]\ndevice = "d"\n[[bus.chip]]\nkind = "mcp23017"\npins.GPA7 = "s"\naddress = 32\n'
+    )
+    with pytest.raises(HarnessError) as caught:
+        load_harness(path)
+    assert str(caught.value).startswith(shown)
