@@ -1,12 +1,12 @@
 """Frames in, recognitions out. The decision is integer arithmetic; a probability is only worked out to be published."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .build import Build
+from .softmax import softmax
 
 Mask = NDArray[np.bool_]
 
@@ -53,10 +53,11 @@ class Recognizer:
         """Return the grasp type of `frame`. Raises FrameError if the frame does not fit the build."""
         lanes, degraded = self._lanes(frame)
         second, best = sorted(lanes)[-2:]
+        winner = lanes.index(best)
         return Recognition(
             time_us=frame.time_us,
-            grasp=self._build.grasps[lanes.index(best)],
-            probability=_probability(lanes, best, self._build.tables.scale),
+            grasp=self._build.grasps[winner],
+            probability=softmax(lanes, winner, self._build.tables.scale),
             margin=best - second,
             degraded=degraded,
         )
@@ -69,7 +70,3 @@ class Recognizer:
         joints = np.zeros(tables.n_joints, bool) if frame.lost_joints is None else frame.lost_joints
         lanes = self._build.lanes_without(frame.bits, frame.codes, switches, joints)
         return lanes, bool(np.any(switches) or np.any(joints))
-
-
-def _probability(lanes: tuple[int, ...], best: int, scale: float) -> float:
-    return 1.0 / sum(math.exp((lane - best) / scale) for lane in lanes)

@@ -1,0 +1,1 @@
+"""Live recognition: devices that come and go, their newest frames joined, scored and decided upon."""

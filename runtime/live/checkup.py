@@ -1,0 +1,157 @@
+"""A look at every device of a harness, one after the other: is it there, and is it as fast as its wire allows?"""
+
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from statistics import median
+from time import monotonic, perf_counter
+
+import msgspec
+
+from ...drivers.errors import ThenarError
+from ...drivers.i2c.scan import Scan
+from ..harness.wiring import GloveWiring, Harness, ScannerWiring
+from ..scanning.scanmap import ScanMap
+from ..scanning.timing import ChipTime, glove_us, scan_us
+from .devices import GloveDevice, ScannerDevice
+from .i2c_device import I2cDevice
+
+# So much slower than its wire a device may be: computers have other things to do, too.
+SLOW = 1.5
+_SCANS = 101
+_LISTEN_S = 1.0
+
+
+class Finding(msgspec.Struct, frozen=True):
+    """What was found of a device; of a bus, chip by chip and as a whole.
+
+    predicted_us  from one record or full bitmap to the next, or what the readings take, by the arithmetic of the wire
+    measured_us   the same as it was, the median; None where nothing came
+    remarks       what is missing, slow or odd, in sentences
+    """
+
+    device: str
+    part: str
+    present: bool
+    predicted_us: float
+    measured_us: float | None = None
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def slow(self) -> bool:
+        """Whether it takes much longer than its wire does."""
+        return self.measured_us is not None and self.measured_us > SLOW * self.predicted_us
+
+
+def check_up(harness: Harness, scan: ScanMap) -> Iterator[Callable[[], tuple[Finding, ...]]]:
+    """Yield a look at each device of `harness`, of its chips at those that `scan` reads: call it, it takes a second.
+
+    None raises because a device is not there: that is a finding.
+    """
+    if (glove := harness.cyberglove) is not None:
+        yield lambda: (_glove(glove),)
+    for wiring in harness.scanners:
+        yield lambda wiring=wiring: (_scanner(wiring, harness),)  # type: ignore[misc]
+    for bus in sorted({port.bus for port in scan.ports}):
+        yield lambda bus=bus: _bus(harness, bus, scan)  # type: ignore[misc]
+
+
+def _glove(wiring: GloveWiring) -> Finding:
+    device = GloveDevice(wiring)
+    predicted = max(device.period_us if wiring.rate_hz else 0.0, glove_us(wiring, device.sensors))
+    try:
+        info = device.driver.open()
+        measured = _gap(lambda: device.read(_LISTEN_S))
+        remarks = (*info.notes, *_counted(device))
+    except ThenarError as wrong:
+        return Finding(device.name, "", False, predicted, None, (str(wrong),))
+    finally:
+        device.close()
+    return _told(Finding(device.name, info.text.strip(), True, predicted, measured, remarks))
+
+
+def _scanner(wiring: ScannerWiring, harness: Harness) -> Finding:
+    device = ScannerDevice(wiring, harness.switches, harness.debounce)
+    try:
+        hello = device.driver.open()
+        device.close()
+        device.open()
+        measured = _gap(lambda: device.read(_LISTEN_S))
+        remarks = _counted(device)
+    except ThenarError as wrong:
+        return Finding(device.name, "", False, float(device.period_us), None, (str(wrong),))
+    finally:
+        device.close()
+    board = f"board {hello.board}, firmware {hello.major}.{hello.minor}.{hello.patch}, {hello.keys} keys"
+    return _told(Finding(device.name, board, True, float(device.period_us), measured, remarks))
+
+
+def _bus(harness: Harness, number: int, scan: ScanMap) -> tuple[Finding, ...]:
+    device = I2cDevice(harness, number, scan, None, lambda: None)
+    times = scan_us(_of_bus(scan, number), harness)
+    try:
+        device.open()
+        found = [_chip(device, place, time) for place, time in enumerate(times.chips)]
+        whole = _duration(device.scan(None))
+        way = (device.bus.trouble,) if device.bus.trouble else (f"reads {device.bus.way}",)
+    except ThenarError as wrong:
+        return (Finding(device.name, "", False, times.us, None, (str(wrong),)),)
+    finally:
+        device.close()
+    there = all(finding.present for finding in found)
+    return (*found, _told(Finding(device.name, "a whole scan", there, times.us, whole if there else None, way)))
+
+
+def _chip(device: I2cDevice, place: int, time: ChipTime) -> Finding:
+    taken = _duration(device.scan(place))
+    state = device.bus.chips[place]
+    if not state.present:
+        return Finding(device.name, time.place, False, time.us, None, (state.last_error,))
+    remarks = (f"{state.errors} failures, the last: {state.last_error}",) if state.errors else ()
+    return _told(Finding(device.name, time.place, True, time.us, taken, remarks))
+
+
+def _told(finding: Finding) -> Finding:
+    """Return the finding with a remark if it is slow, or silent."""
+    if finding.measured_us is None and finding.present:
+        remark = "it answers, and then nothing comes: is it busy, or set to another rate?"
+    elif finding.slow and finding.measured_us is not None:
+        remark = f"{finding.measured_us / finding.predicted_us:.1f} times as slow as its wire: {_ADVICE}"
+    else:
+        return finding
+    return msgspec.structs.replace(finding, remarks=(*finding.remarks, remark))
+
+
+_ADVICE = "does its clock run as fast as glove.toml says, and is the computer busy?"
+
+
+def _of_bus(scan: ScanMap, number: int) -> ScanMap:
+    return msgspec.structs.replace(scan, ports=tuple(port for port in scan.ports if port.bus == number))
+
+
+def _gap(read: Callable[[], object]) -> float | None:
+    """Return the median time between two frames that come within a second, in microseconds."""
+    end, came = monotonic() + _LISTEN_S, list[float]()
+    while monotonic() < end:
+        if read() is not None:
+            came.append(perf_counter())
+    gaps = [later - earlier for earlier, later in pairwise(came)]
+    return 1e6 * median(gaps) if gaps else None
+
+
+def _duration(scan: Scan) -> float:
+    """Return the median time of a scan, in microseconds."""
+    taken = []
+    for _ in range(_SCANS):
+        start = perf_counter()
+        scan.read()
+        taken.append(perf_counter() - start)
+    return 1e6 * median(taken)
+
+
+def _counted(device: GloveDevice | ScannerDevice) -> tuple[str, ...]:
+    """Return a remark on what a line lost or damaged, if it did."""
+    wrong = [f"{count.name} {count.value}" for count in device.counts() if count.value and count.name in _WRONG]
+    return (f"on its line: {', '.join(wrong)}",) if wrong else ()
+
+
+_WRONG = ("faults", "wrong start", "wrong length", "damaged", "short", "overlong", "gaps", "misfits")

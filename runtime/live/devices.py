@@ -1,0 +1,137 @@
+"""The devices of a harness as what `Keeper` keeps, each giving the frames of the live loop."""
+
+from collections.abc import Sequence
+from dataclasses import fields
+from typing import Any
+
+from ...drivers.cyberglove import CyberGlove
+from ...drivers.cyberglove_timing import shortest_us
+from ...drivers.debounce import Debouncer
+from ...drivers.scanner import Scanner
+from ..harness.wiring import Debounce, GloveWiring, ScannerWiring
+from .frames import GloveFrame, SwitchFrame
+from .health import Count
+from .rewiring import Rewired
+
+# A device is expected back at least so often, however fast it is: less would take a busy computer, or the 16 ms for
+# which a USB serial adapter may gather bytes, for a cut cable.
+SHORTEST_US = 10_000
+# A board that speaks less often is asked for its full bitmap: whoever is silent for longer is missed sooner.
+STATE_US = SHORTEST_US
+
+_SLOWEST_BAUD = 9_600
+_SENSORS = 18
+
+
+class GloveDevice:
+    """The CyberGlove of a harness. A record that says the glove is unplugged is no frame: it holds no measurement."""
+
+    def __init__(self, wiring: GloveWiring) -> None:
+        self.name = f"cyberglove at {wiring.port}"
+        self.sensors = sensors_of(wiring)
+        self._unplugged = False
+        self.driver = CyberGlove(
+            wiring.port,
+            baud=None if wiring.baud == "auto" else wiring.baud,
+            mode=wiring.mode,
+            rate_hz=wiring.rate_hz,
+            sensors=self.sensors,
+        )
+        self.period_us = glove_period_us(wiring)
+
+    def open(self) -> None:
+        """Open the glove."""
+        self.driver.open()
+
+    def read(self, timeout_s: float) -> GloveFrame | None:
+        """Return the next record that holds a measurement."""
+        timed = self.driver.read(timeout_s)
+        if timed is None:
+            return None
+        self._unplugged = timed[1].fault == "unplugged"
+        if self._unplugged:
+            return None
+        time_us, record = timed
+        return GloveFrame(time_us, record.sensors, record.status)
+
+    def counts(self) -> tuple[Count, ...]:
+        """Return what the driver counts."""
+        return counted(self.driver.counts)
+
+    def trouble(self) -> str:
+        """Return what is wrong though the line is open; "" if nothing is."""
+        return "the glove is not plugged into its box" if self._unplugged else ""
+
+    def close(self) -> None:
+        """Close the glove."""
+        self.driver.close()
+
+
+class ScannerDevice:
+    """A scanner board of a harness, its keys debounced and turned into the switches that are asked for."""
+
+    def __init__(self, wiring: ScannerWiring, switch_names: Sequence[str], debounce: Debounce) -> None:
+        number = {name: place for place, name in enumerate(switch_names)}
+        self.name = f"scanner at {wiring.port}"
+        self.driver = Scanner(wiring.port, wiring.baud)
+        self._switches = Rewired((key, number[name]) for key, name in enumerate(wiring.switches) if name in number)
+        self.owned = self._switches.targets
+        self.period_us = STATE_US
+        self._debouncer = debouncer_of(debounce)
+
+    def open(self) -> None:
+        """Open the board, and see to it that it is not silent for long while all is well."""
+        hello = self.driver.open()
+        if not 0 < hello.period_us <= STATE_US:
+            self.driver.set_rate(hello.scan_us, STATE_US, hello.heartbeat_us)
+        else:
+            self.period_us = hello.period_us
+
+    def read(self, timeout_s: float) -> SwitchFrame | None:
+        """Return the next reading."""
+        reading = self.driver.read(timeout_s)
+        if reading is None:
+            return None
+        closed, known = self._switches(reading.closed), self._switches(reading.known)
+        if self._debouncer is not None:
+            closed = self._debouncer.update(reading.time_us, closed, known) & known
+        return SwitchFrame(reading.time_us, closed, self.owned & ~known)
+
+    def counts(self) -> tuple[Count, ...]:
+        """Return what the driver counts."""
+        return counted(self.driver.counts)
+
+    def trouble(self) -> str:
+        """Return what is wrong though the line is open; "" if nothing is."""
+        return ""
+
+    def close(self) -> None:
+        """Close the board."""
+        self.driver.close()
+
+
+def counted(counts: Any) -> tuple[Count, ...]:
+    """Return a dataclass of numbers as counts."""
+    return tuple(Count(field.name.replace("_", " "), getattr(counts, field.name)) for field in fields(counts))
+
+
+def debouncer_of(debounce: Debounce) -> Debouncer | None:
+    """Return what debounces as `debounce` says; None: nothing does."""
+    if not debounce.enabled:
+        return None
+    return Debouncer(round(debounce.press_lockout_ms * 1000), round(debounce.release_ms * 1000))
+
+
+def glove_period_us(wiring: GloveWiring) -> int:
+    """Return how often a CyberGlove so wired should send at least; the slowest that it can be where that is open.
+
+    One that is asked for more than box and line can do sends as fast as they can.
+    """
+    baud = _SLOWEST_BAUD if wiring.baud == "auto" else wiring.baud
+    shortest = round(shortest_us(sensors_of(wiring), baud, status=True, filtered=True))
+    return max(SHORTEST_US, shortest, round(1e6 / wiring.rate_hz) if wiring.rate_hz else 0)
+
+
+def sensors_of(wiring: GloveWiring) -> int:
+    """Return how many sensors a CyberGlove so wired must have: 18 where nothing says so."""
+    return len(wiring.joints) or wiring.sensors or _SENSORS

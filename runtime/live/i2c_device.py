@@ -1,0 +1,143 @@
+"""One I2C bus of a harness, its ports read in the order of a scan map, to the end or until the rest cannot matter."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ...drivers.debounce import Debouncer
+from ...drivers.i2c.bus import ChipAt, I2cBus, PortRead
+from ...drivers.i2c.scan import Scan
+from ..harness.wiring import Harness
+from ..scanning.earlyexit import EarlyExit
+from ..scanning.scanmap import Port, ScanMap
+from ..scanning.timing import reading_of, scan_us
+from .devices import SHORTEST_US, debouncer_of
+from .frames import GloveFrame, Mask, SwitchFrame, now_us
+from .health import Count
+from .joiner import LiveRecognizer
+from .rewiring import Rewired
+
+# A bus whose chips are all gone is not asked in a busy loop.
+_NOBODY_THERE_S = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class _PortSwitches:
+    """What the answer of a port says: its bits, which of them are inverted, the switches that they are."""
+
+    inverted: int
+    switches: Rewired
+    debouncer: Debouncer | None
+
+    def closed(self, answer: int, time_us: int) -> Mask:
+        closed = self.switches(answer ^ self.inverted)
+        if self.debouncer is None:
+            return closed
+        return self.debouncer.update(time_us, closed, self.switches.targets)
+
+
+class I2cDevice:
+    """Bus number `number` of a harness, scanned as `scan` has it; only the chips that it names are touched.
+
+    scout  a recogniser of this device's own, which says when the ports not yet read cannot change the answer any more;
+           None: every scan goes to the end
+    """
+
+    def __init__(
+        self,
+        harness: Harness,
+        number: int,
+        scan: ScanMap,
+        scout: LiveRecognizer | None,
+        newest_glove: Callable[[], GloveFrame | None],
+    ) -> None:
+        wiring = harness.buses[number]
+        ports = [port for port in scan.ports if port.bus == number]
+        self.name = f"i2c at {wiring.device}"
+        self.period_us = bus_period_us(scan, harness)
+        self._ports = [_switches_of(port, harness) for port in ports]
+        self.owned: Mask = sum(port.switches.targets for port in self._ports)
+        chips = sorted({port.chip for port in ports})
+        chips_at = [_chip_at(harness, number, chip, ports) for chip in chips]
+        self.bus = I2cBus(wiring.device, chips_at, clock_hz=wiring.clock_hz)
+        self._reads = [PortRead(chips.index(port.chip), reading_of(port, harness)) for port in ports]
+        self._scans: list[Scan] = []
+        self._scout, self._newest_glove = scout, newest_glove
+        self._early = scout.early_exit([port.switches.targets for port in self._ports]) if scout else None
+
+    def open(self) -> None:
+        """Open the bus and set up its chips."""
+        self.bus.open()
+        step = 1 if self._early else len(self._reads)
+        self._scans = [self.bus.prepare(self._reads[at : at + step]) for at in range(0, len(self._reads), step)]
+
+    def scan(self, chip: int | None = None) -> Scan:
+        """Return what reads all ports, or those of the bus's chip of this number, once more."""
+        return self.bus.prepare([read for read in self._reads if chip is None or read.chip == chip])
+
+    def read(self, timeout_s: float) -> SwitchFrame | None:
+        """Scan once."""
+        frame = (
+            self._whole()
+            if self._early is None or self._scout is None
+            else self._until_decided(self._early, self._scout)
+        )
+        if frame.lost == self.owned:
+            time.sleep(min(timeout_s, _NOBODY_THERE_S))
+        return frame
+
+    def _until_decided(self, early: EarlyExit, scout: LiveRecognizer) -> SwitchFrame:
+        glove = self._newest_glove()
+        early.start(scout.codes(now_us(), glove))
+        closed = lost = 0
+        for number, scan in enumerate(self._scans):
+            shut, silent = self._decoded(number, scan.read()[0])
+            closed, lost = closed | shut, lost | silent
+            if early.after(number, shut, silent):
+                break
+        return SwitchFrame(now_us(), closed, lost, early.unread(number), glove)
+
+    def counts(self) -> tuple[Count, ...]:
+        """Return how many transfers there were, and the failures of each chip."""
+        failures = (Count(f"failures of {chip.kind} at 0x{chip.address:02X}", chip.errors) for chip in self.bus.chips)
+        return (Count("transfers", self.bus.transfers), *failures)
+
+    def trouble(self) -> str:
+        """Return what is wrong with the bus, or with the chips that are absent; "" if nothing is."""
+        absent = (chip.last_error for chip in self.bus.chips if not chip.present)
+        return self.bus.trouble or "; ".join(absent)
+
+    def close(self) -> None:
+        """Close the bus."""
+        self.bus.close()
+
+    def _whole(self) -> SwitchFrame:
+        closed = lost = 0
+        for number, answer in enumerate(self._scans[0].read()):
+            shut, silent = self._decoded(number, answer)
+            closed, lost = closed | shut, lost | silent
+        return SwitchFrame(now_us(), closed, lost)
+
+    def _decoded(self, number: int, answer: int | None) -> tuple[Mask, Mask]:
+        """Return which switches of port `number` are closed, and which are lost."""
+        port = self._ports[number]
+        return (0, port.switches.targets) if answer is None else (port.closed(answer, now_us()), 0)
+
+
+def _switches_of(port: Port, harness: Harness) -> _PortSwitches:
+    bits = sum(1 << bit for bit, _ in port.switches)
+    return _PortSwitches(0 if port.closed_high else bits, Rewired(port.switches), debouncer_of(harness.debounce))
+
+
+def _chip_at(harness: Harness, bus: int, number: int, ports: list[Port]) -> ChipAt:
+    chip = harness.buses[bus].chips[number]
+    used = frozenset(
+        reading_of(port, harness).pins[bit] for port in ports if port.chip == number for bit, _ in port.switches
+    )
+    mux, channel = (None, None) if chip.mux is None else (chip.mux.address, chip.mux.channel)
+    return ChipAt(chip.chip, used, mux, channel)
+
+
+def bus_period_us(scan: ScanMap, harness: Harness) -> int:
+    """Return how often the switches on I2C buses should be read at least."""
+    return max(SHORTEST_US, round(scan_us(scan, harness).us))

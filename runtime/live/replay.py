@@ -1,0 +1,43 @@
+"""A live recording run through once more."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from ...drivers.errors import SettingError
+from ..build import Build
+from ..harness.loading import parse_harness
+from ..recording.reader import Reader
+from .frames import GloveFrame, SwitchFrame
+from .policy import Policy
+from .published import LiveGrasp
+from .system import System
+
+
+def replayed(build: Build, recording: Path, policy: Policy | None = None) -> Iterator[tuple[LiveGrasp, LiveGrasp]]:
+    """Yield what was recognised and what is now, moment by moment, decided as it was then or by another `policy`.
+
+    The newest frames at each moment are those that stand before it in the recording, as the live loop wrote them.
+
+    Raises McapError if it is no recording, SettingError if it is of another build.
+    """
+    reader = Reader(recording)
+    recognizer = _system(build, reader, policy).recognizer()
+    switches: SwitchFrame | None = None
+    glove: GloveFrame | None = None
+    for entry in reader:
+        if isinstance(entry, SwitchFrame):
+            switches = entry
+        elif isinstance(entry, GloveFrame):
+            glove = entry
+        elif isinstance(entry, LiveGrasp):
+            joined = glove if switches is None or switches.glove is None else switches.glove
+            yield entry, recognizer.step(entry.time_us, entry.unix_us, switches, joined)
+
+
+def _system(build: Build, reader: Reader, policy: Policy | None) -> System:
+    session = reader.session
+    if session.build != build.manifest.checksum:
+        raise SettingError(f"{reader.path.name} was recorded with another build: its frames hold other switches")
+    harness = parse_harness(session.harness, reader.path.name)
+    scan = System.map_of(build, harness)
+    return System(build, harness, scan, session.sensors, session.calibration, policy or session.policy or Policy())

@@ -1,0 +1,84 @@
+"""A build and a harness put together: the devices, and the recogniser of what they deliver."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from ...drivers.calibration import GloveCalibration, load_calibration
+from ...drivers.cyberglove_sensors import SENSORS_18, SENSORS_22
+from ..build import Build
+from ..harness.wiring import GloveWiring, Harness
+from ..scanning.plan import check_harness, plan_scan
+from ..scanning.scanmap import ScanMap
+from .devices import STATE_US, glove_period_us, sensors_of
+from .i2c_device import bus_period_us
+from .joiner import LiveRecognizer
+from .policy import Policy
+from .sources import Sources
+
+_NAMES = {18: SENSORS_18, 22: SENSORS_22}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class System:
+    """What runs: `scan` is the build's own map, or one that was planned for the harness now."""
+
+    build: Build
+    harness: Harness
+    scan: ScanMap
+    sensor_names: tuple[str, ...]
+    calibration: GloveCalibration | None
+    policy: Policy
+
+    @classmethod
+    def of(cls, build: Build, harness: Harness, policy: Policy | None = None) -> "System":
+        """Put `build` and `harness` together.
+
+        Raises HarnessError if they do not fit, SettingError if the CyberGlove's calibration does not.
+        """
+        glove = harness.cyberglove
+        calibration = None if glove is None or glove.calibration is None else load_calibration(Path(glove.calibration))
+        return cls(build, harness, cls.map_of(build, harness), sensor_names_of(glove), calibration, policy or Policy())
+
+    @staticmethod
+    def map_of(build: Build, harness: Harness) -> ScanMap:
+        """Return the build's own scan map, or one that is planned now. Raises HarnessError if the two do not fit."""
+        if build.scan is not None:
+            check_harness(build.scan, harness)
+            return build.scan
+        return plan_scan([switch.name for switch in build.manifest.switches], build.tables, harness)
+
+    @property
+    def switch_names(self) -> tuple[str, ...]:
+        """The kept switches, in the order of the frames' bits."""
+        return tuple(switch.name for switch in self.build.manifest.switches)
+
+    def recognizer(self) -> LiveRecognizer:
+        """Return a recogniser of what the devices deliver.
+
+        Raises SettingError if the CyberGlove cannot serve the build.
+        """
+        glove = self.harness.cyberglove
+        buses = {port.bus for port in self.scan.ports}
+        periods = [bus_period_us(self.scan, self.harness)] * len(buses) + [STATE_US] * any(self.scan.scanners)
+        return LiveRecognizer(
+            self.build,
+            sensor_names=self.sensor_names,
+            calibration=self.calibration,
+            switch_period_us=max(periods, default=None),
+            glove_period_us=None if glove is None else glove_period_us(glove),
+            policy=self.policy,
+        )
+
+    def sources(self, *, full_scan: bool = False) -> Sources:
+        """Return the devices; with `full_scan` every scan goes to its end."""
+        scout = None if full_scan else self.recognizer()
+        return Sources(self.harness, self.switch_names, self.scan, scout)
+
+
+def sensor_names_of(glove: GloveWiring | None) -> tuple[str, ...]:
+    """Return the names of a CyberGlove's sensors in wire order: as its wiring has them, or the driver's for as many as
+    it says, 18 where it says nothing.
+    """
+    if glove is None:
+        return ()
+    return glove.joints or _NAMES[sensors_of(glove)]

@@ -1,0 +1,104 @@
+from collections.abc import Callable
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.runtime.live.decision import Decision
+from thenar.runtime.live.standing import Standing
+from thenar.runtime.scanning.reach import Reach
+from thenar.runtime.tables import IntegerTables
+
+MakeTables = Callable[..., IntegerTables]
+Frame = tuple[int, tuple[int, ...]]
+
+LEAD, DWELL, HOLD = 5, 40, 150
+
+lanes = st.lists(st.integers(100, 112), min_size=3, max_size=3).map(tuple)
+steps = st.lists(st.tuples(st.integers(0, 25), lanes), min_size=1, max_size=60)
+
+
+@pytest.fixture(scope="module")
+def reach(make_tables: MakeTables) -> Reach:
+    return Reach(make_tables(classes=3))
+
+
+def decide(frames: list[tuple[int, tuple[int, ...]]], reach: Reach) -> list[tuple[int, int, int]]:
+    """Time, candidate and decision of every frame; frames come with the time since the one before."""
+    decision, time_us, found = Decision(LEAD, DWELL, HOLD), 1000, []
+    for wait, scores in frames:
+        time_us += wait
+        standing = Standing(scores, reach)
+        found.append((time_us, standing.candidate, decision.update(time_us, standing)))
+    return found
+
+
+@given(frames=steps)
+def test_it_never_changes_faster_than_the_dwell(frames: list[Frame], reach: Reach) -> None:
+    found = decide(frames, reach)
+    changes = [after[0] for before, after in pairwise(found) if after[2] != before[2]]
+    assert all(later - earlier >= DWELL for earlier, later in pairwise([found[0][0], *changes]))
+
+
+@given(frames=steps, end=st.permutations([107, 101, 100]).map(tuple), wait=st.integers(1, 60))
+def test_a_change_that_persists_is_followed_within_the_dwell(
+    frames: list[Frame], end: tuple[int, ...], wait: int, reach: Reach
+) -> None:
+    """At the first frame that is at least the dwell after the change began: a lead of 6 over anybody is enough."""
+    lasting = [(wait, end)] * (DWELL // wait + 2)
+    found = decide(frames + lasting, reach)[len(frames) :]
+    began = found[0][0]
+    assert all(decided == end.index(107) for time_us, _, decided in found if time_us - began >= DWELL)
+
+
+@given(frames=steps)
+def test_nothing_is_held_against_the_frames_beyond_its_time(frames: list[Frame], reach: Reach) -> None:
+    supported = 0
+    for time_us, candidate, decided in decide(frames, reach):
+        if candidate == decided:
+            supported = time_us
+        assert time_us - supported < HOLD
+
+
+@given(frames=steps)
+def test_what_is_decided_on_was_a_candidate(frames: list[Frame], reach: Reach) -> None:
+    candidates = set()
+    for _, candidate, decided in decide(frames, reach):
+        candidates.add(candidate)
+        assert decided in candidates
+
+
+def test_a_lead_that_is_too_small_takes_over_only_when_the_hold_is_over(reach: Reach) -> None:
+    found = decide([(0, (104, 100, 100)), *[(10, (100, 104, 100))] * 20], reach)
+    assert next(time_us for time_us, _, decided in found if decided == 1) == 1000 + HOLD
+    found = decide([(0, (104, 100, 100)), *[(10, (100, 105, 100))] * 20], reach)
+    assert next(time_us for time_us, _, decided in found if decided == 1) == 1010 + DWELL
+
+
+def test_a_frame_for_the_old_type_begins_the_dwell_anew(reach: Reach) -> None:
+    old, new = (110, 100, 100), (100, 110, 100)
+    found = decide([(0, old), (10, new), (30, new), (5, old), (5, new), (35, new), (5, new)], reach)
+    assert [decided for _, _, decided in found] == [0, 0, 0, 0, 0, 0, 1]
+
+
+@pytest.mark.parametrize("between", [(110, 109, 100), (100, 103, 104)])
+def test_a_frame_without_the_lead_begins_the_dwell_anew(between: tuple[int, ...], reach: Reach) -> None:
+    old, new = (110, 100, 100), (100, 110, 100)
+    found = decide([(0, old), (10, new), (30, between), (20, new), (39, new), (1, new)], reach)
+    assert [decided for _, _, decided in found] == [0, 0, 0, 0, 0, 1]
+
+
+def test_the_same_frame_again_is_no_new_evidence(reach: Reach) -> None:
+    found = decide([(0, (110, 100, 100)), (10, (100, 110, 100)), *[(0, (100, 110, 100))] * 50], reach)
+    assert {decided for _, _, decided in found} == {0}
+
+
+def test_after_unknown_the_first_candidate_is_taken_at_once(reach: Reach) -> None:
+    decision = Decision(LEAD, DWELL, HOLD)
+    assert decision.update(0, Standing((9, 0, 0), reach)) == 0
+    decision.update(1, Standing((0, 9, 0), reach))
+    decision.forget()
+    assert decision.held is None
+    assert decision.update(2, Standing((0, 0, 1), reach)) == 2
+    assert decision.update(50, Standing((0, 9, 0), reach)) == 2
