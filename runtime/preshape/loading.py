@@ -1,0 +1,136 @@
+"""Tables of preshapes from TOML: those that ship, by name, and the user's own, by path.
+
+name = "My gripper"
+time_from_start_s = 1.0
+
+[[joints]]                      # any number, in the order of the positions below
+name = "finger_joint"
+unit = "deg"                    # deg, rad, mm or m
+range = [0, 45]                 # in that unit; positions outside are refused
+
+[[preshapes]]
+name = "open"
+positions = [0]                 # one a joint, each in its joint's unit
+grasps = ["PoS", "CMF"]         # the grasp types, as the build spells them
+"""
+
+import math
+import os
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from ..names import nearest
+from ..toml_source import Place, Source, read_source
+from ..toml_struct import check_finite, convert
+from .preshape import Preshape, PreshapeError
+from .table import PreshapeTable
+
+SHIPPED = ("barrett_bh8", "parallel_gripper")
+
+_TO_SI = {"deg": math.pi / 180, "rad": 1.0, "mm": 0.001, "m": 1.0}
+
+_Name = Annotated[str, Meta(min_length=1)]
+
+
+class _Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    name: _Name
+    unit: Literal["deg", "rad", "mm", "m"]
+    range: tuple[float, float]
+
+
+class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    name: _Name
+    positions: tuple[float, ...]
+    grasps: tuple[_Name, ...]
+
+
+class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    name: _Name
+    time_from_start_s: Annotated[float, Meta(gt=0, le=60)]
+    joints: tuple[_Joint, ...]
+    preshapes: tuple[_Entry, ...]
+
+
+def load_preshapes(name: str | os.PathLike[str]) -> PreshapeTable:
+    """Return a table that ships with thenar, by its name (one of SHIPPED), or the user's own, by its path.
+
+    Raises PreshapeError naming the file, its line and the key.
+    """
+    source = read_source(_find(name), PreshapeError)
+    tables = source.tables()
+    check_finite(source, (), tables)
+    content = convert(source, (), tables, _File)
+    _check_joints(source, content)
+    _check_preshapes(source, content)
+    chosen = {
+        grasp: preshape for entry in content.preshapes for preshape in [_made(content, entry)] for grasp in entry.grasps
+    }
+    return PreshapeTable(content.name, chosen)
+
+
+def _find(name: str | os.PathLike[str]) -> Traversable:
+    if name in SHIPPED:
+        return files(__package__) / "tables" / f"{name}.toml"
+    path = Path(name)
+    if not path.exists():
+        raise PreshapeError(
+            f"there is neither a file {path} nor a table of that name{nearest(str(name), SHIPPED)}: "
+            "name a table that ships, or the path of your own"
+        )
+    return path
+
+
+def _check_joints(source: Source, content: _File) -> None:
+    if not content.joints:
+        raise source.error(("joints",), "must name at least one joint")
+    seen: set[str] = set()
+    for number, joint in enumerate(content.joints):
+        place: Place = ("joints", number)
+        if joint.name in seen:
+            raise source.error((*place, "name"), f"joint {joint.name!r} is there already")
+        seen.add(joint.name)
+        if joint.range[0] > joint.range[1]:
+            raise source.error((*place, "range"), "must be the lowest position and then the highest")
+
+
+def _check_preshapes(source: Source, content: _File) -> None:
+    names: set[str] = set()
+    grasps: dict[str, str] = {}
+    for number, entry in enumerate(content.preshapes):
+        place: Place = ("preshapes", number)
+        if entry.name in names:
+            raise source.error((*place, "name"), f"preshape {entry.name!r} is there already")
+        names.add(entry.name)
+        _check_positions(source, (*place, "positions"), entry, content.joints)
+        for index, grasp in enumerate(entry.grasps):
+            if grasp in grasps:
+                raise source.error((*place, "grasps", index), f"{grasp!r} takes preshape {grasps[grasp]!r} already")
+            grasps[grasp] = entry.name
+    if not grasps:
+        raise source.error(("preshapes",), "must name at least one grasp type")
+
+
+def _check_positions(source: Source, place: Place, entry: _Entry, joints: tuple[_Joint, ...]) -> None:
+    if len(entry.positions) != len(joints):
+        raise source.error(place, f"must be {len(joints)} positions, one a joint, not {len(entry.positions)}")
+    for number, (position, joint) in enumerate(zip(entry.positions, joints, strict=True)):
+        low, high = joint.range
+        if not low <= position <= high:
+            reason = f"{position:g} {joint.unit} is outside {low:g} to {high:g}, the range of {joint.name}"
+            raise source.error((*place, number), reason)
+
+
+def _made(content: _File, entry: _Entry) -> Preshape:
+    return Preshape(
+        name=entry.name,
+        joint_names=tuple(joint.name for joint in content.joints),
+        positions=tuple(
+            position * _TO_SI[joint.unit] for position, joint in zip(entry.positions, content.joints, strict=True)
+        ),
+        time_from_start_s=content.time_from_start_s,
+    )

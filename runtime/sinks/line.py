@@ -1,0 +1,36 @@
+"""What goes to stdout and to sockets, as lines of JSON: grasps, and now and then how the glove fares.
+
+A reader tells them apart by `kind`; msgspec does so by itself: `msgspec.json.decode(line, type=Line | HealthLine)`.
+"""
+
+from msgspec import json
+from msgspec.structs import asdict
+
+from ..live.health import HealthReport
+from ..live.published import LiveGrasp
+from ..preshape.preshape import Preshape
+from .angles import JointAngles
+
+
+class Line(LiveGrasp, frozen=True, tag_field="kind", tag="grasp"):
+    """The fields of `LiveGrasp`, and behind them the preshape and the angles, null where there are none."""
+
+    preshape: Preshape | None = None
+    angles: JointAngles | None = None
+
+
+class HealthLine(HealthReport, frozen=True, tag_field="kind", tag="health"):
+    """The fields of `HealthReport`."""
+
+
+_encoder = json.Encoder()
+
+
+def encode(grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> bytes:
+    """Return a frame's line, its newline included. UTF-8, no newline inside."""
+    return _encoder.encode(Line(**asdict(grasp), preshape=preshape, angles=angles)) + b"\n"
+
+
+def encode_health(report: HealthReport) -> bytes:
+    """Return a report's line, its newline included."""
+    return _encoder.encode(HealthLine(**{name: getattr(report, name) for name in report.__struct_fields__})) + b"\n"

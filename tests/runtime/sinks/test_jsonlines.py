@@ -1,0 +1,128 @@
+"""JSON lines into files and pipes."""
+
+import io
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from msgspec import json
+
+from thenar.runtime.live.published import LiveGrasp
+from thenar.runtime.preshape import Preshape
+from thenar.runtime.sinks import JsonLines, Line, SinkError, open_sink
+
+MakeGrasp = Callable[..., LiveGrasp]
+
+
+def numbers(data: bytes) -> list[int]:
+    return [json.decode(line, type=Line).number for line in data.splitlines()]
+
+
+def test_every_frame_is_a_line(make_grasp: MakeGrasp, preshape: Preshape) -> None:
+    file = io.BytesIO()
+    sink = JsonLines(file)
+    for number in range(5):
+        sink.publish(make_grasp(number), preshape, None)
+    sink.close()
+    assert numbers(file.getvalue()) == list(range(5))
+    assert sink.report().sent == 5
+
+
+def test_a_file_on_disk_grows_and_keeps_what_it_has(make_grasp: MakeGrasp, tmp_path: Path) -> None:
+    path = tmp_path / "run.jsonl"
+    for number in (1, 2):
+        sink = open_sink(f"jsonl:{path}")
+        sink.publish(make_grasp(number), None, None)
+        sink.close()
+        sink.close()
+    assert numbers(path.read_bytes()) == [1, 2]
+
+
+def test_a_slow_pipe_loses_whole_lines_and_holds_nobody_up(make_grasp: MakeGrasp) -> None:
+    ours, theirs = os.pipe()
+    file = os.fdopen(theirs, "wb")
+    sink = JsonLines(file)
+    for number in range(2000):
+        sink.publish(make_grasp(number, lost=("s001",) * 20), None, None)
+    report = sink.report()
+    assert report.lost > 0
+    assert report.sent + report.lost == 2000
+    # The reader wakes up: what it finds are whole lines, and new ones follow.
+    os.set_blocking(ours, False)
+    read = os.read(ours, 1 << 20)
+    sink.publish(make_grasp(9999), None, None)
+    sink.close()
+    file.close()
+    read += os.read(ours, 1 << 20)
+    os.close(ours)
+    found = numbers(read)
+    assert found == sorted(set(found))
+    assert found[-1] == 9999
+    assert len(found) == report.sent + 1
+
+
+def test_a_replay_waits_for_its_reader_and_loses_nothing(make_grasp: MakeGrasp) -> None:
+    ours, theirs = os.pipe()
+    read = bytearray()
+
+    def drain() -> None:
+        while piece := os.read(ours, 4096):
+            read.extend(piece)
+
+    reader = threading.Thread(target=drain)
+    reader.start()
+    with os.fdopen(theirs, "wb") as file:
+        sink = JsonLines(file, wait=True)
+        for number in range(3000):
+            sink.publish(make_grasp(number), None, None)
+        sink.close()
+    reader.join(timeout=30)
+    os.close(ours)
+    assert numbers(bytes(read)) == list(range(3000))
+
+
+def test_a_reader_that_is_gone_is_told_in_the_report(make_grasp: MakeGrasp) -> None:
+    ours, theirs = os.pipe()
+    os.close(ours)
+    with os.fdopen(theirs, "wb") as file:
+        sink = JsonLines(file)
+        for number in range(3):
+            sink.publish(make_grasp(number), None, None)
+        report = sink.report()
+        sink.close()
+    assert (report.sent, report.lost, report.error) == (0, 3, "Broken pipe")
+
+
+def test_a_file_that_somebody_closed_raises_nothing(make_grasp: MakeGrasp) -> None:
+    file = io.BytesIO()
+    sink = JsonLines(file)
+    file.close()
+    sink.publish(make_grasp(), None, None)
+    assert sink.report().lost == 1
+
+
+def test_a_file_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SinkError, match="No such file or directory"):
+        open_sink(f"jsonl:{tmp_path}/nowhere/run.jsonl")
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(SinkError, match="is its reader running"):
+        open_sink(f"jsonl:{tmp_path}/pipe")
+
+
+def test_stdout_gets_the_lines_and_stays_open() -> None:
+    code = (
+        "from thenar.runtime.sinks import open_sink\n"
+        "from thenar.runtime.live.published import LiveGrasp\n"
+        "sink = open_sink('jsonl:-')\n"
+        "sink.publish(LiveGrasp(1, 2, 3, 'PoS', 'PoS', 0.5, 4, 'ok', None, None, 5), None, None)\n"
+        "sink.close()\n"
+        "print('and more')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+    first, second = done.stdout.splitlines()
+    assert json.decode(first, type=Line).number == 3
+    assert second == b"and more"

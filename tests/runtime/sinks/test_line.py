@@ -1,0 +1,54 @@
+"""A line of JSON holds everything that was published, and nothing but itself."""
+
+import json
+from collections.abc import Callable
+
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec import json as typed_json
+from msgspec.structs import asdict
+
+from thenar.runtime.live.health import HealthReport
+from thenar.runtime.live.published import LiveGrasp
+from thenar.runtime.preshape import Preshape
+from thenar.runtime.sinks import HealthLine, JointAngles, Line
+from thenar.runtime.sinks.line import encode, encode_health
+
+numbers = st.floats(allow_nan=False, allow_infinity=False)
+names = st.text(st.characters(codec="utf-8"))
+preshapes = st.builds(Preshape, names, st.tuples(names, names), st.tuples(numbers, numbers), numbers)
+angles = st.builds(JointAngles, st.tuples(names), st.tuples(numbers))
+grasps = st.builds(LiveGrasp, grasp=names, candidate=names, probability=numbers, lost=st.tuples(names, names))
+
+
+@given(grasps, st.none() | preshapes, st.none() | angles)
+def test_a_line_comes_back_as_it_was_published(
+    grasp: LiveGrasp, preshape: Preshape | None, angle: JointAngles | None
+) -> None:
+    line = encode(grasp, preshape, angle)
+    assert line.endswith(b"\n")
+    assert line.count(b"\n") == 1
+    assert typed_json.decode(line, type=Line) == Line(**asdict(grasp), preshape=preshape, angles=angle)
+
+
+def test_any_json_parser_reads_it(make_grasp: Callable[..., LiveGrasp], preshape: Preshape) -> None:
+    told = json.loads(encode(make_grasp(7), preshape, None))
+    assert told["number"] == 7
+    assert told["glove_age_us"] is None
+    assert told["lost"] == []
+    assert told["angles"] is None
+    assert told["preshape"] == {
+        "name": "cylindrical",
+        "joint_names": ["finger_1/prox_joint", "finger_1/med_joint"],
+        "positions": [0.0, 0.5],
+        "time_from_start_s": 1.25,
+    }
+
+
+def test_a_reader_tells_grasps_and_health_apart(make_grasp: Callable[..., LiveGrasp], health: HealthReport) -> None:
+    lines = [encode(make_grasp(7), None, None), encode_health(health)]
+    grasp, report = (typed_json.decode(line, type=Line | HealthLine) for line in lines)
+    assert isinstance(grasp, Line)
+    assert report == HealthLine(**{name: getattr(health, name) for name in health.__struct_fields__})
+    assert [json.loads(line)["kind"] for line in lines] == ["grasp", "health"]
+    assert lines[1].endswith(b"}\n")

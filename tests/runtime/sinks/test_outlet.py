@@ -1,0 +1,68 @@
+"""Whatever a slow reader takes, and whenever: it sees whole lines, in order, and no more than one waits for it."""
+
+import contextlib
+import os
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.runtime.sinks.outlet import Outlet, patient_writer
+
+
+class Reader:
+    """Takes so many bytes at each try: 0 is not now."""
+
+    def __init__(self, takes: list[int]) -> None:
+        self.takes = takes
+        self.got = b""
+
+    def write(self, data: bytes) -> int:
+        took = self.takes.pop(0) if self.takes else 0
+        if not took:
+            raise BlockingIOError
+        self.got += data[:took]
+        return min(took, len(data))
+
+
+@given(st.lists(st.integers(0, 12), max_size=60), st.lists(st.integers(0, 20), max_size=30))
+def test_a_reader_sees_whole_lines_only(takes: list[int], lengths: list[int]) -> None:
+    reader = Reader(takes)
+    outlet = Outlet(reader.write)
+    lines = [f"{number}:{'x' * length}\n".encode() for number, length in enumerate(lengths)]
+    sent = [line for line in lines if outlet.send(line)]
+    reader.takes = [100] * 2
+    outlet.send(b"")
+    assert reader.got == b"".join(sent)
+
+
+def test_a_reader_that_keeps_up_gets_every_line() -> None:
+    reader = Reader([100] * 50)
+    outlet = Outlet(reader.write)
+    assert all(outlet.send(b"line\n") for _ in range(50))
+    assert reader.got == b"line\n" * 50
+
+
+def test_a_line_that_nothing_was_taken_of_is_lost_rather_than_late() -> None:
+    reader = Reader([0, 100])
+    outlet = Outlet(reader.write)
+    assert not outlet.send(b"old\n")
+    assert outlet.send(b"new\n")
+    assert reader.got == b"new\n"
+
+
+def test_a_full_pipe_that_blocks_is_never_written_to() -> None:
+    ours, theirs = os.pipe()
+    write = patient_writer(theirs)
+    assert os.get_blocking(theirs)
+    with contextlib.suppress(BlockingIOError):
+        for _ in range(10_000):
+            write(b"x" * 5000)
+    with pytest.raises(BlockingIOError):
+        write(b"x")
+    assert len(os.read(ours, 4096)) == 4096
+    assert write(b"y" * 5000) == 4096
+    os.close(ours)
+    with pytest.raises(BrokenPipeError):
+        write(b"z")
+    os.close(theirs)
