@@ -1,4 +1,4 @@
-"""`thenar import`: a table of labelled grasps into a .grasps file."""
+"""`thenar import`: a table of labelled grasps, or recordings, into a .grasps file."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -8,36 +8,53 @@ import click
 from .common import existing_file, json_flag, keep_apart, out, output_file, print_json, progress
 
 if TYPE_CHECKING:
+    from ..compiler.recordings.graspset import GraspSet
     from ..compiler.recordings.importer import ImportReport
 
 
 @click.command("import")
-@click.argument("table", type=existing_file)
+@click.argument("tables", metavar="TABLE", type=existing_file, nargs=-1, required=True)
 @click.option("-o", "--output", type=output_file, required=True, help="The .grasps file to write.")
-@click.option("--columns", type=existing_file, required=True, help="columns.toml: what each column of the table is.")
+@click.option("--columns", type=existing_file, help="columns.toml: what each column of the table is.")
 @json_flag
-def command(table: Path, output: Path, columns: Path, as_json: bool) -> None:
+def command(tables: tuple[Path, ...], output: Path, columns: Path | None, as_json: bool) -> None:
     """Import TABLE (.csv, .csv.gz, .arff, .arff.gz or .npz) as labelled grasps.
 
     Missing or malformed cells and unknown labels stop the import, naming their rows and columns; what is merely odd
     (constant switches, rows that two subjects share, ...) is counted in warnings.
 
+    Recordings of `thenar record` (.mcap) say themselves what is in them; several, of several subjects, become one set.
+
     \b
     Example:
         thenar import trials.csv.gz -o set.grasps --columns columns.toml
+        thenar import anna.mcap ben.mcap -o set.grasps
     """
-    from ..compiler.recordings.importer import import_file
-
     if output.suffix != ".grasps":
         raise click.BadParameter(f"{output.name}: a set of grasps ends in .grasps", param_hint="--output")
-    keep_apart(table, columns, output)
-    with progress(f"importing {table.name}"):
-        grasp_set, report = import_file(table, columns)
+    keep_apart(*tables, columns, output)
+    with progress(f"importing {', '.join(table.name for table in tables)}"):
+        grasp_set, report = _imported(tables, columns)
     grasp_set.save(output)
     if as_json:
         print_json(report)
     else:
         _print(report, output)
+
+
+def _imported(tables: tuple[Path, ...], columns: Path | None) -> "tuple[GraspSet, ImportReport]":
+    from ..compiler.recordings.importer import import_file
+    from ..compiler.recordings.mcap_recording import import_recordings
+
+    if all(table.suffix.lower() == ".mcap" for table in tables):
+        if columns is not None:
+            raise click.UsageError("a recording says itself what its columns are: leave --columns out")
+        return import_recordings(tables)
+    if len(tables) > 1:
+        raise click.UsageError("several recordings (.mcap) can be imported together, but only one table")
+    if columns is None:
+        raise click.UsageError(f"{tables[0].name} is a table: say what its columns are with --columns")
+    return import_file(tables[0], columns)
 
 
 def _print(report: "ImportReport", output: Path) -> None:

@@ -1,10 +1,14 @@
 import json
+import os
 from pathlib import Path
 
 import pytest
 
 from thenar.cli import run
 from thenar.compiler import GraspSet
+from thenar.runtime.live.frames import SwitchFrame
+from thenar.runtime.recording.session import Collection, Label, Session, Task
+from thenar.runtime.recording.writer import Recorder
 
 TABLE = "label,who,s1,s2,j1\nmug,A,0,0,10.2\nball,A,1,0,20\nmug,B,0,0,30\nball,B,1,0,\n"
 COLUMNS = """label = "label"
@@ -109,3 +113,68 @@ def test_a_folder_is_no_file_to_write(folder: Path, capsys: pytest.CaptureFixtur
     (folder / "set.grasps").mkdir()
     assert thenar_import(folder) == 2
     assert "set.grasps' is a directory" in capsys.readouterr().err
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    types = ("cup", "pen")
+    tasks = tuple(Task(grasp, ("thing",)) for grasp in types)
+    session = Session(
+        thenar="1", switches=("s1", "s2"), sensors=(), collection=Collection("A", "own", types, tasks, 1, 0)
+    )
+    with Recorder(tmp_path / "a.mcap", session) as recorder:
+        for trial, grasp in enumerate(types, start=1):
+            recorder.switches(SwitchFrame(trial, trial))
+            recorder.label(Label(trial, "captured", trial, grasp, "A", "thing"))
+            recorder.label(Label(trial, "accepted", trial, grasp, "A", "thing"))
+    return recorder.path
+
+
+def test_a_recording_needs_no_columns(recording: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = folder / "set.grasps"
+    assert run(["import", str(recording), "-o", str(output)]) == 0
+    assert GraspSet.load(output).grasps.tolist() == ["cup", "pen"]
+    assert "2 grasps of 2 types (own); subjects 1, objects 1, switches 2, joints 0" in capsys.readouterr().out
+
+
+def test_a_cut_recording_is_imported_with_a_warning(
+    recording: Path, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    os.truncate(recording, recording.read_bytes().rindex(b'"accepted"'))
+    assert run(["import", str(recording), "-o", str(folder / "set.grasps")]) == 0
+    assert len(GraspSet.load(folder / "set.grasps")) == 1
+    assert "warning: a.mcap is whole up to byte " in capsys.readouterr().err
+
+
+def test_a_damaged_recording_is_one_sentence_with_file_and_byte(
+    recording: Path, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording.write_bytes(recording.read_bytes().replace(b'"captured"', b'"kaptured"'))
+    assert run(["import", str(recording), "-o", str(folder / "set.grasps")]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("thenar: a.mcap: the record at byte ")
+    assert said.count("\n") == 1
+    assert not (folder / "set.grasps").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("a.mcap", "--columns", "columns.toml"), "leave --columns out"),
+        (("table.csv",), "table.csv is a table: say what its columns are with --columns"),
+        (("table.csv", "a.mcap", "--columns", "columns.toml"), "only one table"),
+        (("a.mcap", "a.mcap"), "a.mcap is named twice"),
+        ((), "Missing argument 'TABLE'"),
+    ],
+)
+def test_what_cannot_be_imported_together_is_told(
+    recording: Path,
+    folder: Path,
+    arguments: tuple[str, ...],
+    said: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(folder)
+    assert run(["import", *arguments, "-o", "set.grasps"]) == 2
+    assert said in capsys.readouterr().err

@@ -1,0 +1,114 @@
+"""A guided collection under way: devices, terminal and recording around the Guide."""
+
+import sys
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+from threading import Event
+from typing import Protocol
+
+import click
+
+from ..compiler.recordings.names import check_names
+from ..compiler.recordings.taxonomy import Taxonomy
+from ..drivers.calibration import GloveCalibration, load_calibration
+from ..drivers.errors import SettingError
+from ..runtime.harness.wiring import GloveWiring, Harness
+from ..runtime.live.frames import now_us
+from ..runtime.live.keeper import DeviceState
+from ..runtime.live.sources import Sources, Taken
+from ..runtime.live.system import sensor_names_of
+from ..runtime.recording.guide import Guide, Stage
+from ..runtime.recording.session import Collection, Session
+from ..runtime.recording.trials import Journal, Trial
+from ..runtime.recording.writer import Recorder
+from ..runtime.scanning.whole import whole_scan
+from .common import err
+from .guide_keys import GuideKeys
+from .guide_view import GuideView
+from .run_live import ended_by_signals
+
+_WAIT_S = 0.05
+
+
+class Devices(Protocol):
+    """What a collection takes from `Sources`."""
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait until something has come in."""
+
+    def take(self) -> Taken:
+        """Return what has come in."""
+
+    def devices(self) -> tuple[DeviceState, ...]:
+        """Return how the devices fare."""
+
+    def raise_settings(self) -> None:
+        """Raise the SettingError of a device that can never work."""
+
+
+def collect(
+    harness: Harness,
+    file: Path,
+    collection: Collection,
+    left: Sequence[Trial],
+    recording: Path,
+    journal: Journal | None,
+    countdown_s: float,
+) -> int:
+    """Lead through the trials that are `left`; return how many were accepted.
+
+    Raises SettingError or DeviceError if a device cannot serve, click.ClickException if the recording cannot go on.
+    """
+    switches, sensors = harness.switches, sensor_names_of(harness.cyberglove)
+    check_names("column", (*switches, *sensors))
+    with ended_by_signals() as stop, Sources(harness, switches, whole_scan(harness, switches)) as sources:
+        session = Session(
+            thenar=version("thenar"),
+            switches=switches,
+            sensors=sensors,
+            harness=file.read_text("utf-8"),
+            calibration=_calibration(harness.cyberglove),
+            collection=collection,
+        )
+        if journal is not None:
+            _check_same_glove(journal, session)
+        with Recorder(recording, session, tail=None if journal is None else journal.tail) as recorder:
+            guide = Guide(left, recorder, round(countdown_s * 1e6))
+            done = 0 if journal is None else len(journal.accepted)
+            view = GuideView(err(), _taxonomy(collection), len(left) + done, done)
+            lead(guide, sources, recorder, view, stop)
+    if recorder.failure is not None:
+        raise click.ClickException(f"{recorder.failure}; make room, and the same command goes on")
+    return guide.accepted
+
+
+def lead(guide: Guide, devices: Devices, recorder: Recorder, view: GuideView, stop: Event) -> None:
+    """Lead through the guide's trials until they are done, the user leaves, `stop` is set, or the recording fails."""
+    with GuideKeys(sys.stdin.fileno()) as keys, view:
+        while guide.stage is not Stage.OVER and recorder.failure is None and not stop.is_set():
+            devices.wait(_WAIT_S)
+            devices.raise_settings()
+            guide.take(now_us(), devices.take().arrived)
+            for key in keys.pressed():
+                guide.press(now_us(), key)
+            view.show(now_us(), guide, devices.devices())
+
+
+def _taxonomy(collection: Collection) -> Taxonomy:
+    return Taxonomy(collection.taxonomy, collection.types)
+
+
+def _calibration(wiring: GloveWiring | None) -> GloveCalibration | None:
+    return None if wiring is None or wiring.calibration is None else load_calibration(Path(wiring.calibration))
+
+
+def _check_same_glove(journal: Journal, session: Session) -> None:
+    begun = journal.session
+    for what, before, now in (
+        ("switches", begun.switches, session.switches),
+        ("sensors", begun.sensors, session.sensors),
+        ("calibration", begun.calibration, session.calibration),
+    ):
+        if before != now:
+            raise SettingError(f"{journal.path} was begun with other {what}: name another --output for this glove")

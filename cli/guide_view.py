@@ -1,0 +1,95 @@
+"""What a guided collection shows: the grasp to take, the countdown, what was captured, and how far it is."""
+
+from collections.abc import Sequence
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+from ..compiler.recordings.taxonomy import Taxonomy
+from ..runtime.live.keeper import DeviceState
+from ..runtime.recording.guide import Guide, Stage
+
+if TYPE_CHECKING:
+    from ..runtime.recording.trials import Trial
+
+_REDRAW_US = 100_000
+_KEYS = {
+    Stage.READY: "Enter: start the countdown   q: leave, and go on another time",
+    Stage.COUNTDOWN: "r: begin the countdown again   q: leave",
+    Stage.REVIEW: "Enter: keep it, next grasp   r: do it again   q: leave",
+    Stage.OVER: "",
+}
+
+
+class GuideView:
+    """Draws on a terminal ten times a second and at every change, in place; elsewhere says in a line what is new."""
+
+    def __init__(self, console: Console, taxonomy: Taxonomy, total: int, done: int) -> None:
+        self._console = console
+        self._full = dict(zip(taxonomy.types, taxonomy.full_names, strict=True))
+        self._total, self._done = total, done
+        self._live = Live(console=console, auto_refresh=False, transient=True) if console.is_terminal else None
+        self._due_us = 0
+        self._shown: tuple[Stage, Trial | None] | None = None
+        self._said = ""
+
+    def __enter__(self) -> Self:
+        if self._live is not None:
+            self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._live is not None:
+            self._live.stop()
+
+    def show(self, now_us: int, guide: Guide, devices: Sequence[DeviceState]) -> None:
+        """Show where `guide` stands, if it is time to or news."""
+        if self._live is None:
+            self._say(guide)
+        elif now_us >= self._due_us or self._shown != (guide.stage, guide.trial):
+            self._due_us = now_us + _REDRAW_US
+            self._shown = guide.stage, guide.trial
+            self._live.update(self._drawn(now_us, guide, devices), refresh=True)
+
+    def _say(self, guide: Guide) -> None:
+        problem = f"not captured: {guide.problem}; " if guide.problem else ""
+        line = f"{self._task(guide)}: {problem}{_KEYS[guide.stage]}"
+        if line != self._said and guide.stage is not Stage.OVER:
+            self._said = line
+            self._console.print(line, soft_wrap=True)
+
+    def _drawn(self, now_us: int, guide: Guide, devices: Sequence[DeviceState]) -> RenderableType:
+        table = Table.grid(padding=(0, 2))
+        done = self._done + guide.accepted
+        table.add_row("done", Text(f"{done} of {self._total}"), ProgressBar(self._total, done, width=40))
+        for device in devices:
+            table.add_row(device.name, Text("connected") if device.connected else Text(device.error, style="red"))
+        stage = Text(self._standing(now_us, guide), style="bold")
+        return Group(table, Text(), Text(self._task(guide), style="bold cyan"), stage, Text(_KEYS[guide.stage]))
+
+    def _task(self, guide: Guide) -> str:
+        trial = guide.trial
+        if trial is None:
+            return ""
+        full = self._full[trial.grasp]
+        name = trial.grasp if full == trial.grasp else f"{full} ({trial.grasp})"
+        return f"{self._done + guide.accepted + 1} of {self._total}: {name}, object {trial.object}"
+
+    def _standing(self, now_us: int, guide: Guide) -> str:
+        if guide.problem:
+            return f"not captured: {guide.problem}"
+        if guide.stage is Stage.COUNTDOWN:
+            return f"hold it in {guide.seconds_left(now_us):.1f} s"
+        if guide.stage is not Stage.REVIEW:
+            return ""
+        switches, glove = guide.captured
+        closed = "" if switches is None else f"{switches.closed.bit_count()} switches closed"
+        sensors = "" if glove is None else "glove " + " ".join(map(str, glove.sensors))
+        return "captured: " + ", ".join(filter(None, (closed, sensors)))

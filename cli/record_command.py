@@ -1,0 +1,109 @@
+"""`thenar record`: guided collection of labelled grasps."""
+
+import secrets
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from .common import existing_file, keep_apart, output_file, progress
+
+if TYPE_CHECKING:
+    from ..runtime.recording.session import Collection
+    from ..runtime.recording.trials import Journal
+
+
+@click.command("record")
+@click.option("--glove", type=existing_file, required=True, help="The harness, a glove.toml.")
+@click.option("--taxonomy", default="kamakura14", show_default=True, help="kamakura14, cutkosky16, feix33 or own.")
+@click.option("--subject", required=True, help="Whose hand it is.")
+@click.option("--objects", type=existing_file, help="objects.toml: the objects of each grasp type.")
+@click.option("--repetitions", type=click.IntRange(1), default=100, show_default=True, help="Trials a grasp type.")
+@click.option(
+    "--countdown",
+    type=click.FloatRange(0.0),
+    default=3.0,
+    show_default=True,
+    help="Seconds before a grasp is captured.",
+)
+@click.option("--seed", type=click.IntRange(0), help="Of the random order; one is drawn otherwise.")
+@click.option("-o", "--output", type=output_file, required=True, help="The .grasps file to write.")
+def command(
+    glove: Path,
+    taxonomy: str,
+    subject: str,
+    objects: Path | None,
+    repetitions: int,
+    countdown: float,
+    seed: int | None,
+    output: Path,
+) -> None:
+    """Record labelled grasps: which one to take is shown, in random order, and counted down to.
+
+    What the devices deliver goes into OUTPUT with the ending .mcap as it comes. Whatever ends the collection, the same
+    command goes on where it stopped; each time it ends, all trials accepted so far are in OUTPUT.
+
+    \b
+    Example:
+        thenar record --glove glove.toml --subject A --objects objects.toml -o anna.grasps
+    """
+    from ..compiler.recordings.names import check_names
+    from ..compiler.recordings.objects import collected
+    from ..runtime.harness.loading import load_harness
+    from ..runtime.recording.session import Collection
+    from ..runtime.recording.trials import planned, read_journal
+    from .collecting import collect
+
+    if output.suffix != ".grasps":
+        raise click.BadParameter(f"{output.name}: a set of grasps ends in .grasps", param_hint="--output")
+    recording = output.with_suffix(".mcap")
+    keep_apart(glove, objects, output, recording)
+    harness = load_harness(glove)
+    check_names("subject", [subject])
+    types, tasks = collected(taxonomy, objects)
+    drawn = secrets.randbits(32) if seed is None else seed
+    wanted = Collection(subject, types.name, types.types, tasks, repetitions, drawn)
+    journal = None
+    if recording.exists():
+        with progress(f"reading {recording.name}"):
+            journal = read_journal(recording)
+        wanted = _resumed(journal, wanted, seed)
+    accepted = frozenset() if journal is None else journal.accepted
+    trials = planned(wanted)
+    left = [trial for trial in trials if trial.number not in accepted]
+    more = collect(harness, glove, wanted, left, recording, journal, countdown) if left else 0
+    _write(recording, output, len(accepted) + more, len(trials))
+
+
+def _resumed(journal: "Journal", wanted: "Collection", seed: int | None) -> "Collection":
+    """Return the collection to go on with, which must be the one that was begun."""
+    from msgspec.structs import asdict, replace
+
+    from ..drivers.errors import SettingError
+
+    begun = journal.session.collection
+    assert begun is not None
+    if seed is None:
+        wanted = replace(wanted, seed=begun.seed)
+    for name, value in asdict(wanted).items():
+        if value != getattr(begun, name):
+            raise SettingError(
+                f"{journal.path} was begun with other {name} than asked for now: "
+                "go on as it was begun, or name another --output"
+            )
+    return wanted
+
+
+def _write(recording: Path, output: Path, accepted: int, planned: int) -> None:
+    from ..compiler.recordings.mcap_recording import import_recordings
+
+    if not accepted:
+        click.echo(f"no trial was accepted: {output} is not written; the same command goes on")
+        return
+    with progress(f"importing {recording.name}"):
+        grasp_set, report = import_recordings([recording])
+    grasp_set.save(output)
+    for warning in report.warnings:
+        click.echo(f"warning: {warning.message}", err=True)
+    rest = "" if accepted == planned else "; the same command goes on"
+    click.echo(f"{output}: {len(grasp_set)} grasps; {accepted} of {planned} trials are done{rest}")

@@ -1,0 +1,1 @@
+"""Raw frames in MCAP files, which survive whatever ends the process."""

@@ -1,0 +1,74 @@
+"""Frames as bytes that a plot can show: a byte a switch, a byte a sensor.
+
+A switch's byte has bit 0 set when it is closed, bit 1 when it could not be read, bit 2 when it was left unread: 0 open,
+1 closed, 2 or more not known. Where switches were left unread because of a record of the glove, that record follows
+them: its time in microseconds of the host's monotonic clock (8 bytes, little-endian), then its bytes. The bytes of a
+glove are its sensors in wire order, then its status byte if it sends one.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FrameError
+from ..live.frames import GloveFrame, Mask, SwitchFrame
+from .errors import McapError
+
+_CLOSED, _LOST, _UNREAD = 1, 2, 4
+_TIME_BYTES = 8
+
+
+def switch_bytes(frame: SwitchFrame, switches: int, sensors: int) -> bytes:
+    """Return a byte for each of so many switches, and the record of so many sensors that the frame rests on, if any.
+
+    Raises FrameError if the frame is not of so many.
+    """
+    if (frame.closed | frame.lost | frame.unread) >> switches:
+        raise FrameError(f"a frame with bits beyond the {switches} switches that are recorded")
+    states = _spread(frame.closed, switches)
+    if frame.lost or frame.unread:
+        states = states + _LOST * _spread(frame.lost, switches) + _UNREAD * _spread(frame.unread, switches)
+    if frame.glove is None:
+        return states.tobytes()
+    return states.tobytes() + frame.glove.time_us.to_bytes(_TIME_BYTES, "little") + glove_bytes(frame.glove, sensors)
+
+
+def switch_frame(time_us: int, data: bytes, switches: int, sensors: int) -> SwitchFrame:
+    """Return the frame that `switch_bytes` made. Raises McapError."""
+    states, rest = data[:switches], data[switches:]
+    if len(states) < switches or 0 < len(rest) < _TIME_BYTES:
+        raise McapError(f"holds {len(data)} bytes, its session names {switches} switches")
+    array = np.frombuffer(states, np.uint8)
+    if switches and int(array.max()) > _CLOSED | _LOST | _UNREAD:
+        raise McapError(f"holds a switch in state {int(array.max())}")
+    glove_us = int.from_bytes(rest[:_TIME_BYTES], "little")
+    return SwitchFrame(
+        time_us,
+        closed=_gather(array, _CLOSED),
+        lost=_gather(array, _LOST),
+        unread=_gather(array, _UNREAD),
+        glove=glove_frame(glove_us, rest[_TIME_BYTES:], sensors) if rest else None,
+    )
+
+
+def glove_bytes(frame: GloveFrame, sensors: int) -> bytes:
+    """Return the record of so many sensors. Raises FrameError if it has another number."""
+    if len(frame.sensors) != sensors:
+        found = f"a record of {len(frame.sensors)} sensors, {sensors} are recorded"
+        raise FrameError(f"{found}: say under [cyberglove] of glove.toml how many there are")
+    return frame.sensors if frame.status is None else frame.sensors + bytes((frame.status,))
+
+
+def glove_frame(time_us: int, data: bytes, sensors: int) -> GloveFrame:
+    """Return the frame that `glove_bytes` made. Raises McapError."""
+    if len(data) - sensors not in (0, 1):
+        raise McapError(f"holds {len(data)} bytes, its session names {sensors} sensors")
+    return GloveFrame(time_us, data[:sensors], data[sensors] if len(data) > sensors else None)
+
+
+def _spread(mask: Mask, switches: int) -> NDArray[np.uint8]:
+    packed = np.frombuffer(mask.to_bytes((switches + 7) // 8, "little"), np.uint8)
+    return np.unpackbits(packed, count=switches, bitorder="little")
+
+
+def _gather(states: NDArray[np.uint8], flag: int) -> Mask:
+    return int.from_bytes(np.packbits(states & flag != 0, bitorder="little").tobytes(), "little")

@@ -1,0 +1,113 @@
+"""How a recording is laid out as MCAP: its channels, how it begins, and how it ends.
+
+Neither chunked nor compressed: a record is whole in the file as soon as it is written, so that a process that is killed
+loses at most the record that it was writing. All messages are standard ROS 2 messages in CDR under the profile `ros2`,
+with their definitions embedded: Foxglove shows them, `ros2 bag` plays them, and neither needs a package of ours.
+(MCAP specification, appendix `ros2`; rosbag2_storage_mcap, which reads a file without message indices in its order.)
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+from zlib import crc32
+
+from mcap.data_stream import RecordBuilder
+from mcap.records import Channel, DataEnd, Footer, Header, McapRecord, Metadata, MetadataIndex, Schema, Statistics
+
+from .cdr import BYTES, DEFINITIONS, STRING
+from .session import METADATA, Session, to_metadata
+
+MAGIC = b"\x89MCAP0\r\n"
+
+SWITCHES, GLOVE, GRASP, RECOGNITION, TRIALS = range(1, 6)
+# Channel number: (topic, type of its messages).
+CHANNELS = {
+    SWITCHES: ("/thenar/switches", BYTES),
+    GLOVE: ("/thenar/glove", BYTES),
+    GRASP: ("/thenar/grasp", STRING),
+    RECOGNITION: ("/thenar/recognition", STRING),
+    TRIALS: ("/thenar/trials", STRING),
+}
+_SCHEMAS = {name: number for number, name in enumerate(DEFINITIONS, start=1)}
+
+
+@dataclass(slots=True)
+class Tail:
+    """What the end of a recording says of it: length and CRC-32 of the data section so far, messages a channel, times
+    of the first and the last (nanoseconds since 1970), place and length of every session's record.
+    """
+
+    size: int = 0
+    crc: int = 0
+    counts: dict[int, int] = field(default_factory=lambda: dict.fromkeys(CHANNELS, 0))
+    first_ns: int | None = None
+    last_ns: int = 0
+    sessions: list[tuple[int, int]] = field(default_factory=list)
+
+    def add_bytes(self, data: bytes) -> None:
+        """Count bytes of the data section."""
+        self.size += len(data)
+        self.crc = crc32(data, self.crc)
+
+    def add_session(self, length: int) -> None:
+        """Count the session whose record ends here."""
+        self.sessions.append((self.size - length, length))
+
+    def add_message(self, channel: int, log_ns: int) -> None:
+        """Count a message."""
+        self.counts[channel] = self.counts.get(channel, 0) + 1
+        self.first_ns = log_ns if self.first_ns is None else min(self.first_ns, log_ns)
+        self.last_ns = max(self.last_ns, log_ns)
+
+
+def beginning(version: str) -> bytes:
+    """Return what a recording by this version of thenar begins with, up to its first session."""
+    return MAGIC + _written(Header("ros2", f"thenar {version}"), *_schemas(), *_channels())
+
+
+def session_record(session: Session) -> bytes:
+    """Return the record that begins a session."""
+    return _written(Metadata(METADATA, to_metadata(session)))
+
+
+def ending(tail: Tail) -> bytes:
+    """Return what closes a recording: the end of its data, a summary, the footer."""
+    data_end = _written(DataEnd(tail.crc))
+    indices = [MetadataIndex(offset, length, METADATA) for offset, length in tail.sessions]
+    summary = _written(*_schemas(), *_channels(), _statistics(tail), *indices)
+    start = tail.size + len(data_end)
+    # The CRC of a summary covers the footer up to the CRC itself.
+    open_footer = _written(Footer(start, 0, 0))[:-4]
+    footer = _written(Footer(start, 0, crc32(open_footer, crc32(summary))))
+    return data_end + summary + footer + MAGIC
+
+
+def _schemas() -> list[McapRecord]:
+    return [Schema(_SCHEMAS[name], text.encode(), "ros2msg", name) for name, text in DEFINITIONS.items()]
+
+
+def _channels() -> list[McapRecord]:
+    # The profile demands the key; empty, a player takes its own settings.
+    qos = {"offered_qos_profiles": ""}
+    return [Channel(number, topic, "cdr", qos, _SCHEMAS[name]) for number, (topic, name) in CHANNELS.items()]
+
+
+def _statistics(tail: Tail) -> Statistics:
+    return Statistics(
+        attachment_count=0,
+        channel_count=len(CHANNELS),
+        channel_message_counts=tail.counts,
+        chunk_count=0,
+        message_count=sum(tail.counts.values()),
+        message_end_time=tail.last_ns,
+        message_start_time=tail.first_ns or 0,
+        metadata_count=len(tail.sessions),
+        schema_count=len(_SCHEMAS),
+    )
+
+
+def _written(*records: McapRecord) -> bytes:
+    builder: Any = RecordBuilder()
+    for record in records:
+        record.write(builder)
+    data: bytes = builder.end()
+    return data

@@ -1,0 +1,120 @@
+"""What a recording says of itself: which glove, read how, for whom. Stands in the file as text for every MCAP tool.
+
+MCAP holds it as one Metadata record called `thenar`: a key a field, text as it is, all else as JSON. A recording that
+was resumed holds one for every time that it was begun, each with its own clock.
+"""
+
+import re
+from typing import Any, Literal
+
+import msgspec
+from msgspec.structs import fields
+
+from ...drivers.calibration import GloveCalibration
+from ..live.policy import Policy
+from .errors import McapError
+
+METADATA = "thenar"
+VERSION = 1
+
+
+class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A grasp type to collect, and the objects to grasp so, by turns."""
+
+    grasp: str
+    objects: tuple[str, ...]
+
+
+class Collection(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What is collected, and of whom: `repetitions` of every task in an order that `seed` draws.
+
+    `types` are those of the taxonomy, all of them and in its order; `tasks` may be fewer.
+    """
+
+    subject: str
+    taxonomy: str
+    types: tuple[str, ...]
+    tasks: tuple[Task, ...]
+    repetitions: int
+    seed: int
+
+
+Event = Literal["captured", "accepted", "redone"]
+
+
+class Label(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What happened to a trial, numbered from 1 in the order of the collection.
+
+    "captured": the frames before this one are the grasp; "accepted": those captured last are kept; "redone": they are
+    not. time_us is the host's monotonic clock.
+    """
+
+    time_us: int
+    event: Event
+    trial: int
+    grasp: str
+    subject: str
+    object: str
+
+
+class Session(msgspec.Struct, frozen=True, kw_only=True):
+    """One stretch of recording.
+
+    thenar       the version that recorded
+    build        checksum of the build.json in use; empty: none was, and no recognitions follow
+    harness      text of the glove.toml
+    switches     names of the switches, in the order of the frames' bits
+    sensors      names of the CyberGlove's sensors, in wire order
+    calibration  of the CyberGlove, if one was given
+    policy       how grasps were decided on; None: by none, or by an early version that did not say
+    collection   what was collected; None: an unlabelled run
+    clock_ns     nanoseconds since 1970 at which the monotonic clock of this session's frames was 0
+    """
+
+    thenar: str
+    switches: tuple[str, ...]
+    sensors: tuple[str, ...]
+    build: str = ""
+    harness: str = ""
+    calibration: GloveCalibration | None = None
+    policy: Policy | None = None
+    collection: Collection | None = None
+    clock_ns: int = 0
+
+
+def to_metadata(session: Session) -> dict[str, str]:
+    """Return `session` as the keys and texts of a Metadata record."""
+    texts = {field.name: _text(getattr(session, field.name)) for field in fields(Session)}
+    return {"version": str(VERSION), **texts}
+
+
+def from_metadata(texts: dict[str, str]) -> Session:
+    """Return the session that a Metadata record holds. Raises McapError saying which key is wrong."""
+    version = texts.get("version", "")
+    # No more digits than any version will have, and than int() takes.
+    if not re.fullmatch("[0-9]{1,9}", version):
+        raise McapError(f"its version is {version[:20]!r}, not a number: it was not recorded by thenar")
+    if int(version) > VERSION:
+        raise McapError(f"it is of version {version}, this thenar reads up to {VERSION}: update thenar")
+    return Session(**{field.name: _value(field, texts) for field in fields(Session) if field.name in _need(texts)})
+
+
+def _need(texts: dict[str, str]) -> dict[str, str]:
+    for field in fields(Session):
+        if field.required and field.name not in texts:
+            raise McapError(f"its metadata lack {field.name!r}: damaged, or not recorded by thenar")
+    return texts
+
+
+def _text(value: Any) -> str:
+    return value if isinstance(value, str) else msgspec.json.encode(value).decode()
+
+
+def _value(field: Any, texts: dict[str, str]) -> Any:
+    text = texts[field.name]
+    if field.type is str:
+        return text
+    try:
+        return msgspec.json.decode(text, type=field.type)
+    except (msgspec.DecodeError, ValueError, RecursionError) as wrong:
+        raise McapError(f"its metadata {field.name!r} cannot be read: {wrong}") from None

@@ -1,0 +1,283 @@
+"""A collection from end to end: the real command on a terminal of its own, real drivers, emulated devices on ptys."""
+
+import os
+import pty
+import re
+import resource
+import select
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from time import monotonic
+
+import pytest
+
+from thenar.cli import run
+from thenar.compiler import GraspSet
+from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
+from thenar.drivers.emulated.pty_line import PtyLine
+from thenar.drivers.emulated.scanner import EmulatedScanner
+from thenar.runtime.recording.trials import read_journal
+
+GLOVE = """name = "bench"
+[cyberglove]
+port = "{folder}/glove"
+[[scanner]]
+port = "{folder}/scanner"
+switches = ["s1", "", "s2", "s3"]
+"""
+OBJECTS = 'cup = ["mug", "jar"]\npen = ["biro"]\n'
+
+
+class Terminal:
+    """`thenar record` on a pty."""
+
+    def __init__(self, folder: Path, *more: str, most_bytes: int = resource.RLIM_INFINITY) -> None:
+        self.master, slave = pty.openpty()
+        options = ["--glove", folder / "glove.toml", "--taxonomy", "own", "--objects", folder / "objects.toml"]
+        options += ["--subject", "A", "--repetitions", "2", "--countdown", "0.05", "-o", folder / "set.grasps", *more]
+        command = [sys.executable, "-m", "thenar.cli", "record", *map(str, options)]
+        environment = os.environ | {"TERM": "xterm", "COLUMNS": "120", "LINES": "40"}
+        self.process = subprocess.Popen(
+            command,
+            stdin=slave,
+            stdout=slave,
+            stderr=slave,
+            start_new_session=True,
+            env=environment,
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, resource.RLIM_INFINITY)),
+        )
+        os.close(slave)
+        self.said = b""
+
+    def until(self, pattern: bytes, seconds: float = 30.0) -> bytes:
+        """Return what was said up to and with `pattern`, and forget it."""
+        end = monotonic() + seconds
+        while (found := re.search(pattern, self.said, re.DOTALL)) is None:
+            assert monotonic() < end, self.said[-3000:]
+            if select.select([self.master], [], [], 0.1)[0]:
+                self.said += self._read()
+        before, self.said = self.said[: found.end()], self.said[found.end() :]
+        return before
+
+    def press(self, keys: bytes) -> None:
+        os.write(self.master, keys)
+
+    def finish(self) -> tuple[int, str]:
+        """Return the exit code and the rest of what was said."""
+        while chunk := self._read():
+            self.said += chunk
+        return self.process.wait(30), self.said.decode("utf-8", "replace")
+
+    def close(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        os.close(self.master)
+
+    def _read(self) -> bytes:
+        try:
+            return os.read(self.master, 65536)
+        except OSError:  # the other end is closed
+            return b""
+
+
+Start = Callable[..., Terminal]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "glove.toml").write_text(GLOVE.format(folder=tmp_path))
+    (tmp_path / "objects.toml").write_text(OBJECTS)
+    return tmp_path
+
+
+@pytest.fixture
+def scanner(folder: Path) -> Iterator[EmulatedScanner]:
+    with PtyLine(folder / "scanner", 1_000_000) as line, EmulatedScanner(line, 4) as scanner:
+        yield scanner
+
+
+@pytest.fixture
+def glove(folder: Path) -> Iterator[EmulatedCyberGlove]:
+    with PtyLine(folder / "glove") as line, EmulatedCyberGlove(line) as glove:
+        glove.set(bytes(range(101, 119)))
+        yield glove
+
+
+@pytest.fixture
+def start(folder: Path) -> Iterator[Start]:
+    terminals: list[Terminal] = []
+
+    def begin(*more: str, most_bytes: int = resource.RLIM_INFINITY) -> Terminal:
+        terminals.append(Terminal(folder, *more, most_bytes=most_bytes))
+        return terminals[-1]
+
+    yield begin
+    for terminal in terminals:
+        terminal.close()
+
+
+@pytest.fixture(autouse=True)
+def hands(scanner: EmulatedScanner, glove: EmulatedCyberGlove) -> None:
+    scanner.set(0b0101)
+
+
+def reviewed(terminal: Terminal, number: int) -> None:
+    """Wait until this trial's grasp is there to judge; the countdown begins again while devices are on their way."""
+    screen = rb"%d of 4: (?:(?!of 4: ).)*?(not captured: |: keep it)" % number
+    while b"not captured" in terminal.until(screen):
+        terminal.press(b"\r")
+
+
+def test_a_whole_collection_becomes_a_set(folder: Path, start: Start, scanner: EmulatedScanner) -> None:
+    terminal = start("--seed", "5")
+    terminal.until(rb"Enter: start the countdown")
+    terminal.press(b"\r")
+    for number in (1, 2, 3, 4):
+        reviewed(terminal, number)
+        terminal.press(b"\r")
+    code, said = terminal.finish()
+    assert code == 0, said
+    assert "set.grasps: 4 grasps; 4 of 4 trials are done" in said
+    grasp_set = GraspSet.load(folder / "set.grasps")
+    assert sorted(zip(grasp_set.grasps.tolist(), grasp_set.objects.tolist(), strict=True)) == [
+        ("cup", "jar"),
+        ("cup", "mug"),
+        ("pen", "biro"),
+        ("pen", "biro"),
+    ]
+    assert grasp_set.switch_names == ("s1", "s2", "s3")
+    assert grasp_set.switches.tolist() == [[True, True, False]] * 4
+    assert grasp_set.codes.tolist() == [list(range(101, 117))] * 4
+    assert grasp_set.joint_names[:2] == ("thumb_rotation", "thumb_mpj")
+    assert grasp_set.subjects.tolist() == ["A"] * 4
+    assert run(["import", str(folder / "set.mcap"), "-o", str(folder / "again.grasps")]) == 0
+    assert (folder / "again.grasps").read_bytes() == (folder / "set.grasps").read_bytes()
+
+
+def test_after_a_kill_the_same_command_goes_on_where_it_was(folder: Path, start: Start) -> None:
+    first = start("--seed", "5")
+    first.until(rb"Enter: start the countdown")
+    first.press(b"\r")
+    reviewed(first, 1)
+    first.press(b"\r")
+    reviewed(first, 2)
+    os.killpg(first.process.pid, signal.SIGKILL)
+    first.process.wait()
+    assert read_journal(folder / "set.mcap").accepted == {1}
+    assert not (folder / "set.grasps").exists()
+
+    second = start()
+    said = second.until(rb"Enter: start the countdown")
+    assert b"2 of 4: " in said
+    second.press(b"\r")
+    for number in (2, 3, 4):
+        reviewed(second, number)
+        second.press(b"\r")
+    code, text = second.finish()
+    assert code == 0, text
+    assert "set.grasps: 4 grasps; 4 of 4 trials are done" in text
+    assert GraspSet.load(folder / "set.grasps").trials.tolist() == [1, 2, 3, 4]
+
+    third = start()
+    code, text = third.finish()
+    assert code == 0, text
+    assert "4 of 4 trials are done" in text
+
+
+def test_redone_and_left_is_what_was_accepted(folder: Path, start: Start, scanner: EmulatedScanner) -> None:
+    terminal = start()
+    terminal.until(rb"Enter: start the countdown")
+    terminal.press(b"\r")
+    reviewed(terminal, 1)
+    terminal.press(b"r")
+    terminal.until(rb"hold it in")
+    reviewed(terminal, 1)
+    terminal.press(b"a")
+    terminal.until(rb"2 of 4: ")
+    terminal.press(b"q")
+    code, said = terminal.finish()
+    assert code == 0, said
+    assert "1 of 4 trials are done; the same command goes on" in said
+    assert len(GraspSet.load(folder / "set.grasps")) == 1
+
+
+def test_a_full_disk_ends_it_with_a_sentence_and_room_lets_it_go_on(folder: Path, start: Start) -> None:
+    code, said = start(most_bytes=16_384).finish()
+    assert code == 2
+    words = " ".join(said.split())
+    assert "File too large: the recording has stopped after" in words
+    assert "make room, and the same command goes on" in words
+    again = start()
+    again.until(rb"1 of 4: ")
+    again.press(b"q")
+    assert again.finish()[0] == 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_it_cleanly(folder: Path, start: Start, number: signal.Signals) -> None:
+    terminal = start()
+    terminal.until(rb"Enter: start the countdown")
+    terminal.process.send_signal(number)
+    code, said = terminal.finish()
+    assert code == 0, said
+    assert "no trial was accepted" in said
+    assert not (folder / "set.grasps").exists()
+
+
+def test_a_device_that_is_gone_is_no_grasp(folder: Path, start: Start, glove: EmulatedCyberGlove) -> None:
+    terminal = start()
+    terminal.until(rb"Enter: start the countdown")
+    terminal.press(b"\r")
+    reviewed(terminal, 1)
+    glove.close()
+    terminal.press(b"r")
+    while b"not captured: the CyberGlove is silent" not in terminal.until(
+        rb"hold it in.*?(not captured: .{25}|: keep it)"
+    ):
+        terminal.press(b"r")
+    terminal.press(b"q")
+    code, said = terminal.finish()
+    assert code == 0, said
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (["--subject", "B"], "was begun with other subject than asked for now"),
+        (["--repetitions", "3"], "was begun with other repetitions"),
+        (["--seed", "6"], "was begun with other seed"),
+    ],
+)
+def test_another_collection_does_not_go_into_the_same_file(
+    folder: Path, start: Start, change: list[str], said: str
+) -> None:
+    first = start("--seed", "5")
+    first.until(rb"Enter: start the countdown")
+    first.press(b"q")
+    assert first.finish()[0] == 0
+    before = (folder / "set.mcap").read_bytes()
+    code, text = start(*change).finish()
+    assert code == 2
+    assert said in " ".join(text.split())
+    assert (folder / "set.mcap").read_bytes() == before
+
+
+def test_without_a_terminal_lines_are_the_keys(folder: Path) -> None:
+    options = ["--glove", folder / "glove.toml", "--taxonomy", "own", "--objects", folder / "objects.toml"]
+    options += ["--subject", "A", "--repetitions", "1", "--countdown", "0", "-o", folder / "set.grasps"]
+    command = [sys.executable, "-m", "thenar.cli", "record", *map(str, options)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdin is not None
+        assert process.stderr is not None
+        accepted = 0
+        for line in process.stderr:
+            accepted += b"keep it" in line
+            if b"Enter" in line:
+                process.stdin.write(b"\n")
+                process.stdin.flush()
+        assert accepted == 2
+        assert process.wait(30) == 0
+    assert len(GraspSet.load(folder / "set.grasps")) == 2

@@ -1,0 +1,170 @@
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from thenar.runtime.live.frames import GloveFrame, SwitchFrame
+from thenar.runtime.recording.guide import FRESH_US, Guide, Key, Stage
+from thenar.runtime.recording.reader import Reader
+from thenar.runtime.recording.session import Collection, Label, Session, Task
+from thenar.runtime.recording.trials import planned
+from thenar.runtime.recording.writer import Recorder
+
+COUNTDOWN_US = 3_000_000
+COLLECTION = Collection("A", "own", ("cup", "pen"), (Task("cup", ("mug",)), Task("pen", ("biro",))), 2, 1)
+
+
+@pytest.fixture
+def recorder(tmp_path: Path, session: Session) -> Recorder:
+    return Recorder(tmp_path / "a.mcap", replace(session, collection=COLLECTION))
+
+
+@pytest.fixture
+def guide(recorder: Recorder) -> Guide:
+    return Guide(planned(COLLECTION), recorder, COUNTDOWN_US)
+
+
+def whole(time_us: int, closed: int = 1) -> list[SwitchFrame | GloveFrame]:
+    return [SwitchFrame(time_us, closed), GloveFrame(time_us, b"\x01\x02", 3)]
+
+
+def events(recorder: Recorder) -> list[tuple[str, int]]:
+    return [(entry.event, entry.trial) for entry in Reader(recorder.path) if isinstance(entry, Label)]
+
+
+def stage(guide: Guide) -> Stage:
+    return guide.stage
+
+
+def test_one_key_a_trial_leads_through_all(guide: Guide, recorder: Recorder) -> None:
+    assert stage(guide) is Stage.READY
+    guide.press(0, Key.ACCEPT)
+    now = 0
+    for trial in planned(COLLECTION):
+        assert stage(guide) is Stage.COUNTDOWN
+        assert guide.trial == trial
+        assert guide.seconds_left(now) == 3.0
+        guide.take(now + COUNTDOWN_US - 1, whole(now + COUNTDOWN_US - 1))
+        assert stage(guide) is Stage.COUNTDOWN
+        now += COUNTDOWN_US
+        guide.take(now, whole(now))
+        assert stage(guide) is Stage.REVIEW
+        guide.press(now, Key.ACCEPT)
+    assert stage(guide) is Stage.OVER
+    assert guide.trial is None
+    assert guide.accepted == 4
+    assert events(recorder) == [(event, number) for number in (1, 2, 3, 4) for event in ("captured", "accepted")]
+
+
+def test_what_came_when_the_countdown_ended_is_captured_and_nothing_later(guide: Guide, recorder: Recorder) -> None:
+    guide.press(0, Key.ACCEPT)
+    guide.take(COUNTDOWN_US, whole(COUNTDOWN_US, closed=0b101))
+    guide.take(COUNTDOWN_US + 1, whole(COUNTDOWN_US + 1, closed=0b010))
+    assert guide.captured == (SwitchFrame(COUNTDOWN_US, 0b101), GloveFrame(COUNTDOWN_US, b"\x01\x02", 3))
+    entries = list(Reader(recorder.path))
+    before = entries[: next(place for place, entry in enumerate(entries) if isinstance(entry, Label))]
+    assert before[-2] == SwitchFrame(COUNTDOWN_US, 0b101)
+
+
+def test_a_grasp_may_be_done_again(guide: Guide, recorder: Recorder) -> None:
+    guide.press(0, Key.ACCEPT)
+    guide.take(COUNTDOWN_US, whole(COUNTDOWN_US))
+    guide.press(COUNTDOWN_US + 5, Key.REDO)
+    assert stage(guide) is Stage.COUNTDOWN
+    assert guide.seconds_left(COUNTDOWN_US + 5) == 3.0
+    guide.take(2 * COUNTDOWN_US + 5, whole(2 * COUNTDOWN_US + 5))
+    guide.press(2 * COUNTDOWN_US + 6, Key.ACCEPT)
+    assert events(recorder) == [("captured", 1), ("redone", 1), ("captured", 1), ("accepted", 1)]
+
+
+def test_a_countdown_may_begin_again_but_is_not_cut_short(guide: Guide) -> None:
+    guide.press(0, Key.ACCEPT)
+    guide.press(1000, Key.ACCEPT)
+    assert guide.seconds_left(0) == 3.0
+    guide.press(1000, Key.REDO)
+    assert guide.seconds_left(1000) == 3.0
+
+
+@pytest.mark.parametrize("presses", range(3))
+def test_one_may_leave_at_any_time(guide: Guide, recorder: Recorder, presses: int) -> None:
+    for press in range(presses):
+        guide.press(0, Key.ACCEPT)
+        guide.take((press + 1) * COUNTDOWN_US, whole((press + 1) * COUNTDOWN_US))
+    guide.press(10 * COUNTDOWN_US, Key.QUIT)
+    assert stage(guide) is Stage.OVER
+    assert [event for event, _ in events(recorder)].count("accepted") == max(0, presses - 1)
+
+
+@pytest.mark.parametrize(
+    ("frames", "problem"),
+    [
+        ([], "the switches are silent"),
+        ([SwitchFrame(COUNTDOWN_US, 0)], "the CyberGlove is silent"),
+        ([GloveFrame(COUNTDOWN_US, b"12")], "the switches are silent"),
+        (whole(COUNTDOWN_US - FRESH_US - 1), "the switches are silent"),
+        (
+            [SwitchFrame(COUNTDOWN_US, 0), GloveFrame(COUNTDOWN_US - FRESH_US - 1, b"12")],
+            "the CyberGlove is silent",
+        ),
+        ([SwitchFrame(COUNTDOWN_US, 0, lost=0b101)], "switches cannot be read: s000, s002"),
+        ([SwitchFrame(COUNTDOWN_US, 0, unread=1 << 11)], "switches cannot be read: s011"),
+        (
+            [SwitchFrame(COUNTDOWN_US, 0), GloveFrame(COUNTDOWN_US, b"12", 0b110)],
+            "the CyberGlove is not plugged into its box",
+        ),
+    ],
+)
+def test_nothing_is_captured_of_devices_that_are_not_all_there(
+    guide: Guide, recorder: Recorder, frames: list[SwitchFrame | GloveFrame], problem: str
+) -> None:
+    guide.press(0, Key.ACCEPT)
+    guide.take(COUNTDOWN_US, frames)
+    assert (guide.stage, guide.problem) == (Stage.READY, problem)
+    assert events(recorder) == []
+    guide.press(COUNTDOWN_US, Key.ACCEPT)
+    assert guide.problem == ""
+    guide.take(2 * COUNTDOWN_US, whole(2 * COUNTDOWN_US))
+    assert stage(guide) is Stage.REVIEW
+
+
+def test_a_frame_as_old_as_may_be_is_captured(guide: Guide) -> None:
+    guide.press(0, Key.ACCEPT)
+    guide.take(COUNTDOWN_US, whole(COUNTDOWN_US - FRESH_US))
+    assert stage(guide) is Stage.REVIEW
+
+
+def test_a_glove_without_switches_and_switches_without_a_glove_are_enough(tmp_path: Path, session: Session) -> None:
+    frames: tuple[SwitchFrame | GloveFrame, ...] = GloveFrame(0, b"12"), SwitchFrame(0, 1)
+    for frame, bare in zip(frames, (replace(session, switches=()), replace(session, sensors=())), strict=True):
+        recorder = Recorder(tmp_path / f"{len(bare.sensors)}.mcap", replace(bare, collection=COLLECTION))
+        guide = Guide(planned(COLLECTION), recorder, 0)
+        guide.press(0, Key.ACCEPT)
+        guide.take(0, [frame])
+        assert stage(guide) is Stage.REVIEW
+
+
+def test_nothing_left_is_over_at_once(recorder: Recorder) -> None:
+    assert Guide([], recorder, 0).stage is Stage.OVER
+
+
+@settings(deadline=None)
+@given(st.lists(st.sampled_from([*Key, None]), max_size=40))
+def test_whatever_is_pressed_each_trial_is_accepted_once_and_in_order(
+    tmp_path_factory: pytest.TempPathFactory, presses: list[Key | None]
+) -> None:
+    session = Session(thenar="1", switches=("s",), sensors=(), collection=COLLECTION)
+    with Recorder(tmp_path_factory.mktemp("guide") / "a.mcap", session) as recorder:
+        guide = Guide(planned(COLLECTION), recorder, 10)
+        for time_us, press in enumerate(presses):
+            if press is None or guide.stage is Stage.OVER:
+                guide.take(20 * time_us, [SwitchFrame(20 * time_us, 1)])
+            else:
+                guide.press(20 * time_us, press)
+    told = events(recorder)
+    accepted = [trial for event, trial in told if event == "accepted"]
+    assert accepted == list(range(1, guide.accepted + 1))
+    for (event, trial), (before, other) in zip(told[1:], told, strict=False):
+        assert (event == "captured") != (before == "captured")
+        assert event == "captured" or trial == other

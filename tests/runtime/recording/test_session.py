@@ -1,0 +1,60 @@
+import pytest
+from msgspec.structs import replace
+
+from thenar.runtime.recording.errors import McapError
+from thenar.runtime.recording.session import Session, from_metadata, to_metadata
+
+
+def test_a_session_comes_back_from_its_texts(session: Session) -> None:
+    assert from_metadata(to_metadata(session)) == session
+    bare = Session(thenar="1", switches=(), sensors=())
+    assert from_metadata(to_metadata(bare)) == bare
+
+
+def test_texts_are_readable_as_they_are(session: Session) -> None:
+    texts = to_metadata(session)
+    assert texts["version"] == "1"
+    assert texts["harness"] == 'name = "bänk"\n'
+    assert texts["sensors"] == '["thumb","index"]'
+    assert all(isinstance(text, str) for text in texts.values())
+
+
+def test_keys_of_a_later_thenar_are_passed_over(session: Session) -> None:
+    assert from_metadata({**to_metadata(session), "weather": "rain"}) == session
+
+
+def test_what_has_a_default_may_be_missing(session: Session) -> None:
+    texts = to_metadata(replace(session, build="", harness="", calibration=None, collection=None, clock_ns=0))
+    needed = {key: texts[key] for key in ("version", "thenar", "switches", "sensors")}
+    assert from_metadata(needed) == from_metadata(texts)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"version": "2"}, "of version 2, this thenar reads up to 1: update thenar"),
+        ({"version": "9" * 5000}, "not a number"),
+        ({"version": "x"}, "its version is 'x', not a number"),
+        ({"version": "²"}, "not a number"),
+        ({"switches": "s1"}, "its metadata 'switches' cannot be read"),
+        ({"switches": "[" * 100_000}, "its metadata 'switches' cannot be read"),
+        (
+            {"calibration": '{"sensor": [{"name": "a", "raw_a": 1, "raw_b": 1, "value_a": 0, "value_b": 1}]}'},
+            "calibration",
+        ),
+        ({"clock_ns": "1e400"}, "clock_ns"),
+    ],
+)
+def test_a_session_that_cannot_be_read_is_refused_by_its_key(
+    session: Session, change: dict[str, str], said: str
+) -> None:
+    with pytest.raises(McapError, match=said):
+        from_metadata({**to_metadata(session), **change})
+
+
+@pytest.mark.parametrize("key", ["version", "thenar", "switches", "sensors"])
+def test_what_is_needed_is_missed(session: Session, key: str) -> None:
+    texts = to_metadata(session)
+    del texts[key]
+    with pytest.raises(McapError, match=key):
+        from_metadata(texts)

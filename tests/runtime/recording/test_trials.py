@@ -1,0 +1,87 @@
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from thenar.drivers.errors import SettingError
+from thenar.runtime.recording.session import Collection, Label, Session, Task
+from thenar.runtime.recording.trials import planned, read_journal
+from thenar.runtime.recording.writer import Recorder
+
+TASKS = (Task("cup", ("mug", "jar")), Task("pen", ("biro",)), Task("rod", ("a", "b", "c")))
+
+
+def collection(repetitions: int = 4, seed: int = 0, tasks: tuple[Task, ...] = TASKS) -> Collection:
+    return Collection("A", "own", tuple(task.grasp for task in tasks), tasks, repetitions, seed)
+
+
+@given(st.integers(1, 30), st.integers(0, 2**32))
+def test_every_type_comes_as_often_and_its_objects_by_turns(repetitions: int, seed: int) -> None:
+    trials = planned(collection(repetitions, seed))
+    assert [trial.number for trial in trials] == list(range(1, 3 * repetitions + 1))
+    assert Counter(trial.grasp for trial in trials) == dict.fromkeys(("cup", "pen", "rod"), repetitions)
+    for task in TASKS:
+        counts = Counter(trial.object for trial in trials if trial.grasp == task.grasp)
+        assert max(counts.values()) - min(counts[name] for name in task.objects) <= 1
+
+
+def test_the_papers_protocol_is_1400_samples_a_subject() -> None:
+    tasks = tuple(Task(f"type {number}", ("small", "large")) for number in range(14))
+    trials = planned(collection(100, tasks=tasks))
+    assert len(trials) == 1400
+    assert set(Counter((trial.grasp, trial.object) for trial in trials).values()) == {50}
+
+
+@given(st.integers(0, 2**32))
+def test_equal_seeds_give_equal_orders_and_others_mostly_others(seed: int) -> None:
+    assert planned(collection(10, seed)) == planned(collection(10, seed))
+    assert planned(collection(10, seed)) != planned(collection(10, seed + 1))
+
+
+def test_the_order_is_that_of_all_pythons() -> None:
+    assert "".join(trial.grasp[0] for trial in planned(collection(5, 3))) == "pppcpcrrcccrrpr"
+
+
+def test_every_order_is_as_likely() -> None:
+    tasks = TASKS[:2]
+    first = Counter(planned(collection(1, seed, tasks))[0].grasp for seed in range(2000))
+    # 1000 expected, 22 the standard deviation.
+    assert abs(first["cup"] - 1000) < 100
+
+
+def begun(path: Path, session: Session, events: list[tuple[str, int]]) -> None:
+    with Recorder(path, replace(session, collection=collection())) as recorder:
+        for event, trial in events:
+            recorder.label(Label(trial, event, trial, "cup", "A", "mug"))  # type: ignore[arg-type]
+
+
+def test_a_journal_knows_what_was_accepted(tmp_path: Path, session: Session) -> None:
+    path = tmp_path / "a.mcap"
+    events = [("captured", 1), ("accepted", 1), ("captured", 2), ("redone", 2), ("captured", 2), ("accepted", 2)]
+    begun(path, session, [*events, ("captured", 3)])
+    journal = read_journal(path)
+    assert journal.accepted == {1, 2}
+    assert journal.session.collection == collection()
+    with Recorder(path, replace(session, collection=collection()), tail=journal.tail) as recorder:
+        recorder.label(Label(9, "accepted", 3, "cup", "A", "mug"))
+    assert read_journal(path).accepted == {1, 2, 3}
+
+
+def test_a_recording_without_trials_is_no_journal(tmp_path: Path, session: Session) -> None:
+    path = tmp_path / "a.mcap"
+    Recorder(path, replace(session, collection=None)).close()
+    with pytest.raises(SettingError, match="a recording without trials: name another output"):
+        read_journal(path)
+
+
+def test_behind_what_another_program_added_nothing_is_recorded(tmp_path: Path, session: Session) -> None:
+    path = tmp_path / "a.mcap"
+    begun(path, session, [("captured", 1)])
+    data = path.read_bytes()
+    end = data.rindex(b"\x0f\x04\0\0\0\0\0\0\0")
+    path.write_bytes(data[:end] + b"\x80" + (5).to_bytes(8, "little") + b"12345" + data[end:])
+    with pytest.raises(SettingError, match="was changed by another program"):
+        read_journal(path)
