@@ -17,7 +17,7 @@ help:           ## list the targets
 $(VENV)/installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
-	$(BIN)/python -m pip install --quiet --editable ".[compiler,sim,stability]" --group dev
+	$(BIN)/python -m pip install --quiet --editable ".[compiler,sim,stability,ros]" --group dev
 	touch $@
 
 demo: $(VENV)/installed  ## simulate, draw, evaluate, compile, verify, run: SCENE=quick
@@ -26,10 +26,13 @@ demo: $(VENV)/installed  ## simulate, draw, evaluate, compile, verify, run: SCEN
 	$(BIN)/thenar draw $(OUT)/set.grasps -o $(OUT)/contacts.svg
 	$(BIN)/thenar draw $(OUT)/set.grasps --place -o $(OUT)/kept.svg
 	$(BIN)/thenar evaluate $(OUT)/set.grasps -o $(OUT)/evaluation.json
-	$(BIN)/thenar compile $(OUT)/set.grasps -o $(OUT)/build
+	$(BIN)/thenar compile $(OUT)/set.grasps -o $(OUT)/build --propose $(OUT)/glove.toml --chip board --overwrite
 	$(BIN)/thenar verify $(OUT)/build $(OUT)/set.grasps
 	$(BIN)/thenar run $(OUT)/build --replay $(OUT)/set.grasps > $(OUT)/grasps.jsonl
-	@echo "Simulated grasps are in $(OUT)/set.grasps, the build is in $(OUT)/build, one recognised grasp a line in $(OUT)/grasps.jsonl;"
+	$(BIN)/thenar emulate "$(SCENE)" --glove $(OUT)/glove.toml --dir $(OUT)/emulated --period-ms 150 -- \
+	    $(BIN)/thenar run $(OUT)/build --glove $(OUT)/emulated/glove.toml --frames 2000 > $(OUT)/live.jsonl
+	@echo "Simulated grasps are in $(OUT)/set.grasps, the build is in $(OUT)/build, one recognised grasp a line in $(OUT)/grasps.jsonl,"
+	@echo "live ones, from a glove that was emulated, in $(OUT)/live.jsonl;"
 	@echo "hand maps: $(OUT)/contacts.svg (which switches close), $(OUT)/kept.svg (which are kept); the rates: $(OUT)/evaluation.json."
 
 test: $(VENV)/installed  ## the tests, under ten minutes on two cores

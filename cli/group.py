@@ -14,7 +14,7 @@ from ..drivers.errors import ThenarError
 
 COMMANDS = (
     *("simulate", "plan", "import", "export", "info", "place", "draw", "evaluate", "compile", "verify", "run"),
-    "stability",
+    *("calibrate", "record", "emulate", "doctor", "stability"),
 )
 
 # Packages that another extra than `compiler` brings.

@@ -44,6 +44,7 @@ ALLOWED = {
         "compiler.evaluation",
     ),
     "simulator.body": (
+        "drivers.cyberglove_sensors",
         "compiler.elementary",
         "compiler.recordings",
         "simulator.streams",

@@ -1,0 +1,64 @@
+"""`thenar doctor`: is every device of a harness there, and as fast as its wire?"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from .common import existing_file, existing_folder, json_flag, out, print_json, progress
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..runtime.live.checkup import Finding
+
+
+@click.command("doctor")
+@click.argument("glove", metavar="glove.toml", type=existing_file)
+@click.option("--build", metavar="BUILD", type=existing_folder, help="Look only at what this build reads of the glove.")
+@json_flag
+def command(glove: Path, build: Path | None, as_json: bool) -> None:
+    """Open every device of glove.toml and say what is there, how fast it is and how fast its wire would let it be.
+
+    Exit code 1 if something is missing.
+
+    \b
+    Example:
+        thenar doctor glove.toml --build build/
+    """
+    from ..runtime.build import Build
+    from ..runtime.harness.loading import load_harness
+    from ..runtime.live.checkup import check_up
+    from ..runtime.live.system import System
+    from ..runtime.scanning.whole import whole_scan
+
+    harness = load_harness(glove)
+    scan = whole_scan(harness, harness.switches) if build is None else System.map_of(Build.load(build), harness)
+    looks, found = list(check_up(harness, scan)), list["Finding"]()
+    with progress("looking") as report:
+        for number, look in enumerate(looks):
+            found += look()
+            report(number + 1, len(looks))
+    if as_json:
+        print_json(found)
+    else:
+        _print(found)
+    if not all(finding.present for finding in found):
+        click.get_current_context().exit(1)
+
+
+def _print(found: "Sequence[Finding]") -> None:
+    from rich.table import Table
+
+    table = Table(title="Devices")
+    for heading in ("device", "part", "there", "predicted us", "measured us"):
+        table.add_column(heading, justify="right" if heading.endswith("us") else "left")
+    for one in found:
+        measured = "" if one.measured_us is None else f"{one.measured_us:.0f}"
+        there = ("slow" if one.slow else "yes") if one.present else "no"
+        table.add_row(one.device, one.part, there, f"{one.predicted_us:.0f}", measured)
+    console = out()
+    console.print(table)
+    for one in found:
+        for remark in one.remarks:
+            console.print(f"{one.device}{' ' if one.part else ''}{one.part}: {remark}")

@@ -1,0 +1,204 @@
+"""`thenar emulate`: a glove that is not there, on real ports, playing a scene or a recording."""
+
+import os
+import signal
+import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from pathlib import Path
+from threading import Event, Thread
+from typing import IO, TYPE_CHECKING, Literal
+
+import click
+import msgspec
+
+from .common import existing_file, output_file, progress
+from .run_live import ended_by_signals
+
+if TYPE_CHECKING:
+    from ..simulator.playing.bench import Bench
+    from ..simulator.playing.cable import Cable
+    from ..simulator.playing.performance import Performance
+    from ..simulator.playing.player import Log
+
+    CableOf = Callable[[int], Cable | None]
+
+_ADAPTERS = ("any", "bcm2835", "designware", "i2c-gpio", "smbus-only")
+_GRACE_S = 5.0
+_FRAME_US = 10_000
+
+
+class Played(msgspec.Struct, frozen=True):
+    """A line of --log: the frame with this number is shown from this time of the monotonic clock on."""
+
+    time_us: int
+    row: int
+    grasp: str
+
+
+@click.command("emulate", context_settings={"ignore_unknown_options": True})
+@click.argument("source", metavar="SCENE|FILE")
+@click.argument("client", nargs=-1, type=click.UNPROCESSED, metavar="[-- COMMAND...]")
+@click.option("--glove", metavar="glove.toml", type=existing_file, required=True, help="The harness to emulate.")
+@click.option(
+    "--dir",
+    "folder",
+    metavar="DIR",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path("emulated"),
+    show_default=True,
+    help="Where the ports are linked, beside a glove.toml that names them and the subject's calibration.",
+)
+@click.option("--subject", metavar="NAME", help="Whose session of a scene to play [default: the first subject's].")
+@click.option(
+    "--period-ms", type=click.FloatRange(1, 60_000), help="Time from one frame to the next [default: the scene's]."
+)
+@click.option("--repeat", is_flag=True, help="Play again and again, until Ctrl-C or the command ends.")
+@click.option(
+    "--adapter", type=click.Choice(_ADAPTERS), default="any", show_default=True, help="What the I2C bus can batch."
+)
+@click.option("--log", metavar="FILE.jsonl", type=output_file, help="Note there when which frame was shown.")
+def command(
+    source: str,
+    client: tuple[str, ...],
+    glove: Path,
+    folder: Path,
+    subject: str | None,
+    period_ms: float | None,
+    repeat: bool,
+    adapter: Literal["any", "bcm2835", "designware", "i2c-gpio", "smbus-only"],
+    log: Path | None,
+) -> None:
+    """Emulate the devices of a harness and play on them: a SCENE (a shipped one or a .toml file), a .grasps set, or the
+    .mcap recording of a live run.
+
+    A CyberGlove and scanner boards appear as serial ports in DIR, paced like the wire, with the wire effects that the
+    scene lists; expanders on /dev/i2c-N, through umockdev. With a COMMAND, that runs beside the emulated glove and sees
+    it: {glove} in it stands for the glove.toml that names the emulated ports. It is ended when the playing is over.
+
+    \b
+    Examples:
+        thenar emulate quick --glove glove.toml --repeat
+        thenar emulate continuous --glove glove.toml -- thenar run build/ --glove {glove} --sink jsonl:-
+    """
+    from ..runtime.harness.loading import load_harness
+    from ..simulator.playing.bench import Bench
+
+    harness = load_harness(glove)
+    performance, cable = _performance(source, subject, period_ms)
+    with ExitStack() as stack:
+        stop = stack.enter_context(ended_by_signals())
+        folder.mkdir(parents=True, exist_ok=True)
+        bench = stack.enter_context(
+            Bench(harness, performance.switch_names, folder.resolve(), cable=cable, adapter=adapter)
+        )
+        emulated = _write_harness(bench, performance, folder)
+        note = stack.enter_context(_noting(log))
+        _tell_how(bench, emulated)
+        child = _started(client, emulated, bench, stop) if client else None
+        _play(bench, performance, note, stop, repeat=repeat)
+        if child is not None:
+            click.get_current_context().exit(_ended(child))
+
+
+def _performance(source: str, subject: str | None, period_ms: float | None) -> tuple["Performance", "CableOf"]:
+    """Return what to play, and what happens on serial line n."""
+    from ..simulator.playing import performance
+
+    given_us = None if period_ms is None else round(period_ms * 1000)
+    path = Path(source)
+    if path.suffix in (".grasps", ".mcap"):
+        if not path.exists():
+            raise click.BadParameter(f"there is no file {path}", param_hint="SOURCE")
+        if subject is not None:
+            raise click.UsageError("--subject picks one of a scene's subjects: a recording has its own")
+        if path.suffix == ".mcap":
+            return performance.of_recording(path, given_us or _FRAME_US), _no_cable
+        from ..compiler.recordings.graspset import GraspSet
+
+        return performance.of_set(GraspSet.load(path), given_us or _FRAME_US), _no_cable
+    from ..simulator.playing.cable import cable_of
+    from ..simulator.scenes.decode import load_scene
+
+    scene = load_scene(source)
+    with progress("simulating") as report:
+        played = performance.of_scene(scene, subject, progress=report)
+    played = played if given_us is None else replace(played, period_us=given_us)
+    return played, lambda line: cable_of(scene, line)
+
+
+def _no_cable(_line: int) -> "Cable | None":
+    return None
+
+
+def _write_harness(bench: "Bench", performance: "Performance", folder: Path) -> Path:
+    """Write the harness that names the emulated ports, and the subject's calibration; return the harness's path."""
+    from ..runtime.files import write_atomically
+    from ..runtime.harness.writing import harness_to_toml
+
+    harness = bench.harness
+    if harness.cyberglove is not None:
+        write_atomically(folder / "calibration.toml", performance.calibration.to_toml().encode())
+        glove = msgspec.structs.replace(harness.cyberglove, calibration="calibration.toml")
+        harness = msgspec.structs.replace(harness, cyberglove=glove)
+    write_atomically(folder / "glove.toml", harness_to_toml(harness).encode())
+    return folder / "glove.toml"
+
+
+def _tell_how(bench: "Bench", emulated: Path) -> None:
+    """Say on stderr how to meet the emulated glove."""
+    click.echo(f"emulated glove: {emulated}; run it with: thenar run BUILD --glove {emulated}", err=True)
+    if bench.environment:
+        settings = " ".join(f"{name}={value}" for name, value in bench.environment.items())
+        click.echo(f"for its I2C buses, put before that command: {settings}", err=True)
+
+
+@contextmanager
+def _noting(log: Path | None) -> Iterator["Log"]:
+    """Yield what notes every frame in `log`, a line each, as soon as it is shown."""
+    if log is None:
+        yield lambda row, grasp, time_us: None
+        return
+    with log.open("wb", buffering=0) as file:
+        yield lambda row, grasp, time_us: _write(file, Played(time_us, row, grasp))
+
+
+def _write(file: IO[bytes], played: Played) -> None:
+    file.write(msgspec.json.encode(played) + b"\n")
+
+
+def _started(client: tuple[str, ...], emulated: Path, bench: "Bench", stop: Event) -> "subprocess.Popen[bytes]":
+    """Start the command beside the emulated glove; `stop` is set when it ends."""
+    arguments = [argument.replace("{glove}", str(emulated)) for argument in client]
+    try:
+        # In a process group of its own, so that Ctrl-C comes to it from here, once.
+        child = subprocess.Popen(arguments, env={**os.environ, **bench.environment}, process_group=0)
+    except OSError as wrong:
+        raise click.UsageError(f"{arguments[0]} cannot be run: {wrong.strerror}") from None
+
+    def watch() -> None:
+        child.wait()
+        stop.set()
+
+    Thread(target=watch, name="thenar client", daemon=True).start()
+    return child
+
+
+def _play(bench: "Bench", performance: "Performance", note: "Log", stop: Event, *, repeat: bool) -> None:
+    from ..simulator.playing.player import Player
+
+    player = Player(performance, bench.show, note)
+    while player.play(stop) and repeat:
+        pass
+
+
+def _ended(child: "subprocess.Popen[bytes]") -> int:
+    """End the command, unless it has ended; return its exit code."""
+    if child.poll() is None:
+        child.send_signal(signal.SIGINT)
+    try:
+        return child.wait(_GRACE_S)
+    except subprocess.TimeoutExpired:
+        child.kill()
+        return child.wait()

@@ -1,0 +1,86 @@
+"""The live terminal view of `thenar run`: the grasp, how far to trust it, and how the devices fare."""
+
+from collections.abc import Callable, Sequence
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from ..runtime.live.health import DeviceHealth, HealthReport
+from ..runtime.live.published import LiveGrasp
+
+_REDRAWS_HZ = 10
+_STYLES = {"ok": "bold green", "degraded": "bold yellow", "unknown": "bold red"}
+_BAR = 30
+_SHOWN = 6
+
+
+class LiveView:
+    """Draws the newest grasp ten times a second, in place."""
+
+    def __init__(self, console: Console) -> None:
+        self._live = Live(console=console, refresh_per_second=_REDRAWS_HZ, transient=True, auto_refresh=False)
+        self._due_us = 0
+
+    def __enter__(self) -> Self:
+        self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._live.stop()
+
+    def show(self, grasp: LiveGrasp, devices: Callable[[], Sequence[DeviceHealth]], lines: Sequence[str] = ()) -> None:
+        """Draw, if it is time to: `lines` stand below the devices, which are only then asked for."""
+        if grasp.time_us >= self._due_us:
+            self._due_us = grasp.time_us + 1_000_000 // _REDRAWS_HZ
+            self._live.update(drawn(grasp, devices(), lines), refresh=True)
+
+
+def drawn(grasp: LiveGrasp, devices: Sequence[DeviceHealth], lines: Sequence[str] = ()) -> RenderableType:
+    """Return the picture of one moment."""
+    table = Table.grid(padding=(0, 2))
+    table.add_row("grasp", Text(grasp.grasp, style=_STYLES[grasp.health]))
+    table.add_row("", f"{_bar(grasp.probability)} {grasp.probability:5.1%}")
+    table.add_row("this frame", f"{grasp.candidate}, ahead by {grasp.margin} steps")
+    table.add_row("health", Text(grasp.health, style=_STYLES[grasp.health]))
+    if grasp.lost:
+        more = f" and {len(grasp.lost) - _SHOWN} more" if len(grasp.lost) > _SHOWN else ""
+        table.add_row("missing", ", ".join(grasp.lost[:_SHOWN]) + more)
+    table.add_row("age", f"switches {_ms(grasp.switch_age_us)}, glove {_ms(grasp.glove_age_us)}")
+    table.add_row("frame", str(grasp.number))
+    for device in devices:
+        table.add_row(device.name, Text(device.error, style="red") if device.error else "connected")
+    return Group(table, *(Text(line, style="dim") for line in lines))
+
+
+def _bar(share: float) -> str:
+    full = round(share * _BAR)
+    return "█" * full + "░" * (_BAR - full)
+
+
+def _ms(age_us: int | None) -> str:
+    return "none yet" if age_us is None else f"{age_us / 1000:.1f} ms"
+
+
+def health_lines(report: HealthReport | None) -> tuple[str, ...]:
+    """Return how the glove fares, in lines; nothing that is well has one, but the rates."""
+    if report is None:
+        return ()
+    found = {
+        "never closed": report.stuck_open,
+        "never open": report.stuck_closed,
+        "chattering": report.chattering,
+        "drifting": [f"{drift.joint} by {drift.codes:+d} codes" for drift in report.drifting],
+    }
+    rates = f"switches {report.switch_hz:.0f}/s, glove {report.glove_hz:.0f}/s; {report.frames} frames"
+    share = f", {report.degraded} degraded, {report.unknown} unknown"
+    lines = [rates + share, *(f"{what}: {', '.join(names)}" for what, names in found.items() if names)]
+    for device in report.devices:
+        counts = ", ".join(f"{count.name} {count.value}" for count in device.counts if count.value)
+        lines.append(f"{device.name}: {counts or 'nothing counted'}")
+    return tuple(lines)

@@ -1,0 +1,19 @@
+"""Recognise a recording once more, and say what comes out otherwise than it did then.
+
+thenar run build/ --glove glove.toml --record run.mcap
+python replay.py build/ run.mcap
+"""
+
+import sys
+from pathlib import Path
+
+from thenar.runtime import Build
+from thenar.runtime.live.replay import replayed
+
+frames = same = 0
+for then, now in replayed(Build.load(sys.argv[1]), Path(sys.argv[2])):
+    frames += 1
+    same += now == then
+    if now != then:
+        print(f"frame {now.number}: {now.grasp}, then {then.grasp}")
+print(f"{same} of {frames} frames recognised as they were recorded")

@@ -1,0 +1,1 @@
+"""A scene or a recording played on emulated devices, in real time."""

@@ -1,0 +1,119 @@
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from thenar.compiler import GraspSet
+from thenar.drivers.calibration import load_calibration
+from thenar.runtime.harness.loading import load_harness
+
+Thenar = Callable[..., subprocess.CompletedProcess[str]]
+LONG_S = 60
+
+SCENE = """
+seed = 3
+taxonomy = "kamakura14"
+objects = "kamakura14"
+repetitions = 1
+
+[recording]
+hold_ms = 20
+
+[[subjects]]
+name = "A"
+hand_length_mm = 188
+hand_breadth_mm = 84
+
+[effects.contact.quasistatic]
+"""
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = tmp_path / "small.toml"
+    path.write_text(SCENE)
+    return path
+
+
+@pytest.fixture
+def glove(tmp_path: Path) -> Path:
+    path = tmp_path / "glove.toml"
+    path.write_text(
+        '[cyberglove]\nport = "/dev/ttyUSB0"\n\n'
+        '[[scanner]]\nport = "/dev/ttyACM0"\nswitches = ["thumb_distal_1", "", "palm_heel_6"]\n'
+    )
+    return path
+
+
+def test_a_command_runs_beside_the_emulated_glove_and_its_exit_code_is_handed_on(
+    thenar: Thenar, scene: Path, glove: Path, tmp_path: Path
+) -> None:
+    folder, log = tmp_path / "em", tmp_path / "played.jsonl"
+    program = "import os, sys; print(os.path.realpath(sys.argv[2])); sys.exit(7)"
+    done = thenar(
+        *("emulate", scene, "--glove", glove, "--dir", folder, "--log", log, "--repeat"),
+        *("--", sys.executable, "-c", program, "{glove}", folder / "scanner0"),
+    )
+    assert done.returncode == 7, done.stderr
+    assert done.stdout.startswith("/dev/pts/")
+    harness = load_harness(folder / "glove.toml")
+    assert harness.cyberglove is not None
+    assert harness.cyberglove.port == str(folder / "cyberglove")
+    assert harness.scanners[0].port == str(folder / "scanner0")
+    assert load_calibration(Path(str(harness.cyberglove.calibration))).subject == "A"
+    lines = [json.loads(line) for line in log.read_text().splitlines()]
+    assert [line["row"] for line in lines[:14]] == list(range(len(lines[:14])))
+
+
+def test_the_command_is_ended_when_all_is_played(thenar: Thenar, scene: Path, glove: Path, tmp_path: Path) -> None:
+    program = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\ntry: signal.pause()\n"
+    program += "except KeyboardInterrupt: print('ended')"
+    done = thenar(
+        *("emulate", scene, "--glove", glove, "--dir", tmp_path / "em", "--period-ms", 40),
+        *("--", sys.executable, "-c", program),
+    )
+    assert (done.returncode, done.stdout) == (0, "ended\n"), done.stderr
+
+
+def test_a_set_of_grasps_is_played_row_by_row(thenar: Thenar, scene: Path, tmp_path: Path) -> None:
+    made, glove, log = tmp_path / "set.grasps", tmp_path / "glove.toml", tmp_path / "log.jsonl"
+    assert thenar("simulate", scene, "-o", made).returncode == 0
+    grasp_set = GraspSet.load(made)
+    glove.write_text(f'[[scanner]]\nport = "x"\nswitches = {json.dumps(list(grasp_set.switch_names))}\n')
+    done = thenar("emulate", made, "--glove", glove, "--dir", tmp_path / "em", "--period-ms", 2, "--log", log)
+    assert done.returncode == 0, done.stderr
+    assert [json.loads(line)["grasp"] for line in log.read_text().splitlines()] == grasp_set.grasps.tolist()
+
+
+def test_ctrl_c_takes_the_ports_away_and_leaves_no_traceback(scene: Path, glove: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "em"
+    arguments = ["emulate", scene, "--glove", glove, "--dir", folder, "--repeat"]
+    command = [sys.executable, "-m", "thenar.cli", *map(str, arguments)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline().startswith("emulated glove: ")
+        assert (folder / "cyberglove").is_symlink()
+        process.send_signal(signal.SIGINT)
+        _, complaint = process.communicate(timeout=LONG_S)
+    assert process.returncode == 0
+    assert "Traceback" not in complaint
+    assert not (folder / "cyberglove").is_symlink()
+
+
+def test_what_cannot_be_played_is_said(thenar: Thenar, glove: Path, tmp_path: Path) -> None:
+    for arguments, reason in (
+        (("nosuch",), "no shipped scene is called 'nosuch'"),
+        (("no.grasps",), "there is no file no.grasps"),
+        (("quick", "--subject", "Z"), "has no subject 'Z'"),
+    ):
+        done = thenar("emulate", *arguments, "--glove", glove, "--dir", tmp_path / "em")
+        assert done.returncode == 2
+        assert reason in done.stderr
+        assert "Traceback" not in done.stderr
+    done = thenar("emulate", "quick", "--glove", glove, "--dir", tmp_path / "em", "--", "no-such-program")
+    assert done.returncode == 2
+    assert "no-such-program cannot be run" in done.stderr

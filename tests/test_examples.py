@@ -1,0 +1,131 @@
+"""Every example runs as its docstring says, beside an emulated glove, and fits on a card."""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from thenar.runtime import Build
+
+EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+NAMES = sorted(path.name for path in EXAMPLES.glob("*.py"))
+MOST_LINES = 25
+THENAR = [sys.executable, "-m", "thenar.cli"]
+HARNESS = """\
+name = "bench"
+[cyberglove]
+port = "/dev/ttyUSB0"
+[[scanner]]
+port = "/dev/ttyACM0"
+switches = [{}]
+"""
+
+slow = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with recorded grasps, a build of them, and the harness of a glove that both fit."""
+    folder = tmp_path_factory.mktemp("bench")
+    run(folder, *THENAR, "simulate", "quick", "-o", "quick.grasps")
+    run(folder, *THENAR, "compile", "quick.grasps", "-o", "build", "--rounds", "10", "--folds", "0")
+    switches = Build.load(folder / "build").manifest.switches
+    (folder / "bench.toml").write_text(HARNESS.format(", ".join(f'"{switch.name}"' for switch in switches)))
+    return folder
+
+
+def run(folder: Path, *command: str) -> str:
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def emulated(*command: str) -> tuple[str, ...]:
+    """Return a command beside an emulated glove that takes another grasp every 300 ms, again and again."""
+    play = ("emulate", "quick.grasps", "--glove", "bench.toml", "--period-ms", "300", "--repeat", "--")
+    return (*THENAR, *play, *command)
+
+
+def example(name: str, *arguments: str) -> tuple[str, ...]:
+    return (sys.executable, str(EXAMPLES / name), *arguments)
+
+
+@pytest.fixture
+def live(bench: Path) -> Iterator["subprocess.Popen[str]"]:
+    """Return a live run that serves a Unix socket, and goes on until the test ends."""
+    sinks = ("--sink", "jsonl:-", "--sink", "unix:grasps")
+    command = emulated(*THENAR, "run", "build", "--glove", "{glove}", *sinks)
+    with subprocess.Popen(command, cwd=bench, stdout=subprocess.PIPE, text=True) as process:
+        yield process
+        process.terminate()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_example_fits_on_a_card_and_says_how_to_run_it(name: str) -> None:
+    text = (EXAMPLES / name).read_text()
+    assert len(text.splitlines()) <= MOST_LINES
+    assert f"python {name}" in (ast.get_docstring(ast.parse(text)) or "")
+
+
+@slow
+def test_run_build_says_what_is_recognised(bench: Path) -> None:
+    command = emulated(*example("run_build.py", "build", "{glove}"))
+    with subprocess.Popen(command, cwd=bench, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        sure = 0
+        while sure < 50:
+            grasp, share, health = process.stdout.readline().split()
+            assert share.endswith("%")
+            sure += health == "ok" and grasp != "unknown"
+        process.terminate()
+        process.stdout.read()
+    assert process.returncode == 0
+
+
+@slow
+def test_subscribe_prints_a_line_a_frame_from_where_it_came(bench: Path, live: "subprocess.Popen[str]") -> None:
+    assert live.stdout is not None
+    live.stdout.readline()  # by now the socket is there
+    with subprocess.Popen(example("subscribe.py", "grasps"), cwd=bench, stdout=subprocess.PIPE, text=True) as reader:
+        assert reader.stdout is not None
+        numbers = [int(reader.stdout.readline().split()[0]) for _ in range(20)]
+        reader.terminate()
+    assert numbers == list(range(numbers[0], numbers[0] + 20))
+
+
+@slow
+def test_barrett_preshape_says_where_eight_joints_shall_stand(bench: Path) -> None:
+    command = emulated(*THENAR, "run", "build", "--glove", "{glove}", "--sink", "jsonl:-", "--frames", "700")
+    with subprocess.Popen(command, cwd=bench, stdout=subprocess.PIPE) as runs:
+        chosen = subprocess.run(
+            example("barrett_preshape.py"), stdin=runs.stdout, capture_output=True, text=True, check=True
+        )
+    preshapes = [line.split() for line in chosen.stdout.splitlines()]
+    assert preshapes
+    for name, *joints in preshapes:
+        assert name in ("cylindrical", "spherical", "precision-tip", "hook")
+        assert len(joints) == 8
+        assert joints[0].startswith("finger_1/prox_joint=")
+    assert all(before != after for before, after in pairwise(preshapes))
+
+
+@slow
+def test_own_sink_says_what_is_missing_before_the_glove_is_there(bench: Path) -> None:
+    said = run(bench, *emulated(*example("own_sink.py", "build", "{glove}"))).splitlines()
+    number, health, *lost = said[0].split()
+    assert (number, health) == ("0", "unknown")
+    assert "thumb_rotation" in lost
+    assert len(said) < 500
+
+
+@slow
+def test_replay_recognises_a_recording_as_it_was(bench: Path) -> None:
+    live = (*THENAR, "run", "build", "--glove", "{glove}", "--sink", "jsonl:frames", "--frames", "200")
+    run(bench, *emulated(*live, "--record", "run.mcap"))
+    assert run(bench, *example("replay.py", "build", "run.mcap")).endswith(
+        "200 of 200 frames recognised as they were recorded\n"
+    )
