@@ -9,7 +9,7 @@ SCENE ?= quick
 
 PACKAGES := cli compiler drivers firmware_templates reference runtime simulator stability
 
-.PHONY: help demo test test-slow test-all pythons mutants lint format types bench docs check clean
+.PHONY: help demo test test-slow test-all pythons mutants lint format types bench soak docs check clean
 
 help:           ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 16
@@ -88,6 +88,10 @@ bench: $(VENV)/bench  ## the benchmarks, as ratios against a peer or a bound in 
 	$(BIN)/python benchmarks/boosting.py
 	$(BIN)/python benchmarks/runtime.py
 	$(BIN)/python benchmarks/simulator.py
+	$(BIN)/python benchmarks/live.py
+
+soak: $(VENV)/installed  ## an hour of live recognition on emulated devices: does anything grow?
+	$(BIN)/python benchmarks/soak.py
 
 docs: $(VENV)/installed  ## the documentation as a site in site/, offline
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet

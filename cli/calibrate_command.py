@@ -49,6 +49,8 @@ def command(port: str, output: Path, subject: str | None, baud: int | None, sens
         calibrated = _calibrated(guide, subject or output.stem)
     finally:
         glove.close()
+    if not calibrated.sensors:
+        raise click.ClickException(f"no sensor moved, so there is nothing to calibrate by: {output} is not written")
     write_atomically(output, calibrated.to_toml().encode("utf-8"))
     click.echo(f"{output}: {len(calibrated.sensors)} sensors of {calibrated.subject}")
 

@@ -39,7 +39,7 @@ class Guide:
         """
         while True:
             self._say(f"\nPose {number}, {pose.name}: {pose.instruction}")
-            answer = self._asked("Enter when you hold it (b: back to the pose before, q: quit)", pose)
+            answer = self._asked("Enter when you hold it (b: back to the pose before, q: quit)", pose, "b")
             if answer == "b":
                 return None
             found = held(self._samples())
@@ -57,9 +57,17 @@ class Guide:
     def _is_kept(self, against: list[str], pose: Pose) -> bool:
         for problem in against:
             self._say(f"  {problem}")
-        return self._asked("Enter to hold it again (k: keep it all the same, q: quit)", pose) == "k"
+        return self._asked("Enter to hold it again (k: keep it all the same, q: quit)", pose, "k") == "k"
 
-    def _asked(self, question: str, pose: Pose) -> str:
+    def _asked(self, question: str, pose: Pose, other: str) -> str:
+        """Return "" or the `other` answer, asking again whoever types anything else."""
+        while (answer := self._answered(question, pose)) not in ("", other):
+            if answer == "q":
+                raise click.Abort
+            self._say(f"'{answer}' is no answer here")
+        return answer
+
+    def _answered(self, question: str, pose: Pose) -> str:
         self._say(question)
         with Live(console=self._console, transient=True, auto_refresh=False) as live:
             drawn = 0.0
@@ -68,8 +76,6 @@ class Guide:
                 if raw is not None and self._console.is_terminal and monotonic() - drawn > _REFRESH_S:
                     live.update(self._table(raw, pose), refresh=True)
                     drawn = monotonic()
-        if answer == "q":
-            raise click.Abort
         return answer
 
     def _samples(self) -> list[bytes]:

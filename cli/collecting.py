@@ -14,9 +14,10 @@ from ..compiler.recordings.taxonomy import Taxonomy
 from ..drivers.calibration import GloveCalibration, load_calibration
 from ..drivers.errors import SettingError
 from ..runtime.harness.wiring import GloveWiring, Harness
+from ..runtime.live.arrivals import Taken
 from ..runtime.live.frames import now_us
 from ..runtime.live.keeper import DeviceState
-from ..runtime.live.sources import Sources, Taken
+from ..runtime.live.sources import Sources
 from ..runtime.live.system import sensor_names_of
 from ..runtime.recording.guide import Guide, Stage
 from ..runtime.recording.session import Collection, Session
@@ -24,9 +25,9 @@ from ..runtime.recording.trials import Journal, Trial
 from ..runtime.recording.writer import Recorder
 from ..runtime.scanning.whole import whole_scan
 from .common import err
+from .ending import ended_by_signals
 from .guide_keys import GuideKeys
 from .guide_view import GuideView
-from .run_live import ended_by_signals
 
 _WAIT_S = 0.05
 
@@ -60,6 +61,8 @@ def collect(
 
     Raises SettingError or DeviceError if a device cannot serve, click.ClickException if the recording cannot go on.
     """
+    if sys.stdin is None:
+        raise click.UsageError("stdin is closed: the keys that lead through a collection come from there")
     switches, sensors = harness.switches, sensor_names_of(harness.cyberglove)
     check_names("column", (*switches, *sensors))
     with ended_by_signals() as stop, Sources(harness, switches, whole_scan(harness, switches)) as sources:

@@ -4,12 +4,15 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import msgspec
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+if TYPE_CHECKING:
+    from ..runtime.harness.wiring import Harness
 
 
 class _OutputFile(click.Path):
@@ -60,6 +63,12 @@ def keep_apart(*paths: Path | None) -> None:
         seen.add(path.resolve())
 
 
+def check_devices(harness: "Harness", path: Path) -> None:
+    """Raise UsageError if the `harness` in `path` names no device: whatever is done with it would come to nothing."""
+    if harness.cyberglove is None and not harness.scanners and not harness.buses:
+        raise click.UsageError(f"{path.name} names no device: it takes a [cyberglove], a [[scanner]] or a [[bus]]")
+
+
 def out() -> Console:
     """Return the console for results. Wide tables are not cut when piped into a file."""
     console = _console()
@@ -95,3 +104,9 @@ def progress(what: str) -> Iterator[Callable[[int, int], None]]:
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(what, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def of_device(name: str, state: str) -> str:
+    """Return `state` as a sentence about the device `name`, whose port is not named twice."""
+    kind, _, port = name.partition(" at ")
+    return f"{kind if port and port in state else name}: {state}"

@@ -5,11 +5,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import existing_file, existing_folder, json_flag, out, print_json, progress
+from .common import check_devices, existing_file, existing_folder, json_flag, of_device, out, print_json, progress
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
+    from ..runtime.build import Build
+    from ..runtime.harness.wiring import Harness
     from ..runtime.live.checkup import Finding
 
 
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
 def command(glove: Path, build: Path | None, as_json: bool) -> None:
     """Open every device of glove.toml and say what is there, how fast it is and how fast its wire would let it be.
 
-    Exit code 1 if something is missing.
+    Exit code 1 if something is missing; with --build, also if the build cannot work with the glove's calibration.
 
     \b
     Example:
@@ -33,8 +35,10 @@ def command(glove: Path, build: Path | None, as_json: bool) -> None:
     from ..runtime.scanning.whole import whole_scan
 
     harness = load_harness(glove)
-    scan = whole_scan(harness, harness.switches) if build is None else System.map_of(Build.load(build), harness)
-    looks, found = list(check_up(harness, scan)), list["Finding"]()
+    check_devices(harness, glove)
+    loaded = None if build is None else Build.load(build)
+    scan = whole_scan(harness, harness.switches) if loaded is None else System.map_of(loaded, harness)
+    looks, found = list(check_up(harness, scan)), list(_calibration(harness, loaded))
     with progress("looking") as report:
         for number, look in enumerate(looks):
             found += look()
@@ -47,6 +51,23 @@ def command(glove: Path, build: Path | None, as_json: bool) -> None:
         click.get_current_context().exit(1)
 
 
+def _calibration(harness: "Harness", build: "Build | None") -> "Iterator[Finding]":
+    """Yield what is wrong with the CyberGlove's calibration: `thenar run` and `record` would end with it."""
+    from ..drivers.calibration import load_calibration
+    from ..drivers.errors import ThenarError
+    from ..runtime.live.checkup import Finding
+    from ..runtime.live.system import System
+
+    named = None if harness.cyberglove is None else harness.cyberglove.calibration
+    try:
+        if build is not None:
+            System.of(build, harness).recognizer()
+        elif named is not None:
+            load_calibration(Path(named))
+    except ThenarError as wrong:
+        yield Finding("calibration", "" if named is None else Path(named).name, False, 0.0, None, (str(wrong),))
+
+
 def _print(found: "Sequence[Finding]") -> None:
     from rich.table import Table
 
@@ -56,9 +77,10 @@ def _print(found: "Sequence[Finding]") -> None:
     for one in found:
         measured = "" if one.measured_us is None else f"{one.measured_us:.0f}"
         there = ("slow" if one.slow else "yes") if one.present else "no"
-        table.add_row(one.device, one.part, there, f"{one.predicted_us:.0f}", measured)
+        predicted = f"{one.predicted_us:.0f}" if one.predicted_us else ""
+        table.add_row(one.device, one.part, there, predicted, measured)
     console = out()
     console.print(table)
     for one in found:
         for remark in one.remarks:
-            console.print(f"{one.device}{' ' if one.part else ''}{one.part}: {remark}")
+            console.print(of_device(f"{one.device} {one.part}".strip(), remark))

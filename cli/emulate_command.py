@@ -4,7 +4,7 @@ import os
 import signal
 import subprocess
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from threading import Event, Thread
@@ -13,8 +13,8 @@ from typing import IO, TYPE_CHECKING, Literal
 import click
 import msgspec
 
-from .common import existing_file, output_file, progress
-from .run_live import ended_by_signals
+from .common import check_devices, existing_file, keep_apart, output_file, progress
+from .ending import ended_by_signals
 
 if TYPE_CHECKING:
     from ..simulator.playing.bench import Bench
@@ -26,7 +26,12 @@ if TYPE_CHECKING:
 
 _ADAPTERS = ("any", "bcm2835", "designware", "i2c-gpio", "smbus-only")
 _GRACE_S = 5.0
+# Ctrl-C comes to the command too: it is given so long to end before it is told to.
+_BY_ITSELF_S = 1.0
 _FRAME_US = 10_000
+_HARNESS, _CALIBRATION = "glove.toml", "calibration.toml"
+# What a shell adds to the number of the signal that ended a command.
+_KILLED = 128
 
 
 class Played(msgspec.Struct, frozen=True):
@@ -78,15 +83,22 @@ def command(
     it: {glove} in it stands for the glove.toml that names the emulated ports. It is ended when the playing is over.
 
     \b
-    Examples:
+    Example:
         thenar emulate quick --glove glove.toml --repeat
         thenar emulate continuous --glove glove.toml -- thenar run build/ --glove {glove} --sink jsonl:-
     """
     from ..runtime.harness.loading import load_harness
+    from ..runtime.names import list_names
     from ..simulator.playing.bench import Bench
 
     harness = load_harness(glove)
+    check_devices(harness, glove)
+    worn = harness.cyberglove
+    calibration = None if worn is None or worn.calibration is None else Path(worn.calibration)
+    keep_apart(glove, Path(source), calibration, folder / _HARNESS, folder / _CALIBRATION, log)
     performance, cable = _performance(source, subject, period_ms)
+    if missing := [name for name in harness.switches if name not in performance.switch_names]:
+        click.echo(f"warning: {source} has no switch {list_names(missing)}: open all the time", err=True)
     with ExitStack() as stack:
         stop = stack.enter_context(ended_by_signals())
         folder.mkdir(parents=True, exist_ok=True)
@@ -96,10 +108,11 @@ def command(
         emulated = _write_harness(bench, performance, folder)
         note = stack.enter_context(_noting(log))
         _tell_how(bench, emulated)
-        child = _started(client, emulated, bench, stop) if client else None
+        child = stack.enter_context(_beside(client, emulated, bench, stop)) if client else None
         _play(bench, performance, note, stop, repeat=repeat)
-        if child is not None:
-            click.get_current_context().exit(_ended(child))
+    if child is not None:
+        code = child.returncode
+        click.get_current_context().exit(code if code >= 0 else _KILLED - code)
 
 
 def _performance(source: str, subject: str | None, period_ms: float | None) -> tuple["Performance", "CableOf"]:
@@ -114,7 +127,9 @@ def _performance(source: str, subject: str | None, period_ms: float | None) -> t
         if subject is not None:
             raise click.UsageError("--subject picks one of a scene's subjects: a recording has its own")
         if path.suffix == ".mcap":
-            return performance.of_recording(path, given_us or _FRAME_US), _no_cable
+            from ..simulator.playing.recorded import of_recording
+
+            return of_recording(path, given_us or _FRAME_US), _no_cable
         from ..compiler.recordings.graspset import GraspSet
 
         return performance.of_set(GraspSet.load(path), given_us or _FRAME_US), _no_cable
@@ -139,11 +154,11 @@ def _write_harness(bench: "Bench", performance: "Performance", folder: Path) -> 
 
     harness = bench.harness
     if harness.cyberglove is not None:
-        write_atomically(folder / "calibration.toml", performance.calibration.to_toml().encode())
-        glove = msgspec.structs.replace(harness.cyberglove, calibration="calibration.toml")
+        write_atomically(folder / _CALIBRATION, performance.calibration.to_toml().encode())
+        glove = msgspec.structs.replace(harness.cyberglove, calibration=_CALIBRATION)
         harness = msgspec.structs.replace(harness, cyberglove=glove)
-    write_atomically(folder / "glove.toml", harness_to_toml(harness).encode())
-    return folder / "glove.toml"
+    write_atomically(folder / _HARNESS, harness_to_toml(harness).encode())
+    return folder / _HARNESS
 
 
 def _tell_how(bench: "Bench", emulated: Path) -> None:
@@ -168,12 +183,15 @@ def _write(file: IO[bytes], played: Played) -> None:
     file.write(msgspec.json.encode(played) + b"\n")
 
 
-def _started(client: tuple[str, ...], emulated: Path, bench: "Bench", stop: Event) -> "subprocess.Popen[bytes]":
-    """Start the command beside the emulated glove; `stop` is set when it ends."""
+@contextmanager
+def _beside(
+    client: tuple[str, ...], emulated: Path, bench: "Bench", stop: Event
+) -> Iterator["subprocess.Popen[bytes]"]:
+    """Run the command beside the emulated glove, for no longer than this context; `stop` is set when it ends."""
     arguments = [argument.replace("{glove}", str(emulated)) for argument in client]
     try:
-        # In a process group of its own, so that Ctrl-C comes to it from here, once.
-        child = subprocess.Popen(arguments, env={**os.environ, **bench.environment}, process_group=0)
+        # In our process group, so that it has the terminal: it may ask for keys.
+        child = subprocess.Popen(arguments, env={**os.environ, **bench.environment})
     except OSError as wrong:
         raise click.UsageError(f"{arguments[0]} cannot be run: {wrong.strerror}") from None
 
@@ -182,7 +200,10 @@ def _started(client: tuple[str, ...], emulated: Path, bench: "Bench", stop: Even
         stop.set()
 
     Thread(target=watch, name="thenar client", daemon=True).start()
-    return child
+    try:
+        yield child
+    finally:
+        _end(child, _BY_ITSELF_S if stop.is_set() else 0.0)
 
 
 def _play(bench: "Bench", performance: "Performance", note: "Log", stop: Event, *, repeat: bool) -> None:
@@ -193,12 +214,14 @@ def _play(bench: "Bench", performance: "Performance", note: "Log", stop: Event, 
         pass
 
 
-def _ended(child: "subprocess.Popen[bytes]") -> int:
-    """End the command, unless it has ended; return its exit code."""
-    if child.poll() is None:
+def _end(child: "subprocess.Popen[bytes]", patience_s: float) -> None:
+    """End the command, unless it does so by itself in that time; whatever happens here, it does not outlive this."""
+    with ExitStack() as stack:
+        stack.callback(child.wait)
+        stack.callback(child.kill)
+        with suppress(subprocess.TimeoutExpired):
+            child.wait(patience_s)
+            return
         child.send_signal(signal.SIGINT)
-    try:
-        return child.wait(_GRACE_S)
-    except subprocess.TimeoutExpired:
-        child.kill()
-        return child.wait()
+        with suppress(subprocess.TimeoutExpired):
+            child.wait(_GRACE_S)

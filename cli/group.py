@@ -61,7 +61,9 @@ def run_group(arguments: Sequence[str]) -> int:
     except (ThenarError, BrokenExecutor) as mistake:
         return _complain(str(mistake))
     except OSError as mistake:
-        return _complain(f"{mistake.filename}: {mistake.strerror}" if mistake.filename else str(mistake))
+        return _complain(
+            f"{mistake.filename}: {mistake.strerror}" if mistake.filename else mistake.strerror or str(mistake)
+        )
     except MemoryError as lack:
         return _complain(f"not enough memory ({lack}): take fewer rows or columns")
     except ModuleNotFoundError as lack:

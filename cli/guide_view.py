@@ -52,14 +52,16 @@ class GuideView:
     def show(self, now_us: int, guide: Guide, devices: Sequence[DeviceState]) -> None:
         """Show where `guide` stands, if it is time to or news."""
         if self._live is None:
-            self._say(guide)
+            self._say(guide, devices)
         elif now_us >= self._due_us or self._shown != (guide.stage, guide.trial):
             self._due_us = now_us + _REDRAW_US
             self._shown = guide.stage, guide.trial
             self._live.update(self._drawn(now_us, guide, devices), refresh=True)
 
-    def _say(self, guide: Guide) -> None:
-        problem = f"not captured: {guide.problem}; " if guide.problem else ""
+    def _say(self, guide: Guide, devices: Sequence[DeviceState]) -> None:
+        errors = "; ".join(device.error for device in devices if not device.connected)
+        why = f" ({errors})" if errors else ""
+        problem = f"not captured: {guide.problem}{why}; " if guide.problem else ""
         line = f"{self._task(guide)}: {problem}{_KEYS[guide.stage]}"
         if line != self._said and guide.stage is not Stage.OVER:
             self._said = line

@@ -1,6 +1,8 @@
 """The live terminal view of `thenar run`: the grasp, how far to trust it, and how the devices fare."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
+from threading import Event, Thread
 from types import TracebackType
 from typing import Self
 
@@ -12,33 +14,53 @@ from rich.text import Text
 from ..runtime.live.health import DeviceHealth, HealthReport
 from ..runtime.live.published import LiveGrasp
 
-_REDRAWS_HZ = 10
+Devices = Callable[[], Sequence[DeviceHealth]]
+_Shown = tuple[LiveGrasp, Devices, Sequence[str]]
+
+_REDRAW_S = 0.1
 _STYLES = {"ok": "bold green", "degraded": "bold yellow", "unknown": "bold red"}
 _BAR = 30
 _SHOWN = 6
 
 
 class LiveView:
-    """Draws the newest grasp ten times a second, in place."""
+    """Draws the newest grasp ten times a second, in place.
+
+    A thread of its own does: a terminal that is held (Ctrl-S), slow or gone holds up nobody else.
+    """
 
     def __init__(self, console: Console) -> None:
-        self._live = Live(console=console, refresh_per_second=_REDRAWS_HZ, transient=True, auto_refresh=False)
-        self._due_us = 0
+        self._live = Live(console=console, transient=True, auto_refresh=False)
+        self._newest: _Shown | None = None
+        self._closing = Event()
+        self._thread = Thread(target=self._draw, name="thenar view", daemon=True)
 
     def __enter__(self) -> Self:
         self._live.start()
+        self._thread.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._live.stop()
+        self._closing.set()
+        self._thread.join()
+        with suppress(OSError):
+            self._live.stop()
 
-    def show(self, grasp: LiveGrasp, devices: Callable[[], Sequence[DeviceHealth]], lines: Sequence[str] = ()) -> None:
-        """Draw, if it is time to: `lines` stand below the devices, which are only then asked for."""
-        if grasp.time_us >= self._due_us:
-            self._due_us = grasp.time_us + 1_000_000 // _REDRAWS_HZ
-            self._live.update(drawn(grasp, devices(), lines), refresh=True)
+    def show(self, grasp: LiveGrasp, devices: Devices, lines: Sequence[str] = ()) -> None:
+        """Draw this next, unless something newer comes first: `lines` stand below the devices, asked for then."""
+        self._newest = grasp, devices, lines
+
+    def _draw(self) -> None:
+        shown = None
+        # Ends with the terminal, too.
+        with suppress(OSError):
+            while not self._closing.wait(_REDRAW_S):
+                newest = self._newest
+                if newest is not None and newest is not shown:
+                    grasp, devices, lines = shown = newest
+                    self._live.update(drawn(grasp, devices(), lines), refresh=True)
 
 
 def drawn(grasp: LiveGrasp, devices: Sequence[DeviceHealth], lines: Sequence[str] = ()) -> RenderableType:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import existing_file, keep_apart, output_file, progress
+from .common import check_devices, existing_file, keep_apart, output_file, progress
 
 if TYPE_CHECKING:
     from ..runtime.recording.session import Collection
@@ -58,7 +58,14 @@ def command(
         raise click.BadParameter(f"{output.name}: a set of grasps ends in .grasps", param_hint="--output")
     recording = output.with_suffix(".mcap")
     keep_apart(glove, objects, output, recording)
+    if output.exists() and not recording.exists():
+        raise click.UsageError(
+            f"{output} is there, and was not collected into {recording.name}, which is not: name another --output"
+        )
+    if taxonomy == "own" and objects is None:
+        raise click.UsageError("--taxonomy own takes its grasp types from an objects.toml: name it with --objects")
     harness = load_harness(glove)
+    check_devices(harness, glove)
     check_names("subject", [subject])
     types, tasks = collected(taxonomy, objects)
     drawn = secrets.randbits(32) if seed is None else seed
@@ -88,10 +95,15 @@ def _resumed(journal: "Journal", wanted: "Collection", seed: int | None) -> "Col
     for name, value in asdict(wanted).items():
         if value != getattr(begun, name):
             raise SettingError(
-                f"{journal.path} was begun with other {name} than asked for now: "
+                f"{journal.path} was begun with other {name} than asked for now{_both(getattr(begun, name), value)}: "
                 "go on as it was begun, or name another --output"
             )
     return wanted
+
+
+def _both(begun: object, wanted: object) -> str:
+    """Return the two values, where they are short enough to be told."""
+    return f" ({begun}, not {wanted})" if isinstance(begun, str | int) else ""
 
 
 def _write(recording: Path, output: Path, accepted: int, planned: int) -> None:

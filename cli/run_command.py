@@ -1,9 +1,11 @@
 """`thenar run`: the runtime's recogniser, live on a glove or on recorded frames."""
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from .common import existing_file, existing_folder, output_file
 
@@ -44,6 +46,9 @@ if TYPE_CHECKING:
 @click.option(
     "--error-rate", type=click.FloatRange(0, 1), help="Decide by a sequential test of this error rate instead."
 )
+@click.option(
+    "--spacing-ms", type=click.FloatRange(0, 10_000), help="Frames that the sequential test takes are so far apart."
+)
 def command(
     build: Path,
     glove: Path | None,
@@ -59,6 +64,7 @@ def command(
     dwell_ms: float | None,
     max_lost: float | None,
     error_rate: float | None,
+    spacing_ms: float | None,
 ) -> None:
     """Recognise grasps: on the glove that --glove describes, or in the frames that --replay holds.
 
@@ -67,7 +73,7 @@ def command(
     and SIGHUP end a run cleanly, with exit code 0.
 
     \b
-    Examples:
+    Example:
         thenar run build/ --glove glove.toml --status
         thenar run build/ --glove glove.toml --sink unix:/run/grasps --preshape barrett_bh8 --record run.mcap
         thenar run build/ --replay run.mcap | head -3
@@ -75,16 +81,26 @@ def command(
     """
     if (glove is None) == (replay is None):
         raise click.UsageError("name a glove to run on (--glove) or frames to run through (--replay), one of them")
+    if record is not None and record.suffix != ".mcap":
+        raise click.BadParameter(f"{record.name}: a recording ends in .mcap", param_hint="--record")
     from ..runtime.build import Build
 
+    _refuse_idle(glove, replay)
     loaded = Build.load(build)
     if replay is not None and replay.suffix != ".mcap":
         from .run_replay import replay_set
 
         replay_set(loaded, replay, period_us)
         return
-    asked = {"lead": lead, "dwell_ms": dwell_ms, "max_lost": max_lost, "error_rate": error_rate}
-    policy = _policy(**asked) if any(value is not None for value in asked.values()) else None
+    policy = _policy(
+        {
+            "lead": lead,
+            "dwell_us": _us(dwell_ms),
+            "max_lost": max_lost,
+            "error_rate": error_rate,
+            "spacing_us": _us(spacing_ms),
+        }
+    )
     if replay is not None:
         from .run_replay import replay_recording
 
@@ -98,18 +114,41 @@ def command(
     run_live(system, LiveOptions(sinks, preshape, record, full_scan, status, frames))
 
 
-def _policy(
-    *, lead: float | None, dwell_ms: float | None, max_lost: float | None, error_rate: float | None
-) -> "Policy":
-    """Return the usual policy with what was asked for in its place."""
+_LIVE = ("sinks", "preshape", "record", "full_scan", "status", "frames")
+_POLICY = ("lead", "dwell_ms", "max_lost", "error_rate", "spacing_ms")
+
+
+def _refuse_idle(glove: Path | None, replay: Path | None) -> None:
+    """Raise UsageError about an option that would change nothing here."""
+    if glove is not None:
+        _refuse("on a glove", "period_us")
+    elif replay is not None and replay.suffix == ".mcap":
+        _refuse("for a recording, which says when its frames came", "period_us", *_LIVE)
+    else:
+        _refuse("for a set of grasps, each row of which is recognised by itself", *_LIVE, *_POLICY)
+    if click.get_current_context().params["error_rate"] is not None:
+        _refuse("beside --error-rate, whose test decides by itself", "lead", "dwell_ms")
+    else:
+        _refuse("without --error-rate", "spacing_ms")
+
+
+def _refuse(where: str, *names: str) -> None:
+    context = click.get_current_context()
+    for option in context.command.params:
+        if option.name in names and context.get_parameter_source(option.name) is not ParameterSource.DEFAULT:
+            raise click.UsageError(f"{option.opts[0]} changes nothing {where}: leave it out")
+
+
+def _us(ms: float | None) -> int | None:
+    return None if ms is None else round(1000 * ms)
+
+
+def _policy(asked: dict[str, Any]) -> "Policy | None":
+    """Return the usual policy with what was `asked` for in its place; None if nothing was."""
     from ..runtime.live.policy import Policy
 
+    given = {name: value for name, value in asked.items() if value is not None}
+    if not given:
+        return None
     usual = Policy()
-    dwell_us = usual.dwell_us if dwell_ms is None else round(dwell_ms * 1000)
-    return Policy(
-        lead=usual.lead if lead is None else lead,
-        dwell_us=dwell_us,
-        hold_us=max(usual.hold_us, dwell_us),
-        max_lost=usual.max_lost if max_lost is None else max_lost,
-        error_rate=error_rate,
-    )
+    return replace(usual, **{"hold_us": max(usual.hold_us, given.get("dwell_us", 0)), **given})

@@ -35,10 +35,10 @@ class Dialogue:
             " CyberGlove, and is this its baud rate?"
         )
 
-    def ask(self, command: Command, tries: int = _TRIES) -> bytes:
-        """Return the values of the answer. Raises DeviceError if none comes, or only errors."""
+    def ask(self, command: Command) -> bytes:
+        """Return the values of the answer. Raises DeviceError if three times none comes, or only errors."""
         answer = None
-        for attempt in range(tries):
+        for attempt in range(_TRIES):
             if attempt:
                 self.hush()
             answer = self._asked_once(command)

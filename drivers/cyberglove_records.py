@@ -4,9 +4,9 @@ from collections import deque
 from time import monotonic, monotonic_ns
 
 from .cyberglove_commands import POLL, STREAM
-from .cyberglove_frame import OVERHEAD, Counts, Decoder, Record
+from .cyberglove_frame import Counts, Decoder, Record
 from .cyberglove_setup import GloveInfo, Wanted
-from .cyberglove_timing import sending_us, told_us
+from .cyberglove_timing import told_us
 from .errors import DeviceError
 from .serial_line import SerialLine
 
@@ -15,6 +15,10 @@ _POLLED_S = 0.2
 # When a glove is taken for dead, which streams or answers no more.
 _SILENT_S = 1.0
 _SILENT_PERIODS = 4
+# More than any line brings between two readings: what stood in buffers while the host was held up. It is read up to its
+# end, so far as that comes, before it is given times.
+_BACKLOG = 2048
+_LONGEST_BACKLOG = 1 << 18
 
 Timed = tuple[int, Record]
 
@@ -26,7 +30,7 @@ class Records:
         self._line, self._info, self._counts = line, info, counts
         self._poll, self._period_s = wanted.poll, told_us(wanted.words) / 1e6
         self._silent_s = max(_SILENT_S, _SILENT_PERIODS * info.period_us / 1e6)
-        self._record_us = round(sending_us(info.sensors + OVERHEAD + info.status, info.baud))
+        self._last_us = 0
         self.start()
 
     def start(self) -> None:
@@ -40,6 +44,9 @@ class Records:
 
     def read(self, timeout_s: float) -> Timed | None:
         """Return the oldest record not yet returned and when it was in, in microseconds of the monotonic clock.
+
+        Of records that come in together each is a period older than the next, and a polled one was in before it was to
+        be asked for again: what stood in a buffer while the host was held up is not taken for new.
 
         None if none is in by the timeout. Raises DeviceError when the line is gone, or no record came for a second
         (or for four periods, where these are longer).
@@ -67,18 +74,27 @@ class Records:
         return self._poll_at if self._poll else float("inf")
 
     def _receive(self, seconds: float) -> None:
-        records = self._decoder.feed(self._line.read(max(0.0, seconds)))
+        records = self._decoder.feed(self._waiting(seconds))
         now_us = monotonic_ns() // 1000
         if records:
-            # None of them can have come later than the ones behind it left room for on the wire.
-            behind = range(len(records) - 1, -1, -1)
-            self._ready.extend((now_us - n * self._record_us, one) for n, one in zip(behind, records, strict=True))
+            newest_us = min(now_us, round((self._quiet_from + _POLLED_S) * 1e6)) if self._poll else now_us
+            for behind, record in zip(reversed(range(len(records))), records, strict=True):
+                self._last_us = max(self._last_us, newest_us - behind * self._info.period_us)
+                self._ready.append((self._last_us, record))
             self._quiet_from, self._asked, self._poll_at = now_us / 1e6, False, self._due
         elif monotonic() - self._quiet_from > self._silent_s and self._is_expected():
             raise DeviceError(
                 f"{self._line.url}: the CyberGlove has sent no record for {self._silent_s:g} s: check its power and"
                 " the cable"
             )
+
+    def _waiting(self, seconds: float) -> bytes:
+        """Return what has come in, a backlog up to its end; its last record is then the newest there is."""
+        data = self._line.read(max(0.0, seconds))
+        if len(data) >= _BACKLOG:
+            while len(data) < _LONGEST_BACKLOG and (more := self._line.read(0.0)):
+                data += more
+        return data
 
     def _is_expected(self) -> bool:
         return self._asked or not self._poll

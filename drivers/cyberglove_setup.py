@@ -8,7 +8,7 @@ from .cyberglove_commands import INFORMATION, POLL, READY, Command, query, setti
 from .cyberglove_dialogue import Dialogue
 from .cyberglove_sensors import SENSORS_18, SENSORS_22, masked_sensors
 from .cyberglove_timing import FASTEST, Words, sending_us, shortest_us, told_us
-from .errors import DeviceError
+from .errors import DeviceError, SettingError
 from .serial_line import SerialLine
 
 # The rates that the box can be set to without a change inside it, the usual first.
@@ -74,6 +74,9 @@ def find_line(url: str, rates: Sequence[int]) -> SerialLine:
             if len(rates) == 1:
                 raise
             failure = reason
+        except BaseException:
+            line.close()
+            raise
         else:
             return line
     tried = ", ".join(map(str, rates))
@@ -134,7 +137,9 @@ def _sensors(dialogue: Dialogue, url: str, expected: int | None) -> int:
     if count is None:
         raise DeviceError(f"{url}: the CyberGlove does not say how many sensors it has: say so (sensors = 18, or 22)")
     if expected is not None and count != expected:
-        raise DeviceError(f"{url}: the CyberGlove sends {count} sensors, not {expected}: correct `sensors`")
+        raise SettingError(
+            f"{url}: the CyberGlove sends {count} sensors, not {expected}: write `sensors = {count}` under [cyberglove]"
+        )
     if count not in _NAMES:
         raise DeviceError(
             f"{url}: the CyberGlove sends {count} sensors, neither 18 nor 22: another program masked some (its M"
@@ -158,9 +163,9 @@ def _rate_note(told: float, shortest: float) -> tuple[str, ...]:
 
 
 def _optional(dialogue: Dialogue, command: Command) -> bytes | None:
-    """Return the values of the answer, None where this box does not know the command."""
+    """Return the values of the answer, None where this box does not know the command: never for a lost answer."""
     try:
-        return dialogue.ask(command, tries=1)
+        return dialogue.ask(command)
     except DeviceError:
         dialogue.hush()
         return None

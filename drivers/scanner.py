@@ -53,6 +53,7 @@ class Scanner:
         self._waiting: deque[Received] = deque()
         self._misfits = self._asked = 0
         self._ask_at = 0.0
+        self._told: dict[int, SetRate | SetDebounce] = {}
 
     def __enter__(self) -> Self:
         self.open()
@@ -69,7 +70,7 @@ class Scanner:
         self._received = self._link.counts
         try:
             self.hello = self._greet(self._link)
-        except DeviceError:
+        except BaseException:
             self.close()
             raise
         return self.hello
@@ -95,12 +96,15 @@ class Scanner:
         return reading
 
     def set_rate(self, scan_us: int, state_us: int, heartbeat_us: int) -> None:
-        """Ask for other periods, as in Hello; once the answer was read, `hello` says what came of it."""
-        self._send(SetRate(scan_us, state_us, heartbeat_us))
+        """Ask for other periods, as in Hello; once the answer was read, `hello` says what came of it.
+
+        A board that restarts is told again. Raises SettingError for a time that no frame can carry.
+        """
+        self._tell(SetRate(scan_us, state_us, heartbeat_us))
 
     def set_debounce(self, press_us: int, release_us: int) -> None:
         """Ask for debouncing on the board, as in Hello; answered as `set_rate` is."""
-        self._send(SetDebounce(press_us, release_us))
+        self._tell(SetDebounce(press_us, release_us))
 
     def close(self) -> None:
         """Close the line. Does no harm twice."""
@@ -115,6 +119,10 @@ class Scanner:
 
     def _send(self, message: ToBoard) -> None:
         self._open_link().send(message)
+
+    def _tell(self, setting: SetRate | SetDebounce) -> None:
+        self._send(setting)
+        self._told[setting.KIND] = setting
 
     def _greet(self, link: ScannerLink) -> Hello:
         end, ping_at = monotonic() + _BOOT_S, 0.0
@@ -158,6 +166,9 @@ class Scanner:
             self._send(self._times.ping())
         if isinstance(message, Hello):
             self._same(message)
+            if received is not None and received.sequence == 0 and not message.token:  # it has booted
+                for setting in self._told.values():
+                    self._send(setting)
         elif isinstance(message, Faults):
             self.faults = message
         elif message is not None:
@@ -178,13 +189,7 @@ class Scanner:
         return None
 
     def _same(self, hello: Hello) -> None:
-        known = self.hello or hello
-        if (hello.board, hello.rows, hello.columns, hello.flags) != (
-            known.board,
-            known.rows,
-            known.columns,
-            known.flags,
-        ):
+        if self.hello is not None and hello.identity != self.hello.identity:
             raise DeviceError(f"{self.url}: another scanner board answers than was opened: open it again")
         self.hello = hello
 

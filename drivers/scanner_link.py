@@ -18,8 +18,11 @@ class ScannerLink:
         self._decoder = scanner_frame.Decoder()
         self._sequence = 0
         self.received_bytes = 0
-        # Ends whatever stands half-sent in the board's receiver.
-        self._line.write(b"\0")
+        try:
+            self._line.write(b"\0")  # ends whatever stands half-sent in the board's receiver
+        except BaseException:
+            self._line.close()
+            raise
 
     @property
     def counts(self) -> scanner_frame.Counts:

@@ -1,10 +1,10 @@
 """What any payload of a scanner frame is read by: fields of fixed places, and bitmaps of keys. Little-endian."""
 
+import struct
 from dataclasses import astuple
-from struct import Struct
 from typing import ClassVar, Self
 
-from .errors import DeviceError
+from .errors import DeviceError, SettingError
 
 
 class MessageError(DeviceError):
@@ -16,11 +16,14 @@ class Fixed:
 
     __slots__ = ()
     KIND: ClassVar[int]
-    LAYOUT: ClassVar[Struct]
+    LAYOUT: ClassVar[struct.Struct]
 
     def payload(self) -> bytes:
-        """Return what the frame carries."""
-        return self.LAYOUT.pack(*astuple(self))  # type: ignore[call-overload]
+        """Return what the frame carries. Raises SettingError for a value that its field cannot hold."""
+        try:
+            return self.LAYOUT.pack(*astuple(self))  # type: ignore[call-overload]
+        except struct.error as reason:
+            raise SettingError(f"no frame can carry {self}: {reason}") from reason
 
     @classmethod
     def read(cls, payload: bytes) -> Self:

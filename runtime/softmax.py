@@ -7,4 +7,4 @@ from collections.abc import Sequence
 def softmax(scores: Sequence[int], number: int, scale: float) -> float:
     """Return the softmax of `scores` (K,), in steps of 1 / `scale`, for class `number`; it cannot overflow."""
     best = max(scores)
-    return math.exp((scores[number] - best) / scale) / sum(math.exp((score - best) / scale) for score in scores)
+    return math.exp((scores[number] - best) / scale) / sum([math.exp((score - best) / scale) for score in scores])

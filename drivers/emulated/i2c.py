@@ -13,6 +13,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryFile
+from threading import Lock
 from types import TracebackType
 from typing import Any, Literal, Self
 
@@ -97,8 +98,14 @@ class EmulatedI2c:
             start_new_session=True,  # Ctrl-C is for us; the server ends when its stdin does
             env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
         )
-        root = self._tell([asdict(bus) for bus in buses])
-        self.environment = {"UMOCKDEV_DIR": str(root), "LD_PRELOAD": "libumockdev-preload.so.0"}
+        self._lock = Lock()
+        self._root: str | None = None
+        try:
+            self._root = self._tell([asdict(bus) for bus in buses])
+        except BaseException:
+            self.close()
+            raise
+        self.environment = {"UMOCKDEV_DIR": str(self._root), "LD_PRELOAD": "libumockdev-preload.so.0"}
 
     def set_levels(self, bus: int, chip: int, levels: int) -> None:
         """Set the pins of one chip: bit p is pin p; 1 is high, or open where the chip has a pull-up."""
@@ -171,10 +178,12 @@ class EmulatedI2c:
         self._tell(["plug", bus])
 
     def close(self) -> None:
-        """End the server and its device nodes."""
-        if self._server.poll() is None:
-            self._server.communicate(timeout=10)
-        self._errors.close()
+        """End the server and its device nodes. Does no harm twice."""
+        if not self._errors.closed:
+            self._end()
+            self._errors.close()
+            if self._root is not None:  # a server that was killed has left it
+                shutil.rmtree(self._root, ignore_errors=True)
 
     def __enter__(self) -> Self:
         return self
@@ -190,16 +199,29 @@ class EmulatedI2c:
     def _tell(self, line: Any) -> Any:
         assert self._server.stdin is not None
         assert self._server.stdout is not None
-        with suppress(BrokenPipeError):
-            self._server.stdin.write(json.dumps(line) + "\n")
-            self._server.stdin.flush()
-        answer = self._server.stdout.readline()
-        if not answer:
-            raise DeviceError(f"the emulated I2C buses have ended ({self._last_words()}): {_INSTALL}")
+        with self._lock:
+            if self._server.stdout.closed:
+                raise DeviceError("the emulated I2C buses have ended: make new ones")
+            with suppress(BrokenPipeError):
+                self._server.stdin.write(json.dumps(line) + "\n")
+                self._server.stdin.flush()
+            answer = self._server.stdout.readline()
+            if not answer:
+                raise DeviceError(f"the emulated I2C buses have ended ({self._last_words()}): {_INSTALL}")
         return json.loads(answer)
 
-    def _last_words(self) -> str:
+    def _end(self) -> None:
+        """End the server by the end of its stdin; by force, should it hang."""
+        if self._server.stdout is None or self._server.stdout.closed:
+            return
         with suppress(BrokenPipeError):
-            self._server.communicate(timeout=10)
+            try:
+                self._server.communicate(timeout=10)
+            except subprocess.TimeoutExpired:
+                self._server.kill()
+                self._server.communicate()
+
+    def _last_words(self) -> str:
+        self._end()
         self._errors.seek(0)
         return self._errors.read().strip().rpartition("\n")[2]

@@ -79,7 +79,8 @@ class Outgoing:
                 return False
             queued_at, message = self._waiting.popleft()
             self._waiting_bytes -= len(message)
-        self._rest = message if self.damage is None else self.damage(message)
+        damage = self.damage  # another thread may take it away meanwhile
+        self._rest = message if damage is None else damage(message)
         self._from = max(queued_at, self._free_at)
         self._free_at = self._from + len(self._rest) * self.byte_s
         return True

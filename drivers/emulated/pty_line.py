@@ -108,8 +108,9 @@ class PtyLine:
         return wire
 
     def _heard(self, data: bytes) -> None:
-        if self.receive is not None:
-            self.receive(data)
+        receive = self.receive  # another thread may take it away meanwhile
+        if receive is not None:
+            receive(data)
 
     def _sent(self, count: int) -> None:
         self.sent_bytes += count

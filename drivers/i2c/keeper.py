@@ -14,8 +14,9 @@ from .routes import Routes
 T = TypeVar("T")
 
 TRIES = 3
-# An absent chip is tried again so often; what is not the chip it should be, less often, for trying writes to it.
-RETRY_S = 1.0
+# An absent chip is tried again so often: it shall be back, and set up, within a second of its cable's return. What is
+# found again and again not to be the chip it should be is tried less often, for trying writes to it.
+RETRY_S = 0.9
 RETRY_IMPOSTOR_S = 10.0
 
 
@@ -61,6 +62,8 @@ class Keeper:
                 member.due = monotonic() + self._check_every_s
                 self.check(member)
             else:
+                if not any(other.present for other in self._members):
+                    self._renew()  # not every adapter says ENODEV once it is unplugged: its node tells
                 self._bring_up(member, 1)
         self._schedule()
 
@@ -93,10 +96,10 @@ class Keeper:
         try:
             self._node.query(Query(NOBODY, b"", 1))
         except OSError as error:
-            if error.errno in words.NOBODY_THERE:
+            code = error.errno
+            if code not in words.STUCK:  # no acknowledge, by whatever errno this adapter tells it
                 self.trouble = ""
                 return
-            code = error.errno
         self.trouble = words.stuck(self._node.device, code)
         for member in self._members:
             member.present = False
@@ -145,14 +148,16 @@ class Keeper:
         if self.trouble:
             return
         there = whats_there(self._node, member.chip.address)
-        member.blame(f"{member.named} is not there, but {there}: check the harness and the chip's address pins")
-        member.due = monotonic() + RETRY_IMPOSTOR_S
+        found = f"{member.named} is not there, but {there}: check the harness and the chip's address pins"
+        # The first time it may also have been a supply or a contact that came and went during the set-up.
+        member.due = monotonic() + (RETRY_IMPOSTOR_S if found == member.last_error else RETRY_S)
+        member.blame(found)
 
     def _note(self, member: Member, error: OSError) -> None:
         """Blame the mux where it failed, else the chip."""
         named = member.named
-        if member.route and self.routes.selected != member.route:
-            named = words.place(self._node.device, "tca9548a", member.route.mux, None)
+        if member.route and self.routes.selected != member.route and self.routes.mux is not None:
+            named = words.place(self._node.device, "tca9548a", self.routes.mux, None)
         member.blame(words.failure(named, error.errno))
 
     def _lose(self, member: Member, error: OSError) -> None:

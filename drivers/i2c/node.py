@@ -70,6 +70,8 @@ class Node:
         except OSError as error:
             bus.close()
             raise DeviceError(f"{self.device} cannot be opened: {_cause(error)}") from None
+        except ValueError:  # a NUL in the name
+            raise DeviceError(f"{self.device!r} cannot be opened: that is no name of a device node") from None
 
     def close(self) -> None:
         """Close the node; there are no transfers until it is opened again."""
@@ -106,14 +108,20 @@ class Node:
         if not self.plain_i2c:
             (query,) = queries
             return lambda: [self._by_smbus(bus, query)]
+        from smbus2.smbus2 import I2C_RDWR, i2c_rdwr_ioctl_data
+
         messages: list[i2c_msg] = []
         answers: list[i2c_msg] = []
         for query in queries:
             _append(query, messages, answers)
 
+        # What i2c_rdwr of smbus2 makes anew at every call.
+        transfer = i2c_rdwr_ioctl_data.create(*messages)  # type: ignore[arg-type]  # smbus2 says a list, and takes them apart
+
         def run() -> list[bytes]:
             self.transfers += 1
-            bus.i2c_rdwr(*messages)
+            assert bus.fd is not None
+            ioctl(bus.fd, I2C_RDWR, transfer)
             return [bytes(answer) for answer in answers]
 
         return run

@@ -1,11 +1,14 @@
 """Which mux channel is connected, and how to connect another: by a transfer of its own, for it takes effect at STOP."""
 
 from collections.abc import Iterable
-from contextlib import suppress
 from dataclasses import dataclass
 
+from . import words
 from .node import Node, Query
 from .tca9548a import control
+
+# So often a mux must leave its address unacknowledged before it counts as gone: a glitch may swallow one.
+_NAKS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,24 +24,25 @@ class Routes:
 
     What was selected is remembered, and forgotten at any failure behind a mux: a mux that was reset acknowledges
     nothing for the chips behind it, and the next try selects again.
+
+    mux  the address of the mux that was spoken to last
     """
 
     def __init__(self, node: Node, muxes: Iterable[int]) -> None:
         self._node = node
         self._connected = set(muxes)  # those that may have a channel on: all, until they were seen to
         self.selected: Route | None = None
+        self.mux: int | None = None
 
     def select(self, route: Route | None) -> None:
-        """Connect `route` unless it is connected. Raises OSError, with nothing selected, if its mux fails."""
+        """Connect `route`, and nothing else, unless it is connected. Raises OSError, with nothing selected, if not."""
         if route is None or route == self.selected:
             return
         self.selected = None
         for other in sorted(self._connected - {route.mux}):
-            with suppress(OSError):  # it is gone, and takes with it what is behind it
-                self._node.write(other, control(None))
-                self._connected.discard(other)
+            self._release(other)
         self._connected.add(route.mux)
-        self._node.write(route.mux, control(route.channel))
+        self._tell(route.mux, route.channel)
         self.selected = route
 
     def holds(self) -> bool:
@@ -51,3 +55,24 @@ class Routes:
     def forget(self) -> None:
         """Select again next time."""
         self.selected = None
+
+    def _release(self, mux: int) -> None:
+        """Disconnect all channels of a mux. One that is gone takes with it what is behind it.
+
+        Raises OSError where it may still be connected: its chips would answer together with those of the other mux.
+        """
+        for left in reversed(range(_NAKS)):
+            try:
+                self._tell(mux, None)
+            except OSError as error:
+                if error.errno not in words.NOBODY_THERE:
+                    raise
+                if not left:
+                    return
+            else:
+                self._connected.discard(mux)
+                return
+
+    def _tell(self, mux: int, channel: int | None) -> None:
+        self.mux = mux
+        self._node.write(mux, control(channel))

@@ -1,11 +1,15 @@
 """What an errno of an I2C transfer means, in words that say what to check."""
 
 import errno
+from typing import TYPE_CHECKING
 
-from .routes import Route
+if TYPE_CHECKING:
+    from .routes import Route
 
 # No acknowledge: bcm2835 and designware, i2c-gpio, i2c-stub.
 NOBODY_THERE = frozenset({errno.EREMOTEIO, errno.ENXIO, errno.ENODEV})
+# A line may be held low.
+STUCK = frozenset({errno.ETIMEDOUT, errno.EBUSY, errno.EAGAIN})
 # The adapter's driver refuses the batch, not the chip.
 REFUSED = frozenset({errno.EOPNOTSUPP, errno.EINVAL})
 
@@ -26,7 +30,7 @@ def meaning(code: int | None) -> str:
     return f"does not work: {words}"
 
 
-def place(device: str, what: str, address: int, route: Route | None) -> str:
+def place(device: str, what: str, address: int, route: "Route | None") -> str:
     """Name a chip by where it is."""
     behind = f" (channel {route.channel} of the tca9548a at 0x{route.mux:02X})" if route else ""
     return f"{device}: the {what} at 0x{address:02X}{behind}"

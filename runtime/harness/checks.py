@@ -11,6 +11,8 @@ from .wiring import BusWiring, ChipWiring, GloveWiring, Harness
 
 Fault = tuple[Place, str]
 _SENSORS = (18, 22)
+# Their inputs are latches written high: what is not pulled down reads as high, whatever the switch does.
+_PULLED_UP = tuple(CHIPS[kind] for kind in ("pcf8574", "pcf8574a", "pcf8575"))
 
 
 def faults(harness: Harness) -> Iterator[Fault]:
@@ -58,11 +60,14 @@ def _of_chip(place: Place, chip: ChipWiring, bus: BusWiring) -> Iterator[Fault]:
         kind(chip.address)
     except SettingError as reason:
         yield (*place, "address"), str(reason)
+    usable = [pin for pin in kind.pins if pin not in kind.not_inputs]
     for pin in chip.pins:
         if pin not in kind.pins:
-            yield (*place, "pins", pin), f"a {kind.kind} has no pin {pin!r}{nearest(pin, kind.pins)}"
+            yield (*place, "pins", pin), f"a {kind.kind} has no pin {pin!r}{nearest(pin, usable)}"
         if pin in kind.not_inputs:
             yield (*place, "pins", pin), f"must not be an input: {kind.not_inputs[pin]}; use another pin"
+    if chip.closed == "high" and kind in _PULLED_UP:
+        yield (*place, "closed"), f"a {kind.kind} pulls its inputs up by itself: let switches pull them down"
     slowest = min(kind.clock_hz, tca9548a.CLOCK_HZ if chip.mux else kind.clock_hz)
     if bus.clock_hz > slowest:
         which = kind.kind if slowest == kind.clock_hz else "TCA9548A"

@@ -27,6 +27,7 @@ class Finding(msgspec.Struct, frozen=True):
     predicted_us  from one record or full bitmap to the next, or what the readings take, by the arithmetic of the wire
     measured_us   the same as it was, the median; None where nothing came
     remarks       what is missing, slow or odd, in sentences
+    slow          whether it takes much longer than its wire does
     """
 
     device: str
@@ -35,11 +36,7 @@ class Finding(msgspec.Struct, frozen=True):
     predicted_us: float
     measured_us: float | None = None
     remarks: tuple[str, ...] = ()
-
-    @property
-    def slow(self) -> bool:
-        """Whether it takes much longer than its wire does."""
-        return self.measured_us is not None and self.measured_us > SLOW * self.predicted_us
+    slow: bool = False
 
 
 def check_up(harness: Harness, scan: ScanMap) -> Iterator[Callable[[], tuple[Finding, ...]]]:
@@ -114,11 +111,12 @@ def _told(finding: Finding) -> Finding:
     """Return the finding with a remark if it is slow, or silent."""
     if finding.measured_us is None and finding.present:
         remark = "it answers, and then nothing comes: is it busy, or set to another rate?"
-    elif finding.slow and finding.measured_us is not None:
-        remark = f"{finding.measured_us / finding.predicted_us:.1f} times as slow as its wire: {_ADVICE}"
-    else:
+        return msgspec.structs.replace(finding, remarks=(*finding.remarks, remark))
+    times = (finding.measured_us or 0.0) / finding.predicted_us
+    if times <= SLOW:
         return finding
-    return msgspec.structs.replace(finding, remarks=(*finding.remarks, remark))
+    remark = f"{times:.1f} times as slow as its wire: {_ADVICE}"
+    return msgspec.structs.replace(finding, remarks=(*finding.remarks, remark), slow=True)
 
 
 _ADVICE = "does its clock run as fast as glove.toml says, and is the computer busy?"

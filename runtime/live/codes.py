@@ -25,9 +25,11 @@ _RAW_CODES = range(1, _BYTES)
 
 
 class CodeTables:
-    """The joints of a build as look-ups into a record's bytes."""
+    """The joints of a build as look-ups into a record's bytes. The last record's codes are kept: switches come several
+    times as often as records do.
+    """
 
-    __slots__ = ("_pick", "_sensors", "_tables")
+    __slots__ = ("_last", "_last_codes", "_pick", "_sensors", "_tables")
 
     def __init__(
         self, joints: Sequence[Calibration], sensor_names: Sequence[str], calibration: GloveCalibration | None = None
@@ -40,12 +42,19 @@ class CodeTables:
         places = [_place(joint.name, sensor_names) for joint in joints]
         self._pick = itemgetter(*places, *places[:1]) if places else _nothing
         self._tables = [_table(joint, calibration) for joint in joints]
+        self._last: bytes | None = None
+        self._last_codes: list[int] = []
 
     def codes(self, sensors: bytes) -> list[int]:
-        """Return the codes of the build's joints, in its order. Raises FrameError for a record of another length."""
+        """Return the codes of the build's joints, in its order, not to be changed. Raises FrameError for a record of
+        another length.
+        """
+        if sensors == self._last:
+            return self._last_codes
         if len(sensors) != self._sensors:
             raise FrameError(f"a CyberGlove record of {len(sensors)} sensors, {self._sensors} are named")
-        return list(map(getitem, self._tables, self._pick(sensors)))
+        self._last, self._last_codes = sensors, list(map(getitem, self._tables, self._pick(sensors)))
+        return self._last_codes
 
 
 def _nothing(_sensors: bytes) -> tuple[int, ...]:

@@ -16,7 +16,7 @@ from .rewiring import Rewired
 # A device is expected back at least so often, however fast it is: less would take a busy computer, or the 16 ms for
 # which a USB serial adapter may gather bytes, for a cut cable.
 SHORTEST_US = 10_000
-# A board that speaks less often is asked for its full bitmap: whoever is silent for longer is missed sooner.
+# A board that speaks less often is asked for a heartbeat, beside an event for every change: silence is missed sooner.
 STATE_US = SHORTEST_US
 
 _SLOWEST_BAUD = 9_600
@@ -77,15 +77,17 @@ class ScannerDevice:
         self._switches = Rewired((key, number[name]) for key, name in enumerate(wiring.switches) if name in number)
         self.owned = self._switches.targets
         self.period_us = STATE_US
-        self._debouncer = debouncer_of(debounce)
+        self._debounce, self._debouncer = debounce, debouncer_of(debounce)
 
     def open(self) -> None:
         """Open the board, and see to it that it is not silent for long while all is well."""
         hello = self.driver.open()
-        if not 0 < hello.period_us <= STATE_US:
-            self.driver.set_rate(hello.scan_us, STATE_US, hello.heartbeat_us)
-        else:
-            self.period_us = hello.period_us
+        # What was closed before the board was away is no reason to believe it closed now.
+        self._debouncer = debouncer_of(self._debounce)
+        fast = 0 < hello.period_us <= STATE_US
+        self.period_us = hello.period_us if fast else STATE_US
+        if not fast:
+            self.driver.set_rate(hello.scan_us, 0, STATE_US)
 
     def read(self, timeout_s: float) -> SwitchFrame | None:
         """Return the next reading."""

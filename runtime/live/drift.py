@@ -6,6 +6,7 @@ the range move them towards each other.
 """
 
 from collections.abc import Sequence
+from operator import gt, lt
 
 WINDOW_US = 60_000_000
 # Share of a joint's range in the first window by which both ends must have moved.
@@ -31,8 +32,11 @@ class JointDrift:
             self._began_us = None
         if self._began_us is None:
             self._began_us, self._low, self._high = time_us, list(codes), list(codes)
-        self._low = list(map(min, self._low, codes))
-        self._high = list(map(max, self._high, codes))
+        # Seldom so: after a few grasps a joint has been where it goes.
+        if any(map(lt, codes, self._low)):
+            self._low = list(map(min, self._low, codes))
+        if any(map(gt, codes, self._high)):
+            self._high = list(map(max, self._high, codes))
 
     def _end(self) -> None:
         ends = list(zip(self._low, self._high, strict=True))

@@ -9,6 +9,9 @@ from time import monotonic_ns
 
 Mask = int
 
+# Bit of the CyberGlove's status byte: the glove is plugged into its box.
+_PLUGGED = 1
+
 
 def now_us() -> int:
     """Return the host's monotonic clock in microseconds."""
@@ -25,6 +28,11 @@ class GloveFrame:
     sensors: bytes
     status: int | None = None
 
+    @property
+    def plugged(self) -> bool:
+        """Whether the glove is plugged into its box, as far as its status says."""
+        return self.status is None or bool(self.status & _PLUGGED)
+
 
 @dataclass(frozen=True, slots=True)
 class SwitchFrame:
@@ -35,6 +43,7 @@ class SwitchFrame:
     lost     which could not be read (their bits in `closed` mean nothing): a port is silent
     unread   which were left unread, because with the joints of `glove` (None: lost) the leader could not be overtaken
              any more; joined with another frame of the glove, nothing would be certain
+    glove    the glove's frame to join this one with, where the scan could have ended by it; None: the newest
     """
 
     time_us: int

@@ -2,12 +2,10 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
-from ...drivers.debounce import Debouncer
 from ...drivers.i2c.bus import ChipAt, I2cBus, PortRead
 from ...drivers.i2c.scan import Scan
-from ..harness.wiring import Harness
+from ..harness.wiring import Debounce, Harness
 from ..scanning.earlyexit import EarlyExit
 from ..scanning.scanmap import Port, ScanMap
 from ..scanning.timing import reading_of, scan_us
@@ -15,25 +13,31 @@ from .devices import SHORTEST_US, debouncer_of
 from .frames import GloveFrame, Mask, SwitchFrame, now_us
 from .health import Count
 from .joiner import LiveRecognizer
+from .newest import PERIODS
 from .rewiring import Rewired
 
 # A bus whose chips are all gone is not asked in a busy loop.
 _NOBODY_THERE_S = 0.01
 
 
-@dataclass(frozen=True, slots=True)
 class _PortSwitches:
-    """What the answer of a port says: its bits, which of them are inverted, the switches that they are."""
+    """What the answer of a port says: which of its bits are inverted, the switches that they are, debounced."""
 
-    inverted: int
-    switches: Rewired
-    debouncer: Debouncer | None
+    def __init__(self, port: Port, debounce: Debounce) -> None:
+        self._inverted = 0 if port.closed_high else sum(1 << bit for bit, _ in port.switches)
+        self.switches = Rewired(port.switches)
+        self._debounce, self._debouncer = debounce, debouncer_of(debounce)
+        # After such a pause nothing bounces any more that did before it, and what was closed then may have opened.
+        self._pause_us = 2000 * max(debounce.press_lockout_ms, debounce.release_ms)
+        self._read_us = 0
 
     def closed(self, answer: int, time_us: int) -> Mask:
-        closed = self.switches(answer ^ self.inverted)
-        if self.debouncer is None:
-            return closed
-        return self.debouncer.update(time_us, closed, self.switches.targets)
+        """Return which switches are closed."""
+        closed = self.switches(answer ^ self._inverted)
+        if self._debouncer is not None and time_us - self._read_us > self._pause_us:
+            self._debouncer = debouncer_of(self._debounce)
+        self._read_us = time_us
+        return closed if self._debouncer is None else self._debouncer.update(time_us, closed, self.switches.targets)
 
 
 class I2cDevice:
@@ -55,7 +59,7 @@ class I2cDevice:
         ports = [port for port in scan.ports if port.bus == number]
         self.name = f"i2c at {wiring.device}"
         self.period_us = bus_period_us(scan, harness)
-        self._ports = [_switches_of(port, harness) for port in ports]
+        self._ports = [_PortSwitches(port, harness.debounce) for port in ports]
         self.owned: Mask = sum(port.switches.targets for port in self._ports)
         chips = sorted({port.chip for port in ports})
         chips_at = [_chip_at(harness, number, chip, ports) for chip in chips]
@@ -77,12 +81,16 @@ class I2cDevice:
 
     def read(self, timeout_s: float) -> SwitchFrame | None:
         """Scan once."""
+        began_us = now_us()
         frame = (
             self._whole()
             if self._early is None or self._scout is None
             else self._until_decided(self._early, self._scout)
         )
-        if frame.lost == self.owned:
+        if frame.time_us - began_us > PERIODS * self.period_us:
+            # A chip held the bus up: what was read before it is no news any more.
+            frame = SwitchFrame(frame.time_us, 0, self.owned)
+        elif not self.owned & ~(frame.lost | frame.unread):
             time.sleep(min(timeout_s, _NOBODY_THERE_S))
         return frame
 
@@ -122,11 +130,6 @@ class I2cDevice:
         """Return which switches of port `number` are closed, and which are lost."""
         port = self._ports[number]
         return (0, port.switches.targets) if answer is None else (port.closed(answer, now_us()), 0)
-
-
-def _switches_of(port: Port, harness: Harness) -> _PortSwitches:
-    bits = sum(1 << bit for bit, _ in port.switches)
-    return _PortSwitches(0 if port.closed_high else bits, Rewired(port.switches), debouncer_of(harness.debounce))
 
 
 def _chip_at(harness: Harness, bus: int, number: int, ports: list[Port]) -> ChipAt:

@@ -18,9 +18,6 @@ from .scores import LiveScores
 from .sequential import SequentialTest
 from .standing import Standing
 
-# Bit of the CyberGlove's status byte: the glove is plugged into its box.
-_PLUGGED = 1
-
 
 class Decider(Protocol):
     """What turns frames into a grasp type: `Decision` or `SequentialTest`."""
@@ -84,18 +81,18 @@ class LiveRecognizer:
         if not self._build.tables.n_joints:
             return []
         frame = self._glove.fresh(now_us)
-        if frame is None or (frame.status is not None and not frame.status & _PLUGGED):
-            return None
-        return self._codes.codes(frame.sensors)
+        return None if frame is None or not frame.plugged else self._codes.codes(frame.sensors)
 
     def step(self, now_us: int, unix_us: int, switches: SwitchFrame | None, glove: GloveFrame | None) -> LiveGrasp:
         """Return what is recognised at `now_us`, given what came in since the last step (None: nothing).
 
         The same frame may be handed over again: it grows no younger. Raises FrameError for a frame of another glove.
         """
-        codes = self.codes(now_us, glove)
         self._switches.take(switches, now_us)
         frame = self._switches.fresh(now_us)
+        # Ports that were left unread are certain only with the joints by which their scan ended; and a frame that was
+        # handed over once stays the newest, so every scan that can end early brings the joints' frame along.
+        codes = self.codes(now_us, glove if frame is None or frame.glove is None else frame.glove)
         lost = self._all_switches if frame is None else frame.lost
         self._scores.joints(codes)
         standing, lost = self._standing(frame, lost)

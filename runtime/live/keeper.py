@@ -1,6 +1,7 @@
 """A device that is kept: opened, read in a thread of its own, and opened again whenever its cable comes back."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from threading import Event, Thread
 from typing import Generic, Protocol, TypeVar
@@ -11,6 +12,8 @@ from .frames import now_us
 T_co = TypeVar("T_co", covariant=True)
 T = TypeVar("T")
 
+# What is said of a device before it was tried for the first time.
+NOT_YET = "not opened yet"
 # Recovery is promised within a second of the cable's return; opening a CyberGlove takes a part of that.
 RETRY_S = 0.2
 # How long a reading may block before its thread looks whether it is to stop.
@@ -46,12 +49,14 @@ class DeviceState:
 class Keeper(Generic[T]):
     """Keeps `device` open and hands every sample to `take`, in a thread of its own, until it is closed.
 
-    A SettingError ends it: `failure` holds it, for whoever waits on the device.
+    A SettingError ends it unless the device was open before: `failure` holds it, for whoever waits on the device.
     """
 
-    def __init__(self, name: str, device: Device[T], take: Callable[[T], None], changed: Callable[[], None]) -> None:
+    def __init__(
+        self, name: str, device: Device[T], take: Callable[[T], None], changed: Callable[[], None] = lambda: None
+    ) -> None:
         """changed() is called whenever the state changes."""
-        self.state = DeviceState(name, connected=False, error="not opened yet", since_us=now_us(), opened=0)
+        self.state = DeviceState(name, connected=False, error=NOT_YET, since_us=now_us(), opened=0)
         self.failure: SettingError | None = None
         self._device, self._take, self._changed = device, take, changed
         self._stop = Event()
@@ -78,13 +83,18 @@ class Keeper(Generic[T]):
                 self._become(connected=True, error="")
                 self._read()
             except SettingError as wrong:
-                self.failure = wrong
                 self._become(connected=False, error=str(wrong))
-                return
+                # What it did before it can do: only a garbled answer can say otherwise.
+                if not self.state.opened:
+                    self.failure = wrong
+                    return
             except DeviceError as wrong:
                 self._become(connected=False, error=str(wrong))
+            except Exception as fault:  # a fault of ours must not leave a dead thread that passes for a live device
+                self._become(connected=False, error=f"{type(fault).__name__}: {fault}")
             finally:
-                self._device.close()
+                with suppress(OSError):
+                    self._device.close()
             self._stop.wait(RETRY_S)
 
     def _read(self) -> None:

@@ -4,12 +4,27 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from threading import Event
 from time import time_ns
+from typing import Protocol
 
 from ..recording.writer import Recorder
+from .arrivals import Taken
 from .frames import GloveFrame, SwitchFrame, now_us
 from .joiner import LiveRecognizer
 from .published import LiveGrasp
-from .sources import Sources, Taken
+
+
+class Feed(Protocol):
+    """Where frames come from: `Sources`, as a rule."""
+
+    @property
+    def patience_s(self) -> float:
+        """How long to wait for something new before looking what has become too old."""
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait until something has come in that was not taken; return whether it has."""
+
+    def take(self) -> Taken:
+        """Return the newest frames, and all that arrived since the last call."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +46,7 @@ class LiveLoop:
 
     def __init__(
         self,
-        sources: Sources,
+        sources: Feed,
         recognizer: LiveRecognizer,
         tell: Callable[[Moment], None],
         recorder: Recorder | None = None,

@@ -35,13 +35,35 @@ class FrameRate:
         return self._frames * 1e6 / (now_us - (self._began_us or 0))
 
 
+class Tally:
+    """Counts how often each of `bits` bits was set, of all at once: bit k of plane p is bit p of the count of bit k."""
+
+    def __init__(self, bits: int) -> None:
+        self._bits = bits
+        self._planes: list[Mask] = []
+
+    def add(self, mask: Mask) -> None:
+        """Count the bits of `mask`, one each."""
+        for place, plane in enumerate(self._planes):
+            if not mask:
+                return
+            self._planes[place], mask = plane ^ mask, plane & mask
+        if mask:
+            self._planes.append(mask)
+
+    def end(self) -> list[int]:
+        """Return the counts, and begin again at 0."""
+        planes, self._planes = self._planes, []
+        return [sum((plane >> bit & 1) << place for place, plane in enumerate(planes)) for bit in range(self._bits)]
+
+
 class Chattering:
     """Counts changes of every switch, a second at a time."""
 
     def __init__(self, switches: int) -> None:
         self._closed: Mask = 0
         self._began_us: int | None = None
-        self._changes = [0] * switches
+        self._changes = Tally(switches)
         self.switches: tuple[int, ...] = ()
 
     def frame(self, time_us: int, closed: Mask, read: Mask) -> None:
@@ -49,12 +71,7 @@ class Chattering:
         if self._began_us is None:
             self._began_us = time_us
         if time_us - self._began_us >= WINDOW_US:
-            self.switches = tuple(number for number, n in enumerate(self._changes) if n > MOST_CHANGES)
-            self._changes = [0] * len(self._changes)
+            self.switches = tuple(number for number, n in enumerate(self._changes.end()) if n > MOST_CHANGES)
             self._began_us = time_us
-        changed = (closed ^ self._closed) & read
-        while changed:
-            bit = changed & -changed
-            self._changes[bit.bit_length() - 1] += 1
-            changed ^= bit
+        self._changes.add((closed ^ self._closed) & read)
         self._closed = (self._closed & ~read) | (closed & read)

@@ -30,8 +30,7 @@ def replayed(build: Build, recording: Path, policy: Policy | None = None) -> Ite
         elif isinstance(entry, GloveFrame):
             glove = entry
         elif isinstance(entry, LiveGrasp):
-            joined = glove if switches is None or switches.glove is None else switches.glove
-            yield entry, recognizer.step(entry.time_us, entry.unix_us, switches, joined)
+            yield entry, recognizer.step(entry.time_us, entry.unix_us, switches, glove)
 
 
 def _system(build: Build, reader: Reader, policy: Policy | None) -> System:

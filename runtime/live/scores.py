@@ -9,19 +9,19 @@ from ..packed import PackedTables
 from ..tables import IntegerTables
 from .frames import Mask
 
-# Switches are looked up four at a time: a scan changes many at once, and a table of 16 rows is small.
-_FOUR = 4
+# Switches are looked up eight at a time: a byte of a mask is the place of its sum of rows.
+_EIGHT = 8
 
 
 class LiveScores:
-    """A running sum of packed rows; at first every switch is open and every joint lost.
+    """Three sums of packed rows, each worked out anew when what it is of changes; at first every switch is open and
+    every joint lost.
 
     A switch adds its row while it is closed, its mean row while it is lost; a joint adds the row of its code's bin, its
-    mean row while it is lost. Sums of integers forget nothing, so however many changes went by, `lanes` are exactly
-    `Scorer.lanes_without` of the state that they led to.
+    mean row while it is lost. So `lanes` are exactly `Scorer.lanes_without` of the same state.
     """
 
-    __slots__ = ("_codes", "_joints", "_lost", "_means", "_packed", "_rows", "_switches", "_there", "_width")
+    __slots__ = ("_closed", "_codes", "_joints", "_lost", "_means", "_packed", "_rows", "_silent", "_there", "_width")
 
     def __init__(self, tables: IntegerTables) -> None:
         self._packed = PackedTables(tables)
@@ -29,7 +29,7 @@ class LiveScores:
         self._width = tables.n_switches
         self._there: Mask = 0
         self._lost: Mask = 0
-        self._switches = self._packed.start
+        self._closed, self._silent = self._packed.start, 0
         self._codes: tuple[int, ...] | None = None
         self._joints = sum(self._packed.joint_means)
 
@@ -39,10 +39,10 @@ class LiveScores:
             raise FrameError(f"a switch beyond the {self._width} of the build is closed or lost")
         there = closed & ~lost
         if there != self._there:
-            self._switches += _change(self._there, there, self._rows)
+            self._closed = self._packed.start + _sum(there, self._rows)
             self._there = there
         if lost != self._lost:
-            self._switches += _change(self._lost, lost, self._means)
+            self._silent = _sum(lost, self._means)
             self._lost = lost
 
     def joints(self, codes: Sequence[int] | None) -> None:
@@ -61,21 +61,21 @@ class LiveScores:
 
     def lanes(self) -> tuple[int, ...]:
         """Return the K scores, each 2^15 too high."""
-        return self._packed.unpacked(self._switches + self._joints)
+        return self._packed.unpacked(self._closed + self._silent + self._joints)
 
 
 def _sums(rows: Sequence[int]) -> list[list[int]]:
-    """Return, for every four switches, the sum of the rows of each of the 16 sets of them."""
-    fours = [rows[first : first + _FOUR] for first in range(0, len(rows), _FOUR)]
-    return [[sum(row for bit, row in enumerate(four) if chosen >> bit & 1) for chosen in range(16)] for four in fours]
+    """Return, for every eight switches, the sums of the rows of all sets of them, by the byte that such a set is."""
+    return [_sums_of(rows[first : first + _EIGHT]) for first in range(0, len(rows), _EIGHT)]
 
 
-def _change(old: Mask, new: Mask, sums: Sequence[Sequence[int]]) -> int:
-    """Return what the rows of the switches in `new` add up to beyond those in `old`."""
-    total, changed = 0, old ^ new
-    while changed:
-        number = ((changed & -changed).bit_length() - 1) // _FOUR
-        first, rows = number * _FOUR, sums[number]
-        total += rows[new >> first & 15] - rows[old >> first & 15]
-        changed &= -16 << first
-    return total
+def _sums_of(rows: Sequence[int]) -> list[int]:
+    sums = [0]
+    for row in rows:
+        sums += [row + others for others in sums]
+    return sums
+
+
+def _sum(switches: Mask, sums: Sequence[Sequence[int]]) -> int:
+    """Return what the rows of `switches` add up to."""
+    return sum(map(getitem, sums, switches.to_bytes(len(sums), "little")))

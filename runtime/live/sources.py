@@ -1,14 +1,12 @@
 """Every device of a harness, each kept open in a thread of its own, and the newest that they delivered."""
 
-from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from threading import Condition
 from types import TracebackType
 from typing import Any, Self
 
 from ..harness.wiring import Harness
 from ..scanning.scanmap import ScanMap
+from .arrivals import Arrivals, Taken
 from .devices import GloveDevice, ScannerDevice
 from .frames import GloveFrame, SwitchFrame, now_us
 from .health import DeviceHealth
@@ -17,18 +15,7 @@ from .joiner import LiveRecognizer
 from .keeper import DeviceState, Keeper
 from .parts import Part, Parts
 
-# Frames that came in and were not taken yet; a loop that stalls for longer than they last loses the oldest.
-_MOST_WAITING = 4096
 _PATIENCE_US = 100_000
-
-
-@dataclass(frozen=True, slots=True)
-class Taken:
-    """The newest frames, and all that arrived since the last time, in order."""
-
-    switches: SwitchFrame | None
-    glove: GloveFrame | None
-    arrived: tuple[SwitchFrame | GloveFrame, ...]
 
 
 class Sources:
@@ -42,10 +29,6 @@ class Sources:
     def __init__(
         self, harness: Harness, switch_names: Sequence[str], scan: ScanMap, scout: LiveRecognizer | None = None
     ) -> None:
-        self._arrived: deque[SwitchFrame | GloveFrame] = deque(maxlen=_MOST_WAITING)
-        self._condition = Condition()
-        self._newest: SwitchFrame | None = None
-        self._newest_glove: GloveFrame | None = None
         self.gloves = () if harness.cyberglove is None else (GloveDevice(harness.cyberglove),)
         self.scanners = tuple(ScannerDevice(wiring, switch_names, harness.debounce) for wiring in harness.scanners)
         buses = sorted({port.bus for port in scan.ports})
@@ -53,43 +36,38 @@ class Sources:
         self.buses = tuple(I2cDevice(harness, bus, scan, alone, self.glove) for bus in buses)
         switch_devices: tuple[ScannerDevice | I2cDevice, ...] = (*self.scanners, *self.buses)
         self._parts = Parts(len(switch_names), [Part(device.owned, device.period_us) for device in switch_devices])
+        self._arrivals = Arrivals(self._parts)
         self._devices = (*switch_devices, *self.gloves)
         self._keepers: list[Keeper[Any]] = [
-            Keeper(device.name, device, self._taking(part, device), self._note)
+            Keeper(device.name, device, self._taking(part, device))
             for part, device in zip(self._parts.parts, switch_devices, strict=True)
         ]
-        self._keepers += [Keeper(glove.name, glove, self._take_glove, self._note) for glove in self.gloves]
+        self._keepers += [Keeper(glove.name, glove, self._arrivals.put_glove) for glove in self.gloves]
 
     def switches(self) -> SwitchFrame | None:
         """Return the newest frame of the switches, None before the first."""
-        return self._newest
+        return self._arrivals.switches
 
     def glove(self) -> GloveFrame | None:
         """Return the newest frame of the glove, None before the first."""
-        return self._newest_glove
+        return self._arrivals.glove
 
     def wait(self, timeout_s: float) -> bool:
         """Wait until something has come in that was not taken; return whether it has."""
-        with self._condition:
-            return self._condition.wait_for(lambda: bool(self._arrived), timeout_s)
+        return self._arrivals.wait(timeout_s)
 
     def take(self) -> Taken:
-        """Return the newest frames, and all that arrived since the last call.
-
-        Where scans end early, the glove's frame is the one by which the newest scan ended.
-        """
-        with self._condition:
-            arrived = tuple(self._arrived)
-            self._arrived.clear()
-            switches = self._newest
-            glove = self._newest_glove if switches is None or switches.glove is None else switches.glove
-        return Taken(switches, glove, arrived)
+        """Return the newest frames, and all that arrived since the last call."""
+        return self._arrivals.take()
 
     @property
     def patience_s(self) -> float:
-        """How long to wait for something new before looking what has become too old."""
-        periods = [period for period in (self.switch_period_us, self.glove_period_us) if period]
-        return min(periods, default=_PATIENCE_US) / 2e6
+        """How long to wait for something new: until what there is becomes too old, a period where nothing is left."""
+        left_us = self._arrivals.fresh_for_us(now_us(), self.glove_period_us)
+        if left_us is None:
+            periods = [period for period in (self.switch_period_us, self.glove_period_us) if period]
+            left_us = min(periods, default=_PATIENCE_US)
+        return left_us / 1e6
 
     @property
     def switch_period_us(self) -> int | None:
@@ -138,22 +116,4 @@ class Sources:
             keeper.close()
 
     def _taking(self, part: Part, device: ScannerDevice | I2cDevice) -> Callable[[SwitchFrame], None]:
-        def take(frame: SwitchFrame) -> None:
-            with self._condition:
-                part.newest, part.period_us = frame, device.period_us
-                self._newest = self._parts.joined(now_us())
-                if self._newest is not None:
-                    self._arrived.append(self._newest)
-                self._condition.notify_all()
-
-        return take
-
-    def _take_glove(self, frame: GloveFrame) -> None:
-        with self._condition:
-            self._newest_glove = frame
-            self._arrived.append(frame)
-            self._condition.notify_all()
-
-    def _note(self) -> None:
-        with self._condition:
-            self._condition.notify_all()
+        return lambda frame: self._arrivals.put_switches(part, frame, device.period_us)

@@ -15,6 +15,7 @@ from .errors import McapError
 
 _CLOSED, _LOST, _UNREAD = 1, 2, 4
 _TIME_BYTES = 8
+_SPREAD = [bytes(byte >> bit & 1 for bit in range(8)) for byte in range(256)]
 
 
 def switch_bytes(frame: SwitchFrame, switches: int, sensors: int) -> bytes:
@@ -26,10 +27,11 @@ def switch_bytes(frame: SwitchFrame, switches: int, sensors: int) -> bytes:
         raise FrameError(f"a frame with bits beyond the {switches} switches that are recorded")
     states = _spread(frame.closed, switches)
     if frame.lost or frame.unread:
-        states = states + _LOST * _spread(frame.lost, switches) + _UNREAD * _spread(frame.unread, switches)
+        lost, unread = _spread(frame.lost, switches), _spread(frame.unread, switches)
+        states = bytes(a + _LOST * b + _UNREAD * c for a, b, c in zip(states, lost, unread, strict=True))
     if frame.glove is None:
-        return states.tobytes()
-    return states.tobytes() + frame.glove.time_us.to_bytes(_TIME_BYTES, "little") + glove_bytes(frame.glove, sensors)
+        return states
+    return states + frame.glove.time_us.to_bytes(_TIME_BYTES, "little") + glove_bytes(frame.glove, sensors)
 
 
 def switch_frame(time_us: int, data: bytes, switches: int, sensors: int) -> SwitchFrame:
@@ -65,9 +67,9 @@ def glove_frame(time_us: int, data: bytes, sensors: int) -> GloveFrame:
     return GloveFrame(time_us, data[:sensors], data[sensors] if len(data) > sensors else None)
 
 
-def _spread(mask: Mask, switches: int) -> NDArray[np.uint8]:
-    packed = np.frombuffer(mask.to_bytes((switches + 7) // 8, "little"), np.uint8)
-    return np.unpackbits(packed, count=switches, bitorder="little")
+def _spread(mask: Mask, switches: int) -> bytes:
+    """Return a byte of 0 or 1 for each switch."""
+    return b"".join(map(_SPREAD.__getitem__, mask.to_bytes((switches + 7) // 8, "little")))[:switches]
 
 
 def _gather(states: NDArray[np.uint8], flag: int) -> Mask:

@@ -67,7 +67,7 @@ class _Fenced:
                 return self._sink.report()
             except Exception as reason:
                 self._fail(reason)
-        return SinkReport(type(self._sink).__name__, None, 0, self._lost, self._error)
+        return SinkReport(type(self._sink).__name__, None, 0, self._lost, self._error, over=True)
 
     def close(self) -> None:
         try:

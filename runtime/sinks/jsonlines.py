@@ -55,7 +55,7 @@ class JsonLines:
 
     def report(self) -> SinkReport:
         """Return how this sink is doing."""
-        return SinkReport(self._where, None, self._sent, self._lost, self._error)
+        return SinkReport(self._where, None, self._sent, self._lost, self._error, over=bool(self._error))
 
     def close(self) -> None:
         """Finish the line that was begun, if the reader lets us, and close what was opened here."""

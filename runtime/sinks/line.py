@@ -4,7 +4,6 @@ A reader tells them apart by `kind`; msgspec does so by itself: `msgspec.json.de
 """
 
 from msgspec import json
-from msgspec.structs import asdict
 
 from ..live.health import HealthReport
 from ..live.published import LiveGrasp
@@ -23,14 +22,19 @@ class HealthLine(HealthReport, frozen=True, tag_field="kind", tag="health"):
     """The fields of `HealthReport`."""
 
 
-_encoder = json.Encoder()
+_encode = json.Encoder().encode
+_GRASP, _PRESHAPE, _ANGLES = b'{"kind":"grasp",', b',"preshape":', b',"angles":'
 
 
 def encode(grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> bytes:
-    """Return a frame's line, its newline included. UTF-8, no newline inside."""
-    return _encoder.encode(Line(**asdict(grasp), preshape=preshape, angles=angles)) + b"\n"
+    """Return a frame's line, its newline included. UTF-8, no newline inside.
+
+    The bytes of a `Line`, without making one.
+    """
+    parts = (_GRASP, _encode(grasp)[1:-1], _PRESHAPE, _encode(preshape), _ANGLES, _encode(angles), b"}\n")
+    return b"".join(parts)
 
 
 def encode_health(report: HealthReport) -> bytes:
     """Return a report's line, its newline included."""
-    return _encoder.encode(HealthLine(**{name: getattr(report, name) for name in report.__struct_fields__})) + b"\n"
+    return _encode(HealthLine(**{name: getattr(report, name) for name in report.__struct_fields__})) + b"\n"

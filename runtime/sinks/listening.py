@@ -75,7 +75,8 @@ def _unix_error(where: str, reason: OSError) -> Exception:
         return reason
     if reason.errno is None:  # "AF_UNIX path too long" carries no number
         return SettingError(f"{where}: {reason}: a socket's path has at most 107 bytes")
-    return SinkError(f"{where} cannot be opened: {reason.strerror}")
+    hint = ": make its folder first" if reason.errno == errno.ENOENT else ""
+    return SinkError(f"{where} cannot be opened: {reason.strerror}{hint}")
 
 
 def open_tcp(place: str, *, public: bool = False) -> SocketLines:

@@ -5,7 +5,7 @@ from .jsonlines import open_jsonlines
 from .listening import open_tcp, open_unix
 from .sink import Sink, SinkError
 
-KINDS = "jsonl:FILE (- is stdout), unix:PATH, tcp:127.0.0.1:PORT, ros:/NAMESPACE"
+KINDS = "jsonl:FILE (- is stdout), unix:PATH, tcp:127.0.0.1:PORT, tcp-public:ADDRESS:PORT, ros:/NAMESPACE"
 
 
 def open_sink(where: str, *, wait: bool = False) -> Sink:

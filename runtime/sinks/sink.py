@@ -23,6 +23,7 @@ class SinkReport(msgspec.Struct, frozen=True):
     sent      what went out, counted once a reader
     lost      what did not: a reader was slow, was gone, or the system refused
     error     what went wrong last, or nothing
+    over      whether nothing will go out any more: its only reader is gone, the disk is full, it broke
     """
 
     where: str
@@ -30,6 +31,7 @@ class SinkReport(msgspec.Struct, frozen=True):
     sent: int
     lost: int
     error: str = ""
+    over: bool = False
 
 
 class Sink(Protocol):

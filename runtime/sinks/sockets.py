@@ -5,6 +5,7 @@ it keeps up. A slow reader loses whole lines, sees it by the gaps in `number`, a
 the rest of one line and what the system buffers, which is kept small so that it does not read the past.
 """
 
+import select
 import socket
 from collections.abc import Callable
 
@@ -24,11 +25,13 @@ SEND_BUFFER = 16384
 class SocketLines:
     """Serves the readers of a listening socket, which it takes over; `tidy` is called once, at the end."""
 
-    __slots__ = ("_error", "_listener", "_lost", "_readers", "_sent", "_tidy", "_where")
+    __slots__ = ("_error", "_knocks", "_listener", "_lost", "_readers", "_sent", "_tidy", "_where")
 
     def __init__(self, listener: socket.socket, where: str, tidy: Callable[[], None] = lambda: None) -> None:
         listener.setblocking(False)
         self._listener = listener
+        self._knocks = select.poll()
+        self._knocks.register(listener, select.POLLIN)
         self._where = where
         self._tidy = tidy
         self._readers: dict[socket.socket, Outlet] = {}
@@ -53,7 +56,7 @@ class SocketLines:
             self._send_all(encode_health(report))
 
     def _let_in(self) -> None:
-        if self._listener.fileno() < 0:
+        if self._listener.fileno() < 0 or not self._knocks.poll(0):
             return
         try:
             while True:

@@ -13,6 +13,7 @@ from ...drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, Emul
 from ...drivers.emulated.pty_line import PtyLine
 from ...drivers.emulated.scanner import EmulatedScanner
 from ...runtime.harness.wiring import BusWiring, Harness
+from ...runtime.live.devices import sensors_of
 from .cable import Cable
 from .levels import levels_of
 
@@ -47,7 +48,7 @@ class Bench:
             if harness.cyberglove is not None:
                 baud = harness.cyberglove.baud
                 line = self._line("cyberglove", _USUAL_BAUD if baud == "auto" else baud, stack)
-                self.glove = stack.enter_context(EmulatedCyberGlove(line))
+                self.glove = stack.enter_context(EmulatedCyberGlove(line, sensors=sensors_of(harness.cyberglove)))
             self.scanners = tuple(
                 stack.enter_context(
                     EmulatedScanner(self._line(f"scanner{number}", wiring.baud, stack), len(wiring.switches))

@@ -1,7 +1,6 @@
 """What an emulated glove plays: the frames of a scene or of a set of grasps, as the devices would send them."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -9,9 +8,6 @@ from numpy.typing import NDArray
 
 from ...compiler.recordings.graspset import GraspSet
 from ...drivers.calibration import GloveCalibration, SensorCalibration
-from ...runtime.live.frames import GloveFrame, SwitchFrame
-from ...runtime.live.published import UNKNOWN, LiveGrasp
-from ...runtime.recording.reader import Reader
 from ..body.cyberglove import SENSORS, USED, Calibration
 from ..errors import SceneError
 from ..running.simulation import Progress, simulate
@@ -81,12 +77,12 @@ def of_set(grasp_set: GraspSet, period_us: int, calibration: GloveCalibration | 
     A code that no byte of a sensor gives is played as the byte that comes nearest. Sensors that the set does not have
     rest. Without a calibration: of a typical hand. Raises SceneError where none of its joints is a sensor's.
     """
-    meant = calibration or _in_points(Calibration.nominal(), "")
+    meant = calibration or typical()
     known = {sensor.name: sensor for sensor in meant.sensors}
     shared = [joint for joint in grasp_set.joints if joint.name in known]
     if grasp_set.joints and not shared:
         raise SceneError(f"none of the set's joints is a sensor of the CyberGlove: it has {', '.join(sorted(known))}")
-    sensors = np.tile(_resting(meant), (len(grasp_set), 1))
+    sensors = np.tile(resting(meant), (len(grasp_set), 1))
     raw = np.arange(1, 256)
     for joint in shared:
         values = np.array([known[joint.name].value(int(byte)) for byte in raw])
@@ -96,39 +92,6 @@ def of_set(grasp_set: GraspSet, period_us: int, calibration: GloveCalibration | 
         sensors[:, SENSORS.index(joint.name)] = raw[order][_nearest(given[order], codes)]
     return Performance(
         grasp_set.switches, grasp_set.switch_names, sensors, grasp_set.grasps, period_us, calibration=meant
-    )
-
-
-def of_recording(path: Path, period_us: int) -> Performance:
-    """Return the frames of a live recording, the newest ones every `period_us`, with the grasps recognised then.
-
-    Raises McapError if it is none, SceneError if it lacks frames of the glove.
-    """
-    reader = Reader(path)
-    closed, sensors, grasp = 0, b"", UNKNOWN
-    rows: list[tuple[int, bytes, str]] = []
-    due_us: int | None = None
-    for entry in reader:
-        if isinstance(entry, SwitchFrame):
-            closed = entry.closed
-        elif isinstance(entry, GloveFrame):
-            sensors = entry.sensors
-        elif isinstance(entry, LiveGrasp):
-            grasp = entry.grasp
-            if sensors and (due_us is None or entry.time_us >= due_us):
-                rows.append((closed, sensors, grasp))
-                due_us = (entry.time_us if due_us is None else due_us) + period_us
-    session = reader.session
-    if not rows:
-        raise SceneError(f"{path.name}: holds no moment at which the CyberGlove had been read")
-    bits = [[bool(mask >> number & 1) for number in range(len(session.switches))] for mask, _, _ in rows]
-    return Performance(
-        switches=np.array(bits, np.bool_).reshape(len(rows), len(session.switches)),
-        switch_names=session.switches,
-        sensors=np.frombuffer(b"".join(raw for _, raw, _ in rows), np.uint8).reshape(len(rows), -1),
-        grasps=np.array([made for _, _, made in rows]),
-        period_us=period_us,
-        calibration=session.calibration or _in_points(Calibration.nominal(), ""),
     )
 
 
@@ -144,13 +107,19 @@ def _with_wrist(used: Bytes, calibration: Calibration) -> Bytes:
     return np.hstack([used, np.tile(straight, (len(used), 1))])
 
 
-def _resting(calibration: GloveCalibration) -> Bytes:
+def resting(calibration: GloveCalibration) -> Bytes:
+    """Return the bytes (18,) of a straight hand."""
     at_zero = {sensor.name: _byte_at_zero(sensor) for sensor in calibration.sensors}
     return np.array([at_zero.get(name, 128) for name in SENSORS], dtype=np.uint8)
 
 
 def _byte_at_zero(sensor: SensorCalibration) -> int:
     return min(range(1, 256), key=lambda raw: abs(sensor.value(raw)))
+
+
+def typical() -> GloveCalibration:
+    """Return what the bytes mean on a typical hand."""
+    return _in_points(Calibration.nominal(), "")
 
 
 def _in_points(calibration: Calibration, subject: str) -> GloveCalibration:

@@ -119,6 +119,27 @@ def test_it_may_be_kept_all_the_same_and_what_did_not_move_is_left_out(line: Pty
     assert "wrist_yaw" not in [sensor.name for sensor in load_calibration(output).sensors]
 
 
+def test_an_answer_that_was_not_offered_takes_no_pose(line: PtyLine, tmp_path: Path) -> None:
+    with EmulatedCyberGlove(line) as glove, calibrating(line, tmp_path / "a.toml") as process:
+        code, _, said = converse(process, Wearer(glove, 18, {0: "back", 3: "k"}))
+    assert code == 0, said
+    assert "'back' is no answer here" in said
+    assert "'k' is no answer here" in said
+    assert [said.count(f"Pose {number} of 7") for number in range(1, 8)] == [1] * 7
+
+
+def test_a_hand_that_never_moved_leaves_the_old_file(line: PtyLine, tmp_path: Path) -> None:
+    output = tmp_path / "a.toml"
+    output.write_text("old")
+    still: dict[int, str | int | None] = dict.fromkeys(range(0, 13), 60)
+    still |= dict.fromkeys(range(2, 13, 2), "k")
+    with EmulatedCyberGlove(line) as glove, calibrating(line, output) as process:
+        code, _, said = converse(process, Wearer(glove, 18, still))
+    assert code == 2, said
+    assert "no sensor moved" in said.splitlines()[-1]
+    assert output.read_text() == "old"
+
+
 def test_one_may_go_back_to_the_pose_before(line: PtyLine, tmp_path: Path) -> None:
     output = tmp_path / "anna.toml"
     with EmulatedCyberGlove(line) as glove, calibrating(line, output) as process:

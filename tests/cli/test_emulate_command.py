@@ -1,4 +1,6 @@
 import json
+import os
+import pty
 import signal
 import subprocess
 import sys
@@ -117,3 +119,78 @@ def test_what_cannot_be_played_is_said(thenar: Thenar, glove: Path, tmp_path: Pa
     done = thenar("emulate", "quick", "--glove", glove, "--dir", tmp_path / "em", "--", "no-such-program")
     assert done.returncode == 2
     assert "no-such-program cannot be run" in done.stderr
+
+
+def test_nothing_that_it_reads_is_written_over(thenar: Thenar, scene: Path, glove: Path, tmp_path: Path) -> None:
+    before = glove.read_text()
+    done = thenar("emulate", scene, "--glove", glove, "--dir", tmp_path)
+    assert done.returncode == 2
+    assert "glove.toml is named twice" in done.stderr
+    assert glove.read_text() == before
+    done = thenar("emulate", scene, "--glove", glove, "--dir", tmp_path / "em", "--log", scene)
+    assert done.returncode == 2
+    assert scene.read_text() == SCENE
+
+
+def test_a_command_that_a_signal_ended_gives_the_exit_code_that_a_shell_gives(
+    thenar: Thenar, scene: Path, glove: Path, tmp_path: Path
+) -> None:
+    program = "import os, signal; os.kill(os.getpid(), signal.SIGTERM)"
+    arguments = ("emulate", scene, "--glove", glove, "--dir", tmp_path / "em", "--repeat")
+    assert thenar(*arguments, "--", sys.executable, "-c", program).returncode == 128 + signal.SIGTERM
+
+
+def test_a_command_may_ask_for_keys(scene: Path, glove: Path, tmp_path: Path) -> None:
+    arguments = ["emulate", scene, "--glove", glove, "--dir", tmp_path / "em", "--repeat"]
+    program = "print('asked', flush=True); print('got', input())"
+    command = [sys.executable, "-m", "thenar.cli", *map(str, arguments), "--", sys.executable, "-c", program]
+    pid, terminal = pty.fork()
+    if not pid:
+        os.execv(command[0], command)
+    said, answered = b"", False
+    while chunk := _read(terminal):
+        said += chunk
+        if b"asked" in said and not answered:
+            answered = os.write(terminal, b"a key\n") > 0
+    os.close(terminal)
+    assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0, said
+    assert b"got a key" in said
+
+
+def _read(terminal: int) -> bytes:
+    try:
+        return os.read(terminal, 65536)
+    except OSError:  # everybody has left it
+        return b""
+
+
+def test_a_second_ctrl_c_leaves_no_command_behind(scene: Path, glove: Path, tmp_path: Path) -> None:
+    arguments = ["emulate", scene, "--glove", glove, "--dir", tmp_path / "em", "--repeat"]
+    program = "import signal\n"
+    program += "def told(*_): print('told', flush=True)\n"
+    program += "signal.signal(signal.SIGINT, told); print('begun', flush=True)\nwhile True: signal.pause()"
+    command = [sys.executable, "-m", "thenar.cli", *map(str, arguments), "--", sys.executable, "-c", program]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        assert process.stdout is not None
+        for line in ("begun", "told"):
+            assert process.stdout.readline().strip() == line
+            process.send_signal(signal.SIGINT)
+        # Ends only when the command, which holds it too, is gone.
+        assert process.stdout.read() == ""
+    assert process.returncode == 130
+
+
+def test_a_switch_that_is_not_played_is_told(thenar: Thenar, scene: Path, tmp_path: Path) -> None:
+    path = tmp_path / "glove.toml"
+    path.write_text('[[scanner]]\nport = "/dev/ttyACM0"\nswitches = ["thumb_distal_1", "thumb_dorsal_1"]\n')
+    done = thenar("emulate", scene, "--glove", path, "--dir", tmp_path / "em", "--", sys.executable, "-c", "pass")
+    assert done.returncode == 0, done.stderr
+    assert "has no switch thumb_dorsal_1: open all the time" in done.stderr
+
+
+def test_a_harness_without_devices_is_not_emulated(thenar: Thenar, scene: Path, tmp_path: Path) -> None:
+    (tmp_path / "glove.toml").write_text("")
+    done = thenar("emulate", scene, "--glove", tmp_path / "glove.toml", "--dir", tmp_path / "em")
+    assert done.returncode == 2
+    assert "glove.toml names no device" in done.stderr
+    assert not (tmp_path / "em").exists()

@@ -246,7 +246,7 @@ def test_a_device_that_is_gone_is_no_grasp(folder: Path, start: Start, glove: Em
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (["--subject", "B"], "was begun with other subject than asked for now"),
+        (["--subject", "B"], "was begun with other subject than asked for now (A, not B)"),
         (["--repetitions", "3"], "was begun with other repetitions"),
         (["--seed", "6"], "was begun with other seed"),
     ],
@@ -265,6 +265,45 @@ def test_another_collection_does_not_go_into_the_same_file(
     assert (folder / "set.mcap").read_bytes() == before
 
 
+def test_a_set_that_was_not_collected_here_is_not_replaced(folder: Path, start: Start) -> None:
+    (folder / "set.grasps").write_bytes(b"imported")
+    code, said = start().finish()
+    assert code == 2
+    assert "name another --output" in " ".join(said.split())
+    assert (folder / "set.grasps").read_bytes() == b"imported"
+    assert not (folder / "set.mcap").exists()
+
+
+def test_ones_own_grasp_types_come_from_a_file(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = ["--glove", folder / "glove.toml", "--taxonomy", "own", "--subject", "A", "-o", folder / "set.grasps"]
+    assert run(["record", *map(str, options)]) == 2
+    assert "name it with --objects" in capsys.readouterr().err
+
+
+def test_a_glove_without_devices_collects_nothing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "glove.toml").write_text('name = "bare"\n')
+    options = ["--glove", folder / "glove.toml", "--subject", "A", "-o", folder / "set.grasps"]
+    assert run(["record", *map(str, options)]) == 2
+    assert "glove.toml names no device" in capsys.readouterr().err
+
+
+def test_without_a_terminal_a_device_that_is_not_there_is_told(folder: Path) -> None:
+    (folder / "glove.toml").write_text('[cyberglove]\nport = "none"\n')
+    options = ["--glove", folder / "glove.toml", "--subject", "A", "--countdown", "0", "-o", folder / "set.grasps"]
+    command = [sys.executable, "-m", "thenar.cli", "record", *map(str, options)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdin is not None
+        assert process.stderr is not None
+        process.stdin.write(b"\n")
+        process.stdin.flush()
+        said = next(line for line in process.stderr if b"not captured" in line)
+        process.stdin.write(b"q\n")
+        process.stdin.flush()
+        process.stderr.read()
+    assert b"not captured: the CyberGlove is silent (" in said
+    assert b"none: there is no such port" in said
+
+
 def test_without_a_terminal_lines_are_the_keys(folder: Path) -> None:
     options = ["--glove", folder / "glove.toml", "--taxonomy", "own", "--objects", folder / "objects.toml"]
     options += ["--subject", "A", "--repetitions", "1", "--countdown", "0", "-o", folder / "set.grasps"]
@@ -281,3 +320,12 @@ def test_without_a_terminal_lines_are_the_keys(folder: Path) -> None:
         assert accepted == 2
         assert process.wait(30) == 0
     assert len(GraspSet.load(folder / "set.grasps")) == 2
+
+
+def test_without_stdin_it_says_where_keys_would_come_from(folder: Path) -> None:
+    options = ["--glove", folder / "glove.toml", "--subject", "A", "-o", folder / "set.grasps"]
+    command = [sys.executable, "-m", "thenar.cli", "record", *map(str, options)]
+    done = subprocess.run(["sh", "-c", '"$@" <&-', "sh", *command], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "stdin is closed" in done.stderr
+    assert not (folder / "set.mcap").exists()

@@ -4,6 +4,8 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
 from thenar.compiler import GraspSet
 from thenar.runtime import Build
 
@@ -52,3 +54,48 @@ def test_a_reader_that_goes_away_leaves_no_traceback(set_file: Path, build_folde
         complaint = process.stderr.read().decode()
     assert "Traceback" not in complaint
     assert "Error" not in complaint
+
+
+@pytest.mark.parametrize(
+    ("frames", "option", "values"),
+    [
+        ("--glove", "--period-us", ("500",)),
+        ("run.mcap", "--period-us", ("500",)),
+        ("run.mcap", "--sink", ("jsonl:-",)),
+        ("run.mcap", "--frames", ("3",)),
+        ("set.grasps", "--record", ("more.mcap",)),
+        ("set.grasps", "--preshape", ("barrett_bh8",)),
+        ("set.grasps", "--full-scan", ()),
+        ("set.grasps", "--status", ()),
+        ("set.grasps", "--lead", ("1",)),
+        ("set.grasps", "--error-rate", ("0.1",)),
+    ],
+)
+def test_an_option_that_would_change_nothing_is_refused(
+    thenar: Thenar, build_folder: Path, tmp_path: Path, frames: str, option: str, values: tuple[str, ...]
+) -> None:
+    file = tmp_path / ("glove.toml" if frames == "--glove" else frames)
+    file.touch()
+    kind = ("--glove",) if frames == "--glove" else ("--replay",)
+    given = [str(tmp_path / value) if value.endswith(".mcap") else value for value in values]
+    done = thenar("run", build_folder, *kind, file, option, *given)
+    assert done.returncode == 2
+    assert f"{option} changes nothing" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_sequential_test_takes_no_settings_of_the_hysteresis(
+    thenar: Thenar, build_folder: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "run.mcap").touch()
+    done = thenar("run", build_folder, "--replay", tmp_path / "run.mcap", "--error-rate", 0.1, "--dwell-ms", 20)
+    assert done.returncode == 2
+    assert "--dwell-ms changes nothing beside --error-rate" in done.stderr
+
+
+def test_a_recording_has_the_ending_that_replay_knows_it_by(thenar: Thenar, build_folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "glove.toml").write_text('[cyberglove]\nport = "none"\n')
+    done = thenar("run", build_folder, "--glove", tmp_path / "glove.toml", "--record", tmp_path / "run.dat")
+    assert done.returncode == 2
+    assert "run.dat: a recording ends in .mcap" in done.stderr
+    assert not (tmp_path / "run.dat").exists()

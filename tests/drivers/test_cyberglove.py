@@ -4,7 +4,7 @@ import termios
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 from random import Random
 from time import monotonic, monotonic_ns
@@ -97,13 +97,36 @@ def test_times_are_when_records_came_and_no_later_than_now(line: PtyLine) -> Non
     assert times[0] > opened_us - 1_000_000
 
 
-def test_records_that_come_in_one_chunk_are_apart_by_their_time_on_the_line(tmp_path: Path) -> None:
-    record, link = b"S" + VALUES[18] + b"\x81\0", tmp_path / "glove"
-    with PtyLine(link, paced=False) as line, EmulatedCyberGlove(line), CyberGlove(str(link), rate_hz=0.1) as glove:
+@pytest.mark.parametrize("count", [60, 180])
+def test_what_waited_while_the_host_was_held_up_is_as_old_as_it_is(line: PtyLine, count: int) -> None:
+    """180 records are as many bytes as the kernel keeps: they are read in more than one piece."""
+    sent, enough = iter(range(1000)), threading.Event()
+
+    def note(message: bytes) -> bytes:
+        if next(sent) == count:
+            enough.set()
+        return message
+
+    with EmulatedCyberGlove(line), CyberGlove(str(line.link), rate_hz=100) as glove:
         read(glove)
-        line.send(record * 3)
-        times = [timed[0] for _ in range(3) if (timed := glove.read(SOON_S)) is not None]
-    assert [times[1] - times[0], times[2] - times[1]] == [round(21 * 10 * 1e6 / 115_200)] * 2
+        line.damage = note
+        assert enough.wait(SOON_S)
+        held_up_us = monotonic_ns() // 1000
+        times = [timed[0] for _ in range(count) if (timed := glove.read(SOON_S)) is not None]
+    assert times[0] < held_up_us - (count - 20) * 10_000
+    middle = times[10 : count - 10]
+    assert {later - earlier for earlier, later in pairwise(middle)} == {10_000}
+
+
+def test_a_polled_record_that_is_read_late_is_not_taken_for_new(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line), CyberGlove(str(line.link), mode="poll") as glove:
+        read(glove)
+        assert glove.read(0.0) is None  # but it is asked for now
+        asked_us = monotonic_ns() // 1000
+        threading.Event().wait(0.6)  # the host is held up
+        timed = glove.read(SOON_S)
+        assert timed is not None
+        assert timed[0] <= asked_us + 200_000
 
 
 @pytest.mark.parametrize("rate_hz", [None, 100.0])
@@ -295,12 +318,19 @@ def test_a_bad_cable_gives_no_false_record_and_the_next_good_one_is_read(
         assert len(harmed) == 3
 
 
-@pytest.mark.parametrize("lost", range(6))
+@pytest.mark.parametrize("lost", range(10))
 def test_any_answer_may_get_lost_while_it_is_set_up(line: PtyLine, lost: int) -> None:
-    answers = iter(range(100))
+    """All ten: ?G twice, ?N, ?M, ?R, ?i, T, D, U, ?F."""
+    answers = iter(range(1000))
     line.damage = lambda message: b"" if next(answers) == lost else message
-    with EmulatedCyberGlove(line), CyberGlove(str(line.link)) as glove:
-        assert read(glove)
+    with EmulatedCyberGlove(line, text="CyberGlove 2.4") as emulated:
+        glove = CyberGlove(str(line.link))
+        info = glove.open()
+        assert (info.mask, info.right_hand, info.text, info.status) == (MASK_18, True, "CyberGlove 2.4", True)
+        assert info.notes == ()
+        assert read(glove) == Record(bytes([100] * 18), status=0x81)
+        assert emulated.streaming
+        glove.close()
 
 
 def test_a_pulled_plug_is_seen_at_once_and_the_glove_opened_again_after_it(line: PtyLine) -> None:
@@ -380,7 +410,10 @@ def test_the_baud_rate_is_found(tmp_path: Path, baud: int, speed: int) -> None:
 
 
 def test_a_glove_of_another_number_of_sensors_than_said_is_refused(line: PtyLine) -> None:
-    with EmulatedCyberGlove(line, sensors=22), pytest.raises(DeviceError, match="sends 22 sensors, not 18"):
+    with (
+        EmulatedCyberGlove(line, sensors=22),
+        pytest.raises(SettingError, match="sends 22 sensors, not 18: write `sensors = 22`"),
+    ):
         CyberGlove(str(line.link), sensors=18).open()
 
 

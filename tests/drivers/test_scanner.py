@@ -14,7 +14,7 @@ from thenar.drivers import scanner_frame
 from thenar.drivers.emulated.pty_line import PtyLine
 from thenar.drivers.emulated.scanner import EmulatedScanner
 from thenar.drivers.emulated.scanner_board import ScannerBoard
-from thenar.drivers.errors import DeviceError
+from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.scanner import Scanner
 from thenar.drivers.scanner_messages import Event, FromBoard, Heartbeat, Hello, State, frame
 from thenar.drivers.scanner_reading import ScannerReading
@@ -222,6 +222,30 @@ def test_settings_are_answered_by_a_hello(line: PtyLine, start: Callable[..., Em
         assert scanner.hello is not None
         assert (scanner.hello.scan_us, scanner.hello.state_us, scanner.hello.heartbeat_us) == (500, 2000, 100_000)
         assert scanner.hello.press_us == 5000
+
+
+def test_a_board_that_restarts_is_told_its_settings_again(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:
+    board = start()
+    with driver(line) as scanner:
+
+        def state_us() -> int:
+            assert scanner.hello is not None
+            return scanner.hello.state_us
+
+        scanner.set_rate(500, 2000, 100_000)
+        scanner.set_debounce(5000, 10_000)
+        until(scanner, lambda _: state_us() == 2000)
+        board.reboot()
+        until(scanner, lambda _: state_us() == 0)
+        until(scanner, lambda _: state_us() == 2000 and scanner.hello is not None and scanner.hello.press_us == 5000)
+
+
+def test_a_setting_that_no_frame_can_carry_is_refused(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:
+    start()
+    with driver(line) as scanner:
+        for wrong in (-1, 1 << 32):
+            with pytest.raises(SettingError, match="no frame can carry"):
+                scanner.set_rate(wrong, 0, 0)
 
 
 def test_the_troubles_of_the_board_are_heard(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:

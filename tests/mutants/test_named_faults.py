@@ -112,8 +112,8 @@ FAULTS = (
     Fault(
         "a code at a threshold goes right, in the build",
         "runtime/scorer.py",
-        "bins = map(bisect_left, self._thresholds",
-        "bins = map(__import__('bisect').bisect_right, self._thresholds",
+        "bins = map(bisect_left, packed.thresholds",
+        "bins = map(__import__('bisect').bisect_right, packed.thresholds",
         "tests/runtime/test_scorer.py",
     ),
     Fault(

@@ -1,7 +1,9 @@
 import os
+import select
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -75,6 +77,50 @@ def test_nothing_stays_behind_when_it_is_closed() -> None:
     emulated.close()
     emulated.close()
     assert not folder.exists()
+
+
+@pytest.mark.usefixtures("umockdev")
+def test_several_threads_may_speak_to_it_at_a_time() -> None:
+    buses = [EmulatedBus(f"/dev/i2c-{n}", 400_000, "any", (MCP,), paced=False) for n in range(3, 6)]
+    with EmulatedI2c(buses) as emulated, ThreadPoolExecutor(4) as pool:
+        for seen in pool.map(emulated.counters, list(range(3)) * 50):
+            assert (seen.calls, seen.traffic) == (0, ())
+
+
+HOST = """
+from thenar.drivers.emulated.i2c import EmulatedBus, EmulatedChip, EmulatedI2c
+emulated = EmulatedI2c([EmulatedBus("/dev/i2c-3", 400_000, "any", (EmulatedChip("mcp23017", 0x20),))])
+print(emulated._server.pid, emulated.environment["UMOCKDEV_DIR"], flush=True)
+input()
+"""
+
+
+@pytest.mark.usefixtures("umockdev")
+def test_nothing_stays_behind_of_a_program_that_was_killed() -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", HOST], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as host:
+        assert host.stdout is not None
+        pid, folder = host.stdout.readline().split()
+        server = os.pidfd_open(int(pid))
+        try:
+            host.kill()
+            assert select.select([server], [], [], 30.0)[0]
+        finally:
+            os.close(server)
+    assert not Path(folder).exists()
+
+
+@pytest.mark.usefixtures("umockdev")
+def test_nothing_stays_behind_of_a_server_that_was_killed() -> None:
+    emulated = EmulatedI2c([EmulatedBus("/dev/i2c-3", 400_000, "any", (MCP,))])
+    emulated._server.kill()
+    with pytest.raises(DeviceError, match="the emulated I2C buses have ended"):
+        emulated.counters(0)
+    with pytest.raises(DeviceError, match="have ended: make new ones"):
+        emulated.counters(0)
+    emulated.close()
+    assert not Path(emulated.environment["UMOCKDEV_DIR"]).exists()
 
 
 @pytest.mark.usefixtures("umockdev")

@@ -186,6 +186,16 @@ def test_a_chip_swapped_while_running_is_found_out(rig: MakeRig) -> None:
     assert "behaves like a pcf8574" in glove.client.state().chips[0].last_error
 
 
+def test_what_seemed_another_chip_once_is_soon_tried_again(rig: MakeRig) -> None:
+    """As does a contact that comes and goes while a chip is set up."""
+    glove = running(rig, check_every_s=0.05)
+    glove.emulated.replace(0, 0, "pcf8574")
+    glove.client.ask("read_until", [None, LEVELS[1]], RECOVERY_S)
+    glove.emulated.replace(0, 0, "mcp23017")
+    glove.emulated.set_all([LEVELS])
+    assert glove.client.ask("read_until", LEVELS, RECOVERY_S / 2)[-1] == LEVELS
+
+
 def test_a_mux_that_was_reset_is_selected_again_within_the_scan(rig: MakeRig) -> None:
     glove = running(rig, [MUXED[0]], MUXED_LEVELS[:1], check_every_s=3600.0)
     glove.emulated.poke_mux(0, 0x70, 0)
@@ -228,6 +238,50 @@ def test_a_mux_that_is_gone_is_named_and_comes_back(rig: MakeRig) -> None:
         [*MUXED_LEVELS, 0xFFF0],
         by_way_of=[[None, None, 0xFFF0], [MUXED_LEVELS[0], None, 0xFFF0], [None, MUXED_LEVELS[1], 0xFFF0]],
     )
+
+
+TWO_MUXES = [("mcp23017", 0x20, 0x70, 3), ("mcp23017", 0x20, 0x71, 3)]
+THEIR_LEVELS = [0x80F1, 0x9F80]  # both at once would read as 0x8080
+
+
+@pytest.mark.parametrize("code", [errno.EIO, errno.EREMOTEIO, errno.EAGAIN])
+def test_a_mux_that_fails_to_let_go_is_asked_again_before_another_is_connected(rig: MakeRig, code: int) -> None:
+    glove = running(rig, TWO_MUXES, THEIR_LEVELS, check_every_s=3600.0)
+    glove.client.ask("prepare", [(0, "AB")])
+    assert glove.client.ask("read") == THEIR_LEVELS[:1]
+    glove.client.ask("prepare", [(1, "AB")])
+    glove.emulated.fail(0, code, address=0x70, times=1)
+    assert glove.client.ask("read") == THEIR_LEVELS[1:]
+
+
+def test_a_mux_that_does_not_let_go_lets_nothing_be_read_behind_another_and_is_named(rig: MakeRig) -> None:
+    glove = running(rig, TWO_MUXES, THEIR_LEVELS, check_every_s=3600.0)
+    glove.client.ask("prepare", [(0, "AB")])
+    assert glove.client.ask("read") == THEIR_LEVELS[:1]
+    glove.client.ask("prepare", [(1, "AB")])
+    glove.emulated.fail(0, errno.EIO, address=0x70)
+    assert glove.client.ask("read") == [None]
+    assert "the tca9548a at 0x70 does not work" in glove.client.state().chips[1].last_error
+    glove.emulated.heal(0)
+    recovers(glove, THEIR_LEVELS[1:], by_way_of=[[None]])
+
+
+def test_a_mux_that_is_gone_keeps_no_other_from_being_read(rig: MakeRig) -> None:
+    glove = running(rig, TWO_MUXES, THEIR_LEVELS, check_every_s=3600.0)
+    glove.emulated.remove_mux(0, 0x70)
+    assert glove.client.ask("read") == [None, THEIR_LEVELS[1]]
+
+
+def test_an_adapter_with_an_errno_of_its_own_for_no_acknowledge_has_no_stuck_bus(rig: MakeRig) -> None:
+    glove = rig(*TWO, opened=False, check_every_s=3600.0)
+    glove.emulated.set_all([LEVELS])
+    glove.emulated.fail(0, errno.EIO, address=0x7F)
+    glove.client.ask("open")
+    assert glove.client.state().trouble == ""
+    glove.client.ask("prepare", BOTH)
+    glove.emulated.fail(0, errno.EIO, address=0x20)
+    assert glove.client.ask("read") == [None, LEVELS[1]]
+    assert glove.client.state().trouble == ""
 
 
 @pytest.mark.parametrize("leftover", [0x80, 0xA0, 0x20])

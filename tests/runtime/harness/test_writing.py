@@ -39,7 +39,7 @@ def harnesses(draw: st.DrawFn) -> Harness:
                 address=kind.addresses[address % len(kind.addresses)],
                 mux=mux,
                 pins={pin: next(left) for pin in pins},
-                closed=draw(st.sampled_from(["low", "high"])),
+                closed=draw(st.sampled_from(["low"] if kind.kind.startswith("pcf") else ["low", "high"])),
             )
         )
     board = ScannerWiring(port="p", switches=("", *(next(left) for _ in range(draw(st.integers(0, 4))))))

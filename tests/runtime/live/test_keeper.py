@@ -97,5 +97,24 @@ def test_what_no_try_can_help_ends_it(kept: Kept) -> None:
     assert kept.keeper.failure is wrong
 
 
+def test_what_a_device_could_do_before_is_tried_again(kept: Kept) -> None:
+    kept.device.openings.put(None)
+    assert kept.next_change() == (True, "")
+    kept.device.samples.put(SettingError("an answer that the cable garbled"))
+    assert kept.next_change() == (False, "an answer that the cable garbled")
+    kept.device.openings.put(None)
+    assert kept.next_change() == (True, "")
+    assert kept.keeper.failure is None
+
+
+def test_a_fault_of_the_program_shows_and_leaves_no_dead_thread(kept: Kept) -> None:
+    kept.device.openings.put(None)
+    assert kept.next_change() == (True, "")
+    kept.device.samples.put(ZeroDivisionError("oops"))
+    assert kept.next_change() == (False, "ZeroDivisionError: oops")
+    kept.device.openings.put(None)
+    assert kept.next_change() == (True, "")
+
+
 def test_retries_leave_time_to_recover_within_a_second() -> None:
     assert RETRY_S <= 0.25

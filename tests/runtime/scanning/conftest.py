@@ -30,7 +30,7 @@ def _harnesses(draw: st.DrawFn, chips: int = 3, pins: int = 6) -> Harness:
                 address=0x20 + number,
                 mux=None if behind is None else MuxChannel(address=behind[0], channel=behind[1]),
                 pins={pin: f"s{switch + index}" for index, pin in enumerate(used)},
-                closed=draw(st.sampled_from(["low", "high"])),
+                closed=draw(st.sampled_from(["low"] if kind.kind.startswith("pcf") else ["low", "high"])),
             )
         )
         switch += len(used)

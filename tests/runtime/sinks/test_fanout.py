@@ -41,7 +41,7 @@ def test_one_that_raises_is_left_out_and_the_others_go_on(make_grasp: MakeGrasp)
     assert faulty.numbers == [0, 1, 2]
     assert file.getvalue().count(b"\n") == 5
     own, lines = fanout.reports()
-    assert own == SinkReport("Faulty", None, 0, 3, "KeyError: 'own fault'")
+    assert own == SinkReport("Faulty", None, 0, 3, "KeyError: 'own fault'", over=True)
     assert (lines.sent, lines.lost, lines.error) == (5, 0, "")
 
 
@@ -66,4 +66,4 @@ def test_a_report_of_health_reaches_those_that_work(make_grasp: MakeGrasp, healt
     fanout.health(health)
     fanout.publish(make_grasp(0), None, None)
     assert file.getvalue().count(b"\n") == 2
-    assert fanout.reports()[0] == SinkReport("Faulty", None, 0, 2, "ValueError: no health")
+    assert fanout.reports()[0] == SinkReport("Faulty", None, 0, 2, "ValueError: no health", over=True)

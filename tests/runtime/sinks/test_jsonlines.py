@@ -94,7 +94,7 @@ def test_a_reader_that_is_gone_is_told_in_the_report(make_grasp: MakeGrasp) -> N
             sink.publish(make_grasp(number), None, None)
         report = sink.report()
         sink.close()
-    assert (report.sent, report.lost, report.error) == (0, 3, "Broken pipe")
+    assert (report.sent, report.lost, report.error, report.over) == (0, 3, "Broken pipe", True)
 
 
 def test_a_file_that_somebody_closed_raises_nothing(make_grasp: MakeGrasp) -> None:

@@ -7,6 +7,7 @@ import hashlib
 import json
 import struct
 from collections.abc import Sequence
+from importlib import import_module
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
@@ -223,7 +224,7 @@ def test_a_preshape_is_a_trajectory_of_one_point_that_starts_at_once(ros: Module
 @pytest.fixture(scope="module")
 def decoders() -> dict[str, Any]:
     """Return decoders of another hand, made from the .msg files: those of the MCAP tools for ROS 2."""
-    dynamic = pytest.importorskip("mcap_ros2._dynamic")
+    dynamic = import_module("mcap_ros2._dynamic")
     name = "trajectory_msgs/msg/JointTrajectory"
     inner = [f"{'=' * 80}\nMSG: {one.replace('/msg/', '/')}\n{MSG[one]}" for one in sorted(nested_in(name))]
     found: dict[str, Any] = dynamic.generate_dynamic(name, "\n".join([MSG[name], *inner]))

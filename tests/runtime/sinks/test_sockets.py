@@ -165,6 +165,7 @@ def test_too_many_readers_are_turned_away(sink: SocketLines, connect: Connect, m
         sink.publish(make_grasp(3), None, None)
     assert sink.report().readers == MAX_READERS
     assert "turned away" in sink.report().error
+    assert not sink.report().over
     assert readers[-1].socket.recv(1) == b""
     assert readers[0].number() == 3
 

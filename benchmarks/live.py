@@ -1,0 +1,219 @@
+"""What the live loop costs, and how near it comes to what the wires allow.
+
+    python benchmarks/live.py [--seconds N]
+
+Four tables: microseconds of CPU a frame against 150; frames a second on emulated devices against the wire's own rate;
+the kept switches' scan beside that of all 160; the peak of a `thenar run` against 80 MiB. Emulated buses need umockdev
+(Debian packages umockdev, gir1.2-umockdev-1.0, python3-gi). Emulated devices and readers work on the same cores as the
+run, so a machine that has other things to do, or but one core, shows worse numbers than a glove would.
+"""
+
+import argparse
+import os
+import platform
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from itertools import chain
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from liveplay import (
+    Memory,
+    Played,
+    board,
+    glove,
+    joints_alone,
+    played,
+    read_along,
+    restless,
+    session,
+    teller,
+    with_glove,
+)
+from liverates import Found, of_board, of_bus, of_glove
+from livescans import compared, wired
+from rich.console import Console
+from rich.table import Table
+
+from thenar.runtime.harness.writing import harness_to_toml
+from thenar.runtime.live.frames import now_us
+from thenar.runtime.live.loop import LiveLoop, Moment
+from thenar.runtime.live.system import System
+from thenar.runtime.preshape.loading import load_preshapes
+from thenar.runtime.preshape.selector import PreshapeSelector
+from thenar.runtime.recording.writer import Recorder
+from thenar.runtime.sinks.angles import AngleReader
+from thenar.runtime.sinks.fanout import Fanout
+from thenar.runtime.sinks.opening import open_sink
+from thenar.simulator.playing.bench import Bench
+
+MOST_US, LEAST_SHARE, MOST_MIB = 150, 0.9, 80
+FRAMES, TURNS = 500, 8
+# A clock at which the wire takes so long that what emulates it does not matter.
+SLOW_HZ = 10_000
+STAGES = ("the step alone", "and JSON lines, preshape, angles", "and MCAP", "and health", "and a socket with a reader")
+Tell = Callable[[Moment], None]
+# Prints the peak of its only child in KiB: a process's own begins at the size of who started it.
+PEAK = "import os, subprocess, sys; print(os.wait4(subprocess.Popen(sys.argv[1:]).pid, 0)[2].ru_maxrss)"
+
+
+def table(title: str, *columns: str) -> Table:
+    made = Table(title=title, title_justify="left")
+    for column in columns:
+        made.add_column(column, justify="right" if made.columns else "left")
+    return made
+
+
+def loop_costs(scenes: Sequence[Played], folder: Path) -> Table:
+    """Return a line a stage: CPU of the thread, median and 99th percentile, with everything changing in memory."""
+    sizes = (f"{len(scene.kept)} switches: median, 99 %" for scene in scenes)
+    made = table(f"CPU of the live thread a frame, all switches and joints changing (at most {MOST_US} us)", "", *sizes)
+    found = [[np.percentile(spent, (50, 99)) for spent in _stages_us(scene, folder)] for scene in scenes]
+    for what, each in zip(STAGES, zip(*found, strict=True), strict=True):
+        made.add_row(what, *(f"{median:.0f} us, {high:.0f} us" for median, high in each))
+    return made
+
+
+def _stages_us(scene: Played, folder: Path) -> list[list[float]]:
+    """Return microseconds a frame for every stage. They run by turns, so that what else the machine does hits all."""
+    system = System.of(scene.build, with_glove(board(scene), glove(scene)))
+    frames = restless(len(system.switch_names), FRAMES, seed=1)
+    with ExitStack() as stack:
+        loops = [_stage(stage, system, folder, stack) for stage in range(len(STAGES))]
+        turns = [[[_step_us(*each, *frame) for frame in frames] for each in loops] for _ in range(1 + TURNS)]
+    # The first turn fills caches.
+    return [list(chain(*stage)) for stage in zip(*turns[1:], strict=True)]
+
+
+def _step_us(loop: LiveLoop, feed: Memory, closed: int, sensors: bytes) -> float:
+    feed.put(now_us(), closed, sensors)
+    start = time.thread_time_ns()
+    loop.step()
+    return (time.thread_time_ns() - start) / 1e3
+
+
+def _stage(stage: int, system: System, folder: Path, stack: ExitStack) -> tuple[LiveLoop, Memory]:
+    """Return a loop with everything up to this stage, and what feeds it."""
+    own = Path(stack.enter_context(TemporaryDirectory(dir=folder)))
+    recorder = stack.enter_context(Recorder(own / "run.mcap", session(system))) if stage >= 2 else None
+    if stage >= 4:
+        fanout = stack.enter_context(read_along(own))
+    else:
+        fanout = Fanout([open_sink("jsonl:/dev/null")])
+        stack.callback(fanout.close)
+    told = teller(system, fanout, system.sources(), recorder).tell
+    tell: Tell = told if stage >= 3 else _published(system, fanout) if stage else _told_to_nobody
+    feed = Memory(system)
+    return LiveLoop(feed, system.recognizer(), tell, recorder), feed
+
+
+def _told_to_nobody(_: Moment) -> None:
+    pass
+
+
+def _published(system: System, fanout: Fanout) -> Tell:
+    """Return what does with a moment what `thenar run` does, except to watch how the glove fares."""
+    assert system.calibration is not None
+    selector = PreshapeSelector(load_preshapes("barrett_bh8"))
+    angles = AngleReader(system.sensor_names, system.calibration)
+
+    def tell(moment: Moment) -> None:
+        assert moment.glove is not None
+        fanout.publish(moment.grasp, selector.update(moment.grasp), angles.angles(moment.glove.sensors))
+
+    return tell
+
+
+def rates(scene: Played, seconds: float, folder: Path) -> Table:
+    """Return a line a wire: frames a second, all sinks and the recording on."""
+    made = table(
+        f"Frames a second with everything on (at least {LEAST_SHARE:.0%} of what the wire allows)",
+        *("", "wire allows", "device sent", "arrived", "in a grasp", "of the wire", "CPU a grasp: loop, process"),
+        "beside system calls",
+    )
+    joints, own, whole = joints_alone("quick", folder), scene.kept, scene.performance.switch_names
+    found = [of_glove(scene, joints, sensors, seconds) for sensors in (18, 22)]
+    for keys, baud, hz in ((len(own), 115_200, 0), (len(whole), 115_200, 0), (len(whole), 1_000_000, 1000)):
+        found.append(of_board(scene, keys, baud, hz, seconds))
+    found.append(of_board(scene, len(whole), 1_000_000, 0, seconds))
+    for names, clock_hz, full in (
+        *((whole, 100_000, full) for full in (True, False)),
+        *((own, 100_000, full) for full in (True, False)),
+        (own, SLOW_HZ, True),
+    ):
+        how = "in full" if full else "ended early"
+        what = f"I2C at {clock_hz // 1000} kHz, {len(own)} of {len(names)} switches, {how}"
+        found.append(of_bus(scene, what, wired(scene, names, clock_hz), seconds, full=full))
+    for each in found:
+        made.add_row(*_rate(each))
+    return made
+
+
+def _rate(found: Found) -> tuple[str, ...]:
+    rates_hz = (found.allowed_hz, found.sent_hz, found.arrived_hz, found.run.recognised_hz)
+    cost = f"{found.run.loop_us:.0f} us, {found.run.process_us:.0f} us"
+    beside = f"{found.run.between_us:.0f} us a scan: {found.own_share:.0%}" if found.run.between_us else ""
+    return found.what, *(f"{hz:.0f}" for hz in rates_hz), f"{found.share:.0%}", cost, beside
+
+
+def scans(scene: Played) -> Table:
+    """Return a line a way to scan, beside all 160 switches."""
+    made = table(
+        "A scan of the kept switches beside that of all 160, MCP23017 at 100 kHz",
+        *("", "on the wire", "times less", "measured", "times less", "of it Python", "bytes", "system calls"),
+    )
+    every = list(compared(scene))
+    for each in every:
+        made.add_row(
+            each.what,
+            f"{each.predicted_us:.0f} us",
+            f"{every[0].predicted_us / each.predicted_us:.1f}",
+            f"{each.measured_us:.0f} us",
+            f"{every[0].measured_us / each.measured_us:.1f}",
+            f"{each.python_us:.0f} us",
+            f"{each.bytes:.1f}",
+            f"{each.ioctls:.1f}",
+        )
+    return made
+
+
+def peak_mib(scene: Played, folder: Path, seconds: float) -> float:
+    """Return the peak of a `thenar run` on a CyberGlove and a bus, with recording, socket and preshape."""
+    harness = wired(scene, scene.kept, 400_000)
+    with Bench(harness, scene.performance.switch_names, folder) as bench:
+        file = folder / "glove.toml"
+        file.write_text(harness_to_toml(with_glove(bench.harness, glove(scene, str(folder / "cyberglove")))))
+        options = ["--sink", f"unix:{folder}/socket", "--preshape", "barrett_bh8", "--record", folder / "peak.mcap"]
+        run = [sys.executable, "-m", "thenar.cli", "run", scene.folder, "--glove", file, "--status", *options]
+        run += ["--frames", str(int(400 * seconds))]
+        command = [sys.executable, "-c", PEAK, *map(str, run)]
+        done = subprocess.run(command, env=os.environ | bench.environment, capture_output=True, text=True, check=True)
+    return int(done.stdout) / 1024
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seconds", type=float, default=3.0, help="of each run on a wire (default 3)")
+    options = parser.parse_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that devices are taken away again
+    console = Console(width=180)
+    busy = f"{os.getloadavg()[0]:.1f} processes were busy on {os.cpu_count()} cores when it began"
+    console.print(f"{platform.machine()}, Python {platform.python_version()}; {busy}\n")
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        scenes = [played("quick", folder), played("kamakura", folder, prune=20)]
+        console.print(loop_costs(scenes, folder), "")
+        console.print(rates(scenes[0], options.seconds, folder), "")
+        console.print(scans(scenes[0]), "")
+        console.print(
+            f"Peak of `thenar run`: {peak_mib(scenes[0], folder, options.seconds):.0f} MiB (at most {MOST_MIB})"
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,162 @@
+"""What the benchmarks of the live loop play: scenes, builds of them, gloves wired for them, and frames in memory."""
+
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.metadata import version
+from pathlib import Path
+from threading import Event
+from typing import Literal
+
+import msgspec
+import numpy as np
+
+from thenar.cli.teller import Teller
+from thenar.compiler import compile_build
+from thenar.drivers.cyberglove_frame import ALWAYS, PLUGGED
+from thenar.runtime import Build
+from thenar.runtime.harness.loading import parse_harness
+from thenar.runtime.harness.wiring import GloveWiring, Harness
+from thenar.runtime.harness.writing import harness_to_toml
+from thenar.runtime.live.arrivals import Arrivals, Taken
+from thenar.runtime.live.frames import GloveFrame, SwitchFrame
+from thenar.runtime.live.parts import Part, Parts
+from thenar.runtime.live.sources import Sources
+from thenar.runtime.live.system import System
+from thenar.runtime.preshape.loading import load_preshapes
+from thenar.runtime.preshape.selector import PreshapeSelector
+from thenar.runtime.recording.session import Session
+from thenar.runtime.recording.writer import Recorder
+from thenar.runtime.sinks.angles import AngleReader
+from thenar.runtime.sinks.fanout import Fanout
+from thenar.runtime.sinks.opening import open_sink
+from thenar.simulator import load_scene, simulate
+from thenar.simulator.playing.performance import Performance, of_scene
+
+# Reads a socket as fast as lines come, so that they are sent and not lost.
+_READER = "import socket, sys; s = socket.socket(socket.AF_UNIX); s.connect(sys.argv[1])\nwhile s.recv(65536): pass"
+SENSORS: Literal[18] = 18
+STATUS = ALWAYS | PLUGGED
+
+
+@dataclass(frozen=True, eq=False)
+class Played:
+    """A performance, the folder of a build of its scene, and the calibration of who performs."""
+
+    folder: Path
+    build: Build
+    performance: Performance
+    calibration: Path
+
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """The names of the kept switches, in the build's order."""
+        return tuple(switch.name for switch in self.build.manifest.switches)
+
+    @cached_property
+    def keys(self) -> list[int]:
+        """The kept switches that are closed in each row, bit k for the kept switch k."""
+        columns = [self.performance.switch_names.index(name) for name in self.kept]
+        return [mask(row) for row in self.performance.switches[:, columns].tolist()]
+
+
+def played(name: str, folder: Path, prune: int = 0) -> Played:
+    """Simulate and compile a shipped scene; the first subject performs."""
+    scene = load_scene(name)
+    compiled = compile_build(simulate(scene, 1).grasp_set, folder / name, folds=0, prune=prune).folder
+    performance = of_scene(scene, jobs=1)
+    calibration = folder / f"{name}.toml"
+    calibration.write_text(performance.calibration.to_toml())
+    return Played(compiled, Build.load(compiled), performance, calibration)
+
+
+def joints_alone(name: str, folder: Path) -> Path:
+    """Return a build of a shipped scene that uses the joints alone."""
+    return compile_build(simulate(load_scene(name), 1).grasp_set, folder / "joints", folds=0, inputs="joints").folder
+
+
+def glove(played: Played, port: str = "glove", sensors: Literal[18, 22] = SENSORS) -> GloveWiring:
+    """Return a CyberGlove that streams as fast as it can."""
+    return GloveWiring(port=port, sensors=sensors, calibration=str(played.calibration))
+
+
+def board(played: Played, port: str = "board", keys: int = 0, baud: int = 115_200) -> Harness:
+    """Return a glove whose kept switches hang on the first keys of a board, of so many keys at least."""
+    names = [*played.kept, *[""] * (keys - len(played.kept))]
+    text = f'name = "board"\n[[scanner]]\nport = "{port}"\nbaud = {baud}\nswitches = {names!r}\n'
+    return parse_harness(text, "board")
+
+
+def with_glove(harness: Harness, wiring: GloveWiring) -> Harness:
+    """Return `harness` with a CyberGlove besides."""
+    return msgspec.structs.replace(harness, cyberglove=wiring)
+
+
+class Memory:
+    """A feed of the live loop that holds what it was given: no device, no thread, no waiting."""
+
+    patience_s = 0.0
+
+    def __init__(self, system: System) -> None:
+        self._part = Part((1 << len(system.switch_names)) - 1, 1000)
+        self._arrivals = Arrivals(Parts(len(system.switch_names), [self._part]))
+
+    def put(self, time_us: int, closed: int, sensors: bytes | None) -> None:
+        """Let a frame of the switches come in, and before it one of the glove unless there is none."""
+        if sensors is not None:
+            self._arrivals.put_glove(GloveFrame(time_us, sensors, STATUS))
+        self._arrivals.put_switches(self._part, SwitchFrame(time_us, closed), self._part.period_us)
+
+    def wait(self, timeout_s: float) -> bool:
+        """Return whether something came in."""
+        return self._arrivals.wait(timeout_s)
+
+    def take(self) -> Taken:
+        """Return what came in."""
+        return self._arrivals.take()
+
+
+def restless(switches: int, frames: int, seed: int) -> list[tuple[int, bytes]]:
+    """Return frames of which any two have nothing in common but by chance: half of the switches, all sensors change."""
+    rng = np.random.default_rng(seed)
+    bits, sensors = rng.random((frames, switches)) < 0.5, rng.integers(1, 256, (frames, SENSORS), dtype=np.uint8)
+    return [(mask(row.tolist()), raw.tobytes()) for row, raw in zip(bits, sensors, strict=True)]
+
+
+def mask(closed: Sequence[bool]) -> int:
+    """Return the closed switches as one integer."""
+    return sum(1 << number for number, shut in enumerate(closed) if shut)
+
+
+def teller(system: System, fanout: Fanout, sources: Sources, recorder: Recorder | None) -> Teller:
+    """Return what tells `fanout` of every moment, preshapes and angles with it, and how the glove fares."""
+    assert system.calibration is not None
+    selector = PreshapeSelector(load_preshapes("barrett_bh8"))
+    angles = AngleReader(system.sensor_names, system.calibration)
+    return Teller(system, fanout, sources, None, Event(), selector, angles, recorder, status=True)
+
+
+@contextmanager
+def read_along(folder: Path) -> Iterator[Fanout]:
+    """Yield JSON lines to nowhere and a socket in `folder` that a process of its own reads."""
+    fanout = Fanout([open_sink("jsonl:/dev/null"), open_sink(f"unix:{folder}/socket")])
+    with subprocess.Popen([sys.executable, "-c", _READER, f"{folder}/socket"]):
+        try:
+            yield fanout
+        finally:
+            fanout.close()
+
+
+def session(system: System) -> Session:
+    """Return what a recording of `system` says of itself."""
+    return Session(
+        thenar=version("thenar"),
+        switches=system.switch_names,
+        sensors=system.sensor_names,
+        build=system.build.manifest.checksum,
+        harness=harness_to_toml(system.harness),
+        calibration=system.calibration,
+    )

@@ -1,0 +1,178 @@
+"""Frames a second on emulated wires: the devices here, the run in a process of its own (livewire.py)."""
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from itertools import count, pairwise
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from threading import Event, Thread
+from typing import Literal
+
+import msgspec
+from liveplay import Played, board, glove, with_glove
+from livewire import Rate
+
+from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
+from thenar.drivers.emulated.pty_line import PtyLine
+from thenar.drivers.emulated.scanner import EmulatedScanner
+from thenar.drivers.emulated.scanner_board import ScannerBoard
+from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.harness.writing import harness_to_toml
+from thenar.runtime.scanning.timing import free_us, glove_us, scanner_us
+from thenar.simulator.playing.bench import Bench
+
+LIVEWIRE = Path(__file__).with_name("livewire.py")
+_CHANGE_S = 0.01
+_SAMPLE_S = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """Frames a second: what the wire allows, what the emulated device put on it, and what a run made of them."""
+
+    what: str
+    allowed_hz: float
+    sent_hz: float
+    arrived_hz: float
+    run: Rate
+
+    @property
+    def share(self) -> float:
+        """Frames that a grasp was made of, as a share of what the wire allows."""
+        return self.run.recognised_hz / self.allowed_hz
+
+    @property
+    def own_share(self) -> float:
+        """That share of a bus if its system calls took what the wire takes, and what lies between them what it did."""
+        wire_us = 1e6 / self.allowed_hz
+        return wire_us / (wire_us + self.run.between_us)
+
+
+def of_glove(scene: Played, joints: Path, sensors: Literal[18, 22], seconds: float) -> Found:
+    """Return what comes of a CyberGlove that streams as fast as it can; `joints` is a build that uses no switches."""
+    with (
+        TemporaryDirectory() as folder,
+        PtyLine(Path(folder, "glove")) as line,
+        EmulatedCyberGlove(line, sensors=sensors) as device,
+        changing(scene, lambda _, raw: device.set((raw + raw)[:sensors])),
+    ):
+        wiring = glove(scene, str(line.link), sensors)
+        with _metered(lambda: device.records) as sent_hz:
+            run = _ran(joints, Harness(name="glove", cyberglove=wiring), seconds, folder)
+    what = f"CyberGlove, {sensors} sensors, {line.baud} baud"
+    return Found(what, 1e6 / glove_us(wiring, sensors), sent_hz(), run.glove_hz, run)
+
+
+def of_board(scene: Played, keys: int, baud: int, hz: int, seconds: float) -> Found:
+    """Return what comes of a board that sends its state so often, 0: as often as its line carries it; beside a
+    CyberGlove.
+    """
+    with TemporaryDirectory() as folder:
+        harness = with_glove(board(scene, f"{folder}/board", keys, baud), glove(scene, f"{folder}/glove"))
+        frame_us = scanner_us(harness.scanners[0])
+        period_us = 1e6 / hz if hz else frame_us
+        model = ScannerBoard(1, keys, scan_us=100, state_us=-int(-period_us // 1), heartbeat_us=0)
+        with (
+            PtyLine(Path(folder, "board"), baud) as line,
+            PtyLine(Path(folder, "glove")) as other,
+            EmulatedScanner(line, keys, board=model) as device,
+            EmulatedCyberGlove(other) as hand,
+            changing(scene, lambda closed, _: device.set(closed)),
+            changing(scene, lambda _, raw: hand.set(raw)),
+            _metered(lambda: line.sent_bytes * 10e6 / baud / frame_us) as sent_hz,
+        ):
+            run = _ran(scene.folder, harness, seconds, folder)
+    what = f"board of {keys} keys, {baud} baud" + (f", {hz} scans a second" if hz else "")
+    return Found(what, 1e6 / period_us, sent_hz(), run.switches_hz, run)
+
+
+def of_bus(scene: Played, what: str, harness: Harness, seconds: float, *, full: bool) -> Found:
+    """Return what comes of a bus that is scanned without a pause, beside a CyberGlove.
+
+    The wire would allow as many more scans as there was time in which SCL neither ran nor had to rest.
+    """
+    with TemporaryDirectory() as folder:
+        both = with_glove(harness, glove(scene))
+        with Bench(both, scene.performance.switch_names, Path(folder)) as bench:
+            i2c, clock_hz = bench.i2c, harness.buses[0].clock_hz
+            assert i2c is not None
+
+            def busy_s() -> float:
+                seen = i2c.counters(0)
+                return seen.scl_periods / clock_hz + seen.transfers * free_us(clock_hz) / 1e6
+
+            wired = with_glove(bench.harness, glove(scene, f"{folder}/cyberglove"))
+            with _metered(busy_s) as share, shown(scene, bench):
+                run = _ran(scene.folder, wired, seconds, folder, bench.environment, "full" if full else "early")
+    return Found(what, run.switches_hz / share(), run.switches_hz, run.switches_hz, run)
+
+
+def _ran(
+    build: Path, harness: Harness, seconds: float, folder: str, environment: Mapping[str, str] | None = None, *how: str
+) -> Rate:
+    """Run livewire.py on the emulated devices."""
+    path = Path(folder, "glove.toml")
+    path.write_text(harness_to_toml(harness))
+    command = [sys.executable, str(LIVEWIRE), "rate", str(build), str(path), str(seconds), *how]
+    done = subprocess.run(
+        command, env=os.environ | dict(environment or {}), capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        raise SystemExit(done.stderr)
+    return msgspec.json.decode(done.stdout, type=Rate)
+
+
+@contextmanager
+def _every(seconds: float, do: Callable[[], object]) -> Iterator[None]:
+    """Do it again and again, in a thread."""
+    stop = Event()
+
+    def run() -> None:
+        while not stop.wait(seconds):
+            do()
+
+    thread = Thread(target=run)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()
+
+
+@contextmanager
+def _metered(counted: Callable[[], float]) -> Iterator[Callable[[], float]]:
+    """Yield what returns how much the count grew in a second, the median of those tenths in which it did."""
+    seen: list[tuple[float, float]] = []
+    with _every(_SAMPLE_S, lambda: seen.append((time.perf_counter(), counted()))):
+        yield lambda: median(
+            (after[1] - before[1]) / (after[0] - before[0]) for before, after in pairwise(seen) if after[1] > before[1]
+        )
+
+
+def changing(scene: Played, show: Callable[[int, bytes], None]) -> AbstractContextManager[None]:
+    """Show row after row of the performance: the kept switches as keys, and the glove's bytes."""
+    rows = count()
+
+    def step() -> None:
+        row = next(rows) % len(scene.performance)
+        show(scene.keys[row], scene.performance.sensors[row].tobytes())
+
+    return _every(_CHANGE_S, step)
+
+
+def shown(scene: Played, bench: Bench) -> AbstractContextManager[None]:
+    """Show row after row on all devices of a bench."""
+    rows = count()
+
+    def step() -> None:
+        row = next(rows) % len(scene.performance)
+        bench.show(scene.performance.switches[row].tolist(), scene.performance.sensors[row].tobytes())
+
+    return _every(_CHANGE_S, step)

@@ -1,0 +1,126 @@
+"""The kept switches' scan beside that of all 160: by the arithmetic of the wire, and as measured on an emulated bus."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import fmean, median
+from tempfile import TemporaryDirectory
+
+import msgspec
+from liveplay import Played, glove, with_glove
+from liverates import LIVEWIRE
+from livewire import SCANS, Scanned
+
+from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.harness.writing import harness_to_toml
+from thenar.runtime.live.codes import CodeTables
+from thenar.runtime.live.policy import Policy
+from thenar.runtime.scanning.costs import Costs
+from thenar.runtime.scanning.earlyexit import EarlyExit
+from thenar.runtime.scanning.plan import plan_scan
+from thenar.runtime.scanning.propose import propose_harness
+from thenar.runtime.scanning.scanmap import ScanMap
+from thenar.runtime.scanning.timing import scan_us
+from thenar.runtime.scanning.whole import whole_scan
+from thenar.simulator.playing.bench import Bench
+
+CLOCK_HZ = 100_000
+ROWS = 40
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """One way to scan, averaged over rows of the performance.
+
+    predicted_us  what the wire takes, measured_us what a scan took, python_us what of it the thread worked besides
+    its system calls; ioctls and bytes on the wire
+    """
+
+    what: str
+    predicted_us: float
+    measured_us: float
+    python_us: float
+    ioctls: float
+    bytes: float
+
+
+def compared(scene: Played, clock_hz: int = CLOCK_HZ) -> Iterator[Beside]:
+    """Yield all 160 in full; the kept ones on the same glove and on a glove of their own, in full and ended early."""
+    full, reduced = wired(scene, scene.performance.switch_names, clock_hz), wired(scene, scene.kept, clock_hz)
+    yield _measured(scene, full, "all", "all 160 switches")
+    for harness, where in (
+        (full, "kept switches on the glove of 160"),
+        (reduced, "kept switches on a glove of their own"),
+    ):
+        for which, how in (("full", "in full"), ("early", "ended early")):
+            yield _measured(scene, harness, which, f"{where}, {how}")
+
+
+def wired(scene: Played, names: tuple[str, ...], clock_hz: int) -> Harness:
+    """Return a glove of these switches on MCP23017, beside a CyberGlove."""
+    proposed = propose_harness(names, device="/dev/i2c-7")
+    bus = msgspec.structs.replace(proposed.buses[0], clock_hz=clock_hz)
+    return with_glove(msgspec.structs.replace(proposed, buses=(bus,)), glove(scene))
+
+
+def _measured(scene: Played, harness: Harness, which: str, what: str) -> Beside:
+    rows = range(0, len(scene.performance), max(1, len(scene.performance) // ROWS))[:ROWS]
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "glove.toml")
+        path.write_text(harness_to_toml(harness))
+        with Bench(harness, scene.performance.switch_names, Path(folder)) as bench:
+            command = [sys.executable, str(LIVEWIRE), "scans", str(scene.folder), str(path), which]
+            seen = os.environ | bench.environment
+            with subprocess.Popen(
+                command, text=True, env=seen, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+            ) as client:
+                return Beside(what, _predicted_us(scene, harness, which, rows), *_scanned(scene, bench, client, rows))
+
+
+def _scanned(scene: Played, bench: Bench, client: "subprocess.Popen[str]", rows: Iterable[int]) -> tuple[float, ...]:
+    """Let the client scan row after row; return what a scan took, in the order of Beside."""
+    assert bench.i2c is not None
+    assert client.stdin is not None
+    assert client.stdout is not None
+    client.stdout.readline()
+    before, found = bench.i2c.counters(0).total_bytes, list[Scanned]()
+    for row in rows:
+        sensors = scene.performance.sensors[row].tobytes()
+        bench.show(scene.performance.switches[row].tolist(), sensors)
+        client.stdin.write(sensors.hex() + "\n")
+        client.stdin.flush()
+        found.append(msgspec.json.decode(client.stdout.readline(), type=Scanned))
+    sent = (bench.i2c.counters(0).total_bytes - before) / (SCANS * len(found))
+    client.stdin.close()
+    # Medians of each row, so that a scan that was interrupted does not count; means of the rows, of which all count.
+    us, python_us = (fmean(map(median, each)) for each in ([f.us for f in found], [f.python_us for f in found]))
+    return us, python_us, fmean(f.ioctls for f in found) / SCANS, sent
+
+
+def _predicted_us(scene: Played, harness: Harness, which: str, rows: Iterable[int]) -> float:
+    """Return what a scan takes on the wire by arithmetic, on average over the rows."""
+    if which == "all":
+        return scan_us(whole_scan(harness, harness.switches), harness).us
+    scan = plan_scan(scene.kept, scene.build.tables, harness)
+    return scan_us(scan, harness).us if which == "full" else fmean(_until_decided(scene, harness, scan, rows))
+
+
+def _until_decided(scene: Played, harness: Harness, scan: ScanMap, rows: Iterable[int]) -> Iterator[float]:
+    """Yield for each row what the ports take that are read until the scan is decided."""
+    build, costs = scene.build, Costs(scan.ports, harness)
+    groups = [sum(1 << switch for _, switch in port.switches) for port in scan.ports]
+    early = EarlyExit(build.tables, groups, lead=Policy().lead_steps(build.tables.scale))
+    sensors = [sensor.name for sensor in scene.performance.calibration.sensors]
+    codes = CodeTables(build.manifest.joints, sensors, scene.performance.calibration)
+    for row in rows:
+        early.start(codes.codes(scene.performance.sensors[row].tobytes()))
+        read = taken = 0
+        for port, group in enumerate(groups):
+            taken += costs.after(read, port)
+            read |= 1 << port
+            if early.after(port, scene.keys[row] & group):
+                break
+        yield taken / 1e3

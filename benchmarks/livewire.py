@@ -1,0 +1,195 @@
+"""The live side of the benchmark's wires, in a process of its own, as `thenar run` is: benchmarks/live.py starts it.
+
+    python benchmarks/livewire.py rate BUILD GLOVE.toml SECONDS [full]   everything on: frames a second, and their cost
+    python benchmarks/livewire.py scans BUILD GLOVE.toml all|full|early  one bus: the glove's bytes a line in, the
+                                                                         times of some scans a line out
+
+Both answer in JSON.
+"""
+
+import sys
+import time
+from contextlib import ExitStack
+from dataclasses import dataclass
+from fcntl import ioctl
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from threading import Event, Timer
+from typing import Any
+
+import msgspec
+import smbus2.smbus2
+from liveplay import STATUS, read_along, session, teller
+
+import thenar.drivers.i2c.node
+from thenar.runtime import Build
+from thenar.runtime.harness.loading import load_harness
+from thenar.runtime.live.arrivals import Taken
+from thenar.runtime.live.frames import GloveFrame, SwitchFrame, now_us
+from thenar.runtime.live.i2c_device import I2cDevice
+from thenar.runtime.live.loop import LiveLoop, Moment
+from thenar.runtime.live.sources import Sources
+from thenar.runtime.live.system import System
+from thenar.runtime.recording.writer import Recorder
+from thenar.runtime.scanning.whole import whole_scan
+
+SCANS = 4
+_START_S = 20.0
+
+
+class Rate(msgspec.Struct):
+    """What a run came to: frames a second of each device that came in; of the switches or, without any, of the glove
+    those that a grasp was made of; microseconds of CPU a grasp, of the loop's thread and of the whole process; of a
+    bus, microseconds a scan between two system calls.
+    """
+
+    switches_hz: float
+    glove_hz: float
+    recognised_hz: float
+    loop_us: float
+    process_us: float
+    between_us: float
+
+
+class Scanned(msgspec.Struct):
+    """What scans took: microseconds each, and of them the Python besides the system calls."""
+
+    us: list[float]
+    python_us: list[float]
+    ioctls: int
+
+
+@dataclass(eq=False)
+class Counted:
+    """Sources, with what they deliver counted."""
+
+    sources: Sources
+    switches: int = 0
+    gloves: int = 0
+    recognised: int = 0
+
+    @property
+    def patience_s(self) -> float:
+        """As long as the sources say."""
+        return self.sources.patience_s
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait as the sources do."""
+        return self.sources.wait(timeout_s)
+
+    def take(self) -> Taken:
+        """Take what the sources have, and count."""
+        taken = self.sources.take()
+        switches = sum(isinstance(frame, SwitchFrame) for frame in taken.arrived)
+        gloves = len(taken.arrived) - switches
+        self.switches += switches
+        self.gloves += gloves
+        self.recognised += bool(switches if self.sources.switch_period_us else gloves)
+        return taken
+
+
+def rate(build: str, glove: str, seconds: float, which: str = "early") -> Rate:
+    """Run with all sinks on for so long, once all is well."""
+    system = System.of(Build.load(build), load_harness(glove))
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(TemporaryDirectory()))
+        feed = Counted(stack.enter_context(system.sources(full_scan=which == "full")))
+        recorder = stack.enter_context(Recorder(folder / "run.mcap", session(system)))
+        fanout = stack.enter_context(read_along(folder))
+        told, well = teller(system, fanout, feed.sources, recorder), Event()
+
+        def tell(moment: Moment) -> None:
+            told.tell(moment)
+            if moment.grasp.health == "ok":
+                well.set()
+
+        loop = LiveLoop(feed, system.recognizer(), tell, recorder)
+        _run(loop, well, _START_S)
+        if not well.is_set():
+            raise SystemExit(f"nothing came of it: {feed.sources.devices()}")
+        return _over(loop, feed, seconds)
+
+
+def _over(loop: LiveLoop, feed: Counted, seconds: float) -> Rate:
+    ioctls = Ioctls()
+    ioctls.stand_in()
+    counts, clocks = _counts(loop, feed), _clocks()
+    _run(loop, Event(), seconds)
+    inside_s = ioctls.wall_ns / 1e9
+    wall_s, loop_s, process_s = (now - then for now, then in zip(_clocks(), clocks, strict=True))
+    switches, gloves, recognised, grasps = (now - then for now, then in zip(_counts(loop, feed), counts, strict=True))
+    each, between_us = 1e6 / grasps, 1e6 * (wall_s - inside_s) / switches if ioctls.count else 0.0
+    return Rate(switches / wall_s, gloves / wall_s, recognised / wall_s, loop_s * each, process_s * each, between_us)
+
+
+def _counts(loop: LiveLoop, feed: Counted) -> tuple[int, int, int, int]:
+    return feed.switches, feed.gloves, feed.recognised, loop.frames
+
+
+def _clocks() -> tuple[float, float, float]:
+    return time.perf_counter(), time.thread_time(), time.process_time()
+
+
+def _run(loop: LiveLoop, stop: Event, seconds: float) -> None:
+    """Run until `stop`, or for so long."""
+    ending = Timer(seconds, stop.set)
+    ending.daemon = True
+    ending.start()
+    loop.run(stop)
+    ending.cancel()
+
+
+@dataclass(eq=False)
+class Ioctls:
+    """Stands in the I2C driver and in smbus2 for ioctl, and takes the time that it takes."""
+
+    count: int = 0
+    cpu_ns: int = 0
+    wall_ns: int = 0
+
+    def stand_in(self) -> None:
+        """Be there from now on."""
+        for module in (smbus2.smbus2, thenar.drivers.i2c.node):
+            vars(module)["ioctl"] = self
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call ioctl."""
+        start, cpu_ns = time.perf_counter_ns(), time.thread_time_ns()
+        try:
+            return ioctl(*arguments)
+        finally:
+            self.count += 1
+            self.cpu_ns += time.thread_time_ns() - cpu_ns
+            self.wall_ns += time.perf_counter_ns() - start
+
+
+def scans(build: str, glove: str, which: str) -> None:
+    """Scan the one bus: all switches that are wired, the kept ones in full, or those until the scan is decided."""
+    system = System.of(Build.load(build), load_harness(glove))
+    scout = system.recognizer() if which == "early" else None
+    scan = whole_scan(system.harness, system.harness.switches) if which == "all" else system.scan
+    newest: GloveFrame | None = None
+    device = I2cDevice(system.harness, 0, scan, scout, lambda: newest)
+    device.open()
+    ioctls = Ioctls()
+    ioctls.stand_in()
+    print(device.bus.way, flush=True)
+    for line in sys.stdin:
+        found, before = Scanned([], [], 0), ioctls.count
+        for _ in range(SCANS):
+            newest = GloveFrame(now_us(), bytes.fromhex(line), STATUS)
+            start, cpu_ns, inside_ns = time.perf_counter(), time.thread_time_ns(), ioctls.cpu_ns
+            device.read(1.0)
+            python_ns = time.thread_time_ns() - cpu_ns - (ioctls.cpu_ns - inside_ns)
+            found.us.append(1e6 * (time.perf_counter() - start))
+            found.python_us.append(python_ns / 1e3)
+        found.ioctls = ioctls.count - before
+        print(msgspec.json.encode(found).decode(), flush=True)
+
+
+if __name__ == "__main__":
+    verb, *arguments = sys.argv[1:]
+    if verb == "rate":
+        print(msgspec.json.encode(rate(arguments[0], arguments[1], float(arguments[2]), *arguments[3:])).decode())
+    else:
+        scans(*arguments)

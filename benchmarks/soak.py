@@ -1,0 +1,181 @@
+"""An hour of `thenar run` on emulated devices, in real time: nothing may grow.
+
+    python benchmarks/soak.py [--minutes N]
+
+A CyberGlove, a scanner board, and expanders on I2C where umockdev is installed; JSON lines, a socket that is read,
+health, preshapes, and a recording until its file has 256 MiB. Prints a line a minute (six lines of a run shorter than
+that) and exits with 1 if memory, threads, file descriptors or the CPU a grasp grew, or if the run ended.
+"""
+
+import argparse
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from itertools import combinations
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+
+from liveplay import Played, board, glove, played, with_glove
+from liverates import shown
+from livescans import wired
+from msgspec.structs import replace
+
+from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.harness.writing import harness_to_toml
+from thenar.simulator.playing.bench import Bench
+
+MINUTE_S = 60.0
+MOST_FILE = 256 << 20
+# What may come on top from the first minutes, in which caches fill, to the end.
+MOST_KIB, MOST_SHARE = 2048, 0.5
+WARM_UP = 2
+LEAST_SAMPLES = 3
+_TICKS = os.sysconf("SC_CLK_TCK")
+# In the place of `ulimit -f`, which counts in blocks of a size that shells disagree on.
+LIMITED = (
+    "import os, resource as r, sys; r.setrlimit(r.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2);"
+    " os.execv(sys.argv[2], sys.argv[2:])"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """The state of the run: resident KiB, threads, file descriptors, lines read, microseconds of CPU a line."""
+
+    rss_kib: int
+    threads: int
+    files: int
+    lines: int
+    us: float
+
+
+class Reader:
+    """Reads the lines of a run's socket."""
+
+    def __init__(self, path: Path) -> None:
+        self._socket = socket.socket(socket.AF_UNIX)
+        end = time.monotonic() + MINUTE_S
+        while True:
+            try:
+                self._socket.connect(str(path))
+                return
+            except OSError:
+                if time.monotonic() > end:
+                    raise
+                time.sleep(0.1)
+
+    def lines(self, until: float) -> int:
+        """Return how many lines come until a moment of the monotonic clock; fewer if the run ends."""
+        lines = 0
+        while (left := until - time.monotonic()) > 0:
+            self._socket.settimeout(left)
+            try:
+                data = self._socket.recv(1 << 16)
+            except TimeoutError:
+                break
+            if not data:
+                break
+            lines += data.count(b"\n")
+        return lines
+
+
+def glove_of_all(scene: Played) -> Harness:
+    """Return a glove whose kept switches hang half on a board, half on expanders, if these can be emulated."""
+    if shutil.which("umockdev-wrapper") is None:
+        return with_glove(board(scene), glove(scene))
+    half = len(scene.kept) // 2
+    boards = replace(board(scene), scanners=(replace(board(scene).scanners[0], switches=scene.kept[:half]),))
+    return replace(wired(scene, scene.kept[half:], 100_000), name="soak", scanners=boards.scanners)
+
+
+def started(scene: Played, bench: Bench, folder: Path) -> "subprocess.Popen[bytes]":
+    """Start the run."""
+    (folder / "glove.toml").write_text(harness_to_toml(bench.harness))
+    sinks = ["--sink", f"unix:{folder}/socket", "--sink", "jsonl:/dev/null", "--preshape", "barrett_bh8", "--status"]
+    run = [sys.executable, "-m", "thenar.cli", "run", scene.folder, "--glove", folder / "glove.toml", *sinks]
+    limited = [sys.executable, "-c", LIMITED, MOST_FILE, *run, "--record", folder / "soak.mcap"]
+    return subprocess.Popen(list(map(str, limited)), env=os.environ | bench.environment)
+
+
+def sampled(pid: int, reader: Reader, seconds: float) -> Sample:
+    """Return the state of the run after so long."""
+    before = _cpu_s(pid)
+    lines = reader.lines(time.monotonic() + seconds)
+    own = Path("/proc", str(pid))
+    status = dict(line.split(":", 1) for line in (own / "status").read_text().splitlines())
+    us = 1e6 * (_cpu_s(pid) - before) / max(lines, 1)
+    files = len(list((own / "fd").iterdir()))
+    return Sample(int(status["VmRSS"].split()[0]), int(status["Threads"]), files, lines, us)
+
+
+def _cpu_s(pid: int) -> float:
+    """Return what CPU a process has used: fields 14 and 15 of its stat, counted from 1 (proc(5))."""
+    fields = Path("/proc", str(pid), "stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / _TICKS
+
+
+def grown(samples: Sequence[Sample]) -> list[str]:
+    """Return what grew, in words."""
+    later = samples[min(WARM_UP, len(samples) - LEAST_SAMPLES) :]
+    found = []
+    if (kib := _growth(later, lambda sample: sample.rss_kib)) > MOST_KIB:
+        found.append(f"memory by {kib:.0f} KiB (at most {MOST_KIB})")
+    if len({(sample.threads, sample.files) for sample in later}) > 1:
+        found.append("threads or file descriptors came or went")
+    share = _growth(later, lambda sample: sample.us) / median(sample.us for sample in later)
+    if share > MOST_SHARE:
+        found.append(f"the CPU a grasp by {share:.0%} (at most {MOST_SHARE:.0%})")
+    if not all(sample.lines for sample in samples):
+        found.append("for a while nothing was published")
+    return found
+
+
+def _growth(samples: Sequence[Sample], of: Callable[[Sample], float]) -> float:
+    """Return by how much it grows over all samples, if it grows as the median pair of them does."""
+    pairs = combinations(range(len(samples)), 2)
+    slope = median((of(samples[later]) - of(samples[first])) / (later - first) for first, later in pairs)
+    return slope * (len(samples) - 1)
+
+
+def soak(folder: Path, minutes: float) -> list[str]:
+    """Run for so long; return what was wrong."""
+    scene = played("quick", folder)
+    every_s = min(MINUTE_S, minutes * MINUTE_S / 6)
+    with ExitStack() as stack:
+        bench = stack.enter_context(Bench(glove_of_all(scene), scene.performance.switch_names, folder))
+        stack.enter_context(shown(scene, bench))
+        run = stack.enter_context(started(scene, bench, folder))
+        stack.callback(run.terminate)
+        reader, samples = Reader(folder / "socket"), list[Sample]()
+        reader.lines(time.monotonic() + every_s / 10)
+        for number in range(1, round(minutes * MINUTE_S / every_s) + 1):
+            if run.poll() is not None:
+                return [f"the run ended with exit code {run.returncode}"]
+            samples.append(now := sampled(run.pid, reader, every_s))
+            print(
+                f"{number * every_s / MINUTE_S:7.1f} min  {now.rss_kib / 1024:6.1f} MiB  {now.threads} threads"
+                f"  {now.files} files  {now.lines / every_s:5.0f} grasps/s  {now.us:4.0f} us of CPU a grasp",
+                flush=True,
+            )
+    return grown(samples)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--minutes", type=float, default=60.0, help="how long (default 60)")
+    options = parser.parse_args()
+    with TemporaryDirectory() as name:
+        wrong = soak(Path(name), options.minutes)
+    print("grown: " + "; ".join(wrong) if wrong else "flat")
+    sys.exit(bool(wrong))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,80 @@
+import json
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from thenar.compiler import GraspSet, compile_build
+from thenar.drivers.calibration import GloveCalibration, SensorCalibration
+from thenar.drivers.cyberglove_sensors import SENSORS_18
+from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
+from thenar.drivers.emulated.pty_line import PtyLine
+
+Thenar = Callable[..., subprocess.CompletedProcess[str]]
+
+NAMES = ["j0", "j1", *SENSORS_18[2:]]
+
+
+@pytest.fixture
+def glove(tmp_path: Path) -> Iterator[EmulatedCyberGlove]:
+    with PtyLine(tmp_path / "port") as line, EmulatedCyberGlove(line) as glove:
+        yield glove
+
+
+@pytest.fixture
+def harness(tmp_path: Path, glove: EmulatedCyberGlove) -> Path:
+    path = tmp_path / "glove.toml"
+    path.write_text(f'[cyberglove]\nport = "{tmp_path}/port"\njoints = {NAMES}\n')
+    return path
+
+
+def calibrated(harness: Path, *joints: str) -> None:
+    lines = tuple(SensorCalibration(joint, 1, 0.0, 255, 90.0) for joint in joints)
+    harness.with_name("anna.toml").write_text(GloveCalibration(sensors=lines, subject="anna").to_toml())
+    harness.write_text(harness.read_text() + 'calibration = "anna.toml"\n')
+
+
+def test_what_is_there_is_said_with_both_times(thenar: Thenar, harness: Path) -> None:
+    done = thenar("doctor", harness, "--json")
+    assert done.returncode == 0, done.stderr
+    (found,) = json.loads(done.stdout)
+    assert found["present"]
+    assert found["predicted_us"] > 0
+    assert found["measured_us"] > 0
+
+
+def test_a_port_that_is_not_there_is_exit_code_1(thenar: Thenar, tmp_path: Path) -> None:
+    path = tmp_path / "glove.toml"
+    path.write_text('[cyberglove]\nport = "/dev/none"\n')
+    done = thenar("doctor", path)
+    assert done.returncode == 1
+    assert "/dev/none: there is no such port" in done.stdout
+    assert "Traceback" not in done.stderr
+
+
+def test_a_calibration_that_cannot_be_read_is_found(thenar: Thenar, harness: Path) -> None:
+    harness.write_text(harness.read_text() + 'calibration = "anna.toml"\n')
+    done = thenar("doctor", harness)
+    assert done.returncode == 1
+    assert "the calibration cannot be read" in done.stdout
+
+
+def test_what_a_build_needs_of_the_calibration_is_found(
+    thenar: Thenar, small_set: GraspSet, harness: Path, tmp_path: Path
+) -> None:
+    build = compile_build(small_set, tmp_path / "build", rounds=5, folds=0, inputs="joints").folder
+    assert thenar("doctor", harness).returncode == 0
+    done = thenar("doctor", harness, "--build", build)
+    assert done.returncode == 1
+    assert "calibrate the glove (`thenar calibrate`)" in done.stdout
+    calibrated(harness, "j0", "j1")
+    done = thenar("doctor", harness, "--build", build)
+    assert done.returncode == 0, done.stdout
+
+
+def test_a_harness_without_devices_is_refused(thenar: Thenar, tmp_path: Path) -> None:
+    (tmp_path / "glove.toml").write_text("")
+    done = thenar("doctor", tmp_path / "glove.toml")
+    assert done.returncode == 2
+    assert "glove.toml names no device" in done.stderr

@@ -1,0 +1,243 @@
+"""What goes wrong on an I2C bus under a run."""
+
+import errno
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+MakeRun = Callable[..., Any]
+Outage = Callable[..., float]
+Do = Callable[[Any], object]
+
+pytestmark = pytest.mark.slow
+
+# Of the bus: less would take a busy computer for a cut cable.
+PERIOD_US = 10_000
+# Numbers and addresses of the harness's chips.
+STRAIGHT, BEHIND, FIFTH = 1, 2, 3
+PCA9555, MCP23008, MUX = 0x21, 0x22, 0x70
+
+
+def everything_on_the_bus(running: Any) -> set[str]:
+    return set(running.bus_names(0, 1, 2, 3))
+
+
+def assert_no_chip_was_given_up(running: Any, begun_us: int) -> None:
+    """On a busy computer a whole scan may be late; some switches alone are missed only if their chip is given up."""
+    bus = everything_on_the_bus(running)
+    missed = [set(grasp.lost) & bus for grasp in running.scene.grasps.since(begun_us)]
+    assert all(names in (set(), bus) for names in missed)
+
+
+LASTING: dict[str, tuple[Do, tuple[int, ...]]] = {
+    "a chip answers nobody": (lambda i2c: i2c.remove(0, STRAIGHT), (1,)),
+    "a chip behind the mux answers nobody": (lambda i2c: i2c.remove(0, BEHIND), (2,)),
+    "the mux answers nobody": (lambda i2c: i2c.remove_mux(0, MUX), (2, 3)),
+    "EIO at a chip": (lambda i2c: i2c.fail(0, errno.EIO, address=PCA9555), (1,)),
+    "EREMOTEIO at a chip behind the mux": (lambda i2c: i2c.fail(0, errno.EREMOTEIO, address=MCP23008), (2,)),
+    "ETIMEDOUT at a chip": (lambda i2c: i2c.fail(0, errno.ETIMEDOUT, address=PCA9555), (1,)),
+    "EIO everywhere": (lambda i2c: i2c.fail(0, errno.EIO), (0, 1, 2, 3)),
+    "ETIMEDOUT everywhere": (lambda i2c: i2c.fail(0, errno.ETIMEDOUT), (0, 1, 2, 3)),
+    "SDA held low": (lambda i2c: i2c.hold_sda(0), (0, 1, 2, 3)),
+}
+
+
+@pytest.mark.parametrize("fault", list(LASTING))
+def test_what_cannot_be_read_is_missed_at_once_and_back_within_a_second(
+    run: MakeRun, outage: Outage, fault: str
+) -> None:
+    running = run("both", "glove", "bus")
+    scene, client, i2c = running.scene, running.start("--full-scan"), running.bench.i2c
+    do, chips = LASTING[fault]
+    scene.settled(0)
+    held = client.held
+    lost = running.bus_names(*chips)
+    outage(scene, lambda: do(i2c), lambda: i2c.heal(0), lost=lost, period_us=PERIOD_US)
+    outage(scene, lambda: do(i2c), lambda: i2c.heal(0), lost=lost, period_us=PERIOD_US)
+    assert client.held == held
+    assert client.count("i2c", "failures") > 0
+    assert client.end() == 0
+
+
+@pytest.mark.parametrize("address", [PCA9555, MCP23008])
+def test_a_chip_that_is_back_right_after_it_was_looked_for_is_found_within_a_second(run: MakeRun, address: int) -> None:
+    """The worst moment to come back."""
+    running = run("both", "glove", "bus")
+    scene, client, i2c = running.scene, running.start("--full-scan"), running.bench.i2c
+    scene.settled(0)
+    chip = {PCA9555: STRAIGHT, MCP23008: BEHIND}[address]
+    i2c.remove(0, chip)
+    scene.grasps.wait(lambda grasp: set(grasp.lost) == running.bus_names(chip), running.now_us())
+
+    def looked() -> int:
+        return sum(place.count for place in running.wire().traffic if place.address == address)
+
+    before = looked()
+    running.eventually(lambda: looked() > before)
+    i2c.bring_back(0, chip)
+    back_us = running.now_us()
+    took_us = scene.well(back_us).time_us - back_us
+    print(f"well {took_us / 1000:.1f} ms after")
+    assert took_us <= 1_300_000
+    assert client.end() == 0
+
+
+@pytest.mark.parametrize("adapter", ["bcm2835", "designware", "i2c-gpio"])
+def test_sda_held_low_is_no_closed_switch_on_any_adapter(run: MakeRun, outage: Outage, adapter: str) -> None:
+    """i2c-gpio notices nothing and reads zeros, which would be all switches closed."""
+    running = run("both", "glove", "bus", adapter=adapter)
+    client, i2c = running.start("--full-scan"), running.bench.i2c
+    lost = everything_on_the_bus(running)
+    outage(running.scene, lambda: i2c.hold_sda(0), lambda: i2c.heal(0), lost=lost, period_us=PERIOD_US)
+    assert client.end() == 0
+
+
+def test_sda_that_a_few_transfers_clock_free_heals_by_itself(run: MakeRun) -> None:
+    running = run("both", "glove", "bus")
+    scene, client = running.scene, running.start("--full-scan")
+    scene.settled(0)
+    running.bench.i2c.hold_sda(0, 5)
+    scene.show(7)
+    scene.settled(7)
+    assert client.end() == 0
+    assert scene.check() > 0
+
+
+def test_an_adapter_that_is_pulled_out_is_missed_and_found_again(run: MakeRun, outage: Outage) -> None:
+    running = run("both", "glove", "scanner", "bus")
+    scene, client, i2c = running.scene, running.start("--full-scan"), running.bench.i2c
+    scene.settled(0)
+    held = client.held
+    lost = everything_on_the_bus(running)
+    for _ in range(2):
+        outage(scene, lambda: i2c.unplug(0), lambda: i2c.replug(0), lost=lost, period_us=PERIOD_US)
+    assert client.held == held
+    assert client.end() == 0
+
+
+@pytest.mark.parametrize("part", ["glove", "scanner"])
+def test_beside_a_bus_the_serial_devices_come_and_go_likewise(run: MakeRun, outage: Outage, part: str) -> None:
+    running = run("both", "glove", "scanner", "bus")
+    scene, client = running.scene, running.start("--full-scan")
+    scene.settled(0)
+    held = client.held
+    number = ["glove", "scanner"].index(part)
+    boards = set(scene.truth.switch_names) - everything_on_the_bus(running)
+    lost = [set(scene.truth.joint_names), boards][number]
+    cable = running.bench.lines[number]
+    for _ in range(2):
+        outage(scene, cable.unplug, cable.replug, lost=lost, period_us=PERIOD_US)
+    assert client.held == held
+    assert client.end() == 0
+
+
+@pytest.mark.parametrize("code", [errno.EREMOTEIO, errno.EIO, errno.ETIMEDOUT, errno.EAGAIN])
+@pytest.mark.parametrize("address", [PCA9555, MCP23008, MUX, None])
+def test_what_fails_once_or_twice_is_tried_again_and_never_missed(run: MakeRun, code: int, address: int | None) -> None:
+    running = run("both", "glove", "bus")
+    scene, client, i2c = running.scene, running.start("--full-scan"), running.bench.i2c
+    scene.settled(0)
+    begun_us = running.now_us()
+    for times in (1, 2, 1):
+        i2c.fail(0, code, address=address, times=times)
+        scene.show(3 * times)
+        scene.settled(3 * times)
+    assert_no_chip_was_given_up(running, begun_us)
+    assert client.end() == 0
+    assert scene.check() > 0
+
+
+@pytest.mark.parametrize("code", [errno.EOPNOTSUPP, errno.EINVAL])
+def test_a_refused_batch_is_read_otherwise_and_nothing_is_missed(run: MakeRun, code: int) -> None:
+    running = run("both", "glove", "bus")
+    scene, client, i2c = running.scene, running.start("--full-scan"), running.bench.i2c
+    scene.settled(0)
+    begun_us = running.now_us()
+    before = running.wire()
+    i2c.fail(0, code, batches=True)
+    for row in (5, 11, 17):
+        scene.show(row)
+        scene.settled(row)
+    assert running.wire().calls > before.calls
+    assert_no_chip_was_given_up(running, begun_us)
+    assert client.end() == 0
+    assert scene.check() > 0
+
+
+@pytest.mark.parametrize(
+    ("chip", "kind", "other"), [(STRAIGHT, "pca9555", "mcp23017"), (BEHIND, "mcp23008", "pca9555")]
+)
+def test_a_wrong_chip_is_not_believed_and_the_right_one_is_when_it_is_back(
+    run: MakeRun, chip: int, kind: str, other: str
+) -> None:
+    running = run("both", "glove", "bus")
+    scene, client, i2c = running.scene, running.start("--full-scan"), running.bench.i2c
+    scene.settled(0)
+    scene.show(5)
+    scene.settled(5)
+    i2c.remove(0, chip)
+    lost = running.bus_names(chip)
+    scene.grasps.wait(lambda grasp: set(grasp.lost) == lost, running.now_us())
+    i2c.replace(0, chip, other)
+    i2c.bring_back(0, chip)
+    begun_us = running.now_us()
+    scene.grasps.wait(lambda grasp: grasp.time_us > begun_us + 1_500_000, begun_us)
+    assert all(grasp.health != "ok" for grasp in scene.grasps.since(begun_us))
+    i2c.replace(0, chip, kind)
+    scene.show(9)
+    scene.settled(9)
+    assert client.end() == 0
+    assert scene.check() > 0
+
+
+@pytest.mark.parametrize("options", [(), ("--full-scan",)], ids=["early", "full"])
+@pytest.mark.parametrize("control", [0, 1 << 1, 1 << 4, 1 << 6, 0xFF])
+def test_a_mux_that_forgets_its_channel_gives_no_wrong_answer(
+    run: MakeRun, options: tuple[str, ...], control: int
+) -> None:
+    running = run("both", "glove", "bus")
+    scene, client, i2c = running.scene, running.start(*options), running.bench.i2c
+    scene.settled(0)
+    for row in (4, 12):
+        for _ in range(3):
+            i2c.poke_mux(0, MUX, control)
+        scene.show(row)
+        scene.settled(row)
+    assert client.end() == 0
+    assert scene.check() > 0
+
+
+@pytest.mark.parametrize("chip", [0, STRAIGHT, BEHIND, FIFTH])
+def test_a_chip_that_lost_its_supply_for_a_moment_gives_no_wrong_answer(run: MakeRun, chip: int) -> None:
+    """Without its pull-ups it would read open switches as closed."""
+    running = run("both", "glove", "bus")
+    scene, client, i2c = running.scene, running.start("--full-scan"), running.bench.i2c
+    scene.settled(0)
+    for row in (4, 12):
+        i2c.reset(0, chip)
+        scene.show(row)
+        scene.settled(row)
+    assert client.end() == 0
+    assert scene.check() > 0
+
+
+@pytest.mark.parametrize("chip", [0, STRAIGHT, BEHIND, FIFTH])
+def test_a_chip_that_goes_while_scans_end_early_changes_no_answer_or_is_missed(run: MakeRun, chip: int) -> None:
+    """It may go unnoticed for as long as nothing depends on it."""
+    running = run("both", "glove", "bus")
+    scene, client, i2c = running.scene, running.start(), running.bench.i2c
+    scene.settled(0)
+    i2c.remove(0, chip)
+    for row in (4, 12, 18):
+        scene.show(row)
+        gone_us = scene.shown[-1].done_us + 200_000
+        scene.grasps.wait(lambda grasp, after_us=gone_us: grasp.time_us > after_us, gone_us)
+    assert {grasp.health for grasp in scene.grasps.since(gone_us)} <= {"ok", "degraded", "unknown"}
+    i2c.bring_back(0, chip)
+    back_us = running.now_us()
+    assert scene.well(back_us).time_us - back_us < 1_300_000
+    scene.show(22)
+    scene.settled(22)
+    assert client.end() == 0
+    assert scene.check() > 0

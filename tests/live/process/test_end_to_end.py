@@ -1,0 +1,145 @@
+import subprocess
+import sys
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from thenar.runtime.live.policy import Policy
+from thenar.runtime.live.published import LiveGrasp
+from thenar.runtime.live.replay import replayed
+
+MakeRun = Callable[..., Any]
+
+pytestmark = pytest.mark.slow
+
+FRANK = Policy(lead=0.0, dwell_us=0)
+# Registers of the chips' ports.
+GPIOA_23017, GPIOB_23017 = 0x12, 0x13
+
+
+@pytest.mark.parametrize(
+    ("inputs", "parts"),
+    [("switches", ("bus",)), ("both", ("glove", "bus")), ("both", ("glove", "scanner", "bus"))],
+    ids=["bus", "glove and bus", "all"],
+)
+def test_what_is_recognised_is_the_offline_classification_frame_by_frame_and_replays_the_same(
+    run: MakeRun, tmp_path: Path, inputs: str, parts: tuple[str, ...]
+) -> None:
+    running = run(inputs, *parts)
+    scene = running.scene
+    client = running.start("--record", tmp_path / "run.mcap")
+    rows = range(len(scene.truth.performance))
+    for row in rows:
+        scene.show(row)
+        scene.settled(row)
+    assert client.end() == 0
+    assert len({scene.truth.answer(row) for row in rows}) > 5
+    assert scene.check() >= len(rows)
+    pairs = list(replayed(scene.truth.build, tmp_path / "run.mcap", FRANK))
+    assert all(then == now for then, now in pairs)
+    published = {grasp.number: grasp for grasp in scene.grasps.all}
+    assert all(_as_recorded(published[then.number]) == then for then, _ in pairs if then.number in published)
+    assert len(published) > 0.9 * len(pairs)
+
+
+def _as_recorded(line: Any) -> LiveGrasp:
+    return LiveGrasp(**{name: getattr(line, name) for name in LiveGrasp.__struct_fields__})
+
+
+@pytest.mark.parametrize("adapter", ["bcm2835", "designware", "i2c-gpio"])
+def test_every_adapter_gives_the_same_answers(run: MakeRun, adapter: str) -> None:
+    running = run("both", "glove", "bus", adapter=adapter)
+    client, scene = running.start(), running.scene
+    for row in (0, 4, 9, 13, 20):
+        scene.show(row)
+        scene.settled(row)
+    assert client.end() == 0
+    assert scene.check() > 0
+
+
+def test_scans_that_end_early_give_the_same_answers_as_full_ones_with_less_on_the_wire(run: MakeRun) -> None:
+    """Per scan, on the same rows; each shown until its answer is there."""
+    running = run("both", "glove", "bus")
+    scene, rows = running.scene, range(0, 27, 2)
+    answers, costs = list[list[str]](), list[float]()
+    for options in (("--full-scan",), ()):
+        client = running.start(*options)
+        scene.show(0)
+        scene.settled(0)
+        before, from_us = running.wire(), running.now_us()
+        answers.append([])
+        for row in rows:
+            scene.show(row)
+            answers[-1].append(scene.settled(row).candidate)
+        after, until_us = running.wire(), running.now_us()
+        assert client.end() == 0
+        scans = {
+            grasp.time_us - grasp.switch_age_us
+            for grasp in scene.grasps.since(from_us)
+            if grasp.switch_age_us is not None and from_us <= grasp.time_us <= until_us
+        }
+        costs.append((after.scl_periods - before.scl_periods) / len(scans))
+    assert answers[0] == answers[1] == [scene.truth.answer(row) for row in rows]
+    print(f"SCL periods a scan: {costs[0]:.0f} of full scans, {costs[1]:.0f} of such as end early")
+    assert costs[1] < 0.9 * costs[0]
+    assert scene.check() > 0
+
+
+@pytest.mark.parametrize("options", [(), ("--full-scan",)], ids=["early", "full"])
+def test_chips_and_ports_without_a_kept_switch_are_never_touched(run: MakeRun, options: tuple[str, ...]) -> None:
+    running = run("both", "glove", "bus")
+    client, scene = running.start(*options), running.scene
+    for row in (0, 6, 12):
+        scene.show(row)
+        scene.settled(row)
+    assert client.end() == 0
+    chips = running.bench.harness.buses[0].chips
+    seen = running.wire().traffic
+    touched = {(place.address, place.mux, place.channel) for place in seen}
+    used = {(chip.address, *((chip.mux.address, chip.mux.channel) if chip.mux else (None, None))) for chip in chips[:4]}
+    # Nobody has address 0x7F: reading there is how a stuck bus would be noticed.
+    assert touched - {(0x7F, None, None)} == used | {(0x70, None, None)}
+    # Port B of the first chip holds a switch that is not kept: only port A's GPIO register is read, a byte each time.
+    first = {place.register: place.count for place in seen if place.address == chips[0].address}
+    assert first.get(GPIOB_23017, 0) == 0
+    assert first.get(GPIOA_23017, 0) % 4 == 0  # address and register, address and the one byte
+    assert first.get(GPIOA_23017, 0) >= 100 * len(options)
+
+
+class Played(msgspec.Struct):
+    time_us: int
+    row: int
+    grasp: str
+
+
+def test_emulate_plays_a_set_and_run_recognises_it_row_by_row(run: MakeRun, stage: Any, tmp_path: Path) -> None:
+    """Two commands, as a user has them; default policy, so that only the candidate is of the frame alone."""
+    running = run("both", "glove", "scanner", "bus")
+    scene, glove = running.scene, tmp_path / "glove.toml"
+    own = tmp_path / "own"
+    own.mkdir()
+    running.bench.close()
+    log, out, recording = tmp_path / "played.jsonl", tmp_path / "out.jsonl", tmp_path / "run.mcap"
+    thenar = [sys.executable, "-m", "thenar.cli"]
+    scene_file = stage.scene_file(tmp_path)
+    client = [*thenar, "run", str(stage.builds["both"]), "--glove", "{glove}", "--sink", f"jsonl:{out}"]
+    client += ["--record", str(recording), "--lead", "0", "--dwell-ms", "0"]
+    emulate = [*thenar, "emulate", str(scene_file), "--glove", str(glove), "--dir", str(own), "--period-ms", "300"]
+    done = subprocess.run(
+        [*emulate, "--log", str(log), "--", *client], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
+    played = [msgspec.json.decode(line, type=Played) for line in log.read_bytes().splitlines()]
+    assert [line.row for line in played] == list(range(len(scene.truth.performance)))
+    grasps = [msgspec.json.decode(line, type=LiveGrasp) for line in out.read_bytes().splitlines()]
+    met = stage.check_played(scene.truth, grasps, [(line.time_us, line.row) for line in played])
+    # The first rows may pass while the run starts.
+    begun = next(grasp.time_us for grasp in grasps if grasp.health == "ok")
+    whole = {this.row for this, after in pairwise(played) if this.time_us > begun and after}
+    assert whole <= met
+    assert len(met) > 15
+    assert all(then == now for then, now in replayed(scene.truth.build, recording, FRANK))

@@ -1,0 +1,208 @@
+"""How runs end, and what survives of them."""
+
+import json
+import os
+import resource
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from thenar.runtime.live.policy import Policy
+from thenar.runtime.live.replay import replayed
+from thenar.runtime.recording.reader import Reader
+
+MakeRun = Callable[..., Any]
+
+pytestmark = pytest.mark.slow
+
+FRANK = Policy(lead=0.0, dwell_us=0)
+RECOVERY_US = 1_300_000
+SETTLE_US = 150_000
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP], ids=lambda number: number.name)
+def test_a_signal_ends_a_run_cleanly_with_its_recording_closed(
+    run: MakeRun, tmp_path: Path, number: signal.Signals
+) -> None:
+    running, path = run("both", "glove", "scanner"), tmp_path / "run.mcap"
+    client = running.start("--record", path)
+    running.scene.settled(0)
+    assert client.end(number) == 0
+    reader = Reader(path)
+    entries = list(reader)
+    assert reader.end is not None
+    assert (reader.end.closed, reader.end.reason, reader.altered) == (True, "", False)
+    assert f"{len(running.scene.grasps.all)} frames" in client.said
+    assert len(entries) > len(running.scene.grasps.all)
+    assert all(then == now for then, now in replayed(running.scene.truth.build, path, FRANK))
+
+
+def test_signals_end_a_run_whose_devices_are_all_gone(run: MakeRun) -> None:
+    running = run("both", "glove", "scanner", "bus")
+    client = running.start()
+    running.scene.settled(0)
+    for line in running.bench.lines:
+        line.unplug()
+    running.bench.i2c.unplug(0)
+    gone_us = running.now_us()
+    last = running.scene.grasps.wait(lambda grasp: grasp.health == "unknown", gone_us)
+    assert last.grasp == "unknown"
+    assert client.end(signal.SIGTERM) == 0
+
+
+def test_a_killed_run_leaves_its_recording_and_a_new_one_works_at_once(run: MakeRun, tmp_path: Path) -> None:
+    running, path = run("both", "glove", "scanner", "bus"), tmp_path / "run.mcap"
+    scene = running.scene
+    client = running.start("--record", path)
+    for row in (0, 5, 9):
+        scene.show(row)
+        scene.settled(row)
+    client.process.kill()
+    assert client.wait() == -signal.SIGKILL
+    seen = [grasp.number for grasp in scene.grasps.all]
+    reader = Reader(path)
+    list(reader)
+    assert reader.end is not None
+    assert not reader.end.closed
+    pairs = list(replayed(scene.truth.build, path, FRANK))
+    assert all(then == now for then, now in pairs)
+    # What was published had been recorded before.
+    assert max(seen) <= pairs[-1][0].number
+    # The glove still streams, the board has said HELLO: none of it matters.
+    scene.show(12)
+    again = running.start("--record", tmp_path / "second.mcap")
+    scene.settled(12)
+    assert again.end() == 0
+    assert scene.check() > 0
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A disk of 64 KiB, where this user may mount one."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mounting = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(folder)]
+    if os.geteuid() != 0 or subprocess.run(mounting, check=False, capture_output=True).returncode != 0:
+        pytest.skip("only root mounts a small disk")
+    yield folder
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+def test_a_disk_that_fills_up_ends_the_recording_and_nothing_else(run: MakeRun, small_disk: Path) -> None:
+    running, path = run("both", "glove", "scanner"), small_disk / "run.mcap"
+    full_at(running, path, running.start("--record", path), "No space left on device")
+
+
+def test_a_file_that_may_not_grow_ends_the_recording_and_nothing_else(run: MakeRun, tmp_path: Path) -> None:
+    """As a quota that is used up while recording."""
+    running, path = run("both", "glove", "scanner"), tmp_path / "run.mcap"
+    client = running.start("--record", path)
+    running.scene.settled(0)
+    resource.prlimit(client.process.pid, resource.RLIMIT_FSIZE, (path.stat().st_size + 5000,) * 2)
+    full_at(running, path, client, "File too large")
+
+
+def full_at(running: Any, path: Path, client: Any, reason: str) -> None:
+    scene = running.scene
+    scene.settled(0)
+    size = -1
+    while size != (size := path.stat().st_size):
+        scene.grasps.wait(lambda _grasp: True, running.now_us() + 500_000)
+    held = client.held
+    full_us = running.now_us()
+    for row in (6, 11):
+        scene.show(row)
+        scene.settled(row)
+    since = scene.grasps.since(full_us)
+    assert sum(grasp.health == "ok" for grasp in since) > 0.9 * len(since)
+    assert client.held == held
+    assert client.end() == 1  # not all that was asked for came about
+    assert f"{path}: {reason}: the recording has stopped after {size} bytes, all of them whole" in client.said
+    pairs = list(replayed(scene.truth.build, path, FRANK))
+    assert pairs
+    assert all(then == now for then, now in pairs)
+    assert scene.check() > 0
+
+
+def test_a_reader_that_hangs_loses_lines_and_holds_nobody_up(run: MakeRun, tmp_path: Path) -> None:
+    running = run("both", "glove", "scanner")
+    scene, path = running.scene, tmp_path / "grasps"
+    client = running.start("--sink", f"unix:{path}")
+    scene.settled(0)
+    with socket.socket(socket.AF_UNIX) as hanging, socket.socket(socket.AF_UNIX) as reading:
+        for each in (hanging, reading):
+            each.connect(str(path))
+        begun_us = running.now_us()
+        reading.settimeout(10.0)
+        lines = reading.makefile("rb")
+        numbers = [
+            line["number"] for line in map(json.loads, (lines.readline() for _ in range(800))) if "number" in line
+        ]
+        lines.close()
+        scene.show(8)
+        scene.settled(8)
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+    since = scene.grasps.since(begun_us)
+    assert [grasp.number for grasp in since] == list(range(since[0].number, since[0].number + len(since)))
+    assert sum(grasp.health == "ok" for grasp in since) > 0.9 * len(since)
+    assert client.end() == 0
+    assert "lost" in client.said
+    assert not path.exists()
+
+
+def test_a_stdout_that_nobody_reads_holds_nothing_up(run: MakeRun, tmp_path: Path) -> None:
+    running, path = run("both", "glove", "scanner"), tmp_path / "run.mcap"
+    glove = tmp_path / "glove.toml"
+    command = [sys.executable, "-m", "thenar.cli", "run", str(running.build), "--glove", str(glove)]
+    command += ["--record", str(path), "--frames", "1500"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as client:
+        assert client.wait(60.0) == 0
+        assert client.stderr is not None
+        said = client.stderr.read().decode()
+    assert "1500 frames" in said
+    assert "lost" in said
+    assert len(list(replayed(running.scene.truth.build, path, FRANK))) == 1500
+
+
+def test_a_killed_emulator_is_missed_and_its_successor_found_within_a_second(
+    run: MakeRun, stage: Any, tmp_path: Path
+) -> None:
+    """Both are commands here: the ports of the one that is killed stay behind as dead links."""
+    running = run("both", "glove", "scanner")
+    running.bench.close()
+    scene, glove = running.scene, tmp_path / "glove.toml"
+    source = [str(stage.scene_file(tmp_path)), "--glove", str(glove), "--dir", str(tmp_path / "own")]
+    command = [sys.executable, "-m", "thenar.cli", "emulate", *source, "--repeat", "--period-ms", "400"]
+    links = [tmp_path / "own" / name for name in ("cyberglove", "scanner0")]
+    begun_us = running.now_us()
+    first = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+    client = running.start(glove=tmp_path / "own" / "glove.toml", after=links[1])
+    try:
+        scene.well(begun_us)
+        first.kill()
+        first.wait()
+        killed_us = running.now_us()
+        last = scene.grasps.wait(lambda grasp: grasp.health == "unknown", killed_us)
+        assert last.time_us - killed_us < 320_000
+        scene.grasps.wait(lambda grasp: grasp.time_us > killed_us + 1_000_000, killed_us)
+        assert all(grasp.health == "unknown" for grasp in scene.grasps.since(last.time_us))
+        old = [link.lstat().st_mtime_ns for link in links]
+    finally:
+        first.kill()
+        first.wait()
+    second = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+    try:
+        running.eventually(lambda: all(link.lstat().st_mtime_ns != was for link, was in zip(links, old, strict=True)))
+        back_us = running.now_us()
+        assert scene.well(back_us).time_us - back_us <= RECOVERY_US
+        assert client.end() == 0
+        assert second.poll() is None
+    finally:
+        second.send_signal(signal.SIGINT)
+        assert second.wait(20.0) == 0

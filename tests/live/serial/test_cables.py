@@ -1,0 +1,110 @@
+"""Ports and plugs that go away and come back under a run."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+MakeRun = Callable[..., Any]
+Outage = Callable[..., float]
+
+pytestmark = pytest.mark.slow
+
+# The periods of both serial devices are below this.
+PERIOD_US = 10_000
+RECOVERY_US = 1_000_000
+SLACK_US = 300_000
+
+
+@pytest.mark.parametrize(("line", "lost"), [(0, "joint_names"), (1, "switch_names")], ids=["glove", "scanner"])
+def test_an_unplugged_port_is_missed_at_once_and_found_again_within_a_second(
+    run: MakeRun, outage: Outage, line: int, lost: str
+) -> None:
+    running = run("both", "glove", "scanner")
+    assert max(running.periods_us()) <= PERIOD_US
+    cable = running.bench.lines[line]
+    for _ in range(2):
+        names = set(getattr(running.scene.truth, lost))
+        outage(running.scene, cable.unplug, cable.replug, lost=names, period_us=PERIOD_US)
+    kind = ("cyberglove", "scanner")[line]
+    assert running.device(kind).opened == 3
+    assert running.device({"cyberglove": "scanner", "scanner": "cyberglove"}[kind]).opened == 1
+
+
+def test_without_any_port_nothing_is_claimed_and_both_come_back(run: MakeRun, outage: Outage) -> None:
+    running = run("both", "glove", "scanner")
+    glove, scanner = running.bench.lines
+    everything = {*running.scene.truth.switch_names, *running.scene.truth.joint_names}
+
+    def unplug() -> None:
+        glove.unplug()
+        scanner.unplug()
+
+    def replug() -> None:
+        scanner.replug()
+        glove.replug()
+
+    outage(running.scene, unplug, replug, lost=everything, period_us=PERIOD_US)
+    missed = [grasp for grasp in running.scene.grasps.all if len(grasp.lost) == len(everything)]
+    assert missed
+    assert all((grasp.health, grasp.grasp) == ("unknown", "unknown") for grasp in missed)
+
+
+@pytest.mark.parametrize(("line", "lost"), [(0, "joint_names"), (1, "switch_names")], ids=["glove", "scanner"])
+def test_a_run_that_begins_without_a_device_finds_it_within_a_second_of_its_coming(
+    run: MakeRun, line: int, lost: str
+) -> None:
+    running = run("both", "glove", "scanner", unplugged=line)
+    scene = running.scene
+    missing = set(getattr(scene.truth, lost))
+    scene.grasps.wait(lambda grasp: set(grasp.lost) == missing, 0)
+    assert not any(grasp.health == "ok" for grasp in scene.grasps.all)
+    state = running.device(("cyberglove", "scanner")[line])
+    assert not state.connected
+    assert "there is no such port" in state.error
+    plugged_us = running.now_us()
+    running.bench.lines[line].replug()
+    assert scene.well(plugged_us).time_us - plugged_us <= RECOVERY_US + SLACK_US
+    state = running.device(("cyberglove", "scanner")[line])
+    assert (state.connected, state.error) == (True, "")
+
+
+@pytest.mark.parametrize("mode", ["stream", "poll"])
+def test_a_glove_that_is_pulled_from_its_box_gives_no_answer_until_it_is_back(
+    run: MakeRun, outage: Outage, mode: str
+) -> None:
+    """Its records go on, with 'eg' at their ends."""
+    running = run("both", "glove", "scanner", glove=f'mode = "{mode}"')
+    glove = running.bench.glove
+    outage(
+        running.scene,
+        lambda: setattr(glove, "plugged", False),
+        lambda: setattr(glove, "plugged", True),
+        lost=set(running.scene.truth.joint_names),
+        period_us=running.periods_us()[0],
+    )
+    assert running.counts("cyberglove")["unplugged"] > 10
+    assert running.device("cyberglove").opened == 1
+
+
+def test_a_board_that_restarts_is_trusted_again_within_a_second(run: MakeRun) -> None:
+    running = run("both", "glove", "scanner")
+    scene = running.scene
+    scene.settled(0)
+    running.bench.scanners[0].reboot()
+    scene.show(5)
+    scene.settled(5)
+    assert scene.check() > 0
+
+
+def test_a_silent_board_is_missed_though_its_port_is_there(run: MakeRun, outage: Outage) -> None:
+    running = run("both", "glove", "scanner")
+    cable = running.bench.lines[1]
+    outage(
+        running.scene,
+        lambda: setattr(cable, "damage", lambda _message: b""),
+        lambda: setattr(cable, "damage", None),
+        lost=set(running.scene.truth.switch_names),
+        period_us=PERIOD_US,
+    )
+    assert running.device("cyberglove").opened == 1

@@ -1,0 +1,122 @@
+"""What a bad cable does to the bytes of a run."""
+
+from collections.abc import Callable
+from random import Random
+from threading import Event
+from typing import Any
+
+import pytest
+
+MakeRun = Callable[..., Any]
+Cable = Callable[[bytes], bytes]
+
+pytestmark = pytest.mark.slow
+
+GLOVE, SCANNER = 0, 1
+RECOVERY_US = 1_000_000
+SLACK_US = 300_000
+
+
+class Noise:
+    """Damages one message in `every`, by its own generator, and tells when it has damaged `enough`."""
+
+    def __init__(self, damage: Callable[[Random, bytes], bytes], every: int, enough: int) -> None:
+        self._damage, self._every, self._left = damage, every, enough
+        self._random = Random(1)
+        self.enough = Event()
+
+    def __call__(self, message: bytes) -> bytes:
+        if self._random.randrange(self._every):
+            return message
+        self._left -= 1
+        if self._left <= 0:
+            self.enough.set()
+        return self._damage(self._random, message)
+
+
+def cut(random: Random, message: bytes) -> bytes:
+    at = random.randrange(len(message))
+    return message[:at] if random.random() < 0.5 else message[at + 1 :]
+
+
+def insert(random: Random, message: bytes) -> bytes:
+    at = random.randrange(len(message) + 1)
+    return message[:at] + random.randbytes(random.randint(1, 3)) + message[at:]
+
+
+def flip(random: Random, message: bytes) -> bytes:
+    at = random.randrange(len(message))
+    return message[:at] + bytes([message[at] ^ 1 << random.randrange(8)]) + message[at + 1 :]
+
+
+def flood(random: Random, message: bytes) -> bytes:
+    """No more than the line has room for: what waits longer is late, whoever reads it."""
+    return bytes(random.randint(1, 100)) + message + bytes(20)
+
+
+def drop(_random: Random, message: bytes) -> bytes:
+    return b""
+
+
+@pytest.mark.parametrize("line", [GLOVE, SCANNER], ids=["glove", "scanner"])
+@pytest.mark.parametrize("damage", [cut, insert, flip, flood, drop])
+def test_damaged_bytes_give_no_wrong_answer_and_are_over_when_the_cable_is_mended(
+    run: MakeRun, line: int, damage: Callable[[Random, bytes], bytes]
+) -> None:
+    """One message in three is damaged, while rows change; a flipped byte of the glove alone may go unnoticed, for its
+    records have no checksum, and hold only while it is the newest.
+    """
+    running = run("both", "glove", "scanner")
+    scene, cable = running.scene, running.bench.lines[line]
+    noise = Noise(damage, 3, 60)
+    cable.damage = noise
+    row = 0
+    while not noise.enough.wait(0.4):
+        row += 1
+        scene.show(row % 20)
+    cable.damage = None
+    mended_us = running.now_us()
+    healed = scene.well(mended_us)
+    assert healed.time_us - mended_us <= RECOVERY_US + SLACK_US
+    scene.show(25)
+    scene.settled(25)
+    if (line, damage) != (GLOVE, flip):
+        assert scene.check() > 0
+    assert all(device.opened == 1 for device in running.sources.devices())
+    assert running.damaged(line) > 0 or damage in (drop, flood)
+
+
+@pytest.mark.parametrize("line", [GLOVE, SCANNER], ids=["glove", "scanner"])
+def test_a_flood_of_zeros_between_messages_holds_nothing_up(run: MakeRun, line: int) -> None:
+    running = run("both", "glove", "scanner")
+    scene, cable = running.scene, running.bench.lines[line]
+    for row in range(1, 4):
+        for _ in range(20):
+            cable.send(bytes(50))
+        scene.show(row)
+        scene.settled(row)
+    assert scene.check() > 0
+
+
+def test_a_run_opens_its_devices_through_noise(run: MakeRun) -> None:
+    running = run("both", "glove", "scanner", damage=Noise(flip, 20, 1))
+    for line in running.bench.lines:
+        line.damage = None
+    running.scene.show(3)
+    running.scene.settled(3)
+
+
+@pytest.mark.parametrize("mode", ["stream", "poll"])
+def test_a_glove_that_is_asked_for_too_much_is_well_at_the_rate_that_it_can(run: MakeRun, mode: str) -> None:
+    """Its records end in 'es': they are measurements all the same, and none of them is taken for late."""
+    running = run("both", "glove", "scanner", glove=f'mode = "{mode}"\nrate_hz = 1000')
+    scene = running.scene
+    scene.settled(0)
+    begin_us = running.now_us()
+    for row in (4, 9):
+        scene.show(row)
+        scene.settled(row)
+    assert (running.counts("cyberglove")["too fast"] > 0) == (mode == "stream")
+    since = scene.grasps.since(begin_us)
+    assert sum(grasp.health == "ok" for grasp in since) > 0.9 * len(since)
+    assert scene.check() > 0

@@ -1,0 +1,66 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thenar.drivers.cyberglove_sensors import SENSORS_18
+from thenar.runtime.live.frames import GloveFrame, SwitchFrame
+from thenar.runtime.live.published import LiveGrasp
+from thenar.runtime.recording.session import Label, Session
+from thenar.runtime.recording.writer import Recorder
+from thenar.simulator.errors import SceneError
+from thenar.simulator.playing.performance import resting, typical
+from thenar.simulator.playing.recorded import of_recording
+
+NAMES = ("a", "b", "c")
+
+
+def session(sensors: tuple[str, ...] = SENSORS_18) -> Session:
+    return Session(thenar="0", switches=NAMES, sensors=sensors)
+
+
+def raw(first: int) -> bytes:
+    return bytes([first] * 18)
+
+
+def test_the_newest_frames_are_played_every_period_from_when_both_devices_were_read(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with Recorder(path, session()) as recorder:
+        recorder.switches(SwitchFrame(0, 0b001))
+        recorder.glove(GloveFrame(5_000, raw(7)))
+        recorder.grasp(LiveGrasp(5_000, 0, 0, "PoS", "PoS", 1.0, 9, "ok", 0, 0, 0))
+        recorder.switches(SwitchFrame(12_000, 0b110))
+        recorder.glove(GloveFrame(15_500, raw(8)))
+        recorder.glove(GloveFrame(26_000, raw(9)))
+    played = of_recording(path, 10_000)
+    assert played.switch_names == NAMES
+    assert played.switches.tolist() == [[True, False, False], [False, True, True], [False, True, True]]
+    assert played.sensors[:, 0].tolist() == [7, 8, 9]
+    assert played.grasps.tolist() == ["unknown", "PoS", "PoS"]
+    assert played.calibration == typical()
+
+
+def test_a_guided_collection_is_played_with_its_labels(tmp_path: Path) -> None:
+    path = tmp_path / "collected.mcap"
+    with Recorder(path, session()) as recorder:
+        recorder.switches(SwitchFrame(0, 0b001))
+        recorder.glove(GloveFrame(0, raw(7)))
+        recorder.label(Label(time_us=20_000, event="captured", trial=1, grasp="Tip", subject="A", object="pen"))
+        recorder.glove(GloveFrame(31_000, raw(8)))
+    assert of_recording(path, 10_000).grasps.tolist() == ["unknown", "Tip", "Tip"]
+
+
+def test_without_a_cyberglove_its_sensors_rest(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with Recorder(path, session(sensors=())) as recorder:
+        recorder.switches(SwitchFrame(0, 0b001))
+    played = of_recording(path, 10_000)
+    assert np.array_equal(played.sensors, resting(typical())[np.newaxis])
+
+
+def test_a_recording_without_frames_cannot_be_played(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with Recorder(path, session()) as recorder:
+        recorder.switches(SwitchFrame(0, 0b001))
+    with pytest.raises(SceneError, match=r"run\.mcap: holds no frame of a glove"):
+        of_recording(path, 10_000)
