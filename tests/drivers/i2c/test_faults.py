@@ -6,6 +6,9 @@ from typing import Any
 
 import pytest
 
+# Most of them wait for a bus that is tried again once a second.
+pytestmark = pytest.mark.slow
+
 MakeRig = Callable[..., Any]
 RECOVERY_S = 10.0  # a second until the next try, and what a loaded machine adds
 
