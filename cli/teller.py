@@ -44,6 +44,7 @@ class Teller:
         self._glove = Newest[GloveFrame](sources.glove_period_us)
         self._health = Health(system.build)
         self._report: HealthReport | None = None
+        self._lines: tuple[str, ...] = ()
 
     def tell(self, moment: Moment) -> None:
         """Publish one moment; end the run where a device can never work as it is told to."""
@@ -57,12 +58,13 @@ class Teller:
         if self._report is None or grasp.time_us - self._report.time_us >= _REPORT_US:
             self._look()
         if self._view is not None:
-            self._view.show(grasp, self._sources.health, health_lines(self._report) if self._status else ())
+            self._view.show(grasp, self._sources.health, self._lines)
 
     def _look(self) -> None:
         self._report = self._health.report(now_us(), self._sources.health())
         if self._status:
             self._fanout.health(self._report)
+            self._lines = health_lines(self._report)
         if self._view is None:
             self._say_news(self._report)
         if self._sources.failed or self._nobody_is_told():
