@@ -3,6 +3,8 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 OUT    := out
+# Many tests wait for ports and processes: half as many workers again as cores.
+WORKERS = $(shell $(PYTHON) -c "import os; print(os.cpu_count() * 3 // 2)")
 
 # The scene that `make demo` simulates: a shipped one by its name, or a file.
 SCENE ?= quick
@@ -36,10 +38,10 @@ demo: $(VENV)/installed  ## simulate, draw, evaluate, compile, verify, run: SCEN
 	@echo "hand maps: $(OUT)/contacts.svg (which switches close), $(OUT)/kept.svg (which are kept); the rates: $(OUT)/evaluation.json."
 
 test: $(VENV)/installed  ## the tests, under ten minutes on two cores
-	$(BIN)/python -m pytest -m "not slow" -n auto
+	$(BIN)/python -m pytest -m "not slow" -n $(WORKERS)
 
 test-slow: $(VENV)/installed pythons  ## the slower checks: real Weka, fuzzing, real recordings at full length
-	$(BIN)/python -m pytest -m slow -n auto
+	$(BIN)/python -m pytest -m slow -n $(WORKERS)
 
 test-all: test test-slow  ## both
 

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import signal
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +13,12 @@ import pytest
 REQUIRE_ALL = os.environ.get("THENAR_REQUIRE_ALL") == "1"
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
+
+# Who starts the tests under nohup, or in the background, hands ignored signals down to the programs under test; those
+# that are caught here, they meet as usual.
+for _signal in (signal.SIGHUP, signal.SIGINT):
+    if signal.getsignal(_signal) is signal.SIG_IGN:
+        signal.signal(_signal, lambda *_: None)
 
 WEKA_JAR = Path("/usr/share/java/weka.jar")  # where Debian's package puts it
 

@@ -17,6 +17,9 @@ from thenar.drivers.cyberglove_sensors import SENSORS_18, SENSORS_22
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.pty_line import PtyLine
 
+# Dialogues over a pty, in real time.
+pytestmark = pytest.mark.slow
+
 Thenar = Callable[..., "subprocess.CompletedProcess[str]"]
 Answer = Callable[[str], str | None]
 HANGING_S = 60.0

@@ -21,6 +21,9 @@ from thenar.drivers.emulated.pty_line import PtyLine
 from thenar.drivers.emulated.scanner import EmulatedScanner
 from thenar.runtime.recording.trials import read_journal
 
+# Collections over ptys, in real time.
+pytestmark = pytest.mark.slow
+
 GLOVE = """name = "bench"
 [cyberglove]
 port = "{folder}/glove"
@@ -67,8 +70,13 @@ class Terminal:
 
     def finish(self) -> tuple[int, str]:
         """Return the exit code and the rest of what was said."""
-        while chunk := self._read():
-            self.said += chunk
+        end = monotonic() + 60.0
+        while True:
+            assert monotonic() < end, self.said[-3000:]
+            if select.select([self.master], [], [], 1.0)[0]:
+                if not (chunk := self._read()):
+                    break
+                self.said += chunk
         return self.process.wait(30), self.said.decode("utf-8", "replace")
 
     def close(self) -> None:
