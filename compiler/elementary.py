@@ -126,7 +126,9 @@ def softmax_and_loss(scores: Floats, labels: NDArray[np.intp], weights: Floats |
     shares /= total
     if weights is None:
         return shares, math.fsum(losses.tolist()) / labels.size
-    return shares, math.fsum((losses * weights).tolist()) / math.fsum(weights.tolist())
+    # The heaviest to about 1, by a power of two, which is exact: light rows of small losses would lose bits otherwise.
+    near_one = np.ldexp(weights, -int(np.frexp(weights.max())[1]))
+    return shares, math.fsum((losses * near_one).tolist()) / math.fsum(near_one.tolist())
 
 
 def sincos(x: Floats) -> tuple[Floats, Floats]:

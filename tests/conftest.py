@@ -4,11 +4,13 @@ import os
 import shutil
 import signal
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import NoReturn
 
 import pytest
+from hypothesis import settings
 
 REQUIRE_ALL = os.environ.get("THENAR_REQUIRE_ALL") == "1"
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -19,6 +21,11 @@ SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 for _signal in (signal.SIGHUP, signal.SIGINT):
     if signal.getsignal(_signal) is signal.SIG_IGN:
         signal.signal(_signal, lambda *_: None)
+
+# Every run draws the same examples, on every machine: what failed once fails again. Among mutants, quick_verdict decides.
+settings.register_profile("repeatable", derandomize=True, deadline=None)
+if "quick_verdict" not in sys.modules:
+    settings.load_profile("repeatable")
 
 WEKA_JAR = Path("/usr/share/java/weka.jar")  # where Debian's package puts it
 

@@ -43,12 +43,13 @@ def share_error(scores: Sequence[float], k: int, share: mpf) -> mpf:
 def loss_error(rows: Sequence[Sequence[float]], labels: Sequence[int], weights: Sequence[float]) -> mpf:
     """Bound the error of the mean of -ln P(label) over rows of scores (n, K), weighted.
 
-    The weight and the mean, a quotient of two correctly rounded sums, round 3 times.
+    The weight and the mean, a quotient of two correctly rounded sums, round 3 times. Weights are brought to 1 at most
+    before; what is then too light for a double is off by the smallest one, times the loss, and so is the product.
     """
     errors = [_row_error(row, label) for row, label in zip(rows, labels, strict=True)]
     losses = [loss(row, label) for row, label in zip(rows, labels, strict=True)]
     parts = (u * (error + 3 * ROUNDING * each) for u, error, each in zip(weights, errors, losses, strict=True))
-    return mpmath.fsum(parts) / mpmath.fsum(weights) + 2 * SMALLEST
+    return mpmath.fsum(parts) / mpmath.fsum(weights) + (2 + mpmath.fsum(1 + each for each in losses)) * 2 * SMALLEST
 
 
 def _row_error(row: Sequence[float], label: int) -> mpf:

@@ -23,6 +23,7 @@ KEYS = 160
 EVERY = (1 << KEYS) - 1
 BAUD = 1_000_000
 LONG_S = 5.0
+BUSY_US = 200_000
 
 
 @pytest.fixture
@@ -86,7 +87,8 @@ def test_every_set_of_keys_comes_through_whole_and_in_order(
             board.set(closed)
             reading = until(scanner, lambda reading, closed=closed: reading.closed == closed)  # type: ignore[misc]
             assert reading.known == EVERY
-            assert began <= reading.time_us + 2000 <= now_us() + 2000
+            # A bitmap carries no time: it counts as late as the frame before it, which on a busy machine is early.
+            assert began - BUSY_US <= reading.time_us <= now_us()
         assert scanner.counts.gaps == 0
 
 
