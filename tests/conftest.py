@@ -22,7 +22,7 @@ for _signal in (signal.SIGHUP, signal.SIGINT):
     if signal.getsignal(_signal) is signal.SIG_IGN:
         signal.signal(_signal, lambda *_: None)
 
-# Every run draws the same examples, on every machine: what failed once fails again. Among mutants, quick_verdict decides.
+# Every run draws the same examples, on every machine: what failed once fails again. (Among mutants it is theirs.)
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 if "quick_verdict" not in sys.modules:
     settings.load_profile("repeatable")
