@@ -29,7 +29,8 @@ class GuideKeys:
         if self._raw:
             self._before = termios.tcgetattr(self._descriptor)
             # Ctrl-C stays what it is.
-            tty.setcbreak(self._descriptor)
+            # Keys that were pressed a moment too early count as well.
+            tty.setcbreak(self._descriptor, termios.TCSADRAIN)
         return self
 
     def __exit__(

@@ -219,7 +219,7 @@ def test_a_full_disk_ends_it_with_a_sentence_and_room_lets_it_go_on(folder: Path
     assert "File too large: the recording has stopped after" in words
     assert "make room, and the same command goes on" in words
     again = start()
-    again.until(rb"1 of 4: ")
+    again.until(rb"Enter: start the countdown")
     again.press(b"q")
     assert again.finish()[0] == 0
 
