@@ -14,13 +14,14 @@ _TOKENS = 0xFFFF
 class BoardTimes:
     """Gives every message its time, in the host's monotonic microseconds: never one before the last one's.
 
-    pings   how often the board's time was asked for
+    late_us  how late the last message with a time of its own came in, which those without one are taken to share
+    pings    how often the board's time was asked for
     """
 
     def __init__(self) -> None:
         self._clock = BoardClock()
-        self._late_us = self._time_us = 0
-        self._asked_us = 0
+        self.late_us = 0
+        self._time_us = self._asked_us = 0
         self.pings = 0
 
     def ping(self) -> Ping:
@@ -31,15 +32,15 @@ class BoardTimes:
 
     def doubtful(self, came_us: int) -> bool:
         """Whether what last came in was so late that the time should be asked for, and it was not just now."""
-        return self._late_us > _LATE_US and came_us - self._asked_us >= _PING_AGAIN_US
+        return self.late_us > _LATE_US and came_us - self._asked_us >= _PING_AGAIN_US
 
     def stamp(self, message: FromBoard | None, came_us: int) -> int:
         """Return the time of what came in. What carries none is taken to be as late as the last that did."""
         if message is not None and not isinstance(message, State):
             answer = isinstance(message, Hello) and self.pings > 0 and message.token == self._token
             asked_us = self._asked_us if answer else None
-            self._late_us = came_us - self._clock.host_us(message.time_us, came_us, asked_us)
-        self._time_us = max(self._time_us, came_us - self._late_us)
+            self.late_us = came_us - self._clock.host_us(message.time_us, came_us, asked_us)
+        self._time_us = max(self._time_us, came_us - self.late_us)
         return self._time_us
 
     @property

@@ -3,6 +3,8 @@
 Written from the data sheet and from nothing of the drivers; runs under any Python 3.11 without packages.
 """
 
+from abc import abstractmethod
+
 from .i2c_device import Device
 
 
@@ -41,8 +43,9 @@ class _Banked(Device):
                 (self._outputs, self._polarities, self._inputs)[bank - 1][port] = byte
             self._advance()
 
+    @abstractmethod
     def _command(self, byte: int) -> None:
-        raise NotImplementedError
+        """Take the byte of a message that says where to write, or to read from."""
 
     def _advance(self) -> None:
         if self._moves:

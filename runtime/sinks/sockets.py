@@ -8,6 +8,7 @@ the rest of one line and what the system buffers, which is kept small so that it
 import select
 import socket
 from collections.abc import Callable
+from contextlib import suppress
 
 from ..live.health import HealthReport
 from ..live.published import LiveGrasp
@@ -59,17 +60,18 @@ class SocketLines:
         if self._listener.fileno() < 0 or not self._knocks.poll(0):
             return
         try:
-            while True:
-                reader, _ = self._listener.accept()
-                if len(self._readers) >= MAX_READERS:
-                    self._error = f"more than {MAX_READERS} readers: the newest were turned away"
-                    reader.close()
-                else:
-                    self._readers[reader] = _outlet(reader)
-        except BlockingIOError:
-            pass
+            with suppress(BlockingIOError):
+                while True:
+                    self._seat(self._listener.accept()[0])
         except OSError as reason:  # gone between knocking and entering, or no descriptors left
             self._error = reason.strerror or str(reason)
+
+    def _seat(self, reader: socket.socket) -> None:
+        if len(self._readers) >= MAX_READERS:
+            self._error = f"more than {MAX_READERS} readers: the newest were turned away"
+            reader.close()
+        else:
+            self._readers[reader] = _outlet(reader)
 
     def _send_all(self, line: bytes) -> None:
         for reader in tuple(self._readers):

@@ -43,13 +43,15 @@ def share_error(scores: Sequence[float], k: int, share: mpf) -> mpf:
 def loss_error(rows: Sequence[Sequence[float]], labels: Sequence[int], weights: Sequence[float]) -> mpf:
     """Bound the error of the mean of -ln P(label) over rows of scores (n, K), weighted.
 
-    The weight and the mean, a quotient of two correctly rounded sums, round 3 times. Weights are brought to 1 at most
-    before; what is then too light for a double is off by the smallest one, times the loss, and so is the product.
+    The weight and the mean, a quotient of two correctly rounded sums, round 3 times. A power of two has brought the
+    heaviest weight to [1/2, 1) before: one that is then subnormal, and a product that is, may be off by half of the
+    smallest double, the former times its loss. The sum that divides them is 1/2 at least, so that each counts once; so
+    much off in that sum is nothing next to its rounding. The mean itself may be subnormal: 2 are more than it needs.
     """
     errors = [_row_error(row, label) for row, label in zip(rows, labels, strict=True)]
     losses = [loss(row, label) for row, label in zip(rows, labels, strict=True)]
     parts = (u * (error + 3 * ROUNDING * each) for u, error, each in zip(weights, errors, losses, strict=True))
-    return mpmath.fsum(parts) / mpmath.fsum(weights) + (2 + mpmath.fsum(1 + each for each in losses)) * 2 * SMALLEST
+    return mpmath.fsum(parts) / mpmath.fsum(weights) + (2 + mpmath.fsum(1 + each for each in losses)) * SMALLEST
 
 
 def _row_error(row: Sequence[float], label: int) -> mpf:

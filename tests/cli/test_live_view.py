@@ -1,10 +1,12 @@
+from collections.abc import Sequence
 from io import StringIO
 from queue import Queue
 from threading import Event
 
+from msgspec.structs import replace
 from rich.console import Console
 
-from thenar.cli.live_view import LiveView
+from thenar.cli.live_view import LiveView, drawn
 from thenar.runtime.live.health import DeviceHealth
 from thenar.runtime.live.published import LiveGrasp
 
@@ -41,13 +43,49 @@ class Terminal(StringIO):
         self.said.put(text)
         return len(text)
 
-    def until(self, text: str) -> None:
-        while text not in self.said.get(timeout=LONG_S):
-            pass
+    def until(self, *texts: str) -> None:
+        """Wait until all of `texts` were drawn from now on."""
+        drawn = ""
+        while not all(text in drawn for text in texts):
+            drawn += self.said.get(timeout=LONG_S)
 
 
 def view_on(terminal: Terminal) -> LiveView:
     return LiveView(Console(file=terminal, force_terminal=True, width=80))
+
+
+def picture(grasp: LiveGrasp, devices: Sequence[DeviceHealth] = (), lines: Sequence[str] = ()) -> list[str]:
+    """Return the lines of what is drawn, with one blank between the words."""
+    console = Console(file=StringIO(), width=80, record=True)
+    console.print(drawn(grasp, devices, lines))
+    return [" ".join(line.split()) for line in console.export_text().splitlines()]
+
+
+def test_the_picture_says_what_is_held_how_sure_that_is_and_how_every_device_fares() -> None:
+    devices = DeviceHealth("glove", False, "no such port"), DeviceHealth("bus 1", True, "")
+    assert picture(grasp("Tripod"), devices, ("120 frames", "drifting: none")) == [
+        "grasp Tripod",
+        "█" * 27 + "░" * 3 + " 90.0%",
+        "this frame Tripod, ahead by 12 steps",
+        "health ok",
+        "age switches 0.9 ms, glove none yet",
+        "frame 0",
+        "glove no such port",
+        "bus 1 connected",
+        "120 frames",
+        "drifting: none",
+    ]
+
+
+def test_what_is_missing_is_named_six_of_it_at_most() -> None:
+    for count, said in (
+        (1, "missing s0"),
+        (6, "missing s0, s1, s2, s3, s4, s5"),
+        (8, "missing s0, s1, s2, s3, s4, s5 and 2 more"),
+    ):
+        lost = tuple(f"s{number}" for number in range(count))
+        assert said in picture(replace(grasp("Tripod"), health="degraded", lost=lost))
+    assert not any(line.startswith("missing") for line in picture(grasp("Tripod")))
 
 
 def test_the_newest_grasp_is_drawn() -> None:
@@ -56,7 +94,7 @@ def test_the_newest_grasp_is_drawn() -> None:
         view.show(grasp("first"), nobody)
         terminal.until("first")
         view.show(grasp("second"), lambda: (DeviceHealth("glove", False, "no such port"),), ("120 frames",))
-        terminal.until("second")
+        terminal.until("second", "no such port", "120 frames")
 
 
 def test_a_terminal_that_is_held_holds_nobody_up_and_then_shows_the_present() -> None:

@@ -20,6 +20,10 @@ FRANK = Policy(lead=0.0, dwell_us=0)
 # Registers of the chips' ports.
 GPIOA_23017, GPIOB_23017 = 0x12, 0x13
 
+# How long each row is played. A device that a busy computer keeps waiting for over two of its periods is missing until
+# it comes to it, and a row lasts long enough for all of them to be there once.
+PLAYED_US = 1_000_000
+
 
 @pytest.mark.parametrize(
     ("inputs", "parts"),
@@ -128,7 +132,8 @@ def test_emulate_plays_a_set_and_run_recognises_it_row_by_row(run: MakeRun, stag
     scene_file = stage.scene_file(tmp_path)
     client = [*thenar, "run", str(stage.builds["both"]), "--glove", "{glove}", "--sink", f"jsonl:{out}"]
     client += ["--record", str(recording), "--lead", "0", "--dwell-ms", "0"]
-    emulate = [*thenar, "emulate", str(scene_file), "--glove", str(glove), "--dir", str(own), "--period-ms", "300"]
+    emulate = [*thenar, "emulate", str(scene_file), "--glove", str(glove), "--dir", str(own)]
+    emulate += ["--period-ms", str(PLAYED_US // 1000)]
     done = subprocess.run(
         [*emulate, "--log", str(log), "--", *client], capture_output=True, text=True, timeout=120, check=False
     )
@@ -136,11 +141,10 @@ def test_emulate_plays_a_set_and_run_recognises_it_row_by_row(run: MakeRun, stag
     played = [msgspec.json.decode(line, type=Played) for line in log.read_bytes().splitlines()]
     assert [line.row for line in played] == list(range(len(scene.truth.performance)))
     grasps = [msgspec.json.decode(line, type=LiveGrasp) for line in out.read_bytes().splitlines()]
-    met = stage.check_played(scene.truth, grasps, [(line.time_us, line.row) for line in played])
+    met = stage.check_played(scene.truth, grasps, [(line.time_us, line.row) for line in played], PLAYED_US)
     # The first rows may pass while the run starts.
     begun = next(grasp.time_us for grasp in grasps if grasp.health == "ok")
     whole = {this.row for this, after in pairwise(played) if this.time_us > begun and after}
-    # On a busy machine a row may be over before the devices and the run have all come to it.
-    assert len(whole - met) <= 3
+    assert whole <= met
     assert len(met) > 15
     assert all(then == now for then, now in replayed(scene.truth.build, recording, FRANK))

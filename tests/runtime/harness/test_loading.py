@@ -110,7 +110,10 @@ def test_what_is_wrong_with_a_line_or_bus_is_told_with_its_place(load: Load, tex
             "line 5: bus[0].chip[0].address: a mcp23017 answers at 0x20 to 0x27, not",
         ),
         ("kind = 'mcp23017'\naddress = -1", "line 5: bus[0].chip[0].address: a mcp23017 answers at 0x20 to 0x27, not"),
-        ("pins = { GPA8 = 's' }", "bus[0].chip[0].pins.GPA8: a mcp23017 has no pin 'GPA8' (did you mean 'GPA"),
+        (
+            "pins = { GPA8 = 's' }",
+            "bus[0].chip[0].pins.GPA8: a mcp23017 has no pin 'GPA8' (did you mean 'GPA6' or 'GPA5' or 'GPA4'?)",
+        ),
         ("pins = { GPA7 = 's' }", "bus[0].chip[0].pins.GPA7: must not be an input: since revision D of its data sheet"),
         ("pins = { GPB7 = 's' }", "bus[0].chip[0].pins.GPB7: must not be an input"),
         ("kind = 'mcp23008'\npins = { GP7 = 's' }", "bus[0].chip[0].pins.GP7: must not be an input"),

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -26,6 +26,24 @@ def test_losses_are_within_what_rounding_allows_however_they_are_weighted(
     labels = data.draw(arrays(np.intp, n, elements=st.integers(0, len(scores) - 1)))
     weights = data.draw(st.none() | arrays(np.float64, n, elements=st.floats(2.0**-900, 2.0**900)))
     assert elementary.losses_of([(scores, labels, weights)]).holds
+
+
+@given(
+    st.floats(690.0, 770.0),
+    st.lists(st.tuples(st.floats(0.0, 800.0), st.booleans(), st.integers(-1080, 0)), min_size=1, max_size=5),
+    st.integers(-1000, 1000),
+)
+@example(740.0, [(760.0, False, -1073)], 200)  # just heavy enough for a double
+@example(740.0, [(760.0, False, -1074)], 200)
+@example(700.0, [(700.0, True, 0)], -900)
+def test_losses_next_to_the_smallest_double_are_within_what_underflow_allows(
+    sure: float, light: list[tuple[float, bool, int]], heaviest: int
+) -> None:
+    """One heavy row that is next to certain, and rows so light that weight, product or mean underflows."""
+    gaps = [sure, *(gap if right else -gap for gap, right, _ in light)]
+    weights = np.ldexp(1.0, [heaviest, *(max(heaviest + power, -1074) for _, _, power in light)])
+    scores = np.array([gaps, np.zeros(len(gaps))])
+    assert elementary.losses_of([(scores, np.zeros(len(gaps), np.intp), weights)]).holds
 
 
 @given(arrays(np.float64, st.tuples(st.integers(2, 33), st.just(1)), elements=st.floats(-1e300, 1e300)))
