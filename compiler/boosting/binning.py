@@ -133,9 +133,12 @@ class Binned:
     home: dict[int, tuple[TwoValued | ManyValued, int]]  # column -> its group and position there
 
 
-def bin_columns(X: NDArray[np.generic]) -> Binned:
-    """Sort the columns of `X` (n, d), numbers with NaN for missing, into groups; constant ones are left out."""
-    binned = [(column, *_bin(np.asarray(X[:, column], dtype=np.float64))) for column in range(X.shape[1])]
+def bin_columns(X: NDArray[np.generic], max_bins: int | None = None) -> Binned:
+    """Sort the columns of `X` (n, d), numbers with NaN for missing, into groups; constant ones are left out.
+
+    Columns have at most `max_bins` bins (2 or more; None: one for each value), that hold rows as evenly as can be.
+    """
+    binned = [(column, *_bin(np.asarray(X[:, column], dtype=np.float64), max_bins)) for column in range(X.shape[1])]
     varying = [(column, bins, edges) for column, bins, edges in binned if edges.size]
     two = [(column, bins == 0, edges[0]) for column, bins, edges in varying if bins.max() == 1]
     many = [(column, bins, edges) for column, bins, edges in varying if bins.max() > 1]
@@ -149,15 +152,31 @@ def bin_columns(X: NDArray[np.generic]) -> Binned:
     return Binned(X.shape[1], tuple(groups), home)
 
 
-def _bin(numbers: Floats) -> tuple[NDArray[np.int32], Floats]:
+def _bin(numbers: Floats, max_bins: int | None) -> tuple[NDArray[np.int32], Floats]:
     """Return the bin (n,) of every number and the edges between bins; a missing one gets bin len(edges) + 1."""
     low, high = numbers.min(), numbers.max()
     is_high = numbers == high
     if (is_high | (numbers == low)).all():
         # Most columns are switches: no need to sort them.
         return is_high.astype(np.int32), midpoints(np.unique([low, high]))
-    values, bins = np.unique(numbers, return_inverse=True)
-    return bins.astype(np.int32), midpoints(values[~np.isnan(values)])
+    values, bins, counts = np.unique(numbers, return_inverse=True, return_counts=True)
+    present = ~np.isnan(values)
+    edges = midpoints(values[present])
+    if max_bins is not None and len(edges) >= max_bins:
+        kept = _even(counts[present], max_bins)
+        edges = edges[kept]
+        bins = np.where(np.isnan(numbers), len(edges) + 1, np.searchsorted(kept, bins))
+    return bins.astype(np.int32), edges
+
+
+def _even(counts: NDArray[np.intp], bins: int) -> NDArray[np.intp]:
+    """Return after which of the values, each with as many rows as `counts` says, to part them into `bins` at most.
+
+    An edge lies where the share of rows below it is nearest to 1, 2, ... of so many parts; of equally near ones first.
+    """
+    below = np.cumsum(counts)[:-1]
+    wanted = np.arange(1, bins) * counts.sum()
+    return np.unique([np.argmin(np.abs(bins * below - share)) for share in wanted])
 
 
 def midpoints(values: Floats) -> Floats:

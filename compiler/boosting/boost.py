@@ -47,19 +47,21 @@ def boost(
     z_max: float = 3.0,
     tolerance: float | None = None,
     weights: Floats | None = None,
+    max_bins: int | None = None,
     on_round: Callable[[int, int], None] | None = None,
 ) -> tuple[Stumps, History]:
     """Train `rounds` rounds on X (n, d) numbers (NaN: missing), labels (n,) in 0..n_classes-1, weights (n,) >= 0.
 
     Stops early where the mean log-likelihood changes by less than `tolerance` in a round (Weka's -L; None: never), or
-    where no column varies. `on_round(done, rounds)` is called after every round. Raises BoostingError.
+    where no column varies. With `max_bins` (2 or more) no column has more bins than that; they hold rows as evenly as
+    can be. `on_round(done, rounds)` is called after every round. Raises BoostingError.
     """
-    _check_options(rounds, shrinkage, z_max, tolerance)
+    _check_options(rounds, shrinkage, z_max, tolerance, max_bins)
     _check_rows(X, labels, n_classes, weights)
     if weights is not None:
         # By a power of two, which changes no answer: now sums of huge weights stay finite, and of tiny ones exact.
         weights = np.ldexp(weights, -np.frexp(weights.max())[1])
-    binned = bin_columns(X)
+    binned = bin_columns(X, max_bins)
     member = labels == np.arange(n_classes)[:, np.newaxis]
     scores = carry = np.zeros((n_classes, len(X)))
     probability, loss = softmax_and_loss(scores, labels, weights)
@@ -111,9 +113,11 @@ def _stack(
     )
 
 
-def _check_options(rounds: int, shrinkage: float, z_max: float, tolerance: float | None) -> None:
+def _check_options(rounds: int, shrinkage: float, z_max: float, tolerance: float | None, max_bins: int | None) -> None:
     if rounds < 1:
         raise BoostingError(f"rounds={rounds} must be at least 1")
+    if max_bins is not None and max_bins < 2:
+        raise BoostingError(f"max_bins={max_bins} must be at least 2: one bin tells nothing")
     if not SMALLEST_SHRINKAGE <= shrinkage <= 1:
         raise BoostingError(f"shrinkage={shrinkage} must be at least {SMALLEST_SHRINKAGE:g} and at most 1")
     if not 1 < z_max <= LARGEST_Z_MAX:

@@ -1,8 +1,8 @@
-"""From score tables to integer tables: one scale for all, the finest at which no sum can overflow.
+"""From score tables to integer tables: one scale for all, fine, yet such that no sum can overflow.
 
 Rounding every row to whole steps moves a score by at most (inputs + 1)/2 steps, half a step for the bias and for each
 input's row. Two scores can therefore approach each other by at most inputs + 1 steps, and a frame whose best score
-leads by more than that keeps its grasp type.
+leads by more than that keeps its grasp type. This holds of every scale: a coarser one only makes a step worth more.
 """
 
 import math
@@ -13,21 +13,28 @@ from numpy.typing import NDArray
 from ...runtime.tables import IntegerTables
 from .balance import balance
 from .collapse import Floats, ScoreTables
-
-# Steps per unit. At this scale the least safe margin, 2 steps, is still more than what the ensemble takes for a tie
-# (stumps.TIE): a row that is safe is never one that the ensemble decided by the number of the class.
-FINEST = 2.0**30
+from .scales import finest_scale, kindest_scale
 
 Integers = NDArray[np.int16]
 
 
-def quantise(tables: ScoreTables, bits: NDArray[np.bool_], codes: NDArray[np.uint16], width: int = 16) -> IntegerTables:
+def quantise(
+    tables: ScoreTables,
+    bits: NDArray[np.bool_],
+    codes: NDArray[np.uint16],
+    width: int = 16,
+    entry_bits: int = 16,
+) -> IntegerTables:
     """Return integer tables whose sums fit `width` bits (4 to 16), rounded half to even.
 
-    bits (n, s) and codes (n, j) are the rows trained on; their mean contributions stand in for missing inputs.
+    bits (n, s) and codes (n, j) are the rows trained on; their mean contributions stand in for missing inputs. No
+    look-up, a joint or up to GROUP_SIZE consecutive switches, spans more than 2^entry_bits - 1 steps in any class. With
+    16 that is no limit, as sums of 16 bits span no more, and the scale is the finest; with fewer it is the kindest.
     """
     balanced = balance(tables)
-    scale = _finest_scale(balanced, 2 ** (width - 1) - 1)
+    scale = finest_scale(balanced, 2 ** (width - 1) - 1, 2**entry_bits - 1)
+    if entry_bits < 16:
+        scale = kindest_scale(balanced, scale, bits, codes)
     switch_rows = _rounded(balanced.switch_rows, scale)
     switch_means = _rounded(balanced.switch_rows * _mean(bits.astype(np.int64))[:, np.newaxis], scale)
     thresholds, joint_rows, joint_means = [], [], []
@@ -47,34 +54,6 @@ def quantise(tables: ScoreTables, bits: NDArray[np.bool_], codes: NDArray[np.uin
         joint_means=np.array(joint_means, np.int16).reshape(len(joint_means), len(tables.bias)),
         scale=scale,
     )
-
-
-def _finest_scale(tables: ScoreTables, limit: int) -> float:
-    """Return the largest double below FINEST at which no sum of rounded rows exceeds `limit`; 1 for tables of zeros.
-
-    Rounded terms never fall as the scale grows, so neither does the bound, and bisection over the doubles is exact.
-    """
-    whole = reach(tables, 1.0, rounded=False)
-    if whole == 0:
-        return 1.0
-    fits, too_fine = 0.0, min((limit + tables.n_inputs + 2) / whole, FINEST)
-    while (middle := (fits + too_fine) / 2) not in (fits, too_fine):
-        if reach(tables, middle) <= limit:
-            fits = middle
-        else:
-            too_fine = middle
-    return fits
-
-
-def reach(tables: ScoreTables, scale: float, *, rounded: bool = True) -> float:
-    """Return the largest absolute value that a partial sum of the scaled rows can take, in any order."""
-    choices = [tables.bias[np.newaxis], *tables.joint_rows, *tables.switch_rows[:, np.newaxis]]
-    upper, lower = np.zeros(len(tables.bias)), np.zeros(len(tables.bias))
-    for rows in choices:
-        steps = np.rint(rows * scale) if rounded else rows * scale
-        upper += np.maximum(steps.max(axis=0), 0)
-        lower += np.minimum(steps.min(axis=0), 0)
-    return float(max(upper.max(), -lower.min()))
 
 
 def _rounded(rows: Floats, scale: float) -> Integers:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from thenar.compiler.boosting import binning
-from thenar.compiler.boosting.binning import bin_columns, midpoints
+from thenar.compiler.boosting.binning import Binned, TwoValued, bin_columns, midpoints
 
 NUMBERS = st.sampled_from([0.0, 1.0, 2.0, 5.0, -3.0, np.nan]) | st.floats(-10, 10)
 MATRICES = arrays(np.float64, st.tuples(st.integers(1, 12), st.integers(1, 5)), elements=NUMBERS)
@@ -99,3 +99,48 @@ def test_a_threshold_is_the_midpoint_correctly_rounded_below_the_upper(pair: tup
 @pytest.mark.parametrize("lower", [1.0, -1.0, 5e-324, 1e300])
 def test_between_neighbouring_doubles_the_lower_is_the_threshold(lower: float) -> None:
     assert midpoints(np.array([lower, np.nextafter(lower, np.inf)])).tolist() == [lower]
+
+
+@given(MATRICES, st.integers(2, 6))
+def test_no_column_has_more_bins_than_allowed_and_its_edges_are_among_the_others(X: np.ndarray, most: int) -> None:
+    whole, few = bin_columns(X), bin_columns(X, most)
+    assert sorted(few.home) == sorted(whole.home)
+    for column in few.home:
+        every, kept = edges_of(whole, column, X), edges_of(few, column, X)
+        assert set(kept) <= set(every)
+        assert len(kept) <= most - 1
+        if len(every) <= most - 1:
+            assert kept == every
+        group, position = few.home[column]
+        for split, edge in enumerate(kept):
+            assert np.array_equal(group.goes_left(position, split), X[:, column] <= edge)
+        missing = group.is_missing(position)
+        assert np.array_equal(np.isnan(X[:, column]), np.zeros(len(X), bool) if missing is None else missing)
+
+
+def edges_of(binned: Binned, column: int, X: np.ndarray) -> list[float]:
+    """Return the thresholds of a column, as many as part its values."""
+    group, position = binned.home[column]
+    numbers = X[~np.isnan(X[:, column]), column]
+    lefts: list[float] = []
+    for split in range(len(np.unique(numbers)) - 1):
+        try:
+            lefts.append(group.threshold(position, split))
+        except IndexError:
+            break
+    return lefts[:1] if isinstance(group, TwoValued) else lefts
+
+
+@given(st.lists(st.integers(1, 50), min_size=4, max_size=30), st.integers(2, 8))
+def test_bins_hold_rows_as_evenly_as_values_allow(counts: list[int], most: int) -> None:
+    X = np.repeat(np.arange(float(len(counts))), counts)[:, np.newaxis]
+    group, position = bin_columns(X, most).home[0]
+    edges = edges_of(bin_columns(X, most), 0, X)
+    if len(counts) <= most:
+        return
+    shares = [float(np.count_nonzero(X <= edge)) for edge in edges]
+    for part in range(1, most):
+        wanted = part * len(X) / most
+        nearest = min(abs(np.cumsum(counts)[:-1] - wanted))
+        assert min(abs(share - wanted) for share in shares) == nearest
+    assert group.is_missing(position) is None or not np.any(group.is_missing(position))

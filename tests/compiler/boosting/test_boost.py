@@ -138,6 +138,7 @@ def test_the_tolerance_stops_early_and_says_so() -> None:
         ({"z_max": 100.5}, "z_max=100.5"),
         ({"z_max": float("nan")}, "z_max=nan"),
         ({"tolerance": -1e-3}, "tolerance=-0.001"),
+        ({"max_bins": 1}, "max_bins=1 must be at least 2"),
         ({"tolerance": float("nan")}, "tolerance=nan"),
         ({"tolerance": float("inf")}, "tolerance=inf"),
         ({"n_classes": 2}, "labels run from 0 to 2"),

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.tables.balance import balance
 from thenar.compiler.tables.collapse import ScoreTables, collapse
-from thenar.compiler.tables.quantise import reach
+from thenar.compiler.tables.scales import reach
 
 MakeStumps = Callable[..., Stumps]
 MakeRows = Callable[..., tuple[np.ndarray, np.ndarray]]

@@ -10,7 +10,8 @@ from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.tables.balance import balance
 from thenar.compiler.tables.collapse import ScoreTables, collapse
 from thenar.compiler.tables.compare import compare
-from thenar.compiler.tables.quantise import FINEST, quantise, reach
+from thenar.compiler.tables.quantise import quantise
+from thenar.compiler.tables.scales import FINEST, reach
 from thenar.runtime.tables import tables_to_bytes
 
 MakeStumps = Callable[..., Stumps]

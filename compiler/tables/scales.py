@@ -1,0 +1,91 @@
+"""How fine steps may be: so that no sum leaves its integers, and no look-up of firmware the width of its entries.
+
+Firmware adds up what look-ups give: the sum of the rows of a few switches, or a row of a joint. Where it stores these
+in entries of 8 bits, as what exceeds the least of the look-up and class, no look-up may span more than 255 steps. A
+scale for that is some 4 steps per unit of score, where one for 16 bits is some 300.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..boosting.stumps import winners
+from .collapse import Floats, ScoreTables
+
+# Steps per unit. At this scale the least safe margin, 2 steps, is still more than what the ensemble takes for a tie
+# (stumps.TIE): a row that is safe is never one that the ensemble decided by the number of the class.
+FINEST = 2.0**30
+
+# The most consecutive switches that firmware looks up together in tables of narrow entries. Any so many, wherever a
+# group of them may begin, keep the span; so fewer do as well.
+GROUP_SIZE = 5
+
+# Scales that `kindest_scale` tries, evenly spaced down to four fifths of the finest.
+TRIED, _TRIED_OF_ALL = 32, 160
+
+
+def finest_scale(tables: ScoreTables, limit: int, widest: int) -> float:
+    """Return the largest double below FINEST at which no sum of rounded rows exceeds `limit` and no look-up spans more
+    than `widest`; 1 for tables of zeros.
+
+    Rounded terms never fall as the scale grows, so neither do sums and spans, and bisection over the doubles is exact.
+    """
+    whole = reach(tables, 1.0, rounded=False)
+    if whole == 0:
+        return 1.0
+    fits, too_fine = 0.0, min((limit + tables.n_inputs + 2) / whole, FINEST)
+    while (middle := (fits + too_fine) / 2) not in (fits, too_fine):
+        if reach(tables, middle) <= limit and span(tables, middle) <= widest:
+            fits = middle
+        else:
+            too_fine = middle
+    return fits
+
+
+def kindest_scale(tables: ScoreTables, finest: float, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> float:
+    """Return, of `finest` and scales a little coarser, the one at which the fewest rows, bits (n, s) and codes (n, j),
+    change their class; of equal ones the finest.
+
+    Where steps are coarse, whether a frame that many rows share changes its class is a matter of luck and not of how
+    coarse they are. What is proved of rounding is proved at every scale.
+    """
+    scales = finest * (1 - np.arange(TRIED) / _TRIED_OF_ALL)
+    right = winners(tables.scores(bits, codes))
+    changed = [np.count_nonzero(_at(tables, scale).scores(bits, codes).argmax(axis=1) != right) for scale in scales]
+    return float(scales[int(np.argmin(changed))])
+
+
+def reach(tables: ScoreTables, scale: float, *, rounded: bool = True) -> float:
+    """Return the largest absolute value that a partial sum of the scaled rows can take, in any order."""
+    upper, lower = _extremes(tables, scale, rounded=rounded)
+    return float(max(upper.sum(axis=0).max(), -lower.sum(axis=0).min()))
+
+
+def span(tables: ScoreTables, scale: float) -> float:
+    """Return the most that what a look-up gives a class can differ by: a joint's rows and zero, scaled and rounded, or
+    the sums of some of GROUP_SIZE consecutive switches' rows.
+
+    Zero, which `balance` puts between a joint's rows anyhow, is among them so that no span falls as the scale grows.
+    """
+    upper, lower = _extremes(tables, scale)
+    switches, joints = np.split(upper[1:] - lower[1:], [len(tables.switch_rows)])
+    # Sums of whole numbers are exact: so is the difference of two of them, GROUP_SIZE switches apart.
+    sums = np.cumsum(np.vstack([np.zeros((GROUP_SIZE, len(tables.bias))), switches]), axis=0)
+    groups = sums[GROUP_SIZE:] - sums[:-GROUP_SIZE]
+    return float(np.vstack([groups, joints]).max(initial=0.0))
+
+
+def _at(tables: ScoreTables, scale: float) -> ScoreTables:
+    """Return the tables in whole steps."""
+    bias, switch_rows, *joint_rows = (
+        np.rint(rows * scale) for rows in (tables.bias, tables.switch_rows, *tables.joint_rows)
+    )
+    return ScoreTables(bias, switch_rows, tables.thresholds, tuple(joint_rows))
+
+
+def _extremes(tables: ScoreTables, scale: float, *, rounded: bool = True) -> tuple[Floats, Floats]:
+    """Return the most and the least, zero included, that bias, switches and joints add: (1 + s + j, K) each."""
+    upper = np.vstack([tables.bias, tables.switch_rows, *(rows.max(axis=0) for rows in tables.joint_rows)]) * scale
+    lower = np.vstack([tables.bias, tables.switch_rows, *(rows.min(axis=0) for rows in tables.joint_rows)]) * scale
+    if rounded:
+        upper, lower = np.rint(upper), np.rint(lower)
+    return np.maximum(upper, 0), np.minimum(lower, 0)
