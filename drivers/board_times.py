@@ -3,7 +3,7 @@
 from time import monotonic_ns
 
 from .board_clock import BoardClock
-from .scanner_messages import FromBoard, Hello, Ping, State
+from .scanner_messages import FromBoard, Hello, Lost, Ping, State
 
 # What comes in later than this had to wait somewhere, or the clocks lost each other: a PING tells, once a second.
 _LATE_US = 250_000
@@ -36,7 +36,7 @@ class BoardTimes:
 
     def stamp(self, message: FromBoard | None, came_us: int) -> int:
         """Return the time of what came in. What carries none is taken to be as late as the last that did."""
-        if message is not None and not isinstance(message, State):
+        if message is not None and not isinstance(message, State | Lost):
             answer = isinstance(message, Hello) and self.pings > 0 and message.token == self._token
             asked_us = self._asked_us if answer else None
             self.late_us = came_us - self._clock.host_us(message.time_us, came_us, asked_us)

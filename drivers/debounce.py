@@ -50,6 +50,14 @@ class Debouncer:
             self._lock(now, now + self.press_lockout_us, pressed)
         return self._closed
 
+    def forget(self, switches: Mask) -> None:
+        """Begin anew with these: they are open, and no time of theirs runs."""
+        self._closed &= ~switches
+        self._locks, self._openings = (
+            [(time, mask & ~switches) for time, mask in timers if mask & ~switches]
+            for timers in (self._locks, self._openings)
+        )
+
     def _advance(self, time_us: int) -> int:
         """Note the time, and how soon the next reading may come: after the shortest of the recent periods."""
         if self._time is None:

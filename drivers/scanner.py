@@ -11,9 +11,13 @@ from .errors import DeviceError
 from .scanner_frame import Counts, Frame
 from .scanner_link import Received, ScannerLink
 from .scanner_messages import (
+    DEGRADED,
+    EARLY,
+    NO_GRASP,
     Faults,
     FromBoard,
     GetState,
+    Grasp,
     Hello,
     SetDebounce,
     SetRate,
@@ -21,7 +25,7 @@ from .scanner_messages import (
     from_board,
 )
 from .scanner_payload import MessageError
-from .scanner_reading import ScannerCounts, ScannerReading
+from .scanner_reading import BoardGrasp, ScannerCounts, ScannerReading
 
 # Opening the port of an Arduino resets it, and its boot loader answers nobody for up to two seconds.
 _BOOT_S = 3.0
@@ -37,6 +41,7 @@ class Scanner:
 
     hello   what the board last said of itself
     faults  what it last said of its own troubles; None: nothing yet
+    grasp   what it last recognised by itself; None: nothing yet
     """
 
     def __init__(self, url: str, baud: int = 115200) -> None:
@@ -47,6 +52,7 @@ class Scanner:
     def _forget(self) -> None:
         self.hello: Hello | None = None
         self.faults: Faults | None = None
+        self.grasp: BoardGrasp | None = None
         self._received = Counts()
         self._keys = BoardKeys()
         self._times = BoardTimes()
@@ -81,6 +87,11 @@ class Scanner:
         seen = self._received
         received = seen.frames, seen.damaged, seen.short, seen.overlong
         return ScannerCounts(*received, self._keys.gaps, self._misfits, self._asked, self._times.pings)
+
+    @property
+    def late_us(self) -> int:
+        """How late the last message with a time of its own came in: what the last reading's time allows for."""
+        return self._times.late_us
 
     def read(self, timeout_s: float) -> ScannerReading | None:
         """Return the next reading, None if there was none in time. Raises DeviceError."""
@@ -167,10 +178,13 @@ class Scanner:
         if isinstance(message, Hello):
             self._same(message)
             if received is not None and received.sequence == 0 and not message.token:  # it has booted
+                keys.restarted()
                 for setting in self._told.values():
                     self._send(setting)
         elif isinstance(message, Faults):
             self.faults = message
+        elif isinstance(message, Grasp):
+            self.grasp = _recognised(message, time_us)
         elif message is not None:
             keys.heard(message)
             if keys.trusted:
@@ -185,7 +199,9 @@ class Scanner:
                 return from_board(received, self._keys.keys)
             except MessageError:
                 self._misfits += 1
-        self._keys.lost()
+                self._keys.misread()
+        else:
+            self._keys.damaged()
         return None
 
     def _same(self, hello: Hello) -> None:
@@ -200,3 +216,8 @@ class Scanner:
             self._ask_at = now + _ASK_AGAIN_S
             self._asked += 1
             self._send(GetState())
+
+
+def _recognised(message: Grasp, time_us: int) -> BoardGrasp:
+    number = None if message.grasp == NO_GRASP else message.grasp
+    return BoardGrasp(time_us, number, message.margin, bool(message.flags & DEGRADED), bool(message.flags & EARLY))

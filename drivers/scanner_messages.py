@@ -20,6 +20,13 @@ WITHOUT_DIODES = 0x01
 """Flag of HELLO: keys stand in a matrix without diodes, where three closed corners of a rectangle close the fourth."""
 
 
+NO_GRASP = 255
+"""What GRASP says where no grasp type was recognised."""
+
+DEGRADED, EARLY = 0x01, 0x02
+"""Flags of GRASP: an input was missing; the scan ended as soon as the rest of the switches could not matter."""
+
+
 @dataclass(frozen=True, slots=True)
 class Hello(Fixed):
     """What the board is, and how it works now: sent at boot, and in answer to PING, SET_RATE and SET_DEBOUNCE.
@@ -155,6 +162,44 @@ class Faults(Fixed):
 
 
 @dataclass(frozen=True, slots=True)
+class Grasp(Fixed):
+    """What a board that carries a build recognised.
+
+    time_us  when the frame was read
+    grasp    number of the grasp type in the build's order; NO_GRASP: none
+    margin   the best score less the second, in steps of the build's tables; 65535 stands for more, too
+    flags    DEGRADED, EARLY
+    """
+
+    KIND: ClassVar[int] = 0x06
+    LAYOUT: ClassVar[Struct] = Struct("<IBHB")
+
+    time_us: int
+    grasp: int
+    margin: int
+    flags: int
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """The keys that cannot be read now: sent when they change, and right before every HEARTBEAT while there are any."""
+
+    KIND: ClassVar[int] = 0x07
+
+    lost: int
+    keys: int
+
+    def payload(self) -> bytes:
+        """Return what the frame carries. Raises OverflowError where a key is lost that there is not."""
+        return to_bitmap(self.lost, self.keys)
+
+    @classmethod
+    def read(cls, payload: bytes, keys: int) -> Self:
+        """Return the message of a board of so many keys. Raises MessageError."""
+        return cls(from_bitmap(payload, keys), keys)
+
+
+@dataclass(frozen=True, slots=True)
 class SetRate(Fixed):
     """How often to scan and to send, as in Hello; the Hello that answers says what the board made of it."""
 
@@ -195,7 +240,7 @@ class Ping(Fixed):
     token: int
 
 
-FromBoard = Hello | State | Heartbeat | Event | Faults
+FromBoard = Hello | State | Heartbeat | Event | Faults | Grasp | Lost
 ToBoard = SetRate | SetDebounce | GetState | Ping
 _TO_BOARD: dict[int, type[ToBoard]] = {kind.KIND: kind for kind in (SetRate, SetDebounce, GetState, Ping)}
 
@@ -216,6 +261,10 @@ def from_board(received: Frame, keys: int) -> FromBoard:
             return Heartbeat.read(received.payload, keys)
         case Faults.KIND:
             return Faults.read(received.payload)
+        case Grasp.KIND:
+            return Grasp.read(received.payload)
+        case Lost.KIND:
+            return Lost.read(received.payload, keys)
         case Event.KIND:
             event = Event.read(received.payload)
             if event.key >= keys or event.edge > 1:

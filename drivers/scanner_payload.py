@@ -39,10 +39,10 @@ def to_bitmap(closed: int, keys: int) -> bytes:
 
 
 def from_bitmap(payload: bytes, keys: int) -> int:
-    """Return which of so many keys are closed. Raises MessageError at another length, or where others are closed."""
+    """Return which of so many keys are set. Raises MessageError at another length, or where others are set."""
     if len(payload) != (keys + 7) // 8:
         raise MessageError(f"a bitmap of {len(payload)} bytes from a board of {keys} keys")
-    closed = int.from_bytes(payload, "little")
-    if closed >> keys:
-        raise MessageError(f"a bitmap closes key {closed.bit_length() - 1} of a board of {keys} keys")
-    return closed
+    bits = int.from_bytes(payload, "little")
+    if bits >> keys:
+        raise MessageError(f"a bitmap holds key {bits.bit_length() - 1} of a board of {keys} keys")
+    return bits

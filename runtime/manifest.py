@@ -17,6 +17,7 @@ SCHEMA = 1
 MAX_BYTES = 16 << 20
 
 Inputs = Literal["both", "switches", "joints"]
+TableBits = Literal[8, 16]
 Count = Annotated[int, Meta(ge=0)]
 Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 _T = TypeVar("_T")
@@ -36,7 +37,9 @@ class Source(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
 
 
 class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Every option of `thenar compile`; a tolerance is left out where there is none."""
+    """Every option of `thenar compile`; left out are tolerance and max_bins where there is none, and table_bits
+    where it is 16.
+    """
 
     prune: Count
     rounds: Count
@@ -45,6 +48,8 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     folds: Count
     seed: int
     tolerance: float | None = None
+    table_bits: TableBits = 16
+    max_bins: Annotated[int, Meta(ge=2)] | None = None
 
 
 class Switch(Struct, frozen=True, forbid_unknown_fields=True):

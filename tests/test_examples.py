@@ -9,6 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from thenar.drivers.emulated.pty_line import PtyLine
+from thenar.drivers.emulated.scanner import EmulatedScanner
+from thenar.drivers.emulated.scanner_board import ScannerBoard
+from thenar.drivers.scanner_messages import DEGRADED, NO_GRASP
 from thenar.runtime import Build
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
@@ -120,6 +124,33 @@ def test_own_sink_says_what_is_missing_before_the_glove_is_there(bench: Path) ->
     assert (number, health) == ("0", "unknown")
     assert "thumb_rotation" in lost
     assert len(said) < 500
+
+
+class Recognising(ScannerBoard):
+    """A board that recognises grasp type `number` whenever it scans, degraded if it recognises none."""
+
+    number = 1
+
+    def scan(self, closed: int, now: int, *, unread: int = 0, whole: bool = True) -> list[bytes]:
+        flags = DEGRADED if self.number == NO_GRASP else 0
+        return [*super().scan(closed, now, unread=unread, whole=whole), *self.recognised(self.number, 7, flags, now)]
+
+
+@slow
+def test_board_grasps_names_what_a_board_recognises_by_itself(bench: Path) -> None:
+    grasps, board = Build.load(bench / "build").grasps, Recognising(1, 8)
+    command = example("board_grasps.py", "build", str(bench / "board"))
+    with (
+        PtyLine(bench / "board", 115200) as line,
+        EmulatedScanner(line, 8, board=board),
+        subprocess.Popen(command, cwd=bench, stdout=subprocess.PIPE, text=True) as process,
+    ):
+        assert process.stdout is not None
+        for number, said in ((1, f"{grasps[1]} ahead by 7 steps"), (NO_GRASP, "unknown ahead by 7 steps degraded")):
+            board.number = number
+            while (told := process.stdout.readline().rstrip("\n").partition(" ")[2]) != said:
+                assert told
+        process.terminate()
 
 
 @slow

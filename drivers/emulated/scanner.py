@@ -23,6 +23,7 @@ class EmulatedScanner:
         self.line = line
         self.board = board or ScannerBoard(1, switches)
         self._closed: Mask = 0
+        self._lost: Mask = 0
         self._closing = False
         self._heard: deque[bytes] = deque()
         self._booted_us = monotonic_ns() // 1000
@@ -45,6 +46,18 @@ class EmulatedScanner:
             self.board.touch(self._now())
             self._condition.notify()
 
+    def lose(self, lost: Mask) -> None:
+        """Read all keys but these from now on: they keep their state, and the board says so."""
+        with self._condition:
+            self._lost = lost
+            self.board.touch(self._now())
+            self._condition.notify()
+
+    def recognise(self, grasp: int, margin: int, flags: int = 0) -> None:
+        """Say that the board recognised grasp type number `grasp`, with the values of GRASP's fields."""
+        with self._condition:
+            self._send(self.board.recognised(grasp, margin, flags, self._now()))
+
     def reboot(self, board: ScannerBoard | None = None) -> None:
         """Start again as after a power cut, as `board` if given: numbers and clock from their beginnings."""
         with self._condition:
@@ -52,7 +65,6 @@ class EmulatedScanner:
             self.board = board or ScannerBoard(old.rows, old.columns, diodes=old.diodes, board=old.board)
             self._booted_us = monotonic_ns() // 1000
             self._send(self.board.boot(0))
-            self.board.touch(0)
             self._condition.notify()
 
     def close(self) -> None:
@@ -75,7 +87,7 @@ class EmulatedScanner:
                     self._send(self.board.receive(self._heard.popleft(), self._now()))
                 now, due = self._now(), self.board.next_us()
                 if due is not None and due <= now:
-                    self._send(self.board.scan(self._closed, now))
+                    self._send(self.board.scan(self._closed, now, unread=self._lost))
                 else:
                     self._condition.wait(None if due is None else (due - now) / 1e6)
 

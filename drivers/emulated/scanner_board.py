@@ -8,8 +8,10 @@ from ..scanner_messages import (
     Faults,
     FromBoard,
     GetState,
+    Grasp,
     Heartbeat,
     Hello,
+    Lost,
     Ping,
     SetDebounce,
     SetRate,
@@ -25,6 +27,7 @@ Mask = int
 
 _CLOCK = (1 << 32) - 1
 _FASTEST_US = 100
+_MOST_MARGIN = 0xFFFF
 _FAULTS_EVERY_US = 1_000_000
 
 
@@ -55,6 +58,8 @@ class ScannerBoard:
         self.debounce = SetDebounce(0, 0)
         self.overruns = self.refused = self.dropped = 0
         self._closed: Mask = 0
+        self._lost: Mask = 0
+        self._scanned = False
         self._sequence = 0
         self._decoder = scanner_frame.Decoder()
         self._state_at = self._heartbeat_at = self._faults_at = 0
@@ -62,8 +67,12 @@ class ScannerBoard:
         self._told = (0, 0, 0)
 
     def boot(self, now: int) -> list[bytes]:
-        """Return what it sends first: an end, so that nothing before it can matter, its HELLO, all keys."""
-        return [b"\0" + self._sent(self._hello(0, now)), self._heartbeat(now)]
+        """Return what it sends first: an end, so that nothing before it can matter, and its HELLO.
+
+        Of its keys it says nothing before it has scanned them all, at once.
+        """
+        self._scan_at = now
+        return [b"\0" + self._sent(self._hello(0, now))]
 
     def touch(self, now: int) -> None:
         """Note that keys changed: the next scan sees it."""
@@ -72,39 +81,43 @@ class ScannerBoard:
 
     def next_us(self) -> int | None:
         """Return when it will send again, or look at changed keys. None: not by itself."""
-        due = [self._state_at] * (self.rate.state_us > 0) + [self._heartbeat_at] * (self.rate.heartbeat_us > 0)
+        due = []
+        if self._scanned:
+            due += [self._state_at] * (self.rate.state_us > 0) + [self._heartbeat_at] * (self.rate.heartbeat_us > 0)
         due += [] if self._scan_at is None else [self._scan_at]
         due += [self._faults_at] * (self._told != self._faults())
         return min(due, default=None)
 
-    def scan(self, closed: Mask, now: int) -> list[bytes]:
-        """Read the keys and return the frames that are due."""
-        before, self._closed, self._scan_at = self._closed, self._read(closed), None
-        if self.rate.state_us:
-            sent = self._due_state(now)
-        else:
-            sent = [self._sent(event) for event in self._events(before ^ self._closed, now)]
-        if self.rate.heartbeat_us and now >= self._heartbeat_at:
-            sent.append(self._heartbeat(now))
+    def scan(self, closed: Mask, now: int, *, unread: Mask = 0, whole: bool = True) -> list[bytes]:
+        """Read the keys and return the frames that are due.
+
+        unread  keys that keep their state, since they were not read      whole  whether all were tried: those are lost
+        """
+        self._scan_at = None
+        sent = self._keys(closed, unread, whole, now) if self._scanned or whole else []
         if self._told != self._faults() and now >= self._faults_at:
             self._told, self._faults_at = self._faults(), now + _FAULTS_EVERY_US
             sent.append(self._sent(Faults(self._clock(now), *self._told, 0)))
         return sent
+
+    def recognised(self, grasp: int, margin: int, flags: int, now: int) -> list[bytes]:
+        """Return what it sends of a grasp; a margin beyond what the frame can say is the largest that it can."""
+        return [self._sent(Grasp(self._clock(now), grasp, min(margin, _MOST_MARGIN), flags))]
 
     def receive(self, data: bytes, now: int) -> list[bytes]:
         """Return the answers to the frames that `data` completes."""
         answers = []
         for received in self._decoder.feed(data):
             try:
-                answers.append(self._answer(to_board(received), now))
+                answers += self._answer(to_board(received), now)
             except MessageError:
                 self.refused += 1
         return answers
 
-    def _answer(self, message: ToBoard, now: int) -> bytes:
+    def _answer(self, message: ToBoard, now: int) -> list[bytes]:
         match message:
             case GetState():
-                return self._heartbeat(now)
+                return self._all_keys(now) if self._scanned else []  # the first scan answers
             case SetRate():
                 scan_us = max(message.scan_us, _FASTEST_US)
                 state_us, heartbeat_us = (
@@ -114,7 +127,26 @@ class ScannerBoard:
                 self._state_at = self._heartbeat_at = now
             case SetDebounce():
                 self.debounce = message
-        return self._sent(self._hello(message.token if isinstance(message, Ping) else 0, now))
+        return [self._sent(self._hello(message.token if isinstance(message, Ping) else 0, now))]
+
+    def _keys(self, closed: Mask, unread: Mask, whole: bool, now: int) -> list[bytes]:
+        """Take a scan and return what it sends of keys. The first one tells all of them, and has no changes."""
+        before, lost, first = self._closed, self._lost, not self._scanned
+        self._closed = before & unread | self._read(closed) & ~unread
+        self._lost = unread if whole else lost & unread
+        self._scanned = True
+        if self.rate.state_us:
+            sent = self._due_state(now)
+        else:
+            sent = [self._sent(event) for event in self._events(before ^ self._closed, now) if not first]
+        beats = first or bool(self.rate.heartbeat_us and now >= self._heartbeat_at)
+        return sent + self._all_keys(now, lost=self._lost != lost, beats=beats)
+
+    def _all_keys(self, now: int, *, lost: bool = False, beats: bool = True) -> list[bytes]:
+        """Return a LOST, if it is news or there are any before a HEARTBEAT; and the HEARTBEAT."""
+        tells = lost or (beats and self._lost != 0)
+        sent = [self._sent(Lost(self._lost, self.rows * self.columns))] if tells else []
+        return [*sent, self._heartbeat(now)] if beats else sent
 
     def _due_state(self, now: int) -> list[bytes]:
         if now < self._state_at:

@@ -9,6 +9,7 @@ import msgspec
 
 from ...drivers.errors import ThenarError
 from ...drivers.i2c.scan import Scan
+from ...drivers.scanner_reading import BoardGrasp
 from ..harness.wiring import GloveWiring, Harness, ScannerWiring
 from ..scanning.scanmap import ScanMap
 from ..scanning.timing import ChipTime, glove_us, scan_us
@@ -73,13 +74,21 @@ def _scanner(wiring: ScannerWiring, harness: Harness) -> Finding:
         device.close()
         device.open()
         measured = _gap(lambda: device.read(_LISTEN_S))
-        remarks = _counted(device)
+        remarks = (*_recognising(device.driver.grasp), *_counted(device))
     except ThenarError as wrong:
         return Finding(device.name, "", False, float(device.period_us), None, (str(wrong),))
     finally:
         device.close()
     board = f"board {hello.board}, firmware {hello.major}.{hello.minor}.{hello.patch}, {hello.keys} keys"
     return _told(Finding(device.name, board, True, float(device.period_us), measured, remarks))
+
+
+def _recognising(grasp: BoardGrasp | None) -> tuple[str, ...]:
+    """Return a remark if the board recognises by itself."""
+    if grasp is None:
+        return ()
+    what = "no grasp type" if grasp.number is None else f"grasp type {grasp.number} of the build that it carries"
+    return (f"it recognises by itself, at last {what}, counted from 0",)
 
 
 def _bus(harness: Harness, number: int, scan: ScanMap) -> tuple[Finding, ...]:

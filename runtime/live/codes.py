@@ -41,7 +41,7 @@ class CodeTables:
         self._sensors = len(sensor_names)
         places = [_place(joint.name, sensor_names) for joint in joints]
         self._pick = itemgetter(*places, *places[:1]) if places else _nothing
-        self._tables = [_table(joint, calibration) for joint in joints]
+        self._tables = [codes_of_bytes(joint, calibration) for joint in joints]
         self._last: bytes | None = None
         self._last_codes: list[int] = []
 
@@ -70,7 +70,8 @@ def _place(joint: str, sensor_names: Sequence[str]) -> int:
     )
 
 
-def _table(joint: Calibration, calibration: GloveCalibration | None) -> tuple[int, ...]:
+def codes_of_bytes(joint: Calibration, calibration: GloveCalibration | None) -> tuple[int, ...]:
+    """Return the code of each byte, 0 to 255, of the sensor of `joint`. Raises SettingError where there is none."""
     if calibration is None:
         return _raw(joint)
     if calibration.unit != joint.unit:

@@ -11,6 +11,7 @@ from ...drivers.scanner import Scanner
 from ..harness.wiring import Debounce, GloveWiring, ScannerWiring
 from .frames import GloveFrame, SwitchFrame
 from .health import Count
+from .pauses import Pauses
 from .rewiring import Rewired
 
 # A device is expected back at least so often, however fast it is: less would take a busy computer, or the 16 ms for
@@ -77,13 +78,13 @@ class ScannerDevice:
         self._switches = Rewired((key, number[name]) for key, name in enumerate(wiring.switches) if name in number)
         self.owned = self._switches.targets
         self.period_us = STATE_US
-        self._debounce, self._debouncer = debounce, debouncer_of(debounce)
+        self._debounce, self._debouncer, self._pauses = debounce, debouncer_of(debounce), Pauses(pause_us(debounce))
 
     def open(self) -> None:
         """Open the board, and see to it that it is not silent for long while all is well."""
         hello = self.driver.open()
         # What was closed before the board was away is no reason to believe it closed now.
-        self._debouncer = debouncer_of(self._debounce)
+        self._debouncer, self._pauses = debouncer_of(self._debounce), Pauses(pause_us(self._debounce))
         fast = 0 < hello.period_us <= STATE_US
         self.period_us = hello.period_us if fast else STATE_US
         if not fast:
@@ -96,6 +97,7 @@ class ScannerDevice:
             return None
         closed, known = self._switches(reading.closed), self._switches(reading.known)
         if self._debouncer is not None:
+            self._debouncer.forget(self._pauses.over(reading.time_us, known))
             closed = self._debouncer.update(reading.time_us, closed, known) & known
         return SwitchFrame(reading.time_us, closed, self.owned & ~known)
 
@@ -122,6 +124,14 @@ def debouncer_of(debounce: Debounce) -> Debouncer | None:
     if not debounce.enabled:
         return None
     return Debouncer(round(debounce.press_lockout_ms * 1000), round(debounce.release_ms * 1000))
+
+
+def pause_us(debounce: Debounce) -> int:
+    """Return for how long a switch must not have been read for nothing of it to bounce any more.
+
+    What was closed before such a pause may have opened: it is no reason to believe it closed.
+    """
+    return round(2000 * max(debounce.press_lockout_ms, debounce.release_ms))
 
 
 def glove_period_us(wiring: GloveWiring) -> int:

@@ -9,7 +9,7 @@ from ..harness.wiring import Debounce, Harness
 from ..scanning.earlyexit import EarlyExit
 from ..scanning.scanmap import Port, ScanMap
 from ..scanning.timing import reading_of, scan_us
-from .devices import SHORTEST_US, debouncer_of
+from .devices import SHORTEST_US, debouncer_of, pause_us
 from .frames import GloveFrame, Mask, SwitchFrame, now_us
 from .health import Count
 from .joiner import LiveRecognizer
@@ -27,8 +27,7 @@ class _PortSwitches:
         self._inverted = 0 if port.closed_high else sum(1 << bit for bit, _ in port.switches)
         self.switches = Rewired(port.switches)
         self._debounce, self._debouncer = debounce, debouncer_of(debounce)
-        # After such a pause nothing bounces any more that did before it, and what was closed then may have opened.
-        self._pause_us = 2000 * max(debounce.press_lockout_ms, debounce.release_ms)
+        self._pause_us = pause_us(debounce)
         self._read_us = 0
 
     def closed(self, answer: int, time_us: int) -> Mask:

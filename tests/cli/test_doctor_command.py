@@ -10,6 +10,8 @@ from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.cyberglove_sensors import SENSORS_18
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.pty_line import PtyLine
+from thenar.drivers.emulated.scanner import EmulatedScanner
+from thenar.drivers.emulated.scanner_board import ScannerBoard
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
 
@@ -78,3 +80,22 @@ def test_a_harness_without_devices_is_refused(thenar: Thenar, tmp_path: Path) ->
     done = thenar("doctor", tmp_path / "glove.toml")
     assert done.returncode == 2
     assert "glove.toml names no device" in done.stderr
+
+
+class Recognising(ScannerBoard):
+    """A board that recognises grasp type 2 whenever it scans."""
+
+    def scan(self, closed: int, now: int, *, unread: int = 0, whole: bool = True) -> list[bytes]:
+        return [*super().scan(closed, now, unread=unread, whole=whole), *self.recognised(2, 100, 0, now)]
+
+
+@pytest.mark.parametrize(("board", "remark"), [(Recognising(1, 2), True), (ScannerBoard(1, 2), False)])
+def test_of_a_board_that_recognises_by_itself_it_says_so(
+    thenar: Thenar, tmp_path: Path, board: ScannerBoard, remark: bool
+) -> None:
+    (tmp_path / "glove.toml").write_text(f'[[scanner]]\nport = "{tmp_path}/port"\nswitches = ["s0", "s1"]\n')
+    with PtyLine(tmp_path / "port", 115200) as line, EmulatedScanner(line, 2, board=board):
+        done = thenar("doctor", tmp_path / "glove.toml")
+    assert done.returncode == 0, done.stderr
+    said = "it recognises by itself, at last grasp type 2 of the build that it carries, counted from 0"
+    assert (said in " ".join(done.stdout.split())) is remark

@@ -177,6 +177,23 @@ def test_a_switch_that_is_not_read_for_a_while_keeps_its_state_and_its_opening_g
     assert debouncer.update(60_000, 0, 1) == 0
 
 
+@given(READINGS, READINGS, MANY)
+def test_switches_that_are_forgotten_begin_anew_and_the_others_do_not_notice(
+    before: list[tuple[int, int, int]], after: list[tuple[int, int, int]], forgotten: int
+) -> None:
+    debouncer, others, anew, now = Debouncer(), Debouncer(), Debouncer(), 0
+    for passed, closed, known in before:
+        now += passed
+        debouncer.update(now, closed, known)
+        others.update(now, closed, known)
+        anew.update(now, 0, 0)
+    debouncer.forget(forgotten)
+    for passed, closed, known in after:
+        now += passed
+        expected = others.update(now, closed, known) & ~forgotten | anew.update(now, closed, known) & forgotten
+        assert debouncer.update(now, closed, known) == expected
+
+
 def test_time_that_goes_back_stands_still() -> None:
     debouncer = Debouncer()
     for time in range(0, 20_000, 1000):

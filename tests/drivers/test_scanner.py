@@ -23,7 +23,6 @@ KEYS = 160
 EVERY = (1 << KEYS) - 1
 BAUD = 1_000_000
 LONG_S = 5.0
-BUSY_US = 200_000
 
 
 @pytest.fixture
@@ -87,8 +86,9 @@ def test_every_set_of_keys_comes_through_whole_and_in_order(
             board.set(closed)
             reading = until(scanner, lambda reading, closed=closed: reading.closed == closed)  # type: ignore[misc]
             assert reading.known == EVERY
-            # A bitmap carries no time: it counts as late as the frame before it, which on a busy machine is early.
-            assert began - BUSY_US <= reading.time_us <= now_us()
+            # An event has a time of its own. A bitmap has none: it counts as late as the last message that has one.
+            assert began <= reading.time_us + (scanner.late_us if state_us else 0)
+            assert reading.time_us <= now_us()
         assert scanner.counts.gaps == 0
 
 
@@ -120,6 +120,7 @@ def test_a_lost_event_is_known_to_be_lost_and_asked_for(line: PtyLine, start: Ca
     board = start(heartbeat_us=0)
     with driver(line) as scanner:
         until(scanner, lambda reading: reading.known == EVERY)
+        asked = scanner.counts.asked
         line.damage = lambda _: b""
         board.set(0b1)
         board.set(0b11)
@@ -134,7 +135,7 @@ def test_a_lost_event_is_known_to_be_lost_and_asked_for(line: PtyLine, start: Ca
         healed = until(scanner, lambda reading: reading.known == EVERY)
         assert healed.closed == 0b1111
         assert scanner.counts.gaps >= 1
-        assert scanner.counts.asked >= 2
+        assert scanner.counts.asked > asked
 
 
 def test_a_damaged_frame_is_not_trusted_away_before_the_next_one_comes(
@@ -197,6 +198,63 @@ def test_a_board_that_restarts_is_followed(line: PtyLine, start: Callable[..., E
         board.set(0b111)
         reading = until(scanner, lambda reading: reading.closed == 0b111)
         assert now_us() - 2_000_000 < reading.time_us <= now_us()
+
+
+@pytest.mark.parametrize("settings", [{"heartbeat_us": 10_000}, {"state_us": 2000}, {"heartbeat_us": 0}])
+def test_a_board_that_restarts_is_not_believed_before_it_has_scanned(
+    line: PtyLine, start: Callable[..., EmulatedScanner], settings: dict[str, int]
+) -> None:
+    board = start(**settings)
+    board.set(0b101)
+    with driver(line) as scanner:
+        for _ in range(5):
+            board.reboot()
+            gaps = scanner.counts.gaps
+            end = monotonic() + LONG_S
+            while scanner.counts.gaps == gaps:
+                assert monotonic() < end
+                scanner.read(0.01)
+            reading = until(scanner, lambda reading: reading.known != 0)
+            assert (reading.closed, reading.known) == (0b101, EVERY)
+
+
+@pytest.mark.parametrize("settings", [{"heartbeat_us": 10_000}, {"state_us": 2000}, {"heartbeat_us": 0}])
+def test_keys_that_the_board_cannot_read_are_not_known_until_it_can(
+    line: PtyLine, start: Callable[..., EmulatedScanner], settings: dict[str, int]
+) -> None:
+    board = start(**settings)
+    with driver(line) as scanner:
+        board.set(0b1011)
+        until(scanner, lambda reading: reading.closed == 0b1011)
+        board.lose(0b110)
+        board.set(0b1100)
+        reading = until(scanner, lambda reading: reading.closed == 0b1000)
+        assert reading.known == EVERY & ~0b110
+        board.reboot()
+        reading = until(scanner, lambda reading: reading.known == EVERY & ~0b110)
+        assert reading.closed == 0b1000
+        board.lose(0)
+        reading = until(scanner, lambda reading: reading.known == EVERY)
+        assert reading.closed == 0b1100
+
+
+@pytest.mark.parametrize("settings", [{"heartbeat_us": 3000}, {"state_us": 2000, "heartbeat_us": 20_000}])
+def test_through_a_bad_cable_keys_that_cannot_be_read_are_never_known(
+    line: PtyLine, start: Callable[..., EmulatedScanner], settings: dict[str, int]
+) -> None:
+    """One message in three is swallowed. A change is over once it was told; before that the keys are in between."""
+    board, random = start(**settings), np.random.default_rng(7)
+    line.damage = lambda message: b"" if random.integers(3) == 0 else message
+    with driver(line) as scanner:
+        for number in range(20):
+            lost = EVERY & ~(0b111 << number)
+            board.lose(lost)
+            until(scanner, lambda reading, lost=lost: reading.known == EVERY & ~lost)  # type: ignore[misc]
+            for _ in range(10):
+                if (reading := scanner.read(0.01)) is not None:
+                    assert reading.known in (0, EVERY & ~lost)
+            board.lose(0)
+            until(scanner, lambda reading: reading.known == EVERY)
 
 
 def test_another_board_in_its_place_is_an_error(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:

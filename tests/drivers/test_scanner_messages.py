@@ -10,14 +10,17 @@ from hypothesis import strategies as st
 from thenar.drivers import scanner_frame
 from thenar.drivers.scanner_frame import Frame
 from thenar.drivers.scanner_messages import (
+    DEGRADED,
     MOST_KEYS,
     PROTOCOL,
     Event,
     Faults,
     FromBoard,
     GetState,
+    Grasp,
     Heartbeat,
     Hello,
+    Lost,
     Ping,
     SetDebounce,
     SetRate,
@@ -56,6 +59,8 @@ FROM_BOARD: st.SearchStrategy[FromBoard] = st.one_of(
     st.builds(Heartbeat, U32, CLOSED, st.just(KEYS)),
     st.builds(Event, U32, st.integers(0, KEYS - 1), st.integers(0, 1)),
     st.builds(Faults, U32, U32, U32, U32, U32),
+    st.builds(Grasp, U32, U8, U16, U8),
+    st.builds(Lost, CLOSED, st.just(KEYS)),
 )
 TO_BOARD: st.SearchStrategy[ToBoard] = st.one_of(
     st.builds(SetRate, U32, U32, U32), st.builds(SetDebounce, U16, U16), st.just(GetState()), st.builds(Ping, U16)
@@ -72,6 +77,8 @@ DRAWN: list[tuple[FromBoard | ToBoard, int, str]] = [
     (Event(0x01020304, 0x0027, 1), 0x03, "04030201 2700 01"),
     (Heartbeat(0x01020304, 1 << 8, 40), 0x04, "04030201 00 01 00 00 00"),
     (Faults(0x01020304, 1, 2, 3, 4), 0x05, "04030201 01000000 02000000 03000000 04000000"),
+    (Grasp(0x01020304, 5, 0x0123, 0x03), 0x06, "04030201 05 2301 03"),
+    (Lost(1 << 8 | 1 << 39, 40), 0x07, "00 01 00 00 80"),
     (SetRate(1000, 2000, 50_000), 0x11, "e8030000 d0070000 50c30000"),
     (SetDebounce(5000, 10_000), 0x12, "8813 1027"),
     (GetState(), 0x13, ""),
@@ -130,8 +137,8 @@ def test_an_event_of_no_key_or_no_edge_is_refused(key: int, edge: int) -> None:
 
 
 @pytest.mark.parametrize(("keys", "payload"), list(product([3, 7], [b"\x80", b"\xff"])))
-def test_a_bitmap_that_closes_a_key_beyond_the_last_is_refused(keys: int, payload: bytes) -> None:
-    with pytest.raises(MessageError, match="closes key 7"):
+def test_a_bitmap_that_holds_a_key_beyond_the_last_is_refused(keys: int, payload: bytes) -> None:
+    with pytest.raises(MessageError, match="holds key 7"):
         from_board(Frame(State.KIND, 0, payload), keys)
 
 
@@ -177,6 +184,8 @@ def test_the_frames_in_the_documentation_are_sound_ones() -> None:
         State(1 << 0 | 1 << 9 | 1 << 39, 40),
         Event(0x01020304, 39, 1),
         Heartbeat(0x01020304, 1 << 8, 40),
+        Grasp(0x01020304, 5, 291, DEGRADED),
+        Lost(1 << 8 | 1 << 39, 40),
         GetState(),
         Ping(0x1234),
     ]

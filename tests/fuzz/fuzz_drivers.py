@@ -79,8 +79,11 @@ def heard(received: list[scanner_frame.Frame], keys: BoardKeys) -> None:
         keys.numbered(frame.sequence)
         with contextlib.suppress(ThenarError):
             scanner_messages.to_board(frame)
-        with contextlib.suppress(ThenarError):
+        try:
             message = scanner_messages.from_board(frame, keys.keys)
+        except ThenarError:
+            keys.misread()
+        else:
             assert scanner_messages.frame(message, frame.sequence) == frame
             assert times.stamp(message, number) <= number
             if not isinstance(message, scanner_messages.Hello | scanner_messages.Faults):

@@ -10,8 +10,10 @@ from thenar.drivers.scanner_messages import (
     Faults,
     FromBoard,
     GetState,
+    Grasp,
     Heartbeat,
     Hello,
+    Lost,
     Ping,
     SetDebounce,
     SetRate,
@@ -39,18 +41,43 @@ def run(board: ScannerBoard, until: int) -> list[bytes]:
     return sent
 
 
-def test_it_begins_with_an_end_a_hello_and_all_keys() -> None:
-    sent = ScannerBoard(2, 4, diodes=False, board=77).boot(5)
+def scanned(board: ScannerBoard) -> ScannerBoard:
+    """Return it as it is once it has booted and scanned."""
+    board.boot(0)
+    board.scan(0, 0)
+    return board
+
+
+def test_it_begins_with_an_end_and_a_hello_and_tells_all_keys_once_it_has_scanned_them() -> None:
+    board = ScannerBoard(2, 4, diodes=False, board=77, heartbeat_us=0)
+    sent = board.boot(5)
     assert sent[0].startswith(b"\0")
-    hello, heartbeat = said(sent)
+    (hello,) = said(sent)
     assert isinstance(hello, Hello)
     assert (hello.rows, hello.columns, hello.flags, hello.board, hello.time_us) == (2, 4, WITHOUT_DIODES, 77, 5)
-    assert heartbeat == Heartbeat(5, 0, 8)
+    assert board.next_us() == 5
+    assert board.receive(scanner_frame.encode(frame(GetState(), 0)), 6) == []
+    assert board.scan(0, 6, unread=0b1, whole=False) == []
+    assert said(board.scan(0b101, 7)) == [Heartbeat(7, 0b101, 8)]
+    assert board.next_us() is None
+    assert asked(board, GetState(), 8) == Heartbeat(8, 0b101, 8)
+
+
+def test_keys_that_cannot_be_read_keep_their_state_and_are_told_when_they_change_and_before_heartbeats() -> None:
+    board = scanned(ScannerBoard(1, 8))
+    board.scan(0b110, 1000)
+    assert said(board.scan(0, 2000, unread=0b1010)) == [Event(2000, 2, 0), Lost(0b1010, 8)]
+    assert said(board.scan(0, 3000, unread=0b1010)) == []
+    assert said(board.scan(0, 50_000, unread=0b1010)) == [Lost(0b1010, 8), Heartbeat(50_000, 0b10, 8)]
+    get_state = scanner_frame.encode(frame(GetState(), 0))
+    assert said(board.receive(get_state, 50_001)) == [Lost(0b1010, 8), Heartbeat(50_001, 0b10, 8)]
+    assert said(board.scan(0b10, 51_000, unread=0b1111_1000, whole=False)) == [Lost(0b1000, 8)]
+    assert said(board.scan(0, 52_000)) == [Event(52_000, 1, 0), Lost(0, 8)]
+    assert said(board.scan(0, 100_000)) == [Heartbeat(100_000, 0, 8)]
 
 
 def test_a_change_is_seen_at_the_next_scan_and_every_key_has_its_event() -> None:
-    board = ScannerBoard(1, 8, heartbeat_us=0)
-    board.boot(0)
+    board = scanned(ScannerBoard(1, 8, heartbeat_us=0))
     assert board.next_us() is None
     board.touch(2500)
     assert board.next_us() == 3000
@@ -66,8 +93,10 @@ def test_heartbeats_and_states_keep_their_schedule(period_us: int) -> None:
         ScannerBoard(1, 8, state_us=period_us, heartbeat_us=0),
     )
     assert len(said(beating.boot(0) + run(beating, 100 * period_us))) == 1 + 100
-    states = said(run(streaming, 100 * period_us))
-    assert states == [State(0, 8)] * 100
+    streaming.boot(0)
+    first, heartbeat, *states = said(run(streaming, 100 * period_us))
+    assert heartbeat == Heartbeat(0, 0, 8)
+    assert [first, *states] == [State(0, 8)] * 100
     late = streaming.scan(0, 100 * period_us + period_us // 2)
     assert len(late) == 1
     assert streaming.next_us() == 101 * period_us
@@ -96,7 +125,7 @@ def test_commands_are_answered_by_what_holds_from_then_on() -> None:
 
 
 def test_what_it_cannot_understand_is_counted_and_told_once_a_second() -> None:
-    board = ScannerBoard(1, 8, heartbeat_us=0)
+    board = scanned(ScannerBoard(1, 8, heartbeat_us=0))
     damaged = b"\x05nonsense\0"
     unknown = scanner_frame.encode(scanner_frame.Frame(0x77, 0, b""))
     assert board.receive(damaged + unknown, 0) == []
@@ -109,8 +138,13 @@ def test_what_it_cannot_understand_is_counted_and_told_once_a_second() -> None:
     assert said(board.scan(0, 1_000_010)) == [Faults(1_000_010, 0, 3, 0, 0)]
 
 
+def test_what_it_recognises_is_sent_with_the_time_and_no_margin_is_too_large() -> None:
+    board = ScannerBoard(1, 8, clock_us=0xFFFFFFFF)
+    assert said(board.recognised(3, 70_000, 2, 5)) == [Grasp(4, 3, 0xFFFF, 2)]
+
+
 def test_its_clock_wraps() -> None:
-    board = ScannerBoard(1, 8, clock_us=2**32 - 10)
+    board = scanned(ScannerBoard(1, 8, clock_us=2**32 - 10))
     assert asked(board, GetState(), 30) == Heartbeat(20, 0, 8)
 
 
