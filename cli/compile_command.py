@@ -11,10 +11,11 @@ from .scan_tables import print_scan
 
 if TYPE_CHECKING:
     from ..compiler.build.compile import BuildReport
-    from ..runtime.manifest import Inputs, Manifest
+    from ..runtime.manifest import Inputs, Manifest, TableBits
 
 _CHIP = "mcp23017"
 _BOARD = "board"
+_TABLE_BITS: "dict[str, TableBits]" = {"16": 16, "8": 8}
 
 
 @click.command("compile")
@@ -35,6 +36,16 @@ _BOARD = "board"
 @click.option("--tolerance", type=float, help="Stop after a round that changes the mean loss by less than this.")
 @click.option("--folds", type=int, default=4, show_default=True, help="Folds of the rate in build.json; 0 for none.")
 @click.option("--seed", type=int, default=1, show_default=True, help="Seed of the folds.")
+@click.option(
+    "--table-bits",
+    type=click.Choice(list(_TABLE_BITS)),
+    default="16",
+    show_default=True,
+    help="8: coarser steps, so that firmware can store a byte an entry.",
+)
+@click.option(
+    "--max-bins", type=click.IntRange(2), help="At most so many bins a joint: smaller tables.  [default: no limit]"
+)
 @click.option("--glove", type=existing_file, help="A glove.toml: add the scan map of its wiring to the build.")
 @click.option("--propose", type=output_file, help="Write a glove.toml for the kept switches: on the fewest ports.")
 @click.option(
@@ -54,6 +65,8 @@ def command(
     tolerance: float | None,
     folds: int,
     seed: int,
+    table_bits: str,
+    max_bins: int | None,
     glove: Path | None,
     propose: Path | None,
     chip: str | None,
@@ -62,8 +75,8 @@ def command(
 ) -> None:
     """Choose the switches, train, and write integer tables with their proof.
 
-    The folder holds build.json, tables.bin and ensemble.bin, and with --glove scan.json. The same recordings, options
-    and wiring give the same bytes.
+    The folder holds build.json, tables.bin and ensemble.bin, the classifier in C in firmware/, and with --glove
+    scan.json. The same recordings, options and wiring give the same bytes.
 
     \b
     Example:
@@ -89,6 +102,8 @@ def command(
             tolerance=tolerance,
             folds=folds,
             seed=seed,
+            table_bits=_TABLE_BITS[table_bits],
+            max_bins=max_bins,
             harness=harness,
             progress=report,
         )
@@ -164,3 +179,4 @@ def _print(made: "BuildReport", folder: Path) -> None:
         f"integers: {proof.scale:.1f} steps a unit, no sum beyond {proof.bound} of 32767, no score off by more than "
         f"{proof.error:g} steps; {proof.covered} of {manifest.source.rows} rows are safe, {proof.changed} change class"
     )
+    console.print(made.firmware, soft_wrap=True)

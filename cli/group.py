@@ -13,8 +13,8 @@ import click
 from ..drivers.errors import ThenarError
 
 COMMANDS = (
-    *("simulate", "plan", "import", "export", "info", "place", "draw", "evaluate", "compile", "verify", "run"),
-    *("calibrate", "record", "emulate", "doctor", "stability"),
+    *("simulate", "plan", "import", "export", "info", "place", "draw", "evaluate", "compile", "verify"),
+    *("firmware", "run", "calibrate", "record", "emulate", "doctor", "stability"),
 )
 
 # Packages that another extra than `compiler` brings.
@@ -46,6 +46,7 @@ def thenar() -> None:
         thenar compile set.grasps -o build/
         thenar verify build/ set.grasps
         thenar run build/ --replay set.grasps
+        thenar firmware build/ --target avr328p -o firmware/
     """
 
 

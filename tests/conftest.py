@@ -61,6 +61,22 @@ def c_compiler() -> str:
     return need_tool("cc")
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add `pytest --update-golden`: golden files are written as they come out today, to be read before a commit."""
+    parser.addoption("--update-golden", action="store_true", help="write the files of tests/golden anew")
+
+
+@pytest.fixture(scope="session")
+def update_golden(request: pytest.FixtureRequest) -> bool:
+    return bool(request.config.getoption("--update-golden"))
+
+
+@pytest.fixture(scope="session")
+def tool() -> Callable[[str], str]:
+    """Return a function that finds an installed program by its name, or skips (fails under THENAR_REQUIRE_ALL=1)."""
+    return need_tool
+
+
 @pytest.fixture(scope="session")
 def weka_data() -> Path:
     return need(SHARED_DATA / "weka")

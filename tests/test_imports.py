@@ -33,6 +33,15 @@ ALLOWED = {
     ),
     "compiler.boosting": ("runtime", "drivers.errors", "compiler.boosting", "compiler.elementary"),
     "compiler.tables": ("runtime", "drivers.errors", "compiler.boosting", "compiler.elementary", "compiler.tables"),
+    "compiler.firmware": (
+        "runtime",
+        "drivers",
+        "compiler.boosting",
+        "compiler.elementary",
+        "compiler.firmware",
+        "compiler.tables",
+        "firmware_templates",
+    ),
     "compiler.evaluation": (
         "runtime",
         "drivers.errors",

@@ -101,6 +101,22 @@ def test_the_wheel_holds_every_module_and_no_other(board: Path) -> None:
 
 
 @pytest.mark.slow
+def test_the_wheel_holds_what_the_modules_read_beside_them_such_as_every_template(board: Path) -> None:
+    listed = on_board(
+        board,
+        "import thenar.runtime, pathlib; r = pathlib.Path(thenar.runtime.__file__).parents[1]; "
+        "print(*sorted(p.relative_to(r).as_posix() for p in r.rglob('*') if p.is_file() and p.suffix[:3] != '.py'))",
+    )
+    expected = []
+    for name, folder in FOLDERS.items():
+        short = name.removeprefix("thenar.")
+        beside = (p for p in (ROOT / folder).rglob("*") if p.is_file() and p.suffix not in (".py", ".pyc"))
+        expected += [f"{short}/{p.relative_to(ROOT / folder).as_posix()}" for p in beside]
+    assert listed.split() == sorted(expected)
+    assert any(path.startswith("firmware_templates/") and path.endswith(".j2") for path in expected)
+
+
+@pytest.mark.slow
 def test_a_board_has_none_of_the_workstations_packages_and_imports_the_runtime(board: Path) -> None:
     for name in ("sklearn", "scipy", "joblib", "matplotlib", "jinja2"):
         refusal = f"import importlib.util; assert importlib.util.find_spec('{name}') is None"

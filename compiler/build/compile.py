@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from ...runtime.manifest import (
     Recognised,
     Source,
     Switch,
+    TableBits,
     manifest_from_bytes,
     manifest_to_bytes,
 )
@@ -31,7 +33,9 @@ from ..recordings.graspset import GraspSet
 from ..tables.collapse import collapse
 from ..tables.compare import Comparison, compare
 from ..tables.quantise import quantise
+from .carried import made_firmware
 from .ensemble import ensemble_to_bytes
+from .errors import CompileError
 from .recognition import cross_validated
 from .staging import check_target, publish
 from .training import Material, Trained, material_of, train
@@ -43,13 +47,14 @@ WIDTH = 16
 class BuildReport:
     """Where the build is, what its `build.json` says of it, how to read the harness it was compiled for, if it was for
     one, and the one grasp type that it gives all rows, if it does: then the inputs tell nothing that stumps, which add
-    up, can tell.
+    up, can tell. `firmware` is a sentence: what its firmware is laid out for, or why there is none.
     """
 
     folder: Path
     manifest: Manifest
     tables_bytes: int
     only_answer: str | None
+    firmware: str
     scan: ScanMap | None = None
 
 
@@ -64,6 +69,8 @@ def compile_build(
     tolerance: float | None = None,
     folds: int = 4,
     seed: int = 1,
+    table_bits: TableBits = 16,
+    max_bins: int | None = None,
     harness: Harness | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> BuildReport:
@@ -71,20 +78,24 @@ def compile_build(
 
     prune is the paper's S, inputs which of switches and joints to use; a round that changes the mean loss by less than
     tolerance is the last; folds and seed cut the cross-validation whose rate goes into the build (0 folds: none).
+    With table_bits 8, steps are coarse enough for firmware with 8-bit entries (quantise); with max_bins, no joint has
+    more bins than that, so that tables stay small.
     With a harness, the build says how to read its switches there. progress(done, total) is called as work is done. The
     same recordings, options and harness give the same bytes. Raises CompileError, HarnessError if the harness lacks a
     kept switch, or what placement and boosting raise of their options.
     """
+    if table_bits not in get_args(TableBits):
+        raise CompileError(f"tables of {table_bits} bits: firmware has entries of 8 or 16")
     target = check_target(Path(folder))
     least = None if tolerance is None else float(tolerance)
-    options = Options(prune, rounds, inputs, float(shrinkage), folds, seed, least)
+    options = Options(prune, rounds, inputs, float(shrinkage), folds, seed, least, table_bits, max_bins)
     material = material_of(grasp_set, options)
     if folds:
         check_cut(len(grasp_set), folds, "rows")
     steps = _Steps(progress, rounds, folds)
     trained = train(material, options, steps.round_done)
     bits = trained.kept(material)
-    integers = quantise(collapse(trained.stumps, len(trained.columns)), bits, material.codes, WIDTH)
+    integers = quantise(collapse(trained.stumps, len(trained.columns)), bits, material.codes, WIDTH, table_bits)
     switches = _switches(grasp_set, trained)
     names = [switch.name for switch in switches]
     scan = None if harness is None else plan_scan(names, integers, harness, bits, material.codes)
@@ -114,10 +125,12 @@ def compile_build(
         scan_sha256=digests.get(SCAN_NAME),
     )
     described = manifest_to_bytes(manifest)
-    publish({**files, MANIFEST_NAME: described}, target)
+    made_manifest = manifest_from_bytes(described)
+    firmware, note = made_firmware(made_manifest, integers)
+    publish({**files, **{path: text.encode() for path, text in firmware.items()}, MANIFEST_NAME: described}, target)
     answers = np.unique(comparison.deployed)
     only_answer = material.grasps[answers[0]] if len(answers) == 1 else None
-    return BuildReport(target, manifest_from_bytes(described), len(files[TABLES_NAME]), only_answer, scan)
+    return BuildReport(target, made_manifest, len(files[TABLES_NAME]), only_answer, note, scan)
 
 
 class _Steps:

@@ -8,10 +8,12 @@ from pathlib import Path
 
 from ...runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME
 from ...runtime.files import sync_folder, write_atomically
+from ..firmware.library_names import FIRMWARE_NAME, LIBRARY_FILES
 from .errors import CompileError
 
-# The last one is only there in a build that was compiled for a harness.
+# A build that was compiled for no harness has no scan map, one that is too large for any microcontroller no firmware.
 MEMBERS = frozenset({MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME, SCAN_NAME})
+_FIRMWARE_MEMBERS = frozenset(LIBRARY_FILES)
 
 
 def check_target(folder: Path) -> Path:
@@ -34,13 +36,23 @@ def check_target(folder: Path) -> Path:
 
 
 def _refuse_foreign(folder: Path) -> None:
-    for path in sorted(folder.iterdir()) if folder.exists() else ():
-        if path.name not in MEMBERS or not path.is_file():
-            raise CompileError(f"{folder} holds {path.name}, which is not of a build: move it, or name another folder")
+    firmware = folder / FIRMWARE_NAME
+    kept_apart = firmware.is_dir() and not firmware.is_symlink()
+    foreign = _foreign(folder, MEMBERS, firmware if kept_apart else None)
+    foreign += _foreign(firmware, _FIRMWARE_MEMBERS) if kept_apart else []
+    if foreign:
+        name = foreign[0].relative_to(folder)
+        raise CompileError(f"{folder} holds {name}, which is not of a build: move it, or name another folder")
+
+
+def _foreign(folder: Path, members: frozenset[str], but: Path | None = None) -> list[Path]:
+    """Return what is in `folder`, if there is one, that is not a file by the name of a member."""
+    there = sorted(folder.iterdir()) if folder.exists() else []
+    return [path for path in there if path != but and (path.name not in members or not path.is_file())]
 
 
 def publish(files: Mapping[str, bytes], target: Path) -> None:
-    """Write `files` as the folder `target`, in place of what `check_target` allows there.
+    """Write `files`, path below the folder -> content, as `target`, in place of what `check_target` allows there.
 
     Interrupted, it leaves the old build or the new one, whole, and nothing else; after a crash in the moment between
     two renames the old build is in `.NAME.old` beside the place of the new one. Raises CompileError as `check_target`
@@ -51,6 +63,7 @@ def publish(files: Mapping[str, bytes], target: Path) -> None:
     try:
         staged.mkdir()
         for name, data in files.items():
+            (staged / name).parent.mkdir(exist_ok=True)
             write_atomically(staged / name, data)
         # Again, because training takes its time and the folder is the user's.
         _exchange(staged, check_target(target))
@@ -83,6 +96,12 @@ def _exchange(staged: Path, target: Path) -> None:
 def _discard(build: Path) -> None:
     """Delete a build, and nothing that is not of one: a folder that holds more stays, as an OSError."""
     if build.exists():
-        for name in MEMBERS:
-            (build / name).unlink(missing_ok=True)
-        build.rmdir()
+        if (firmware := build / FIRMWARE_NAME).exists():
+            _discard_files(firmware, _FIRMWARE_MEMBERS)
+        _discard_files(build, MEMBERS)
+
+
+def _discard_files(folder: Path, names: frozenset[str]) -> None:
+    for name in names:
+        (folder / name).unlink(missing_ok=True)
+    folder.rmdir()

@@ -78,6 +78,7 @@ def train(material: Material, options: Options, report: Report | None = None) ->
         rounds=options.rounds,
         shrinkage=options.shrinkage,
         tolerance=options.tolerance,
+        max_bins=options.max_bins,
         on_round=report,
     )
     if not stumps.n_rounds:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from ...runtime.build import ENSEMBLE_NAME, Build, read_member
@@ -20,6 +21,7 @@ from .ensemble import MAX_BYTES, ensemble_from_bytes
 from .errors import CompileError
 from .scanned import ScanCheck, check_scan
 from .select import select_inputs
+from .verify_firmware import FirmwareVerification
 
 
 class ChangedRow(Struct, frozen=True):
@@ -64,7 +66,7 @@ class Verification(Struct, frozen=True, kw_only=True):
 
     collapse_* compare the ensemble with the float tables, in units of score; integer_* the float tables with the
     integers, in steps. covered counts rows whose margin exceeds safe_margin, covered_changed those of them that change.
-    worst looks beyond the rows; scan is there if the build says how to read a harness.
+    worst looks beyond the rows; scan is there if the build says how to read a harness, firmware if it was asked for.
     """
 
     same_recordings: bool
@@ -82,6 +84,11 @@ class Verification(Struct, frozen=True, kw_only=True):
     changed: tuple[ChangedRow, ...]
     scan: ScanCheck | None
     holds: bool
+    firmware: FirmwareVerification | None = None
+
+    def with_firmware(self, firmware: FirmwareVerification) -> "Verification":
+        """Return the same with what was found of compiled classifiers, which must hold too."""
+        return replace(self, firmware=firmware, holds=self.holds and firmware.holds)
 
 
 def verify_build(

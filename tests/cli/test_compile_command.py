@@ -18,7 +18,8 @@ def test_compile_writes_a_build_and_says_what_it_is(thenar: Thenar, set_file: Pa
     assert "3 grasp types from" in done.stdout
     assert "of 6 switches and 2 joints" in done.stdout
     assert "in 4 folds, placement and all:" in done.stdout
-    assert sorted(path.name for path in (tmp_path / "build").iterdir()) == ["build.json", "ensemble.bin", "tables.bin"]
+    made = sorted(path.name for path in (tmp_path / "build").iterdir())
+    assert made == ["build.json", "ensemble.bin", "firmware", "tables.bin"]
 
 
 def test_json_prints_what_build_json_says(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
@@ -33,7 +34,7 @@ def test_compiling_again_gives_the_same_bytes(thenar: Thenar, set_file: Path, tm
     seen = []
     for _ in range(2):
         assert thenar("compile", set_file, "-o", tmp_path / "build", "--rounds", 3).returncode == 0
-        seen.append({path.name: path.read_bytes() for path in (tmp_path / "build").iterdir()})
+        seen.append({path: path.read_bytes() for path in (tmp_path / "build").rglob("*") if path.is_file()})
     assert seen[0] == seen[1]
 
 
@@ -43,9 +44,17 @@ def test_help_has_an_example(thenar: Thenar) -> None:
 
 def test_every_option_reaches_the_build(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
     options = {"prune": 2, "rounds": 3, "inputs": "both", "shrinkage": 0.5, "folds": 2, "seed": 7, "tolerance": 1e-9}
-    given = [word for name, value in options.items() for word in (f"--{name}", value)]
+    options |= {"table_bits": 8, "max_bins": 4}
+    given = [word for name, value in options.items() for word in (f"--{name.replace('_', '-')}", value)]
     done = thenar("compile", set_file, "-o", tmp_path / "build", *given, "--json")
     assert json.loads(done.stdout)["options"] == options
+
+
+def test_tables_have_8_or_16_bits(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+    done = thenar("compile", set_file, "-o", tmp_path / "build", "--table-bits", 9)
+    assert done.returncode == 2
+    assert "'9' is not one of '16', '8'" in done.stderr
+    assert not (tmp_path / "build").exists()
 
 
 def test_a_tolerance_ends_the_training_and_the_build_says_so(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
@@ -80,3 +89,11 @@ def test_a_build_that_answers_one_grasp_type_only_says_so(thenar: Thenar, small_
     assert done.returncode == 0
     assert "warning: the build recognises every row as" in " ".join(done.stderr.split())
     assert "of the placement's decisions no switch gains anything alone" in done.stdout
+
+
+def test_it_says_what_the_firmware_in_the_build_is_laid_out_for(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+    done = thenar("compile", set_file, "-o", tmp_path / "build", "--rounds", 10, "--folds", 0)
+    assert done.returncode == 0, done.stderr
+    assert "\nfirmware for atmega328p: 16-bit entries, " in done.stdout
+    made = sorted(path.name for path in (tmp_path / "build" / "firmware").iterdir())
+    assert made == ["thenar_glove.c", "thenar_glove.h", "thenar_glove_avr.S"]

@@ -95,7 +95,7 @@ def _interrupt(command: list[str], ready: Path) -> "subprocess.CompletedProcess[
 
 
 def test_ctrl_c_exits_with_130_and_leaves_the_old_build_alone(set_file: Path, build_folder: Path) -> None:
-    before = {path.name: path.read_bytes() for path in build_folder.iterdir()}
+    before = {path: path.read_bytes() for path in build_folder.rglob("*") if path.is_file()}
     ready = build_folder.parent.parent / f"{build_folder.parent.name}.ready"
     program = (
         "import sys, pathlib\n"
@@ -109,7 +109,7 @@ def test_ctrl_c_exits_with_130_and_leaves_the_old_build_alone(set_file: Path, bu
     done = _interrupt([sys.executable, "-c", program, "compile", str(set_file), "-o", str(build_folder)], ready)
     assert done.returncode == 130
     assert done.stderr.strip() == "thenar: interrupted"
-    assert {path.name: path.read_bytes() for path in build_folder.iterdir()} == before
+    assert {path: path.read_bytes() for path in build_folder.rglob("*") if path.is_file()} == before
     assert [path.name for path in build_folder.parent.iterdir()] == ["build"]
 
 

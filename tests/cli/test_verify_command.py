@@ -5,8 +5,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 from msgspec.structs import replace as replace_fields
 
+from thenar.cli.verify_firmware import print_firmware, verdict
+from thenar.compiler.build.carried import Carried
+from thenar.compiler.build.firmware_trial import Difference, TargetCheck
+from thenar.compiler.build.verify_firmware import FirmwareVerification
 from thenar.runtime.manifest import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.tables import tables_from_bytes, tables_to_bytes
 
@@ -65,3 +70,64 @@ def test_json_lists_every_changed_row(thenar: Thenar, set_file: Path, build_fold
     assert found["holds"] is False
     assert all(row["ensemble"] != row["integers"] for row in found["changed"])
     assert found["changed"]
+
+
+def test_firmware_is_compiled_and_held_against_python(
+    thenar: Thenar, set_file: Path, build_folder: Path, tool: Callable[[str], str]
+) -> None:
+    tool("gcc")
+    done = thenar("verify", build_folder, set_file, "--firmware", "host")
+    assert done.returncode == 0, done.stderr
+    assert "host, every frame from nothing: every score and grasp type of " in done.stdout
+    assert "the build carries the firmware that thenar makes of it now" in done.stdout
+    found = json.loads(thenar("verify", build_folder, set_file, "--firmware", "host", "--json").stdout)
+    assert [check["differing"] for check in found["firmware"]["checks"]] == [0, 0]
+    assert found["holds"] is True
+
+
+def test_firmware_that_is_not_the_builds_is_exit_code_1(
+    thenar: Thenar, set_file: Path, build_folder: Path, tool: Callable[[str], str]
+) -> None:
+    tool("gcc")
+    (build_folder / "firmware" / "thenar_glove.h").write_text("")
+    done = thenar("verify", build_folder, set_file, "--firmware", "host")
+    assert done.returncode == 1
+    assert "firmware/thenar_glove.h: not what thenar makes of the build now" in done.stdout
+    assert done.stdout.endswith("DOES NOT HOLD: compile the build again\n")
+
+
+def test_firmware_for_what_there_is_not_is_refused_with_what_there_is(
+    thenar: Thenar, set_file: Path, build_folder: Path
+) -> None:
+    done = thenar("verify", build_folder, set_file, "--firmware", "host,pdp11")
+    assert done.returncode == 2
+    assert "there is no target 'pdp11': it takes host, avr, cortex-m" in done.stderr
+
+
+def test_a_difference_is_shown_with_both_answers(capsys: pytest.CaptureFixture[str]) -> None:
+    first = Difference("row 3", ("s1",), (7, 8), "cup", (5, 4), "pen", (5, 6))
+    check = TargetCheck(
+        part="cortex-m4",
+        layout="",
+        answer="update",
+        frames=10,
+        differing=2,
+        first=first,
+        misnamed=3,
+        worst=900,
+        unit="instructions",
+        stack=None,
+    )
+    found = FirmwareVerification(rows=4, extreme=3, random=3, checks=(check,), carried=Carried(False, ()))
+    print_firmware(found)
+    assert capsys.readouterr().out.splitlines() == [
+        "firmware, on 4 rows, 3 extreme and 3 random frames:",
+        "  cortex-m4, every frame from the one before: 2 of 10 frames DIFFER; the first:",
+        "    3 of the grasp types have ANOTHER NAME",
+        "    row 3: closed s1; codes 7 8",
+        "    Python: cup, scores 5 4",
+        "    compiled: pen, scores 5 6",
+        "  the build carries no firmware",
+    ]
+    assert verdict(found).endswith("a fault of thenar or of the compiler: report it, with the first frame shown")
+    assert "compile the build again" not in verdict(found)

@@ -138,7 +138,8 @@ def test_bins_hold_rows_as_evenly_as_values_allow(counts: list[int], most: int) 
     edges = edges_of(bin_columns(X, most), 0, X)
     if len(counts) <= most:
         return
-    shares = [float(np.count_nonzero(X <= edge)) for edge in edges]
+    column = X[:, 0]
+    shares = [float(np.count_nonzero(column <= edge)) for edge in edges]
     for part in range(1, most):
         wanted = part * len(X) / most
         nearest = min(abs(np.cumsum(counts)[:-1] - wanted))

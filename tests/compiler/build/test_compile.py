@@ -13,6 +13,7 @@ import pytest
 
 from thenar.compiler import GraspSet, compile_build, grow_id3
 from thenar.compiler.build.errors import CompileError
+from thenar.compiler.build.verify import verify_build
 from thenar.compiler.evaluation.errors import EvaluationError
 from thenar.drivers.errors import ThenarError
 from thenar.runtime import Build
@@ -23,7 +24,7 @@ ROUNDS = 12
 
 
 def _bytes(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def test_a_build_knows_its_inputs_and_recognises_what_it_was_trained_on(grasp_set: GraspSet, tmp_path: Path) -> None:
@@ -92,6 +93,7 @@ def test_recordings_of_one_kind_need_no_option(make_set: Make, tmp_path: Path, l
         ({}, {"shrinkage": 2.0}, "shrinkage=2.0"),
         ({}, {"prune": -1}, "min_samples is -1"),
         ({"rows": 4}, {"folds": 5}, "cannot be cut into 5 folds"),
+        ({}, {"table_bits": 9}, "tables of 9 bits: firmware has entries of 8 or 16"),
     ],
 )
 def test_what_makes_no_build_is_refused_and_nothing_written(
@@ -153,6 +155,37 @@ def test_threads_and_hash_seed_change_no_byte(
         check=True,
     )
     assert _bytes(tmp_path / "here") == _bytes(tmp_path / "there")
+
+
+def test_tables_for_narrow_entries_are_coarser_say_so_and_hold(grasp_set: GraspSet, tmp_path: Path) -> None:
+    wide = compile_build(grasp_set, tmp_path / "wide", rounds=ROUNDS, folds=0).manifest
+    narrow = compile_build(grasp_set, tmp_path / "narrow", rounds=ROUNDS, folds=0, table_bits=8).manifest
+    assert narrow.options.table_bits == 8
+    assert narrow.proof.scale < wide.proof.scale / 8
+    assert (narrow.proof.error, narrow.proof.safe_margin) == (wide.proof.error, wide.proof.safe_margin)
+    assert narrow.proof.bound == Build.load(tmp_path / "narrow").tables.bound < wide.proof.bound
+    found = verify_build(tmp_path / "narrow", grasp_set)
+    assert found.holds
+    assert (found.covered, len(found.changed)) == (narrow.proof.covered, narrow.proof.changed)
+
+
+def test_joints_of_few_bins_make_small_tables_that_hold(grasp_set: GraspSet, tmp_path: Path) -> None:
+    every = compile_build(grasp_set, tmp_path / "every", rounds=ROUNDS, folds=0)
+    few = compile_build(grasp_set, tmp_path / "few", rounds=ROUNDS, folds=0, max_bins=3)
+    assert few.manifest.options.max_bins == 3
+    assert max(map(len, Build.load(tmp_path / "every").tables.thresholds)) > 2
+    assert max(map(len, Build.load(tmp_path / "few").tables.thresholds)) <= 2
+    assert few.tables_bytes < every.tables_bytes
+    assert verify_build(tmp_path / "few", grasp_set).holds
+
+
+def test_wide_tables_are_what_a_build_has_unless_told_and_build_json_is_as_it_was(
+    grasp_set: GraspSet, tmp_path: Path
+) -> None:
+    compile_build(grasp_set, tmp_path / "told", rounds=2, folds=0, table_bits=16)
+    compile_build(grasp_set, tmp_path / "untold", rounds=2, folds=0)
+    assert _bytes(tmp_path / "told") == _bytes(tmp_path / "untold")
+    assert b"table_bits" not in (tmp_path / "told" / "build.json").read_bytes()
 
 
 def test_a_file_in_the_way_is_refused_before_any_work(grasp_set: GraspSet, tmp_path: Path) -> None:

@@ -6,10 +6,16 @@ import numpy as np
 import pytest
 
 from thenar.compiler import compile_build
+from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.build.select import select_inputs
+from thenar.compiler.build.training import material_of, train
 from thenar.compiler.build.verify import verify_build
+from thenar.compiler.evaluation.folds import weka_folds
 from thenar.compiler.recordings.importer import import_file
+from thenar.compiler.tables.collapse import collapse
+from thenar.compiler.tables.quantise import quantise
 from thenar.runtime import Build, Recognizer
+from thenar.runtime.manifest import Inputs, Options
 from thenar.runtime.recognizer import Frame
 
 COLUMNS = Path(__file__).parents[3] / "examples" / "columns"
@@ -33,3 +39,27 @@ def test_a_build_of_real_recordings_holds_and_recognises(
     bits, codes = select_inputs(grasp_set, manifest)
     seen = [recognizer.recognise(Frame(0, *frame)).grasp for frame in zip(bits, codes, strict=True)]
     assert np.count_nonzero(np.array(seen) == grasp_set.grasps) == found.correct_integers
+
+
+@pytest.mark.parametrize("inputs", ["both", "switches"])
+@pytest.mark.parametrize("entry_bits", [16, 8])
+def test_integers_recognise_within_a_fifth_of_a_point_of_what_the_ensemble_does_in_rows_not_trained_on(
+    icub_table: Path, inputs: Inputs, entry_bits: int
+) -> None:
+    grasp_set, _ = import_file(icub_table, COLUMNS / "icub.toml")
+    options = Options(0, 100, inputs, 1.0, 4, 1)
+    material = material_of(grasp_set, options)
+    by_ensemble = by_integers = 0
+    for fold in weka_folds(material.labels, options.folds, options.seed):
+        part, test = material.rows(fold.train), material.rows(fold.test)
+        trained = train(part, options)
+        tables = collapse(trained.stumps, len(trained.columns))
+        integers = quantise(tables, trained.kept(part), part.codes, entry_bits=entry_bits)
+        scores = trained.kept(test) @ integers.switch_rows.astype(int) + integers.bias
+        for codes, thresholds, rows in zip(test.codes.T, integers.thresholds, integers.joint_rows, strict=True):
+            scores += rows[np.searchsorted(thresholds, codes)]
+        found = winners(trained.stumps.scores(np.hstack([trained.kept(test), test.codes])))
+        by_ensemble += int(np.count_nonzero(found == test.labels))
+        by_integers += int(np.count_nonzero(scores.argmax(axis=1) == test.labels))
+    assert by_ensemble > len(grasp_set) / 2
+    assert abs(by_integers - by_ensemble) <= 0.002 * len(grasp_set)

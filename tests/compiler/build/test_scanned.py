@@ -28,7 +28,7 @@ def harness(grasp_set: GraspSet) -> Harness:
 
 
 def _bytes(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
 
 
 def test_the_build_holds_a_map_of_the_harness_and_says_its_checksum(

@@ -10,23 +10,29 @@ OLD = {"build.json": b"old", "tables.bin": b"old"}
 NEW = {"build.json": b"new", "tables.bin": b"new", "ensemble.bin": b"new"}
 
 
+# A build that carries firmware.
+FIRM = {**OLD, "firmware/thenar_glove.c": b"old", "firmware/thenar_glove.h": b"old"}
+
+
 def _content(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def _fill(folder: Path, files: dict[str, bytes]) -> None:
     folder.mkdir()
     for name, data in files.items():
+        (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_bytes(data)
 
 
-@pytest.mark.parametrize("before", [None, {}, OLD])
+@pytest.mark.parametrize("before", [None, {}, OLD, FIRM])
 def test_a_build_takes_its_place_and_leaves_nothing_beside_it(tmp_path: Path, before: dict[str, bytes] | None) -> None:
     if before is not None:
         _fill(tmp_path / "build", before)
-    publish(NEW, check_target(tmp_path / "build"))
-    assert _content(tmp_path / "build") == NEW
-    assert [path.name for path in tmp_path.iterdir()] == ["build"]
+    for files in (NEW, FIRM, NEW):
+        publish(files, check_target(tmp_path / "build"))
+        assert _content(tmp_path / "build") == files
+        assert [path.name for path in tmp_path.iterdir()] == ["build"]
 
 
 @pytest.mark.parametrize("interrupted", [1, 2])
@@ -73,6 +79,9 @@ def test_what_a_crash_left_aside_is_cleared_by_the_next_build(tmp_path: Path) ->
     [
         ({"notes.txt": b"mine"}, "is not empty and not a build"),
         ({**OLD, "notes.txt": b"mine"}, r"holds notes\.txt, which is not of a build"),
+        ({**FIRM, "firmware/main.c": b"mine"}, r"holds firmware/main\.c, which is not of a build"),
+        ({**OLD, "firmware": b"mine"}, r"holds firmware, which is not of a build"),
+        ({**OLD, "thenar_glove.c": b"mine"}, r"holds thenar_glove\.c, which is not of a build"),
     ],
 )
 def test_a_users_files_are_never_deleted(tmp_path: Path, files: dict[str, bytes], reason: str) -> None:
@@ -115,6 +124,15 @@ def test_a_folder_by_the_name_of_a_file_of_a_build_is_not_of_a_build(tmp_path: P
     _fill(tmp_path / "build" / "tables.bin", {"notes.txt": b"mine"})
     with pytest.raises(CompileError, match=r"holds tables\.bin, which is not of a build"):
         check_target(tmp_path / "build")
+
+
+def test_a_link_by_the_name_of_a_folder_of_a_build_is_not_of_a_build(tmp_path: Path) -> None:
+    _fill(tmp_path / "build", OLD)
+    _fill(tmp_path / "mine", {"thenar_glove.c": b"mine"})
+    (tmp_path / "build" / "firmware").symlink_to(tmp_path / "mine")
+    with pytest.raises(CompileError, match=r"holds firmware, which is not of a build"):
+        check_target(tmp_path / "build")
+    assert _content(tmp_path / "mine") == {"thenar_glove.c": b"mine"}
 
 
 def test_a_users_files_aside_are_never_deleted(tmp_path: Path) -> None:

@@ -1,0 +1,145 @@
+"""What a classifier takes of an AVR: compiled, linked, and run frame by frame in libsimavr."""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+from firmwaredata import ROUNDS, SEED, SWITCHES
+from firmwarepeers import Peer
+from numpy.typing import NDArray
+
+from thenar.compiler.firmware.avr_harness import AVR_COMPILER, harness
+from thenar.compiler.firmware.avr_runner import run as run_avr
+from thenar.compiler.firmware.classifier import classifier_files
+from thenar.compiler.firmware.cortex_runner import run as run_cortex
+from thenar.compiler.firmware.errors import FirmwareError
+from thenar.compiler.firmware.layout import Layout
+from thenar.compiler.firmware.targets import Target
+from thenar.compiler.firmware.tools import call, find, workshop
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Proof, Source, Switch
+from thenar.runtime.tables import IntegerTables, tables_to_bytes
+
+# As thenar's Makefiles compile: what is not called is not linked.
+_HOW = ("-Os", "-std=gnu99", "-w", "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections")
+Frames = NDArray[np.uint8]
+Scores = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """What a classifier takes on `part`: cycles a frame, the middle and the most; bytes of flash, of RAM and of stack.
+
+    differing  how many of `rows` answers are not those of its Python
+    """
+
+    part: str
+    cycles: int
+    most: int
+    flash: int
+    ram: int
+    stack: int
+    differing: int
+    rows: int
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """The columns of the table that every classifier has."""
+        return (
+            f"{self.cycles:,} ({self.most:,})",
+            f"{self.flash:,}",
+            f"{self.ram} + {self.stack}",
+            f"{self.differing} of {self.rows}",
+            self.part,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What is asked of a classifier: cycles of its slowest frame, bytes of flash, of RAM with stack."""
+
+    cycles: int
+    flash: int = 1 << 20
+    ram: int = 1 << 20
+
+    def verdict(self, cost: Cost) -> str:
+        """Return what is asked, and whether it is kept."""
+        kept = cost.most <= self.cycles and cost.flash <= self.flash and cost.ram + cost.stack <= self.ram
+        asked = [f"{limit:,}" for limit in (self.cycles, self.flash, self.ram) if limit < 1 << 20]
+        return f"{', '.join(asked)}: {'kept' if kept else 'NOT KEPT'}"
+
+
+def manifest_of(integers: IntegerTables) -> Manifest:
+    """Return a manifest for tables that belong to no build: names for the comments of the generated C."""
+    data = hashlib.sha256(tables_to_bytes(integers)).hexdigest()
+    return Manifest(
+        schema=SCHEMA,
+        checksum="",
+        thenar=version("thenar"),
+        tables_sha256=data,
+        ensemble_sha256=data,
+        source=Source(data, 0, "kamakura14", SWITCHES),
+        options=Options(0, ROUNDS, "both", 1.0, 0, SEED),
+        grasps=tuple(f"grasp {k}" for k in range(integers.n_classes)),
+        switches=tuple(Switch(s, f"switch {s}", 0.0) for s in range(integers.n_switches)),
+        joints=tuple(Calibration(a, f"joint {a}", "deg", 1, 0.0, 2, 1.0) for a in range(integers.n_joints)),
+        proof=Proof(16, integers.scale, integers.bound, 0.0, 0.0, 0, 0),
+        rates=(),
+    )
+
+
+def _linked(folder: Path, sources: Mapping[str, str], part: str) -> tuple[int, int]:
+    """Link `program.elf` of the sources in the folder; return bytes of flash and RAM. Peers' warnings are theirs."""
+    code = sorted(path for path in sources if path.endswith((".c", ".S")))
+    call([find(AVR_COMPILER), f"-mmcu={part}", *_HOW, *code, "-lm", "-o", "program.elf"], folder)
+    text, data, bss = call(["avr-size", "program.elf"], folder).decode().splitlines()[1].split()[:3]
+    return int(text) + int(data), int(data) + int(bss)
+
+
+def of_ours(layout: Layout, target: Target, frames: Frames, expected: Scores, *, changes: bool = False) -> Cost:
+    """Return what thenar's classifier takes for frames whose scores (n, K) are known; with `changes`, update()'s cost
+    for every frame but the first, which has nothing to start from.
+    """
+    files = classifier_files("glove", manifest_of(layout.tables), layout, avr=True)
+    called = ("classify", "update") if changes else ("classify",)
+    body = " ".join(f"thenar_glove_{function}();" for function in called)
+    program = {**files, "main.c": f'#include "thenar_glove.h"\nint main(void) {{ for (;;) {{ {body} }} }}\n'}
+    with workshop(program) as folder:
+        flash, ram = _linked(folder, program, target.part)
+    answers = run_avr(files, "glove", layout, target, frames, incremental=changes)
+    assert answers.cost is not None
+    assert answers.stack is not None
+    wrong = (answers.scores != expected).any(axis=1) | (answers.classes != expected.argmax(axis=1))
+    cycles = answers.cost[1 if changes else 0 :]
+    most, differing = int(cycles.max()), int(np.count_nonzero(wrong))
+    return Cost(target.part, int(np.median(cycles)), most, flash, ram, answers.stack, differing, len(frames))
+
+
+def of_peer(peer: Peer, target: Target) -> Cost:
+    """Return what a peer's classifier takes. Raises FirmwareError if it does not fit."""
+    program = {"peer.c": peer.source, "main.c": "int predict(void);\nint main(void) { for (;;) predict(); }\n"}
+    with workshop(program) as folder:
+        flash, ram = _linked(folder, program, target.part)
+        if flash > target.flash:
+            raise FirmwareError(f"{peer.name} takes {flash} bytes of flash, {target.part} has {target.flash}")
+        words = [line.split() for line in call(["avr-nm", "-P", "program.elf"], folder).decode().splitlines()]
+        at = {word[0]: f"0x{word[2]}" for word in words if len(word) > 2}
+        places = [at["predict"], at["_end"], f"{at['input']}:{peer.features.shape[1]}", f"{at['input']}:1"]
+        command = [str(harness("simavr_classify")), target.part, str(target.clock_hz), "program.elf", *places]
+        told = call(command, folder, peer.features.tobytes())
+    record = np.dtype([("echo", "u1"), ("grasp", "<u2"), ("cycles", "<u4"), ("stack", "<u2")])
+    found = np.frombuffer(told, record)
+    differing = int(np.count_nonzero(found["grasp"] != peer.expected))
+    middle, most, stack = int(np.median(found["cycles"])), int(found["cycles"].max()), int(found["stack"].max())
+    return Cost(target.part, middle, most, flash, ram, stack, differing, len(found))
+
+
+def instructions(layout: Layout, core: Target, frames: Frames, expected: Scores) -> int:
+    """Return the most instructions that a frame takes on a Cortex-M. Raises FirmwareError if any score is wrong."""
+    files = classifier_files("glove", manifest_of(layout.tables), layout, avr=False)
+    answers = run_cortex(files, "glove", layout, core, frames)
+    if answers.cost is None or (answers.scores != expected).any():
+        raise FirmwareError(f"{core.part} gives other scores than Python")
+    return int(answers.cost.max())

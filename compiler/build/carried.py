@@ -1,0 +1,46 @@
+"""The firmware that a build carries: made when it is compiled, held against what would be made today."""
+
+from pathlib import Path
+
+from msgspec import Struct
+
+from ...runtime.build import Build
+from ...runtime.manifest import Manifest
+from ...runtime.tables import IntegerTables
+from ..firmware.errors import FirmwareError
+from ..firmware.library import library_files, smallest_fit
+from ..firmware.library_names import FIRMWARE_NAME, LIBRARY_FILES
+
+
+class Carried(Struct, frozen=True):
+    """Whether a build has the folder `firmware/`, and which of its files are not what thenar makes of the build now."""
+
+    present: bool
+    outdated: tuple[str, ...]
+
+
+def made_firmware(manifest: Manifest, tables: IntegerTables) -> tuple[dict[str, str], str]:
+    """Return path in the build -> text of its firmware, and a sentence that says what for, or why there is none."""
+    try:
+        fit = smallest_fit(tables)
+        made = library_files(manifest, fit)
+    except FirmwareError as reason:
+        return {}, f"no firmware: {reason}"
+    return {f"{FIRMWARE_NAME}/{name}": text for name, text in made.items()}, f"firmware {fit.words}"
+
+
+def carried_firmware(folder: Path, build: Build) -> Carried:
+    """Return how the firmware in the build `folder` stands."""
+    if not (folder / FIRMWARE_NAME).is_dir():
+        return Carried(False, ())
+    made, _ = made_firmware(build.manifest, build.tables)
+    now = {name: text.encode() for name, text in made.items()}
+    names = [f"{FIRMWARE_NAME}/{name}" for name in LIBRARY_FILES]
+    return Carried(True, tuple(name for name in names if now.get(name) != _content(folder / name)))
+
+
+def _content(path: Path) -> bytes | None:
+    try:
+        return path.read_bytes()
+    except OSError:
+        return None

@@ -1,0 +1,99 @@
+"""The compiled classifier on an AVR in libsimavr: every frame, its cycles, and the stack it takes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...firmware_templates.rendering import render
+from .answers import Answers, Frames, check_frames
+from .avr_harness import AVR_COMPILER, harness
+from .errors import FirmwareError
+from .layout import Layout
+from .targets import Target
+from .tools import STRICT, call, find, workshop
+
+_CLOCK_HZ = 16_000_000
+
+
+def run(
+    files: Mapping[str, str],
+    name: str,
+    layout: Layout,
+    target: Target,
+    frames: Frames,
+    *,
+    incremental: bool = False,
+) -> Answers:
+    """Return what the classifier `name` in `files` (file name -> text, for AVR) answers to frames (n, F).
+
+    `cost` is the cycles from the first instruction of thenar_NAME_classify to the end of its return, without the call;
+    `stack` the most that any frame took, the return address included.
+
+    incremental  each answer comes from update(), the change since the frame before, instead of classify()
+
+    Raises FirmwareError if compiler or simulator are missing, or the files do not compile without any warning or do not
+    fit, or the program does not answer.
+    """
+    check_frames(frames, layout)
+    answer = "update" if incremental else "classify"
+    command = [find(AVR_COMPILER), *STRICT, f"-mmcu={target.part}", "-Os"]
+    program = harness("simavr_classify")
+    main = {"main.c": render("checking/avr_main.c.j2", name=name, answer=answer)}
+    with workshop({**files, **main}) as folder:
+        sources = sorted(path for path in (*files, *main) if path.endswith((".c", ".S")))
+        call([*command, *sources, "-o", "classifier.elf"], folder)
+        found = _symbols(folder)
+        spans = (
+            _span(found, f"thenar_{name}_input", frames.shape[1]),
+            _span(found, f"thenar_{name}_scores", 2 * len(layout.start)),
+        )
+        clock = str(target.clock_hz or _CLOCK_HZ)
+        places = hex(_symbol(found, f"thenar_{name}_{answer}").address), hex(_symbol(found, "_end").address)
+        printed = call([str(program), target.part, clock, "classifier.elf", *places, *spans], folder, frames.tobytes())
+    return _answers(printed, len(frames), layout)
+
+
+@dataclass(frozen=True, slots=True)
+class _Symbol:
+    address: int
+    size: int
+
+
+def _symbols(folder: Path) -> dict[str, _Symbol]:
+    """Return the symbols of the compiled program, data from 0x800000 on."""
+    lines = call(["avr-nm", "--format=posix", "classifier.elf"], folder).decode().splitlines()
+    words = [line.split() for line in lines]
+    return {word[0]: _Symbol(int(word[2], 16), int(word[3], 16) if len(word) > 3 else 0) for word in words}
+
+
+def _symbol(found: Mapping[str, _Symbol], name: str) -> _Symbol:
+    if name not in found:
+        raise FirmwareError(f"the compiled program has no {name}")
+    return found[name]
+
+
+def _span(found: Mapping[str, _Symbol], name: str, size: int) -> str:
+    symbol = _symbol(found, name)
+    if symbol.size != size:
+        raise FirmwareError(f"{name} has {symbol.size} bytes in the compiled program, its layout says {size}")
+    return f"{symbol.address:#x}:{size}"
+
+
+def _answers(printed: bytes, frames: int, layout: Layout) -> Answers:
+    classes = len(layout.start)
+    record = np.dtype([("scores", "<i2", (classes,)), ("grasp", "<u2"), ("cycles", "<u4"), ("stack", "<u2")])
+    if len(printed) != frames * record.itemsize:
+        raise FirmwareError(f"the simulator gave {len(printed)} bytes for {frames} frames of {record.itemsize}")
+    records = np.frombuffer(printed, record)
+    # A class of one byte comes back in r24; what r25 holds then means nothing.
+    grasps = records["grasp"] if classes > 256 else records["grasp"] & 0xFF
+    stack = int(records["stack"].max()) if frames else None
+    return Answers(
+        records["scores"].astype(np.int16),
+        grasps.astype(np.uint16),
+        records["cycles"].astype(np.uint32),
+        "cycles",
+        stack,
+    )

@@ -1,0 +1,28 @@
+"""From `board.toml` to a Board; what is wrong in it is told with file, line, key, and what to do."""
+
+from pathlib import Path
+
+from ...runtime.toml_source import Source, read_source
+from ...runtime.toml_struct import check_finite, convert
+from .board import Board
+from .board_checks import faults
+from .errors import FirmwareError
+
+
+def load_board(path: str | Path) -> Board:
+    """Return the board in a TOML file. Raises FirmwareError with file, line and key."""
+    return _board_of(read_source(Path(path), FirmwareError))
+
+
+def parse_board(text: str, name: str = "board.toml") -> Board:
+    """Return the board that `text`, which messages call `name`, is. Raises FirmwareError as `load_board` does."""
+    return _board_of(Source(name, text, FirmwareError))
+
+
+def _board_of(source: Source) -> Board:
+    tables = source.tables()
+    check_finite(source, (), tables)
+    board = convert(source, (), tables, Board)
+    for place, reason in faults(board):
+        raise source.error(place, reason)
+    return board

@@ -1,0 +1,132 @@
+"""The layout that suits a target: the fastest that fits its flash, and what there was to choose from."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import product
+from typing import get_args
+
+from ...runtime.tables import IntegerTables
+from .costs import Cost, cost_of
+from .errors import FirmwareError
+from .layout import LARGEST_GROUP, SMALLEST_GROUP, Adding, Bins, Layout, arrange
+from .targets import Target
+
+__all__ = ["Choice", "Option", "choose", "features", "flash_shares", "frontier"]
+
+Option = tuple[Layout, Cost]
+
+# `lpm` reaches the first 64 KiB of an AVR's flash, and the tables share them with whatever else is constant.
+_MOST_LPM = 48 << 10
+_UNIT = {"avr": "cycles", "cortex-m": "instructions", "host": "instructions"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Choice:
+    """The layout chosen, what it costs at most, and why it was chosen, in a sentence.
+
+    frontier holds, from the fastest to the smallest, all layouts than which none is both faster and smaller, whether or
+    not they fit.
+    """
+
+    layout: Layout
+    cost: Cost
+    why: str
+    frontier: tuple[Option, ...]
+
+
+def choose(tables: IntegerTables, target: Target, *, flash: int | None = None, entry_bits: int | None = None) -> Choice:
+    """Return the fastest layout of `tables` that takes at most `flash` bytes, of equally fast ones the smallest.
+
+    flash is one of `flash_shares` unless given; entry_bits allows only 8 or 16, else both that are possible.
+    Raises FirmwareError if no layout fits, the tables cannot be laid out, or the part has not as much flash.
+    """
+    if flash is not None and flash > target.flash:
+        raise FirmwareError(
+            f"the classifier cannot be allowed {flash} bytes of flash: {target.named} has {target.flash} bytes"
+        )
+    options = list(_options(tables, target, entry_bits))
+    best = frontier(options)
+    for allowed in flash_shares(target) if flash is None else (flash,):
+        for layout, cost in best:
+            if cost.flash <= allowed and cost.ram <= target.ram:
+                return Choice(layout, cost, _why(layout, cost, len(options), allowed, target), best)
+    smallest = best[-1][1]
+    raise FirmwareError(
+        f"the smallest layout for {target.part} takes {smallest.flash} bytes of flash and {smallest.ram} of RAM, "
+        f"{allowed} and {target.ram} are allowed: compile with a higher --prune, fewer --rounds or --table-bits 8, "
+        "or take a larger part"
+    )
+
+
+def frontier(options: Iterable[Option]) -> tuple[Option, ...]:
+    """Return the options than which none is both faster and smaller, from the fastest to the smallest.
+
+    Options of several builds may be mixed, such as those of one compiled with 8 and with 16 table bits.
+    """
+    best: list[Option] = []
+    for option in sorted(options, key=lambda option: (option[1].cycles, option[1].flash)):
+        if not best or option[1].flash < best[-1][1].flash:
+            best.append(option)
+    return tuple(best)
+
+
+def flash_shares(target: Target) -> tuple[int, int]:
+    """Return the bytes of flash that a classifier may take where nobody says how many: half of it, so that scanning and
+    sending have room; or three quarters, if less will not do. On an AVR at most 48 KiB.
+    """
+    most = _MOST_LPM if target.kind == "avr" else target.flash
+    return min(target.flash // 2, most), min(target.flash * 3 // 4, most)
+
+
+def _options(tables: IntegerTables, target: Target, entry_bits: int | None) -> Iterator[Option]:
+    """Yield the layouts that there are, each with its cost. Raises FirmwareError if there is none, saying why not."""
+    refused: FirmwareError | None = None
+    found = False
+    sizes = range(SMALLEST_GROUP, LARGEST_GROUP + 1) if tables.n_switches else [SMALLEST_GROUP]
+    for bits, size, bins, adding in product(
+        (8, 16) if entry_bits is None else (entry_bits,), sizes, _bins(tables), _addings(target)
+    ):
+        try:
+            layout = arrange(tables, group_size=size, entry_bits=bits, bins=bins, adding=adding)
+        except FirmwareError as reason:
+            refused = refused or reason
+        else:
+            found = True
+            yield layout, cost_of(layout, target)
+    if not found and refused is not None:
+        raise refused
+
+
+def _bins(tables: IntegerTables) -> tuple[Bins, ...]:
+    return ("search", "trimmed", "direct") if tables.n_joints else ("direct",)
+
+
+def _addings(target: Target) -> tuple[Adding, ...]:
+    """Where a compiler makes the code, it decides how."""
+    return get_args(Adding) if target.kind == "avr" else ("called",)
+
+
+def features(layout: Layout, target: Target) -> str:
+    """Return in words how `layout` lies in flash, and on an AVR how it is added up."""
+    parts = [f"{layout.entry_bits}-bit entries"]
+    if layout.groups:
+        parts.append(f"up to {max(map(len, layout.groups))} switches a look-up")
+    if layout.joints:
+        parts.append(
+            {
+                "direct": "codes looked up in 256 bytes a joint",
+                "trimmed": "codes looked up between the first and the last threshold of a joint",
+                "search": "codes searched among thresholds",
+            }[layout.bins]
+        )
+    if target.kind == "avr":
+        parts.append({"called": "rows added by one routine", "unrolled": "rows added in line"}[layout.adding])
+    return ", ".join(parts)
+
+
+def _why(layout: Layout, cost: Cost, tried: int, allowed: int, target: Target) -> str:
+    bound = "at most" if target.counted else "about"
+    return (
+        f"{features(layout, target)}: the fastest of {tried} layouts in {allowed} bytes of flash, "
+        f"{bound} {cost.cycles} {_UNIT[target.kind]} ({cost.update_cycles} by update()) and {cost.flash} bytes"
+    )

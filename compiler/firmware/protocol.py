@@ -1,0 +1,146 @@
+"""The portable C of a scanner board: frames, protocol, debouncing, and when a scan may stop.
+
+The C does no input or output: bytes in, bytes out, times as arguments. It is the same as `drivers.scanner_frame`,
+`drivers.emulated.scanner_board.ScannerBoard`, `drivers.debounce.Debouncer` and `runtime.scanning.earlyexit.EarlyExit`,
+byte for byte, given the same scans, times and received bytes.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from textwrap import wrap
+
+from ...firmware_templates.rendering import render
+from ...runtime.scanning.earlyexit import EarlyExit
+from ...runtime.scanning.reach import Reach
+from ...runtime.tables import IntegerTables
+from .errors import FirmwareError
+from .words import comment
+
+# What a HEARTBEAT of a frame whose length is one byte has room for.
+MOST_KEYS = 1960
+_FOREVER_US, _LONGEST_DEBOUNCE_US, _MOST_BOARDS, _MOST_PLACES = (1 << 32) - 1, 0xFFFF, (1 << 32) - 1, 0xFFFF
+_MOST_PORTS = 256
+# No score leads another by as much: sums are -32767 to 32767.
+_NEVER = 0xFFFF
+# Of lines of numbers and names, before they are indented.
+_WIDTH = 100
+
+_PORTABLE = ("thenar_time.h", *(f"thenar_{part}.{end}" for part in ("frames", "debounce", "board") for end in "hc"))
+
+
+@dataclass(frozen=True, slots=True)
+class BoardConfig:
+    """What `thenar_config.h` says of a board; the fields are those of the protocol's HELLO.
+
+    rows, columns  of its keys, one row: wired directly      diodes  whether the keys of a matrix have any
+    board          its number                                scan_us from scan to scan, at least `fastest_us`
+    state_us, heartbeat_us  from frame to frame, 0: none     press_us, release_us  debouncing, 0: none
+
+    Raises FirmwareError where a value is out of its field's range, or there are more keys than `MOST_KEYS`.
+    """
+
+    rows: int
+    columns: int
+    diodes: bool = True
+    board: int = 1
+    scan_us: int = 1000
+    state_us: int = 0
+    heartbeat_us: int = 50_000
+    press_us: int = 0
+    release_us: int = 0
+    fastest_us: int = 100
+
+    def __post_init__(self) -> None:
+        for name, (least, most) in _RANGES.items():
+            value = getattr(self, name)
+            if not least <= value <= most:
+                raise FirmwareError(f"{name} of the board is {value}: it is {least} to {most}")
+        if self.keys > MOST_KEYS:
+            raise FirmwareError(f"the board has {self.rows} x {self.columns} keys: it can tell of {MOST_KEYS}")
+        if self.scan_us < self.fastest_us:
+            raise FirmwareError(f"scan_us of the board is {self.scan_us}: it scans every {self.fastest_us} us at most")
+
+    @property
+    def keys(self) -> int:
+        """How many keys there are."""
+        return self.rows * self.columns
+
+
+_RANGES = {
+    "rows": (1, _MOST_PLACES),
+    "columns": (1, _MOST_PLACES),
+    "board": (0, _MOST_BOARDS),
+    "scan_us": (1, _FOREVER_US),
+    "state_us": (0, _FOREVER_US),
+    "heartbeat_us": (0, _FOREVER_US),
+    "press_us": (0, _LONGEST_DEBOUNCE_US),
+    "release_us": (0, _LONGEST_DEBOUNCE_US),
+    "fastest_us": (1, _FOREVER_US),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class HurdleRow:
+    """By how many steps `leader` must be ahead of every class, in lines of C."""
+
+    leader: str
+    steps: list[str]
+
+
+def protocol_files(config: BoardConfig) -> dict[str, str]:
+    """Return name -> text of the C of a board: configuration, frames, debouncing and protocol."""
+    return {"thenar_config.h": _text("thenar_config.h", config=config), **{name: _text(name) for name in _PORTABLE}}
+
+
+def decided_files(
+    name: str, tables: IntegerTables, grasps: Sequence[str], ports: Sequence[Sequence[int]]
+) -> dict[str, str]:
+    """Return name -> text of thenar_NAME_decided.h and .c.
+
+    name    C identifier of the build                        grasps  names of its K classes
+    ports   the switches of each port, in the order in which ports are read; all switches of the build are in one
+
+    Raises FirmwareError where there are no ports, more than 256, or a switch is in none; SettingError where a switch is
+    in two, or is none of the build's.
+    """
+    masks = [sum(1 << switch for switch in port) for port in ports]
+    early = EarlyExit(tables, masks)
+    if not 1 <= len(ports) <= _MOST_PORTS:
+        raise FirmwareError(f"a scan of {len(ports)} ports: early exit is for 1 to {_MOST_PORTS}")
+    if missing := (1 << tables.n_switches) - 1 & ~sum(masks):
+        raise FirmwareError(f"no port reads switch {missing.bit_length() - 1}: early exit needs all of the build's")
+    reach, names = Reach(tables), [comment(grasp) for grasp in grasps]
+    values = {
+        "name": name,
+        "guard": f"THENAR_{name.upper()}",
+        "class_type": "uint8_t" if tables.n_classes <= 256 else "uint16_t",
+        "grasps": names,
+        "columns": wrap(", ".join(names), _WIDTH),
+        "n_ports": len(ports),
+        "ports": [
+            line for number, port in enumerate(ports) for line in wrap(f"port {number}: {_listed(port)}", _WIDTH)
+        ],
+        "tables": [_hurdles(reach, early.unread(port), names) for port in range(len(ports) - 1)],
+    }
+    return {f"thenar_{name}_decided.{end}": _text(f"thenar_NAME_decided.{end}", **values) for end in "hc"}
+
+
+def _hurdles(reach: Reach, unread: int, grasps: Sequence[str]) -> list[HurdleRow]:
+    rows = []
+    for leader, grasp in enumerate(grasps):
+        steps = [
+            0 if rival == leader else min(most + (rival < leader), _NEVER)
+            for rival, most in enumerate(reach.of(leader, unread))
+        ]
+        rows.append(HurdleRow(grasp, wrap(", ".join(map(str, steps)), _WIDTH)))
+    return rows
+
+
+def _listed(port: Sequence[int]) -> str:
+    return ("switches " if len(port) > 1 else "switch ") + ", ".join(map(str, port)) if port else "no switch"
+
+
+def _text(file: str, /, **values: object) -> str:
+    template = f"board/{file}.j2"
+    return render(template, origin=f"thenar {version('thenar')}, template {template}.", **values)

@@ -1,0 +1,86 @@
+"""Compilers and emulators: found, run for a limited time, in a folder that does not outlive their use."""
+
+import os
+import shutil
+import subprocess
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from .errors import FirmwareError
+
+LIMIT_S = 300.0
+# Every C file of ours is held to these.
+STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-pedantic")
+
+# The first of the programs that is installed is the one used; the packages are Debian's.
+Tool = tuple[tuple[str, ...], str]
+HOST_COMPILER: Tool = (("gcc", "clang"), "gcc")
+ARM_COMPILER: Tool = (("arm-none-eabi-gcc",), "gcc-arm-none-eabi")
+ARM_EMULATOR: Tool = (("qemu-system-arm",), "qemu-system-arm")
+
+
+def lacking(*tools: Tool) -> str | None:
+    """Return which of the tools are not installed and which packages bring them, None if all are there."""
+    gone = [tool for tool in tools if not any(map(shutil.which, tool[0]))]
+    if not gone:
+        return None
+    programs = " and ".join(" or ".join(names) for names, _ in gone)
+    return f"{programs} not found; Debian: apt-get install {' '.join(package for _, package in gone)}"
+
+
+def find(tool: Tool) -> str:
+    """Return the path of the first program of `tool` that is installed. Raises FirmwareError."""
+    for name in tool[0]:
+        if path := shutil.which(name):
+            return path
+    raise FirmwareError(lacking(tool))
+
+
+@contextmanager
+def workshop(files: Mapping[str, str | bytes]) -> Iterator[Path]:
+    """Give a new folder with `files`, path below it -> content; it is removed however the block is left.
+
+    Raises FirmwareError if they cannot be written.
+    """
+    with _new_folder() as name:
+        for path, content in files.items():
+            _write(Path(name, path), content.encode() if isinstance(content, str) else content)
+        yield Path(name)
+
+
+def _new_folder() -> TemporaryDirectory[str]:
+    try:
+        return TemporaryDirectory(prefix="thenar-")
+    except OSError as wrong:
+        raise FirmwareError(f"there is no temporary folder: {wrong.strerror}; $TMPDIR names another place") from None
+
+
+def _write(path: Path, content: bytes) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    except OSError as wrong:
+        raise FirmwareError(f"{path} cannot be written: {wrong.strerror}; is the disk full?") from None
+
+
+def call(command: Sequence[str], folder: Path, given: bytes = b"", limit_s: float = LIMIT_S) -> bytes:
+    """Run `command` in `folder` with `given` on its standard input; return what it printed.
+
+    Raises FirmwareError if it ends with an error, with the beginning of what it said, or not within `limit_s`.
+    """
+    program = Path(command[0]).name
+    english = os.environ | {"LC_ALL": "C"}
+    try:
+        done = subprocess.run(
+            command, cwd=folder, input=given, capture_output=True, timeout=limit_s, env=english, check=False
+        )
+    except subprocess.TimeoutExpired:
+        raise FirmwareError(f"{program} had not ended after {limit_s:g} s and was stopped: it hangs") from None
+    except OSError as wrong:
+        raise FirmwareError(f"{program} cannot be started: {wrong.strerror}") from None
+    if done.returncode:
+        said = (done.stderr or done.stdout).decode(errors="replace").strip()
+        raise FirmwareError(f"{program} ended with {done.returncode}: {said[:2000] or 'it said nothing'}")
+    return done.stdout

@@ -1,0 +1,203 @@
+import json
+import re
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from thenar.compiler import GraspSet, compile_build
+
+Thenar = Callable[..., subprocess.CompletedProcess[str]]
+Tool = Callable[[str], str]
+
+BOARD = 'part = "atmega328p"\n[pins]\n' + "\n".join(f's{number} = "PD{number + 2}"' for number in range(6)) + "\n"
+
+
+@pytest.fixture(scope="module")
+def build(small_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return compile_build(small_set, tmp_path_factory.mktemp("builds") / "build", rounds=10, folds=0).folder
+
+
+@pytest.fixture
+def board(tmp_path: Path) -> Path:
+    (tmp_path / "board.toml").write_text(BOARD)
+    return tmp_path / "board.toml"
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+NEXT_STEP = {
+    "avr328p": "`make -C {made}` compiles it",
+    "avr2560": "`make -C {made}` compiles it",
+    "cortex-m0plus": "`make -C {made} check` compiles and tests it",
+    "cortex-m4": "`make -C {made} check` compiles and tests it",
+    "arduino": "put it into `libraries` of your sketchbook, or into `lib` of a PlatformIO project",
+}
+
+
+@pytest.mark.parametrize("target", NEXT_STEP)
+def test_a_folder_is_written_and_the_layout_told_with_its_reason_and_what_to_do_next(
+    thenar: Thenar, build: Path, tmp_path: Path, target: str
+) -> None:
+    done = thenar("firmware", build, "--target", target, "-o", tmp_path / "made")
+    assert done.returncode == 0, done.stderr
+    assert "layout for " in done.stdout
+    assert ": the fastest of " in done.stdout
+    assert re.search(
+        rf"^expected: {'about' if 'cortex' in target else 'at most'} \d+ (cycles|instructions) a frame "
+        r"\(\d+ by update\(\)\), "
+        r"\d+ bytes of flash "
+        r"\(\d+ where nothing calls update\(\)\), \d+ of RAM$",
+        done.stdout,
+        re.MULTILINE,
+    )
+    made = tmp_path / "made"
+    assert done.stdout.endswith(f"{made}: firmware for {target}; {NEXT_STEP[target].format(made=made)}\n")
+    assert ("Makefile" in content(made)) == ("`make " in done.stdout)
+    assert any(path.endswith("thenar_glove.h") for path in content(made))
+
+
+def test_on_this_machine_no_microcontroller_and_no_cost_is_told_of(thenar: Thenar, build: Path, tmp_path: Path) -> None:
+    done = thenar("firmware", build, "--target", "host", "-o", tmp_path / "made")
+    assert done.returncode == 0, done.stderr
+    layout, ending = done.stdout.splitlines()
+    assert layout.startswith("layout for this machine: ")
+    assert (
+        ending == f"{tmp_path / 'made'}: firmware for host; `make -C {tmp_path / 'made'} check` compiles and tests it"
+    )
+    told = json.loads(thenar("firmware", build, "--target", "host", "-o", tmp_path / "json", "--json").stdout)
+    assert (told["part"], told["cost"], told["frontier"]) == ("host", None, [])
+    assert not re.search("atmega|cycles", done.stdout + told["layout"])
+    assert "atmega" not in (tmp_path / "made" / "thenar_glove.h").read_text()
+
+
+def test_a_cost_has_a_unit(thenar: Thenar, build: Path) -> None:
+    for target, unit, bound in (("avr328p", "cycles", True), ("cortex-m4", "instructions", False)):
+        told = json.loads(thenar("firmware", build, "--target", target, "--frontier", "--json").stdout)
+        assert (told["cost"]["unit"], told["cost"]["bound"]) == (unit, bound)
+
+
+def test_layouts_of_a_cortex_are_estimates(thenar: Thenar, build: Path) -> None:
+    done = thenar("firmware", build, "--target", "cortex-m4", "--frontier")
+    assert "Layouts for cortex-m4, about" in done.stdout
+    assert "at most" not in done.stdout
+
+
+def test_the_same_build_gives_the_same_bytes(thenar: Thenar, build: Path, tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        assert thenar("firmware", build, "--target", "avr328p", "-o", tmp_path / name).returncode == 0
+    assert content(tmp_path / "one") == content(tmp_path / "two")
+
+
+def test_the_frontier_is_shown_without_writing_anything(thenar: Thenar, build: Path, tmp_path: Path) -> None:
+    done = thenar("firmware", build, "--target", "avr328p", "--frontier")
+    assert done.returncode == 0, done.stderr
+    assert "Layouts for atmega328p, at most" in done.stdout
+    told = json.loads(thenar("firmware", build, "--target", "avr328p", "--frontier", "--json").stdout)
+    times, flashes = ([row[key] for row in told["frontier"]] for key in ("time", "flash"))
+    assert times == sorted(times)
+    assert flashes == sorted(flashes, reverse=True)
+    (chosen,) = (row for row in told["frontier"] if row["chosen"])
+    assert (chosen["time"], chosen["flash"], chosen["ram"]) == tuple(
+        told["cost"][key] for key in ("time", "flash", "ram")
+    )
+    for row in told["frontier"]:
+        assert str(row["time"]) in done.stdout
+        assert str(row["flash"]) in done.stdout
+
+
+def test_a_flash_limit_is_kept(thenar: Thenar, build: Path, tmp_path: Path) -> None:
+    told = json.loads(thenar("firmware", build, "--target", "avr328p", "--frontier", "--json").stdout)
+    least, ram = (told["frontier"][-1][key] for key in ("flash", "ram"))
+    limit = ("firmware", build, "--target", "avr328p", "--frontier", "--json", "--flash-limit")
+    assert json.loads(thenar(*limit, least).stdout)["cost"]["flash"] == least
+    done = thenar(*limit, least - 1)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == (
+        f"thenar: the smallest layout for atmega328p takes {least} bytes of flash and {ram} of RAM, "
+        f"{least - 1} and 2048 are allowed: compile with a higher --prune, "
+        "fewer --rounds or --table-bits 8, or take a larger part\n"
+    )
+
+
+@pytest.mark.parametrize("target", ["avr328p", "cortex-m0plus"])
+def test_what_was_measured_stands_in_the_header_beside_its_bounds(
+    thenar: Thenar, build: Path, tmp_path: Path, tool: Tool, target: str
+) -> None:
+    for name in ("avr-gcc", "make") if target == "avr328p" else ("arm-none-eabi-gcc", "qemu-system-arm"):
+        tool(name)
+    done = thenar("firmware", build, "--target", target, "-o", tmp_path / "made", "--measure", "--json")
+    assert done.returncode == 0, done.stderr
+    measured = json.loads(done.stdout)["measured"]
+    assert measured["rough"] == (target != "avr328p")
+    for what in ("time", "flash", "flash_classify", "ram"):
+        assert 0 < measured[what] <= (2 if measured["rough"] else 1) * measured[f"most_{what}"]
+    opening = " ".join((tmp_path / "made" / "thenar_glove.h").read_text().split("*/")[0].split())
+    beside = f"{'expected about' if measured['rough'] else 'bound'} {measured['most_time']}"
+    assert f"at most {measured['time']} {measured['unit']} a frame ({beside})" in opening
+    assert f"{measured['flash']} bytes of flash ({beside.rsplit(' ', 1)[0]} {measured['most_flash']}), " in opening
+
+
+@pytest.mark.parametrize("flag", ["--measure", "--frontier"])
+def test_on_this_machine_there_is_nothing_to_count(thenar: Thenar, build: Path, flag: str) -> None:
+    done = thenar("firmware", build, "--target", "host", flag)
+    assert done.returncode == 2
+    assert "On this machine nothing is counted" in done.stderr
+
+
+def test_a_board_that_scans_is_written(thenar: Thenar, build: Path, board: Path, tmp_path: Path) -> None:
+    arguments = ("--target", "avr328p", "--mode", "scan", "--board", board, "-o", tmp_path / "made")
+    done = thenar("firmware", build, *arguments)
+    assert done.returncode == 0, done.stderr
+    assert {"main.c", "Makefile", "glove.toml", "thenar_board.c"} <= content(tmp_path / "made").keys()
+    assert "thenar_glove.c" not in content(tmp_path / "made")
+    assert "layout" not in done.stdout
+
+
+def test_firmware_is_replaced_when_asked_and_the_users_files_stay(thenar: Thenar, build: Path, tmp_path: Path) -> None:
+    made = ("firmware", build, "--target", "host", "-o", tmp_path / "made")
+    assert thenar(*made).returncode == 0
+    (tmp_path / "made" / "mine.c").write_text("int mine;\n")
+    again = thenar(*made)
+    assert again.returncode == 2
+    assert "holds firmware already: name another folder, or add --overwrite" in again.stderr
+    assert thenar(*made, "--name", "left_hand", "--overwrite").returncode == 0
+    assert {"mine.c", "thenar_left_hand.c"} <= content(tmp_path / "made").keys()
+    assert "thenar_glove.c" not in content(tmp_path / "made")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--target", "avr328p"), "Name a folder to write with -o"),
+        (("--target", "pdp11", "-o", "made"), "'pdp11' is not one of"),
+        (("--target", "avr328p", "--mode", "scan", "-o", "made"), "the mode scan needs a board.toml"),
+        (("--target", "avr328p", "--mode", "scan", "--measure"), "A board that only scans holds no classifier"),
+        (("--target", "avr328p", "--calibration", "{board}", "-o", "made"), "--calibration is for --mode glove"),
+        (("--target", "avr328p", "--board", "{board}", "-o", "made"), "the mode classify reads no board"),
+        (
+            ("--target", "avr2560", "--mode", "scan", "--board", "{board}", "-o", "made"),
+            "the board has an atmega328p, the target avr2560 is an atmega2560",
+        ),
+        (("--target", "avr328p", "--flash-limit", "32769", "-o", "made"), "an atmega328p has 32768 bytes"),
+        (("--target", "avr328p", "--name", "../x", "-o", "made"), "'../x' cannot be the name: it takes lower-case"),
+        (("--target", "avr328p", "-o", "nowhere/made"), "nowhere is no folder: make it first"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(
+    thenar: Thenar, build: Path, board: Path, arguments: tuple[str, ...], message: str
+) -> None:
+    done = thenar("firmware", build, *(argument.format(board=board) for argument in arguments))
+    assert (done.returncode, done.stdout) == (2, "")
+    assert message in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert not Path("made").exists()
+
+
+def test_a_folder_that_is_no_build_is_named(thenar: Thenar, tmp_path: Path) -> None:
+    done = thenar("firmware", tmp_path, "--target", "avr328p", "-o", tmp_path / "made")
+    assert done.returncode == 2
+    assert f"is {tmp_path} a build?" in done.stderr

@@ -1,0 +1,177 @@
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from msgspec import structs
+
+from thenar.compiler import GraspSet, compile_build
+from thenar.compiler.build import firmware_trial
+from thenar.compiler.build.verify import verify_build
+from thenar.compiler.build.verify_firmware import Kind, verify_firmware
+from thenar.compiler.firmware import classifier
+from thenar.compiler.firmware.classifier import classifier_files
+from thenar.compiler.firmware.errors import FirmwareError
+from thenar.compiler.firmware.layout import Layout
+from thenar.compiler.firmware.probes import extreme_frames
+from thenar.runtime.build import Build
+from thenar.runtime.manifest import Manifest
+
+MakeSet = Callable[..., GraspSet]
+Tool = Callable[[str], str]
+
+TOOLS: dict[Kind, tuple[str, ...]] = {
+    "host": ("gcc",),
+    "avr": ("avr-gcc", "make", "gcc"),
+    "cortex-m": ("arm-none-eabi-gcc", "qemu-system-arm"),
+}
+PARTS = {"host": ["host"], "avr": ["atmega328p"], "cortex-m": ["cortex-m0plus", "cortex-m4"]}
+
+
+@pytest.fixture(scope="module")
+def build(grasp_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return compile_build(grasp_set, tmp_path_factory.mktemp("builds") / "build", rounds=10, folds=0).folder
+
+
+@pytest.mark.parametrize("kind", ["host", "avr", "cortex-m"])
+def test_every_score_and_type_of_every_frame_is_pythons(
+    build: Path, grasp_set: GraspSet, tool: Tool, kind: Kind
+) -> None:
+    for name in TOOLS[kind]:
+        tool(name)
+    found = verify_firmware(build, grasp_set, (kind,))
+    assert found.holds
+    assert [check.part for check in found.checks[::2]] == PARTS[kind]
+    assert [check.answer for check in found.checks[:2]] == ["classify", "update"]
+    assert (found.rows, found.random) == (96, 10_000)
+    for check in found.checks:
+        assert (check.frames, check.differing, check.first) == (96 + found.extreme + 10_000, 0, None)
+        assert (check.worst is None) == (kind == "host")
+        assert check.misnamed == (None if kind == "avr" else 0)
+    assert (found.carried.present, found.carried.outdated) == (True, ())
+
+
+@pytest.mark.parametrize("inputs", ["switches", "joints"])
+@pytest.mark.parametrize("kind", ["host", "avr"])
+def test_builds_without_joints_or_without_switches_are_pythons_too(
+    grasp_set: GraspSet, tool: Tool, tmp_path: Path, inputs: str, kind: Kind
+) -> None:
+    for name in TOOLS[kind]:
+        tool(name)
+    folder = compile_build(grasp_set, tmp_path / "build", rounds=5, folds=0, inputs=inputs).folder  # type: ignore[arg-type]
+    assert verify_firmware(folder, grasp_set, (kind,)).holds
+
+
+def test_one_wrong_entry_is_found_with_the_first_frame_that_shows_it(
+    build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tool("gcc")
+    made = classifier_files
+
+    def one_off(*arguments: object, **options: object) -> dict[str, str]:
+        files = made(*arguments, **options)  # type: ignore[arg-type]
+        first = re.compile(r"PAIR\( *(-?\d+)")
+        rows = list(first.finditer(files["thenar_glove.c"]))
+        at = rows[-1]
+        wrong = f"PAIR({int(at[1]) + 1}"
+        files["thenar_glove.c"] = files["thenar_glove.c"][: at.start()] + wrong + files["thenar_glove.c"][at.end() :]
+        return files
+
+    monkeypatch.setattr(firmware_trial, "classifier_files", one_off)
+    some = grasp_set.rows(np.flatnonzero(grasp_set.codes[:, -1] < 30)[:2])
+    found = verify_firmware(build, some, ("host",))
+    assert not found.holds
+    check = found.checks[0]
+    assert 0 < check.differing < check.frames
+    assert check.first is not None
+    kind, number = check.first.frame.rsplit(" ", 1)
+    assert kind == "extreme frame"
+    assert tuple(extreme_frames(Build.load(build).tables).codes[int(number)].tolist()) == check.first.codes
+    off = [there - here for here, there in zip(check.first.scores, check.first.compiled_scores, strict=True)]
+    assert sorted(off) == [0] * (len(off) - 1) + [1]
+    loaded = Build.load(build)
+    bits = [switch.name in check.first.closed for switch in loaded.manifest.switches]
+    assert loaded.scores(bits, check.first.codes).tolist() == list(check.first.scores)
+    assert loaded.classify(bits, check.first.codes) == check.first.grasp
+
+
+@pytest.mark.parametrize("kind", ["host", "cortex-m"])
+def test_a_switch_put_into_the_wrong_bit_is_found(
+    build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch, kind: Kind
+) -> None:
+    for name in TOOLS[kind]:
+        tool(name)
+
+    def turned(layout: Layout) -> list[str]:
+        bits = [[f"{{{g}, {1 << bit}}}," for bit in range(len(group))] for g, group in enumerate(layout.groups)]
+        return [" ".join(reversed(group)) for group in bits]
+
+    monkeypatch.setattr(classifier, "_place_lines", turned)
+    found = verify_firmware(build, grasp_set.rows(np.arange(2)), (kind,))
+    assert not found.holds
+    assert [check.differing > 0 for check in found.checks[:2]] == [False, True]
+    assert {check.misnamed for check in found.checks} == {0}
+
+
+@pytest.mark.parametrize("kind", ["host", "cortex-m"])
+def test_names_that_are_mixed_up_are_found(
+    build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch, kind: Kind
+) -> None:
+    for name in TOOLS[kind]:
+        tool(name)
+    made = classifier_files
+
+    def mixed_up(name: str, manifest: Manifest, *arguments: object, **options: object) -> dict[str, str]:
+        grasps = manifest.grasps[1::-1] + manifest.grasps[2:]
+        return made(name, structs.replace(manifest, grasps=grasps), *arguments, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(firmware_trial, "classifier_files", mixed_up)
+    found = verify_firmware(build, grasp_set.rows(np.arange(2)), (kind,))
+    assert not found.holds
+    assert [(check.differing, check.misnamed) for check in found.checks[:2]] == [(0, 2), (0, 2)]
+
+
+def test_what_does_not_hold_of_firmware_does_not_hold_of_the_build(
+    build: Path, grasp_set: GraspSet, tool: Tool, tmp_path: Path
+) -> None:
+    tool("gcc")
+    folder = compile_build(grasp_set, tmp_path / "build", rounds=10, folds=0).folder
+    whole = verify_build(folder, grasp_set)
+    assert whole.firmware is None
+    sound = verify_firmware(folder, grasp_set, ("host",))
+    assert whole.with_firmware(sound).holds
+    (folder / "firmware" / "thenar_glove.c").write_text("/* mine */\n")
+    (folder / "firmware" / "thenar_glove_avr.S").unlink()
+    changed = verify_firmware(folder, grasp_set, ("host",))
+    assert changed.carried.outdated == ("firmware/thenar_glove.c", "firmware/thenar_glove_avr.S")
+    assert not changed.holds
+    assert not whole.with_firmware(changed).holds
+
+
+def test_a_build_of_before_carries_no_firmware_and_holds(grasp_set: GraspSet, tool: Tool, tmp_path: Path) -> None:
+    tool("gcc")
+    folder = compile_build(grasp_set, tmp_path / "build", rounds=5, folds=0).folder
+    for path in (folder / "firmware").iterdir():
+        path.unlink()
+    (folder / "firmware").rmdir()
+    found = verify_firmware(folder, grasp_set, ("host",))
+    assert (found.carried.present, found.holds) == (False, True)
+
+
+@pytest.mark.parametrize("kind", ["host", "avr", "cortex-m"])
+def test_without_the_tools_it_says_what_to_install(
+    build: Path, grasp_set: GraspSet, monkeypatch: pytest.MonkeyPatch, kind: Kind
+) -> None:
+    monkeypatch.setenv("PATH", "/nowhere")
+    with pytest.raises(FirmwareError, match=f"firmware for {PARTS[kind][0]} cannot be tried here: .*apt-get install"):
+        verify_firmware(build, grasp_set, (kind,))
+
+
+def test_its_progress_ends_before_the_last_run_and_never_goes_back(
+    build: Path, grasp_set: GraspSet, tool: Tool
+) -> None:
+    tool("gcc")
+    told: list[tuple[int, int]] = []
+    verify_firmware(build, grasp_set, ("host",), lambda done, total: told.append((done, total)))
+    assert told == [(0, 2), (1, 2)]

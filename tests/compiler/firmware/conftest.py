@@ -1,0 +1,91 @@
+"""Integer tables and manifests of any size, without training anything, and what Python answers by them."""
+
+import hashlib
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from thenar.compiler.firmware.answers import Answers
+from thenar.compiler.firmware.probes import Probes, extreme_frames, joined, random_frames
+from thenar.runtime.build import Build
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Proof, Recognised, Source, Switch
+from thenar.runtime.tables import IntegerTables, tables_to_bytes
+
+MakeTables = Callable[..., IntegerTables]
+Describe = Callable[[IntegerTables], Manifest]
+
+
+def _make_tables(
+    seed: int = 0,
+    classes: int = 5,
+    switches: int = 9,
+    joints: int = 3,
+    bins: int = 6,
+    reach: int = 20,
+    highest: int = 254,
+) -> IntegerTables:
+    """Return random tables: entries -reach..reach, `bins` rows a joint, thresholds 0..highest, the highest one used."""
+    random = np.random.default_rng(seed)
+
+    def rows(*shape: int) -> np.ndarray:
+        return random.integers(-reach, reach + 1, shape).astype(np.int16)
+
+    def thresholds() -> np.ndarray:
+        return np.sort(np.append(random.choice(highest, bins - 2, replace=False), highest)).astype(np.uint16)
+
+    return IntegerTables(
+        bias=rows(classes),
+        switch_rows=rows(switches, classes),
+        thresholds=tuple(thresholds() for _ in range(joints)),
+        joint_rows=tuple(rows(bins, classes) for _ in range(joints)),
+        switch_means=rows(switches, classes),
+        joint_means=rows(joints, classes),
+        scale=100.0,
+    )
+
+
+def _describe(tables: IntegerTables) -> Manifest:
+    return Manifest(
+        schema=SCHEMA,
+        checksum="",
+        thenar="0.1.0",
+        tables_sha256=hashlib.sha256(tables_to_bytes(tables)).hexdigest(),
+        ensemble_sha256="0" * 64,
+        source=Source("1" * 64, 10, "own", 20),
+        options=Options(0, 100, "both", 1.0, 4, 1),
+        grasps=tuple(f"grasp {number}" for number in range(tables.n_classes)),
+        switches=tuple(Switch(number, f"s{number}", 0.5) for number in range(tables.n_switches)),
+        joints=tuple(Calibration(n, f"j{n}", "deg", 0, 0.0, 100, 50.0) for n in range(tables.n_joints)),
+        proof=Proof(16, tables.scale, tables.bound, 6.5, 13.0, 10, 0),
+        rates=(Recognised("training", 0, 1, 10, 10),),
+    )
+
+
+@pytest.fixture(scope="session")
+def make_tables() -> MakeTables:
+    return _make_tables
+
+
+@pytest.fixture(scope="session")
+def describe() -> Describe:
+    return _describe
+
+
+@pytest.fixture(scope="session")
+def probed() -> Callable[[IntegerTables, int], Probes]:
+    """Return what gives every extreme frame of tables and n random ones."""
+    return lambda tables, n: joined(extreme_frames(tables), random_frames(tables, n, seed=1))
+
+
+@pytest.fixture(scope="session")
+def same_as_python() -> Callable[[Answers, IntegerTables, Probes], None]:
+    """Return what holds every score and class against those that a Build computes."""
+
+    def compare(answers: Answers, tables: IntegerTables, frames: Probes) -> None:
+        build = Build(_describe(tables), tables)
+        scores = np.array([build.scores(bits, codes) for bits, codes in zip(frames.bits, frames.codes, strict=True)])
+        assert np.array_equal(answers.scores, scores)
+        assert np.array_equal(answers.classes, scores.argmax(axis=1))
+
+    return compare

@@ -1,0 +1,277 @@
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from thenar.compiler.firmware import avr_harness, avr_runner, host_runner
+from thenar.compiler.firmware.answers import Answers
+from thenar.compiler.firmware.classifier import classifier_files
+from thenar.compiler.firmware.layout import Layout, arrange
+from thenar.compiler.firmware.probes import Probes, random_frames
+from thenar.compiler.firmware.targets import TARGETS
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.tables import IntegerTables
+
+MakeTables = Callable[..., IntegerTables]
+Describe = Callable[[IntegerTables], Manifest]
+Probed = Callable[[IntegerTables, int], Probes]
+SameAsPython = Callable[[Answers, IntegerTables, Probes], None]
+Tool = Callable[[str], str]
+
+_arrange: Callable[..., Layout] = arrange
+
+
+@dataclass(frozen=True)
+class Case:
+    """Sizes of tables and how these are laid out; all codes of joint `constant` take the same row."""
+
+    tables: dict[str, int]
+    how: dict[str, object]
+    constant: int | None = None
+
+
+def _without_thresholds(tables: IntegerTables, joint: int) -> IntegerTables:
+    thresholds, rows = list(tables.thresholds), list(tables.joint_rows)
+    thresholds[joint], rows[joint] = thresholds[joint][:0], rows[joint][:1]
+    kept = tables.bias, tables.switch_rows, tuple(thresholds), tuple(rows)
+    return IntegerTables(*kept, tables.switch_means, tables.joint_means, tables.scale)
+
+
+def _case(bins: str = "direct", entry_bits: int = 16, constant: int | None = None, **sizes: int) -> Case:
+    return Case(sizes, {"bins": bins, "entry_bits": entry_bits}, constant)
+
+
+CASES = {
+    "2 classes": _case(classes=2),
+    "2 classes, bytes": _case(classes=2, entry_bits=8, bins="trimmed"),
+    "3 classes": _case(classes=3, bins="trimmed"),
+    "5 classes, bytes": _case(classes=5, entry_bits=8),
+    "7 classes, bytes, search": _case(classes=7, entry_bits=8, bins="search"),
+    "14 classes, 33 switches, 16 joints": _case(classes=14, switches=33, joints=16, bins_=20, reach=300),
+    "14 classes, bytes, trimmed": _case("trimmed", 8, classes=14, switches=33, joints=16, bins_=20),
+    "codes beyond both ends of the bins": _case("trimmed", joints=3, lowest=40, highest=150),
+    "codes beyond both ends of the bins, bytes": _case("trimmed", 8, joints=3, lowest=40, highest=150),
+    "16 classes": _case(classes=16, reach=1000),
+    "17 classes, one of them in two parts": _case(classes=17, reach=1000),
+    "31 classes, two of them in two parts, bytes, search": _case("search", 8, classes=31),
+    "33 classes, bytes, trimmed": _case("trimmed", 8, classes=33),
+    "33 classes, search": _case("search", classes=33),
+    "no joints": _case(joints=0),
+    "no joints, bytes": _case(joints=0, entry_bits=8),
+    "no switches": _case(switches=0, bins="trimmed"),
+    "one switch": _case(switches=1, joints=0),
+    "codes of 16 bits, search": _case("search", joints=4, switches=13, highest=65535),
+    "codes of 16 bits, trimmed": _case("trimmed", joints=4, switches=3, lowest=600, highest=854),
+    "codes of 16 bits, trimmed, bytes": _case("trimmed", 8, joints=4, lowest=900, highest=1154),
+    "a constant joint": _case(constant=1),
+    "a constant joint, search": _case("search", constant=0),
+    "a constant joint alone with switches": _case("search", joints=1, constant=0),
+    "254 thresholds": _case("direct", joints=1, bins_=255),
+    "48 look-ups, more than near calls reach": _case("trimmed", switches=160, joints=16, classes=4, reach=150),
+}
+NAMED = pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+
+
+@pytest.fixture
+def arranged(make_tables: MakeTables) -> Callable[[Case], Layout]:
+    """Return what makes a case's layout; `bins_` is the number of a joint's rows, `lowest` shifts its thresholds."""
+
+    def make(case: Case) -> Layout:
+        sizes = dict(case.tables)
+        bins, lowest = sizes.pop("bins_", 6), sizes.pop("lowest", 0)
+        highest = sizes.pop("highest", 254)
+        tables = make_tables(bins=bins, highest=highest - lowest, **sizes)
+        shifted = tuple((steps + lowest).astype(np.uint16) for steps in tables.thresholds)
+        kept = tables.bias, tables.switch_rows, shifted, tables.joint_rows
+        tables = IntegerTables(*kept, tables.switch_means, tables.joint_means, tables.scale)
+        if case.constant is not None:
+            tables = _without_thresholds(tables, case.constant)
+        return _arrange(tables, **case.how)
+
+    return make
+
+
+@NAMED
+@pytest.mark.parametrize(("compiler", "incremental"), [("gcc", False), ("clang", True)], ids=["gcc", "clang, update"])
+def test_portable_c_scores_as_python_does(
+    tool: Tool,
+    arranged: Callable[[Case], Layout],
+    describe: Describe,
+    probed: Probed,
+    same_as_python: SameAsPython,
+    case: Case,
+    compiler: str,
+    incremental: bool,
+) -> None:
+    layout, name = arranged(case), Path(tool(compiler)).name
+    files = classifier_files("hand", describe(layout.tables), layout, avr=False)
+    frames = probed(layout.tables, 200)
+    held = layout.frame_bytes(frames.bits, frames.codes)
+    answers = host_runner.run(
+        files, "hand", layout, TARGETS["host"], held, incremental=incremental, compiler=name, sanitize=True
+    )
+    same_as_python(answers, layout.tables, frames)
+
+
+@NAMED
+@pytest.mark.parametrize(("part", "adding"), [("atmega328p", "called"), ("atmega2560", "unrolled")])
+def test_assembly_scores_as_python_does(
+    avr: None,
+    arranged: Callable[[Case], Layout],
+    describe: Describe,
+    probed: Probed,
+    same_as_python: SameAsPython,
+    case: Case,
+    part: str,
+    adding: str,
+) -> None:
+    layout = arranged(Case(case.tables, case.how | {"adding": adding}, case.constant))
+    files = classifier_files("hand", describe(layout.tables), layout, avr=True)
+    frames = probed(layout.tables, 40)
+    held = layout.frame_bytes(frames.bits, frames.codes)
+    for incremental in (False, True):
+        answers = avr_runner.run(files, "hand", layout, TARGETS[part], held, incremental=incremental)
+        same_as_python(answers, layout.tables, frames)
+
+
+@pytest.fixture
+def avr(tool: Tool) -> None:
+    tool("avr-gcc")
+    if avr_harness.missing() is not None:
+        tool("libsimavr-dev")
+
+
+def test_many_classes_are_added_up_in_many_parts(
+    tool: Tool, make_tables: MakeTables, describe: Describe, probed: Probed, same_as_python: SameAsPython
+) -> None:
+    tool("gcc")
+    layout = arrange(make_tables(classes=300, switches=6, joints=1))
+    frames = probed(layout.tables, 50)
+    held = layout.frame_bytes(frames.bits, frames.codes)
+    for avr in (False, True):
+        files = classifier_files("hand", describe(layout.tables), layout, avr=avr)
+        text = {name: text for name, text in files.items() if not name.endswith(".S")}
+        answers = host_runner.run(text, "hand", layout, TARGETS["host"], held, sanitize=True)
+        same_as_python(answers, layout.tables, frames)
+
+
+def test_tables_at_the_limit_of_16_bits_borrow_and_carry_as_they_should(
+    tool: Tool, describe: Describe, same_as_python: SameAsPython
+) -> None:
+    # Neighbouring classes at opposite ends: whatever leaks from one lane into the other shows.
+    tool("gcc")
+    row = np.array([16383, -16383, -16383, 16383, 16383], np.int16)
+    rows = np.stack([row, -row, row, -row])
+    zero = np.zeros((0, 5), np.int16)
+    tables = IntegerTables(np.full(5, -1, np.int16), rows, (), (), 0 * rows, zero, 1.0)
+    bits = np.array([[b >> i & 1 for i in range(4)] for b in range(16)], bool)
+    frames = Probes(bits, np.zeros((16, 0), np.uint16))
+    layout = arrange(tables)
+    files = classifier_files("hand", describe(tables), layout, avr=False)
+    for incremental in (False, True):
+        held = layout.frame_bytes(frames.bits, frames.codes)
+        answers = host_runner.run(files, "hand", layout, TARGETS["host"], held, incremental=incremental, sanitize=True)
+        same_as_python(answers, tables, frames)
+
+
+@settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.integers(0, 1000),
+    st.integers(2, 40),
+    st.integers(1, 40),
+    st.integers(0, 6),
+    st.integers(2, 6),
+    st.sampled_from([8, 16]),
+    st.sampled_from(["direct", "trimmed", "search"]),
+)
+def test_any_tables_in_any_layout_score_as_python_does(
+    tool: Tool,
+    make_tables: MakeTables,
+    describe: Describe,
+    same_as_python: SameAsPython,
+    seed: int,
+    classes: int,
+    switches: int,
+    joints: int,
+    group_size: int,
+    entry_bits: int,
+    bins: str,
+) -> None:
+    tool("gcc")
+    tables = make_tables(seed, classes=classes, switches=switches, joints=joints)
+    layout = _arrange(tables, group_size=group_size, entry_bits=entry_bits, bins=bins)
+    frames = random_frames(tables, 60, seed=seed)
+    files = classifier_files("hand", describe(tables), layout, avr=False)
+    held = layout.frame_bytes(frames.bits, frames.codes)
+    same_as_python(host_runner.run(files, "hand", layout, TARGETS["host"], held, incremental=True), tables, frames)
+
+
+@pytest.mark.parametrize("entry_bits", [8, 16])
+@pytest.mark.parametrize(
+    ("bins", "shift", "codes"), [("direct", 40, 256), ("trimmed", 40, 256), ("trimmed", 600, 1024), ("search", 40, 256)]
+)
+def test_every_code_finds_its_row_on_both(
+    avr: None,
+    make_tables: MakeTables,
+    describe: Describe,
+    same_as_python: SameAsPython,
+    bins: str,
+    shift: int,
+    codes: int,
+    entry_bits: int,
+) -> None:
+    drawn = make_tables(seed=3, switches=2, joints=2, bins=9, highest=100)
+    shifted = tuple((steps + shift).astype(np.uint16) for steps in drawn.thresholds)
+    kept = drawn.bias, drawn.switch_rows, shifted, drawn.joint_rows
+    tables = IntegerTables(*kept, drawn.switch_means, drawn.joint_means, drawn.scale)
+    layout = _arrange(tables, bins=bins, entry_bits=entry_bits)
+    every = np.arange(codes, dtype=np.uint16)
+    frames = Probes(np.zeros((codes, 2), bool), np.stack([every, every[::-1]], axis=1))
+    held = layout.frame_bytes(frames.bits, frames.codes)
+    files = [classifier_files("hand", describe(tables), layout, avr=avr) for avr in (False, True)]
+    same_as_python(host_runner.run(files[0], "hand", layout, TARGETS["host"], held, sanitize=True), tables, frames)
+    for incremental in (False, True):
+        part = TARGETS["atmega328p"]
+        answers = avr_runner.run(files[1], "hand", layout, part, held, incremental=incremental)
+        same_as_python(answers, tables, frames)
+
+
+def _watched(call: str) -> str:
+    """Return assembly that makes `call` what it is, and answers 255 where it loses a register that C keeps, or r1."""
+    kept = [*range(2, 18), 28, 29]
+    saved = "".join(f"    push r{n}\n" for n in kept)
+    marked = "".join(f"    ldi r24, {n}\n    mov r{n}, r24\n" for n in kept)
+    held = "".join(f"    ldi r25, {n}\n    cpse r{n}, r25\n    ldi r24, 255\n" for n in kept)
+    restored = "".join(f"    pop r{n}\n" for n in reversed(kept))
+    zero = "    ldi r25, 0\n    cpse r1, r25\n    ldi r24, 255\n    clr r1\n"
+    return f"    .global {call}\n{call}:\n{saved}{marked}    call unwatched_{call}\n{held}{zero}{restored}    ret\n"
+
+
+@pytest.mark.parametrize("incremental", [False, True], ids=["classify", "update"])
+@pytest.mark.parametrize("classes", [2, 6, 14, 20])
+@pytest.mark.parametrize("entry_bits", [8, 16])
+def test_assembly_keeps_the_registers_that_c_keeps(
+    avr: None,
+    make_tables: MakeTables,
+    describe: Describe,
+    same_as_python: SameAsPython,
+    entry_bits: int,
+    classes: int,
+    incremental: bool,
+) -> None:
+    # Scores beyond a byte, where entries have room for them: the best is in r1:r0 in the end.
+    layout = arrange(make_tables(classes=classes, reach=20 if entry_bits == 8 else 1500), entry_bits=entry_bits)
+    files = classifier_files("hand", describe(layout.tables), layout, avr=True)
+    call_name = "thenar_hand_update" if incremental else "thenar_hand_classify"
+    # Only as a whole word: its section keeps its name.
+    unwatched = re.sub(rf"(?<![\w.]){call_name}\b", f"unwatched_{call_name}", files["thenar_hand_avr.S"])
+    watched = {**files, "thenar_hand_avr.S": unwatched, "watched.S": _watched(call_name)}
+    frames = random_frames(layout.tables, 20, seed=1)
+    held = layout.frame_bytes(frames.bits, frames.codes)
+    answers = avr_runner.run(watched, "hand", layout, TARGETS["atmega328p"], held, incremental=incremental)
+    same_as_python(answers, layout.tables, frames)

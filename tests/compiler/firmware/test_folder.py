@@ -1,0 +1,126 @@
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from thenar.compiler.firmware.errors import FirmwareError
+from thenar.compiler.firmware.folder import SUMS, sums, write_folder
+
+OLD = {"thenar_glove.c": "old\n", "examples/one/one.ino": "old\n", "gone.h": "old\n"}
+NEW = {"thenar_glove.c": "new\n", "examples/one/one.ino": "new\n", "Makefile": "all:\n"}
+
+
+def content(folder: Path) -> dict[str, str]:
+    return {str(path.relative_to(folder)): path.read_text() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return write_folder(OLD, tmp_path / "firmware")
+
+
+def test_a_new_or_empty_folder_takes_the_files_and_their_sums(tmp_path: Path, tool: Callable[[str], str]) -> None:
+    (tmp_path / "empty").mkdir()
+    for name in ("new", "empty"):
+        folder = write_folder(NEW, tmp_path / name)
+        assert content(folder) == {**NEW, SUMS: sums(NEW)}
+        subprocess.run([tool("sha256sum"), "--check", "--strict", "--quiet", SUMS], cwd=folder, check=True)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["empty", "new"]
+
+
+def test_firmware_is_replaced_only_where_that_is_asked_for(folder: Path) -> None:
+    with pytest.raises(FirmwareError, match="holds firmware already: name another folder, or add --overwrite"):
+        write_folder(NEW, folder)
+    assert content(folder) == {**OLD, SUMS: sums(OLD)}
+    write_folder(NEW, folder, overwrite=True)
+    assert content(folder) == {**NEW, SUMS: sums(NEW)}
+    assert [path.name for path in folder.parent.iterdir()] == ["firmware"]
+
+
+def test_what_the_user_put_there_stays(folder: Path) -> None:
+    mine = {"main.c": "int main(void)\n", "examples/one/notes": "mine", "build/thenar_glove.o": "object"}
+    (folder / "build").mkdir()
+    for path, text in mine.items():
+        (folder / path).write_text(text)
+    (folder / "link").symlink_to("main.c")
+    write_folder(NEW, folder, overwrite=True)
+    assert content(folder) == {**NEW, **mine, "link": "int main(void)\n", SUMS: sums(NEW)}
+    assert (folder / "link").is_symlink()
+
+
+@pytest.mark.parametrize("path", ["Makefile", "examples/one/one.ino"])
+def test_a_users_file_where_one_of_ours_is_to_stand_is_not_replaced(tmp_path: Path, path: str) -> None:
+    folder = write_folder({"gone.h": "old\n"}, tmp_path / "firmware")
+    (folder / path).parent.mkdir(parents=True, exist_ok=True)
+    (folder / path).write_text("mine")
+    with pytest.raises(FirmwareError, match=f"holds {path}, which thenar has not written"):
+        write_folder(NEW, folder, overwrite=True)
+    assert (folder / path).read_text() == "mine"
+
+
+def test_a_users_file_where_a_folder_of_ours_is_to_stand_is_not_replaced(tmp_path: Path) -> None:
+    folder = write_folder({"gone.h": "old\n"}, tmp_path / "firmware")
+    (folder / "examples").write_text("mine")
+    with pytest.raises(FirmwareError, match="holds examples, which thenar has not written"):
+        write_folder(NEW, folder, overwrite=True)
+
+
+def test_what_was_changed_since_is_not_replaced(folder: Path) -> None:
+    (folder / "thenar_glove.c").write_text("better\n")
+    with pytest.raises(FirmwareError, match=r"thenar_glove\.c was changed since thenar wrote it"):
+        write_folder(NEW, folder, overwrite=True)
+    assert (folder / "thenar_glove.c").read_text() == "better\n"
+
+
+def test_a_folder_of_somebody_elses_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "firmware").mkdir()
+    (tmp_path / "firmware" / "main.c").write_text("mine")
+    with pytest.raises(FirmwareError, match="is not empty and holds no firmware of thenar"):
+        write_folder(NEW, tmp_path / "firmware", overwrite=True)
+    assert content(tmp_path / "firmware") == {"main.c": "mine"}
+
+
+def test_a_place_that_cannot_be_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(FirmwareError, match="file is a file: name a folder"):
+        write_folder(NEW, tmp_path / "file")
+    with pytest.raises(FirmwareError, match="nowhere is no folder: make it first"):
+        write_folder(NEW, tmp_path / "nowhere" / "firmware")
+
+
+@pytest.mark.parametrize("interrupted", [1, 2])
+def test_interrupted_at_either_rename_the_old_folder_stays(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, interrupted: int
+) -> None:
+    renames, rename = [], Path.rename
+
+    def counting(self: Path, target: Path) -> Path:
+        renames.append(target)
+        if len(renames) == interrupted:
+            raise KeyboardInterrupt
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "rename", counting)
+    with pytest.raises(KeyboardInterrupt):
+        write_folder(NEW, folder, overwrite=True)
+    assert content(folder) == {**OLD, SUMS: sums(OLD)}
+    assert [path.name for path in folder.parent.iterdir()] == ["firmware"]
+
+
+def test_a_full_disk_leaves_the_old_folder(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        write_folder(NEW, folder, overwrite=True)
+    assert content(folder) == {**OLD, SUMS: sums(OLD)}
+    assert [path.name for path in folder.parent.iterdir()] == ["firmware"]
+
+
+def test_through_a_link_the_folder_behind_it_is_written(tmp_path: Path, folder: Path) -> None:
+    (tmp_path / "link").symlink_to(folder)
+    assert write_folder(NEW, tmp_path / "link", overwrite=True) == folder
+    assert (tmp_path / "link").is_symlink()
+    assert content(folder) == {**NEW, SUMS: sums(NEW)}

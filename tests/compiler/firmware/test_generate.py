@@ -1,0 +1,208 @@
+import re
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from thenar.cli import firmware_command
+from thenar.compiler.firmware.board import Board
+from thenar.compiler.firmware.board_loading import parse_board
+from thenar.compiler.firmware.errors import FirmwareError
+from thenar.compiler.firmware.folder import write_folder
+from thenar.compiler.firmware.generate import MODES, PLATFORMS, Mode, Request, firmware_files, fit_of
+from thenar.compiler.firmware.one_hand import for_one_hand
+from thenar.compiler.firmware.targets import TARGETS
+from thenar.drivers.calibration import GloveCalibration, SensorCalibration
+from thenar.runtime.build import Build
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.tables import IntegerTables
+
+MakeTables = Callable[..., IntegerTables]
+Describe = Callable[[IntegerTables], Manifest]
+Tool = Callable[[str], str]
+
+PINS = "\n".join(f's{number} = "PD{number + 2}"' for number in range(6)) + '\ns6 = "PB0"\ns7 = "PB1"\ns8 = "PB2"\n'
+CHIP = "pins = { " + ", ".join(f'GP{"AB"[n // 7]}{n % 7} = "s{n}"' for n in range(9)) + " }\n"
+MORE = "pins = { " + ", ".join(f'GPA{n - 3} = "s{n}"' for n in range(3, 9)) + " }\n"
+CYBERGLOVE = '[cyberglove]\nsensors = 18\njoints = ["j0", "j1", "j2"' + ', ""' * 15 + "]\n"
+BOARDS = {
+    "scan pins": ("scan", "atmega328p", "[pins]\n" + PINS),
+    "scan chip": ("scan", "atmega2560", '[[chip]]\nkind = "mcp23017"\naddress = 0x20\n' + CHIP),
+    "glove analog": ("glove", "atmega328p", "[pins]\n" + PINS + '[analog]\nj0 = "ADC0"\nj1 = "ADC1"\nj2 = "ADC2"\n'),
+    "glove chip": ("glove", "atmega2560", '[[chip]]\nkind = "mcp23017"\naddress = 0x20\n' + CHIP + CYBERGLOVE),
+    "glove early, of one reading": (
+        "glove",
+        "atmega2560",
+        'early_exit = true\n[[chip]]\nkind = "mcp23017"\naddress = 0x20\n' + CHIP + CYBERGLOVE,
+    ),
+    "glove early": (
+        "glove",
+        "atmega2560",
+        'early_exit = true\n[[chip]]\nkind = "mcp23008"\naddress = 0x20\n'
+        'pins = { GP0 = "s0", GP1 = "s1", GP2 = "s2" }\n[[chip]]\nkind = "mcp23017"\naddress = 0x21\n'
+        + MORE
+        + CYBERGLOVE,
+    ),
+}
+PLATFORM = {part: platform for platform, part in PLATFORMS.items() if part is not None}
+COMPILERS = {"avr": "avr-gcc", "cortex": "arm-none-eabi-gcc", "host": "gcc"}
+
+
+@pytest.fixture(scope="session")
+def build(make_tables: MakeTables, describe: Describe) -> Build:
+    tables = make_tables()
+    return Build(describe(tables), tables)
+
+
+def board_of(case: str) -> tuple[Mode, Board]:
+    mode, part, text = BOARDS[case]
+    return mode, parse_board(f'part = "{part}"\n' + text)  # type: ignore[return-value]
+
+
+def of_board(build: Build, case: str) -> dict[str, str]:
+    mode, board = board_of(case)
+    hand = GloveCalibration(sensors=tuple(SensorCalibration(f"j{n}", 40, 0.0, 200, 90.0) for n in range(3)))
+    if mode == "glove":
+        build = for_one_hand(build, hand)
+    request = Request(build, PLATFORM[board.part], mode, board=board)
+    return firmware_files(request, fit_of(request))
+
+
+def classifier(build: Build, platform: str) -> dict[str, str]:
+    request = Request(build, platform)
+    return firmware_files(request, fit_of(request))
+
+
+def make(folder: Path, *arguments: str) -> str:
+    strict = "CFLAGS=-Os -Werror"
+    done = subprocess.run(["make", "-C", str(folder), strict, *arguments], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "warning" not in done.stderr, done.stderr
+    return done.stdout + done.stderr  # qemu's semihosting prints on the latter
+
+
+@pytest.mark.parametrize("platform", [name for name in PLATFORMS if name != "arduino"])
+def test_the_folder_of_a_classifier_compiles_without_a_warning_and_tests_itself(
+    build: Build, platform: str, tmp_path: Path, tool: Tool
+) -> None:
+    tool(COMPILERS[next(kind for kind in COMPILERS if platform.startswith(kind))])
+    folder = write_folder(classifier(build, platform), tmp_path / "firmware")
+    make(folder)
+    assert "text" in make(folder, "size")
+    if platform.startswith("cortex"):
+        tool("qemu-system-arm")
+    if not platform.startswith("avr"):
+        assert "\n18 frames, answered as by Python\n" in make(folder, "check")
+    make(folder, "clean")
+    assert {path.name for path in folder.iterdir()} == {*classifier(build, platform), "SHA256SUMS"}
+
+
+@pytest.mark.parametrize("case", BOARDS)
+def test_the_folder_of_a_board_compiles_without_a_warning(build: Build, case: str, tmp_path: Path, tool: Tool) -> None:
+    tool("avr-gcc")
+    folder = write_folder(of_board(build, case), tmp_path / "firmware")
+    make(folder)
+    make(folder, "size")
+
+
+@pytest.mark.parametrize("platform", PLATFORMS)
+def test_the_same_request_gives_the_same_files_which_name_no_place_and_no_time(build: Build, platform: str) -> None:
+    files = classifier(build, platform)
+    assert files == classifier(build, platform)
+    for text in files.values():
+        assert str(Path.cwd()) not in text
+        assert not re.search(r"20\d\d-\d\d-\d\d", text)
+
+
+@pytest.mark.parametrize("platform", PLATFORMS)
+def test_files_are_called_by_the_name_and_no_name_is_rewritten(build: Build, platform: str) -> None:
+    request = Request(build, platform, name="anne_2")
+    files = firmware_files(request, fit_of(request))
+    assert any(path.endswith("thenar_anne_2.h") for path in files)
+    with pytest.raises(FirmwareError, match="'Anne' cannot be the name"):
+        Request(build, platform, name="Anne")
+
+
+@pytest.mark.parametrize(("switches", "joints", "words"), [(9, 0, "9 switches"), (0, 3, "3 joints")])
+def test_nobody_reads_of_inputs_that_there_are_none_of(
+    make_tables: MakeTables, describe: Describe, switches: int, joints: int, words: str
+) -> None:
+    tables = make_tables(switches=switches, joints=joints)
+    files = classifier(Build(describe(tables), tables), "arduino")
+    for path in ("src/thenar_glove.h", "README.md", "library.properties"):
+        assert re.search(rf"grasp types\s+from {words} of a glove", files[path]), path
+
+
+def test_on_this_machine_the_layout_is_told_without_a_microcontrollers_cycles(build: Build) -> None:
+    fit = fit_of(Request(build, "host"))
+    assert fit.target.part == "host"
+    assert fit.words.startswith("for this machine: ")
+    assert not re.search("atmega|cycles|instructions", fit.words)
+
+
+@pytest.mark.parametrize("platform", [name for name, part in PLATFORMS.items() if part is not None])
+def test_more_flash_than_the_part_has_is_refused(build: Build, platform: str) -> None:
+    part = TARGETS[str(PLATFORMS[platform])]
+    assert fit_of(Request(build, platform, flash=part.flash)).choice.cost.flash <= part.flash
+    with pytest.raises(FirmwareError, match=f"{part.part} has {part.flash} bytes$"):
+        fit_of(Request(build, platform, flash=part.flash + 1))
+
+
+def test_where_any_part_will_do_none_is_chosen_for_flash_that_it_has_not(build: Build) -> None:
+    fit = fit_of(Request(build, "arduino", flash=1 << 20))
+    assert (fit.target.part, fit.choice.cost.flash <= fit.target.flash) == ("atmega328p", True)
+
+
+def test_notes_stand_in_the_opening_of_the_header(build: Build) -> None:
+    request = Request(build, "avr328p")
+    files = firmware_files(request, fit_of(request), ("measured on a rainy day",))
+    assert "measured on a rainy day" in files["thenar_glove.h"].split("*/")[0]
+
+
+@pytest.mark.parametrize("platform", ["avr328p", "cortex-m4", "host", "arduino"])
+def test_less_flash_is_a_smaller_layout_and_too_little_is_refused(build: Build, platform: str) -> None:
+    whole = fit_of(Request(build, platform)).choice
+    smallest = whole.frontier[-1][1].flash
+    assert whole.cost.flash > smallest
+    assert fit_of(Request(build, platform, flash=smallest)).choice.cost.flash == smallest
+    # Where any part will do, the largest is the last to refuse.
+    refused = f"takes {smallest} bytes of flash" if PLATFORMS[platform] else "bytes of flash"
+    with pytest.raises(FirmwareError, match=refused):
+        fit_of(Request(build, platform, flash=smallest - 1))
+
+
+@pytest.mark.parametrize(
+    ("platform", "mode", "board", "message"),
+    [
+        ("avr328p", "classify", "scan pins", "the mode classify reads no board"),
+        ("cortex-m4", "scan", "scan pins", "the mode scan is written for avr328p and avr2560, not for cortex-m4"),
+        ("arduino", "glove", "scan pins", "the mode glove is written for avr328p and avr2560, not for arduino"),
+        ("avr328p", "scan", None, r"the mode scan needs a board\.toml"),
+        ("avr2560", "scan", "scan pins", "the board has an atmega328p, the target avr2560 is an atmega2560"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(
+    build: Build, platform: str, mode: Mode, board: str | None, message: str
+) -> None:
+    wiring = None if board is None else board_of(board)[1]
+    with pytest.raises(FirmwareError, match=message):
+        Request(build, platform, mode, board=wiring)
+
+
+def test_the_command_offers_what_can_be_made() -> None:
+    assert tuple(PLATFORMS) == firmware_command.PLATFORMS
+    assert firmware_command.MODES == MODES
+
+
+def test_a_build_too_large_for_an_uno_is_laid_out_for_what_holds_it(
+    make_tables: MakeTables, describe: Describe
+) -> None:
+    tables = make_tables(classes=40, switches=40, joints=12, bins=30)
+    build = Build(describe(tables), tables)
+    assert fit_of(Request(build, "arduino")).target.part == "atmega2560"
+    for classes, part in ((60, "cortex-m4"), (200, "host")):
+        huge = make_tables(classes=classes, switches=60, joints=20, bins=60)
+        request = Request(Build(describe(huge), huge), "arduino")
+        assert fit_of(request).target.part == part
+        assert "src/thenar_glove_avr.S" not in firmware_files(request, fit_of(request))

@@ -1,0 +1,173 @@
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.compiler.firmware.errors import FirmwareError
+from thenar.compiler.firmware.layout import Bins, Layout, arrange
+from thenar.compiler.firmware.lookups import lookups
+from thenar.compiler.firmware.parts import parts_of
+from thenar.compiler.firmware.probes import Probes
+from thenar.runtime.tables import IntegerTables
+
+MakeTables = Callable[..., IntegerTables]
+ANY_LAYOUT = st.fixed_dictionaries(
+    {"group_size": st.integers(2, 6), "entry_bits": st.sampled_from([8, 16])}
+    | {"bins": st.sampled_from(["direct", "trimmed", "search"])}
+)
+
+
+def plain_scores(tables: IntegerTables, frames: Probes) -> np.ndarray:
+    """The sum of runtime/tables.py, written down once more."""
+    scores = tables.bias + frames.bits.astype(np.int64) @ tables.switch_rows.astype(np.int64)
+    for codes, thresholds, rows in zip(frames.codes.T, tables.thresholds, tables.joint_rows, strict=True):
+        scores = scores + rows[(codes[:, np.newaxis] > thresholds).sum(axis=1)]
+    return np.asarray(scores)
+
+
+def without_thresholds(tables: IntegerTables, joint: int) -> IntegerTables:
+    """The same tables with a joint whose every code takes the same row."""
+    thresholds, rows = list(tables.thresholds), list(tables.joint_rows)
+    thresholds[joint], rows[joint] = thresholds[joint][:0], rows[joint][:1]
+    return IntegerTables(
+        tables.bias,
+        tables.switch_rows,
+        tuple(thresholds),
+        tuple(rows),
+        tables.switch_means,
+        tables.joint_means,
+        tables.scale,
+    )
+
+
+@given(st.integers(0, 99), st.integers(0, 12), st.integers(0, 3), ANY_LAYOUT)
+def test_scores_are_those_of_the_tables(
+    make_tables: MakeTables, probed: Callable[..., Probes], seed: int, switches: int, joints: int, how: dict
+) -> None:
+    tables = make_tables(seed, switches=switches, joints=joints)
+    if switches + joints == 0:
+        return
+    frames = probed(tables, 30)
+    layout = arrange(tables, **how)
+    assert np.array_equal(layout.scores(frames.bits, frames.codes), plain_scores(tables, frames))
+
+
+@pytest.mark.parametrize("bins", ["direct", "trimmed", "search"])
+@pytest.mark.parametrize("entry_bits", [8, 16])
+def test_every_code_of_a_byte_finds_its_row(make_tables: MakeTables, bins: Bins, entry_bits: int) -> None:
+    tables = make_tables(seed=4, switches=0, joints=1, bins=9)
+    codes = np.arange(256, dtype=np.uint16)[:, np.newaxis]
+    frames = Probes(np.zeros((256, 0), bool), codes)
+    scores = arrange(tables, bins=bins, entry_bits=entry_bits).scores(frames.bits, codes)
+    assert np.array_equal(scores, plain_scores(tables, frames))
+
+
+def test_groups_are_consecutive_and_as_even_as_can_be(make_tables: MakeTables) -> None:
+    tables = make_tables(switches=33)
+    assert [len(group) for group in arrange(tables).groups] == [5, 5, 5, 5, 5, 4, 4]
+    assert [len(group) for group in arrange(tables, n_groups=8).groups] == [5, 4, 4, 4, 4, 4, 4, 4]
+    assert [number for group in arrange(tables).groups for number in group] == list(range(33))
+
+
+def test_with_wide_entries_row_0_of_a_group_is_zero_and_row_2_to_the_b_its_switch_b(make_tables: MakeTables) -> None:
+    tables = make_tables(switches=11)
+    layout = arrange(tables)
+    for numbers, rows in zip(layout.groups, layout.group_rows, strict=True):
+        assert not rows[0].any()
+        for bit, number in enumerate(numbers):
+            assert np.array_equal(rows[1 << bit], tables.switch_rows[number])
+
+
+@given(st.integers(0, 99))
+def test_narrow_entries_are_bytes_of_which_every_class_has_a_zero_in_every_look_up(
+    make_tables: MakeTables, seed: int
+) -> None:
+    layout = arrange(make_tables(seed), entry_bits=8)
+    for lookup in lookups(layout):
+        assert lookup.rows.dtype == np.uint8
+        assert not lookup.rows.min(axis=0).any()
+
+
+def test_look_ups_lie_one_after_the_other(make_tables: MakeTables) -> None:
+    layout = arrange(without_thresholds(make_tables(joints=4), 1), bins="trimmed")
+    made = list(lookups(layout))
+    assert [lookup.index for lookup in made] == list(range(layout.n_lookups))
+    assert [lookup.number for lookup in made] == [0, 1, 0, 2, 3]
+    ends = np.cumsum([len(lookup.rows) for lookup in made]).tolist()
+    assert [lookup.first_row for lookup in made] == [0, *ends[:-1]]
+    assert ends[-1] == layout.n_rows
+
+
+def test_a_constant_joint_is_part_of_the_start(make_tables: MakeTables, probed: Callable[..., Probes]) -> None:
+    whole = make_tables(joints=3)
+    tables = without_thresholds(whole, 1)
+    frames = probed(whole, 20)
+    layout = arrange(tables)
+    assert layout.joints[1].constant
+    assert not layout.joints[1].rows.any()
+    assert np.array_equal(layout.scores(frames.bits, frames.codes), plain_scores(tables, frames))
+
+
+def test_frames_hold_groups_then_codes(make_tables: MakeTables) -> None:
+    layout = arrange(make_tables(switches=7, joints=2))
+    bits = np.array([[1, 0, 0, 1, 0, 0, 1]], bool)
+    assert layout.frame_bytes(bits, np.array([[7, 254]], np.uint16)).tolist() == [[0b1001, 0b100, 7, 254]]
+    assert layout.frame_bytes(bits, np.array([[7, 60000]], np.uint16)).tolist() == [[0b1001, 0b100, 7, 255]]
+
+
+def test_wide_codes_are_little_endian_at_even_offsets(make_tables: MakeTables) -> None:
+    layout = arrange(make_tables(switches=3, joints=2, highest=700), bins="search")
+    frames = layout.frame_bytes(np.ones((1, 3), bool), np.array([[0x1234, 9]], np.uint16))
+    assert layout.code_bits == 16
+    assert frames.tolist() == [[7, 0, 0x34, 0x12, 9, 0]]
+
+
+def test_a_threshold_of_254_is_the_last_that_a_byte_can_tell(make_tables: MakeTables) -> None:
+    assert arrange(make_tables(highest=254)).code_bits == 8
+    assert arrange(make_tables(highest=255), bins="search").code_bits == 16
+
+
+def test_trimmed_bins_serve_wide_codes_whose_thresholds_are_close(make_tables: MakeTables) -> None:
+    tables = make_tables(seed=2, switches=0, joints=1, highest=254)
+    shifted = IntegerTables(
+        tables.bias,
+        tables.switch_rows,
+        (tables.thresholds[0] + np.uint16(900),),
+        tables.joint_rows,
+        tables.switch_means,
+        tables.joint_means,
+        tables.scale,
+    )
+    frames = Probes(np.zeros((1300, 0), bool), np.arange(1300, dtype=np.uint16)[:, np.newaxis])
+    layout = arrange(shifted, bins="trimmed")
+    assert np.array_equal(layout.scores(frames.bits, frames.codes), plain_scores(shifted, frames))
+
+
+def refused(tables: IntegerTables, **how: object) -> str:
+    arranged: Callable[..., Layout] = arrange
+    with pytest.raises(FirmwareError) as raised:
+        arranged(tables, **how)
+    return str(raised.value)
+
+
+def test_what_cannot_be_laid_out_is_refused(make_tables: MakeTables) -> None:
+    wide = make_tables(highest=800)
+    assert "nothing to make firmware of" in refused(make_tables(switches=0, joints=0))
+    assert "entries of 12 bits" in refused(make_tables(), entry_bits=12)
+    assert "groups of 7 switches" in refused(make_tables(), group_size=7)
+    assert "1 groups of at most 5 for 9 switches: 2 or more" in refused(make_tables(), n_groups=1)
+    assert '"trimmed" or "search", not "direct"' in refused(wide)
+    assert 'found by "search"' in refused(wide, bins="trimmed")
+    assert "compile the build with --table-bits 8" in refused(make_tables(reach=300), entry_bits=8)
+    assert "300 rows" in refused(make_tables(bins=300, highest=3000), bins="search")
+
+
+@given(st.integers(2, 1024))
+def test_parts_are_of_equal_width_and_cover_all_classes(classes: int) -> None:
+    parts = parts_of(classes)
+    covered = {first + k for first in parts.firsts for k in range(parts.width)}
+    assert covered == set(range(classes))
+    assert parts.width <= 14
+    assert len(parts.firsts) == -(-classes // 14)

@@ -1,0 +1,167 @@
+"""The folders for this machine and for a Cortex-M, made and checked by their own Makefiles."""
+
+import re
+import subprocess
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thenar.compiler.firmware.classifier import classifier_files
+from thenar.compiler.firmware.cortex_files import cortex_files
+from thenar.compiler.firmware.host_files import host_files
+from thenar.compiler.firmware.layout import Layout, arrange
+from thenar.compiler.firmware.probes import turns
+from thenar.compiler.firmware.self_test import CHECKS, self_test_frames
+from thenar.compiler.firmware.targets import TARGETS
+from thenar.runtime.build import Build
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.tables import IntegerTables
+
+MakeTables = Callable[..., IntegerTables]
+Describe = Callable[[IntegerTables], Manifest]
+Make = Callable[..., "subprocess.CompletedProcess[str]"]
+
+PARTS = ("host", "cortex-m0plus", "cortex-m4")
+AGREED = {
+    "host": f"{CHECKS} frames, answered as by Python\n",
+    "cortex-m0plus": f"{CHECKS} frames, answered as by Python\n",
+    "cortex-m4": f"{CHECKS} frames, answered as by Python\n",
+}
+SHAPES = {
+    "switches_and_joints": {"classes": 14, "switches": 33, "joints": 16},
+    "switches_only": {"joints": 0},
+    "joints_only_wide_codes": {"switches": 0, "highest": 4095},
+    "wide_codes_after_an_odd_byte": {"switches": 3, "highest": 4095},
+    "more_than_256_classes": {"classes": 260, "reach": 3},
+}
+
+
+def files_for(part: str, layout: Layout, manifest: Manifest) -> dict[str, str]:
+    own = classifier_files("hand", manifest, layout, avr=False)
+    grasps = manifest.grasps
+    around = (
+        host_files("hand", layout, grasps) if part == "host" else cortex_files("hand", layout, TARGETS[part], grasps)
+    )
+    assert not own.keys() & around.keys()
+    return own | around
+
+
+@pytest.fixture
+def make(tool: Callable[[str], str], tmp_path: Path) -> Make:
+    """Return what writes files into a folder and runs make there."""
+
+    def make(part: str, files: Mapping[str, str], *arguments: str) -> "subprocess.CompletedProcess[str]":
+        for program in ("gcc",) if part == "host" else ("arm-none-eabi-gcc", "qemu-system-arm"):
+            tool(program)
+        for name, text in files.items():
+            (tmp_path / name).write_text(text)
+        command = [tool("make"), "-s", *arguments]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120)
+
+    return make
+
+
+@pytest.mark.parametrize("shape", list(SHAPES))
+@pytest.mark.parametrize("part", PARTS)
+def test_a_folder_checks_itself_without_a_warning(
+    make: Make, make_tables: MakeTables, describe: Describe, part: str, shape: str
+) -> None:
+    tables = make_tables(**SHAPES[shape])
+    files = files_for(part, arrange(tables, bins="search"), describe(tables))
+    assert [line for text in files.values() for line in text.splitlines() if len(line) > 120] == []
+    done = make(part, files, "CFLAGS=-O2 -Werror", "check")
+    assert (done.returncode, done.stdout + done.stderr) == (0, AGREED[part])
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_a_classifier_with_a_wrong_entry_fails_its_check(
+    make: Make, make_tables: MakeTables, describe: Describe, part: str
+) -> None:
+    tables = make_tables()
+    files = files_for(part, arrange(tables), describe(tables))
+    wrong = re.sub(r"START\((-?\d+), ", lambda found: f"START({int(found[1]) + 1}, ", files["thenar_hand.c"], count=1)
+    assert wrong != files["thenar_hand.c"]
+    done = make(part, files | {"thenar_hand.c": wrong}, "check")
+    assert done.returncode != 0
+    assert "answers differ from Python's\n" in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("part", PARTS)
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [("{0, 1}, {0, 2},", "{0, 2}, {0, 1},"), ('"grasp 0",\n    "grasp 1"', '"grasp 1",\n    "grasp 0"')],
+)
+def test_a_wrong_bit_of_a_switch_and_a_wrong_name_fail_the_check(
+    make: Make, make_tables: MakeTables, describe: Describe, part: str, right: str, wrong: str
+) -> None:
+    tables = make_tables()
+    files = files_for(part, arrange(tables), describe(tables))
+    text = files["thenar_hand.c"]
+    assert text.count(right) == 1
+    done = make(part, files | {"thenar_hand.c": text.replace(right, wrong)}, "check")
+    assert done.returncode != 0
+    assert "answers differ from Python's" in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_make_builds_says_the_size_and_cleans_up(
+    make: Make, make_tables: MakeTables, describe: Describe, tmp_path: Path, part: str
+) -> None:
+    tables = make_tables()
+    files = files_for(part, arrange(tables), describe(tables))
+    made = "libthenar_hand.a" if part == "host" else "thenar_hand.elf"
+    assert make(part, files).returncode == 0
+    assert (tmp_path / made).exists()
+    size = make(part, {}, "size")
+    assert size.stdout.split()[:4] == ["text", "data", "bss", "dec"]
+    assert make(part, {}, "clean").returncode == 0
+    assert {path.name for path in tmp_path.iterdir()} == files.keys()
+
+
+@pytest.mark.parametrize("changed", ["thenar_hand.c", "thenar_hand.h", "thenar_hand_check.h"])
+@pytest.mark.parametrize("part", PARTS)
+def test_what_a_changed_file_is_part_of_is_made_again(
+    make: Make, make_tables: MakeTables, describe: Describe, part: str, changed: str
+) -> None:
+    tables = make_tables()
+    assert make(part, files_for(part, arrange(tables), describe(tables)), "check").returncode == 0
+    again = make(part, {}, "-n", "-W", changed, "check").stdout
+    assert ("-c -o thenar_hand.o thenar_hand.c" in again) == (changed != "thenar_hand_check.h")
+    assert ("check.c" in again if part == "host" else "-c -o main.o main.c" in again) or changed == "thenar_hand.c"
+
+
+def test_flash_runs_the_command_that_it_is_given_and_asks_for_one_otherwise(
+    make: Make, make_tables: MakeTables, describe: Describe
+) -> None:
+    tables = make_tables()
+    files = files_for("cortex-m0plus", arrange(tables), describe(tables))
+    asked = make("cortex-m0plus", files, "flash")
+    assert asked.returncode != 0
+    assert asked.stdout == "name the command that programs your part: see the top of the Makefile\n"
+    done = make("cortex-m0plus", {}, "flash", "FLASH_WITH=@echo programming $<")
+    assert (done.returncode, done.stdout) == (0, "programming thenar_hand.elf\n")
+
+
+def test_the_frames_are_the_extreme_ones_and_others_at_the_thresholds(make_tables: MakeTables) -> None:
+    tables = make_tables(switches=9, joints=4)
+    frames = self_test_frames(arrange(tables))
+    assert frames.bits.shape == (CHECKS, 9)
+    assert frames.codes.shape == (CHECKS, 4)
+    assert (frames.bits[0].any(), frames.bits[1].all()) == (False, True)
+    assert frames.codes[:2].tolist() == [[0] * 4, [255] * 4]
+    for joint in range(4):
+        assert set(frames.codes[:, joint].tolist()) <= set(turns(tables, joint).tolist())
+    assert len(np.unique(frames.bits, axis=0)) == CHECKS
+
+
+def test_the_answers_in_the_check_are_those_of_the_build(make_tables: MakeTables, describe: Describe) -> None:
+    tables = make_tables()
+    layout = arrange(tables)
+    frames, build = self_test_frames(layout), Build(describe(tables), tables)
+    grasps = build.grasps
+    scores = [build.scores(bits, codes) for bits, codes in zip(frames.bits, frames.codes, strict=True)]
+    text = "".join(host_files("hand", layout, grasps)["thenar_hand_check.h"].split())
+    for each in scores:
+        assert f"}},{each.argmax()},{{{','.join(str(score) for score in each)}}}," in text

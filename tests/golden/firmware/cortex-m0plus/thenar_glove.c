@@ -1,0 +1,267 @@
+/* thenar_glove.c: tables and integer arithmetic; the header says how it is used.
+   Layout for cortex-m0plus: 16-bit entries, up to 6 switches a look-up, codes looked up in 256 bytes a joint: the
+   fastest of 15 layouts in 65536 bytes of flash, about 87 instructions (162 by update()) and 1677 bytes.
+
+   From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME.c.j2. */
+#include "thenar_glove.h"
+
+#define CLASSES THENAR_GLOVE_CLASSES
+#define ROWS 71u
+
+/* A word holds the entries of two classes, as one sum: they are added up at once. */
+#define WORDS 2u
+typedef uint32_t thenar_glove_row[WORDS];
+#define PAIR(a, b) ((uint32_t)(int32_t)(a) + ((uint32_t)(int32_t)(b) << 16))
+#define REST(a) PAIR(a, 0)
+
+static const thenar_glove_row thenar_glove_rows[ROWS] = {
+    /* columns: power grip, tip pinch, lateral pinch */
+
+    /* switches 0 to 5: thumb tip, index tip, index middle, middle tip, palm radial, palm ulnar */
+    {PAIR(     0,      0), REST(     0)}, /* all open */
+    {PAIR(   310,    205), REST(   -80)}, /* thumb tip */
+    {PAIR(   -45,    260), REST(    33)}, /* index tip */
+    {PAIR(   265,    465), REST(   -47)}, /* thumb tip + index tip */
+    {PAIR(    90,    -12), REST(    -7)}, /* index middle */
+    {PAIR(   400,    193), REST(   -87)}, /* thumb tip + index middle */
+    {PAIR(    45,    248), REST(    26)}, /* index tip + index middle */
+    {PAIR(   355,    453), REST(   -54)}, /* thumb tip + index tip + index middle */
+    {PAIR(   150,   -300), REST(    41)}, /* middle tip */
+    {PAIR(   460,    -95), REST(   -39)}, /* thumb tip + middle tip */
+    {PAIR(   105,    -40), REST(    74)}, /* index tip + middle tip */
+    {PAIR(   415,    165), REST(    -6)}, /* thumb tip + index tip + middle tip */
+    {PAIR(   240,   -312), REST(    34)}, /* index middle + middle tip */
+    {PAIR(   550,   -107), REST(   -46)}, /* thumb tip + index middle + middle tip */
+    {PAIR(   195,    -52), REST(    67)}, /* index tip + index middle + middle tip */
+    {PAIR(   505,    153), REST(   -13)}, /* thumb tip + index tip + index middle + middle tip */
+    {PAIR(   400,   -390), REST(  -120)}, /* palm radial */
+    {PAIR(   710,   -185), REST(  -200)}, /* thumb tip + palm radial */
+    {PAIR(   355,   -130), REST(   -87)}, /* index tip + palm radial */
+    {PAIR(   665,     75), REST(  -167)}, /* thumb tip + index tip + palm radial */
+    {PAIR(   490,   -402), REST(  -127)}, /* index middle + palm radial */
+    {PAIR(   800,   -197), REST(  -207)}, /* thumb tip + index middle + palm radial */
+    {PAIR(   445,   -142), REST(   -94)}, /* index tip + index middle + palm radial */
+    {PAIR(   755,     63), REST(  -174)}, /* thumb tip + index tip + index middle + palm radial */
+    {PAIR(   550,   -690), REST(   -79)}, /* middle tip + palm radial */
+    {PAIR(   860,   -485), REST(  -159)}, /* thumb tip + middle tip + palm radial */
+    {PAIR(   505,   -430), REST(   -46)}, /* index tip + middle tip + palm radial */
+    {PAIR(   815,   -225), REST(  -126)}, /* thumb tip + index tip + middle tip + palm radial */
+    {PAIR(   640,   -702), REST(   -86)}, /* index middle + middle tip + palm radial */
+    {PAIR(   950,   -497), REST(  -166)}, /* thumb tip + index middle + middle tip + palm radial */
+    {PAIR(   595,   -442), REST(   -53)}, /* index tip + index middle + middle tip + palm radial */
+    {PAIR(   905,   -237), REST(  -133)}, /* thumb tip + index tip + index middle + middle tip + palm radial */
+    {PAIR(    77,     -8), REST(   260)}, /* palm ulnar */
+    {PAIR(   387,    197), REST(   180)}, /* thumb tip + palm ulnar */
+    {PAIR(    32,    252), REST(   293)}, /* index tip + palm ulnar */
+    {PAIR(   342,    457), REST(   213)}, /* thumb tip + index tip + palm ulnar */
+    {PAIR(   167,    -20), REST(   253)}, /* index middle + palm ulnar */
+    {PAIR(   477,    185), REST(   173)}, /* thumb tip + index middle + palm ulnar */
+    {PAIR(   122,    240), REST(   286)}, /* index tip + index middle + palm ulnar */
+    {PAIR(   432,    445), REST(   206)}, /* thumb tip + index tip + index middle + palm ulnar */
+    {PAIR(   227,   -308), REST(   301)}, /* middle tip + palm ulnar */
+    {PAIR(   537,   -103), REST(   221)}, /* thumb tip + middle tip + palm ulnar */
+    {PAIR(   182,    -48), REST(   334)}, /* index tip + middle tip + palm ulnar */
+    {PAIR(   492,    157), REST(   254)}, /* thumb tip + index tip + middle tip + palm ulnar */
+    {PAIR(   317,   -320), REST(   294)}, /* index middle + middle tip + palm ulnar */
+    {PAIR(   627,   -115), REST(   214)}, /* thumb tip + index middle + middle tip + palm ulnar */
+    {PAIR(   272,    -60), REST(   327)}, /* index tip + index middle + middle tip + palm ulnar */
+    {PAIR(   582,    145), REST(   247)}, /* thumb tip + index tip + index middle + middle tip + palm ulnar */
+    {PAIR(   477,   -398), REST(   140)}, /* palm radial + palm ulnar */
+    {PAIR(   787,   -193), REST(    60)}, /* thumb tip + palm radial + palm ulnar */
+    {PAIR(   432,   -138), REST(   173)}, /* index tip + palm radial + palm ulnar */
+    {PAIR(   742,     67), REST(    93)}, /* thumb tip + index tip + palm radial + palm ulnar */
+    {PAIR(   567,   -410), REST(   133)}, /* index middle + palm radial + palm ulnar */
+    {PAIR(   877,   -205), REST(    53)}, /* thumb tip + index middle + palm radial + palm ulnar */
+    {PAIR(   522,   -150), REST(   166)}, /* index tip + index middle + palm radial + palm ulnar */
+    {PAIR(   832,     55), REST(    86)}, /* thumb tip + index tip + index middle + palm radial + palm ulnar */
+    {PAIR(   627,   -698), REST(   181)}, /* middle tip + palm radial + palm ulnar */
+    {PAIR(   937,   -493), REST(   101)}, /* thumb tip + middle tip + palm radial + palm ulnar */
+    {PAIR(   582,   -438), REST(   214)}, /* index tip + middle tip + palm radial + palm ulnar */
+    {PAIR(   892,   -233), REST(   134)}, /* thumb tip + index tip + middle tip + palm radial + palm ulnar */
+    {PAIR(   717,   -710), REST(   174)}, /* index middle + middle tip + palm radial + palm ulnar */
+    {PAIR(  1027,   -505), REST(    94)}, /* thumb tip + index middle + middle tip + palm radial + palm ulnar */
+    {PAIR(   672,   -450), REST(   207)}, /* index tip + index middle + middle tip + palm radial + palm ulnar */
+    /* thumb tip + index tip + index middle + middle tip + palm radial + palm ulnar */
+    {PAIR(   982,   -245), REST(   127)},
+
+    /* joint 0: thumb_rotation */
+    {PAIR(  -200,    180), REST(    90)}, /* thumb_rotation to 60 */
+    {PAIR(   -90,    100), REST(    80)}, /* thumb_rotation to 61 */
+    {PAIR(    10,     20), REST(    30)}, /* thumb_rotation to 140 */
+    {PAIR(   250,   -170), REST(   -60)}, /* thumb_rotation above 140 */
+
+    /* joint 1: index_pij */
+    {PAIR(  -310,     40), REST(   220)}, /* index_pij to 90 */
+    {PAIR(    15,    130), REST(   -25)}, /* index_pij to 200 */
+    {PAIR(   330,    -90), REST(  -240)}, /* index_pij above 200 */
+};
+
+/* The rows that joints' codes take. */
+static const uint8_t thenar_glove_bins[512] = {
+    /* thumb_rotation, from code 0 on */
+    0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 2,
+    2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2,
+    2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2,
+    2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2,
+    2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2,
+    2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 3, 3, 3,
+    3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3,
+    3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3,
+    3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3,
+    3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3,
+    3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3,
+    3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3,
+    3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3,
+    /* index_pij, from code 0 on */
+    0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1,
+    1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+    1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+    1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+    1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+    1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+    1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+    1, 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2,
+    2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2,
+    2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2,
+    2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2, 2,
+};
+
+static const char names[CLASSES + 1u][14] = {
+    "power grip",
+    "tip pinch",
+    "lateral pinch",
+    "",
+};
+
+/* Where the input has each switch: byte and bit. */
+static const struct {
+    uint8_t group;
+    uint8_t bit;
+} places[THENAR_GLOVE_SWITCHES] = {
+    {0, 1}, {0, 2}, {0, 4}, {0, 8}, {0, 16}, {0, 32},
+};
+
+thenar_glove_frame thenar_glove_input;
+int16_t thenar_glove_scores[CLASSES] = {
+    -390, 180, 317,
+};
+
+void thenar_glove_set_switch(thenar_glove_switch number, bool closed)
+{
+    if (number < THENAR_GLOVE_SWITCHES) {
+        uint8_t *group = &thenar_glove_input.switches[places[number].group];
+        const uint8_t bit = places[number].bit;
+
+        *group = (uint8_t)(closed ? (*group | bit) : (*group & (uint8_t)~bit));
+    }
+}
+
+const char *thenar_glove_grasp(thenar_glove_class grasp)
+{
+    return names[(grasp < CLASSES) ? grasp : CLASSES];
+}
+
+#define LOOKUPS 3u
+#define LANES 2u /* words of two sums */
+
+/* Sums begin 2^15 too high, so that no lane is negative in the end, when all have taken what they borrowed. */
+#define START(low, high) (((uint32_t)(int32_t)(low) + 32768u) + (((uint32_t)(int32_t)(high) + 32768u) << 16))
+
+static const uint32_t start[LANES] = {
+    START(120, -40), START(7, 0),
+};
+
+/* The rows that are in the sums: at first those of all open and all codes 0. */
+static const thenar_glove_row *added[LOOKUPS] = {
+    &thenar_glove_rows[0],
+    &thenar_glove_rows[64],
+    &thenar_glove_rows[68],
+};
+static uint32_t sums[LANES] = {
+    START(-390, 180), START(317, 0),
+};
+
+static void find_rows(const thenar_glove_row **row)
+{
+    row[0] = &thenar_glove_rows[thenar_glove_input.switches[0]];
+    row[1] = &thenar_glove_rows[64u + thenar_glove_bins[thenar_glove_input.codes[0]]];
+    row[2] = &thenar_glove_rows[68u + thenar_glove_bins[256u + thenar_glove_input.codes[1]]];
+}
+
+/* Set the sums to the start and what the rows add. */
+static void add_up(const uint32_t *from, uint32_t *sum)
+{
+    uint32_t s0 = from[0];
+    uint32_t s1 = from[1];
+
+    for (const thenar_glove_row *const *next = added; next < (added + LOOKUPS); next++) {
+        const uint32_t *row = **next;
+
+        s0 += row[0];
+        s1 += row[1];
+    }
+    sum[0] = s0;
+    sum[1] = s1;
+}
+
+/* Replace a row in the sums. */
+static void replace(const uint32_t *before, const uint32_t *after, uint32_t *sum)
+{
+    sum[0] += after[0] - before[0];
+    sum[1] += after[1] - before[1];
+}
+
+/* The largest sum so far, and the first class that has it. */
+typedef struct {
+    uint32_t sum;
+    uint_fast16_t grasp;
+} largest;
+
+static void take(uint32_t sum, uint_fast16_t k, largest *best)
+{
+    thenar_glove_scores[k] = (int16_t)((int32_t)sum - 32768);
+    if (sum > best->sum) {
+        best->sum = sum;
+        best->grasp = k;
+    }
+}
+
+/* Set the scores to the sums; return the first class whose score is largest. */
+static thenar_glove_class unpack(void)
+{
+    largest best = {0u, 0u};
+
+    take(sums[0] & 0xFFFFu, 0u, &best);
+    take(sums[0] >> 16, 1u, &best);
+    take(sums[1] & 0xFFFFu, 2u, &best);
+    return (thenar_glove_class)best.grasp;
+}
+
+thenar_glove_class thenar_glove_classify(void)
+{
+    find_rows(added);
+    add_up(start, sums);
+    return unpack();
+}
+
+thenar_glove_class thenar_glove_update(void)
+{
+    const thenar_glove_row *now[LOOKUPS];
+
+    find_rows(now);
+    for (uint_fast16_t i = 0u; i < LOOKUPS; i++) {
+        if (now[i] != added[i]) {
+            replace(*added[i], *now[i], sums);
+            added[i] = now[i];
+        }
+    }
+    return unpack();
+}

@@ -1,0 +1,52 @@
+/* Whether a scan may stop; thenar_glove_decided.h says when.
+
+   thenar 0.1.0, template board/thenar_NAME_decided.c.j2. */
+#include "thenar_glove_decided.h"
+
+#ifdef __AVR__
+#include <avr/pgmspace.h>
+#define IN_FLASH PROGMEM
+#define READ(place) pgm_read_word(&(place))
+#else
+#define IN_FLASH
+#define READ(place) (place)
+#endif
+
+#include "thenar_glove.h"
+
+#define CLASSES 3u
+#define LAST_PORT (THENAR_GLOVE_PORTS - 1u)
+
+/* By so many steps the leader (row) must be ahead of a rival (column) after a port: the most that the unread switches
+   can bring the rival closer, and one more where the rival would win a tie. 65535: no lead is enough.
+
+   columns:
+   power grip, tip pinch, lateral pinch
+*/
+static const uint16_t hurdles[LAST_PORT][CLASSES][CLASSES] IN_FLASH = {
+    { /* after port 0 */
+        /* power grip */
+        { 0, 305, 78 },
+        /* tip pinch */
+        { 711, 0, 346 },
+        /* lateral pinch */
+        { 976, 797, 0 },
+    },
+};
+
+bool thenar_glove_decided(uint8_t port, uint8_t leader)
+{
+    bool decided = true;
+
+    if (port < LAST_PORT) {
+        const uint16_t best = (uint16_t)thenar_glove_scores[leader];
+        const uint16_t *needed = hurdles[port][leader];
+
+        for (uint16_t rival = 0u; decided && (rival < CLASSES); rival++) {
+            const uint16_t lead = (uint16_t)(best - (uint16_t)thenar_glove_scores[rival]);
+
+            decided = lead >= READ(needed[rival]);
+        }
+    }
+    return decided;
+}

@@ -1,0 +1,22 @@
+/* Whether a scan may stop: no state of the unread switches, open, closed or lost, could change which grasp type wins.
+
+   thenar 0.1.0, template board/thenar_NAME_decided.h.j2. */
+#ifndef THENAR_GLOVE_DECIDED_H
+#define THENAR_GLOVE_DECIDED_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define THENAR_GLOVE_PORTS 2u
+
+/* Return whether the ports after `port` (numbers from 0, in the order in which they are read) can be left out.
+
+   leader: what classify or update has just returned, with the switches of the ports up to this one as they were read,
+   and those of all later ports open. No input is missing. After the last port the answer is true.
+
+   port 0: switches 4, 5
+   port 1: switches 0, 1, 2, 3
+*/
+bool thenar_glove_decided(uint8_t port, uint8_t leader);
+
+#endif

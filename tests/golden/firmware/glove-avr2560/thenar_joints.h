@@ -1,0 +1,19 @@
+/* The joints: a CyberGlove on a UART.
+
+   thenar 0.1.0, template avr/thenar_joints.h.j2. */
+#ifndef THENAR_JOINTS_H
+#define THENAR_JOINTS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* Start to measure. */
+void thenar_joints_begin(void);
+
+/* Take some of what has come in, as often as can be. */
+void thenar_joints_attend(uint32_t now_us);
+
+/* Put the newest codes into thenar_glove_input. Return false if there are none, or none that is new enough. */
+bool thenar_joints_read(uint32_t now_us);
+
+#endif

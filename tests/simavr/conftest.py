@@ -1,0 +1,51 @@
+"""The harness's programs, compiled, and small AVR programs for them."""
+
+import importlib.util
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from thenar.compiler.firmware.avr_harness import harness, missing
+
+Compile = Callable[..., Path]
+
+
+@pytest.fixture(scope="session")
+def program(tool: Callable[[str], str]) -> Callable[[str], Path]:
+    """Return what gives the path of a program of the harness."""
+    for name in ("avr-gcc", "make"):
+        tool(name)
+    if (gone := missing()) is not None:
+        assert "libsimavr" in gone, gone
+        tool("libsimavr-dev")
+    return harness
+
+
+@pytest.fixture
+def compiled(tool: Callable[[str], str], tmp_path: Path) -> Compile:
+    """Return what compiles a text, C or (suffix ".S") assembly, for a part."""
+
+    def compiled(text: str, part: str, suffix: str = ".c") -> Path:
+        source, elf = tmp_path / f"program{suffix}", tmp_path / "program.elf"
+        source.write_text(text)
+        command = [tool("avr-gcc"), f"-mmcu={part}", "-Os", "-Wall", "-Wextra", "-Werror", str(source), "-o", str(elf)]
+        subprocess.run(command, check=True, timeout=60)
+        return elf
+
+    return compiled
+
+
+@pytest.fixture(scope="session")
+def simulated() -> Any:
+    """Return the module with SimulatedBoard, which tests of other folders load too."""
+    spec = importlib.util.spec_from_file_location("simulated", Path(__file__).with_name("simulated.py"))
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses look their module up
+    spec.loader.exec_module(module)
+    return module
