@@ -16,6 +16,9 @@ from thenar.runtime.build import Build
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
 
+# Compilers and simulators of whole programs: minutes, together.
+pytestmark = pytest.mark.slow
+
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
 

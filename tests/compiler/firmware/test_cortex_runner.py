@@ -14,6 +14,9 @@ from thenar.compiler.firmware.targets import TARGETS, Target
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
 
+# Compilers and simulators of whole programs: minutes, together.
+pytestmark = pytest.mark.slow
+
 PARTS = ("cortex-m0plus", "cortex-m4")
 # Of classify() for 33 switches and 16 joints with 14 classes.
 MOST_INSTRUCTIONS = {
