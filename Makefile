@@ -3,8 +3,10 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 OUT    := out
-# Many tests wait for ports and processes: half as many workers again as cores.
-WORKERS = $(shell $(PYTHON) -c "import os; print(os.cpu_count() * 3 // 2)")
+# Many tests wait for ports and processes: half as many workers again as cores. Slow ones keep a core busy each, with
+# emulated gloves and simulated boards that must keep time.
+CORES = $(shell $(PYTHON) -c "import os; print(os.cpu_count())")
+WORKERS = $(shell expr $(CORES) \* 3 / 2)
 
 # The scene that `make demo` simulates: a shipped one by its name, or a file.
 SCENE ?= quick
@@ -41,7 +43,7 @@ test: $(VENV)/installed  ## the tests, under ten minutes on two cores
 	$(BIN)/python -m pytest -m "not slow" -n $(WORKERS)
 
 test-slow: $(VENV)/installed pythons  ## the slower checks: real Weka, fuzzing, real recordings at full length
-	$(BIN)/python -m pytest -m slow -n $(WORKERS)
+	$(BIN)/python -m pytest -m slow -n $(CORES)
 
 test-all: test test-slow  ## both
 
