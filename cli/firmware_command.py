@@ -89,14 +89,7 @@ def command(
     from ..drivers.calibration import load_calibration
     from ..runtime.build import Build
 
-    if mode == "scan" and (measure or frontier):
-        raise click.UsageError("A board that only scans holds no classifier to --measure or to see the --frontier of.")
-    if target == "host" and (measure or frontier):
-        raise click.UsageError("On this machine nothing is counted: --measure and --frontier are for microcontrollers.")
-    if output is None and not frontier and not measure:
-        raise click.UsageError("Name a folder to write with -o, or look first, with --frontier or --measure.")
-    if calibration is not None and mode != "glove":
-        raise click.UsageError("--calibration is for --mode glove: no other reads a CyberGlove.")
+    _check(target, mode, writes=output is not None, counts=measure or frontier, calibrated=calibration is not None)
     loaded = Build.load(build)
     if calibration is not None:
         loaded = for_one_hand(loaded, load_calibration(calibration))
@@ -116,6 +109,18 @@ def command(
         if output is not None:
             out().print(f"{output}: firmware for {target}; {_next_step(target, output)}", soft_wrap=True)
     return 0 if measured is None or measured.holds else 1
+
+
+def _check(target: str, mode: "Mode", *, writes: bool, counts: bool, calibrated: bool) -> None:
+    """Raise UsageError where options do not go together; `counts` is --measure or --frontier."""
+    if mode == "scan" and counts:
+        raise click.UsageError("A board that only scans holds no classifier to --measure or to see the --frontier of.")
+    if target == "host" and counts:
+        raise click.UsageError("On this machine nothing is counted: --measure and --frontier are for microcontrollers.")
+    if not writes and not counts:
+        raise click.UsageError("Name a folder to write with -o, or look first, with --frontier or --measure.")
+    if calibrated and mode != "glove":
+        raise click.UsageError("--calibration is for --mode glove: no other reads a CyberGlove.")
 
 
 def _measured(request: "Request", fit: "Fit") -> "Measured":

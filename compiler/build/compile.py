@@ -103,9 +103,7 @@ def compile_build(
     rates = [_training_rate(comparison, material, options)]
     if folds:
         rates.append(cross_validated(material, options, steps.fold_done))
-    files = {TABLES_NAME: tables_to_bytes(integers), ENSEMBLE_NAME: ensemble_to_bytes(trained.stumps)}
-    if scan is not None:
-        files[SCAN_NAME] = scanmap_to_bytes(scan)
+    files = _files(integers, trained, scan)
     digests = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
     manifest = Manifest(
         schema=SCHEMA,
@@ -128,9 +126,19 @@ def compile_build(
     made_manifest = manifest_from_bytes(described)
     firmware, note = made_firmware(made_manifest, integers)
     publish({**files, **{path: text.encode() for path, text in firmware.items()}, MANIFEST_NAME: described}, target)
+    only = _only_answer(comparison, material)
+    return BuildReport(target, made_manifest, len(files[TABLES_NAME]), only, note, scan)
+
+
+def _files(integers: IntegerTables, trained: Trained, scan: ScanMap | None) -> dict[str, bytes]:
+    """Return name -> content of what `build.json` holds digests of."""
+    files = {TABLES_NAME: tables_to_bytes(integers), ENSEMBLE_NAME: ensemble_to_bytes(trained.stumps)}
+    return files if scan is None else {**files, SCAN_NAME: scanmap_to_bytes(scan)}
+
+
+def _only_answer(comparison: Comparison, material: Material) -> str | None:
     answers = np.unique(comparison.deployed)
-    only_answer = material.grasps[answers[0]] if len(answers) == 1 else None
-    return BuildReport(target, made_manifest, len(files[TABLES_NAME]), only_answer, note, scan)
+    return material.grasps[answers[0]] if len(answers) == 1 else None
 
 
 class _Steps:

@@ -28,7 +28,6 @@
 
 /* The keys as the classifier knows them. */
 static uint8_t seen[THENAR_BITMAP_BYTES];
-static bool begun; /* it has answered once, and only needs to know what changes */
 
 bool thenar_port_send(const uint8_t *frame, uint8_t length)
 {
@@ -59,14 +58,6 @@ static void show(const uint8_t *closed)
     }
 }
 
-static uint8_t recognised(void)
-{
-    const uint8_t grasp = begun ? thenar_glove_update() : thenar_glove_classify();
-
-    begun = true;
-    return grasp;
-}
-
 /* Return by how many steps a grasp type leads the second. */
 static uint16_t margin(uint8_t grasp)
 {
@@ -92,12 +83,12 @@ static void tell_grasp(uint8_t grasp, bool complete, uint8_t flags, uint32_t now
 /* What was not read keeps its last state for the host, lost or not: so often everything is read. */
 #define WHOLE_US UINT32_C(50000)
 
-static uint32_t whole_at_us;
+static uint32_t whole_at_us = 0u - WHOLE_US; /* so the first scan is one */
 
 /* Return whether this scan is to read everything. */
 static bool whole_is_due(uint32_t now_us)
 {
-    const bool due = !begun || ((now_us - whole_at_us) >= WHOLE_US);
+    const bool due = (now_us - whole_at_us) >= WHOLE_US;
 
     if (due) {
         whole_at_us = now_us;
@@ -121,7 +112,7 @@ static void scan(uint32_t now_us)
     for (uint8_t port = 0u; (port < THENAR_KEYS_PORTS) && !decided; port++) {
         complete = thenar_keys_read(port, closed, known) && complete;
         show(closed);
-        grasp = recognised();
+        grasp = thenar_glove_update();
         decided = complete && !whole && (port < (THENAR_KEYS_PORTS - 1u)) && thenar_glove_decided(port, grasp);
     }
     thenar_board_found(known);
