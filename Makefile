@@ -21,7 +21,7 @@ help:           ## list the targets
 $(VENV)/installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
-	$(BIN)/python -m pip install --quiet --editable ".[compiler,sim,stability,ros]" --group dev
+	$(BIN)/python -m pip install --quiet --editable ".[compiler,cluster,sim,stability,ros]" --group dev
 	touch $@
 
 demo: $(VENV)/installed  ## simulate, draw, evaluate, compile, verify, run: SCENE=quick

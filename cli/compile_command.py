@@ -1,7 +1,7 @@
 """`thenar compile`: recordings in, a build folder out."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -11,10 +11,13 @@ from .scan_tables import print_scan
 
 if TYPE_CHECKING:
     from ..compiler.build.compile import BuildReport
+    from ..compiler.build.made import Documents
     from ..runtime.manifest import Inputs, Manifest, TableBits
 
 _CHIP = "mcp23017"
 _BOARD = "board"
+# What a point of a frontier says.
+_SETTLED = ("prune", "rounds", "inputs", "table_bits", "max_bins", "placement", "keep", "width")
 _TABLE_BITS: "dict[str, TableBits]" = {"16": 16, "8": 8}
 
 
@@ -46,6 +49,13 @@ _TABLE_BITS: "dict[str, TableBits]" = {"16": 16, "8": 8}
 @click.option(
     "--max-bins", type=click.IntRange(2), help="At most so many bins a joint: smaller tables.  [default: no limit]"
 )
+@click.option("--placement", default="id3", show_default=True, help="How switches are chosen: see thenar place.")
+@click.option("--keep", type=click.IntRange(1), help="How many switches, for placements that take a number.")
+@click.option("--width", type=click.IntRange(4, 16), default=16, show_default=True, help="Bits that every sum fits.")
+@click.option("--from", "from_frontier", type=existing_file, help="A frontier.json: build one of its points.")
+@click.option("--point", type=click.IntRange(1), help="Which point of it.  [default: the one that it picked]")
+@click.option("--report/--no-report", default=True, show_default=True, help="Write report.html and spec/ as well.")
+@click.option("--hand-length", type=click.FloatRange(100, 300), help="Of whom the glove is for, mm.  [default: 190]")
 @click.option("--glove", type=existing_file, help="A glove.toml: add the scan map of its wiring to the build.")
 @click.option("--propose", type=output_file, help="Write a glove.toml for the kept switches: on the fewest ports.")
 @click.option(
@@ -55,7 +65,9 @@ _TABLE_BITS: "dict[str, TableBits]" = {"16": 16, "8": 8}
 )
 @click.option("--overwrite", is_flag=True, help="Let --propose replace a file that is there.")
 @json_flag
+@click.pass_context
 def command(
+    context: click.Context,
     recordings: Path,
     output: Path,
     prune: int,
@@ -67,6 +79,13 @@ def command(
     seed: int,
     table_bits: str,
     max_bins: int | None,
+    placement: str,
+    keep: int | None,
+    width: int,
+    from_frontier: Path | None,
+    point: int | None,
+    report: bool,
+    hand_length: float | None,
     glove: Path | None,
     propose: Path | None,
     chip: str | None,
@@ -76,36 +95,59 @@ def command(
     """Choose the switches, train, and write integer tables with their proof.
 
     The folder holds build.json, tables.bin and ensemble.bin, the classifier in C in firmware/, and with --glove
-    scan.json. The same recordings, options and wiring give the same bytes.
+    scan.json; report.html tells all of it in a browser, spec/ is the reduced glove to cut, solder and run. The same
+    recordings, options and wiring give the same bytes.
 
     \b
     Example:
         thenar compile set.grasps -o build/ --prune 13
         thenar compile set.grasps -o build/ --glove glove.toml
+        thenar compile set.grasps -o build/ --from frontier/frontier.json --point 7
     """
     from ..compiler.build.compile import compile_build
+    from ..compiler.build.made import no_documents
+    from ..compiler.frontier.whole_glove import ports_of_whole_glove
     from ..compiler.recordings.graspset import GraspSet
     from ..runtime.harness.loading import load_harness
+    from .compile_documents import Papers, study_of
+    from .from_frontier import picked
 
     _check_proposal(glove, propose, chip, overwrite)
-    keep_apart(recordings, glove, propose)
-    harness = None if glove is None else load_harness(glove)
+    _check_point(context, from_frontier, point)
+    keep_apart(recordings, glove, propose, from_frontier)
+    given = None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
-    with progress("compiling") as report:
+    options: dict[str, Any] = {
+        "prune": prune,
+        "rounds": rounds,
+        "inputs": inputs,
+        "table_bits": _TABLE_BITS[table_bits],
+        "max_bins": max_bins,
+        "placement": placement,
+        "keep": keep,
+        "width": width,
+    }
+    chosen = None if from_frontier is None else picked(from_frontier, point, grasp_set)
+    if chosen is not None:
+        options |= chosen.options
+    papers: Documents = no_documents
+    if report:
+        with progress("the paper's tables") as told:
+            study = study_of(grasp_set, options["rounds"], folds, told) if folds else None
+        papers = Papers(study, None if chosen is None else chosen.frontier, hand_length)
+    with progress("compiling") as told:
         made = compile_build(
             grasp_set,
             output,
-            prune=prune,
-            rounds=rounds,
-            inputs=inputs,
+            **options,
             shrinkage=shrinkage,
             tolerance=tolerance,
             folds=folds,
             seed=seed,
-            table_bits=_TABLE_BITS[table_bits],
-            max_bins=max_bins,
-            harness=harness,
-            progress=report,
+            harness=given if chosen is None else chosen.wired(given),
+            ports=ports_of_whole_glove(given, grasp_set.switch_names),
+            documents=papers,
+            progress=told,
         )
     if made.only_answer is not None:
         err().print(
@@ -118,12 +160,25 @@ def command(
         print_json(made.manifest)
         return
     _print(made, output)
-    if harness is not None and made.scan is not None:
-        print_scan(made.scan, harness)
+    if made.harness is not None and made.scan is not None:
+        print_scan(made.scan, made.harness)
     if propose is not None:
         out().print(
             f"{propose}: a harness for the kept switches; wire the glove so, then compile with --glove {propose}"
         )
+
+
+def _check_point(context: click.Context, frontier: Path | None, point: int | None) -> None:
+    """Refuse options that a point settles, and a point of no frontier."""
+    if frontier is None:
+        if point is not None:
+            raise click.UsageError("--point is one of a frontier: name its file with --from.")
+        return
+    for name in _SETTLED:
+        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
+            raise click.UsageError(
+                f"--{name.replace('_', '-')} is settled by the point that --from names: leave it out."
+            )
 
 
 def _check_proposal(glove: Path | None, propose: Path | None, chip: str | None, overwrite: bool) -> None:

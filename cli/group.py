@@ -13,8 +13,8 @@ import click
 from ..drivers.errors import ThenarError
 
 COMMANDS = (
-    *("simulate", "plan", "import", "export", "info", "place", "draw", "evaluate", "compile", "verify"),
-    *("firmware", "run", "calibrate", "record", "emulate", "doctor", "stability"),
+    *("simulate", "plan", "import", "export", "info", "place", "draw", "evaluate", "frontier", "compile", "verify"),
+    *("firmware", "spec", "run", "calibrate", "record", "emulate", "doctor", "stability"),
 )
 
 # Packages that another extra than `compiler` brings.
@@ -43,6 +43,7 @@ def thenar() -> None:
     Example, from a table to a running recogniser:
         thenar import table.csv -o set.grasps --columns columns.toml
         thenar evaluate set.grasps
+        thenar frontier set.grasps -o frontier/
         thenar compile set.grasps -o build/
         thenar verify build/ set.grasps
         thenar run build/ --replay set.grasps

@@ -1,98 +1,156 @@
 """`thenar place`: which switches to keep."""
 
-from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from .common import existing_file, json_flag, keep_apart, out, output_file, picture_file, print_json, progress
+from .common import existing_file, json_flag, keep_apart, output_file, picture_file, print_json, progress
 
 if TYPE_CHECKING:
-    from ..compiler.placement.placement import Placement
+    from ..compiler.recordings.graspset import GraspSet
+
+_PAPERS = "id3"
+_FOR_CROWDS = "elimination"
+
+
+@dataclass(frozen=True, slots=True)
+class _Options:
+    """What the user asked for."""
+
+    grasps: Path
+    method: str | None
+    prune: int | None
+    keep: int | None
+    exact: bool
+    crowd: bool
+    joints: bool
+    jobs: int | None
+    show_tree: bool
+    draw: Path | None
+    output: Path | None
+    as_json: bool
+
+    def check(self) -> None:
+        """Raise UsageError if the options do not go together."""
+        for wrong, reason in (
+            (self.as_json and self.show_tree, "--tree is for people and --json for machines: take one of them"),
+            (self.show_tree and not self.of_tree, "--tree prints the tree of the paper's ID3 alone"),
+            (self.draw is not None and not (self.of_tree or self.crowd), "--draw draws ID3's tree, or a --crowd"),
+            (self.exact and self.crowd, "--exact judges one placement and --crowd looks for one: take one of them"),
+            (self.crowd and self.method == _PAPERS, "--crowd takes a method that is told how many switches to --keep"),
+            (self.joints and self.of_tree, "--joints is for the methods beside the paper's ID3"),
+            (
+                self.by_size and self.prune is not None,
+                "--prune is for ID3: this method takes --keep",
+            ),
+            (self.by_size and self.keep is None, "tell this method how many switches to --keep"),
+            (not self.by_size and self.keep is not None, "ID3 takes --prune S: to --keep a number, name a --method"),
+        ):
+            if wrong:
+                raise click.UsageError(reason)
+        keep_apart(self.grasps, self.draw, self.output)
+
+    @property
+    def of_tree(self) -> bool:
+        """Whether the paper's ID3 is all that is wanted."""
+        return self.method in (None, _PAPERS) and not self.exact and not self.crowd
+
+    @property
+    def by_size(self) -> bool:
+        """Whether the method takes a number of switches."""
+        return self.crowd or self.method not in (None, _PAPERS)
 
 
 @click.command("place")
 @click.argument("grasps", type=existing_file)
-@click.option("--prune", type=click.IntRange(min=0), default=0, metavar="S", help="End nodes of fewer than S rows.")
-@click.option("--tree", "show_tree", is_flag=True, help="Also print the tree.")
-@click.option("--draw", type=picture_file, help="Also draw the tree: an .svg or .png file to write.")
+@click.option("--method", metavar="NAME", help="How to choose; a wrong NAME lists them all.  [default: id3]")
+@click.option("--prune", type=click.IntRange(min=0), metavar="S", help="ID3: end nodes of fewer than S rows.")
+@click.option("--keep", type=click.IntRange(min=1), metavar="M", help="Other methods: keep at most M switches.")
+@click.option("--joints", is_flag=True, help="Choose what helps beside the joints (default: switches alone).")
+@click.option("--exact", is_flag=True, help="Also say how far the placement is from the best of as many switches.")
+@click.option("--crowd", is_flag=True, help="One standard placement for many subjects, the worst-served included.")
+@click.option("--jobs", type=click.IntRange(min=1), help="Processes for --crowd.  [default: all cores]")
+@click.option("--tree", "show_tree", is_flag=True, help="ID3: also print the tree.")
+@click.option("--draw", type=picture_file, help="Also draw ID3's tree, or how a crowd is served: an .svg or .png file.")
 @click.option("-o", "--output", type=output_file, help="Also store the placement: a .json file to write.")
 @json_flag
-def command(grasps: Path, prune: int, show_tree: bool, draw: Path | None, output: Path | None, as_json: bool) -> None:
-    """Choose the switches of GRASPS that tell its grasp types apart, with ID3: those that its tree asks for.
+def command(**options: Any) -> None:
+    """Choose the switches of GRASPS that tell its grasp types apart: with ID3, those that its tree asks for.
 
     They stand in the order in which the tree asks for them, each with the information it brought and the share of
-    the grasp types' entropy that it and all before it brought.
+    the grasp types' entropy that it and all before it brought. Other methods take a number of switches to keep.
 
     \b
     Example:
         thenar place set.grasps
         thenar place set.grasps --prune 13 --draw tree.svg -o placement.json
+        thenar place set.grasps --method elimination --keep 16 --exact
+        thenar place crowd.grasps --crowd --keep 16 --draw subjects.svg
     """
-    from ..compiler.placement.placement import place
     from ..compiler.recordings.graspset import GraspSet
 
-    if as_json and show_tree:
-        raise click.UsageError("--tree is for people and --json for machines: take one of them")
-    keep_apart(grasps, draw, output)
-    grasp_set = GraspSet.load(grasps)
-    with progress(f"growing the tree of {grasps.name}"):
-        placement, tree = place(grasp_set, prune)
+    asked = _Options(**options)
+    asked.check()
+    grasp_set = GraspSet.load(asked.grasps)
+    found = _answer(asked, grasp_set)
+    if asked.output is not None:
+        _store(found, asked.output)
+    if asked.as_json:
+        print_json(found)
+
+
+def _answer(asked: _Options, grasp_set: "GraspSet") -> Any:
+    if asked.of_tree:
+        return _of_tree(asked, grasp_set)
+    return _of_crowd(asked, grasp_set) if asked.crowd else _of_method(asked, grasp_set)
+
+
+def _of_tree(asked: _Options, grasp_set: "GraspSet") -> Any:
+    from ..compiler.placement.placement import place
+
+    with progress(f"growing the tree of {asked.grasps.name}"):
+        placement, tree = place(grasp_set, asked.prune or 0)
     types = [grasp_set.taxonomy.types[number] for number in map(int, tree.classes)]
-    if draw is not None:
+    if asked.draw is not None:
         from ..compiler.placement.draw import draw_tree
 
-        draw_tree(tree, draw, grasp_set.switch_names, types)
-    if output is not None:
-        _store(placement, output)
-    if as_json:
-        print_json(placement)
-        return
-    if show_tree:
+        draw_tree(tree, asked.draw, grasp_set.switch_names, types)
+    if asked.show_tree:
         click.echo(tree.text(grasp_set.switch_names, types))
-    _print(placement)
+    if not asked.as_json:
+        from .place_tree import print_placement
+
+        print_placement(placement)
+    return placement
 
 
-def _store(placement: "Placement", path: Path) -> None:
+def _of_method(asked: _Options, grasp_set: "GraspSet") -> Any:
+    from .place_chosen import chosen, print_chosen
+
+    method, parameter = asked.method or _PAPERS, asked.keep if asked.by_size else asked.prune
+    choice = chosen(grasp_set, method, float(parameter or 0), joints=asked.joints, exact=asked.exact)
+    if not asked.as_json:
+        print_chosen(choice)
+    return choice
+
+
+def _of_crowd(asked: _Options, grasp_set: "GraspSet") -> Any:
+    from .place_crowd import crowded, draw_crowd, print_crowd
+
+    method, keep = asked.method or _FOR_CROWDS, asked.keep or 1
+    placement = crowded(grasp_set, method, keep, joints=asked.joints, jobs=asked.jobs or -1)
+    if asked.draw is not None:
+        draw_crowd(placement, asked.draw)
+    if not asked.as_json:
+        print_crowd(placement)
+    return placement
+
+
+def _store(found: Any, path: Path) -> None:
     import msgspec
 
     from ..runtime.files import write_atomically
 
-    write_atomically(path, msgspec.json.format(msgspec.json.encode(placement), indent=2) + b"\n")
-
-
-def _print(placement: "Placement") -> None:
-    from rich.table import Table
-
-    table = Table("switch", "name", "gain, bits", "cumulative share", title="Placement")
-    for chosen in placement.switches:
-        share = f"{chosen.cumulative_share:.1%}"
-        table.add_row(str(chosen.number), chosen.name, f"{chosen.gain_bits:.4f}", share)
-    out().print(table)
-    pruned = f", pruned at S = {placement.prune}" if placement.prune else ""
-    click.echo(
-        f"{len(placement.switches)} of {placement.n_switches} switches ({placement.kept_share:.0%}) bring "
-        f"{placement.gain_bits:.3f} of {placement.entropy_bits:.3f} bits; the tree has {placement.decision_nodes} "
-        f"decisions, {placement.leaves} leaves, depth {placement.depth}{pruned}"
-    )
-    for remark in _remarks(placement):
-        click.echo(remark)
-
-
-def _remarks(placement: "Placement") -> Iterator[str]:
-    """Yield what should not pass in silence: why nothing was decided, or decided without a gain."""
-    if placement.entropy_bits == 0:
-        yield "all rows are of one grasp type: there is nothing to tell apart"
-    elif placement.rows < placement.prune:
-        yield f"no decision was made: the {placement.rows} rows are fewer than S = {placement.prune}"
-    if placement.zero_gain_nodes:
-        yield (
-            f"at {placement.zero_gain_nodes} of the decisions no switch gains anything alone: "
-            "the lowest-numbered one that varies was taken"
-        )
-    if placement.undecided_leaves:
-        yield (
-            f"at {placement.undecided_leaves} of the leaves rows of several grasp types agree in every switch: "
-            "no switch tells them apart"
-        )
+    write_atomically(path, msgspec.json.format(msgspec.json.encode(found), indent=2) + b"\n")

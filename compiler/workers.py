@@ -6,6 +6,8 @@ from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from typing import TypeVar
 
+from .cluster import on_cluster
+
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
 
@@ -13,14 +15,21 @@ Answer = TypeVar("Answer")
 MOST_JOBS = 1024
 
 
-def in_workers(work: Callable[[Task], Answer], tasks: Iterable[Task], jobs: int) -> Iterator[Answer]:
+def in_workers(
+    work: Callable[[Task], Answer], tasks: Iterable[Task], jobs: int, cluster: str | None = None
+) -> Iterator[Answer]:
     """Yield the answers in the order in which they come.
 
-    jobs  worker processes, as joblib counts them: -1 for all cores, 1 for this process alone; no more than MOST_JOBS.
-          A worker runs one thread.
+    jobs     worker processes, as joblib counts them: -1 for all cores, 1 for this process alone; no more than
+             MOST_JOBS. A worker runs one thread.
+    cluster  address of a Dask scheduler, such as tcp://10.0.0.5:8786: all of its workers do the work, and none here
 
-    Raises BrokenExecutor if a worker is killed or cannot start, and whatever the work raises.
+    Raises BrokenExecutor if a worker is killed or cannot start, ClusterError (which is one) if the cluster cannot do
+    the work, and whatever the work raises.
     """
+    if cluster is not None:
+        yield from on_cluster(work, tasks, cluster)
+        return
     if jobs == 1:
         yield from map(work, tasks)
         return

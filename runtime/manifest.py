@@ -37,8 +37,11 @@ class Source(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
 
 
 class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Every option of `thenar compile`; left out are tolerance and max_bins where there is none, and table_bits
-    where it is 16.
+    """Every option of `thenar compile`; left out are tolerance, max_bins and keep where there is none, and table_bits,
+    placement and width where they are 16, "id3" and 16.
+
+    placement is the method that chooses the switches, keep how many, where it is not pruned by S; no sum of the tables
+    needs more than `width` bits.
     """
 
     prune: Count
@@ -50,10 +53,15 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     tolerance: float | None = None
     table_bits: TableBits = 16
     max_bins: Annotated[int, Meta(ge=2)] | None = None
+    placement: Name = "id3"
+    keep: Annotated[int, Meta(ge=1)] | None = None
+    width: Annotated[int, Meta(ge=4, le=16)] = 16
 
 
 class Switch(Struct, frozen=True, forbid_unknown_fields=True):
-    """A kept switch: its column in the recordings, from 0, its name, and the information (bits) that it brought."""
+    """A kept switch: its column in the recordings, from 0, its name, and the information (bits) that it brought: to the
+    tree of ID3, or alone where another method chose it.
+    """
 
     column: Count
     name: Name

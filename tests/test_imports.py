@@ -19,9 +19,13 @@ ALLOWED = {
     "runtime.tables": ("runtime.errors", "runtime.sealed"),
     "runtime.errors": ("drivers.errors",),
     "compiler": ("runtime", "drivers.errors", "compiler"),
+    "compiler.frontier": ("runtime", "drivers", "compiler"),
     "compiler.pictures": ("runtime.errors",),
     "compiler.elementary": (),
-    "compiler.workers": (),
+    "compiler.payloads": ("drivers.errors",),
+    "compiler.cluster": ("drivers.errors", "compiler.payloads"),
+    "compiler.workers": ("compiler.cluster",),
+    "compiler.hand": (),
     "compiler.recordings": ("runtime", "drivers.errors", "compiler.recordings", "compiler.pictures"),
     "compiler.placement": (
         "runtime",
@@ -41,6 +45,24 @@ ALLOWED = {
         "compiler.firmware",
         "compiler.tables",
         "firmware_templates",
+    ),
+    "compiler.selection": (
+        "runtime",
+        "drivers.errors",
+        "compiler.boosting",
+        "compiler.elementary",
+        "compiler.placement",
+        "compiler.recordings",
+        "compiler.selection",
+        "compiler.tables",
+        "compiler.workers",
+    ),
+    "compiler.spec": (
+        "runtime",
+        "drivers",
+        "compiler.hand",
+        "compiler.recordings.graspset",
+        "compiler.spec",
     ),
     "compiler.evaluation": (
         "runtime",
@@ -82,8 +104,22 @@ ALLOWED = {
     "cli": tuple(package for package in PACKAGES if package != "reference"),
 }
 
-# Third-party packages of the extras `compiler`, `sim` and `stability`, which a board does not have.
-WORKSTATION_ONLY = {"sklearn", "scipy", "matplotlib", "joblib", "mujoco", "threadpoolctl", "mpmath", "jinja2"}
+# Third-party packages of the extras `compiler`, `cluster`, `sim` and `stability`, and of peers, which a board does not have.
+WORKSTATION_ONLY = {
+    "sklearn",
+    "scipy",
+    "matplotlib",
+    "joblib",
+    "mujoco",
+    "threadpoolctl",
+    "mpmath",
+    "jinja2",
+    "plotly",
+    "ezdxf",
+    "dask",
+    "distributed",
+    "pysensors",
+}
 
 
 def modules() -> Iterator[tuple[str, ast.Module]]:

@@ -1,7 +1,7 @@
 """`compile_build`: recordings in, a build folder out."""
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -29,6 +29,8 @@ from ...runtime.scanning.plan import plan_scan
 from ...runtime.scanning.scanmap import ScanMap, scanmap_to_bytes
 from ...runtime.tables import IntegerTables, tables_to_bytes
 from ..evaluation.folds import check_cut
+from ..frontier.whole_glove import ports_of_whole_glove
+from ..placement.costaware import PortCosts
 from ..recordings.graspset import GraspSet
 from ..tables.collapse import collapse
 from ..tables.compare import Comparison, compare
@@ -36,18 +38,21 @@ from ..tables.quantise import quantise
 from .carried import made_firmware
 from .ensemble import ensemble_to_bytes
 from .errors import CompileError
+from .made import Documents, Made, no_documents
 from .recognition import cross_validated
 from .staging import check_target, publish
-from .training import Material, Trained, material_of, train
+from .training import Material, Trained, check_placement, material_of, train
 
-WIDTH = 16
+# A wiring, or what makes one for the names of the kept switches.
+Wired = Harness | Callable[[Sequence[str]], Harness]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BuildReport:
     """Where the build is, what its `build.json` says of it, how to read the harness it was compiled for, if it was for
     one, and the one grasp type that it gives all rows, if it does: then the inputs tell nothing that stumps, which add
-    up, can tell. `firmware` is a sentence: what its firmware is laid out for, or why there is none.
+    up, can tell. `firmware` is a sentence: what its firmware is laid out for, or why there is none. `harness` is the
+    wiring that `scan` reads.
     """
 
     folder: Path
@@ -56,6 +61,7 @@ class BuildReport:
     only_answer: str | None
     firmware: str
     scan: ScanMap | None = None
+    harness: Harness | None = None
 
 
 def compile_build(
@@ -71,7 +77,12 @@ def compile_build(
     seed: int = 1,
     table_bits: TableBits = 16,
     max_bins: int | None = None,
-    harness: Harness | None = None,
+    placement: str = "id3",
+    keep: int | None = None,
+    width: int = 16,
+    harness: Wired | None = None,
+    ports: PortCosts | None = None,
+    documents: Documents = no_documents,
     progress: Callable[[int, int], None] | None = None,
 ) -> BuildReport:
     """Choose the placement, train, collapse, quantise, prove, and write the build `folder`, whole or not at all.
@@ -79,30 +90,35 @@ def compile_build(
     prune is the paper's S, inputs which of switches and joints to use; a round that changes the mean loss by less than
     tolerance is the last; folds and seed cut the cross-validation whose rate goes into the build (0 folds: none).
     With table_bits 8, steps are coarse enough for firmware with 8-bit entries (quantise); with max_bins, no joint has
-    more bins than that, so that tables stay small.
-    With a harness, the build says how to read its switches there. progress(done, total) is called as work is done. The
-    same recordings, options and harness give the same bytes. Raises CompileError, HarnessError if the harness lacks a
-    kept switch, or what placement and boosting raise of their options.
+    more bins than that, so that tables stay small; no sum needs more than `width` bits, 4 to 16. `placement` is a
+    method of selection.ways, `keep` how many switches it keeps, where it is not pruned by S.
+    `ports` say what reading each switch costs, for methods that ask (None: on a glove of as few MCP23017 as will do).
+    With a harness, the build says how to read its switches there; `documents` go into the folder with it.
+    progress(done, total) is called as work is done. The same recordings, options and harness give the same bytes.
+    Raises CompileError, HarnessError if the harness lacks a kept switch, or what placement and boosting raise of their
+    options.
     """
-    if table_bits not in get_args(TableBits):
-        raise CompileError(f"tables of {table_bits} bits: firmware has entries of 8 or 16")
     target = check_target(Path(folder))
     least = None if tolerance is None else float(tolerance)
-    options = Options(prune, rounds, inputs, float(shrinkage), folds, seed, least, table_bits, max_bins)
+    options = Options(
+        prune, rounds, inputs, float(shrinkage), folds, seed, least, table_bits, max_bins, placement, keep, width
+    )
+    _check(options)
     material = material_of(grasp_set, options)
     if folds:
         check_cut(len(grasp_set), folds, "rows")
     steps = _Steps(progress, rounds, folds)
-    trained = train(material, options, steps.round_done)
+    ports = ports or ports_of_whole_glove(None, grasp_set.switch_names)
+    trained = train(material, options, steps.round_done, ports)
     bits = trained.kept(material)
-    integers = quantise(collapse(trained.stumps, len(trained.columns)), bits, material.codes, WIDTH, table_bits)
+    integers = quantise(collapse(trained.stumps, len(trained.columns)), bits, material.codes, width, table_bits)
     switches = _switches(grasp_set, trained)
     names = [switch.name for switch in switches]
-    scan = None if harness is None else plan_scan(names, integers, harness, bits, material.codes)
+    wired = harness(names) if callable(harness) else harness
+    scan = None if wired is None else plan_scan(names, integers, wired, bits, material.codes)
     comparison = compare(trained.stumps, integers, bits, material.codes)
-    rates = [_training_rate(comparison, material, options)]
-    if folds:
-        rates.append(cross_validated(material, options, steps.fold_done))
+    tested = cross_validated(material, options, steps.fold_done, ports) if folds else None
+    rates = [_training_rate(comparison, material, options), *([tested.rate] if tested else [])]
     files = _files(integers, trained, scan)
     digests = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
     manifest = Manifest(
@@ -116,7 +132,7 @@ def compile_build(
         grasps=material.grasps,
         switches=switches,
         joints=_joints(grasp_set) if inputs != "switches" else (),
-        proof=_proof(integers, comparison),
+        proof=_proof(integers, comparison, width),
         rates=tuple(rates),
         stopped_after=trained.stumps.n_rounds if trained.stopped_early else 0,
         zero_gain_nodes=trained.zero_gain_nodes,
@@ -125,9 +141,30 @@ def compile_build(
     described = manifest_to_bytes(manifest)
     made_manifest = manifest_from_bytes(described)
     firmware, note = made_firmware(made_manifest, integers)
-    publish({**files, **{path: text.encode() for path, text in firmware.items()}, MANIFEST_NAME: described}, target)
-    only = _only_answer(comparison, material)
-    return BuildReport(target, made_manifest, len(files[TABLES_NAME]), only, note, scan)
+    made = Made(
+        grasp_set=grasp_set,
+        manifest=made_manifest,
+        trained=trained,
+        tables=integers,
+        tables_bytes=len(files[TABLES_NAME]),
+        comparison=comparison,
+        confusion=None if tested is None else tested.confusion,
+        harness=wired,
+        scan=scan,
+        firmware=note,
+        only_answer=_only_answer(comparison, material),
+    )
+    written = {path: text.encode() for path, text in firmware.items()}
+    publish({**files, **written, **documents(made), MANIFEST_NAME: described}, target)
+    return BuildReport(target, made_manifest, made.tables_bytes, made.only_answer, note, scan, wired)
+
+
+def _check(options: Options) -> None:
+    if options.table_bits not in get_args(TableBits):
+        raise CompileError(f"tables of {options.table_bits} bits: firmware has entries of 8 or 16")
+    if not 4 <= options.width <= 16:
+        raise CompileError(f"sums of {options.width} bits: tables have 4 to 16")
+    check_placement(options)
 
 
 def _files(integers: IntegerTables, trained: Trained, scan: ScanMap | None) -> dict[str, bytes]:
@@ -177,9 +214,9 @@ def _joints(grasp_set: GraspSet) -> tuple[Calibration, ...]:
     )
 
 
-def _proof(integers: IntegerTables, comparison: Comparison) -> Proof:
+def _proof(integers: IntegerTables, comparison: Comparison, width: int) -> Proof:
     return Proof(
-        width=WIDTH,
+        width=width,
         scale=integers.scale,
         bound=integers.bound,
         error=comparison.integer_bound,

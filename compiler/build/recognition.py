@@ -1,28 +1,41 @@
 """The recognition rate to expect of a build: its own recipe, placement included, cross-validated."""
 
+from dataclasses import dataclass
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ...runtime.manifest import Options, Recognised
 from ..boosting.stumps import winners
 from ..evaluation.folds import weka_folds
+from ..placement.costaware import PortCosts
 from .errors import CompileError
 from .training import Material, Report, Trained, train
 
 
-def cross_validated(material: Material, options: Options, report: Report) -> Recognised:
-    """Return the rate over stratified folds, each trained anew and without a look at its test rows."""
-    correct = 0
+@dataclass(frozen=True, slots=True, eq=False)
+class Tested:
+    """What came of the folds: the rate, and how often each grasp type (rows) was answered by each (columns), (K, K)."""
+
+    rate: Recognised
+    confusion: NDArray[np.intp]
+
+
+def cross_validated(material: Material, options: Options, report: Report, ports: PortCosts | None = None) -> Tested:
+    """Return what comes of stratified folds, each trained anew and without a look at its test rows."""
+    confusion = np.zeros((len(material.grasps),) * 2, dtype=np.intp)
     for number, fold in enumerate(weka_folds(material.labels, options.folds, options.seed)):
-        trained = _train(material.rows(fold.train), options, number)
+        trained = _train(material.rows(fold.train), options, number, ports)
         test = material.rows(fold.test)
         scores = trained.stumps.scores(np.hstack([trained.kept(test), test.codes]))
-        correct += int(np.count_nonzero(winners(scores) == test.labels))
+        np.add.at(confusion, (test.labels, winners(scores)), 1)
         report(number + 1, options.folds)
-    return Recognised("honest", options.folds, options.seed, correct, len(material.labels))
+    correct = int(np.trace(confusion))
+    return Tested(Recognised("honest", options.folds, options.seed, correct, len(material.labels)), confusion)
 
 
-def _train(material: Material, options: Options, fold: int) -> Trained:
+def _train(material: Material, options: Options, fold: int, ports: PortCosts | None) -> Trained:
     try:
-        return train(material, options)
+        return train(material, options, ports=ports)
     except CompileError as wrong:
         raise CompileError(f"in fold {fold + 1}: {wrong}, or do without folds (0)") from None

@@ -1,4 +1,4 @@
-"""What `compile` trains: a placement by ID3, then an ensemble on the kept switches and the joints."""
+"""What `compile` trains: a placement, then an ensemble on the kept switches and the joints."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,9 +9,17 @@ from numpy.typing import NDArray
 from ...runtime.manifest import Options
 from ..boosting.boost import boost
 from ..boosting.stumps import Stumps
+from ..placement.cooccurrence import Cooccurrence
+from ..placement.costaware import PortCosts
 from ..placement.id3 import grow_id3
+from ..placement.tree import Tree
 from ..recordings.graspset import GraspSet
+from ..selection.learning import Columns, Learning
+from ..selection.ways import METHODS, chooser
 from .errors import CompileError
+
+PAPERS = "id3"  # the method of the paper
+LN2 = 0.6931471805599453
 
 Report = Callable[[int, int], None]
 
@@ -32,15 +40,20 @@ class Material:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trained:
-    """The kept switches in the order in which they were chosen, what each brought (bits), and at how many decisions of
-    their tree none gained anything alone; the ensemble, and whether the tolerance ended its training.
+    """The kept switches in the order in which they were chosen, and what each brought (bits): to the tree of ID3, which
+    is None where another method chose, and alone otherwise; the ensemble, and whether the tolerance ended its training.
     """
 
-    columns: tuple[int, ...]
+    columns: Columns
     gains: tuple[float, ...]
-    zero_gain_nodes: int
+    tree: Tree | None
     stumps: Stumps
     stopped_early: bool
+
+    @property
+    def zero_gain_nodes(self) -> int:
+        """At how many decisions of the tree no switch gained anything alone."""
+        return 0 if self.tree is None else self.tree.n_zero_gain
 
     def kept(self, material: Material) -> NDArray[np.bool_]:
         """Return the kept switches (n, kept) of `material`."""
@@ -64,10 +77,14 @@ def material_of(grasp_set: GraspSet, options: Options) -> Material:
     )
 
 
-def train(material: Material, options: Options, report: Report | None = None) -> Trained:
-    """Choose the switches and boost on them and the joints. Raises CompileError if no input tells grasps apart."""
-    tree = grow_id3(material.switches, material.labels, min_samples=options.prune)
-    columns = tree.inputs
+def train(
+    material: Material, options: Options, report: Report | None = None, ports: PortCosts | None = None
+) -> Trained:
+    """Choose the switches and boost on them and the joints. Raises CompileError if no input tells grasps apart.
+
+    ports  what reading switches costs, for methods that ask
+    """
+    columns, gains, tree = _placed(material, options, ports)
     if not columns and not material.codes.shape[1]:
         raise CompileError("no switch is worth keeping: lower --prune, or record switches that differ between grasps")
     X = np.hstack([material.switches[:, list(columns)], material.codes])
@@ -83,4 +100,31 @@ def train(material: Material, options: Options, report: Report | None = None) ->
     )
     if not stumps.n_rounds:
         raise CompileError("no input differs between rows: there is nothing to tell grasp types apart by")
-    return Trained(columns, tree.gains, tree.n_zero_gain, stumps, history.stopped_early)
+    return Trained(columns, gains, tree, stumps, history.stopped_early)
+
+
+def check_placement(options: Options) -> None:
+    """Raise CompileError unless `options` name a method that there is, with the parameter that it takes."""
+    if options.placement not in METHODS:
+        raise CompileError(f"there is no placement {options.placement!r}: choose one of {', '.join(METHODS)}")
+    by_number = METHODS[options.placement].parameter == "switches"
+    if by_number and options.keep is None:
+        raise CompileError(f"placement {options.placement!r} needs --keep: how many switches")
+    if by_number and options.prune:
+        raise CompileError(f"placement {options.placement!r} knows no --prune: say with --keep how many switches")
+    if not by_number and options.keep is not None:
+        raise CompileError(f"placement {options.placement!r} is pruned by --prune: it cannot --keep a given number")
+
+
+def _placed(
+    material: Material, options: Options, ports: PortCosts | None
+) -> tuple[Columns, tuple[float, ...], Tree | None]:
+    if options.placement == PAPERS or not material.switches.shape[1]:
+        tree = grow_id3(material.switches, material.labels, min_samples=options.prune)
+        return tree.inputs, tree.gains, tree
+    learning = Learning(material.switches, material.codes, material.labels, len(material.grasps))
+    parameter = options.prune if options.keep is None else options.keep
+    columns = chooser(options.placement, learning, ports)(float(parameter))
+    counts = Cooccurrence(material.switches, material.labels, len(material.grasps))
+    alone = counts.information() / (len(material.labels) * LN2)
+    return columns, tuple(float(alone[column]) for column in columns), None

@@ -1,0 +1,125 @@
+"""`thenar spec`: the reduced glove of a build, ready to cut, sew, solder and run."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from .common import any_path, existing_file, existing_folder, json_flag, out, print_json
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from ..compiler.hand import HandShape
+    from ..compiler.spec.ends import BoardPins
+    from ..runtime.build import Build
+    from ..runtime.harness.wiring import Harness
+    from ..runtime.manifest import Manifest
+
+_FOLDER = "spec"
+_WIRING = "glove.toml"
+_MARK = "spec.json"
+
+
+@click.command("spec")
+@click.argument("build", type=existing_folder)
+@click.option("--hand-length", type=click.FloatRange(100, 300), metavar="MM", help="From wrist to middle fingertip.")
+@click.option("--glove", type=existing_file, help="The glove.toml of its wiring.  [default: a new one is proposed]")
+@click.option("--board", type=existing_file, help="The board.toml of the scanner board that reads the switches.")
+@click.option("-o", "--output", type=any_path, help="Also write the files: a folder; a spec there is replaced.")
+@json_flag
+def command(
+    build: Path, hand_length: float | None, glove: Path | None, board: Path | None, output: Path | None, as_json: bool
+) -> None:
+    """Describe the reduced glove of a BUILD: where its switches lie, how they are wired, what to buy, what to expect.
+
+    The files are the pattern at 1:1 as SVG and DXF, lists of switches, wires and materials, a netlist for KiCad, and
+    glove.toml.
+
+    \b
+    Example:
+        thenar spec build/
+        thenar spec build/ --hand-length 182 --glove glove.toml -o spec/
+    """
+    from ..compiler.spec.files import files_of
+    from ..compiler.spec.glove_spec import glove_spec
+    from ..runtime.build import Build
+    from .spec_tables import print_spec
+
+    loaded = Build.load(build)
+    _check_output(output)
+    hand = _hand(loaded.manifest, hand_length)
+    pins = () if board is None else (_board_pins(board, loaded.manifest),)
+    harness = _harness(build, loaded, glove, board)
+    spec = glove_spec(loaded.manifest, loaded.scan, harness, hand, pins)
+    if output is not None:
+        files = files_of(spec)
+        _write(files, output)
+    if as_json:
+        print_json(spec.summary)
+        return
+    print_spec(spec.summary)
+    if output is not None:
+        out().print(f"{output}: {', '.join(sorted(files))}", soft_wrap=True)
+
+
+def _hand(manifest: "Manifest", length_mm: float | None) -> "HandShape | None":
+    from .hand import hand_of
+
+    hand = hand_of([switch.name for switch in manifest.switches], length_mm)
+    if hand is None and length_mm is not None:
+        raise click.UsageError(
+            "--hand-length: the switches of this build are not those of murakami160, and where they lie is not known"
+        )
+    return hand
+
+
+def _harness(folder: Path, loaded: "Build", glove: Path | None, board: Path | None) -> "Harness | None":
+    """Return the wiring that was named, the one of the board, or the one that the build holds; None for a new one."""
+    from ..runtime.harness.loading import load_harness, parse_harness
+
+    if glove is not None:
+        return load_harness(glove)
+    if board is not None:
+        from ..compiler.firmware.board_keys import glove_toml
+        from ..compiler.firmware.board_loading import load_board
+
+        return parse_harness(glove_toml(board.stem, load_board(board), loaded.manifest), board.stem)
+    own = folder / _FOLDER / _WIRING
+    return load_harness(own) if loaded.scan is not None and own.is_file() else None
+
+
+def _board_pins(path: Path, manifest: "Manifest") -> "BoardPins":
+    """Return how the board in a `board.toml` reaches its keys."""
+    from ..compiler.firmware.board_keys import check_switches, key_names
+    from ..compiler.firmware.board_loading import load_board
+    from ..compiler.spec.ends import BoardPins
+    from ..runtime.harness.wiring import BusWiring
+
+    board = load_board(path)
+    names = [switch.name for switch in manifest.switches]
+    check_switches(board, names)
+    if board.chips:
+        return BoardPins(bus=BusWiring(device=board.part, clock_hz=board.bus.clock_hz, chips=board.chips))
+    if board.matrix is None:
+        return BoardPins(tuple(board.pins[name] for name in key_names(board, names)), ("",) * len(names))
+    rows, columns = board.matrix.rows, board.matrix.columns
+    return BoardPins(columns * len(rows), tuple(row for row in rows for _ in columns), board.matrix.diodes)
+
+
+def _check_output(output: Path | None) -> None:
+    if output is None or not output.exists():
+        return
+    if not output.is_dir() or (any(output.iterdir()) and not (output / _MARK).is_file()):
+        raise click.UsageError(f"{output} is there already and is no spec: name another folder.")
+
+
+def _write(files: "Mapping[str, bytes]", folder: Path) -> None:
+    """Write the files, the mark of a spec last, and remove the pattern of another one."""
+    from ..runtime.files import write_atomically
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for stale in {"cutting.svg", "cutting.dxf"} - files.keys():
+        (folder / stale).unlink(missing_ok=True)
+    for name in sorted(files, key=lambda name: (name == _MARK, name)):
+        write_atomically(folder / name, files[name])

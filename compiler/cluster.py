@@ -1,0 +1,158 @@
+"""Independent pieces of work on the workers of a Dask cluster: same answers as here, each as soon as it is there."""
+
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import BrokenExecutor
+from contextlib import contextmanager
+from itertools import islice
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from ..drivers.errors import ThenarError
+from .payloads import SharedArrays, UnreadableError, answered, installed
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+Task = TypeVar("Task")
+Answer = TypeVar("Answer")
+
+CONNECT_S = 5.0
+WORKERS_S = 10.0
+# So long without an answer, and it is asked whether anybody is left to give one.
+PATIENCE_S = 10.0
+# Pieces that are handed out ahead, so that no worker waits for this process: for each of its threads, and at least.
+AHEAD_EACH, AHEAD = 4, 64
+
+
+class ClusterError(ThenarError, BrokenExecutor):
+    """A cluster is not there, lost its workers, or cannot run this program's work."""
+
+
+def on_cluster(work: Callable[[Task], Answer], tasks: Iterable[Task], address: str) -> Iterator[Answer]:
+    """Yield the answers in the order in which they come.
+
+    work     and tasks go through pickle, `work` by the name of its module: thenar is to be installed on the cluster, of
+             this version. An array of SHARED_BYTES or more that several tasks hold is sent to each worker once.
+    address  of the scheduler, such as tcp://10.0.0.5:8786
+
+    A worker that dies loses nothing: the others do its work. Work runs in threads of the workers (`dask worker
+    --nthreads 1` keeps them out of each other's way), and there BLAS takes one thread, as long as the worker lives.
+
+    Raises ClusterError if there is no such cluster, if it has no workers (any more), if a piece of work killed several,
+    or if they cannot read it; and whatever the work raises.
+    """
+    with _connected(address) as client:
+        _check_workers(client, address)
+        yield from _answers(client, address, work, tasks)
+
+
+@contextmanager
+def _connected(address: str) -> "Iterator[Client]":
+    try:
+        from distributed import Client
+    except ImportError:
+        raise ClusterError(
+            "work on a cluster takes Dask, which is not installed: pip install 'thenar[cluster]'"
+        ) from None
+    try:
+        if not address:
+            raise ValueError("no address")  # for which Dask would start a cluster here
+        client = Client(address, timeout=CONNECT_S, set_as_default=False)
+    except (OSError, ValueError, TypeError, RuntimeError) as reason:
+        raise ClusterError(
+            f"no Dask scheduler answers at {address!r}: start one there (dask scheduler), or mend the address, "
+            "which is like tcp://10.0.0.5:8786"
+        ) from reason
+    try:
+        yield client
+    finally:
+        client.close(timeout=CONNECT_S)
+
+
+def _check_workers(client: "Client", address: str) -> None:
+    """Raise ClusterError unless there are workers, and each has thenar of this version."""
+    _wait_for_workers(client, address)
+    ours = installed()
+    for worker, theirs in client.run(installed, on_error="return").items():
+        if theirs != ours:
+            raise ClusterError(
+                f"worker {worker} lacks thenar {ours} ({theirs}): install it on all workers and on the scheduler"
+            )
+
+
+def _wait_for_workers(client: "Client", address: str) -> None:
+    try:
+        client.wait_for_workers(1, timeout=WORKERS_S)
+    except TimeoutError:
+        raise ClusterError(f"the scheduler at {address} has no workers: start some (dask worker {address})") from None
+
+
+def _answers(client: "Client", address: str, work: Callable[[Task], Answer], tasks: Iterable[Task]) -> Iterator[Answer]:
+    arrays = SharedArrays(client)
+    finished: SimpleQueue[Future[Any]] = SimpleQueue()
+    begun: set[Future[Any]] = set()
+    waiting = iter(tasks)
+
+    def begin(number: int) -> None:
+        for task in islice(waiting, number):
+            try:
+                arguments = arrays.packed((work, task))
+            except TimeoutError as reason:  # no worker takes an array
+                raise _lost(address) from reason
+            future = client.submit(answered, *arguments, pure=False)
+            begun.add(future)
+            future.add_done_callback(finished.put)
+
+    begin(max(AHEAD, AHEAD_EACH * sum(client.ncores().values())))
+    while begun:
+        future = _next(finished, client, address)
+        answer = _result(future, client, address)
+        begun.discard(future)
+        begin(1)
+        yield answer
+
+
+def _next(finished: "SimpleQueue[Future[Any]]", client: "Client", address: str) -> "Future[Any]":
+    while True:
+        try:
+            return finished.get(timeout=PATIENCE_S)
+        except Empty:
+            _check_alive(client, address)
+
+
+def _check_alive(client: "Client", address: str) -> None:
+    if client.status != "running":
+        raise _lost(address)
+    _wait_for_workers(client, address)
+
+
+def _lost(address: str) -> ClusterError:
+    return ClusterError(
+        f"the scheduler at {address}, or what it was given, is lost: look at how it or its workers ended, and do the "
+        "same again"
+    )
+
+
+def _result(future: "Future[Any]", client: "Client", address: str) -> Any:
+    """Return the answer of a `future` that has ended one way or another, or raise what the work raised."""
+    from distributed import CancelledError, KilledWorker
+
+    patience = PATIENCE_S
+    while True:
+        try:
+            return future.result(timeout=patience)
+        except KilledWorker as reason:
+            raise ClusterError(
+                f"one piece of work ended {reason.allowed_failures + 1} workers of the cluster at {address}, perhaps "
+                "for want of memory: give each worker more"
+            ) from reason
+        except UnreadableError as reason:
+            raise ClusterError(f"{reason}: the cluster at {address} needs what is installed here") from reason
+        except CancelledError as reason:
+            raise _lost(address) from reason
+        except TimeoutError:
+            if future.status == "error":
+                raise  # the work's own
+        # The worker that had the answer may be gone: another finds it again.
+        _check_alive(client, address)
+        patience *= 2

@@ -1,0 +1,93 @@
+"""A close look at the finalists: all rounds and shapes of tables, in all folds, each subject left out, and priced."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from .candidates import NO_SWITCHES, Screened, rate_of
+from .equipment import Equipment
+from .learnt import Fit
+from .pareto import STEP
+from .points import Rate
+from .pricing import Priced, PriceKey, PriceTask, Tabled, find_prices
+from .settings import SHAPES, Search, Shape
+from .stages import Learner
+
+_PRICE_S = 4.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Close:
+    """A finalist: what it recognises after every stage (by the ensemble) and with each of the tables; with a subject
+    left out, by the same tables (None: only one subject); what the tables worth building cost; how long choosing,
+    training and tables took together.
+    """
+
+    screened: Screened
+    stages: dict[int, Rate]
+    rates: dict[Tabled, Rate]
+    left_out: dict[Tabled, Rate] | None
+    priced: Priced
+    compile_s: float
+
+
+def look_closely(
+    learner: Learner, search: Search, equipment: Equipment, chosen: Sequence[Screened]
+) -> tuple[Close, ...]:
+    """Return the finalists with all that is to be known of them."""
+    cuts = learner.cuts
+    choices = [one.choice for one in chosen]
+    others = [fold for fold in cuts.all if fold not in cuts.screening]
+    learner.choose("finalists' placements", choices, others)
+    fits = learner.fit("finalists", choices, cuts.all, search.stages, search.tabled, SHAPES)
+    found = []
+    for one in chosen:
+        repeats = [[fits[one.choice, fold] for fold in folds] for folds in cuts.repeats]
+        left_out = [[fits[one.choice, fold] for fold in cuts.subjects]] if cuts.subjects else None
+        found.append((one, repeats, left_out))
+    rated = [(one, _tabled(search, repeats), repeats, left_out) for one, repeats, left_out in found]
+    keys = [
+        PriceKey(one.columns, one.choice.joints, worthwhile(rates), learner.max_bins, equipment.identity)
+        for one, rates, _, _ in rated
+    ]
+    tasks = [PriceTask(key, learner.material, equipment, _PRICE_S) for key in keys]
+    prices = learner.desk.ask("prices", tasks, find_prices, Priced)
+    return tuple(
+        Close(
+            screened=one,
+            stages=_staged(search, repeats),
+            rates=rates,
+            left_out=None if left_out is None else _tabled(search, left_out),
+            priced=prices[key],
+            compile_s=prices[key].seconds + (learner.choosing_s(one.choice) if one.choice.way != NO_SWITCHES else 0.0),
+        )
+        for (one, rates, repeats, left_out), key in zip(rated, keys, strict=True)
+    )
+
+
+def worthwhile(rates: dict[Tabled, Rate]) -> tuple[Tabled, ...]:
+    """Return, for each shape, the tables of the fewest rounds that recognise as well as any of that shape."""
+    found = []
+    for shape in dict.fromkeys(tabled.shape for tabled in rates):
+        mine = {tabled: rate.mean for tabled, rate in rates.items() if tabled.shape == shape}
+        best = max(mine.values())
+        found.append(min((tabled for tabled in mine if mine[tabled] >= best - STEP), key=lambda tabled: tabled.rounds))
+    return tuple(found)
+
+
+def _staged(search: Search, repeats: Sequence[Sequence[Fit]]) -> dict[int, Rate]:
+    return {
+        stage: _rate(repeats, [[fit.correct[number] for fit in fits] for fits in repeats])
+        for number, stage in enumerate(search.stages)
+    }
+
+
+def _tabled(search: Search, repeats: Sequence[Sequence[Fit]]) -> dict[Tabled, Rate]:
+    return {
+        Tabled(rounds, Shape(*shape)): _rate(repeats, [[fit.deployed[row][column] for fit in fits] for fits in repeats])
+        for row, rounds in enumerate(search.tabled)
+        for column, shape in enumerate(SHAPES)
+    }
+
+
+def _rate(repeats: Sequence[Sequence[Fit]], correct: Sequence[Sequence[int]]) -> Rate:
+    return rate_of(tuple(map(sum, correct)), sum(fit.total for fit in repeats[0]))

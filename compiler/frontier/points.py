@@ -1,0 +1,215 @@
+"""`frontier.json`: the points that were found, what each costs and recognises, and how every number came about."""
+
+from typing import Annotated, Literal, TypeVar
+
+import msgspec
+from msgspec import Meta, Struct
+
+from ...drivers.errors import ThenarError
+from ...runtime.manifest import Inputs, TableBits
+
+SCHEMA = 1
+MAX_BYTES = 64 << 20
+
+# measured: wall time on this machine. simulated: cycles of the real firmware in a simulator. wire: arithmetic of clocks
+# and baud rates, held against an emulated bus. model: predicted by a model that was held against measured points.
+How = Literal["measured", "simulated", "wire", "model"]
+Scan = Literal["full", "early"]
+DecisionKind = Literal["single", "dwell", "sequential"]
+Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+_T = TypeVar("_T")
+
+
+class FrontierError(ThenarError, ValueError):
+    """A frontier cannot be computed as asked, or a file is none."""
+
+
+class Rate(Struct, frozen=True, forbid_unknown_fields=True):
+    """A recognition rate and its 95 % interval, in 0..1."""
+
+    mean: Share
+    low: Share
+    high: Share
+
+
+class Time(Struct, frozen=True, forbid_unknown_fields=True):
+    """A time in microseconds, and how it came about."""
+
+    us: float
+    how: How
+
+
+class Way(Struct, frozen=True, forbid_unknown_fields=True):
+    """How switches are chosen: a method of `selection.ways`, and its parameter (S, or a number of switches)."""
+
+    method: str
+    parameter: float
+
+
+class Setting(Struct, frozen=True, forbid_unknown_fields=True):
+    """All that a point chose: what `compile --from` needs, and what the runtime is told.
+
+    width       bits that every sum fits; table_bits: 8 where firmware may store a byte an entry
+    layout      how the tables lie in flash, in words; "" where nothing is laid out (host and pi)
+    wiring      "as wired" (the given glove.toml), "board" (a switch scanner) or a kind of port expander; clock_hz of
+                its bus, or baud of the board's line; 0 where no switch is read
+    """
+
+    way: Way
+    inputs: Inputs
+    rounds: int
+    width: int
+    layout: str
+    scan: Scan
+    decision: DecisionKind
+    wiring: str
+    clock_hz: int
+    table_bits: TableBits = 16
+    max_bins: int | None = None
+
+
+class Latency(Struct, frozen=True, forbid_unknown_fields=True):
+    """From a hand's arrival in a grasp until it is decided on, microseconds over a stream.
+
+    missed  the share of grasps that were never decided on rightly while they lasted: they are in neither number
+    wrong   the share of the time for which grasps were held, decided on once, that another type was decided on
+    """
+
+    mean_us: float
+    p99_us: float
+    missed: Share
+    wrong: Share = 0.0
+
+
+class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One way to build the glove.
+
+    number      what `compile --from frontier.json --point` takes
+    switches    names of the kept switches, in the order in which they were chosen from all rows
+    rate        honest, repeated folds; left_out: each subject recognised from the others (None: only one subject)
+    scan        reading the switches (the mean where it ends early); transfer: one record of the CyberGlove
+    frame       max(scan, transfer) + classify: the two lie on lines of their own
+    flash, ram  bytes of the classifier on its target; of the tables alone on host and pi
+    fronts      on which lines of best points it lies: "frame", "switches", "latency"
+    """
+
+    number: int
+    setting: Setting
+    switches: tuple[str, ...]
+    rate: Rate
+    left_out: Rate | None
+    scan: Time
+    transfer: Time
+    classify: Time
+    frame: Time
+    latency: Latency
+    flash: int
+    ram: int
+    ports: int
+    chips: int
+    compile_s: float
+    fronts: tuple[str, ...] = ()
+
+
+class Tried(Struct, frozen=True, forbid_unknown_fields=True):
+    """A placement as it was screened: its rate at the best number of rounds, in the fastest of its wirings."""
+
+    way: Way
+    inputs: Inputs
+    n_switches: int
+    rounds: int
+    rate: Rate
+    frame_us: float
+
+
+class Curve(Struct, frozen=True, forbid_unknown_fields=True):
+    """Recognition against the number of switches, switches alone: one method; `ours` or a rival."""
+
+    method: str
+    what: str
+    ours: bool
+    sizes: tuple[float, ...]
+    rates: tuple[Rate, ...]
+
+
+class Check(Struct, frozen=True, forbid_unknown_fields=True):
+    """A model's predictions beside what was measured: of what, how often, and relative errors."""
+
+    what: str
+    how: How
+    n: int
+    mean_error: float
+    worst_error: float
+
+
+class Mark(Struct, frozen=True, forbid_unknown_fields=True):
+    """Something to see on the pictures beside the points: the paper's choices, all switches, the user's build."""
+
+    name: str
+    n_switches: int
+    rate: Rate
+    frame_us: float
+    latency_us: float | None = None
+
+
+class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """All that `thenar frontier` found.
+
+    picked   number of the point that suits the budget or the rate asked for; None where nothing was asked
+    skipped  sentences: what could not be measured here, and what was left out
+    """
+
+    schema: int
+    thenar: str
+    source: str
+    fingerprint: str
+    rows: int
+    subjects: int
+    n_switches: int
+    n_joints: int
+    grasps: tuple[str, ...]
+    target: str
+    folds: int
+    repeats: int
+    combinations: int
+    points: tuple[Point, ...]
+    tried: tuple[Tried, ...]
+    curves: tuple[Curve, ...]
+    marks: tuple[Mark, ...]
+    checks: tuple[Check, ...]
+    skipped: tuple[str, ...]
+    picked: int | None = None
+    wanted: str = ""
+
+    def point(self, number: int) -> Point:
+        """Return the point of that number. Raises FrontierError."""
+        for point in self.points:
+            if point.number == number:
+                return point
+        raise FrontierError(f"there is no point {number}: the frontier has points 1 to {len(self.points)}")
+
+
+class _Version(Struct, frozen=True):
+    schema: int
+
+
+def frontier_to_bytes(frontier: Frontier) -> bytes:
+    """Return the content of `frontier.json`."""
+    return msgspec.json.format(msgspec.json.encode(frontier), indent=2) + b"\n"
+
+
+def frontier_from_bytes(data: bytes, what: str = "frontier.json") -> Frontier:
+    """Return the frontier of a `frontier.json`, which messages call `what`. Raises FrontierError."""
+    if len(data) > MAX_BYTES:
+        raise FrontierError(f"{what} has {len(data)} bytes, a frontier has at most {MAX_BYTES}")
+    schema = _decode(data, _Version, what).schema
+    if schema > SCHEMA:
+        raise FrontierError(f"{what} has schema {schema}, this thenar reads up to {SCHEMA}: update thenar")
+    return _decode(data, Frontier, what)
+
+
+def _decode(data: bytes, kind: type[_T], what: str) -> _T:
+    try:
+        return msgspec.json.decode(data, type=kind)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as wrong:
+        raise FrontierError(f"{what} is not a frontier's: {wrong}") from None

@@ -1,0 +1,67 @@
+"""How long finalists keep one waiting: tables of rows that the stream does not hold, under every way to decide."""
+
+from dataclasses import dataclass
+
+from msgspec import Struct
+
+from ..evaluation.folds import Fold
+from ..selection.learning import Columns
+from .latency import Decider, latency
+from .material import Material
+from .points import DecisionKind, Latency
+from .pricing import PriceKey, Tabled, tables_of
+from .stream import Stream
+
+DECISIONS: tuple[DecisionKind, ...] = ("single", "dwell", "sequential")
+
+
+class Pace(Struct, frozen=True):
+    """Tables that answer every `frame_us`."""
+
+    tabled: Tabled
+    frame_us: float
+
+
+class WaitKey(Struct, frozen=True):
+    """Which latencies: of tables on these switches and perhaps the joints, trained on a fold, at these paces."""
+
+    columns: Columns
+    joints: bool
+    fold: str
+    stream: str
+    paces: tuple[Pace, ...]
+    max_bins: int | None
+
+
+class Waited(Struct, frozen=True):
+    """The latencies, of every pace one for each of DECISIONS."""
+
+    latencies: tuple[tuple[Latency, ...], ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WaitTask:
+    """Train on a fold's rows, then see how long a stream keeps one waiting for decisions."""
+
+    key: WaitKey
+    material: Material
+    fold: Fold
+    stream: Stream
+    cost: float
+
+
+def find_latencies(task: WaitTask) -> Waited:
+    """Return what `task` asks for."""
+    key = task.key
+    asked = tuple(dict.fromkeys(pace.tabled for pace in key.paces))
+    priced = PriceKey(key.columns, key.joints, asked, key.max_bins, ())
+    tables = dict(tables_of(task.material, priced, task.fold.train))
+    return Waited(
+        tuple(
+            tuple(
+                latency(tables[pace.tabled], key.columns, key.joints, task.stream, pace.frame_us, Decider(kind))
+                for kind in DECISIONS
+            )
+            for pace in key.paces
+        )
+    )

@@ -1,0 +1,59 @@
+"""A hand laid flat on paper, with its switches: what pictures, reports and specs know of a glove.
+
+The places come from whoever knows the glove (the command line takes them from the simulator's hand map), so that
+nothing here depends on how hands are simulated.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandShape:
+    """A right hand, palm up, thumb right, its digits' sides unfolded; all places in mm for a hand of `length_mm`.
+
+    names, places (s, 2)  the switches, and where their middles lie; radius_mm of the circle that stands for one
+    parts (s,)            index of each switch's part in part_names: the digits from the thumb on, then the palm
+    sides (s,)            -1 on the unfolded left side of its digit, 1 on the right one, 0 elsewhere
+    outline (k, 2)        the hand from cuff to cuff; strips: outlines of the unfolded sides; creases: open lines
+    labels (digits, 2)    where a digit's name is written
+    """
+
+    length_mm: float
+    names: tuple[str, ...]
+    places: Floats
+    radius_mm: float
+    part_names: tuple[str, ...]
+    parts: NDArray[np.intp]
+    sides: NDArray[np.intp]
+    outline: Floats
+    strips: tuple[Floats, ...]
+    creases: tuple[Floats, ...]
+    labels: Floats
+
+    def scaled(self, length_mm: float) -> "HandShape":
+        """Return the same hand, of another length: its proportions stay, and so does the size of a switch."""
+        factor = length_mm / self.length_mm
+        return replace(
+            self,
+            length_mm=length_mm,
+            places=self.places * factor,
+            outline=self.outline * factor,
+            strips=tuple(strip * factor for strip in self.strips),
+            creases=tuple(crease * factor for crease in self.creases),
+            labels=self.labels * factor,
+        )
+
+    def knows(self, names: Sequence[str]) -> bool:
+        """Return whether every one of `names` is a switch of this hand."""
+        return set(names) <= set(self.names)
+
+    def numbers_of(self, names: Sequence[str]) -> NDArray[np.intp]:
+        """Return the numbers of the switches called `names`, all of which the hand `knows`."""
+        number = {name: number for number, name in enumerate(self.names)}
+        return np.array([number[name] for name in names], dtype=np.intp)

@@ -1,0 +1,69 @@
+"""All that a report tells of, gathered by whoever compiled the build."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...runtime.harness.wiring import Harness
+from ...runtime.manifest import Manifest
+from ...runtime.scanning.scanmap import ScanMap
+from ...runtime.tables import IntegerTables
+from ..evaluation.study import Study
+from ..frontier.points import Frontier
+from ..hand import HandShape
+from ..placement.tree import Tree
+from .errors import ReportError
+from .guarantee import Guarantee
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReportContent:
+    """A build and what is known of it; None where a thing was not asked for or has no meaning.
+
+    tables        the build's integer tables, tables_bytes their size in `tables.bin`
+    rounds        rounds of boosting that the ensemble holds
+    firmware      a sentence: what the firmware in the build is laid out for, or why there is none
+    only_answer   the one grasp type that every row gets, where there is but one
+    tree          the tree that chose the switches, over the recordings' switches; classes index manifest.grasps
+    confusion     (K, K) counts of the honest folds, row: true, column: recognised, K as in manifest.grasps
+    study         the paper's tables for these recordings
+    hand          where the recordings' switches lie
+    scan, harness the scan map and the harness that it was made for
+    guarantee     the worst that integers can do, over every frame there is
+
+    Raises ReportError where parts do not belong together.
+    """
+
+    manifest: Manifest
+    tables: IntegerTables
+    tables_bytes: int
+    rounds: int
+    firmware: str = ""
+    only_answer: str | None = None
+    tree: Tree | None = None
+    confusion: NDArray[np.intp] | None = None
+    study: Study | None = None
+    frontier: Frontier | None = None
+    hand: HandShape | None = None
+    scan: ScanMap | None = None
+    harness: Harness | None = None
+    guarantee: Guarantee | None = None
+
+    def __post_init__(self) -> None:
+        grasps = len(self.manifest.grasps)
+        if self.tables.n_classes != grasps or self.tables.n_switches != len(self.manifest.switches):
+            raise ReportError("the tables are of another build than build.json: compile the build again")
+        if self.confusion is not None and self.confusion.shape != (grasps, grasps):
+            raise ReportError(f"a confusion matrix of {grasps} grasp types is not {self.confusion.shape}")
+        if self.tree is not None and len(self.tree.classes) > grasps:
+            raise ReportError("the tree knows more grasp types than the build: it is of other recordings")
+        if self.hand is not None and not self.hand.knows(self.switch_names):
+            raise ReportError("the hand lacks a kept switch: it is of another glove")
+        if self.scan is not None and (self.harness is None or self.scan.harness != self.harness.fingerprint):
+            raise ReportError("the scan map is not of this harness: compile with --glove and the glove.toml in use")
+
+    @property
+    def switch_names(self) -> tuple[str, ...]:
+        """Names of the kept switches, in the order in which they were chosen."""
+        return tuple(switch.name for switch in self.manifest.switches)

@@ -1,0 +1,152 @@
+"""All that a spec says of a reduced glove, decided once: files and tables only write it down."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from ...runtime.errors import HarnessError
+from ...runtime.harness.wiring import GloveWiring, Harness
+from ...runtime.manifest import Manifest
+from ...runtime.names import list_names
+from ...runtime.scanning.plan import check_harness
+from ...runtime.scanning.propose import propose_harness
+from ...runtime.scanning.scanmap import ScanMap
+from ...runtime.scanning.whole import whole_scan
+from ..hand import HandShape
+from .circuit import Circuit
+from .ends import BoardPins, End, as_soldered, ends_of
+from .errors import SpecError
+from .expected import Expected, expected_of
+from .glove_circuit import glove_circuit
+from .materials import Material, bill_of
+from .pattern import Pattern, pattern_of
+from .placing import BODY_MM, PlacedSwitch, crowded, place_switches
+from .wires import Wire, wires_of
+
+_GLOVE_PORT = "/dev/ttyUSB0"
+
+
+class Reader(Struct, frozen=True):
+    """What reads switches, by its designator: an expander or a board, and the numbers of the switches on its pins."""
+
+    ref: str
+    place: str
+    pins: tuple[str, ...]
+    switches: tuple[int, ...]
+
+
+class Summary(Struct, frozen=True):
+    """A spec as values: what `spec.json` holds. `remarks` are sentences for whoever builds the glove."""
+
+    glove: str
+    proposed: bool
+    hand_length_mm: float | None
+    print_on: str
+    switches: tuple[PlacedSwitch, ...]
+    readers: tuple[Reader, ...]
+    wires: tuple[Wire, ...]
+    materials: tuple[Material, ...]
+    expected: Expected
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GloveSpec:
+    """A reduced glove: its summary, and what is drawn, connected and loaded. No pattern: nobody knows the places."""
+
+    summary: Summary
+    harness: Harness
+    scan: ScanMap
+    circuit: Circuit
+    pattern: Pattern | None
+
+
+def glove_spec(
+    manifest: Manifest,
+    scan: ScanMap | None = None,
+    harness: Harness | None = None,
+    hand: HandShape | None = None,
+    boards: Sequence[BoardPins | None] = (),
+) -> GloveSpec:
+    """Return the spec of a build's glove, wired as `harness` says; without one, as one is proposed for it.
+
+    scan is the build's scan map, where it has one; hand, the hand that knows its switches. boards[n], where given, says
+    what its keys are wired to. Raises SpecError if the build keeps no switch, or has a scan map and no
+    harness is given; HarnessError if the harness lacks a kept switch, or is not the scan map's.
+    """
+    names = [switch.name for switch in manifest.switches]
+    if not names:
+        raise SpecError("the build keeps no switch, so there is no glove to build: compile it with --inputs both")
+    wired = _harness(manifest, scan, harness, names)
+    read = whole_scan(wired, names) if scan is None else scan
+    known = hand if hand is not None and hand.knows(names) else None
+    switches = place_switches(names, known)
+    soldered = as_soldered(wired, boards)
+    ends = ends_of(soldered, names, boards)
+    wires = wires_of(switches, ends, known)
+    circuit = glove_circuit(switches, ends, wires, soldered)
+    title = f"{wired.name}: {len(names)} switches, right hand of {known.length_mm:g} mm" if known else ""
+    pattern = None if known is None else pattern_of(switches, known, title)
+    summary = Summary(
+        glove=wired.name,
+        proposed=harness is None,
+        hand_length_mm=None if known is None else known.length_mm,
+        print_on="" if pattern is None else pattern.page.hint,
+        switches=switches,
+        readers=_readers(ends),
+        wires=wires,
+        materials=bill_of(circuit, wires),
+        expected=expected_of(manifest, read, wired),
+        remarks=tuple(_remarks(switches)),
+    )
+    return GloveSpec(summary, wired, read, circuit, pattern)
+
+
+def _harness(manifest: Manifest, scan: ScanMap | None, harness: Harness | None, names: Sequence[str]) -> Harness:
+    if harness is None:
+        if scan is not None:
+            raise SpecError("the build was compiled for a wiring of its own: name its glove.toml with --glove")
+        glove = GloveWiring(port=_GLOVE_PORT) if manifest.joints else None
+        return propose_harness(names, cyberglove=glove)
+    if scan is not None:
+        check_harness(scan, harness)
+    wired = set(harness.switches)
+    if lacking := [name for name in names if name not in wired]:
+        raise HarnessError(
+            f"harness {harness.name!r} has no pin or key for {list_names(lacking)}, which the build keeps: "
+            "add what is missing to its file"
+        )
+    return _portable(harness)
+
+
+def _portable(harness: Harness) -> Harness:
+    """Return the harness with the name alone of its calibration: the file belongs beside the spec's glove.toml."""
+    glove = harness.cyberglove
+    if glove is None or glove.calibration is None:
+        return harness
+    name = glove.calibration.replace("\\", "/").rsplit("/", 1)[-1]
+    return replace(harness, cyberglove=replace(glove, calibration=name))
+
+
+def _readers(ends: Sequence[End]) -> tuple[Reader, ...]:
+    groups: dict[str, list[End]] = {}
+    for end in ends:
+        groups.setdefault(end.unit.ref, []).append(end)
+    return tuple(
+        Reader(ref, group[0].unit.place, tuple(end.pin for end in group), tuple(end.switch + 1 for end in group))
+        for ref, group in sorted(groups.items(), key=lambda item: (item[0][0], int(item[0][1:])))
+    )
+
+
+def _remarks(switches: Sequence[PlacedSwitch]) -> list[str]:
+    remarks = [
+        f"SW{first} and SW{second} are {apart} mm apart and their bodies {BODY_MM} mm broad: move one of them aside"
+        for first, second, apart in crowded(switches)
+    ]
+    if switches[0].x_mm is None:
+        remarks.append(
+            "nobody knows where this glove's switches lie: there is no pattern to cut, and lengths of wire are left out"
+        )
+    return remarks

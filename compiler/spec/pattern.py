@@ -1,0 +1,116 @@
+"""The cutting pattern: the flat hand with its kept switches as shapes on a page, in millimetres at 1:1.
+
+Page coordinates: x to the right, y up, from the lower left corner. SVG and DXF are written from the same shapes.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..hand import HandShape
+from .pages import MARGIN_MM, Page, page_for
+from .placing import CONTACT_MM, PlacedSwitch
+
+Floats = NDArray[np.float64]
+LAYERS = ("outline", "strips", "creases", "holes", "names", "scale")
+SCALE_BAR_MM = 50.0
+
+_TITLE_MM, _TEXT_MM, _ROW_MM, _COLUMN_MM = 3.5, 2.0, 3.2, 48.0
+_BAR_ROOM_MM, _GAP_MM = 14.0, 4.0
+_TICK_MM = 2.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Line:
+    """A line through points (k, 2), back to the first one if `closed`."""
+
+    layer: str
+    points: Floats
+    closed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Circle:
+    """A circle."""
+
+    layer: str
+    x: float
+    y: float
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A line of text of capitals `height` mm high: (x, y) is where it begins, its middle if `centred`."""
+
+    layer: str
+    x: float
+    y: float
+    height: float
+    text: str
+    centred: bool = False
+
+
+Shape = Line | Circle | Text
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pattern:
+    """Shapes on a page."""
+
+    page: Page
+    shapes: tuple[Shape, ...]
+
+
+def pattern_of(switches: Sequence[PlacedSwitch], hand: HandShape, title: str) -> Pattern:
+    """Return the pattern: title, hand, a bar of 50 mm to check the print, and the list of switches below."""
+    extent = np.concatenate([hand.outline, *hand.strips, hand.labels])
+    low, high = extent.min(axis=0), extent.max(axis=0)
+    columns = max(1, int((high[0] - low[0]) // _COLUMN_MM))
+    rows = -(-len(switches) // columns)
+    below = rows * _ROW_MM + _GAP_MM + _BAR_ROOM_MM
+    width = float(max(high[0] - low[0], columns * _COLUMN_MM))
+    page = page_for(width, float(high[1] - low[1]) + below + 2 * _GAP_MM + _TITLE_MM)
+    left = (page.width_mm - width) / 2
+    move = np.array([left - low[0], MARGIN_MM + below - low[1]])
+    top = page.height_mm - MARGIN_MM - _TITLE_MM
+    shapes = (
+        Text("names", MARGIN_MM, top, _TITLE_MM, title),
+        *_hand(hand, move),
+        *_holes(switches, move),
+        *_bar(left, MARGIN_MM + rows * _ROW_MM + _GAP_MM),
+        *_legend(switches, rows, left),
+    )
+    return Pattern(page, shapes)
+
+
+def _hand(hand: HandShape, move: Floats) -> Iterator[Shape]:
+    yield Line("outline", hand.outline + move, closed=True)
+    yield from (Line("strips", strip + move, closed=True) for strip in hand.strips)
+    yield from (Line("creases", crease + move, closed=False) for crease in hand.creases)
+    for name, (x, y) in zip(hand.part_names, hand.labels + move, strict=False):
+        yield Text("names", float(x), float(y), _TEXT_MM, name, centred=True)
+
+
+def _holes(switches: Sequence[PlacedSwitch], move: Floats) -> Iterator[Shape]:
+    for switch in switches:
+        x, y = (switch.x_mm or 0.0) + float(move[0]), (switch.y_mm or 0.0) + float(move[1])
+        yield Circle("holes", x, y, CONTACT_MM / 2)
+        yield Text("names", x, y, 1.4 if switch.number < 100 else 1.0, str(switch.number), centred=True)
+
+
+def _bar(x: float, y: float) -> Iterator[Shape]:
+    yield Line("scale", np.array([[x, y], [x + SCALE_BAR_MM, y]]), closed=False)
+    for at in (x, x + SCALE_BAR_MM):
+        yield Line("scale", np.array([[at, y - _TICK_MM], [at, y + _TICK_MM]]), closed=False)
+    yield Text("names", x, y + _TICK_MM + 1.0, _TEXT_MM, "50 mm: measure it on paper, and print without scaling")
+
+
+def _legend(switches: Sequence[PlacedSwitch], rows: int, left: float) -> Iterator[Shape]:
+    """Yield the list of switches, column by column."""
+    for place, switch in enumerate(switches):
+        column, row = divmod(place, rows)
+        x, y = left + column * _COLUMN_MM, MARGIN_MM + (rows - 1 - row) * _ROW_MM
+        yield Text("names", x, y, _TEXT_MM, f"{switch.number}  {switch.name}")

@@ -1,0 +1,158 @@
+"""`thenar frontier` as a user calls it, and `compile --from` after it."""
+
+import csv
+import json
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from thenar.compiler import GraspSet
+from thenar.compiler.frontier.points import Frontier, frontier_from_bytes
+from thenar.runtime import Build
+
+Thenar = Callable[..., subprocess.CompletedProcess[str]]
+QUICK = ("--target", "host", "--methods", "elimination,id3", "--rivals", "forest", "--rounds", 12, "--finalists", 3)
+
+
+@pytest.fixture(scope="session")
+def found_folder(thenar: Thenar, set_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("found") / "frontier"
+    done = thenar("frontier", set_file, "-o", folder, *QUICK, "--rate", 0.5)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.fixture(scope="session")
+def found(found_folder: Path) -> Frontier:
+    return frontier_from_bytes((found_folder / "frontier.json").read_bytes())
+
+
+def test_the_folder_holds_tables_pictures_and_the_store(found_folder: Path) -> None:
+    names = {path.name for path in found_folder.iterdir()}
+    assert names == {"frontier.json", "frontier.csv", "frontier.svg", "switches.svg", "latency.svg", "store.jsonl"}
+
+
+def test_every_point_stands_in_the_csv(found_folder: Path, found: Frontier) -> None:
+    with (found_folder / "frontier.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(found.points) > 0
+
+
+def test_points_are_numbered_from_the_fastest_on(found: Frontier) -> None:
+    assert [point.number for point in found.points] == list(range(1, len(found.points) + 1))
+    times = [point.frame.us for point in found.points]
+    assert times == sorted(times)
+
+
+def test_no_point_of_the_frame_front_is_beaten_by_another(found: Frontier) -> None:
+    front = [point for point in found.points if "frame" in point.fronts]
+    assert front
+    for point in front:
+        assert not any(other.frame.us < point.frame.us and other.rate.mean >= point.rate.mean for other in front)
+
+
+def test_the_picked_point_is_the_fastest_that_recognises_enough(found: Frontier) -> None:
+    assert found.picked is not None
+    picked = found.point(found.picked)
+    good = [each for each in found.points if each.rate.mean >= 0.5 and each.setting.decision == "single"]
+    assert picked.frame.us == min(each.frame.us for each in good)
+
+
+def test_running_again_asks_nothing_twice(
+    thenar: Thenar, set_file: Path, found_folder: Path, found: Frontier, tmp_path: Path
+) -> None:
+    again = tmp_path / "again"
+    shutil.copytree(found_folder, again)
+    done = thenar("frontier", set_file, "-o", again, *QUICK, "--rate", 0.5)
+    assert done.returncode == 0, done.stderr
+    assert (again / "store.jsonl").read_bytes() == (found_folder / "store.jsonl").read_bytes()
+    second = frontier_from_bytes((again / "frontier.json").read_bytes())
+    assert second.points == found.points
+
+
+@pytest.mark.parametrize("worth", ["best", "joints"])
+def test_a_point_becomes_a_build(
+    thenar: Thenar, set_file: Path, found_folder: Path, found: Frontier, tmp_path: Path, worth: str
+) -> None:
+    point = max(found.points, key=lambda each: (worth == "joints" and not each.switches, each.rate.mean))
+    build = tmp_path / "build"
+    done = thenar(
+        *("compile", set_file, "-o", build, "--folds", 0),
+        *("--from", found_folder / "frontier.json", "--point", point.number),
+    )
+    assert done.returncode == 0, done.stderr
+    made = Build.load(build).manifest
+    assert tuple(switch.name for switch in made.switches) == point.switches
+    assert (made.options.rounds, made.options.width, made.options.table_bits) == (
+        point.setting.rounds,
+        point.setting.width,
+        point.setting.table_bits,
+    )
+    assert (made.scan_sha256 is not None) == bool(point.switches)
+
+
+def test_options_that_the_point_settles_cannot_be_given_as_well(
+    thenar: Thenar, set_file: Path, found_folder: Path, tmp_path: Path
+) -> None:
+    done = thenar(
+        "compile", set_file, "-o", tmp_path / "b", "--from", found_folder / "frontier.json", "--point", 1, "--rounds", 5
+    )
+    assert done.returncode == 2
+    assert "--rounds is settled by the point" in done.stderr
+
+
+def test_a_frontier_of_other_recordings_is_refused(
+    thenar: Thenar, small_set: GraspSet, found_folder: Path, tmp_path: Path
+) -> None:
+    other = tmp_path / "other.grasps"
+    small_set.rows(list(range(50))).save(other)
+    done = thenar("compile", other, "-o", tmp_path / "b", "--from", found_folder / "frontier.json", "--point", 1)
+    assert done.returncode == 1
+    assert "found for other recordings" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--methods", "nonsense"), "there is no method 'nonsense'"),
+        (("--budget-us", 5, "--rate", 0.5), "give one of them"),
+        (("--dask", "nowhere:1"), "nowhere:1"),
+    ],
+)
+def test_what_is_wrong_is_said_in_a_sentence(
+    thenar: Thenar, set_file: Path, tmp_path: Path, arguments: tuple[Any, ...], said: str
+) -> None:
+    done = thenar("frontier", set_file, "-o", tmp_path / "f", *QUICK[:2], *arguments)
+    assert done.returncode in (1, 2)
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_point_that_does_not_exist_is_told(
+    thenar: Thenar, set_file: Path, found_folder: Path, tmp_path: Path
+) -> None:
+    done = thenar("compile", set_file, "-o", tmp_path / "b", "--from", found_folder / "frontier.json", "--point", 999)
+    assert done.returncode == 1
+    assert "there is no point 999" in done.stderr
+
+
+def test_a_budget_that_nothing_meets_ends_with_a_code(
+    thenar: Thenar, set_file: Path, found_folder: Path, tmp_path: Path
+) -> None:
+    again = tmp_path / "again"
+    shutil.copytree(found_folder, again)
+    done = thenar("frontier", set_file, "-o", again, *QUICK, "--budget-us", 0.001)
+    assert done.returncode == 1
+    assert "no point suits" in done.stderr
+    assert (again / "frontier.json").exists()
+
+
+def test_json_is_the_frontier(thenar: Thenar, set_file: Path, found_folder: Path, tmp_path: Path) -> None:
+    again = tmp_path / "again"
+    shutil.copytree(found_folder, again)
+    done = thenar("frontier", set_file, "-o", again, *QUICK, "--rate", 0.5, "--json")
+    assert json.loads(done.stdout) == json.loads((again / "frontier.json").read_bytes())

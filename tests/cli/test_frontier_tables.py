@@ -1,0 +1,57 @@
+"""What `thenar frontier` prints of what it found."""
+
+import importlib.util
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from thenar.cli.frontier_tables import print_frontier
+
+_EXAMPLE = Path(__file__).parents[1] / "compiler" / "frontier" / "example_frontier.py"
+
+
+@pytest.fixture(scope="module")
+def examples() -> Any:
+    spec = importlib.util.spec_from_file_location("example_frontier", _EXAMPLE)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def _printed(frontier: Any, capsys: pytest.CaptureFixture[str]) -> list[str]:
+    print_frontier(frontier)
+    return capsys.readouterr().out.splitlines()
+
+
+def test_a_point_is_a_line_of_the_table(examples: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = [line for line in _printed(examples.example_frontier(), capsys) if line.startswith("│")]
+    assert [line.strip("│").split("│")[0].strip() for line in lines] == [str(number) for number in range(1, 12)]
+    assert [cell.strip() for cell in lines[4].strip("│").split("│")] == [
+        *("5", "33", "switches", "elimination 33", "100, 8", "mcp23017 1 MHz", "early", "sequential"),
+        *("92.9 [92.1, 93.7]", "89.5 [88.6, 90.4]", "440 us model", "2.91 ms, 7.4 ms", "8,844", "114"),
+    ]
+
+
+def test_errors_of_models_what_was_skipped_and_the_sentence_follow(
+    examples: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told = "\n".join(_printed(examples.example_frontier(), capsys))
+    assert "classify on the AVR, simulated: 36 times" in told
+    assert "off by 1.1% in the mean, 3.4% at worst" in told
+    assert "qemu-system-arm is missing" in told
+    assert "Point 5: 33 of 160 switches" in told
+
+
+def test_names_are_no_markup(examples: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    told = "\n".join(_printed(examples.example_frontier(source="[bold]:smile:[/nothing]"), capsys))
+    assert "[bold]:smile:[/nothing]" in told
+
+
+def test_no_points_and_one_subject_print_too(examples: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    told = "\n".join(_printed(examples.example_frontier(points=(), picked=None), capsys))
+    assert "none is a point of the frontier" in told

@@ -1,0 +1,156 @@
+"""`thenar spec`: the reduced glove of a build, printed and written."""
+
+import json
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thenar.cli.hand import hand_of
+from thenar.compiler import GraspSet, compile_build
+from thenar.compiler.recordings.taxonomy import own
+from thenar.compiler.spec.files import spec_files
+from thenar.runtime import Build
+from thenar.runtime.harness.loading import load_harness
+from thenar.runtime.harness.writing import harness_to_toml
+from thenar.runtime.scanning.propose import propose_harness
+
+Thenar = Callable[..., subprocess.CompletedProcess[str]]
+NAMES = ("thumb_distal_5", "palm_heel_6", "index_distal_3", "little_distal_8")
+
+
+@pytest.fixture(scope="module")
+def hand_set() -> GraspSet:
+    """Four switches of the shipped glove that tell three grasp types apart."""
+    labels = np.arange(30) % 3
+    return GraspSet(
+        switches=np.array([[0, 0, 1, 1], [0, 1, 0, 1], [1, 0, 0, 0]], bool)[labels],
+        switch_names=NAMES,
+        codes=np.zeros((30, 0), np.uint16),
+        joints=(),
+        grasps=np.array(["cup", "pen", "rod"])[labels],
+        taxonomy=own(["cup", "pen", "rod"]),
+        subjects=np.full(30, "A"),
+        objects=np.full(30, "thing"),
+        trials=np.arange(30),
+    )
+
+
+@pytest.fixture(scope="module")
+def hand_build(hand_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return compile_build(hand_set, tmp_path_factory.mktemp("hand") / "build", rounds=3, folds=0).folder
+
+
+def said(done: subprocess.CompletedProcess[str]) -> str:
+    assert done.returncode == 0, done.stderr
+    return " ".join(done.stdout.split())
+
+
+def refused(done: subprocess.CompletedProcess[str]) -> str:
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    return " ".join(done.stderr.split())
+
+
+def test_a_spec_is_printed_and_written(thenar: Thenar, hand_build: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "a" / "spec"
+    told = said(thenar("spec", hand_build, "-o", folder))
+    manifest = Build.load(hand_build).manifest
+    names = [switch.name for switch in manifest.switches]
+    assert f"{len(names)} switches, a proposed wiring, for a right hand of 190 mm" in told
+    assert all(name in told for name in names)
+    assert "us on the wire, in 1 transaction." in told
+    written = {path.name: path.read_bytes() for path in folder.iterdir()}
+    assert written == spec_files(manifest, hand=hand_of(names))
+    assert load_harness(folder / "glove.toml").switches == tuple(names)
+
+
+def test_without_a_folder_nothing_is_written(thenar: Thenar, hand_build: Path) -> None:
+    before = sorted(hand_build.rglob("*"))
+    said(thenar("spec", hand_build))
+    assert sorted(hand_build.rglob("*")) == before
+
+
+def test_machines_get_the_same_as_spec_json(thenar: Thenar, hand_build: Path, tmp_path: Path) -> None:
+    done = thenar("spec", hand_build, "--json", "--hand-length", 171, "-o", tmp_path / "spec")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == json.loads((tmp_path / "spec" / "spec.json").read_bytes())
+    assert json.loads(done.stdout)["hand_length_mm"] == 171
+
+
+def test_a_glove_is_described_as_it_is_wired(thenar: Thenar, hand_set: GraspSet, tmp_path: Path) -> None:
+    glove = tmp_path / "bench.toml"
+    glove.write_text(harness_to_toml(propose_harness(["spare", *NAMES], "pca9555", name="bench")))
+    build = compile_build(hand_set, tmp_path / "build", rounds=3, folds=0, harness=load_harness(glove)).folder
+    assert "name its glove.toml with --glove" in refused(thenar("spec", build))
+    told = said(thenar("spec", build, "--glove", glove, "-o", build / "spec"))
+    assert "wired as bench" in told
+    assert "U1: pca9555 at 0x20" in told
+    assert "wired as bench" in said(thenar("spec", build)), "the wiring that the build holds"
+
+
+def test_a_matrix_is_described_by_its_board(thenar: Thenar, hand_build: Path, tmp_path: Path) -> None:
+    board = tmp_path / "board.toml"
+    board.write_text(
+        'part = "atmega328p"\n[matrix]\nrows = ["PD2", "PD3"]\ncolumns = ["PB0", "PB1"]\ndiodes = true\n'
+        f"switches = [{json.dumps(NAMES[:2])}, {json.dumps(NAMES[2:])}]\n"
+    )
+    done = thenar("spec", hand_build, "--board", board, "--json", "-o", tmp_path / "spec")
+    assert done.returncode == 0, done.stderr
+    (reader,) = json.loads(done.stdout)["readers"]
+    names = [switch.name for switch in Build.load(hand_build).manifest.switches]
+    pins = [("PB0", "PB1")[NAMES.index(name) % 2] for name in names]
+    assert (reader["ref"], reader["pins"]) == ("A1", pins)
+    assert load_harness(tmp_path / "spec" / "glove.toml").scanners[0].switches == NAMES
+
+
+@pytest.mark.parametrize("joined", [True, False])
+def test_a_board_is_described_by_its_pins_or_its_expanders(
+    thenar: Thenar, hand_build: Path, tmp_path: Path, joined: bool
+) -> None:
+    pins = ("GPA0", "GPA1", "GPB0", "GPB1") if joined else ("PD2", "PD3", "PB0", "PB1")
+    wired = "\n".join(f'{name} = "{pin}"' for name, pin in zip(NAMES, pins, strict=True))
+    if joined:
+        wired = ", ".join(f'{pin} = "{name}"' for name, pin in zip(NAMES, pins, strict=True))
+        wired = f'[[chip]]\nkind = "mcp23017"\naddress = 0x20\npins = {{ {wired} }}'
+    else:
+        wired = f"[pins]\n{wired}"
+    board = tmp_path / "board.toml"
+    board.write_text(f'part = "atmega328p"\nscan_us = 3000\n{wired}\n')
+    done = thenar("spec", hand_build, "--board", board, "--json")
+    assert done.returncode == 0, done.stderr
+    (reader,) = json.loads(done.stdout)["readers"]
+    names = [switch.name for switch in Build.load(hand_build).manifest.switches]
+    assert reader["ref"] == ("U1" if joined else "A1")
+    assert dict(zip(reader["switches"], reader["pins"], strict=True)) == {
+        number: pins[NAMES.index(name)] for number, name in enumerate(names, start=1)
+    }
+
+
+def test_a_glove_of_ones_own_has_no_pattern_and_no_length(thenar: Thenar, build_folder: Path, tmp_path: Path) -> None:
+    told = said(thenar("spec", build_folder, "-o", tmp_path / "spec"))
+    assert "nobody knows where this glove's switches lie" in told
+    assert not (tmp_path / "spec" / "cutting.svg").exists()
+    assert "murakami160" in refused(thenar("spec", build_folder, "--hand-length", 180))
+
+
+def test_a_spec_is_replaced_whole_and_anything_else_is_kept(
+    thenar: Thenar, hand_build: Path, build_folder: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "spec"
+    said(thenar("spec", hand_build, "-o", folder))
+    assert (folder / "cutting.dxf").exists()
+    said(thenar("spec", build_folder, "-o", folder))
+    assert not (folder / "cutting.dxf").exists()
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "letter.txt").write_text("dear")
+    assert "is no spec" in refused(thenar("spec", hand_build, "-o", other))
+    assert [path.name for path in other.iterdir()] == ["letter.txt"]
+
+
+def test_a_build_without_switches_is_refused(thenar: Thenar, small_set: GraspSet, tmp_path: Path) -> None:
+    build = compile_build(small_set, tmp_path / "build", rounds=3, folds=0, inputs="joints").folder
+    assert "keeps no switch" in refused(thenar("spec", build))

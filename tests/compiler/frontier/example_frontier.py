@@ -1,0 +1,235 @@
+"""A frontier as `thenar frontier` finds it on 3 subjects x 1400 grasps, made up: valid, rich, and the same every time.
+
+Import it as a module of its own (`conftest.py` beside it shows how); every call returns an equal frontier.
+"""
+
+from collections.abc import Callable, Sequence
+from itertools import product
+from typing import Any
+
+import msgspec
+
+from thenar.compiler.frontier.points import (
+    SCHEMA,
+    Check,
+    Curve,
+    DecisionKind,
+    Frontier,
+    Latency,
+    Mark,
+    Point,
+    Rate,
+    Scan,
+    Setting,
+    Time,
+    Tried,
+    Way,
+    frontier_from_bytes,
+    frontier_to_bytes,
+)
+from thenar.runtime.manifest import Inputs
+
+GRASPS = (
+    *("PoS", "PoH", "PoI", "PoE-W", "PoE-N", "Lat", "Tri"),
+    *("PMT", "Par", "CirS", "CirP", "TiP", "Add", "Pla"),
+)
+N_SWITCHES, N_JOINTS = 160, 16
+TRANSFER_US = 1736.1  # 20 bytes at 115200 baud
+
+_PARTS = ("thumb", "index", "middle", "ring", "little", "palm")
+SWITCHES = tuple(f"{_PARTS[number * 7 % 6]}-{number:03d}" for number in range(N_SWITCHES))
+
+# inputs, switches, method, parameter, rounds, width, wiring, its clock in kHz, scan, scan us, classify us, decision,
+# rate, latency us: mean and 99th percentile
+_POINTS: tuple[tuple[Any, ...], ...] = (
+    ("switches", 6, "elimination", 6, 20, 4, "mcp23017", 1000, "full", 48.0, 61.5, "single", 0.712, 1450, 5900),
+    ("switches", 10, "elimination", 10, 40, 5, "mcp23017", 1000, "full", 48.0, 97.9, "single", 0.801, 1380, 5200),
+    ("switches", 16, "elimination", 16, 60, 6, "mcp23017", 1000, "full", 48.0, 150.6, "dwell", 0.866, 2100, 6400),
+    ("switches", 24, "id3-cost", 24, 80, 8, "tca6424a", 1000, "full", 58.0, 231.4, "sequential", 0.918, 2650, 6900),
+    ("switches", 33, "elimination", 33, 100, 8, "mcp23017", 1000, "early", 96, 344.0, "sequential", 0.929, 2910, 7400),
+    ("switches", 50, "id3-ccp", 50, 120, 8, "mcp23017", 400, "early", 241.0, 429.0, "sequential", 0.934, 3260, 9100),
+    ("joints", 0, "elimination", 0, 150, 8, "as wired", 0, "full", 0.0, 298.2, "single", 0.952, 5900, 11800),
+    ("both", 8, "elimination", 8, 150, 8, "mcp23017", 1000, "full", 48.0, 330.0, "sequential", 0.978, 6400, 12900),
+    ("both", 16, "elimination", 16, 200, 8, "as wired", 400, "full", 118.0, 421.3, "sequential", 0.988, 7200, 15100),
+    ("both", 33, "elimination", 33, 300, 12, "board", 1000, "full", 330.0, 905.7, "dwell", 0.9915, 9800, 24600),
+    ("both", 12, "id3-rep", 0.25, 80, 6, "pca9555", 400, "full", 122.0, 363.0, "single", 0.961, 5200, 10400),
+)  # fmt: skip
+
+# What each method recognises with so many switches.
+_SIZES = (1, 2, 4, 8, 16, 33, 64, 100, 160)
+_CURVES: tuple[tuple[str, str, bool, tuple[float, ...]], ...] = (
+    (
+        "elimination",
+        "Backward elimination on the boosted tables",
+        True,
+        (0.19, 0.32, 0.571, 0.768, 0.868, 0.930, 0.935, 0.936, 0.936),
+    ),
+    (
+        "id3-cost",
+        "ID3, gain against marginal scan time",
+        True,
+        (0.19, 0.30, 0.540, 0.731, 0.853, 0.924, 0.933, 0.936, 0.936),
+    ),
+    (
+        "id3",
+        "The paper's ID3, pruned by S",
+        True,
+        (0.19, 0.29, 0.512, 0.690, 0.829, 0.914, 0.932, 0.935, 0.936),
+    ),
+    (
+        "rfe",
+        "Recursive elimination by logistic regression",
+        False,
+        (0.18, 0.30, 0.548, 0.752, 0.858, 0.925, 0.935, 0.936, 0.936),
+    ),
+    (
+        "forest",
+        "Importance in a forest",
+        False,
+        (0.19, 0.28, 0.505, 0.708, 0.851, 0.922, 0.934, 0.935, 0.936),
+    ),
+    (
+        "mrmr",
+        "Most relevance, least redundance",
+        False,
+        (0.19, 0.29, 0.503, 0.671, 0.802, 0.893, 0.926, 0.934, 0.936),
+    ),
+    (
+        "mutual-information",
+        "The greatest mutual information, one by one",
+        False,
+        (0.19, 0.25, 0.381, 0.518, 0.651, 0.802, 0.905, 0.929, 0.936),
+    ),
+    ("qr", "PySensors' QR, no labels", False, (0.11, 0.19, 0.362, 0.581, 0.773, 0.881, 0.924, 0.933, 0.936)),
+    ("sspoc", "PySensors' SSPOC", False, (0.12, 0.21, 0.334, 0.492, 0.644, 0.771, 0.881, 0.922, 0.936)),
+    ("random", "Drawn at random", False, (0.10, 0.15, 0.243, 0.389, 0.542, 0.714, 0.862, 0.917, 0.936)),
+)  # fmt: skip
+
+
+def example_frontier(**changes: object) -> Frontier:
+    """Return the frontier, some of its fields changed; it has gone through JSON, so all types hold."""
+    frontier = Frontier(
+        schema=SCHEMA,
+        thenar="0.1.0",
+        source="kamakura.grasps",
+        fingerprint="5f3a9c0e" * 8,
+        rows=4200,
+        subjects=3,
+        n_switches=N_SWITCHES,
+        n_joints=N_JOINTS,
+        grasps=GRASPS,
+        target="avr328p",
+        folds=4,
+        repeats=3,
+        combinations=184_320,
+        points=_points(),
+        tried=_tried(),
+        curves=tuple(Curve(name, what, ours, _SIZES, tuple(map(rate, means))) for name, what, ours, means in _CURVES),
+        marks=_marks(),
+        checks=_checks(),
+        skipped=("qemu-system-arm is missing: no Cortex-M was measured.",),
+        picked=5,
+        wanted="--budget-us 500",
+    )
+    return frontier_from_bytes(frontier_to_bytes(msgspec.structs.replace(frontier, **changes)))
+
+
+def rate(mean: float) -> Rate:
+    """Return a rate with the interval that 4200 rows give, or nearly so."""
+    half = 1.96 * (mean * (1 - mean) / 4200) ** 0.5
+    return Rate(mean, max(0.0, mean - half), min(1.0, mean + half))
+
+
+def _points() -> tuple[Point, ...]:
+    points = [_point(number, *row) for number, row in enumerate(_POINTS, 1)]
+    costs: dict[str, Callable[[Point], float]] = {
+        "frame": lambda point: point.frame.us,
+        "switches": lambda point: len(point.switches),
+        "latency": lambda point: point.latency.mean_us,
+    }
+    return tuple(
+        msgspec.structs.replace(
+            point, fronts=tuple(name for name, cost in costs.items() if not _beaten(point, points, cost))
+        )
+        for point in points
+    )
+
+
+def _beaten(point: Point, points: Sequence[Point], cost: Callable[[Point], float]) -> bool:
+    mine = (cost(point), -point.rate.mean)
+    return any(
+        cost(other) <= mine[0] and -other.rate.mean <= mine[1] and (cost(other), -other.rate.mean) != mine
+        for other in points
+    )
+
+
+def _point(
+    number: int,
+    inputs: Inputs,
+    kept: int,
+    method: str,
+    parameter: float,
+    rounds: int,
+    width: int,
+    wiring: str,
+    clock_khz: int,
+    scan: Scan,
+    scan_us: float,
+    classify_us: float,
+    decision: DecisionKind,
+    mean: float,
+    latency_us: float,
+    p99_us: float,
+) -> Point:
+    transfer_us = 0.0 if inputs == "switches" else TRANSFER_US
+    layout = f"{8 * (1 + (width > 8))}-bit entries, {4 if kept > 8 else 2} switches a look-up"
+    setting = Setting(Way(method, parameter), inputs, rounds, width, layout, scan, decision, wiring, 1000 * clock_khz)
+    return Point(
+        number=number,
+        setting=setting,
+        switches=tuple(SWITCHES[(41 * place + 3) % N_SWITCHES] for place in range(kept)),
+        rate=rate(mean),
+        left_out=rate(mean - 0.03 - 0.002 * (number % 3)),
+        scan=Time(scan_us, "wire"),
+        transfer=Time(transfer_us, "wire"),
+        classify=Time(classify_us, "simulated" if number % 3 == 1 else "model"),
+        frame=Time(max(scan_us, transfer_us) + classify_us, "simulated" if number % 3 == 1 else "model"),
+        latency=Latency(latency_us, p99_us, 0.012, 0.004),
+        flash=1900 + 14 * (rounds + 12 * kept) + (2600 if inputs != "switches" else 0),
+        ram=48 + 2 * kept,
+        ports=-(-kept // 8),
+        chips=-(-kept // 16),
+        compile_s=1.5 + rounds / 40,
+    )
+
+
+def _tried() -> tuple[Tried, ...]:
+    kept: list[tuple[Inputs, int, float, float]] = [
+        *(("switches", size, 0.70 + 0.236 * (1 - 0.94 ** (size - 5)), 105 + 9.5 * size) for size in _sizes(6)),
+        *(("both", size, 0.955 + 0.036 * (1 - 0.93**size), 2030 + 16 * size) for size in _sizes(4)),
+    ]
+    methods = (("elimination", 0.998, 1.02, 120), ("id3", 0.985, 1.16, 100), ("rfe", 0.994, 1.1, 150))
+    return tuple(
+        Tried(Way(method, float(size)), inputs, size, rounds, rate(mean * worse), us * slower)
+        for (inputs, size, mean, us), (method, worse, slower, rounds) in product(kept, methods)
+    )
+
+
+def _sizes(first: int) -> tuple[int, ...]:
+    return tuple(round(first * 1.7**step) for step in range(7))
+
+
+def _marks() -> tuple[Mark, ...]:
+    return (
+        Mark("all 160 switches", 160, rate(0.936), 2050.0, 8900.0),
+        Mark("paper, S = 13", 66, rate(0.932), 1420.0, 6600.0),
+        Mark("paper, S = 62", 35, rate(0.915), 905.0, 5200.0),
+        Mark("your build", 49, rate(0.927), 1105.0, 6000.0),
+    )
+
+
+def _checks() -> tuple[Check, ...]:
+    return (
+        Check("classify on the AVR", "simulated", 36, 0.011, 0.034),
+        Check("reading the chips", "wire", 12, 0.0, 0.0),
+    )

@@ -1,0 +1,160 @@
+"""Small builds with everything that a report can tell of, and the made-up frontier."""
+
+import importlib.util
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from thenar.cli.hand import hand_of
+from thenar.compiler.build.compile import compile_build
+from thenar.compiler.build.ensemble import ensemble_from_bytes
+from thenar.compiler.evaluation.study import Options as Asked
+from thenar.compiler.evaluation.study import evaluate
+from thenar.compiler.frontier.points import Frontier
+from thenar.compiler.hand import HandShape
+from thenar.compiler.placement.id3 import grow_id3
+from thenar.compiler.recordings.graspset import GraspSet, Joint
+from thenar.compiler.recordings.taxonomy import own
+from thenar.compiler.report.content import ReportContent
+from thenar.compiler.report.guarantee import guarantee_of
+from thenar.compiler.tables.compare import compare
+from thenar.runtime.build import Build
+from thenar.runtime.harness.wiring import GloveWiring
+from thenar.runtime.scanning.propose import propose_harness
+from thenar.simulator.handmaps.handmap import hand_map
+
+TYPES = ("cup", "pen", "plate", "rod")
+# What a name in a recording may hold, and a page must not run, close or break.
+NASTY = (
+    "</script><script>document.title='owned'</script>",
+    "<img src=x onerror=\"document.title='owned'\">",
+    "\"quotes\" & 'more' ${x} {{ 7 * 7 }} %{y}",
+    "Griff ✊ 握り \u2028 <!-- <script> \\u003c",
+)
+
+
+@pytest.fixture(scope="session")
+def examples() -> Any:
+    """Return the module with example_frontier."""
+    path = Path(__file__).parents[1] / "frontier" / "example_frontier.py"
+    spec = importlib.util.spec_from_file_location("example_frontier", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="session")
+def hand() -> HandShape:
+    shape = hand_of(hand_map().names)
+    assert shape is not None
+    return shape
+
+
+@pytest.fixture(scope="session")
+def frontier(examples: Any, hand: HandShape) -> Frontier:
+    """Return the made-up frontier, its switches called as the hand's are."""
+    made: Frontier = examples.example_frontier()
+    called = dict(zip(examples.SWITCHES, hand.names, strict=True))
+    points = tuple(
+        msgspec.structs.replace(point, switches=tuple(called[name] for name in point.switches)) for point in made.points
+    )
+    return msgspec.structs.replace(made, points=points)
+
+
+def _make_set(switch_names: tuple[str, ...], types: tuple[str, ...], joint_names: tuple[str, ...]) -> GraspSet:
+    random, rows = np.random.default_rng(7), 120
+    labels = np.arange(rows) % len(types)
+    closed = random.random((len(types), len(switch_names))) < 0.4
+    centres = random.integers(40, 200, (len(types), len(joint_names)))
+    return GraspSet(
+        switches=closed[labels] ^ (random.random((rows, len(switch_names))) < 0.15),
+        switch_names=switch_names,
+        codes=np.clip(centres[labels] + random.normal(0, 30, (rows, len(joint_names))), 0, 255).astype(np.uint16),
+        joints=tuple(Joint(name, "deg", 0, 0.0, 255, 127.5) for name in joint_names),
+        grasps=np.array(types)[labels],
+        taxonomy=own(types),
+        subjects=np.where(np.arange(rows) % 8 < 4, "A", "B"),
+        objects=np.full(rows, "thing"),
+        trials=np.arange(rows),
+    )
+
+
+def _content(grasp_set: GraspSet, folder: Path, hand: HandShape | None) -> ReportContent:
+    """Return what a caller that knows everything would hand over, without a frontier."""
+    tree = grow_id3(grasp_set.switches, grasp_set.labels, min_samples=8)
+    names = [grasp_set.switch_names[number] for number in tree.inputs]
+    glove = GloveWiring(port="/dev/ttyUSB0") if grasp_set.joints else None
+    harness = propose_harness(names, cyberglove=glove)
+    made = compile_build(grasp_set, folder, prune=8, rounds=4, folds=2, harness=harness)
+    build = Build.load(folder)
+    stumps = ensemble_from_bytes((folder / "ensemble.bin").read_bytes())
+    bits = grasp_set.switches[:, list(tree.inputs)]
+    comparison = compare(stumps, build.tables, bits, grasp_set.codes)
+    confusion = np.zeros((len(build.grasps), len(build.grasps)), np.intp)
+    np.add.at(confusion, (grasp_set.labels, comparison.deployed), 1)
+    asked = Asked(rounds=2, folds=2, repeats=1, prune=8, prune_list=(0, 8))
+    return ReportContent(
+        manifest=made.manifest,
+        tables=build.tables,
+        tables_bytes=made.tables_bytes,
+        rounds=stumps.n_rounds,
+        firmware=made.firmware,
+        tree=tree,
+        confusion=confusion,
+        study=evaluate(grasp_set, asked, jobs=1),
+        hand=hand,
+        scan=made.scan,
+        harness=harness,
+        guarantee=guarantee_of(stumps, build.tables, comparison, build.grasps),
+    )
+
+
+@pytest.fixture(scope="session")
+def bare(tmp_path_factory: pytest.TempPathFactory, hand: HandShape) -> ReportContent:
+    """Return a build of the glove that thenar draws, without a frontier."""
+    grasp_set = _make_set(hand.names, TYPES, ("thumb", "index"))
+    return _content(grasp_set, tmp_path_factory.mktemp("bare") / "build", hand)
+
+
+@pytest.fixture(scope="session")
+def whole(bare: ReportContent, frontier: Frontier) -> ReportContent:
+    """Return the same build with a frontier."""
+    return replace(bare, frontier=frontier)
+
+
+@pytest.fixture(scope="session")
+def nasty(tmp_path_factory: pytest.TempPathFactory, examples: Any) -> ReportContent:
+    """Return a build whose names of grasps, switches, joints and marks are HTML, scripts and worse."""
+    switches = tuple(f"{name} {number}" for number, name in enumerate(NASTY * 3))
+    grasp_set = _make_set(switches, NASTY, (f"joint {NASTY[0]}",))
+    content = _content(grasp_set, tmp_path_factory.mktemp("nasty") / "build", None)
+    made: Frontier = examples.example_frontier(source=f"{NASTY[0]}.grasps")
+    point = msgspec.structs.replace(made.points[0], switches=switches[:6])
+    marks = (msgspec.structs.replace(made.marks[0], name=NASTY[1]), *made.marks[1:])
+    curves = (msgspec.structs.replace(made.curves[0], method=NASTY[0], what=NASTY[1]), *made.curves[1:])
+    points = (point, *made.points[1:])
+    return replace(
+        content,
+        frontier=msgspec.structs.replace(made, points=points, marks=marks, curves=curves, skipped=NASTY),
+    )
+
+
+@pytest.fixture(scope="session")
+def write(tmp_path_factory: pytest.TempPathFactory) -> Callable[[bytes], Path]:
+    """Return a function that writes a page to a file of its own."""
+
+    def writing(page: bytes) -> Path:
+        path = tmp_path_factory.mktemp("page") / "report.html"
+        path.write_bytes(page)
+        return path
+
+    return writing

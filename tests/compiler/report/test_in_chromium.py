@@ -1,0 +1,242 @@
+"""The report as a reader has it: opened from a file in a real browser, clicked, typed at, printed."""
+
+import base64
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.wait import WebDriverWait
+
+from thenar.compiler.frontier.points import Frontier
+from thenar.compiler.report.content import ReportContent
+from thenar.compiler.report.page import report_html
+
+FLAGS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1300,1000")
+PATIENCE_S = 30
+
+# Where point N lies in a chart, in pixels from the chart's middle.
+PLACE = """
+    const [chart, number] = arguments, { xaxis, yaxis, meta } = chart._fullLayout, [x, y] = meta.places[number];
+    const box = chart.getBoundingClientRect();
+    return [xaxis._offset + xaxis.d2p(x) - box.width / 2, yaxis._offset + yaxis.d2p(y) - box.height / 2];
+"""
+
+pytestmark = pytest.mark.slow
+
+
+class Reader:
+    """A browser with one page open."""
+
+    def __init__(self, driver: webdriver.Chrome) -> None:
+        self.driver = driver
+
+    def open(self, path: Path) -> None:
+        self._log("performance")
+        self.scheme("light")
+        self.driver.get(path.as_uri())
+
+    def scheme(self, name: str) -> None:
+        """Let the reader's system be "light" or "dark"."""
+        features = [{"name": "prefers-color-scheme", "value": name}]
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+
+    def script(self, text: str, *arguments: object) -> object:
+        return self.driver.execute_script(text, *arguments)
+
+    def wait(self, until: Callable[[], object]) -> None:
+        WebDriverWait(self.driver, PATIENCE_S, poll_frequency=0.05).until(lambda _: until())
+
+    def kept_on_hand(self) -> list[str]:
+        """Return the names of the switches marked on the frontier's hand, in their order."""
+        dots = self.script(
+            "return [...document.querySelectorAll('#picked-hand .dot.kept')].map((dot) =>"
+            " [Number(dot.querySelector('text').textContent), dot.querySelector('title').textContent])"
+        )
+        assert isinstance(dots, list)
+        return [name for _, name in sorted(dots)]
+
+    def _log(self, kind: str) -> list[dict[str, Any]]:
+        entries: list[dict[str, Any]] = self.driver.get_log(kind)  # type: ignore[no-untyped-call]
+        return entries
+
+    def said(self) -> str:
+        return self.driver.find_element(By.ID, "picked-said").text
+
+    def point_at(self, chart: str, number: int) -> ActionChains:
+        """Return the movement of the mouse to a point of a chart."""
+        element = self.driver.find_element(By.ID, chart)
+        self.script("arguments[0].scrollIntoView({block: 'center'})", element)
+        place = self.script(PLACE, element, str(number))
+        assert isinstance(place, list)
+        x, y = place
+        return ActionChains(self.driver).move_to_element_with_offset(element, round(x), round(y))
+
+    def complaints(self) -> list[dict[str, Any]]:
+        return self._log("browser")
+
+    def requests(self) -> list[str]:
+        """Return the addresses that were asked for since the page was opened."""
+        messages = [json.loads(entry["message"])["message"] for entry in self._log("performance")]
+        sent = [message for message in messages if message["method"] == "Network.requestWillBeSent"]
+        return [message["params"]["request"]["url"] for message in sent]
+
+
+@pytest.fixture(scope="module")
+def reader(tool: Callable[[str], str]) -> Iterator[Reader]:
+    options = webdriver.ChromeOptions()
+    options.binary_location = tool("chromium")
+    for flag in FLAGS:
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    driver = webdriver.Chrome(options=options, service=Service(executable_path=tool("chromedriver")))
+    yield Reader(driver)
+    driver.quit()
+
+
+@pytest.fixture(scope="module")
+def path(whole: ReportContent, write: Callable[[bytes], Path]) -> Path:
+    return write(report_html(whole))
+
+
+@pytest.fixture
+def opened(reader: Reader, path: Path) -> Iterator[Reader]:
+    """Return the reader with the report open; nothing may have been complained of or asked for when the test ends."""
+    reader.open(path)
+    yield reader
+    assert reader.complaints() == []
+    assert reader.requests() == [path.as_uri()]
+
+
+def switches(frontier: Frontier, number: int) -> list[str]:
+    return list(frontier.point(number).switches)
+
+
+def test_the_report_opens_with_all_its_charts_and_the_picked_point(opened: Reader, frontier: Frontier) -> None:
+    drawn = opened.driver.find_elements(By.CSS_SELECTOR, ".plot:has(.main-svg)")
+    assert [chart.get_attribute("id") for chart in drawn] == ["tree-chart", "by-frame", "by-switches", "by-latency"]
+    assert frontier.picked is not None
+    assert opened.kept_on_hand() == switches(frontier, frontier.picked)
+
+
+@pytest.mark.parametrize("chart", ["by-frame", "by-switches", "by-latency"])
+def test_a_click_on_a_point_shows_its_switches_on_the_hand(opened: Reader, frontier: Frontier, chart: str) -> None:
+    opened.point_at(chart, 2).click().perform()
+    opened.wait(lambda: opened.said().startswith("Point 2:"))
+    assert opened.kept_on_hand() == switches(frontier, 2)
+    checked = opened.driver.find_element(By.CSS_SELECTOR, "#points input:checked")
+    assert checked.get_attribute("value") == "2"
+    command = opened.driver.find_element(By.ID, "picked-command").text
+    assert command == "thenar compile kamakura.grasps -o build/ --from frontier/frontier.json --point 2"
+
+
+def test_the_mouse_over_a_point_tells_what_it_is(opened: Reader) -> None:
+    opened.point_at("by-frame", 2).perform()
+    selector = "#by-frame .hoverlayer .hovertext"
+    opened.wait(lambda: "Point 2" in " ".join(e.text for e in opened.driver.find_elements(By.CSS_SELECTOR, selector)))
+
+
+def test_arrow_keys_go_from_point_to_point(opened: Reader, frontier: Frontier) -> None:
+    assert frontier.picked is not None
+    following = frontier.picked + 1
+    radio = opened.driver.find_element(By.CSS_SELECTOR, "#points input:checked")
+    radio.send_keys(Keys.ARROW_DOWN)
+    opened.wait(lambda: opened.said().startswith(f"Point {following}:"))
+    assert opened.kept_on_hand() == switches(frontier, following)
+    ring = opened.script(
+        "const chart = document.getElementById('by-frame'); return chart.data[chart.layout.meta.ring].x[0]"
+    )
+    assert ring == pytest.approx(frontier.point(following).frame.us, abs=1e-3)
+
+
+def test_what_is_picked_is_told_in_words_and_numbers(opened: Reader, frontier: Frontier) -> None:
+    opened.driver.find_element(By.CSS_SELECTOR, "#points input[value='10']").click()
+    opened.wait(lambda: opened.said().startswith("Point 10:"))
+    names = [item.text for item in opened.driver.find_elements(By.CSS_SELECTOR, "#picked-switches li")]
+    assert names == switches(frontier, 10)
+    facts = opened.driver.find_element(By.ID, "picked-facts").text
+    assert "board at 1,000,000 baud" in facts
+    assert "99.2 [98.9, 99.4]" in facts
+    summary = opened.driver.find_element(By.ID, "picked-hand-summary").get_attribute("textContent")
+    assert summary == opened.said()
+
+
+def test_colours_follow_the_readers_system_in_page_hand_and_charts(opened: Reader) -> None:
+    look = (
+        "return [getComputedStyle(document.body).backgroundColor,"
+        " getComputedStyle(document.querySelector('#kept-hand .skin')).fill,"
+        " document.querySelector('#by-frame .trace.scatter .point').style.fill,"
+        " getComputedStyle(document.querySelector('#by-frame .xtick text')).fill]"
+    )
+    light = opened.script(look)
+    assert isinstance(light, list)
+    opened.scheme("dark")
+    opened.wait(lambda: all(one != other for one, other in zip(light, opened.script(look), strict=True)))  # type: ignore[call-overload]
+    opened.scheme("light")
+    opened.wait(lambda: opened.script(look) == light)
+
+
+def test_a_narrow_screen_need_not_be_scrolled_sideways(opened: Reader) -> None:
+    metrics = {"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": True}
+    opened.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+    try:
+        opened.wait(lambda: opened.script("return document.getElementById('by-frame')._fullLayout.width < 400"))
+        assert opened.script("return document.documentElement.scrollWidth") == 400
+    finally:
+        opened.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_on_paper_the_report_is_light_and_afterwards_as_before(opened: Reader) -> None:
+    opened.scheme("dark")
+    opened.script(
+        "addEventListener('beforeprint', () => { window.printed = [document.documentElement.className,"
+        " document.getElementById('by-frame')._fullLayout.width] })"
+    )
+    assert base64.b64decode(opened.driver.print_page()).startswith(b"%PDF")
+    assert opened.script("return window.printed") == ["on-paper", 680]
+    opened.wait(lambda: opened.script("return document.documentElement.className") == "")
+
+
+def test_the_first_stop_of_the_keyboard_leads_past_the_contents(opened: Reader) -> None:
+    ActionChains(opened.driver).send_keys(Keys.TAB).perform()
+    assert opened.driver.switch_to.active_element.text == "Skip to the content"
+    ActionChains(opened.driver).send_keys(Keys.ENTER).perform()
+    opened.wait(lambda: opened.driver.switch_to.active_element.get_attribute("id") == "content")
+
+
+def test_a_screen_reader_finds_landmarks_and_names(opened: Reader) -> None:
+    opened.wait(lambda: opened.script("return !document.querySelector('.plot svg:not([aria-hidden])')"))
+    nodes = opened.driver.execute_cdp_cmd("Accessibility.getFullAXTree", {})["nodes"]
+    told = [(node["role"]["value"], node.get("name", {}).get("value", "")) for node in nodes if not node["ignored"]]
+    roles = [role for role, _ in told]
+    assert {"banner", "navigation", "main", "status"} <= set(roles)
+    assert roles.count("main") == 1
+    named = [(role, name) for role, name in told if role in {"image", "radio", "table", "region", "link"}]
+    assert len(named) > 40
+    assert [role for role, name in named if not name] == []
+
+
+def test_names_that_hold_scripts_run_nothing(
+    reader: Reader, nasty: ReportContent, write: Callable[[bytes], Path]
+) -> None:
+    path = write(report_html(nasty))
+    reader.open(path)
+    reader.driver.find_element(By.CSS_SELECTOR, "#points input[value='1']").click()
+    reader.wait(lambda: reader.said().startswith("Point 1:"))
+    assert reader.driver.title == "thenar: report of a build"
+    assert reader.driver.find_elements(By.TAG_NAME, "img") == []
+    names = [item.text for item in reader.driver.find_elements(By.CSS_SELECTOR, "#picked-switches li")]
+    assert nasty.frontier is not None
+    assert [" ".join(name.split()) for name in switches(nasty.frontier, 1)] == [
+        " ".join(name.split()) for name in names
+    ]
+    charted = reader.driver.find_element(By.ID, "by-frame").text
+    assert "<img src=x onerror=" in charted
+    assert reader.complaints() == []
+    assert reader.requests() == [path.as_uri()]

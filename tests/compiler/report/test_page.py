@@ -1,0 +1,172 @@
+import re
+import shlex
+from collections.abc import Iterator
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import msgspec
+import numpy as np
+import pytest
+
+from thenar.cli.compile_command import command
+from thenar.compiler.frontier.points import Frontier
+from thenar.compiler.report.content import ReportContent
+from thenar.compiler.report.errors import ReportError
+from thenar.compiler.report.page import report_html
+
+VOID = {"meta", "input", "br", "img", "link", "path", "circle"}
+
+
+class Page(HTMLParser):
+    """A page read as a browser would: elements with attributes, texts, and whether tags close as they opened."""
+
+    def __init__(self, content: bytes) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.texts: list[str] = []
+        self.scripts: list[str] = []
+        self._open: list[str] = []
+        self.feed(content.decode())
+        self.close()
+        assert self._open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        assert len(dict(attrs)) == len(attrs)
+        self.elements.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self._open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self._open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        (self.scripts if self._open[-1:] == ["script"] else self.texts).append(data)
+
+    def of(self, tag: str) -> Iterator[dict[str, str | None]]:
+        return (attributes for name, attributes in self.elements if name == tag)
+
+    @property
+    def text(self) -> str:
+        return " ".join(" ".join(self.texts).split())
+
+
+@pytest.fixture(scope="module")
+def page(whole: ReportContent) -> Page:
+    return Page(report_html(whole))
+
+
+def test_the_same_content_gives_the_same_bytes(whole: ReportContent) -> None:
+    assert report_html(whole) == report_html(whole)
+
+
+def test_every_section_is_there_and_has_something_to_say(page: Page) -> None:
+    links = [attributes["href"] for attributes in page.of("a")]
+    ids = [attributes["id"] for _, attributes in page.elements if "id" in attributes]
+    assert len(set(ids)) == len(ids)
+    assert {link[1:] for link in links if link} <= {name for name in ids if name}
+    for said in ("recognises 4 grasp types", "At worst, over every frame", "A whole scan is", "honest protocol"):
+        assert said in page.text
+    assert "No frontier was given" not in page.text
+
+
+def test_the_page_names_no_other_file(whole: ReportContent) -> None:
+    without = re.sub(rb"<script>.*?</script>", b"", report_html(whole), flags=re.S)
+    assert not re.search(rb"https?:|//[a-z]|@import|url\(", without)
+    read = Page(without)
+    assert not [name for tag, names in read.elements for name in names if name in {"src", "srcset", "action"} and tag]
+    assert all((attributes["href"] or "").startswith("#") for attributes in read.of("a"))
+
+
+def test_plotly_is_in_the_page_once_and_its_version_is_stated(whole: ReportContent, page: Page) -> None:
+    from plotly.offline import get_plotlyjs_version
+
+    assert report_html(whole).count(f"plotly.js v{get_plotlyjs_version()}".encode()) == 1
+    assert f"plotly.js {get_plotlyjs_version()}" in page.text
+
+
+def test_a_report_without_charts_leaves_plotly_out(bare: ReportContent) -> None:
+    plain = report_html(replace(bare, tree=None))
+    assert len(plain) < 500_000
+    assert "plotly" not in Page(plain).text
+    assert b"Plotly.react" in plain
+
+
+def test_names_are_text_and_nothing_else(nasty: ReportContent) -> None:
+    content = report_html(nasty)
+    read = Page(content)
+    assert sum(1 for _ in read.of("script")) == 3
+    assert not list(read.of("img"))
+    for name in nasty.manifest.grasps:
+        assert " ".join(name.split()) in read.text
+    assert "{{ 7 * 7 }}" in read.text
+
+
+def test_the_data_are_json_whatever_names_hold(nasty: ReportContent) -> None:
+    data = msgspec.json.decode(Page(report_html(nasty)).scripts[0])
+    assert nasty.frontier is not None
+    assert data["points"]["1"]["switches"] == list(nasty.frontier.points[0].switches)
+    assert set(data["charts"]) == {"tree-chart", "by-frame", "by-switches", "by-latency"}
+
+
+def test_every_table_has_a_caption_and_heads_with_a_scope(page: Page) -> None:
+    tables, captions = list(page.of("table")), list(page.of("caption"))
+    assert len(tables) == len(captions) > 8
+    assert all(attributes.get("scope") in {"col", "row"} for attributes in page.of("th"))
+
+
+def test_every_picture_says_what_it_is(page: Page) -> None:
+    pictures = [attributes for _, attributes in page.elements if attributes.get("role") in {"img", "group"}]
+    ids = {attributes["id"] for _, attributes in page.elements if "id" in attributes}
+    assert len(pictures) == 6
+    assert all(set((attributes["aria-labelledby"] or "").split()) <= ids for attributes in pictures)
+
+
+def test_the_kept_switches_and_no_others_are_marked_on_the_hand(bare: ReportContent) -> None:
+    content = report_html(bare).decode()
+    kept = re.findall(r'<g class="dot kept"[^>]*><title>(.*?)</title><circle r="1.8"/><text>(\d+)</text>', content)
+    assert kept
+    assert len(re.findall(r'<g class="dot"', content)) == 160 - len(kept)
+    assert [name for name, _ in sorted(kept, key=lambda pair: int(pair[1]))] == list(bare.switch_names)
+
+
+def test_the_command_to_make_the_build_again_is_one_that_compile_understands(bare: ReportContent) -> None:
+    (said,) = re.findall(r"thenar compile SET.grasps -o build/ --prune.*", report_html(bare).decode())
+    known = {flag for parameter in command.params for flag in parameter.opts}
+    assert {word for word in shlex.split(said) if word.startswith("--")} <= known
+    assert "--prune 8 --rounds 4 --inputs both" in said
+    assert said.endswith("--glove glove.toml")
+
+
+def test_a_frontier_of_other_recordings_is_called_so(whole: ReportContent, frontier: Frontier) -> None:
+    said = "This frontier is of other recordings than the build."
+    assert said in Page(report_html(whole)).text
+    same = msgspec.structs.replace(frontier, fingerprint=whole.manifest.source.fingerprint)
+    assert said not in Page(report_html(replace(whole, frontier=same))).text
+
+
+def test_what_was_not_asked_for_is_said_with_the_command_that_makes_it(bare: ReportContent) -> None:
+    little = replace(
+        bare, tree=None, confusion=None, study=None, hand=None, scan=None, harness=None, guarantee=None, frontier=None
+    )
+    text = Page(report_html(little)).text
+    for command_line in ("thenar evaluate", "thenar frontier", "--glove glove.toml"):
+        assert command_line in text
+    assert "Where these switches lie on the hand is not known" in text
+
+
+def test_a_frontier_without_points_is_shown_as_such(whole: ReportContent, frontier: Frontier) -> None:
+    empty = msgspec.structs.replace(frontier, points=(), picked=None, tried=(), curves=(), marks=(), checks=())
+    assert "It has no points." in Page(report_html(replace(whole, frontier=empty))).text
+
+
+def test_parts_that_do_not_belong_together_are_refused(bare: ReportContent) -> None:
+    with pytest.raises(ReportError, match="confusion matrix of 4 grasp types is not"):
+        replace(bare, confusion=np.zeros((3, 3), np.intp))
+    with pytest.raises(ReportError, match="not of this harness"):
+        replace(bare, harness=None)
+    assert bare.hand is not None
+    with pytest.raises(ReportError, match="lacks a kept switch"):
+        replace(bare, hand=replace(bare.hand, names=tuple(f"x{number}" for number in range(160))))

@@ -1,0 +1,69 @@
+"""The fit beside scikit-learn's, which minimises the same sum, and beside itself with the rows in another order."""
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from sklearn.linear_model import LogisticRegression
+
+from thenar.compiler.selection.logistic import RIDGE, Logistic
+
+Bits = npt.NDArray[np.bool_]
+Labels = npt.NDArray[np.intp]
+
+
+def grasps(seed: int, n: int = 200, s: int = 12, classes: int = 4) -> tuple[Bits, Labels]:
+    random = np.random.default_rng(seed)
+    labels = random.integers(0, classes, n)
+    return ((random.random((classes, s)) < 0.4)[labels] ^ (random.random((n, s)) < 0.2)).T, labels
+
+
+def fitted(bits: Bits, labels: Labels) -> npt.NDArray[np.float64]:
+    model = LogisticRegression(C=1 / RIDGE, tol=1e-10, max_iter=5000).fit(bits.T, labels)
+    probability: npt.NDArray[np.float64] = model.predict_proba(bits.T).T
+    return probability
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_it_comes_to_scikit_learns_probabilities(seed: int) -> None:
+    bits, labels = grasps(seed)
+    fit = Logistic(bits, labels, 4)
+    fit.improve(300)
+    np.testing.assert_allclose(fit.probability, fitted(bits, labels), atol=1e-5)
+
+
+def test_without_columns_it_goes_on_to_the_fit_of_the_rest() -> None:
+    bits, labels = grasps(5)
+    fit = Logistic(bits, labels, 4)
+    fit.improve(60)
+    rest = fit.without([2, 7])
+    worse = rest.loss
+    rest.improve(300)
+    assert fit.loss < rest.loss < worse
+    np.testing.assert_allclose(rest.probability, fitted(np.delete(bits, [2, 7], axis=0), labels), atol=1e-5)
+    assert fit.rows.shape == (13, 4)
+
+
+def test_every_step_makes_the_loss_smaller() -> None:
+    fit = Logistic(*grasps(6), 4)
+    losses = [fit.loss]
+    for _ in range(20):
+        fit.improve(1)
+        losses.append(fit.loss)
+    assert losses == sorted(losses, reverse=True)
+    assert losses[-1] < losses[0] / 2
+
+
+def test_the_order_of_the_rows_changes_no_bit() -> None:
+    bits, labels = grasps(7)
+    order = np.random.default_rng(1).permutation(len(labels))
+    one, other = Logistic(bits, labels, 4), Logistic(bits[:, order], labels[order], 4)
+    for fit in (one, other):
+        fit.improve(40)
+    assert np.array_equal(one.rows, other.rows)
+    assert np.array_equal(one.without([3]).rows, other.without([3]).rows)
+
+
+def test_a_single_class_needs_no_rows() -> None:
+    fit = Logistic(np.array([[True, False, True]]), np.zeros(3, np.intp), 1)
+    fit.improve(5)
+    assert not fit.rows.any()

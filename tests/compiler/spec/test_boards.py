@@ -1,0 +1,65 @@
+"""Scanner boards whose wiring is known: pins, matrices with and without diodes, expanders behind a board."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import pytest
+
+from thenar.compiler.spec.ends import BoardPins
+from thenar.compiler.spec.files import spec_files
+from thenar.runtime.harness.loading import parse_harness
+from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, ScannerWiring
+from thenar.runtime.manifest import Manifest
+
+if TYPE_CHECKING:
+    from .conftest import Netlist
+
+Reader = Callable[[bytes], "Netlist"]
+Manifests = Callable[..., Manifest]
+NAMES = ("a", "b", "c")
+HARNESS = Harness(name="h", scanners=(ScannerWiring(port="/dev/ttyACM0", switches=("a", "b", "c", "")),))
+
+
+def test_switches_on_pins_of_their_own_go_to_ground(read_netlist: Reader, manifest_of: Manifests) -> None:
+    board = BoardPins(("PD2", "PD3", "PB0", "PB1"), ("",) * 4)
+    netlist = read_netlist(spec_files(manifest_of(NAMES), None, HARNESS, boards=[board])["glove.net"])
+    for number, pin in enumerate(("PD2", "PD3", "PB0"), start=1):
+        assert netlist.net_of(f"SW{number}", "1") == netlist.net_of("A1", netlist.pin_of("A1", pin))
+        assert netlist.net_of(f"SW{number}", "2") == "GND"
+
+
+@pytest.mark.parametrize("diodes", [True, False])
+def test_in_a_matrix_each_switch_joins_its_column_to_its_row(
+    read_netlist: Reader, manifest_of: Manifests, diodes: bool
+) -> None:
+    """Rows PD2, PD3 and columns PB0, PB1: key k stands at row k / 2, column k % 2."""
+    board = BoardPins(("PB0", "PB1") * 2, ("PD2", "PD2", "PD3", "PD3"), diodes)
+    netlist = read_netlist(spec_files(manifest_of(NAMES), None, HARNESS, boards=[board])["glove.net"])
+    for number, (column, row) in enumerate([("PB0", "PD2"), ("PB1", "PD2"), ("PB0", "PD3")], start=1):
+        assert netlist.net_of(f"SW{number}", "2") == f"A1_{row}"
+        assert column_of(netlist, number, diodes) == netlist.net_of("A1", netlist.pin_of("A1", column))
+    assert sum(ref[0] == "D" for ref in netlist.components) == 3 * diodes
+    nodes = [node for net in netlist.nets.values() for node in net]
+    assert len(nodes) == len(set(nodes))
+
+
+def column_of(netlist: "Netlist", switch: int, diodes: bool) -> str:
+    """Return the net that a switch's contact 1 pulls down: through a diode from its anode, where there is one."""
+    net = netlist.net_of(f"SW{switch}", "1")
+    if not diodes:
+        return net
+    (diode,) = [ref for ref, _ in netlist.nets[net] if ref[0] == "D"]
+    assert netlist.net_of(diode, netlist.pin_of(diode, "K")) == net
+    return netlist.net_of(diode, netlist.pin_of(diode, "A"))
+
+
+def test_expanders_behind_a_board_are_wired_and_the_host_still_reads_the_board(
+    read_netlist: Reader, manifest_of: Manifests
+) -> None:
+    chip = ChipWiring(kind="mcp23017", address=0x21, pins={"GPA0": "a", "GPB0": "b", "GPB1": "c"})
+    board = BoardPins(bus=BusWiring(device="atmega328p", clock_hz=400_000, chips=(chip,)))
+    files = spec_files(manifest_of(NAMES), None, HARNESS, boards=[board])
+    netlist = read_netlist(files["glove.net"])
+    for number, pin in enumerate(("GPA0", "GPB0", "GPB1"), start=1):
+        assert netlist.net_of(f"SW{number}", "1") == netlist.net_of("U1", netlist.pin_of("U1", pin))
+    assert parse_harness(files["glove.toml"].decode(), "glove.toml") == HARNESS

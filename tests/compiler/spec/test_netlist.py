@@ -1,0 +1,179 @@
+"""The netlist, read again: every kept switch reaches one input, the one of glove.toml, and the scan map reads it."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from thenar.compiler.hand import HandShape
+from thenar.compiler.spec.files import spec_files
+from thenar.compiler.spec.glove_spec import glove_spec
+from thenar.compiler.spec.packages import PACKAGES
+from thenar.drivers.i2c.registry import CHIPS
+from thenar.runtime.harness.loading import load_harness, parse_harness
+from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel, ScannerWiring
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.scanning.propose import propose_harness
+from thenar.runtime.scanning.whole import whole_scan
+
+if TYPE_CHECKING:
+    from .conftest import Netlist
+
+Reader = Callable[[bytes], "Netlist"]
+Manifests = Callable[..., Manifest]
+
+
+def reached(netlist: "Netlist", switch: int) -> list[tuple[str, str]]:
+    """Return (designator, name of the pin) of what reads contact 1 of a switch."""
+    nodes = netlist.nets[netlist.net_of(f"SW{switch}", "1")]
+    readers = [(ref, pin) for ref, pin in nodes if ref[0] in "UA"]
+    return [(ref, netlist.pin_names[netlist.components[ref]["part"], pin]) for ref, pin in readers]
+
+
+def check(netlist: "Netlist", harness: Harness, names: tuple[str, ...]) -> None:
+    """Check that the netlist connects the switches called `names` as the harness of expanders says."""
+    chips = [chip for bus in harness.buses for chip in bus.chips if set(chip.pins.values()) & set(names)]
+    wired = {name: (f"U{n}", pin) for n, chip in enumerate(chips, start=1) for pin, name in chip.pins.items()}
+    for number, name in enumerate(names, start=1):
+        assert reached(netlist, number) == [wired[name]]
+    nodes = [node for net in netlist.nets.values() for node in net]
+    assert len(nodes) == len(set(nodes)), "a pin on two nets"
+    for number, chip in enumerate(chips, start=1):
+        check_address(netlist, f"U{number}", chip)
+
+
+def check_address(netlist: "Netlist", ref: str, chip: ChipWiring) -> None:
+    lowest = min(CHIPS[chip.kind].addresses)
+    straps = [name for name, _ in PACKAGES[chip.kind].selects(lowest)]
+    levels = [netlist.net_of(ref, netlist.pin_of(ref, name)) for name in straps]
+    assert set(levels) <= {"VCC", "GND"}
+    assert lowest + sum(1 << bit for bit, net in enumerate(levels) if net == "VCC") == chip.address
+
+
+@settings(deadline=None, max_examples=25)
+@given(kind=st.sampled_from(sorted(CHIPS)), data=st.data())
+def test_every_kept_switch_reaches_one_input_and_the_scan_map_reads_it(
+    read_netlist: Reader, manifest_of: Manifests, hand: HandShape, kind: str, data: st.DataObject
+) -> None:
+    names = tuple(data.draw(st.lists(st.sampled_from(hand.names), min_size=1, max_size=40, unique=True)))
+    spare = [f"spare {number}" for number in range(data.draw(st.integers(0, 20)))]
+    order = data.draw(st.permutations([*names, *spare]))
+    harness = propose_harness(order, kind)
+    files = spec_files(manifest_of(names), None, harness, hand)
+    check(read_netlist(files["glove.net"]), harness, names)
+    loaded = parse_harness(files["glove.toml"].decode(), "glove.toml")
+    assert loaded == harness
+    assert sorted(whole_scan(loaded, names).switches) == list(range(len(names)))
+    assert glove_spec(manifest_of(names), None, harness, hand).scan == whole_scan(loaded, names)
+
+
+def test_a_proposed_glove_of_all_switches_is_wired_and_loads_and_is_read(
+    read_netlist: Reader, manifest_of: Manifests, hand: HandShape, tmp_path: Path
+) -> None:
+    files = spec_files(manifest_of(hand.names), hand=hand)
+    (tmp_path / "glove.toml").write_bytes(files["glove.toml"])
+    loaded = load_harness(tmp_path / "glove.toml")
+    netlist = read_netlist(files["glove.net"])
+    check(netlist, loaded, hand.names)
+    assert sorted(whole_scan(loaded, hand.names).switches) == list(range(160))
+    assert netlist.off_board == {f"SW{number}" for number in range(1, 161)}
+    assert all(each["footprint"].count(":") == 1 for each in netlist.components.values())
+
+
+def test_a_chip_behind_a_mux_has_its_channels_wires_and_they_have_pull_ups(
+    read_netlist: Reader, manifest_of: Manifests
+) -> None:
+    near = ChipWiring(kind="pca9555", address=0x21, pins={"P00": "a"})
+    far = ChipWiring(kind="mcp23017", address=0x20, mux=MuxChannel(address=0x71, channel=3), pins={"GPB2": "b"})
+    harness = Harness(name="h", buses=(BusWiring(device="/dev/i2c-1", clock_hz=400_000, chips=(near, far)),))
+    netlist = read_netlist(spec_files(manifest_of(["a", "b"]), None, harness)["glove.net"])
+    mux = next(ref for ref, each in netlist.components.items() if each["value"] == "TCA9548APWR")
+    check(netlist, harness, ("a", "b"))
+    for chip, wire in (("SDA", "SD3"), ("SCL", "SC3")):
+        net = netlist.net_of("U2", netlist.pin_of("U2", chip))
+        assert net == netlist.net_of(mux, netlist.pin_of(mux, wire))
+        upstream = netlist.net_of("U1", netlist.pin_of("U1", chip))
+        assert upstream == netlist.net_of(mux, netlist.pin_of(mux, chip)) != net
+        for each in (net, upstream):
+            (pull,) = [ref for ref, _ in netlist.nets[each] if ref[0] == "R"]
+            assert netlist.components[pull]["value"] == "2k2"
+            assert netlist.net_of(pull, "1") == "VCC"
+    assert netlist.net_of(mux, netlist.pin_of(mux, "A0")) == "VCC"
+    assert netlist.net_of(mux, netlist.pin_of(mux, "A1")) == "GND"
+
+
+@pytest.mark.parametrize(
+    ("kind", "closed", "other", "pull", "far"),
+    [
+        ("mcp23017", "low", "GND", "", ""),
+        ("mcp23017", "high", "VCC", "4k7", "GND"),
+        ("tca6424a", "low", "GND", "10k", "VCC"),
+        ("tca6424a", "high", "VCC", "4k7", "GND"),
+    ],
+)
+def test_an_input_has_the_resistor_that_its_chip_lacks(
+    read_netlist: Reader,
+    manifest_of: Manifests,
+    kind: str,
+    closed: Literal["low", "high"],
+    other: str,
+    pull: str,
+    far: str,
+) -> None:
+    pin = CHIPS[kind].pins[0]
+    chip = ChipWiring(kind=kind, address=0x22, pins={pin: "a"}, closed=closed)
+    harness = Harness(name="h", buses=(BusWiring(device="/dev/i2c-1", chips=(chip,)),))
+    netlist = read_netlist(spec_files(manifest_of(["a"]), None, harness)["glove.net"])
+    assert netlist.net_of("SW1", "2") == other
+    resistors = [ref for ref, _ in netlist.nets[netlist.net_of("SW1", "1")] if ref[0] == "R"]
+    assert [netlist.components[ref]["value"] for ref in resistors] == [pull] * bool(pull)
+    assert [netlist.net_of(ref, "2") for ref in resistors if far == "GND"] == [far] * (far == "GND")
+    assert [netlist.net_of(ref, "2") for ref in resistors if far == "VCC"] == [far] * (far == "VCC")
+
+
+def test_unused_inputs_of_a_chip_without_pull_ups_do_not_float(read_netlist: Reader, manifest_of: Manifests) -> None:
+    netlist = read_netlist(spec_files(manifest_of(["a"]), None, propose_harness(["a"], "tca6424a"))["glove.net"])
+    for pin in CHIPS["tca6424a"].pins[1:]:
+        assert netlist.net_of("U1", netlist.pin_of("U1", pin)) == "GND"
+
+
+def test_every_supply_pin_has_its_capacitor(read_netlist: Reader, manifest_of: Manifests) -> None:
+    netlist = read_netlist(spec_files(manifest_of(["a"]), None, propose_harness(["a"], "tca6424a"))["glove.net"])
+    values = [each["value"] for ref, each in netlist.components.items() if ref[0] == "C"]
+    assert sorted(values) == ["100n", "100n", "10u"]
+    for ref in (ref for ref in netlist.components if ref[0] == "C"):
+        assert {netlist.net_of(ref, "1"), netlist.net_of(ref, "2")} == {"VCC", "GND"}
+
+
+def test_names_that_mean_something_to_the_netlist_are_only_names(read_netlist: Reader, manifest_of: Manifests) -> None:
+    names = ("GND", "VCC", 'a "quoted" (one)', "back\\slash", "ß 指", "SDA0")
+    harness = propose_harness(names)
+    netlist = read_netlist(spec_files(manifest_of(names), None, harness)["glove.net"])
+    check(netlist, harness, names)
+    assert {netlist.net_of(f"SW{number}", "2") for number in range(1, 7)} == {"GND"}
+    assert [netlist.net_of(f"SW{number}", "1") for number in range(1, 7)] == [f"/{name}" for name in names]
+
+
+def test_every_wire_of_the_list_is_on_the_net_of_its_switches(
+    read_netlist: Reader, manifest_of: Manifests, hand: HandShape
+) -> None:
+    names = hand.names[:50]
+    summary = glove_spec(manifest_of(names), hand=hand).summary
+    netlist = read_netlist(spec_files(manifest_of(names), hand=hand)["glove.net"])
+    for wire in summary.wires:
+        contact = "1" if wire.unit else "2"
+        nets = {netlist.net_of(f"SW{number}", contact) for number in wire.switches}
+        assert nets == {netlist.net_of(wire.connector, str(wire.pin))} == {wire.net}
+
+
+def test_a_board_has_a_pin_for_every_kept_key_and_one_for_ground(read_netlist: Reader, manifest_of: Manifests) -> None:
+    board = ScannerWiring(port="/dev/ttyACM0", switches=("x", "b", "", "a"))
+    harness = Harness(name="h", scanners=(board,))
+    netlist = read_netlist(spec_files(manifest_of(["a", "b"]), None, harness)["glove.net"])
+    assert reached(netlist, 1) == [("A1", "key 3")]
+    assert reached(netlist, 2) == [("A1", "key 1")]
+    assert netlist.net_of("A1", netlist.pin_of("A1", "GND")) == netlist.net_of("SW1", "2") == "GND"
+    assert netlist.off_board == {"SW1", "SW2", "A1"}

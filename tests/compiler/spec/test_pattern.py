@@ -1,0 +1,129 @@
+"""The pattern at 1:1: SVG and DXF, read again, have the switches where the hand has them, in millimetres."""
+
+import io
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import ezdxf.audit
+import ezdxf.recover
+import ezdxf.units
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from thenar.compiler.hand import HandShape
+from thenar.compiler.spec.files import spec_files
+from thenar.compiler.spec.pattern import LAYERS
+from thenar.runtime.manifest import Manifest
+
+Manifests = Callable[..., Manifest]
+SVG = "{http://www.w3.org/2000/svg}"
+KEPT = 48
+
+
+@pytest.fixture(scope="module")
+def kept(hand: HandShape) -> tuple[str, ...]:
+    return hand.names[:KEPT]
+
+
+@pytest.fixture(scope="module")
+def files(manifest_of: Manifests, hand: HandShape, kept: tuple[str, ...]) -> Mapping[str, bytes]:
+    return spec_files(manifest_of(kept), hand=hand)
+
+
+def groups(svg: bytes) -> dict[str, ET.Element]:
+    root = ET.fromstring(svg)
+    return {group.attrib["id"]: group for group in root.iter(f"{SVG}g")}
+
+
+def holes(svg: bytes) -> NDArray[np.float64]:
+    """Return the middles of the holes, y up."""
+    height = float(ET.fromstring(svg).attrib["height"].removesuffix("mm"))
+    circles = groups(svg)["holes"].iter(f"{SVG}circle")
+    return np.array([(float(c.attrib["cx"]), height - float(c.attrib["cy"])) for c in circles])
+
+
+def dxf(data: bytes) -> Any:
+    document, auditor = ezdxf.recover.read(io.BytesIO(data))
+    assert not auditor.errors
+    assert not auditor.fixes
+    return document
+
+
+def test_one_unit_of_the_svg_is_one_millimetre(files: Mapping[str, bytes]) -> None:
+    root = ET.fromstring(files["cutting.svg"])
+    width, height = (root.attrib[name].removesuffix("mm") for name in ("width", "height"))
+    assert root.attrib["viewBox"] == f"0 0 {width} {height}"
+    assert (float(width), float(height)) == (210.0, 297.0)
+
+
+def test_holes_lie_to_each_other_as_the_switches_on_the_hand(
+    files: Mapping[str, bytes], hand: HandShape, kept: tuple[str, ...]
+) -> None:
+    drawn, places = holes(files["cutting.svg"]), hand.places[hand.numbers_of(kept)]
+    np.testing.assert_allclose(drawn - drawn[0], places - places[0], atol=0.11)
+
+
+def test_a_longer_hand_is_drawn_larger_with_holes_of_the_same_size(
+    files: Mapping[str, bytes], manifest_of: Manifests, hand: HandShape, kept: tuple[str, ...]
+) -> None:
+    longer = spec_files(manifest_of(kept), hand=hand.scaled(209.0))
+    small, large = holes(files["cutting.svg"]), holes(longer["cutting.svg"])
+    np.testing.assert_allclose(large - large[0], (small - small[0]) * 1.1, atol=0.25)
+    for name in ("cutting.svg",):
+        radii = {c.attrib["r"] for c in groups(longer[name])["holes"].iter(f"{SVG}circle")}
+        assert radii == {"1.6"}
+
+
+def test_the_bar_is_50_mm_long(files: Mapping[str, bytes]) -> None:
+    bars = [line.attrib["points"].split() for line in groups(files["cutting.svg"])["scale"]]
+    (x0, y0), (x1, y1) = (tuple(map(float, point.split(","))) for point in bars[0])
+    assert (x1 - x0, y1 - y0) == (50.0, 0.0)
+
+
+def test_the_dxf_is_sound_in_millimetres_and_has_the_layers(files: Mapping[str, bytes]) -> None:
+    document = dxf(files["cutting.dxf"])
+    assert document.units == ezdxf.units.MM
+    assert {layer.dxf.name for layer in document.layers} >= set(LAYERS)
+    assert {entity.dxf.layer for entity in document.modelspace()} == set(LAYERS)
+
+
+def test_dxf_and_svg_draw_the_same(files: Mapping[str, bytes], hand: HandShape) -> None:
+    space = dxf(files["cutting.dxf"]).modelspace()
+    circles = list(space.query('CIRCLE[layer=="holes"]'))
+    np.testing.assert_allclose([tuple(c.dxf.center)[:2] for c in circles], holes(files["cutting.svg"]), atol=1e-3)
+    assert {c.dxf.radius for c in circles} == {1.6}
+    (outline,) = space.query('LWPOLYLINE[layer=="outline"]')
+    assert outline.closed
+    size = np.ptp([point[:2] for point in outline.get_points()], axis=0)
+    np.testing.assert_allclose(size, np.ptp(hand.outline, axis=0))
+    assert len(space.query('LWPOLYLINE[layer=="strips"]')) == len(hand.strips)
+    assert len(space.query('LWPOLYLINE[layer=="creases"]')) == len(hand.creases)
+
+
+def test_every_switch_is_named_on_the_drawing(files: Mapping[str, bytes], kept: tuple[str, ...]) -> None:
+    texts = [text.text for text in groups(files["cutting.svg"])["names"]]
+    assert texts == [text.dxf.text for text in dxf(files["cutting.dxf"]).modelspace().query("TEXT")]
+    for number, name in enumerate(kept, start=1):
+        assert texts.count(f"{number}  {name}") == 1
+        assert texts.count(str(number)) == 1
+
+
+@pytest.mark.parametrize("count", [1, 48, 160])
+def test_nothing_is_drawn_off_the_page(manifest_of: Manifests, hand: HandShape, count: int) -> None:
+    files = spec_files(manifest_of(hand.names[:count]), hand=hand)
+    svg = ET.fromstring(files["cutting.svg"])
+    page = [float(svg.attrib[name].removesuffix("mm")) for name in ("width", "height")]
+    for shape in svg.iter():
+        if "points" in shape.attrib:
+            points = np.array([pair.split(",") for pair in shape.attrib["points"].split()], float)
+            assert np.all((points >= 4.9) & (points <= np.array(page) - 4.9))
+        if shape.tag == f"{SVG}text":
+            assert 0 < float(shape.attrib["x"]) < page[0]
+            assert 4.9 < float(shape.attrib["y"]) < page[1] - 4.0
+
+
+def test_a_hand_that_is_no_a4_sheet_tells_what_to_print_it_on(manifest_of: Manifests, hand: HandShape) -> None:
+    readme = spec_files(manifest_of(hand.names), hand=hand)["README.txt"].decode()
+    assert "A3 (297 x 420 mm), or 4 A4 sheets, 2 across and 2 down" in " ".join(readme.split())
