@@ -2,17 +2,20 @@
 
     python benchmarks/placement.py [SET.grasps ...] [--folds N] [--jobs N]
 
-Each set is cut into stratified folds (Weka's, seed 1); placement and classifier are learnt from the training part
-alone. Without files the scenes kamakura and cutkosky are simulated. S of the paper is 29 for 16 grasp types, else 62
-where the set has so many rows a type, else 13. Scan time: wire time of a whole scan of a new glove of MCP23017.
+Each set is cut into stratified folds (Weka's, seed 1); placement and classifier (LogitBoost, 100 rounds) are learnt
+from the training part alone, and rates are means over the folds. Without files the scenes kamakura and cutkosky are
+simulated. S of the paper is 29 for 16 grasp types, else 62 where the set has so many rows a type, else 13. The smallest
+placement is looked for by halving between sizes that recognise enough and sizes that do not, to STEP switches. Scan
+times are wire times of whole scans: of a new glove of the kept switches alone, on MCP23017 at 400 kHz, and of the whole
+glove's chips as wired, of which only the ports that hold kept switches are read (the methods named -cost know these).
 """
 
 import argparse
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from time import process_time
+from time import perf_counter, process_time
 
 import numpy as np
 from rich.console import Console
@@ -22,10 +25,13 @@ from rich.table import Table
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.evaluation.folds import Fold, weka_folds
+from thenar.compiler.frontier.wirings import port_costs
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.selection.learning import Columns, Learning
+from thenar.compiler.selection.pairs import Pairs
 from thenar.compiler.selection.rivals import available
-from thenar.compiler.selection.ways import METHODS, chooser
+from thenar.compiler.selection.subset import Subset, best_subset
+from thenar.compiler.selection.ways import METHODS, Chooser, chooser
 from thenar.compiler.workers import in_workers
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import scan_us
@@ -33,20 +39,22 @@ from thenar.runtime.scanning.whole import whole_scan
 from thenar.simulator.running.simulation import simulate
 from thenar.simulator.scenes.decode import load_scene
 
-SIZES = (4, 8, 12, 14, 16, 18, 20, 24, 28, 33, 40)
-SHOWN = (8, 16, 33)
+# Beside the joints, 33 switches tell no more than 16: time better spent elsewhere.
+SHOWN = {False: (8, 16, 33), True: (8, 16)}
+MOST, STEP = 40, 2
+FEW, BOUNDED = (2, 4, 8), "elimination"
 ROUNDS, WITHIN, SEED = 100, 0.005, 1
 PAPERS = "id3"
-CONSOLE = Console(width=140)
+CONSOLE = Console(width=150)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Task:
-    """One method on one fold of a set, switches alone or with joints."""
+class Data:
+    """A set, switches alone or with joints, its folds, and the S that the paper would take."""
 
     learning: Learning
-    fold: Fold
-    method: str
+    names: tuple[str, ...]
+    folds: tuple[Fold, ...]
     prune: int
 
     @property
@@ -54,102 +62,194 @@ class Task:
         """Whether the joints are read too."""
         return bool(self.learning.codes.size)
 
+    @property
+    def shown(self) -> tuple[int, ...]:
+        """Return the sizes whose rates are shown."""
+        return SHOWN[self.joints]
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """Means over the folds: recognition rate, number of switches, scan time of a new glove and as wired."""
+
+    rate: float
+    size: float
+    new_us: float
+    wired_us: float
+
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """Rate and number of switches for every parameter of a method, and processor seconds for choosing."""
+    """What one method reaches: at the sizes SHOWN, and with the fewest switches that recognise enough (None: none up to
+    MOST, or not asked); processor seconds of choosing, for a fold.
+    """
 
     method: str
     joints: bool
-    rates: tuple[float, ...]
-    sizes: tuple[float, ...]
+    shown: tuple[Point, ...]
+    smallest: Point | None
     seconds: float
 
 
-def scanned_us(count: float) -> float:
-    """Return the wire time of a scan of so many switches, on as few chips as they need."""
-    names = [f"s{number}" for number in range(round(count))]
-    harness = propose_harness(names)
-    return scan_us(whole_scan(harness, names), harness).us
+@dataclass(slots=True)
+class Ways:
+    """One method on all folds; what was measured is known."""
+
+    data: Data
+    method: str
+    chosen: list[Chooser] = field(init=False)
+    seconds: float = field(init=False)
+    _known: dict[int, Point] = field(default_factory=dict)
+    _rates: dict[tuple[int, frozenset[int]], float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        names = self.data.names
+        ports = port_costs(propose_harness(names), names)
+        start = process_time()
+        learnt = (self.data.learning.rows(np.sort(fold.train)) for fold in self.data.folds)
+        self.chosen = [chooser(self.method, learning, ports) for learning in learnt]
+        self.seconds = (process_time() - start) / len(self.data.folds)
+
+    def pruned(self) -> Point:
+        """Return what the paper's ID3 reaches under its S."""
+        return self._mean([choose(self.data.prune) for choose in self.chosen])
+
+    def at(self, most: int) -> Point:
+        """Return what is reached with at most so many switches; ID3's S is the smallest that leaves no more."""
+        if most not in self._known:
+            self._known[most] = self._mean([self._kept(choose, most) for choose in self.chosen])
+        return self._known[most]
+
+    def smallest(self, wanted: float) -> Point | None:
+        """Return the smallest placement found that recognises as much."""
+        enough = next((size for size in (*self.data.shown, MOST) if self.at(size).rate >= wanted), None)
+        if enough is None:
+            return None
+        short = max(size for size in (0, *self.data.shown) if size < enough)
+        while enough - short > STEP:
+            middle = (enough + short) // 2
+            if self.at(middle).rate >= wanted:
+                enough = middle
+            else:
+                short = middle
+        return self.at(enough)
+
+    def _kept(self, choose: Chooser, most: int) -> Columns:
+        if METHODS[self.method].parameter == "switches":
+            return choose(most)
+        low, high = 0, len(self.data.learning.labels) + 1
+        while low < high:
+            middle = (low + high) // 2
+            low, high = (low, middle) if len(choose(middle)) <= most else (middle + 1, high)
+        return choose(low)
+
+    def _mean(self, placements: Sequence[Columns]) -> Point:
+        harness = propose_harness(self.data.names)
+        found = []
+        for number, columns in enumerate(placements):
+            names = [self.data.names[column] for column in columns]
+            new = propose_harness(names)
+            new_us, wired_us = (scan_us(whole_scan(one, names), one).us for one in (new, harness))
+            found.append((self._rate(number, columns), len(columns), new_us, wired_us))
+        return Point(*np.mean(found, axis=0).tolist())
+
+    def _rate(self, number: int, columns: Columns) -> float:
+        key = (number, frozenset(columns))
+        if key not in self._rates:
+            self._rates[key] = rate(self.data.learning, self.data.folds[number], columns)
+        return self._rates[key]
 
 
 def rate(learning: Learning, fold: Fold, columns: Columns) -> float:
     """Return the share of the test rows that LogitBoost recognises."""
-    X = np.hstack([learning.switches[:, list(columns)].astype(np.uint16), learning.codes])
+    X = np.hstack([learning.switches[:, sorted(columns)].astype(np.uint16), learning.codes])
     stumps, _ = boost(X[fold.train], learning.labels[fold.train], learning.n_classes, rounds=ROUNDS)
     return float((winners(stumps.scores(X[fold.test])) == learning.labels[fold.test]).mean())
 
 
-def measure(task: Task) -> Line:
-    """Return the rates of one method on one fold."""
-    start = process_time()
-    choose = chooser(task.method, task.learning.rows(np.sort(task.fold.train)))
-    seconds = process_time() - start
-    parameters: Sequence[float] = (task.prune,) if METHODS[task.method].parameter == "S" else SIZES
-    placements = [choose(parameter) for parameter in parameters]
-    rates = tuple(rate(task.learning, task.fold, columns) for columns in placements)
-    return Line(task.method, task.joints, rates, tuple(float(len(columns)) for columns in placements), seconds)
+def measure(task: tuple[Data, str, float | None]) -> Line:
+    """Return what one method reaches on a set, where a rate is wanted (None: rates at the sizes SHOWN alone)."""
+    data, method, wanted = task
+    ways = Ways(data, method)
+    shown = tuple(ways.at(size) for size in data.shown)
+    return Line(method, data.joints, shown, None if wanted is None else ways.smallest(wanted), ways.seconds)
 
 
-def mean(lines: Sequence[Line]) -> Line:
-    """Return the mean over the folds of one method."""
-    rates = np.mean([line.rates for line in lines], axis=0)
-    sizes = np.mean([line.sizes for line in lines], axis=0)
-    seconds = float(np.mean([line.seconds for line in lines]))
-    return Line(lines[0].method, lines[0].joints, tuple(rates.tolist()), tuple(sizes.tolist()), seconds)
+def papers(data: Data) -> tuple[bool, Point]:
+    """Return what the paper's placement reaches, and whether with joints."""
+    return data.joints, Ways(data, PAPERS).pruned()
 
 
-def measured(grasp_set: GraspSet, prune: int, folds: int, jobs: int) -> list[Line]:
-    """Return every method's line, switches alone first; joints are no matter to rivals."""
-    types, labels = np.unique(grasp_set.labels, return_inverse=True)
+def bounded(task: tuple[Data, int]) -> tuple[int, int, Subset]:
+    """Return m, the pairs alike in m switches that elimination keeps of all rows, and what bounded search says."""
+    data, m = task
+    columns = chooser(BOUNDED, data.learning)(m)
+    return m, Pairs(data.learning).alike(columns), best_subset(data.learning, m, starts=(columns,))
+
+
+def measured(alone: Data, with_joints: Data, paper: dict[bool, Point], jobs: int) -> list[Line]:
+    """Return every method's line, switches alone first. Joints are no matter to rivals."""
     ours = [name for name, method in METHODS.items() if method.ours]
-    wanted = [(name, joints) for joints in (False, True) for name in ours]
-    wanted += [(name, False) for name in available()]
-    tasks = []
-    for fold in weka_folds(labels, folds, SEED):
-        for name, joints in wanted:
-            codes = grasp_set.codes if joints else grasp_set.codes[:, :0]
-            tasks.append(Task(Learning(grasp_set.switches, codes, labels, len(types)), fold, name, prune))
-    found: dict[tuple[str, bool], list[Line]] = {key: [] for key in wanted}
-    for line in track(in_workers(measure, tasks, jobs), "methods", total=len(tasks), console=CONSOLE, transient=True):
-        found[line.method, line.joints].append(line)
-    return [mean(sorted(lines, key=lambda line: line.rates)) for lines in found.values()]
+    wanted = {joints: point.rate - WITHIN for joints, point in paper.items()}
+    # What takes longest begins first.
+    tasks: list[tuple[Data, str, float | None]] = [
+        (data, name, wanted[data.joints]) for data in (with_joints, alone) for name in reversed(ours)
+    ]
+    tasks += [(alone, name, None) for name in available()]
+    lines = track(in_workers(measure, tasks, jobs), "methods", total=len(tasks), console=CONSOLE, transient=True)
+    order = [*ours, *available()]
+    return sorted(lines, key=lambda line: (line.joints, order.index(line.method)))
 
 
-def smallest(line: Line, wanted: float) -> int | None:
-    """Return the place of the smallest placement that recognises as much as wanted."""
-    return next((place for place, found in enumerate(line.rates) if found >= wanted), None)
-
-
-def saved(lines: Sequence[Line], joints: bool) -> Table:
+def saved(lines: Sequence[Line], joints: bool, paper: Point) -> Table:
     """Return the table of smallest placements within half a point of the paper's."""
-    paper = next(line for line in lines if line.method == PAPERS and line.joints == joints)
-    title = f"{'switches + joints' if joints else 'switches alone'}: smallest within {100 * WITHIN:g} points of ID3"
-    table = Table("method", "switches", "recognition, %", "fewer switches", "scan, us", "less scan", title=title)
-    before = scanned_us(paper.sizes[0])
-    table.add_row("id3 (the paper's)", f"{paper.sizes[0]:.1f}", f"{100 * paper.rates[0]:.2f}", "", f"{before:.0f}", "")
+    title = f"{kind(joints)}: fewest switches within {100 * WITHIN:g} points of the paper's"
+    times = ("scan, new glove, us", "less", "as wired, us", "less")
+    table = Table("method", "switches", "recognition, %", "fewer switches", *times, title=title)
+    cells = (f"{paper.size:.1f}", f"{100 * paper.rate:.2f}", "", f"{paper.new_us:.0f}", "", f"{paper.wired_us:.0f}", "")
+    table.add_row("the paper's pruned ID3", *cells, end_section=True)
     for line in lines:
-        if line.joints != joints or line.method == PAPERS:
+        if line.joints != joints or not METHODS[line.method].ours:
             continue
-        place = smallest(line, paper.rates[0] - WITHIN)
-        if place is None:
-            table.add_row(line.method, f"none up to {SIZES[-1]}", f"{100 * line.rates[-1]:.2f}")
+        point = line.smallest
+        if point is None:
+            table.add_row(line.method, f"none up to {MOST}", f"{100 * line.shown[-1].rate:.2f} at {SHOWN[joints][-1]}")
             continue
-        size, us = line.sizes[place], scanned_us(line.sizes[place])
-        fewer, less = 1 - size / paper.sizes[0], 1 - us / before
-        cells = (f"{size:.1f}", f"{100 * line.rates[place]:.2f}", f"{fewer:.0%}", f"{us:.0f}", f"{less:.0%}")
-        table.add_row(line.method, *cells)
+        fewer = f"{1 - point.size / paper.size:.0%}"
+        new = (f"{point.new_us:.0f}", f"{1 - point.new_us / paper.new_us:.0%}")
+        wired = (f"{point.wired_us:.0f}", f"{1 - point.wired_us / paper.wired_us:.0%}")
+        table.add_row(line.method, f"{point.size:.1f}", f"{100 * point.rate:.2f}", fewer, *new, *wired)
     return table
 
 
 def compared(lines: Sequence[Line], joints: bool) -> Table:
-    """Return the table of rates at given numbers of switches."""
-    heads = (f"{size} switches, %" for size in SHOWN)
-    table = Table("method", *heads, "seconds to choose", title="switches + joints" if joints else "switches alone")
+    """Return the table of rates at given numbers of switches; numbers that a tree misses stand beside."""
+    heads = (f"{size} switches, %" for size in SHOWN[joints])
+    table = Table("method", *heads, "seconds to choose", title=kind(joints))
     for line in lines:
-        if line.joints == joints and line.method != PAPERS:
-            rates = (f"{100 * line.rates[SIZES.index(size)]:.2f}" for size in SHOWN)
-            table.add_row(line.method, *rates, f"{line.seconds:.1f}")
+        if line.joints == joints:
+            cells = (cell(point, size) for point, size in zip(line.shown, SHOWN[joints], strict=True))
+            table.add_row(line.method, *cells, f"{line.seconds:.1f}")
+    return table
+
+
+def cell(point: Point, size: int) -> str:
+    """Return a rate, with the mean number of switches if that is another."""
+    return f"{100 * point.rate:.2f}" + ("" if point.size == size else f" ({point.size:.1f})")
+
+
+def kind(joints: bool) -> str:
+    """Return what is read, in words."""
+    return "switches and joints" if joints else "switches alone"
+
+
+def bounds(found: Sequence[tuple[int, int, Subset]]) -> Table:
+    """Return the table of how far elimination is from the best subset of few switches, chosen from all rows."""
+    heads = ("switches", f"{BOUNDED}, %", "best found, %", "none below, %", "at most from the best, points", "programs")
+    table = Table(*heads, title="pairs of rows of different types that look alike, switches alone")
+    for m, alike, best in sorted(found, key=lambda one: one[0]):
+        shares = [100 * count / best.pairs for count in (alike, best.alike, best.least)]
+        table.add_row(str(m), *(f"{share:.3f}" for share in shares), f"{shares[0] - shares[2]:.3f}", str(best.nodes))
     return table
 
 
@@ -168,6 +268,17 @@ def papers_prune(grasp_set: GraspSet) -> int:
     return 62 if len(grasp_set) >= 62 * types else 13
 
 
+def datas(grasp_set: GraspSet, folds: int) -> tuple[Data, Data]:
+    """Return the set with switches alone, and with joints."""
+    types, labels = np.unique(grasp_set.labels, return_inverse=True)
+    cut, prune = tuple(weka_folds(labels, folds, SEED)), papers_prune(grasp_set)
+    alone, both = (
+        Data(Learning(grasp_set.switches, codes, labels, len(types)), grasp_set.switch_names, cut, prune)
+        for codes in (grasp_set.codes[:, :0], grasp_set.codes)
+    )
+    return alone, both
+
+
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -176,13 +287,16 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     options = parser.parse_args()
     for name, make in sets(options.sets).items():
-        grasp_set = make()
-        prune = papers_prune(grasp_set)
-        CONSOLE.rule(f"{name}: {len(grasp_set)} rows, {len(grasp_set.switch_names)} switches, S = {prune}")
-        lines = measured(grasp_set, prune, options.folds, options.jobs)
+        began, grasp_set = perf_counter(), make()
+        alone, both = datas(grasp_set, options.folds)
+        CONSOLE.rule(f"{name}: {len(grasp_set)} rows, {len(alone.names)} switches, S = {alone.prune}")
+        paper = dict(in_workers(papers, (both, alone), options.jobs))
+        lines = measured(alone, both, paper, options.jobs)
         for joints in (False, True):
-            CONSOLE.print(saved(lines, joints))
+            CONSOLE.print(saved(lines, joints, paper[joints]))
             CONSOLE.print(compared(lines, joints))
+        CONSOLE.print(bounds(list(in_workers(bounded, [(alone, m) for m in FEW], options.jobs))))
+        CONSOLE.print(f"{perf_counter() - began:.0f} s, {options.jobs} processes")
 
 
 if __name__ == "__main__":

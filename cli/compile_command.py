@@ -7,12 +7,14 @@ import click
 
 from ..drivers.i2c.registry import CHIPS
 from .common import any_path, err, existing_file, json_flag, keep_apart, out, output_file, print_json, progress
+from .hand import hand_of
 from .scan_tables import print_scan
 
 if TYPE_CHECKING:
     from ..compiler.build.compile import BuildReport
-    from ..compiler.build.made import Documents
     from ..runtime.manifest import Inputs, Manifest, TableBits
+    from .compile_documents import Papers, Progress
+    from .from_frontier import Picked
 
 _CHIP = "mcp23017"
 _BOARD = "board"
@@ -109,14 +111,20 @@ def command(
     from ..compiler.frontier.whole_glove import ports_of_whole_glove
     from ..compiler.recordings.graspset import GraspSet
     from ..runtime.harness.loading import load_harness
-    from .compile_documents import Papers, study_of
     from .from_frontier import picked
 
     _check_proposal(glove, propose, chip, overwrite)
     _check_point(context, from_frontier, point)
+    if hand_length is not None and not report:
+        raise click.UsageError("--hand-length is of the hand in spec/, which --no-report leaves out: give one of them.")
     keep_apart(recordings, glove, propose, from_frontier)
     given = None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
+    if hand_length is not None and hand_of(grasp_set.switch_names) is None:
+        raise click.UsageError(
+            "--hand-length: the switches of these recordings are not those of murakami160, and where they lie is not "
+            "known."
+        )
     options: dict[str, Any] = {
         "prune": prune,
         "rounds": rounds,
@@ -130,12 +138,7 @@ def command(
     chosen = None if from_frontier is None else picked(from_frontier, point, grasp_set)
     if chosen is not None:
         options |= chosen.options
-    papers: Documents = no_documents
-    if report:
-        with progress("the paper's tables") as told:
-            study = study_of(grasp_set, options["rounds"], folds, told) if folds else None
-        papers = Papers(study, None if chosen is None else chosen.frontier, hand_length)
-    with progress("compiling") as told:
+    with progress("compiling, then the paper's tables" if report and folds else "compiling") as told:
         made = compile_build(
             grasp_set,
             output,
@@ -146,7 +149,7 @@ def command(
             seed=seed,
             harness=given if chosen is None else chosen.wired(given),
             ports=ports_of_whole_glove(given, grasp_set.switch_names),
-            documents=papers,
+            documents=_papers(chosen, hand_length, told) if report else no_documents,
             progress=told,
         )
     if made.only_answer is not None:
@@ -166,6 +169,14 @@ def command(
         out().print(
             f"{propose}: a harness for the kept switches; wire the glove so, then compile with --glove {propose}"
         )
+
+
+def _papers(chosen: "Picked | None", hand_length: float | None, told: "Progress") -> "Papers":
+    from .compile_documents import Papers
+
+    if chosen is None:
+        return Papers(told, hand_length=hand_length)
+    return Papers(told, chosen.frontier, chosen.point.number, hand_length)
 
 
 def _check_point(context: click.Context, frontier: Path | None, point: int | None) -> None:

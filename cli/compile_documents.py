@@ -4,30 +4,31 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ..compiler.build.made import REPORT_NAME, SPEC_FOLDER
 from .hand import hand_of
 
 if TYPE_CHECKING:
     from ..compiler.build.made import Made
     from ..compiler.evaluation.study import Study
     from ..compiler.frontier.points import Frontier
-    from ..compiler.recordings.graspset import GraspSet
 
-    Report = Callable[[int, int], None]
+    Progress = Callable[[int, int], None]
 
-REPORT_NAME, SPEC_FOLDER = "report.html", "spec"
+_SMALL = 5000  # rows times rounds
 
 
 @dataclass(frozen=True, slots=True)
 class Papers:
     """Writes `report.html` and, where switches are kept, `spec/`.
 
-    study        the paper's tables for the recordings, None for none
-    frontier     the frontier that the build was picked from
+    report       called with what is done and to do of the paper's tables
+    frontier     the frontier that the build was picked from, and the number of its point
     hand_length  of whom the glove is for, mm; None: the usual hand
     """
 
-    study: "Study | None" = None
+    report: "Progress | None" = None
     frontier: "Frontier | None" = None
+    point: int | None = None
     hand_length: float | None = None
 
     def __call__(self, made: "Made") -> Mapping[str, bytes]:
@@ -46,6 +47,7 @@ class Papers:
         from ..compiler.report.guarantee import guarantee_of
         from ..compiler.report.page import report_html
 
+        study, no_study = self._study(made)
         return report_html(
             ReportContent(
                 manifest=made.manifest,
@@ -56,8 +58,10 @@ class Papers:
                 only_answer=made.only_answer,
                 tree=made.trained.tree,
                 confusion=made.confusion,
-                study=self.study,
+                study=study,
+                no_study=no_study,
                 frontier=self.frontier,
+                point=self.point,
                 hand=hand_of(made.grasp_set.switch_names),
                 scan=made.scan,
                 harness=made.harness,
@@ -65,20 +69,28 @@ class Papers:
             )
         )
 
+    def _study(self, made: "Made") -> "tuple[Study | None, str]":
+        """Return the paper's tables, honest and once, of the build's own folds, rounds and seed; or why there are none.
 
-def study_of(grasp_set: "GraspSet", rounds: int, folds: int, report: "Report") -> "Study | None":
-    """Return the paper's tables for the recordings, honest and once; None where they cannot be cut so."""
-    from ..compiler.evaluation.errors import EvaluationError
-    from ..compiler.evaluation.study import Options, evaluate
+        Last of all: by then, nothing is wrong with the build.
+        """
+        from ..compiler.evaluation.errors import EvaluationError
+        from ..compiler.evaluation.study import Options, evaluate
 
-    options = Options(
-        folds=folds,
-        repeats=1,
-        rounds=rounds,
-        protocols=("honest",),
-        tables=("compositions", "generality", "pruning"),
-    )
-    try:
-        return evaluate(grasp_set, options, progress=report)
-    except EvaluationError:
-        return None
+        asked = made.manifest.options
+        if not asked.folds:
+            return None, "The build was compiled without folds."
+        options = Options(
+            folds=asked.folds,
+            repeats=1,
+            rounds=asked.rounds,
+            protocols=("honest",),
+            tables=("compositions", "generality", "pruning"),
+            seed=asked.seed,
+        )
+        # Little work is done before other processes are up.
+        jobs = 1 if len(made.grasp_set) * asked.rounds < _SMALL else -1
+        try:
+            return evaluate(made.grasp_set, options, jobs, self.report), ""
+        except EvaluationError as reason:
+            return None, f"These recordings have none: {reason}."

@@ -17,7 +17,7 @@ TARGETS = ("avr328p", "avr2560", "cortex-m0plus", "cortex-m4", "host", "pi")
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option("-o", "--output", type=any_path, required=True, help="Folder for tables, pictures and the store.")
 @click.option("--glove", type=existing_file, help="A glove.toml: try its wiring as well, and choose by its ports.")
-@click.option("--target", type=click.Choice(TARGETS), default="avr328p", show_default=True, help="What classifies.")
+@click.option("--target", type=click.Choice(TARGETS), default="host", show_default=True, help="What classifies.")
 @click.option("--budget-us", type=click.FloatRange(min=0, min_open=True), help="Pick the best within so long a frame.")
 @click.option("--rate", type=click.FloatRange(0, 1, min_open=True), help="Pick the fastest that recognises this share.")
 @click.option("--build", type=existing_folder, help="A build of yours: mark it on the pictures.")
@@ -25,7 +25,7 @@ TARGETS = ("avr328p", "avr2560", "cortex-m0plus", "cortex-m4", "host", "pi")
 @click.option("--methods", help="Placements to build from, by commas.  [default: elimination,id3,id3-cost,id3-ccp]")
 @click.option("--rivals", help="Placements to see beside them, by commas, or none.  [default: all installed]")
 @click.option("--rounds", type=click.IntRange(1, 300), default=300, show_default=True, help="The most rounds to try.")
-@click.option("--repeats", type=click.IntRange(1), default=2, show_default=True, help="Repeats of the folds.")
+@click.option("--repeats", type=click.IntRange(1), default=3, show_default=True, help="Repeats of the folds.")
 @click.option(
     "--finalists", type=click.IntRange(1), default=14, show_default=True, help="Placements to look at closely."
 )
@@ -103,7 +103,7 @@ def command(
 def _names(text: str | None) -> tuple[str, ...] | None:
     if text is None:
         return None
-    return tuple(name.strip() for name in text.split(",") if name.strip() and name.strip() != "none")
+    return tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip() and name.strip() != "none"))
 
 
 def _print(found: "Frontier", output: Path) -> None:

@@ -13,7 +13,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..compiler.recordings.graspset import GraspSet
-    from ..compiler.selection.crowd import CurvePoint, Standard
+    from ..compiler.selection.crowd import Standard
+
+_BETTERED = {"plain": "as chosen", "mean": "bettered for the mean", "worst tenth": "bettered for the worst tenth"}
 
 
 class CrowdPlacement(msgspec.Struct, frozen=True):
@@ -52,17 +54,22 @@ def print_crowd(placement: CrowdPlacement) -> None:
         table.add_row(str(order), str(kept.number), kept.name)
     out().print(table)
     served = Table(
-        *("subjects", "learnt for", "mean, %", "worst tenth, %", "lowest, %"),
+        *("subjects", "placement", "mean, %", "worst tenth, %", "lowest, %"),
         title=f"Recognition of {study.held_out} held-out subjects",
     )
     for point in study.curve:
         rates = (point.served.mean, point.served.worst_tenth, point.served.lowest)
-        served.add_row(str(point.subjects), _aim(point), *(f"{100 * rate:.1f}" for rate in rates))
+        served.add_row(str(point.subjects), _BETTERED[point.aim], *(f"{100 * rate:.1f}" for rate in rates))
     out().print(served)
     click.echo(
-        f"{len(placement.switches)} of {placement.n_switches} switches, chosen by {study.method} for "
-        f"{'the worst-served tenth' if study.aim == 'worst tenth' else 'all subjects alike'}, which did better within "
-        f"the subjects learnt from; learnt again from {study.rows} rows of all {study.subjects} subjects"
+        f"{len(placement.switches)} of {placement.n_switches} switches, chosen by {study.method}, "
+        f"{_BETTERED[study.aim]}: this did best within the subjects learnt from. Learnt again from {study.rows} rows "
+        f"of all {study.subjects} subjects"
+    )
+    click.echo(
+        "bettered: the switches chosen last exchanged for the next ones, where half of the subjects learnt from then "
+        "recognise the other half better. Counting badly served subjects more often was tried on 80 simulated hands, "
+        "gained no more than another draw of rows did, and is not done"
     )
 
 
@@ -74,20 +81,20 @@ def draw_crowd(placement: CrowdPlacement, path: Path) -> None:
     with painting(font_size=10):
         from matplotlib.figure import Figure
 
-        figure = Figure(figsize=(7.5, 4.6), layout="constrained", dpi=120)
+        figure = Figure(figsize=(7.5, 5.0), layout="constrained", dpi=120)
         _draw(figure.subplots(), placement.study)
+        figure.legend(frameon=False, loc="outside lower center", ncols=3, fontsize=8)
         write_atomically(path, rendered(figure, path.suffix.lower().removeprefix(".")))
 
 
 def _draw(axes: "Axes", study: "Standard") -> None:
-    """Draw four lines: two aims, the mean and the worst tenth of each, named at their ends."""
-    for aim, colour in (("mean", "#0072b2"), ("worst tenth", "#d55e00")):
+    """Draw a pair of lines for every aim: the mean and the worst tenth."""
+    for aim, colour in (("plain", "#595959"), ("mean", "#0072b2"), ("worst tenth", "#d55e00")):
         points = [point for point in study.curve if point.aim == aim]
         sizes = [point.subjects for point in points]
-        who = "all alike" if aim == "mean" else "the worst tenth"
         for what, style in (("mean", "-"), ("worst_tenth", "--")):
             rates = [100 * getattr(point.served, what) for point in points]
-            label = f"{'mean' if what == 'mean' else 'worst tenth'}, learnt for {who}"
+            label = f"{'mean' if what == 'mean' else 'worst tenth'}, {_BETTERED[aim]}"
             axes.plot(sizes, rates, style, marker="o", markersize=4, color=colour, label=label)
     axes.set_xscale("log")
     sizes = sorted({point.subjects for point in study.curve})
@@ -97,8 +104,3 @@ def _draw(axes: "Axes", study: "Standard") -> None:
     axes.set_ylabel(f"recognition of {study.held_out} other subjects, %")
     axes.set_title(f"{len(study.columns)} switches for everybody")
     axes.grid(visible=True, alpha=0.3)
-    axes.legend(frameon=False, loc="lower right")
-
-
-def _aim(point: "CurvePoint") -> str:
-    return "all alike" if point.aim == "mean" else "the worst tenth"

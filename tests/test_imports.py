@@ -104,7 +104,7 @@ ALLOWED = {
     "cli": tuple(package for package in PACKAGES if package != "reference"),
 }
 
-# Third-party packages of the extras `compiler`, `cluster`, `sim` and `stability`, and of peers, which a board does not have.
+# Third-party packages of the extras `compiler`, `cluster`, `sim` and `stability`, and of peers: a board has none.
 WORKSTATION_ONLY = {
     "sklearn",
     "scipy",

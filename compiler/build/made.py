@@ -37,7 +37,9 @@ class Made:
     only_answer: str | None
 
 
-# What is published with a build: path in its folder -> content.
+REPORT_NAME, SPEC_FOLDER = "report.html", "spec"
+# What is published with a build: path in its folder -> content. Other names than the report's, and a spec's in its
+# folder, are not a build's: `staging` would not replace them.
 Documents = Callable[[Made], Mapping[str, bytes]]
 
 

@@ -9,11 +9,14 @@ from pathlib import Path
 from ...runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME
 from ...runtime.files import sync_folder, write_atomically
 from ..firmware.library_names import FIRMWARE_NAME, LIBRARY_FILES
+from ..spec.files import NAMES
 from .errors import CompileError
+from .made import REPORT_NAME, SPEC_FOLDER
 
-# A build that was compiled for no harness has no scan map, one that is too large for any microcontroller no firmware.
-MEMBERS = frozenset({MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME, SCAN_NAME})
-_FIRMWARE_MEMBERS = frozenset(LIBRARY_FILES)
+# A build that was compiled for no harness has no scan map, one that is too large for any microcontroller no firmware,
+# one without a report no spec.
+MEMBERS = frozenset({MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME, SCAN_NAME, REPORT_NAME})
+_FOLDERS = {FIRMWARE_NAME: frozenset(LIBRARY_FILES), SPEC_FOLDER: NAMES}
 
 
 def check_target(folder: Path) -> Path:
@@ -36,19 +39,19 @@ def check_target(folder: Path) -> Path:
 
 
 def _refuse_foreign(folder: Path) -> None:
-    firmware = folder / FIRMWARE_NAME
-    kept_apart = firmware.is_dir() and not firmware.is_symlink()
-    foreign = _foreign(folder, MEMBERS, firmware if kept_apart else None)
-    foreign += _foreign(firmware, _FIRMWARE_MEMBERS) if kept_apart else []
+    places = {folder / name: names for name, names in _FOLDERS.items()}
+    inner = {place: names for place, names in places.items() if place.is_dir() and not place.is_symlink()}
+    foreign = [path for path in _foreign(folder, MEMBERS) if path not in inner]
+    foreign += [path for place, names in inner.items() for path in _foreign(place, names)]
     if foreign:
         name = foreign[0].relative_to(folder)
         raise CompileError(f"{folder} holds {name}, which is not of a build: move it, or name another folder")
 
 
-def _foreign(folder: Path, members: frozenset[str], but: Path | None = None) -> list[Path]:
+def _foreign(folder: Path, members: frozenset[str]) -> list[Path]:
     """Return what is in `folder`, if there is one, that is not a file by the name of a member."""
     there = sorted(folder.iterdir()) if folder.exists() else []
-    return [path for path in there if path != but and (path.name not in members or not path.is_file())]
+    return [path for path in there if path.name not in members or not path.is_file()]
 
 
 def publish(files: Mapping[str, bytes], target: Path) -> None:
@@ -96,8 +99,9 @@ def _exchange(staged: Path, target: Path) -> None:
 def _discard(build: Path) -> None:
     """Delete a build, and nothing that is not of one: a folder that holds more stays, as an OSError."""
     if build.exists():
-        if (firmware := build / FIRMWARE_NAME).exists():
-            _discard_files(firmware, _FIRMWARE_MEMBERS)
+        for name, members in _FOLDERS.items():
+            if (inner := build / name).exists():
+                _discard_files(inner, members)
         _discard_files(build, MEMBERS)
 
 

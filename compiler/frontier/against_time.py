@@ -1,6 +1,6 @@
 """Rate against a cost in time, logarithmic: of a frame, and of a decision."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -37,6 +37,7 @@ class _Cost:
     of_point: Callable[[Point], float]
     end: Callable[[Point], float]  # of a line from the point to the right; the point itself: no line
     of_mark: Callable[[Mark], float | None]
+    shows: Callable[[Point], bool]
     tried: Callable[[Frontier], tuple[Tried, ...]]
     words: Callable[[Point], str]
 
@@ -50,6 +51,8 @@ _FRAME = _Cost(
     end=lambda point: point.frame.us,
     tried=lambda frontier: frontier.tried,
     of_mark=lambda mark: mark.frame_us,
+    # A frame takes as long whatever is made of its answer: other decisions would lie on the same places.
+    shows=lambda point: point.fronts != ("latency",),
     words=inputs_of,
 )
 _LATENCY = _Cost(
@@ -61,6 +64,7 @@ _LATENCY = _Cost(
     end=lambda point: point.latency.p99_us,
     tried=lambda _: (),
     of_mark=lambda mark: mark.latency_us,
+    shows=lambda point: "latency" in point.fronts,
     words=lambda point: _DECISIONS[point.setting.decision],
 )
 
@@ -78,9 +82,10 @@ def draw_latency(frontier: Frontier) -> "Figure":
 def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
     figure, axes = sheet(frontier, cost.title)
     marks = [(us, mark) for mark in frontier.marks if (us := cost.of_mark(mark)) is not None]
-    rates(axes, [*(point.rate for point in frontier.points), *(mark.rate for _, mark in marks)])
+    shown = [point for point in frontier.points if cost.shows(point)]
+    rates(axes, [*(point.rate for point in shown), *(mark.rate for _, mark in marks)])
     tried = [(each.frame_us, each) for each in cost.tried(frontier) if each.rate.mean >= axes.get_ylim()[0]]
-    points = [(cost.of_point(point), point, cost.front in point.fronts) for point in frontier.points]
+    points = [(cost.of_point(point), point, cost.front in point.fronts) for point in shown]
     tails = [(x, cost.end(point), point) for x, point, _ in points]
     all_us = (
         *(us for us, _ in marks),
@@ -98,18 +103,21 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
     draw_marks(axes, labels, marks)
     ring(axes, [(x, point) for x, point, _ in points if point is featured(frontier)])
     key(axes)
-    labels.write(*_labels(frontier, cost, marks))
+    labels.write(*_labels(frontier, shown, cost, marks))
     return figure
 
 
-def _labels(frontier: Frontier, cost: _Cost, marks: list[tuple[float, Mark]]) -> Iterator[Label]:
+def _labels(
+    frontier: Frontier, shown: Sequence[Point], cost: _Cost, marks: list[tuple[float, Mark]]
+) -> Iterator[Label]:
     """Yield what is written, what takes most room first."""
     spoken_of = featured(frontier)
-    if spoken_of is not None:
+    if spoken_of in shown:
+        assert spoken_of is not None
         us = cost.of_point(spoken_of)
         yield loud_label(us, spoken_of, duration(us))
     for us, mark in marks:
         yield mark_label(us, mark, duration(us))
-    for point in frontier.points:
+    for point in shown:
         if point is not spoken_of:
             yield point_label(cost.of_point(point), point, cost.words(point))

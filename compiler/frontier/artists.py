@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from .chart import COLOURS, GREY, INK, NAMES, SHAPES
 from .labels import Label
+from .pareto import front
 from .points import Mark, Point, Rate, Tried
 from .room import FAINT, LINE
 from .words import inputs_of, percent, shorten, switches
@@ -29,8 +30,11 @@ def draw_tried(axes: "Axes", labels: "Labels", tried: Sequence[tuple[float, Trie
 
 
 def draw_best(axes: "Axes", labels: "Labels", best: Iterable[tuple[float, float]], name: str) -> None:
-    """Draw the line of best points, (cost, rate) each: from each point on its rate is to be had, until a better one."""
-    corners = sorted(best)
+    """Draw the line of best points, (cost, rate) each: from each point on its rate is to be had, until a better one.
+
+    A point that is best of its kind alone, as of those that decide alike, may lie below it.
+    """
+    corners = front(list(best), lambda place: place[0], lambda place: place[1], step=0.0)
     if not corners:
         return
     xs = [*(x for x, _ in corners), axes.get_xlim()[1]]

@@ -1,6 +1,6 @@
 """From finalists to points: every way to build each of them, and those that are on a front."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from .candidates import Choice
@@ -44,6 +44,11 @@ class Design:
         return len(self.close.screened.columns)
 
     @property
+    def compile_s(self) -> float:
+        """How long choosing the switches, training and the tables took."""
+        return self.close.choosing_s + self.tables.seconds
+
+    @property
     def scan(self) -> Time:
         """Reading the switches."""
         if self.wired is None:
@@ -62,13 +67,15 @@ class Design:
         return Time(self.classified.us * self.looks, self.classified.how)
 
     @property
-    def looks(self) -> int:
-        """How often a frame is classified at most: a scan that may end early looks at the scores after every port."""
-        return self.wired.scan.ports if self.scan_kind == "early" and self.wired is not None else 1
+    def looks(self) -> float:
+        """How often a frame is classified, the mean over frames as the time of its scan is: a scan that may end early
+        looks at the scores after every port that it reads.
+        """
+        return self.wired.scan.early_ports if self.scan_kind == "early" and self.wired is not None else 1.0
 
     @property
     def frame_us(self) -> float:
-        """Reading everything, on lines of their own, and classifying."""
+        """Reading everything, on lines of their own, and classifying, as the model has it."""
         return max(self.scan.us, self.transfer.us) + self.classify.us
 
 
@@ -80,19 +87,22 @@ def designs(close: Close, joints: int) -> Iterator[Design]:
             if not close.screened.columns:
                 yield Design(close, tables, classified, None, "full", read)
             for wired in tables.wired:
-                kinds: tuple[Scan, ...] = ("full", "early") if wired.scan.ports > 1 else ("full",)
+                # Not where ending early never leaves anything out, as with boards.
+                kinds: tuple[Scan, ...] = ("full", "early") if wired.scan.early_us < wired.scan.full_us else ("full",)
                 for kind in kinds:
                     yield Design(close, tables, classified, wired, kind, read)
 
 
-def best_designs(all_designs: Sequence[Design]) -> tuple[list[Design], list[Design]]:
+def best_designs(
+    all_designs: Sequence[Design], frame_us: Callable[[Design], float]
+) -> tuple[list[Design], list[Design]]:
     """Return the designs on the front of rate against frame time, and those on that against the number of switches.
 
     Of designs that are equal there, the one of fewer chips, fewer ports, less reading and less flash.
     """
     cheapest = sorted(all_designs, key=_effort)
-    by_time = front(cheapest, lambda design: design.frame_us, lambda design: design.rate.mean)
-    cheapest.sort(key=lambda design: design.frame_us)
+    by_time = front(cheapest, frame_us, lambda design: design.rate.mean)
+    cheapest.sort(key=frame_us)
     by_switches = front(cheapest, lambda design: design.n_switches, lambda design: design.rate.mean)
     return by_time, by_switches
 

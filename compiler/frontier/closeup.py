@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .candidates import NO_SWITCHES, Screened, rate_of
+from .candidates import Screened, rate_of
 from .equipment import Equipment
 from .learnt import Fit
 from .pareto import STEP
@@ -12,14 +12,15 @@ from .pricing import Priced, PriceKey, PriceTask, Tabled, find_prices
 from .settings import SHAPES, Search, Shape
 from .stages import Learner
 
-_PRICE_S = 4.0
+# Expected seconds of one core: of training twice, and of the layouts of all tables.
+PRICE_S = 4.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Close:
     """A finalist: what it recognises after every stage (by the ensemble) and with each of the tables; with a subject
-    left out, by the same tables (None: only one subject); what the tables worth building cost; how long choosing,
-    training and tables took together.
+    left out, by the same tables (None: only one subject); what the tables worth building cost; how long choosing its
+    switches took.
     """
 
     screened: Screened
@@ -27,14 +28,14 @@ class Close:
     rates: dict[Tabled, Rate]
     left_out: dict[Tabled, Rate] | None
     priced: Priced
-    compile_s: float
+    choosing_s: float
 
 
 def look_closely(
     learner: Learner, search: Search, equipment: Equipment, chosen: Sequence[Screened]
 ) -> tuple[Close, ...]:
     """Return the finalists with all that is to be known of them."""
-    cuts = learner.cuts
+    cuts, fold = learner.cuts, learner.cuts.screening[0]
     choices = [one.choice for one in chosen]
     others = [fold for fold in cuts.all if fold not in cuts.screening]
     learner.choose("finalists' placements", choices, others)
@@ -46,10 +47,17 @@ def look_closely(
         found.append((one, repeats, left_out))
     rated = [(one, _tabled(search, repeats), repeats, left_out) for one, repeats, left_out in found]
     keys = [
-        PriceKey(one.columns, one.choice.joints, worthwhile(rates), learner.max_bins, equipment.identity)
+        PriceKey(
+            one.columns,
+            one.choice.joints,
+            _to_price(rates, search),
+            learner.max_bins,
+            equipment.identity,
+            cuts.names[fold],
+        )
         for one, rates, _, _ in rated
     ]
-    tasks = [PriceTask(key, learner.material, equipment, _PRICE_S) for key in keys]
+    tasks = [PriceTask(key, learner.material, equipment, PRICE_S, fold) for key in keys]
     prices = learner.desk.ask("prices", tasks, find_prices, Priced)
     return tuple(
         Close(
@@ -58,10 +66,19 @@ def look_closely(
             rates=rates,
             left_out=None if left_out is None else _tabled(search, left_out),
             priced=prices[key],
-            compile_s=prices[key].seconds + (learner.choosing_s(one.choice) if one.choice.way != NO_SWITCHES else 0.0),
+            choosing_s=learner.choosing_s(one.choice),
         )
         for (one, rates, repeats, left_out), key in zip(rated, keys, strict=True)
     )
+
+
+def papers_tables(search: Search) -> Tabled:
+    """Return which tables stand for the paper's: of its hundred rounds, as wide as need be."""
+    return Tabled(min(100, search.rounds), Shape(16))
+
+
+def _to_price(rates: dict[Tabled, Rate], search: Search) -> tuple[Tabled, ...]:
+    return tuple(dict.fromkeys([*worthwhile(rates), papers_tables(search)]))
 
 
 def worthwhile(rates: dict[Tabled, Rate]) -> tuple[Tabled, ...]:

@@ -1,8 +1,12 @@
 """What a glove may be built of: the target that classifies, and the wirings that its switches may hang on."""
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import msgspec
+
+from ...runtime.harness.wiring import Harness
 from .beside_wire import Beside
 from .classify_times import ClassifyModel
 from .wirings import Wiring
@@ -23,9 +27,10 @@ class Equipment:
     @property
     def identity(self) -> tuple[str, ...]:
         """What prices depend on besides the tables."""
-        harnesses = (wiring.harness.fingerprint if wiring.harness else "" for wiring in self.wirings)
-        named = (
-            f"{wiring.name}@{wiring.clock_hz}:{harness}"
-            for wiring, harness in zip(self.wirings, harnesses, strict=True)
-        )
-        return (self.model.target, repr(self.beside), repr(self.model.python), *named)
+        named = (f"{wiring.name}@{wiring.clock_hz}:{_digest(wiring.harness)}" for wiring in self.wirings)
+        return (self.model.target, repr(self.beside), repr((self.model.python, self.model.factor)), *named)
+
+
+def _digest(harness: Harness | None) -> str:
+    # All of it: a harness's own fingerprint leaves out clocks and bauds, on which times depend.
+    return "" if harness is None else hashlib.sha256(msgspec.json.encode(harness)).hexdigest()[:16]

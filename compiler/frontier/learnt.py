@@ -20,12 +20,13 @@ from .settings import Shape
 
 
 class PathKey(Struct, frozen=True):
-    """Which placements: a method's for several parameters, from the training rows of a fold."""
+    """Which placements: a method's for several parameters, from the training rows of a fold, at these ports' costs."""
 
     method: str
     parameters: tuple[float, ...]
     joints: bool
     fold: str
+    ports: str = ""
 
 
 class Path(Struct, frozen=True):

@@ -4,6 +4,7 @@ import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,6 +47,11 @@ class Material:
             grasp_set.fingerprint(),
             ports,
         )
+
+    @property
+    def wired(self) -> str:
+        """What identifies in a store what ports cost: a digest, "" where that is not known."""
+        return "" if self.ports is None else hashlib.sha256(msgspec.json.encode(self.ports)).hexdigest()[:16]
 
     @property
     def n_subjects(self) -> int:

@@ -1,7 +1,8 @@
-"""What the points themselves take: every design on a front compiled and simulated, and the model beside it."""
+"""What the points themselves take: every design on a front simulated, or timed here, and the model beside it."""
 
+import platform
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from msgspec import Struct
 
@@ -10,14 +11,16 @@ from ..firmware.choose import Option, features
 from ..firmware.targets import Target
 from .asking import Desk
 from .building import Design
-from .checks import check, unchecked
+from .checks import LEAST, check, unchecked
 from .classify_times import ClassifyModel, fitting
 from .equipment import Equipment
 from .measured_cycles import Trial, run_trial
 from .points import Check, FrontierError, Time
+from .python_times import classify_us
 from .wire_check import check_wire
 
-_TRIAL_S = 2.0
+# Expected seconds: of a trial, of checks in Python.
+TRIAL_S, CHECK_S = 2.0, 5.0
 
 
 class TrialKey(Struct, frozen=True):
@@ -43,9 +46,53 @@ class CountTask:
     cost: float
 
 
+class TimeKey(Struct, frozen=True):
+    """Which wall times: of the runtime with these tables, on a machine."""
+
+    contents: tuple[bytes, ...]
+    machine: str
+
+
+class Timed(Struct, frozen=True):
+    """Microseconds a frame, of each of the tables."""
+
+    us: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TimeTask:
+    """Let the runtime classify on this machine."""
+
+    key: TimeKey
+    cost: float = 1.0
+
+
+class CheckKey(Struct, frozen=True):
+    """Which checks: of the model of this equipment, over these tables."""
+
+    contents: tuple[bytes, ...]
+    equipment: tuple[str, ...]
+
+
+class Checked(Struct, frozen=True):
+    """How far the model is off."""
+
+    checks: tuple[Check, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CheckTask:
+    """Hold a model against what is measured, in `jobs` processes."""
+
+    key: CheckKey
+    model: ClassifyModel
+    jobs: int
+    cost: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Measured:
-    """Classify times as they were simulated, by tables and layout; checks of the model; what could not be done."""
+    """Classify times as simulated or timed, by tables and layout; checks of the model; what could not be done."""
 
     times: dict[TrialKey, Time]
     target: str
@@ -53,11 +100,9 @@ class Measured:
     skipped: tuple[str, ...]
 
     def classify(self, design: Design) -> Time:
-        """Return what classifying takes: as simulated where it was, else as the model has it."""
-        simulated = self.times.get(_key(design, self.target))
-        if simulated is None:
-            return design.classify
-        return Time(simulated.us * design.looks, simulated.how)
+        """Return what classifying takes: as simulated or timed where it was, else as the model has it."""
+        known = self.times.get(_key(design, self.target))
+        return design.classify if known is None else Time(known.us * design.looks, known.how)
 
 
 def count_steps(task: CountTask) -> Counted:
@@ -67,21 +112,47 @@ def count_steps(task: CountTask) -> Counted:
 
 
 def measure_designs(equipment: Equipment, designs: Sequence[Design], desk: Desk) -> Measured:
-    """Return what the designs take, and how far the model is off over these and more."""
-    model = equipment.model
+    """Return what the designs take, and how far the model is off over these and more.
+
+    The simulators of this machine are asked, whatever cluster there is: its workers may have none.
+    """
+    model, here = equipment.model, replace(desk, cluster=None)
     lack = unchecked(model)
-    times = {} if model.part is None or lack else _simulated(model, model.part, designs, desk)
-    tables = [tables_from_bytes(content) for content in dict.fromkeys(design.tables.content for design in designs)]
-    checks = check(model, tables, jobs=desk.jobs)
+    times = {} if lack else _simulated(model, model.part, designs, here) if model.part else _timed(designs, model, here)
+    checks = () if lack else _checks(equipment, designs, here)
     wire, without = check_wire()
     said = (lack, model.note, equipment.beside.what, without)
     return Measured(times, model.target, (*checks, *wire), tuple(sentence for sentence in said if sentence))
 
 
+def run_checks(task: CheckTask) -> Checked:
+    """Return what `task` asks for. Raises FirmwareError."""
+    return Checked(check(task.model, [tables_from_bytes(content) for content in task.key.contents], jobs=task.jobs))
+
+
+def time_here(task: TimeTask) -> Timed:
+    """Return what `task` asks for."""
+    return Timed(tuple(classify_us([tables_from_bytes(content) for content in task.key.contents])))
+
+
+def _timed(designs: Sequence[Design], model: ClassifyModel, desk: Desk) -> dict[TrialKey, Time]:
+    contents = tuple(dict.fromkeys(design.tables.content for design in designs))
+    task = TimeTask(TimeKey(contents, platform.node()))
+    us = dict(zip(contents, desk.here().ask("simulations", [task], time_here, Timed)[task.key].us, strict=True))
+    return {_key(design, model.target): Time(us[design.tables.content], "measured") for design in designs}
+
+
 def _simulated(model: ClassifyModel, part: Target, designs: Sequence[Design], desk: Desk) -> dict[TrialKey, Time]:
-    tasks = [CountTask(_key(design, model.target), part, _TRIAL_S) for design in designs]
+    tasks = [CountTask(_key(design, model.target), part, TRIAL_S) for design in designs]
     found = desk.ask("simulations", tasks, count_steps, Counted)
     return {task.key: Time(model.us(round(found[task.key].steps)), "simulated") for task in tasks}
+
+
+def _checks(equipment: Equipment, designs: Sequence[Design], desk: Desk) -> tuple[Check, ...]:
+    contents = tuple(dict.fromkeys(design.tables.content for design in designs))
+    cost = CHECK_S if equipment.model.part is None else LEAST * TRIAL_S
+    task = CheckTask(CheckKey(contents, equipment.identity), equipment.model, desk.jobs, cost)
+    return desk.here().ask("checks", [task], run_checks, Checked)[task.key].checks
 
 
 def _key(design: Design, target: str) -> TrialKey:

@@ -2,26 +2,25 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
-from ...runtime.build import Build
 from ...runtime.files import write_atomically
 from ...runtime.harness.loading import load_harness
 from ...runtime.harness.wiring import Harness
 from ..recordings.graspset import GraspSet
-from ..selection.rivals import available
+from ..selection.rivals import RIVALS, available
 from .asking import Desk
 from .calibrating import equipment_for
-from .candidates import rate_of
-from .equipment import Equipment
+from .foreseeing import foreseen
 from .material import Cuts, Material
 from .movements import holds_movements
+from .own_build import own_build
 from .pictures import pictures
-from .points import Frontier, FrontierError, Mark, frontier_to_bytes
+from .points import Frontier, FrontierError, frontier_to_bytes
 from .resuming import Effort
-from .scan_times import scan_times, transfer_us
 from .settings import USUAL_METHODS, USUAL_RIVALS, WIRED_METHODS, Search
 from .store import Store
 from .stream import Stream
@@ -64,18 +63,25 @@ def run_frontier(request: Request, report: Callable[[int, int], None]) -> Fronti
     harness = None if request.glove is None else load_harness(request.glove)
     search, lacking = _search(request)
     request.output.mkdir(parents=True, exist_ok=True)
-    with Store(request.output / STORE_NAME, f"frontier {_VERSION} {grasp_set.fingerprint()}") as store:
-        desk = Desk(store, Effort(report), request.jobs, request.cluster)
+    with Store(request.output / STORE_NAME, _scope(grasp_set)) as store:
+        effort = Effort(report)
+        desk = Desk(store, effort, request.jobs, request.cluster)
         study = _study(request, grasp_set, harness, search, desk)
+        effort.foresee(foreseen(search, study.material, study.cuts, study.equipment.model.part is not None))
         found = find_frontier(replace(study, skipped=lacking), desk)
     _write(found, request.output)
     return found
 
 
+def _scope(grasp_set: GraspSet) -> str:
+    return f"frontier {_VERSION} of thenar {version('thenar')} {grasp_set.fingerprint()}"
+
+
 def _search(request: Request) -> tuple[Search, tuple[str, ...]]:
     """Return what is tried, and a sentence on each rival that is not installed."""
     rivals = USUAL_RIVALS if request.rivals is None else request.rivals
-    there = tuple(name for name in rivals if name in available())
+    missing = [name for name in rivals if name in RIVALS and name not in available()]
+    there = tuple(name for name in rivals if name not in missing)
     search = Search(
         methods=request.methods or (USUAL_METHODS if request.glove is None else WIRED_METHODS),
         rivals=there,
@@ -85,11 +91,15 @@ def _search(request: Request) -> tuple[Search, tuple[str, ...]]:
         max_bins=request.max_bins,
         seed=request.seed,
     )
-    missing = [name for name in rivals if name not in there]
     return search, tuple(f"{name} was left out: PySensors is not installed (python-sensors)" for name in missing)
 
 
 def _study(request: Request, grasp_set: GraspSet, harness: Harness | None, search: Search, desk: Desk) -> Study:
+    if holds_movements(grasp_set):
+        raise FrontierError(
+            f"{request.recordings.name} holds whole movements, every frame a row: rows of one would be trained on and "
+            "tested; give a set of single trials, and this one with --stream"
+        )
     material = Material.of(grasp_set, ports_of_whole_glove(harness, grasp_set.switch_names))
     cuts = Cuts.of(material, search)
     equipment = equipment_for(request.target, wirings(harness, request.target), desk)
@@ -101,20 +111,20 @@ def _study(request: Request, grasp_set: GraspSet, harness: Harness | None, searc
         equipment=equipment,
         stream=_stream(request, grasp_set, material, cuts),
         wanted=request.wanted,
-        own=None if request.build is None else _own(request.build, grasp_set, equipment),
+        own=None if request.build is None else own_build(request.build, grasp_set, equipment),
     )
 
 
 def _stream(request: Request, grasp_set: GraspSet, material: Material, cuts: Cuts) -> Stream:
     """Return the test rows of the first fold as a stream, or the recordings named for it."""
     if request.stream is None:
-        if holds_movements(grasp_set):
-            raise FrontierError(
-                f"{request.recordings.name} holds whole movements, every frame a row: rows of one would be trained on "
-                "and tested; give a set of single trials, and this one with --stream"
-            )
         return stream_of(grasp_set, material.labels, cuts.screening[0].test, seed=request.seed)
     played = GraspSet.load(request.stream)
+    if played.fingerprint() == grasp_set.fingerprint():
+        raise FrontierError(
+            f"{request.stream.name} is what is trained on: name other recordings with --stream, or leave it out, and "
+            "rows that are set aside are used"
+        )
     if (played.switch_names, played.joints) != (grasp_set.switch_names, grasp_set.joints):
         raise FrontierError(f"{request.stream.name} has other switches or joints than {request.recordings.name}")
     number = {grasp: label for label, grasp in enumerate(material.grasps)}
@@ -123,26 +133,6 @@ def _stream(request: Request, grasp_set: GraspSet, material: Material, cuts: Cut
         raise FrontierError(f"{request.stream.name} holds {strange[0]!r}, which {request.recordings.name} does not")
     labels = np.array([number[str(grasp)] for grasp in played.grasps], dtype=np.intp)
     return stream_of(played, labels, seed=request.seed)
-
-
-def _own(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
-    """Return the user's own build as a mark: its rate as it says, its frame in the fastest wiring for its switches."""
-    build = Build.load(folder)
-    manifest = build.manifest
-    names = [switch.name for switch in manifest.switches]
-    rate = manifest.rates[-1]
-    options = equipment.model.options(build.tables)
-    if not options:
-        raise FrontierError(f"{folder}: its classifier does not fit {equipment.model.target}")
-    columns = [grasp_set.switch_names.index(name) for name in names]
-    joints = [joint.column for joint in manifest.joints]
-    bits, codes = grasp_set.switches[:, columns], grasp_set.codes[:, joints]
-    scans = [
-        scan_times(names, build.tables, wiring, bits, codes, equipment.beside).full_us
-        for wiring in equipment.fitting(names)
-    ]
-    frame_us = max(min(scans, default=0.0), transfer_us(len(joints))) + options[0].us
-    return Mark(f"build {folder.name}", len(names), rate_of((rate.correct,), rate.total), frame_us)
 
 
 def _write(found: Frontier, folder: Path) -> None:

@@ -39,6 +39,10 @@ class Effort:
         self._costs = dict(foreseen or {})
         self._done = 0.0
 
+    def foresee(self, costs: Mapping[str, float]) -> None:
+        """Say what stages that have not begun will cost."""
+        self._costs = {**costs, **self._costs}
+
     def begin(self, stage: str, cost: float) -> None:
         """Say what `stage` costs; replaces what was foreseen."""
         self._costs[stage] = cost

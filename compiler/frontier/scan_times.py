@@ -35,6 +35,8 @@ class ScanTimes:
               apart here: they are read one after another, as `scan_us` of the runtime adds them up
     ports     transactions of a whole scan, and a board's frame is one; chips: a board is one
     how       "wire", or "model" where a firmware's own work is in it
+    early_ports  how many ports of chips are read then, the mean over the same frames: after each of them the scores are
+              looked at
     """
 
     full_us: float
@@ -42,6 +44,7 @@ class ScanTimes:
     ports: int
     chips: int
     how: How
+    early_ports: float
 
 
 def scan_times(
@@ -55,24 +58,27 @@ def scan_times(
     """Return what scans of the build's switches `names` take, the build's order, over frames bits (n, s), codes (n, j).
 
     beside is what every transaction takes besides the wire; a board takes what thenar's firmware does to scan its keys
-    before it sends. Boards and buses work side by side, so the slower counts. A decision that asks for a lead
-    reads on until that is safe as well: here scans end when the grasp type is certain. Raises HarnessError if a switch
-    has no place.
+    before it sends. Boards and buses work side by side, so the slower counts. Scans end here when the grasp type is
+    certain, which is for decisions on single frames: one that asks for a lead reads on until that is safe as well, and
+    a sequential test needs whole scans. Raises HarnessError if a switch has no place.
     """
     if not len(names):
-        return ScanTimes(0.0, 0.0, 0, 0, "wire")
+        return ScanTimes(0.0, 0.0, 0, 0, "wire", 0.0)
     harness = wiring.harness_of(names, joints=bool(tables.n_joints))
     rows = np.linspace(0, len(bits) - 1, min(_ORDERING, len(bits))).astype(np.intp)
     scan = plan_scan(names, tables, harness, bits[rows], codes[rows])
     boards = [(board, keys) for board, keys in zip(harness.scanners, scan.scanners, strict=True) if keys]
     board_us = max((_board_us(board) for board, _ in boards), default=0.0)
-    full_us, early_us = _bus_us(scan, harness, tables, bits, codes, beside) if scan.ports else (0.0, 0.0)
+    full_us, early_us, early_ports = (
+        _bus_us(scan, harness, tables, bits, codes, beside) if scan.ports else (0.0, 0.0, 0.0)
+    )
     return ScanTimes(
         full_us=max(full_us, board_us),
         early_us=max(early_us, board_us),
         ports=len(scan.ports) + len(boards),
         chips=len({(port.bus, port.chip) for port in scan.ports}) + len(boards),
         how="model" if boards or beside.scan_us else "wire",
+        early_ports=early_ports,
     )
 
 
@@ -88,12 +94,12 @@ def _bus_us(
     bits: NDArray[np.bool_],
     codes: NDArray[np.uint16],
     beside: Beside,
-) -> tuple[float, float]:
-    """Return the time of a whole scan of the chips, and the mean of one that ends early."""
+) -> tuple[float, float, float]:
+    """Return the time of a whole scan of the chips, and the mean time and number of ports of one that ends early."""
     costs = Costs(scan.ports, harness)
     frames = Decided(tables, [[switch for _, switch in port.switches] for port in scan.ports], bits, codes)
     always = beside.scan_us + beside.key_us * len(scan.switches)
-    whole, weighted, read = [always], [always], 0
+    whole, weighted, shares, read = [always], [always], list[float](), 0
     for number, port in enumerate(scan.ports):
         # A selection of a channel is a transaction as well.
         wire_ns = costs.after(read, number)
@@ -103,8 +109,9 @@ def _bus_us(
         share = frames.undecided(read) / len(frames) if read and len(frames) else 1.0
         whole.append(us)
         weighted.append(us * share)
+        shares.append(share)
         read |= 1 << number
-    return fsum(whole), fsum(weighted)
+    return fsum(whole), fsum(weighted), fsum(shares)
 
 
 def transfer_us(joints: int) -> float:

@@ -15,7 +15,7 @@ from .stages import Learner
 
 # How long a frame takes hardly depends on how many rounds there were: tables of few tell it.
 _ROUNDS = 12
-_PRICE_S = 0.5
+QUICK_PRICE_S = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +38,10 @@ def screen(learner: Learner, search: Search, equipment: Equipment) -> Screening:
     ]
     rivals = [Choice(way, "switches") for name in search.rivals for way in curve_ways(name, n_switches)]
     learner.choose("placements", choices, (cuts.everything, *cuts.screening))
+    # A placement that keeps nothing is none.
+    choices = [one for one in choices if one.way == NO_SWITCHES or learner.columns(one, cuts.everything)]
     learner.choose("rivals", rivals, cuts.screening)
-    fits = learner.fit("screening", [*choices, *rivals], cuts.screening, (search.screening,))
+    fits = learner.fit("screening", [*choices, *rivals], cuts.screening, (search.screened,))
     totals = {choice: _total([fits[choice, fold] for fold in cuts.screening]) for choice in [*choices, *rivals]}
     frames = _frames_us(learner, choices, equipment)
     screened = tuple(
@@ -47,7 +49,7 @@ def screen(learner: Learner, search: Search, equipment: Equipment) -> Screening:
         for choice, (correct, total) in totals.items()
         if choice in frames
     )
-    names = [*search.methods, *search.rivals]
+    names = dict.fromkeys([*search.methods, *search.rivals])
     curves = tuple(_curve(learner, name, totals) for name in names if "switches" in inputs)
     return Screening(screened, curves)
 
@@ -82,7 +84,7 @@ def _frames_us(learner: Learner, choices: Sequence[Choice], equipment: Equipment
         )
         for choice in choices
     }
-    tasks = [PriceTask(key, material, equipment, _PRICE_S) for key in keys.values()]
+    tasks = [PriceTask(key, material, equipment, QUICK_PRICE_S) for key in keys.values()]
     prices = learner.desk.ask("times", tasks, find_prices, Priced)
     found = {}
     for choice, key in keys.items():

@@ -19,6 +19,8 @@ BEST = "elimination"  # tried at every size, all switches included
 USUAL_METHODS = (BEST, "id3", "id3-cost", "id3-ccp")
 # Where the glove's own wiring is known, and may be kept: by what its ports cost.
 WIRED_METHODS = (BEST, "elimination-cost", "id3", "id3-cost")
+# What the ports cost has a say in these alone.
+PRICED_METHODS = ("elimination-cost", "id3-cost")
 USUAL_RIVALS = ("rfe", "forest", "mrmr", "mutual-information", "random", "sspoc", "qr")
 ROUNDS = (1, 2, 3, 5, 8, 12, 20, 30, 50, 75, 100, 150, 200, 300)
 
@@ -49,7 +51,7 @@ class Search:
     methods: tuple[str, ...] = USUAL_METHODS
     rivals: tuple[str, ...] = USUAL_RIVALS
     folds: int = 4
-    repeats: int = 2
+    repeats: int = 3
     seed: int = 1
     screening: int = 60
     rounds: int = 300
@@ -63,6 +65,11 @@ class Search:
                 raise FrontierError(f"there is no method {name!r}: choose among {', '.join(METHODS)}")
         if min(self.repeats, self.screening, self.rounds, self.finalists) < 1 or not self.methods:
             raise FrontierError("a frontier needs a method, a repeat, a round and a finalist at least")
+
+    @property
+    def screened(self) -> int:
+        """The rounds of screening: no more than those on the front are trained for."""
+        return min(self.screening, self.rounds)
 
     @property
     def stages(self) -> tuple[int, ...]:

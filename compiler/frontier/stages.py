@@ -10,11 +10,22 @@ from .candidates import NO_SWITCHES, Choice
 from .learnt import Fit, FitKey, FitTask, Path, PathKey, PathTask, choose_path, fit_stages
 from .material import Cuts, Material
 from .points import Way
-from .settings import BEST, Shape
+from .settings import BEST, PRICED_METHODS, Shape
 
-# Expected seconds of one core, for 3000 rows: they only say how the time that is left is told.
-_PATH_S = {"elimination": 8.0, "rfe": 6.0, "sspoc": 4.0}
+# Expected seconds of one core, for so many rows: they only say how the time that is left is told.
+_ROWS = 3000
+_PATH_S = {BEST: 8.0, "elimination-cost": 8.0, "rfe": 6.0, "sspoc": 4.0}
 _ROUND_S, _TABLE_S = 0.009, 0.06
+
+
+def path_s(method: str, rows: int) -> float:
+    """Return the expected seconds of all placements of a method."""
+    return _PATH_S.get(method, 0.5) * rows / _ROWS
+
+
+def fit_s(rounds: int, tables: int, rows: int) -> float:
+    """Return the expected seconds of a training with tests, and with so many tables made and tested."""
+    return (rounds * _ROUND_S + tables * _TABLE_S) * rows / _ROWS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,10 +48,16 @@ class Learner:
                 parameters.append(choice.way.parameter)
         tasks = [
             PathTask(
-                PathKey(method, tuple(dict.fromkeys(parameters)), joints, self.cuts.names[fold]),
+                PathKey(
+                    method,
+                    tuple(dict.fromkeys(parameters)),
+                    joints,
+                    self.cuts.names[fold],
+                    self.material.wired if method in PRICED_METHODS else "",
+                ),
                 self.material,
                 fold,
-                self._scaled(_PATH_S.get(method, 0.5), fold),
+                path_s(method, len(fold.train)),
             )
             for (method, joints), parameters in asked.items()
             for fold in folds
@@ -81,13 +98,13 @@ class Learner:
             for choice in choices
             for fold in folds
         }
-        cost = stages[-1] * _ROUND_S + len(tabled) * len(shapes) * _TABLE_S
-        tasks = [FitTask(key, self.material, fold, self._scaled(cost, fold)) for (_, fold), key in keys.items()]
+        tables = len(tabled) * len(shapes)
+        tasks = [
+            FitTask(key, self.material, fold, fit_s(stages[-1], tables, len(fold.train)))
+            for (_, fold), key in keys.items()
+        ]
         found = self.desk.ask(stage, tasks, fit_stages, Fit)
         return {place: found[key] for place, key in keys.items()}
-
-    def _scaled(self, seconds: float, fold: Fold) -> float:
-        return seconds * len(fold.train) / 3000
 
 
 def _learns_from_joints(choice: Choice) -> bool:

@@ -39,7 +39,8 @@ def logarithmic(title: str, values: Sequence[float]) -> dict[str, Any]:
     positive = [value for value in values if value > 0] or [1.0]
     low, high = min(positive), max(positive)
     decades = range(floor(log10(low)), ceil(log10(high)) + 1)
-    steps = (1, 2, 5) if high > 10 * low else (1, 2, 3, 5, 7)
+    # No more than a narrow screen has room for.
+    steps = (1, 2, 3, 5, 7) if high <= 10 * low else (1, 2, 5) if high <= 200 * low else (1,)
     ticks = [step * 10.0**decade for decade in decades for step in steps]
     return axis(title, type="log", tickangle=0, tickvals=ticks, ticktext=[f"{tick:,g}" for tick in ticks])
 

@@ -27,7 +27,8 @@ class ReportContent:
     only_answer   the one grasp type that every row gets, where there is but one
     tree          the tree that chose the switches, over the recordings' switches; classes index manifest.grasps
     confusion     (K, K) counts of the honest folds, row: true, column: recognised, K as in manifest.grasps
-    study         the paper's tables for these recordings
+    study         the paper's tables for these recordings; no_study: a sentence, why there are none
+    frontier      of which the report tells; point: the number of the one that the build is, None if it is none of them
     hand          where the recordings' switches lie
     scan, harness the scan map and the harness that it was made for
     guarantee     the worst that integers can do, over every frame there is
@@ -44,7 +45,9 @@ class ReportContent:
     tree: Tree | None = None
     confusion: NDArray[np.intp] | None = None
     study: Study | None = None
+    no_study: str = "They were not asked for."
     frontier: Frontier | None = None
+    point: int | None = None
     hand: HandShape | None = None
     scan: ScanMap | None = None
     harness: Harness | None = None

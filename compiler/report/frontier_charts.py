@@ -49,12 +49,13 @@ def _by_switches(frontier: Frontier) -> Chart:
 
 
 def _by_latency(frontier: Frontier) -> Chart:
-    points = frontier.points
+    points = [point for point in frontier.points if point.latency.mean_us > 0]
     marks = [(mark.latency_us, mark) for mark in frontier.marks if mark.latency_us]
     traces = [best_line(points, "latency", _latency_us), *point_traces(points, _latency_us, to_p99=True)]
     caption = (
         "Recognition rate against decision latency, from the hand's arrival in a grasp until it is decided on: the "
-        "mean, and to its right the 99th percentile."
+        "mean, and to its right the 99th percentile. Grasps that were missed are in neither, and points that miss all "
+        "are not on it."
     )
     return _chart("by-latency", caption, traces, marks, points, _latency_us, "Decision latency, µs (logarithmic)")
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from math import log10
 from typing import Any
 
+from ..frontier.pareto import front
 from ..frontier.points import Curve, Mark, Point, Rate, Tried
 from .charts import words
 from .numbers import interval, microseconds
@@ -62,9 +63,10 @@ def _hover(point: Point) -> str:
     )
 
 
-def best_line(points: Sequence[Point], front: str, cost: Cost) -> Trace:
-    """Return the line through the points of a front."""
-    best = sorted((cost(point), point.rate.mean) for point in points if front in point.fronts)
+def best_line(points: Sequence[Point], name: str, cost: Cost) -> Trace:
+    """Return the line through the points of a front; one that is best of its kind alone may lie below it."""
+    there = [(cost(point), point.rate.mean) for point in points if name in point.fronts]
+    best = front(there, lambda place: place[0], lambda place: place[1], step=0.0)
     return {
         "type": "scatter",
         "mode": "lines",

@@ -10,10 +10,14 @@ from ..hand import HandShape
 from .frontier_tables import frontier_tables
 from .hand_picture import HandPicture, hand_picture
 from .numbers import NBSP, counted, interval, microseconds
+from .numbers import sentence as as_sentence
 from .plain_table import PlainTable
-from .point_view import Detail, point_detail, point_placement
+from .point_view import Detail, point_detail, point_latency, point_placement
 
-COLUMNS = ("Switches", "Inputs", "Method", "Rate, %", "Frame, µs", "Latency, µs", "99th pct., µs", "Flash, bytes")
+COLUMNS = (
+    *("Switches", "Inputs", "Method", "Rate, %", "Frame, µs"),
+    *("Latency, µs", "99th pct., µs", "Missed, %", "Flash, bytes"),
+)
 _FOREIGN = "This frontier is of other recordings than the build."
 
 
@@ -40,10 +44,12 @@ class FrontierView:
     notes: tuple[str, ...]
 
 
-def frontier_view(frontier: Frontier, fingerprint: str, hand: HandShape | None) -> FrontierView:
-    """Return the section of `frontier` in a build from the recordings of that fingerprint."""
+def frontier_view(
+    frontier: Frontier, fingerprint: str, hand: HandShape | None, built: int | None = None
+) -> FrontierView:
+    """Return the section of `frontier` in a build from the recordings of that fingerprint, which is point `built`."""
     details = tuple(point_detail(point, frontier.source) for point in frontier.points)
-    first = featured(frontier)
+    first = featured(frontier) if built is None else frontier.point(built)
     picked = None if first is None else point_detail(first, frontier.source)
     return FrontierView(
         columns=COLUMNS,
@@ -53,20 +59,19 @@ def frontier_view(frontier: Frontier, fingerprint: str, hand: HandShape | None) 
         hand=_hand(frontier, hand, picked),
         tables=tuple(frontier_tables(frontier)),
         warnings=() if frontier.fingerprint == fingerprint else (_FOREIGN,),
-        notes=tuple(_notes(frontier)),
+        notes=(*_notes(frontier), *(() if built is None else (f"This build is point {built}.",))),
     )
 
 
 def _row(point: Point, picked: Detail | None) -> PointRow:
-    latency = point.latency
     cells = (
         str(len(point.switches)),
         point.setting.inputs,
         point_placement(point),
         interval(point.rate),
         microseconds(point.frame.us),
-        microseconds(latency.mean_us),
-        microseconds(latency.p99_us),
+        *point_latency(point),
+        f"{100 * point.latency.missed:.1f}",
         f"{point.flash:,}",
     )
     return PointRow(point.number, cells, picked is not None and point.number == picked.number)
@@ -88,4 +93,4 @@ def _notes(frontier: Frontier) -> Iterable[str]:
     )
     if frontier.wanted and frontier.picked is not None:
         yield f"Point {frontier.picked} was picked for {frontier.wanted}."
-    yield from frontier.skipped
+    yield from map(as_sentence, frontier.skipped)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...runtime.tables import LIMIT, IntegerTables
+from ...runtime.tables import IntegerTables
 from ..boosting.stumps import TIE, Stumps
 from ..tables.collapse import collapse
 from ..tables.compare import Comparison
@@ -21,7 +21,7 @@ class Guarantee:
     integer_*    float tables against integers on them, in steps
     loss         the most steps that the lead of `leader` over `rival` can lose, over all frames; at most `loss_bound`
     safe_margin  leads of more steps than this keep their grasp type, proved over all frames: `covered` of `rows`
-    reach        the furthest that a sum can get from zero, in any order, inputs missing or not; `limit` is what fits
+    reach        the furthest that a sum can get from zero, in any order, inputs missing or not
     """
 
     rows: int
@@ -37,7 +37,6 @@ class Guarantee:
     covered: int
     changed: int
     reach: int
-    limit: int = LIMIT
 
 
 def guarantee_of(stumps: Stumps, integers: IntegerTables, comparison: Comparison, grasps: Sequence[str]) -> Guarantee:

@@ -29,18 +29,19 @@ def guarantee_view(content: ReportContent) -> GuaranteeView:
     found = content.guarantee
     if found is None:
         return GuaranteeView(sentences, None)
-    return GuaranteeView((*sentences, _worst(found)), _table(found))
+    return GuaranteeView((*sentences, _worst(found)), _table(found, proof.width))
 
 
 def _worst(found: Guarantee) -> str:
     return (
         f"At worst, over every frame there is and not only those recorded, {found.leader} loses {found.loss:.3f} steps "
-        f"of its lead over {found.rival}. Worked out exactly, a lead of more than {found.safe_margin:.3f} steps is "
-        f"safe: {share_of(found.covered, found.rows)} rows trained on have it."
+        f"of its lead over {found.rival}. Worked out exactly, ties in whole steps included, a lead of more than "
+        f"{found.safe_margin:.3f} steps is safe: {share_of(found.covered, found.rows)} rows trained on have it."
     )
 
 
-def _table(found: Guarantee) -> PlainTable:
+def _table(found: Guarantee, width: int) -> PlainTable:
+    most = 2 ** (width - 1) - 1
     rows = (
         (
             "Ensemble against float tables, units of score",
@@ -49,6 +50,6 @@ def _table(found: Guarantee) -> PlainTable:
         ),
         ("Float tables against integers, steps", f"{found.integer_difference:.3f}", f"{found.integer_bound:.3f}"),
         ("Most that a lead can lose, steps, all frames", f"{found.loss:.3f}", f"{found.loss_bound:.3f}"),
-        ("Furthest that a sum can get from zero, steps", f"{abs(found.reach):,}", f"{found.limit:,}"),
+        ("Furthest that a sum can get from zero, steps", f"{abs(found.reach):,}", f"{most:,}"),
     )
     return PlainTable("Differences beside their bounds", ("What", "Found", "Bound"), rows)

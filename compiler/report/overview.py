@@ -67,7 +67,7 @@ def _facts(content: ReportContent) -> list[Fact]:
         Fact("Joints", f"{len(manifest.joints)}", "of the CyberGlove" if manifest.joints else "none are used"),
         Fact("Rounds", f"{content.rounds}", _rounds(content)),
         Fact("Tables", f"{content.tables_bytes:,}", "bytes of tables.bin"),
-        Fact("Grasp type changed by integers", f"{proof.changed}", f"of {manifest.source.rows:,} rows"),
+        Fact("Changed by rounding", f"{proof.changed}", f"of {counted(manifest.source.rows, 'row')}"),
     ]
 
 

@@ -28,15 +28,18 @@ def report_html(content: ReportContent) -> bytes:
     manifest, frontier = content.manifest, content.frontier
     tree = _tree(content)
     charts = () if frontier is None else frontier_charts(frontier)
-    shown = None if frontier is None else frontier_view(frontier, manifest.source.fingerprint, content.hand)
+    shown = (
+        None if frontier is None else frontier_view(frontier, manifest.source.fingerprint, content.hand, content.point)
+    )
     tree_charts = () if tree is None else (tree_chart(tree),)
     page = environment.get_template("report.html.j2").render(
         overview=overview(content),
         hand=_hand(content),
-        switches=placement_view(manifest.switches, content.tree, content.hand),
+        placement=placement_view(manifest, content.tree, content.hand),
         tree=tree,
         tree_charts=tree_charts,
         study=None if content.study is None else study_view(content.study),
+        no_study=content.no_study,
         confusions=_confusions(content),
         frontier=shown,
         charts=charts,

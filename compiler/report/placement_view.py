@@ -1,13 +1,14 @@
-"""The kept switches: in which order, where on the hand, and what each brought."""
+"""The kept switches: by which method and in which order, where on the hand, and what each brought."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 
-from ...runtime.manifest import Switch
+from ...runtime.manifest import Manifest, Switch
 from ..hand import HandShape
 from ..placement.gain import entropy_bits
 from ..placement.tree import Tree
+from ..selection.ways import METHODS
 from .numbers import percent
 
 
@@ -25,8 +26,36 @@ class KeptSwitch:
     share: str
 
 
-def placement_view(switches: Sequence[Switch], tree: Tree | None, hand: HandShape | None) -> tuple[KeptSwitch, ...]:
-    """Return the rows of the table; shares are known where a tree chose the switches, parts where there is a hand."""
+@dataclass(frozen=True, slots=True)
+class PlacementView:
+    """The table's rows, whether their shares are known, sentences that read it, and why there is no tree."""
+
+    switches: tuple[KeptSwitch, ...]
+    together: bool
+    sentences: tuple[str, ...]
+    no_tree: str
+
+
+def placement_view(manifest: Manifest, tree: Tree | None, hand: HandShape | None) -> PlacementView:
+    """Return what is said of the placement; shares are known where a tree chose it, parts where there is a hand."""
+    method, switches = manifest.options.placement, manifest.switches
+    how = METHODS[method].what if method in METHODS else "Chosen by another version of thenar"
+    if tree is not None:
+        bits = "brought the tree; together is what it and those before it brought, as a share of all there is to know"
+    else:
+        bits = "holds alone, without the others"
+    return PlacementView(
+        switches=_kept(switches, tree, hand),
+        together=tree is not None,
+        sentences=(
+            f"{how} (--placement {method}).",
+            f"Columns count from 0 in the recordings. Bits are the information on the grasp type that a switch {bits}.",
+        ),
+        no_tree=f"No tree: the switches were chosen by {method}." if switches else "No tree: no switches were chosen.",
+    )
+
+
+def _kept(switches: Sequence[Switch], tree: Tree | None, hand: HandShape | None) -> tuple[KeptSwitch, ...]:
     entropy = 0.0 if tree is None else entropy_bits(list(tree.nodes[0].counts))
     parts = {} if hand is None else dict(zip(hand.names, hand.parts.tolist(), strict=True))
     together = accumulate(switch.gain for switch in switches)

@@ -45,7 +45,7 @@ def point_detail(point: Point, source: str) -> Detail:
 
 
 def _facts(point: Point) -> Iterable[tuple[str, str]]:
-    setting, latency = point.setting, point.latency
+    setting = point.setting
     yield "Recognition rate, %", interval(point.rate)
     yield "Subject left out, %", interval(point.left_out)
     yield "Placement", point_placement(point)
@@ -61,8 +61,9 @@ def _facts(point: Point) -> Iterable[tuple[str, str]]:
     yield "Classify", _time(point.classify)
     yield "Frame", _time(point.frame)
     yield "Decision", setting.decision
-    yield "Latency", f"{microseconds(latency.mean_us)} µs, 99th percentile {microseconds(latency.p99_us)} µs"
-    yield "Grasps missed", f"{100 * latency.missed:.1f} %"
+    mean, late = point_latency(point)
+    yield "Latency", DASH if mean == DASH else f"{mean} µs, 99th percentile {late} µs"
+    yield "Grasps missed", f"{100 * point.latency.missed:.1f} %"
     yield "Flash and RAM", f"{point.flash:,} and {point.ram:,} bytes"
     yield "To compile", f"{point.compile_s:.1f} s"
 
@@ -71,6 +72,12 @@ def point_placement(point: Point) -> str:
     """Return by which method the point's switches were chosen, and its parameter; a dash where there are none."""
     way = point.setting.way
     return f"{way.method} {way.parameter:g}" if point.switches else DASH
+
+
+def point_latency(point: Point) -> tuple[str, str]:
+    """Return mean and 99th percentile of the latency, µs; dashes where no grasp was decided on rightly."""
+    latency = point.latency
+    return (DASH, DASH) if latency.missed >= 1 else (microseconds(latency.mean_us), microseconds(latency.p99_us))
 
 
 def _time(time: Time) -> str:

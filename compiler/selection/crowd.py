@@ -1,9 +1,9 @@
 """A standard placement: one for many subjects, those it serves worst included, and how many subjects it takes.
 
-Placements are learnt from some subjects and recognise others, who are never learnt from. Two aims are tried: rows of
-all subjects alike, and rows of the worst-served tenth counted several times. Who these are is found among the subjects
-that are learnt from: half of them recognise the other half. Which aim is better is decided among them as well, on a
-fifth that is kept aside, by the mean and the worst tenth in equal parts.
+Placements are learnt from some subjects and recognise others, who are never learnt from. Three are held beside each
+other: as a method chooses them, and bettered for the mean over subjects or for the worst-served tenth (`refining`).
+Which of the three is taken is decided among the subjects that are learnt from, on a fifth of them that is kept aside,
+by the mean and the worst tenth in equal parts.
 """
 
 from collections.abc import Callable
@@ -15,11 +15,13 @@ import numpy as np
 from ..placement.errors import PlacementError
 from ..workers import in_workers
 from .learning import Columns
-from .serving import WORST_SHARE, Aim, Crowd, Numbers, Served, rates, served
+from .refining import REACH, Refining
+from .serving import Aim, Crowd, Numbers, Served, rates, served
+from .ways import chooser
 
-AIMS: tuple[Aim, ...] = ("mean", "worst tenth")
+AIMS: tuple[Aim, ...] = ("plain", "mean", "worst tenth")
 
-_LEAST_SUBJECTS = 8
+LEAST_SUBJECTS = 8
 _HELD_OUT = 0.2
 _SIZES = (2, 5, 10, 20, 40, 80, 160)
 
@@ -29,7 +31,7 @@ class Asked:
     """What a study of a crowd takes.
 
     keep     switches to keep; method: one of `ways` whose parameter is a number of switches
-    rows     at most so many are learnt from, equally many of every subject
+    rows     at most so many are learnt from to place, equally many of every subject; a classifier learns from all
     rounds   of LogitBoost that judges a placement
     repeats  other draws of subjects for every point of the learning curve
     """
@@ -56,7 +58,7 @@ class Standard(msgspec.Struct, frozen=True):
     """A standard placement, and what was found on the way.
 
     columns   learnt from all subjects with `aim`, in the order of the method
-    aim       what did better among the subjects learnt from: `tried` says by how much
+    aim       what did best among the subjects learnt from, the first of equal ones: `tried` says by how much
     held_out  subjects that the curve is measured on; subjects: all there are
     rows      that were learnt from for the placement
     """
@@ -73,12 +75,11 @@ class Standard(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Task:
-    """Learn from some subjects of a crowd, recognise others, with one aim."""
+    """Learn from some subjects of a crowd, recognise others."""
 
     crowd: Crowd
     learnt: Numbers
     asked: Numbers
-    aim: Aim
     take: Asked
     seed: int
     place: int
@@ -93,14 +94,14 @@ def standard_placement(
     Raises PlacementError for fewer than eight subjects.
     """
     people = np.unique(crowd.subjects)
-    if len(people) < _LEAST_SUBJECTS:
+    if len(people) < LEAST_SUBJECTS:
         raise PlacementError(
-            f"the set has {len(people)} subject(s): a standard placement is learnt from at least {_LEAST_SUBJECTS}"
+            f"the set has {len(people)} subject(s): a standard placement is learnt from at least {LEAST_SUBJECTS}"
         )
     people = np.random.default_rng(take.seed).permutation(people)
     asked, learnt = _apart(people)
-    tasks = [*_trials(crowd, learnt, take), *_curve(crowd, learnt, asked, take)]
-    found: dict[int, Served] = {}
+    tasks = [_trial(crowd, learnt, take), *_curve(crowd, learnt, asked, take)]
+    found: dict[int, tuple[Served, ...]] = {}
     for done, (place, answer) in enumerate(in_workers(_work, tasks, jobs), 1):
         found[place] = answer
         if on_done is not None:
@@ -108,11 +109,11 @@ def standard_placement(
     points = _points(tasks, found)
     tried, curve = points[: len(AIMS)], points[len(AIMS) :]
     aim = max(tried, key=lambda point: point.served.worth).aim
-    rows = _learnt_from(crowd, aim, take, take.seed)
-    columns = rows.place(take.method, take.keep)
+    columns = _refining(crowd, take, take.seed).best(aim)
     if on_done is not None:
         on_done(len(tasks) + 1, len(tasks) + 1)
-    return Standard(columns, take.method, aim, len(people), len(asked), len(rows.subjects), tried, curve)
+    rows = len(crowd.drawn(take.rows, take.seed).subjects)
+    return Standard(columns, take.method, aim, len(people), len(asked), rows, tried, curve)
 
 
 def _apart(people: Numbers) -> tuple[Numbers, Numbers]:
@@ -121,63 +122,51 @@ def _apart(people: Numbers) -> tuple[Numbers, Numbers]:
     return people[:held_out], people[held_out:]
 
 
-def _trials(crowd: Crowd, learnt: Numbers, take: Asked) -> list[_Task]:
-    """Return a task for each aim, within the people learnt from."""
+def _trial(crowd: Crowd, learnt: Numbers, take: Asked) -> _Task:
+    """Return the task that the aims are compared by, within the people learnt from."""
     asked, rest = _apart(learnt)
-    return [_Task(crowd.of(learnt), rest, asked, aim, take, take.seed, place) for place, aim in enumerate(AIMS)]
+    return _Task(crowd.of(learnt), rest, asked, take, take.seed, 0)
 
 
 def _curve(crowd: Crowd, learnt: Numbers, asked: Numbers, take: Asked) -> list[_Task]:
-    """Return the tasks of the learning curve: numbers of subjects, draws of them, aims."""
+    """Return the tasks of the learning curve: numbers of subjects, draws of them."""
     sizes = [*(size for size in _SIZES if size < len(learnt)), len(learnt)]
     tasks: list[_Task] = []
     for size in sizes:
         draws = take.repeats if size < len(learnt) else 1
         for seed in range(take.seed, take.seed + draws):
             some = np.random.default_rng([seed, size]).permutation(learnt)[:size]
-            for aim in AIMS:
-                place = len(AIMS) + len(tasks)
-                tasks.append(_Task(crowd.of(np.append(some, asked)), some, asked, aim, take, seed, place))
+            tasks.append(_Task(crowd.of(np.append(some, asked)), some, asked, take, seed, len(tasks) + 1))
     return tasks
 
 
-def _work(task: _Task) -> tuple[int, Served]:
-    take = task.take
-    rows = _learnt_from(task.crowd.of(task.learnt), task.aim, take, task.seed)
-    columns = rows.place(take.method, take.keep)
-    judge = task.crowd.of(task.learnt).drawn(take.rows, task.seed)
-    return task.place, served(rates(judge, task.crowd.of(task.asked), columns, take.rounds))
+def _work(task: _Task) -> tuple[int, tuple[Served, ...]]:
+    """Return the task's place, and how the people asked are served for each aim."""
+    learnt, asked = task.crowd.of(task.learnt), task.crowd.of(task.asked)
+    refining = _refining(learnt, task.take, task.seed)
+    placements = [refining.best(aim) for aim in AIMS]
+    found = {columns: served(rates(learnt, asked, columns, task.take.rounds)) for columns in placements}
+    return task.place, tuple(found[columns] for columns in placements)
 
 
-def _learnt_from(crowd: Crowd, aim: Aim, take: Asked, seed: int) -> Crowd:
-    """Return the rows that a placement is learnt from: drawn evenly, those of the worst served more often if wanted."""
-    drawn = crowd.drawn(take.rows, seed)
-    people = np.unique(crowd.subjects)
-    if aim == "mean" or len(people) < _LEAST_SUBJECTS:
-        return drawn
-    mixed = np.random.default_rng([seed, len(people)]).permutation(people)
-    halves = mixed[::2], mixed[1::2]
-    found = [
-        (rate, subject)
-        for one, other in (halves, halves[::-1])
-        for rate, subject in zip(_rates_of(drawn.of(one), drawn.of(other), take), np.sort(other), strict=True)
-    ]
-    worst = sorted(found)[: max(round(WORST_SHARE * len(people)), 1)]
-    return drawn.favouring(np.array([subject for _, subject in worst], dtype=np.intp))
+def _refining(crowd: Crowd, take: Asked, seed: int) -> Refining:
+    """Return the method's placement, from rows drawn evenly over the subjects, ready to be bettered."""
+    choose = chooser(take.method, crowd.drawn(take.rows, seed).learning)
+    kept = choose(take.keep)
+    spare = tuple(column for column in choose(take.keep + REACH) if column not in kept)
+    return Refining(crowd, kept, spare, take.rows, take.rounds, seed)
 
 
-def _rates_of(learnt: Crowd, asked: Crowd, take: Asked) -> list[float]:
-    found: list[float] = rates(learnt, asked, learnt.place(take.method, take.keep), take.rounds).tolist()
-    return found
-
-
-def _points(tasks: list[_Task], found: dict[int, Served]) -> tuple[CurvePoint, ...]:
-    """Return the means over the draws, the trials of the aims first."""
-    draws: dict[tuple[bool, int, Aim], list[Served]] = {}
+def _points(tasks: list[_Task], found: dict[int, tuple[Served, ...]]) -> tuple[CurvePoint, ...]:
+    """Return the means over the draws for every aim, those of the trial first."""
+    draws: dict[tuple[bool, int], list[tuple[Served, ...]]] = {}
     for task in tasks:
-        key = (task.place < len(AIMS), len(task.learnt), task.aim)
-        draws.setdefault(key, []).append(found[task.place])
-    return tuple(CurvePoint(size, aim, _mean(several)) for (_, size, aim), several in draws.items())
+        draws.setdefault((task.place == 0, len(task.learnt)), []).append(found[task.place])
+    return tuple(
+        CurvePoint(size, aim, _mean([one[number] for one in several]))
+        for (_, size), several in draws.items()
+        for number, aim in enumerate(AIMS)
+    )
 
 
 def _mean(several: list[Served]) -> Served:

@@ -10,15 +10,12 @@ from numpy.typing import NDArray
 from ..boosting.boost import boost
 from ..boosting.stumps import winners
 from .learning import Columns, Learning
-from .ways import chooser
 
 Numbers = NDArray[np.intp]
-# What a standard placement is learnt for: all subjects alike, or those that are served worst.
-Aim = Literal["mean", "worst tenth"]
+# What a standard placement is bettered for: nothing, the mean over subjects, or those that are served worst.
+Aim = Literal["plain", "mean", "worst tenth"]
 
 WORST_SHARE = 0.1
-# How often the worst-served subjects count where a placement is to serve them.
-_TIMES = 4
 
 
 class Served(msgspec.Struct, frozen=True):
@@ -56,15 +53,6 @@ class Crowd:
         random = np.random.default_rng(seed)
         own = (random.permutation(np.flatnonzero(self.subjects == subject))[:each] for subject in there)
         return self._rows(np.sort(np.concatenate(list(own))))
-
-    def favouring(self, subjects: Numbers) -> "Crowd":
-        """Return all rows, those of `subjects` several times."""
-        favoured = np.flatnonzero(np.isin(self.subjects, subjects))
-        return self._rows(np.concatenate([np.arange(len(self.subjects)), np.tile(favoured, _TIMES - 1)]))
-
-    def place(self, method: str, keep: int) -> Columns:
-        """Return the placement of `keep` switches that a method of `ways` learns from these rows."""
-        return chooser(method, self.learning)(keep)
 
     def _rows(self, rows: Numbers) -> "Crowd":
         return replace(self, learning=self.learning.rows(rows), subjects=self.subjects[rows])

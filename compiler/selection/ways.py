@@ -7,6 +7,7 @@ from typing import Literal
 
 from ..placement.costaware import PortCosts
 from ..placement.errors import PlacementError
+from .boosted_elimination import boosted_elimination_order
 from .elimination import elimination_order
 from .id3_family import cost_aware_chooser, cost_complexity_chooser, id3_chooser, reduced_error_chooser
 from .learning import Columns, Learning
@@ -31,8 +32,7 @@ class Method:
     ours: bool
 
 
-def _elimination(learning: Learning, ports: PortCosts | None) -> Chooser:
-    order = elimination_order(learning, ports)
+def _first_of(order: Columns) -> Chooser:
     return lambda most: order[: max(int(most), 0)]
 
 
@@ -54,12 +54,16 @@ _OURS: Mapping[str, tuple[str, Callable[[Learning, PortCosts | None], Chooser]]]
         lambda learning, _: reduced_error_chooser(learning),
     ),
     "elimination": (
-        "The switch whose row of the score tables is missed least goes, again and again",
-        lambda learning, _: _elimination(learning, None),
+        "The switch whose row of the score tables is missed least goes, again and again: tables fitted whole",
+        lambda learning, _: _first_of(elimination_order(learning)),
     ),
     "elimination-cost": (
         "Elimination that holds what a switch is worth against its part of the time to read its port",
-        _elimination,
+        lambda learning, ports: _first_of(elimination_order(learning, ports)),
+    ),
+    "elimination-boosted": (
+        "The same on boosted tables: LogitBoost starts anew once the switches whose removal costs least are gone",
+        lambda learning, _: _first_of(boosted_elimination_order(learning)),
     ),
 }
 

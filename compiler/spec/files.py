@@ -17,6 +17,14 @@ from .netlist import netlist_of
 from .reading import readme_of
 from .svg import svg_of
 
+# All that a spec may hold.
+NAMES = frozenset(
+    {
+        *("README.txt", "bom.csv", "glove.net", "glove.toml", "spec.json", "switches.csv", "wiring.csv"),
+        *("cutting.dxf", "cutting.svg"),
+    }
+)
+
 
 def spec_files(
     manifest: Manifest,

@@ -32,9 +32,10 @@ def finest_scale(tables: ScoreTables, limit: int, widest: int) -> float:
     whole = reach(tables, 1.0, rounded=False)
     if whole == 0:
         return 1.0
+    outer = _outermost(tables)
     fits, too_fine = 0.0, min((limit + tables.n_inputs + 2) / whole, FINEST)
     while (middle := (fits + too_fine) / 2) not in (fits, too_fine):
-        if reach(tables, middle) <= limit and span(tables, middle) <= widest:
+        if reach(outer, middle) <= limit and span(outer, middle) <= widest:
             fits = middle
         else:
             too_fine = middle
@@ -49,8 +50,12 @@ def kindest_scale(tables: ScoreTables, finest: float, bits: NDArray[np.bool_], c
     coarse they are. What is proved of rounding is proved at every scale.
     """
     scales = finest * (1 - np.arange(TRIED) / _TRIED_OF_ALL)
-    right = winners(tables.scores(bits, codes))
-    changed = [np.count_nonzero(_at(tables, scale).scores(bits, codes).argmax(axis=1) != right) for scale in scales]
+    scores = tables.scores(bits, codes)
+    near = _leads(scores) * scales[-1] <= tables.n_inputs + 2  # no scale can change the others: quantise.py
+    right, closed = winners(scores[near]), bits[near].astype(np.float64)
+    columns = zip(tables.thresholds, codes[near].T, strict=True)
+    bins = [np.searchsorted(steps, column) for steps, column in columns]
+    changed = [np.count_nonzero(_whole_scores(tables, scale, closed, bins).argmax(axis=1) != right) for scale in scales]
     return float(scales[int(np.argmin(changed))])
 
 
@@ -74,12 +79,26 @@ def span(tables: ScoreTables, scale: float) -> float:
     return float(np.vstack([groups, joints]).max(initial=0.0))
 
 
-def _at(tables: ScoreTables, scale: float) -> ScoreTables:
-    """Return the tables in whole steps."""
-    bias, switch_rows, *joint_rows = (
-        np.rint(rows * scale) for rows in (tables.bias, tables.switch_rows, *tables.joint_rows)
-    )
-    return ScoreTables(bias, switch_rows, tables.thresholds, tuple(joint_rows))
+def _leads(scores: Floats) -> Floats:
+    """Return by how much the best of each row of (n, K) leads the second best, (n,)."""
+    second, best = np.partition(scores, -2, axis=1)[:, -2:].T
+    leads: Floats = best - second
+    return leads
+
+
+def _whole_scores(tables: ScoreTables, scale: float, closed: Floats, bins: list[NDArray[np.intp]]) -> Floats:
+    """Return the scores (n, K) of the tables in whole steps: closed (n, s) switches, and the bin (n,) of each joint."""
+    # Sums of whole numbers are exact, in any order: a matrix product may add them up.
+    scores: Floats = closed @ np.rint(tables.switch_rows * scale) + np.rint(tables.bias * scale)
+    for rows, found in zip(tables.joint_rows, bins, strict=True):
+        scores += np.rint(rows * scale)[found]
+    return scores
+
+
+def _outermost(tables: ScoreTables) -> ScoreTables:
+    """Return the tables with each joint's largest and smallest rows alone: rounding keeps them outermost."""
+    joint_rows = tuple(np.array([rows.max(axis=0), rows.min(axis=0)]) for rows in tables.joint_rows)
+    return ScoreTables(tables.bias, tables.switch_rows, tables.thresholds, joint_rows)
 
 
 def _extremes(tables: ScoreTables, scale: float, *, rounded: bool = True) -> tuple[Floats, Floats]:

@@ -19,11 +19,12 @@ def test_compile_writes_a_build_and_says_what_it_is(thenar: Thenar, set_file: Pa
     assert "of 6 switches and 2 joints" in done.stdout
     assert "in 4 folds, placement and all:" in done.stdout
     made = sorted(path.name for path in (tmp_path / "build").iterdir())
-    assert made == ["build.json", "ensemble.bin", "firmware", "tables.bin"]
+    assert made == ["build.json", "ensemble.bin", "firmware", "report.html", "spec", "tables.bin"]
 
 
 def test_json_prints_what_build_json_says(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
-    done = thenar("compile", set_file, "-o", tmp_path / "build", "--rounds", 3, "--inputs", "switches", "--json")
+    given = ("--rounds", 3, "--inputs", "switches", "--no-report", "--json")
+    done = thenar("compile", set_file, "-o", tmp_path / "build", *given)
     document = json.loads(done.stdout)
     assert document == json.loads((tmp_path / "build" / "build.json").read_bytes())
     assert document["options"]["inputs"] == "switches"
@@ -44,9 +45,9 @@ def test_help_has_an_example(thenar: Thenar) -> None:
 
 def test_every_option_reaches_the_build(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
     options = {"prune": 2, "rounds": 3, "inputs": "both", "shrinkage": 0.5, "folds": 2, "seed": 7, "tolerance": 1e-9}
-    options |= {"table_bits": 8, "max_bins": 4}
+    options |= {"table_bits": 8, "max_bins": 4, "width": 15}
     given = [word for name, value in options.items() for word in (f"--{name.replace('_', '-')}", value)]
-    done = thenar("compile", set_file, "-o", tmp_path / "build", *given, "--json")
+    done = thenar("compile", set_file, "-o", tmp_path / "build", *given, "--no-report", "--json")
     assert json.loads(done.stdout)["options"] == options
 
 
@@ -58,16 +59,16 @@ def test_tables_have_8_or_16_bits(thenar: Thenar, set_file: Path, tmp_path: Path
 
 
 def test_a_tolerance_ends_the_training_and_the_build_says_so(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
-    given = ("compile", set_file, "-o", tmp_path / "build", "--rounds", 500, "--tolerance", 0.01, "--folds", 0)
-    done = thenar(*given)
+    given = ("compile", set_file, "-o", tmp_path / "build", "--no-report", "--rounds", 500, "--folds", 0)
+    done = thenar(*given, "--tolerance", 0.01)
     rounds = json.loads((tmp_path / "build" / "build.json").read_bytes())["stopped_after"]
     assert 1 < rounds < 500
     assert f"stopped after {rounds} of 500 rounds: the last changed the mean loss by less than 0.01" in done.stdout
-    assert thenar(*given[:-1], "--tolerance", "nan").returncode == 2
+    assert thenar(*given, "--tolerance", "nan").returncode == 2
 
 
 def test_a_training_that_no_tolerance_ends_says_nothing_of_it(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
-    done = thenar("compile", set_file, "-o", tmp_path / "build", "--rounds", 3, "--folds", 0)
+    done = thenar("compile", set_file, "-o", tmp_path / "build", "--rounds", 3, "--folds", 0, "--no-report")
     assert "stopped" not in done.stdout
     document = json.loads((tmp_path / "build" / "build.json").read_bytes())
     assert "stopped_after" not in document
@@ -92,7 +93,7 @@ def test_a_build_that_answers_one_grasp_type_only_says_so(thenar: Thenar, small_
 
 
 def test_it_says_what_the_firmware_in_the_build_is_laid_out_for(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
-    done = thenar("compile", set_file, "-o", tmp_path / "build", "--rounds", 10, "--folds", 0)
+    done = thenar("compile", set_file, "-o", tmp_path / "build", "--rounds", 10, "--folds", 0, "--no-report")
     assert done.returncode == 0, done.stderr
     assert "\nfirmware for atmega328p: 16-bit entries, " in done.stdout
     made = sorted(path.name for path in (tmp_path / "build" / "firmware").iterdir())

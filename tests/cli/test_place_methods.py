@@ -61,7 +61,7 @@ def test_a_standard_placement_is_printed_stored_and_drawn(
         assert words in said
     placement = json.loads(stored.read_text())
     assert len(kept_names(stored)) == 3
-    assert [point["subjects"] for point in placement["study"]["curve"]] == [2, 2, 5, 5, 10, 10]
+    assert [point["subjects"] for point in placement["study"]["curve"]] == [2, 2, 2, 5, 5, 5, 10, 10, 10]
     assert drawn.read_text().startswith("<?xml")
     assert run([*ask, "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == placement

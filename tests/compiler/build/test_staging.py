@@ -12,6 +12,8 @@ NEW = {"build.json": b"new", "tables.bin": b"new", "ensemble.bin": b"new"}
 
 # A build that carries firmware.
 FIRM = {**OLD, "firmware/thenar_glove.c": b"old", "firmware/thenar_glove.h": b"old"}
+# One with its report and the spec of its glove.
+TOLD = {**FIRM, "report.html": b"old", "spec/spec.json": b"old", "spec/cutting.svg": b"old"}
 
 
 def _content(folder: Path) -> dict[str, bytes]:
@@ -25,11 +27,11 @@ def _fill(folder: Path, files: dict[str, bytes]) -> None:
         (folder / name).write_bytes(data)
 
 
-@pytest.mark.parametrize("before", [None, {}, OLD, FIRM])
+@pytest.mark.parametrize("before", [None, {}, OLD, FIRM, TOLD])
 def test_a_build_takes_its_place_and_leaves_nothing_beside_it(tmp_path: Path, before: dict[str, bytes] | None) -> None:
     if before is not None:
         _fill(tmp_path / "build", before)
-    for files in (NEW, FIRM, NEW):
+    for files in (NEW, FIRM, TOLD, NEW):
         publish(files, check_target(tmp_path / "build"))
         assert _content(tmp_path / "build") == files
         assert [path.name for path in tmp_path.iterdir()] == ["build"]
@@ -80,6 +82,7 @@ def test_what_a_crash_left_aside_is_cleared_by_the_next_build(tmp_path: Path) ->
         ({"notes.txt": b"mine"}, "is not empty and not a build"),
         ({**OLD, "notes.txt": b"mine"}, r"holds notes\.txt, which is not of a build"),
         ({**FIRM, "firmware/main.c": b"mine"}, r"holds firmware/main\.c, which is not of a build"),
+        ({**TOLD, "spec/notes.txt": b"mine"}, r"holds spec/notes\.txt, which is not of a build"),
         ({**OLD, "firmware": b"mine"}, r"holds firmware, which is not of a build"),
         ({**OLD, "thenar_glove.c": b"mine"}, r"holds thenar_glove\.c, which is not of a build"),
     ],

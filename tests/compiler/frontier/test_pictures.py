@@ -6,13 +6,14 @@ from collections.abc import Iterator
 from typing import Any
 
 import msgspec
+import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from thenar.compiler.frontier.pictures import PICTURES, pictures
-from thenar.compiler.frontier.points import Frontier, Mark
+from thenar.compiler.frontier.points import Frontier, Mark, Point
 from thenar.compiler.pictures import PictureError, painting
 
 NASTY = r"$\left{<&> -- ü = ]]> 'x'"
@@ -28,7 +29,7 @@ def _texts(figure: Figure) -> list[str]:
 
 
 def _boxes(figure: Figure) -> Iterator[tuple[str, Any]]:
-    renderer = FigureCanvasAgg(figure).get_renderer()
+    renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
     for text in figure.findobj(Text):
         assert isinstance(text, Text)
         if text.get_text() and text.get_visible():
@@ -39,6 +40,15 @@ def _overlaps(figure: Figure) -> list[tuple[str, str]]:
     figure.canvas.draw()
     pairs = itertools.combinations(_boxes(figure), 2)
     return [(a, b) for (a, box), (b, other) in pairs if box.overlaps(other) and box.width and other.width]
+
+
+def _is_shown(point: Point, name: str) -> bool:
+    """Return whether a picture has anything to say of a point."""
+    return {
+        "frontier": point.fronts != ("latency",),
+        "switches": bool(point.switches),
+        "latency": "latency" in point.fronts,
+    }[name]
 
 
 def _crowded(frontier: Frontier, several: int) -> Frontier:
@@ -67,7 +77,7 @@ def test_every_point_and_mark_is_named(examples: Any, name: str) -> None:
     frontier = examples.example_frontier()
     written = _texts(_drawn(frontier, name))
     for point in frontier.points:
-        if point.switches or name != "switches":
+        if _is_shown(point, name):
             own = [text for text in written if text.removeprefix("point ").split(":")[0] == str(point.number)]
             assert len(own) == 1, (point.number, written)
     for mark in frontier.marks:
@@ -90,7 +100,8 @@ def test_many_points_close_together_are_named_and_readable(examples: Any, name: 
     frontier = _crowded(examples.example_frontier(), 4)
     figure = _drawn(frontier, name)
     assert _overlaps(figure) == []
-    assert len(_texts(figure)) == len(frontier.points) + len(frontier.marks)
+    shown = [point for point in frontier.points if _is_shown(point, name)]
+    assert len(_texts(figure)) == len(shown) + len(frontier.marks)
 
 
 @pytest.mark.parametrize("name", list(PICTURES))
@@ -122,7 +133,21 @@ def test_the_line_of_the_best_is_a_step_at_each_of_them(examples: Any) -> None:
     ]
     best = sorted((point.frame.us, point.rate.mean) for point in frontier.points if "frame" in point.fronts)
     assert line.get_drawstyle() == "steps-post"
-    assert list(zip(*line.get_data(), strict=True))[:-1] == best
+    places = np.asarray(line.get_data(), np.float64).T.tolist()
+    assert [tuple(place) for place in places][:-1] == best
+
+
+def test_the_line_of_the_best_never_falls_where_points_are_best_of_their_kind_alone(examples: Any) -> None:
+    found = examples.example_frontier()
+    frontier = msgspec.structs.replace(
+        found, points=tuple(msgspec.structs.replace(point, fronts=("latency",)) for point in found.points)
+    )
+    (line,) = [
+        line for line in _drawn(frontier, "latency").axes[0].lines if line.get_label() == "the best for its latency"
+    ]
+    rates = np.asarray(line.get_ydata(), np.float64).tolist()
+    assert rates == sorted(rates)
+    assert len(rates) - 1 < len(found.points)
 
 
 def test_names_are_no_formulas_and_no_markup(examples: Any) -> None:

@@ -53,7 +53,7 @@ def test_a_scan_that_ends_early_takes_what_scanning_the_frames_one_by_one_comes_
     # Of no more frames than decide on the order of ports, so that it is the same.
     scan = plan_scan(names, tables, harness, bits, codes)
     costs, ports = Costs(scan.ports, harness), [sum(1 << s for _, s in port.switches) for port in scan.ports]
-    early, taken_us = EarlyExit(tables, ports), list[float]()
+    early, taken_us, looks = EarlyExit(tables, ports), list[float](), 0
     for frame, code in zip(bits, codes, strict=True):
         closed = sum(1 << int(switch) for switch in np.flatnonzero(frame))
         early.start(code.tolist())
@@ -61,10 +61,12 @@ def test_a_scan_that_ends_early_takes_what_scanning_the_frames_one_by_one_comes_
         for port, group in enumerate(ports):
             taken_us.append(costs.after(read, port) / 1000 + CALL.call_us * (1 + _selects(costs, read, port)))
             read |= 1 << port
+            looks += 1
             if early.after(port, closed & group):
                 break
     times = scan_times(names, tables, wiring, bits, codes, CALL)
     assert times.early_us == pytest.approx(fsum(taken_us) / len(bits))
+    assert times.early_ports == pytest.approx(looks / len(bits))
     assert switches == 12 or times.early_us < times.full_us
 
 
@@ -91,7 +93,7 @@ def test_a_board_scans_its_keys_and_then_sends_its_whole_frame() -> None:
 
 def test_without_switches_there_is_nothing_to_read() -> None:
     none = scan_times((), random_tables(0, 16, 4), Wiring("mcp23017", 400_000), *frames(0, 16))
-    assert none == ScanTimes(0.0, 0.0, 0, 0, "wire")
+    assert none == ScanTimes(0.0, 0.0, 0, 0, "wire", 0.0)
 
 
 def test_a_switch_without_a_place_is_an_error() -> None:

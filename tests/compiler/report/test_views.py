@@ -1,16 +1,21 @@
 """What the sections are made of."""
 
+import msgspec
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from thenar.compiler.frontier.points import Frontier
 from thenar.compiler.hand import HandShape
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.report.charts import words
 from thenar.compiler.report.confusion_view import WIDEST, confusion_view
 from thenar.compiler.report.content import ReportContent
+from thenar.compiler.report.frontier_charts import frontier_charts
+from thenar.compiler.report.frontier_view import COLUMNS, frontier_view
 from thenar.compiler.report.hand_picture import hand_picture
+from thenar.compiler.report.numbers import DASH
 from thenar.compiler.report.placement_view import placement_view
 from thenar.compiler.report.scan_view import scan_view
 from thenar.compiler.report.tree_view import MOST_NODES, tree_view
@@ -81,13 +86,51 @@ def test_all_that_is_drawn_lies_in_the_view(hand: HandShape) -> None:
 
 
 def test_the_share_of_all_switches_together_is_what_the_tree_tells(bare: ReportContent) -> None:
-    rows = placement_view(bare.manifest.switches, bare.tree, bare.hand)
+    view = placement_view(bare.manifest, bare.tree, bare.hand)
+    assert view.together
+    assert view.sentences[0].startswith("The paper's ID3")
+    rows = view.switches
     assert [row.name for row in rows] == list(bare.switch_names)
     assert [row.order for row in rows] == list(range(1, len(rows) + 1))
     shares = [float(row.share.split()[0]) for row in rows]
     assert shares == sorted(shares)
     assert 0 < shares[0] <= shares[-1] <= 100
     assert all(row.part in row.name for row in rows if row.part != "palm")
+
+
+def test_a_placement_without_a_tree_names_its_method_and_shows_no_shares(bare: ReportContent) -> None:
+    replace = msgspec.structs.replace
+    options = replace(bare.manifest.options, placement="elimination", prune=0, keep=len(bare.manifest.switches))
+    view = placement_view(replace(bare.manifest, options=options), None, bare.hand)
+    assert not view.together
+    assert all(not row.share for row in view.switches)
+    assert view.no_tree == "No tree: the switches were chosen by elimination."
+    assert view.sentences[0].endswith("(--placement elimination).")
+    assert "together" not in view.sentences[1]
+
+
+def test_a_point_that_misses_every_grasp_has_no_latency_to_show(frontier: Frontier) -> None:
+    first, *others = frontier.points
+    missing = msgspec.structs.replace(first.latency, mean_us=0.0, p99_us=0.0, missed=1.0)
+    points = (msgspec.structs.replace(first, latency=missing), *others)
+    changed = msgspec.structs.replace(frontier, points=points, skipped=("no tools were there",))
+    view = frontier_view(changed, frontier.fingerprint, None)
+    at = COLUMNS.index("Latency, µs")
+    assert view.rows[0].cells[at : at + 3] == (DASH, DASH, "100.0")
+    assert dict(view.details[0].facts)["Latency"] == DASH
+    assert DASH not in view.rows[1].cells[at : at + 3]
+    assert "No tools were there." in view.notes
+    by_latency = msgspec.json.decode(frontier_charts(changed)[2].figure)
+    assert set(by_latency["layout"]["meta"]["places"]) == {str(point.number) for point in others}
+
+
+def test_the_point_that_the_build_is_comes_first(frontier: Frontier, hand: HandShape) -> None:
+    for built in (frontier.points[0].number, frontier.points[-1].number):
+        view = frontier_view(frontier, frontier.fingerprint, hand, built)
+        assert [row.number for row in view.rows if row.picked] == [built]
+        assert view.picked is not None
+        assert view.picked.number == built
+        assert f"This build is point {built}." in view.notes
 
 
 def test_every_kept_switch_is_read_in_one_transaction(bare: ReportContent) -> None:

@@ -22,7 +22,7 @@ def learning(switches: int = 14) -> Learning:
 
 
 def test_the_papers_ours_and_the_rivals_are_there() -> None:
-    assert OURS == ["id3", "id3-cost", "id3-ccp", "id3-rep", "elimination", "elimination-cost"]
+    assert OURS == ["id3", "id3-cost", "id3-ccp", "id3-rep", "elimination", "elimination-cost", "elimination-boosted"]
     assert [name for name in METHODS if name not in OURS] == list(RIVALS)
     assert all(method.name == name and method.what for name, method in METHODS.items())
     assert {name for name, method in METHODS.items() if method.parameter == "S"} == {"id3"}

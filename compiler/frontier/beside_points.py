@@ -1,0 +1,49 @@
+"""What is seen beside the points: everything that was tried, the paper's placements, all switches, the user's build."""
+
+from collections.abc import Sequence
+
+from .candidates import Choice
+from .closeup import Close, papers_tables
+from .points import Mark, Tried, Way
+from .screening import Screening, fastest_us
+from .settings import BEST, Search
+
+# The paper's S.
+_PAPERS = (0.0, 13.0, 62.0)
+
+
+def choices_to_mark(n_switches: int, n_joints: int) -> dict[Choice, str]:
+    """Return what to mark, with its name: with all inputs, the paper's placements and all switches."""
+    if not n_switches:
+        return {}
+    marked = {Way("id3", prune): f"paper, S = {prune:g}" for prune in _PAPERS}
+    # Whichever method says so, to keep all of them is the same.
+    marked[Way(BEST, float(n_switches))] = f"all {n_switches} switches"
+    return {Choice(way, "both" if n_joints else "switches"): name for way, name in marked.items()}
+
+
+def marks_of(named: dict[Choice, str], closes: Sequence[Close], search: Search, joints: int) -> tuple[Mark, ...]:
+    """Return the marks of these choices that were looked at closely, with the paper's rounds and whole scans."""
+    found = []
+    for close in closes:
+        name, tabled = named.get(close.screened.choice), papers_tables(search)
+        if name is not None:
+            priced = next(tables for tables in close.priced.tables if tables.tabled == tabled)
+            us = fastest_us(priced, joints if close.screened.choice.joints else 0)
+            if us is not None:
+                found.append(Mark(name, len(close.screened.columns), close.rates[tabled], us))
+    return tuple(found)
+
+
+def tried(screening: Screening, closes: Sequence[Close], search: Search) -> tuple[Tried, ...]:
+    """Return everything that was screened, and the finalists after every stage of their training."""
+    screened = [
+        Tried(one.choice.way, one.choice.inputs, len(one.columns), search.screened, one.rate, one.frame_us)
+        for one in screening.screened
+    ]
+    stages = [
+        Tried(one.choice.way, one.choice.inputs, len(one.columns), rounds, rate, one.frame_us)
+        for close, one in ((close, close.screened) for close in closes)
+        for rounds, rate in close.stages.items()
+    ]
+    return (*screened, *stages)

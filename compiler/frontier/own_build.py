@@ -1,0 +1,44 @@
+"""The user's own build, to be seen beside the points of a frontier."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from ...runtime.build import Build
+from ..recordings.graspset import GraspSet
+from .candidates import rate_of
+from .equipment import Equipment
+from .points import FrontierError, Mark
+from .scan_times import scan_times, transfer_us
+
+
+def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
+    """Return the user's own build as a mark: its rate as it says, its frame in the fastest wiring for its switches.
+
+    Raises FrontierError where it does not say, or is not for these recordings or this equipment.
+    """
+    build = Build.load(folder)
+    manifest = build.manifest
+    names = [switch.name for switch in manifest.switches]
+    honest = [rate for rate in manifest.rates if rate.protocol == "honest"]
+    if not honest:
+        raise FrontierError(
+            f"{folder} does not say what it recognises: compile it with --folds 4, or leave --build out"
+        )
+    rate, options, wirings = honest[-1], equipment.model.options(build.tables), equipment.fitting(names)
+    if not options or (names and not wirings):
+        raise FrontierError(f"{folder} cannot be built for {equipment.model.target}: leave --build out, or --target")
+    joints = [joint.name for joint in manifest.joints]
+    bits = grasp_set.switches[:, _places(names, grasp_set.switch_names, folder)]
+    codes = grasp_set.codes[:, _places(joints, [joint.name for joint in grasp_set.joints], folder)]
+    scans = [scan_times(names, build.tables, wiring, bits, codes, equipment.beside).full_us for wiring in wirings]
+    frame_us = max(min(scans, default=0.0), transfer_us(len(joints))) + options[0].us
+    return Mark(f"build {folder.name}", len(names), rate_of((rate.correct,), rate.total), frame_us)
+
+
+def _places(names: Sequence[str], there: Sequence[str], folder: Path) -> list[int]:
+    for name in names:
+        if name not in there:
+            raise FrontierError(
+                f"{folder} reads {name!r}, which the recordings do not hold: it was compiled from others"
+            )
+    return [there.index(name) for name in names]

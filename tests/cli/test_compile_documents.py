@@ -1,0 +1,215 @@
+"""What `thenar compile` writes beside a build: report.html and spec/; and the options that choose the switches."""
+
+import html
+import json
+import re
+import shlex
+import subprocess
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thenar.compiler import GraspSet
+from thenar.compiler.recordings.taxonomy import own
+from thenar.simulator.handmaps.handmap import hand_map
+
+Thenar = Callable[..., subprocess.CompletedProcess[str]]
+QUICK = ("--rounds", 3, "--folds", 0)
+TAGS = re.compile(r"<[^>]*>")
+
+
+def done(result: subprocess.CompletedProcess[str]) -> str:
+    assert result.returncode == 0, result.stderr
+    assert result.stderr == ""
+    return result.stdout
+
+
+def refused(result: subprocess.CompletedProcess[str]) -> str:
+    assert result.returncode == 2
+    assert "Traceback" not in result.stderr
+    return " ".join(result.stderr.split())
+
+
+def told(build: Path) -> str:
+    """Return the words of a build's report, without its styles and scripts."""
+    page = (build / "report.html").read_text()
+    page = re.sub(r"<(style|script)\b.*?</\1>", "", page, flags=re.DOTALL)
+    return " ".join(html.unescape(TAGS.sub(" ", page)).split())
+
+
+@pytest.fixture(scope="module")
+def gloved(small_set: GraspSet) -> GraspSet:
+    """The small set, as if six switches of the shipped glove had recorded it."""
+    return replace(small_set, switch_names=hand_map().names[::25][:6])
+
+
+@pytest.fixture(scope="module")
+def gloved_file(gloved: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("gloved") / "set.grasps"
+    gloved.save(path)
+    return path
+
+
+def test_no_report_leaves_out_the_report_and_the_spec(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
+    done(thenar("compile", gloved_file, "-o", tmp_path / "build", *QUICK, "--no-report"))
+    made = sorted(path.name for path in (tmp_path / "build").iterdir())
+    assert made == ["build.json", "ensemble.bin", "firmware", "tables.bin"]
+
+
+def test_documents_come_and_go_with_the_builds_they_are_of(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
+    build = tmp_path / "build"
+    for flags, there in (((), True), (("--no-report",), False), (("--inputs", "joints"), False)):
+        done(thenar("compile", gloved_file, "-o", build, *QUICK, *flags))
+        assert (build / "spec").exists() == there
+    assert "This build reads no switches." in told(build)
+
+
+def test_the_same_recordings_give_the_same_documents(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
+    seen = []
+    for name in ("a", "b"):
+        done(thenar("compile", gloved_file, "-o", tmp_path / name, "--rounds", 3, "--folds", 2))
+        files = (tmp_path / name).rglob("*")
+        seen.append({path.relative_to(tmp_path / name): path.read_bytes() for path in files if path.is_file()})
+    assert seen[0] == seen[1]
+    assert {"report.html", "spec/glove.toml", "spec/cutting.svg"} <= set(map(Path.as_posix, seen[0]))
+
+
+@pytest.mark.parametrize("length", [None, 150])
+def test_the_spec_in_a_build_is_what_spec_writes_of_it(
+    thenar: Thenar, gloved_file: Path, tmp_path: Path, length: int | None
+) -> None:
+    build, spec = tmp_path / "build", tmp_path / "spec"
+    given = () if length is None else ("--hand-length", length)
+    done(thenar("compile", gloved_file, "-o", build, *QUICK, *given))
+    done(thenar("spec", build, "-o", spec, *given))
+    files = [{path.name: path.read_bytes() for path in folder.iterdir()} for folder in (build / "spec", spec)]
+    assert files[0] == files[1]
+    assert f"right hand of {length or 190} mm" in files[0]["cutting.svg"].decode()
+
+
+def test_a_wiring_is_in_the_report_and_its_spec_agrees(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
+    build, spec, glove = tmp_path / "build", tmp_path / "spec", tmp_path / "glove.toml"
+    done(thenar("compile", gloved_file, "-o", build, *QUICK, "--no-report", "--propose", glove))
+    done(thenar("compile", gloved_file, "-o", build, *QUICK, "--glove", glove))
+    assert "A whole scan is" in told(build)
+    done(thenar("spec", build, "-o", spec))
+    for path in spec.iterdir():
+        assert path.read_bytes() == (build / "spec" / path.name).read_bytes(), path.name
+
+
+def test_a_hand_length_needs_a_spec_to_be_used_in(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
+    given = ("compile", gloved_file, "-o", tmp_path / "build", *QUICK, "--hand-length", 180, "--no-report")
+    assert "--no-report leaves out" in refused(thenar(*given))
+    assert not (tmp_path / "build").exists()
+
+
+def test_a_hand_length_needs_switches_whose_places_are_known(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+    given = ("compile", set_file, "-o", tmp_path / "build", *QUICK, "--hand-length", 180)
+    assert "where they lie is not known" in refused(thenar(*given))
+    assert not (tmp_path / "build").exists()
+
+
+def test_switches_of_nobody_knows_which_glove_have_a_spec_without_a_pattern(
+    thenar: Thenar, set_file: Path, tmp_path: Path
+) -> None:
+    done(thenar("compile", set_file, "-o", tmp_path / "build", *QUICK))
+    assert "Where these switches lie on the hand is not known" in told(tmp_path / "build")
+    assert not list((tmp_path / "build" / "spec").glob("cutting.*"))
+
+
+def test_the_report_has_the_papers_tables_of_the_builds_own_folds(
+    thenar: Thenar, gloved_file: Path, tmp_path: Path
+) -> None:
+    done(thenar("compile", gloved_file, "-o", tmp_path / "build", "--rounds", 3, "--folds", 3, "--seed", 5))
+    words = told(tmp_path / "build")
+    assert "Angle + Sel-Co" in words
+    assert "3 stratified folds, 1 repeat from seed 5; 3 rounds" in words
+    assert "This build's own recipe, 3 honest folds" in words
+
+
+def test_without_folds_the_report_says_what_it_lacks(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
+    done(thenar("compile", gloved_file, "-o", tmp_path / "build", *QUICK))
+    words = told(tmp_path / "build")
+    assert "The build was compiled without folds. thenar evaluate SET.grasps prints them." in words
+    assert "It was not measured: the build was compiled without folds." in words
+    assert "what to expect of new grasps was not measured" in words
+
+
+def test_a_method_that_takes_a_number_keeps_it(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
+    build = tmp_path / "build"
+    done(thenar("compile", gloved_file, "-o", build, *QUICK, "--placement", "elimination", "--keep", 2))
+    document = json.loads((build / "build.json").read_bytes())
+    assert len(document["switches"]) == 2
+    assert document["options"]["placement"] == "elimination"
+    assert document["options"]["keep"] == 2
+    assert "No tree: the switches were chosen by elimination." in told(build)
+
+
+@pytest.mark.parametrize(
+    ("given", "because"),
+    [
+        (("--placement", "elimination"), "needs --keep"),
+        (("--placement", "elimination", "--keep", 2, "--prune", 3), "knows no --prune"),
+        (("--keep", 2), "cannot --keep a given number"),
+        (("--placement", "crystal-ball", "--keep", 2), "there is no placement 'crystal-ball'"),
+    ],
+)
+def test_a_method_gets_its_own_parameter(
+    thenar: Thenar, gloved_file: Path, tmp_path: Path, given: tuple[object, ...], because: str
+) -> None:
+    result = thenar("compile", gloved_file, "-o", tmp_path / "build", *QUICK, *given)
+    assert because in refused(result)
+    assert not (tmp_path / "build").exists()
+
+
+def test_a_width_bounds_every_sum(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
+    bounds = []
+    for width in (6, 16):
+        build = tmp_path / str(width)
+        done(thenar("compile", gloved_file, "-o", build, *QUICK, "--no-report", "--width", width))
+        proof = json.loads((build / "build.json").read_bytes())["proof"]
+        assert 0 < proof["bound"] <= 2 ** (width - 1) - 1
+        bounds.append(proof["bound"])
+    assert bounds[0] < bounds[1]
+
+
+def test_the_commands_of_a_report_make_the_build_again(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
+    build, again = tmp_path / "build", tmp_path / "again"
+    given = ("--rounds", 3, "--folds", 2, "--placement", "elimination", "--keep", 3, "--width", 12, "--max-bins", 5)
+    done(thenar("compile", gloved_file, "-o", build, *given))
+    (said,) = re.findall(r"thenar compile SET\.grasps -o build/ --prune.*", (build / "report.html").read_text())
+    words = {"SET.grasps": str(gloved_file), "build/": str(again)}
+    done(thenar(*(words.get(word, word) for word in shlex.split(said)[1:])))
+    for path in build.rglob("*"):
+        if path.is_file():
+            assert path.read_bytes() == (again / path.relative_to(build)).read_bytes(), path.name
+
+
+@pytest.mark.parametrize(("types", "switches", "joints"), [(2, 1, 0), (2, 0, 1), (33, 12, 2), (33, 6, 0)])
+def test_sets_at_the_edges_have_a_report(
+    thenar: Thenar, tmp_path: Path, types: int, switches: int, joints: int, small_set: GraspSet
+) -> None:
+    labels, random = np.arange(types * 6) % types, np.random.default_rng(3)
+    names = tuple(f"</td><b>type {number} & 握り \u202e" for number in range(types))
+    edge = replace(
+        small_set,
+        switches=(labels[:, None] >> np.arange(switches) & 1).astype(bool),
+        switch_names=tuple(f"palm <{number}>" for number in range(switches)),
+        codes=(4 * labels[:, None] + random.integers(0, 3, (len(labels), joints))).astype(np.uint16),
+        joints=small_set.joints[:joints],
+        grasps=np.array(names)[labels],
+        taxonomy=own(list(names)),
+        subjects=np.full(len(labels), "<i>A"),
+        objects=np.full(len(labels), "thing"),
+        trials=np.arange(len(labels)),
+    )
+    edge.save(tmp_path / "edge.grasps")
+    done(thenar("compile", tmp_path / "edge.grasps", "-o", tmp_path / "build", "--rounds", 2, "--folds", 2))
+    page = (tmp_path / "build" / "report.html").read_text()
+    assert "<b>type" not in page
+    assert "<i>A" not in page
+    assert f"This build recognises {types} grasp types" in told(tmp_path / "build")
+    assert (tmp_path / "build" / "spec").exists() == bool(switches)

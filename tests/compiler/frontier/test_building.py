@@ -1,0 +1,111 @@
+"""Designs of a finalist, made up by hand: what they take, and what becomes of them as points."""
+
+from dataclasses import replace
+
+import pytest
+
+from thenar.compiler.frontier.building import Design, best_designs, designs
+from thenar.compiler.frontier.built import Built, points_of, with_whole_scans
+from thenar.compiler.frontier.candidates import Choice, Screened
+from thenar.compiler.frontier.classify_times import Classified
+from thenar.compiler.frontier.closeup import Close
+from thenar.compiler.frontier.points import Latency, Rate, Time, Way
+from thenar.compiler.frontier.pricing import Priced, PricedTables, Tabled, Wired
+from thenar.compiler.frontier.scan_times import ScanTimes
+from thenar.compiler.frontier.settings import Shape
+from thenar.compiler.frontier.waiting import DECISIONS
+
+TABLED = Tabled(10, Shape(16))
+WAIT = Latency(1000.0, 2000.0, 0.0)
+NAMES = [f"s{number}" for number in range(40)]
+
+
+def close_of(switches: int = 20, rate: float = 0.9, early_us: float = 200.0, layout_us: float = 50.0) -> Close:
+    scan = ScanTimes(500.0, early_us, 4, 2, "wire", 1.5)
+    wired = (Wired("mcp23017", 400_000, scan),) if switches else ()
+    tables = PricedTables(TABLED, b"", (Classified("plain", layout_us, "model", 900, 30),), wired, 1.25)
+    way = Way("id3", float(switches))
+    screened = Screened(
+        Choice(way, "switches" if switches else "joints"), tuple(range(switches)), Rate(rate, rate, rate), 1.0
+    )
+    return Close(screened, {}, {TABLED: Rate(rate, rate, rate)}, None, Priced((tables,)), 2.0)
+
+
+def built_of(design: Design, us: float | None = None) -> Built:
+    return Built(design, design.classify if us is None else Time(us, "simulated"))
+
+
+def test_a_scan_that_may_end_early_looks_at_the_scores_once_a_port_that_it_reads() -> None:
+    whole, early = designs(close_of(), 0)
+    assert (whole.scan_kind, whole.scan.us, whole.classify.us) == ("full", 500.0, 50.0)
+    assert (early.scan_kind, early.scan.us, early.classify.us) == ("early", 200.0, 75.0)
+    assert early.frame_us == 275.0
+
+
+def test_where_no_frame_ends_a_scan_early_it_is_not_offered() -> None:
+    assert [design.scan_kind for design in designs(close_of(early_us=500.0), 0)] == ["full"]
+
+
+def test_joints_alone_have_one_design_a_layout_and_wait_for_a_record() -> None:
+    (design,) = designs(close_of(switches=0), 16)
+    assert (design.scan.us, design.wired, design.looks) == (0.0, None, 1.0)
+    assert design.frame_us == pytest.approx(21 * 10 / 115_200 * 1e6 + 50.0)
+
+
+def test_compiling_is_choosing_training_and_making_the_tables() -> None:
+    assert next(designs(close_of(), 0)).compile_s == 3.25
+
+
+def test_fronts_hold_the_quickest_and_the_smallest() -> None:
+    big, small = close_of(30, 0.95, early_us=100.0), close_of(5, 0.9, early_us=400.0)
+    by_time, by_switches = best_designs([*designs(small, 0), *designs(big, 0)], lambda design: design.frame_us)
+    assert [design.n_switches for design in by_time] == [30]
+    assert [design.n_switches for design in by_switches] == [5, 30]
+    assert by_switches[0].scan_kind == "early"
+
+
+def test_a_design_that_ends_early_is_joined_by_the_one_of_whole_scans_once() -> None:
+    whole, early = designs(close_of(), 0)
+    assert [design.scan_kind for design in with_whole_scans([early, early])] == ["early", "full"]
+    assert with_whole_scans([whole, early]) == [whole, early]
+
+
+def test_dwell_and_tests_are_for_whole_scans() -> None:
+    whole, early = (built_of(design) for design in designs(close_of(), 0))
+    assert (whole.decisions, early.decisions) == (DECISIONS, ("single",))
+
+
+def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
+    one, other = next(designs(close_of(20, 0.9), 0)), next(designs(close_of(10, 0.8, layout_us=30.0), 0))
+    # The model has the other one faster, the simulator the better one: so the other is beaten on time.
+    assert other.frame_us < one.frame_us
+    builts = [built_of(one, 20.0), built_of(other, 60.0)]
+    waits = {(built, kind): WAIT for built in builts for kind in built.decisions}
+    points = points_of(builts, waits, NAMES, None)
+    assert [point.frame.us for point in points] == sorted(point.frame.us for point in points)
+    fronts = {(len(point.switches), point.setting.decision): point.fronts for point in points}
+    assert fronts[20, "single"] == ("frame", "switches", "latency")
+    assert fronts[10, "single"] == ("switches",)
+    assert (20, "dwell") in fronts
+    assert (10, "dwell") not in fronts
+    assert points[0].classify == Time(20.0, "simulated")
+
+
+def test_a_decision_that_is_quicker_is_on_its_own_front() -> None:
+    one, other = (built_of(next(designs(close_of(n, rate), 0))) for n, rate in ((20, 0.9), (10, 0.8)))
+    waits = {(built, kind): WAIT for built in (one, other) for kind in built.decisions}
+    waits[other, "sequential"] = replace_latency(WAIT, 10.0)
+    points = points_of([one, other], waits, NAMES, None)
+    (found,) = (each for each in points if len(each.switches) == 10 and each.setting.decision == "sequential")
+    assert found.fronts == ("latency",)
+    assert found.latency.mean_us == 10.0
+
+
+def replace_latency(latency: Latency, mean_us: float) -> Latency:
+    return Latency(mean_us, latency.p99_us, latency.missed, latency.wrong)
+
+
+def test_measured_times_of_early_scans_count_every_look() -> None:
+    _, early = designs(close_of(), 0)
+    twice = replace(early, classified=Classified("plain", 100.0, "model", 900, 30))
+    assert twice.classify.us == 150.0

@@ -1,0 +1,31 @@
+from msgspec.structs import replace
+
+from thenar.compiler.frontier.beside_wire import WIRE_ONLY, Beside
+from thenar.compiler.frontier.classify_times import ClassifyModel
+from thenar.compiler.frontier.equipment import Equipment
+from thenar.compiler.frontier.wirings import wirings
+from thenar.runtime.scanning.propose import propose_board, propose_harness
+
+MODEL = ClassifyModel("cortex-m4")
+NAMES = ["s0", "s1", "s2"]
+
+
+def test_whatever_times_depend_on_is_part_of_the_identity() -> None:
+    glove, board = propose_harness(NAMES), propose_board(NAMES)
+    slower = replace(glove, buses=tuple(replace(bus, clock_hz=100_000) for bus in glove.buses))
+    other = replace(board, scanners=tuple(replace(each, baud=9600) for each in board.scanners), buses=slower.buses)
+    faster = replace(other, scanners=board.scanners)
+    equipments = [
+        Equipment(MODEL, wirings(None), WIRE_ONLY),
+        Equipment(ClassifyModel("avr328p"), wirings(None), WIRE_ONLY),
+        Equipment(MODEL, wirings(None), Beside("", call_us=1.0)),
+        *(Equipment(MODEL, wirings(given), WIRE_ONLY) for given in (glove, slower, other, faster)),
+    ]
+    assert len({each.identity for each in equipments}) == len(equipments)
+
+
+def test_without_switches_no_wiring_is_wanted_and_one_without_a_place_does_not_fit() -> None:
+    equipment = Equipment(MODEL, wirings(propose_harness(NAMES[:2])), WIRE_ONLY)
+    assert equipment.fitting(()) == ()
+    assert "as wired" in [wiring.name for wiring in equipment.fitting(NAMES[:2])]
+    assert "as wired" not in [wiring.name for wiring in equipment.fitting(NAMES)]
