@@ -24,12 +24,13 @@ $(VENV)/installed: pyproject.toml
 	$(BIN)/python -m pip install --quiet --editable ".[compiler,cluster,sim,stability,ros]" --group dev
 	touch $@
 
-demo: $(VENV)/installed  ## simulate, draw, evaluate, compile, verify, run: SCENE=quick
+demo: $(VENV)/installed  ## simulate, draw, evaluate, find the frontier, compile, verify, run: SCENE=quick
 	mkdir -p $(OUT)
 	$(BIN)/thenar simulate "$(SCENE)" -o $(OUT)/set.grasps
 	$(BIN)/thenar draw $(OUT)/set.grasps -o $(OUT)/contacts.svg
 	$(BIN)/thenar draw $(OUT)/set.grasps --place -o $(OUT)/kept.svg
 	$(BIN)/thenar evaluate $(OUT)/set.grasps -o $(OUT)/evaluation.json
+	$(BIN)/thenar frontier $(OUT)/set.grasps -o $(OUT)/frontier --methods elimination,id3 --rivals none --rounds 50 --repeats 1 --finalists 4
 	$(BIN)/thenar compile $(OUT)/set.grasps -o $(OUT)/build --propose $(OUT)/glove.toml --chip board --overwrite
 	$(BIN)/thenar verify $(OUT)/build $(OUT)/set.grasps
 	$(BIN)/thenar run $(OUT)/build --replay $(OUT)/set.grasps > $(OUT)/grasps.jsonl
@@ -37,6 +38,7 @@ demo: $(VENV)/installed  ## simulate, draw, evaluate, compile, verify, run: SCEN
 	    $(BIN)/thenar run $(OUT)/build --glove $(OUT)/emulated/glove.toml --frames 2000 > $(OUT)/live.jsonl
 	@echo "Simulated grasps are in $(OUT)/set.grasps, the build is in $(OUT)/build, one recognised grasp a line in $(OUT)/grasps.jsonl,"
 	@echo "live ones, from a glove that was emulated, in $(OUT)/live.jsonl;"
+	@echo "what accuracy costs in time: $(OUT)/frontier/frontier.svg; the build on one page: $(OUT)/build/report.html; its glove: $(OUT)/build/spec;"
 	@echo "hand maps: $(OUT)/contacts.svg (which switches close), $(OUT)/kept.svg (which are kept); the rates: $(OUT)/evaluation.json."
 
 test: $(VENV)/installed  ## the tests, under ten minutes on two cores

@@ -108,7 +108,7 @@ def command(
     """
     from ..compiler.build.compile import compile_build
     from ..compiler.build.made import no_documents
-    from ..compiler.frontier.whole_glove import ports_of_whole_glove
+    from ..compiler.frontier.timing.whole_glove import ports_of_whole_glove
     from ..compiler.recordings.graspset import GraspSet
     from ..runtime.harness.loading import load_harness
     from .from_frontier import picked

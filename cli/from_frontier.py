@@ -41,7 +41,7 @@ class Picked:
 
     def wired(self, given: "Harness | None") -> "Wired | None":
         """Return the wiring to build for: the given one where the point is wired so, else a new one of its kind."""
-        from ..compiler.frontier.wirings import AS_WIRED, Wiring
+        from ..compiler.frontier.timing.wirings import AS_WIRED, Wiring
 
         setting = self.point.setting
         if not setting.wiring:

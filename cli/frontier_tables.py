@@ -18,7 +18,7 @@ def print_frontier(frontier: "Frontier") -> None:
     """Print the points, the picked one bold; then checks, what was left out, and what the picture says."""
     from rich.text import Text
 
-    from ..compiler.frontier.sentence import sentence
+    from ..compiler.frontier.drawing.sentence import sentence
 
     console = out()
     console.print(_grid(frontier))
@@ -57,7 +57,7 @@ def _title(frontier: "Frontier") -> str:
 def _cells(point: "Point") -> "tuple[Text, ...]":
     from rich.text import Text
 
-    from ..compiler.frontier.words import duration, interval, way_of, wiring_of
+    from ..compiler.frontier.drawing.words import duration, interval, way_of, wiring_of
 
     setting = point.setting
     texts = (

@@ -29,7 +29,7 @@ from ...runtime.scanning.plan import plan_scan
 from ...runtime.scanning.scanmap import ScanMap, scanmap_to_bytes
 from ...runtime.tables import IntegerTables, tables_to_bytes
 from ..evaluation.folds import check_cut
-from ..frontier.whole_glove import ports_of_whole_glove
+from ..frontier.timing.whole_glove import ports_of_whole_glove
 from ..placement.costaware import PortCosts
 from ..recordings.graspset import GraspSet
 from ..tables.collapse import collapse

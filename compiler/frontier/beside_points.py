@@ -9,7 +9,7 @@ from .screening import Screening, fastest_us
 from .settings import BEST, Search
 
 # The paper's S.
-_PAPERS = (0.0, 13.0, 62.0)
+_PAPERS = (13.0, 62.0)
 
 
 def choices_to_mark(n_switches: int, n_joints: int) -> dict[Choice, str]:

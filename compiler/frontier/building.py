@@ -4,12 +4,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from .candidates import Choice
-from .classify_times import Classified
 from .closeup import Close
 from .pareto import front
 from .points import Rate, Scan, Time
 from .pricing import PricedTables, Tabled, Wired
-from .scan_times import transfer_us
+from .timing.classify_times import Classified
+from .timing.scan_times import transfer_us
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 from msgspec import Struct
 
-from .asking import Desk
-from .beside_wire import Beside, beside_wire
-from .classify_times import ClassifyModel
 from .equipment import Equipment
-from .python_times import PythonCost
-from .wirings import Wiring
+from .storing.asking import Desk
+from .timing.beside_wire import Beside, beside_wire
+from .timing.classify_times import ClassifyModel
+from .timing.python_times import PythonCost
+from .timing.wirings import Wiring
 
 
 class CalibrationKey(Struct, frozen=True):

@@ -2,17 +2,21 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
+from math import log
 
 from ...runtime.manifest import Inputs
 from ..evaluation.rates import Rate as Counted
 from ..selection.learning import Columns
-from .pareto import front, shortfalls
+from .pareto import front
 from .points import Rate, Way
 
 # The placement of inputs without switches.
 NO_SWITCHES = Way("none", 0.0)
-# Placements that recognise so much less than the best that takes no more time are out.
-_FAR = 0.02
+# Of what the best recognises; the least gain that counts on a front of rates that were screened; what is level.
+_USEFUL, _STEP, _LEVEL = 0.5, 0.003, 0.005
+# The share of errors below which fewer no longer count: a screening of some hundred rows cannot tell.
+_FEWEST = 0.002
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,37 +49,53 @@ def rate_of(correct: tuple[int, ...], total: int) -> Rate:
 
 
 def finalists(screened: Sequence[Screened], wanted: Sequence[Choice], most: int) -> tuple[Screened, ...]:
-    """Return at most `most` of `screened`, in their order: those on a front of rate against frame time or number of
-    switches, then those nearest to it; `wanted` ones come on top. Choices of the same inputs and switches count once.
+    """Return at most `most` of `screened`, in their order; `wanted` ones come on top.
+
+    They are on a front of rate against frame time or, among the same inputs, against the number of switches, and are
+    shared out evenly among the kinds of inputs. Of a kind first the best, then the smallest that is level with it, then
+    always the one whose share of errors is least like that of any chosen. Choices of the same inputs and switches count
+    once; those that recognise less than half of what the best does are of no use.
     """
-    different = _different(screened)
-    by_time = shortfalls(different, lambda one: one.frame_us, lambda one: one.rate.mean)
-    by_switches = _by_switches(different)
-    best = {id(one) for one in _fronts(different)}
-    order = sorted(
-        range(len(different)),
-        key=lambda i: (id(different[i]) not in best, min(by_time[i], by_switches[i]), different[i].frame_us),
-    )
-    chosen = {id(different[i]) for i in order[:most] if min(by_time[i], by_switches[i]) <= _FAR}
-    chosen |= {id(one) for one in screened if one.choice in wanted}
+    enough = _USEFUL * max((one.rate.mean for one in screened), default=0.0)
+    useful = [one for one in _different(screened) if one.rate.mean >= enough]
+    pool = _fronts(useful)
+    queues = [_spread([one for one in pool if one.choice.inputs == kind]) for kind in _kinds(pool)]
+    turns = [one for turn in zip_longest(*queues) for one in turn if one is not None]
+    chosen = {id(one) for one in turns[:most]} | {id(one) for one in screened if one.choice in wanted}
     return tuple(one for one in screened if id(one) in chosen)
 
 
+def _kinds(screened: Sequence[Screened]) -> list[Inputs]:
+    return list(dict.fromkeys(one.choice.inputs for one in screened))
+
+
 def _fronts(screened: Sequence[Screened]) -> list[Screened]:
-    step = 0.003
-    by_time = front(screened, lambda one: one.frame_us, lambda one: one.rate.mean, step)
-    return by_time + front(screened, lambda one: len(one.columns), lambda one: one.rate.mean, step)
+    """Return what is on a front, in its order."""
+    found = front(screened, lambda one: one.frame_us, lambda one: one.rate.mean, _STEP)
+    for kind in _kinds(screened):
+        mine = [one for one in screened if one.choice.inputs == kind]
+        found += front(mine, lambda one: len(one.columns), lambda one: one.rate.mean, _STEP)
+    known = {id(one) for one in found}
+    return [one for one in screened if id(one) in known]
 
 
-def _by_switches(screened: Sequence[Screened]) -> list[float]:
-    """Return shortfalls against the number of switches, among choices of the same inputs."""
-    found = [0.0] * len(screened)
-    for inputs in {one.choice.inputs for one in screened}:
-        mine = [number for number, one in enumerate(screened) if one.choice.inputs == inputs]
-        part = shortfalls([screened[i] for i in mine], lambda one: len(one.columns), lambda one: one.rate.mean)
-        for number, shortfall in zip(mine, part, strict=True):
-            found[number] = shortfall
-    return found
+def _spread(mine: list[Screened]) -> list[Screened]:
+    """Return all of `mine` in the order in which they are worth a closer look."""
+    if not mine:
+        return []
+    best = max(mine, key=lambda one: one.rate.mean)
+    level = [one for one in mine if one.rate.mean >= best.rate.mean - _LEVEL]
+    order = list(dict.fromkeys([best, min(level, key=lambda one: len(one.columns))]))
+    left = [one for one in mine if one not in order]
+    while left:
+        order.append(max(left, key=lambda one: min(abs(_errors(one) - _errors(known)) for known in order)))
+        left.remove(order[-1])
+    return order
+
+
+def _errors(one: Screened) -> float:
+    """Return how many errors are made, on a scale on which halving them counts the same everywhere."""
+    return log(1.0 - one.rate.mean + _FEWEST)
 
 
 def _different(screened: Sequence[Screened]) -> list[Screened]:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import msgspec
 
 from ...runtime.harness.wiring import Harness
-from .beside_wire import Beside
-from .classify_times import ClassifyModel
-from .wirings import Wiring
+from .timing.beside_wire import Beside
+from .timing.classify_times import ClassifyModel
+from .timing.wirings import Wiring
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,15 +9,15 @@ from msgspec import Struct
 from ...runtime.tables import IntegerTables, tables_from_bytes
 from ..firmware.choose import Option, features
 from ..firmware.targets import Target
-from .asking import Desk
 from .building import Design
-from .checks import LEAST, check, unchecked
-from .classify_times import ClassifyModel, fitting
 from .equipment import Equipment
-from .measured_cycles import Trial, run_trial
 from .points import Check, FrontierError, Time
-from .python_times import classify_us
-from .wire_check import check_wire
+from .storing.asking import Desk
+from .timing.checks import LEAST, check, unchecked
+from .timing.classify_times import ClassifyModel, fitting
+from .timing.measured_cycles import Trial, run_trial
+from .timing.python_times import classify_us
+from .timing.wire_check import check_wire
 
 # Expected seconds: of a trial, of checks in Python.
 TRIAL_S, CHECK_S = 2.0, 5.0

@@ -8,7 +8,7 @@ from ..recordings.graspset import GraspSet
 from .candidates import rate_of
 from .equipment import Equipment
 from .points import FrontierError, Mark
-from .scan_times import scan_times, transfer_us
+from .timing.scan_times import scan_times, transfer_us
 
 
 def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:

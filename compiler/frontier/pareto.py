@@ -21,18 +21,3 @@ def front(
         if not best or worth(item) >= worth(best[-1]) + step:
             best.append(item)
     return best
-
-
-def shortfalls(items: Sequence[_T], price: Callable[[_T], float], worth: Callable[[_T], float]) -> list[float]:
-    """Return, for each item, how much less it is worth than the best that costs no more; 0 on the front."""
-    best, found, order = float("-inf"), [0.0] * len(items), sorted(range(len(items)), key=lambda i: price(items[i]))
-    start = 0
-    while start < len(order):
-        stop = start
-        while stop < len(order) and price(items[order[stop]]) == price(items[order[start]]):
-            best = max(best, worth(items[order[stop]]))
-            stop += 1
-        for index in order[start:stop]:
-            found[index] = best - worth(items[index])
-        start = stop
-    return found

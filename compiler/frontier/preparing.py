@@ -12,23 +12,23 @@ from ...runtime.harness.loading import load_harness
 from ...runtime.harness.wiring import Harness
 from ..recordings.graspset import GraspSet
 from ..selection.rivals import RIVALS, available
-from .asking import Desk
 from .calibrating import equipment_for
+from .drawing.pictures import pictures
+from .drawing.table import csv_bytes
 from .foreseeing import foreseen
 from .material import Cuts, Material
-from .movements import holds_movements
 from .own_build import own_build
-from .pictures import pictures
 from .points import Frontier, FrontierError, frontier_to_bytes
-from .resuming import Effort
 from .settings import USUAL_METHODS, USUAL_RIVALS, WIRED_METHODS, Search
-from .store import Store
-from .stream import Stream
-from .streams import stream_of
+from .storing.asking import Desk
+from .storing.resuming import Effort
+from .storing.store import Store
+from .streaming.movements import holds_movements
+from .streaming.stream import Stream
+from .streaming.streams import stream_of
 from .study import Study, Wanted, find_frontier
-from .table import csv_bytes
-from .whole_glove import ports_of_whole_glove
-from .wirings import wirings
+from .timing.whole_glove import ports_of_whole_glove
+from .timing.wirings import wirings
 
 FRONTIER_NAME, TABLE_NAME, STORE_NAME = "frontier.json", "frontier.csv", "store.jsonl"
 # Answers of another version are not mixed with these: raise it where a method changes what it answers.

@@ -13,12 +13,12 @@ from ..evaluation.folds import Fold
 from ..selection.learning import Columns
 from ..tables.collapse import collapse
 from ..tables.quantise import quantise
-from .classify_times import Classified
 from .equipment import Equipment
 from .learnt import trained
 from .material import Material
-from .scan_times import ScanTimes, scan_times
 from .settings import Shape
+from .timing.classify_times import Classified
+from .timing.scan_times import ScanTimes, scan_times
 
 # Of more rows than this, evenly spaced ones tell how early a scan ends.
 _FRAMES = 1000

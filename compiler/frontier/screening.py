@@ -9,9 +9,9 @@ from .equipment import Equipment
 from .learnt import Fit
 from .points import Curve, Way
 from .pricing import Priced, PricedTables, PriceKey, PriceTask, Tabled, find_prices
-from .scan_times import transfer_us
 from .settings import Search, Shape, available_inputs, curve_ways, ways
 from .stages import Learner
+from .timing.scan_times import transfer_us
 
 # How long a frame takes hardly depends on how many rounds there were: tables of few tell it.
 _ROUNDS = 12

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 
-from .asking import Desk
 from .beside_points import choices_to_mark, marks_of, tried
 from .building import best_designs, designs
 from .built import EARLY, Built, Waits, points_of, with_whole_scans
@@ -17,7 +16,8 @@ from .points import SCHEMA, Frontier, FrontierError, Mark, Point
 from .screening import Screening, screen
 from .settings import Search
 from .stages import Learner
-from .stream import Stream
+from .storing.asking import Desk
+from .streaming.stream import Stream
 from .waiting import Pace, Waited, WaitKey, WaitTask, digest, find_latencies
 
 

@@ -9,11 +9,11 @@ from msgspec import Struct
 
 from ..evaluation.folds import Fold
 from ..selection.learning import Columns
-from .latency import Decider, latency
 from .material import Material
 from .points import DecisionKind, Latency
 from .pricing import PriceKey, Tabled, tables_of
-from .stream import Stream
+from .streaming.latency import Decider, latency
+from .streaming.stream import Stream
 
 DECISIONS: tuple[DecisionKind, ...] = ("single", "dwell", "sequential")
 

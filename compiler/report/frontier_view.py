@@ -3,9 +3,9 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from ..frontier.drawing.sentence import sentence
+from ..frontier.drawing.words import featured
 from ..frontier.points import Frontier, Point
-from ..frontier.sentence import sentence
-from ..frontier.words import featured
 from ..hand import HandShape
 from .frontier_tables import frontier_tables
 from .hand_picture import HandPicture, hand_picture

@@ -7,12 +7,12 @@ import pytest
 from thenar.compiler.frontier.building import Design, best_designs, designs
 from thenar.compiler.frontier.built import Built, points_of, with_whole_scans
 from thenar.compiler.frontier.candidates import Choice, Screened
-from thenar.compiler.frontier.classify_times import Classified
 from thenar.compiler.frontier.closeup import Close
 from thenar.compiler.frontier.points import Latency, Rate, Time, Way
 from thenar.compiler.frontier.pricing import Priced, PricedTables, Tabled, Wired
-from thenar.compiler.frontier.scan_times import ScanTimes
 from thenar.compiler.frontier.settings import Shape
+from thenar.compiler.frontier.timing.classify_times import Classified
+from thenar.compiler.frontier.timing.scan_times import ScanTimes
 from thenar.compiler.frontier.waiting import DECISIONS
 
 TABLED = Tabled(10, Shape(16))

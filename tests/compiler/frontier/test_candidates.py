@@ -12,19 +12,36 @@ def test_joints_are_read_unless_switches_stand_alone() -> None:
     assert [Choice(NO_SWITCHES, kind).joints for kind in ("both", "joints", "switches")] == [True, True, False]
 
 
-def test_those_on_a_front_come_first() -> None:
-    best, worse, slower = _screened(8, 0.9, 100), _screened(9, 0.895, 110), _screened(20, 0.95, 200)
-    assert finalists([best, worse, slower], [], 2) == (best, slower)
+def test_the_best_and_the_smallest_that_is_level_come_first() -> None:
+    best, level, between = _screened(40, 0.99, 300), _screened(16, 0.986, 200), _screened(8, 0.9, 100)
+    assert finalists([between, level, best], [], 2) == (level, best)
 
 
-def test_what_is_far_from_the_front_is_no_finalist() -> None:
-    best, far = _screened(8, 0.9, 100), _screened(9, 0.8, 100)
-    assert finalists([best, far], [], 5) == (best,)
+def test_then_comes_what_errs_least_like_those() -> None:
+    best, near, far = _screened(40, 0.99, 300), _screened(20, 0.97, 200), _screened(4, 0.6, 100)
+    assert finalists([far, near, best], [], 2) == (far, best)
 
 
-def test_what_is_wanted_is_among_them_however_far() -> None:
-    best, far = _screened(8, 0.9, 100), _screened(9, 0.1, 300)
-    assert finalists([best, far], [far.choice], 1) == (best, far)
+def test_kinds_of_inputs_share_evenly() -> None:
+    switches = [_screened(size, rate, size) for size, rate in ((40, 0.9), (20, 0.8), (10, 0.7))]
+    both = [_screened(size, rate, 1000 + size, "both") for size, rate in ((40, 0.99), (20, 0.98), (10, 0.95))]
+    chosen = finalists([*switches, *both], [], 4)
+    assert [one.choice.inputs for one in chosen] == ["switches"] * 2 + ["both"] * 2
+
+
+def test_what_others_beat_is_no_finalist() -> None:
+    best, beaten = _screened(8, 0.9, 100), _screened(9, 0.8, 110)
+    assert finalists([best, beaten], [], 5) == (best,)
+
+
+def test_what_recognises_less_than_half_as_much_is_of_no_use() -> None:
+    best, useless = _screened(8, 0.9, 100), _screened(1, 0.4, 50)
+    assert finalists([useless, best], [], 5) == (best,)
+
+
+def test_what_is_wanted_is_among_them_however_bad() -> None:
+    best, bad = _screened(8, 0.9, 100), _screened(9, 0.1, 300)
+    assert finalists([best, bad], [bad.choice], 1) == (best, bad)
 
 
 def test_equal_placements_count_once() -> None:

@@ -1,9 +1,9 @@
 from msgspec.structs import replace
 
-from thenar.compiler.frontier.beside_wire import WIRE_ONLY, Beside
-from thenar.compiler.frontier.classify_times import ClassifyModel
 from thenar.compiler.frontier.equipment import Equipment
-from thenar.compiler.frontier.wirings import wirings
+from thenar.compiler.frontier.timing.beside_wire import WIRE_ONLY, Beside
+from thenar.compiler.frontier.timing.classify_times import ClassifyModel
+from thenar.compiler.frontier.timing.wirings import wirings
 from thenar.runtime.scanning.propose import propose_board, propose_harness
 
 MODEL = ClassifyModel("cortex-m4")

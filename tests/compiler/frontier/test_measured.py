@@ -5,22 +5,22 @@ from pathlib import Path
 
 import pytest
 
-from thenar.compiler.frontier.asking import Desk
-from thenar.compiler.frontier.beside_wire import WIRE_ONLY
 from thenar.compiler.frontier.building import Design
 from thenar.compiler.frontier.candidates import Choice, Screened
-from thenar.compiler.frontier.checks import unchecked
-from thenar.compiler.frontier.classify_times import ClassifyModel
 from thenar.compiler.frontier.closeup import Close
 from thenar.compiler.frontier.equipment import Equipment
 from thenar.compiler.frontier.measured import measure_designs
 from thenar.compiler.frontier.points import Rate, Way
 from thenar.compiler.frontier.pricing import Priced, PricedTables, Tabled, Wired
-from thenar.compiler.frontier.python_times import PythonCost, random_tables
-from thenar.compiler.frontier.resuming import Effort
-from thenar.compiler.frontier.scan_times import ScanTimes
 from thenar.compiler.frontier.settings import Shape
-from thenar.compiler.frontier.store import Store
+from thenar.compiler.frontier.storing.asking import Desk
+from thenar.compiler.frontier.storing.resuming import Effort
+from thenar.compiler.frontier.storing.store import Store
+from thenar.compiler.frontier.timing.beside_wire import WIRE_ONLY
+from thenar.compiler.frontier.timing.checks import unchecked
+from thenar.compiler.frontier.timing.classify_times import ClassifyModel
+from thenar.compiler.frontier.timing.python_times import PythonCost, random_tables
+from thenar.compiler.frontier.timing.scan_times import ScanTimes
 from thenar.runtime.tables import tables_to_bytes
 
 PYTHON = PythonCost(5.0, 0.1, 0.5, 0.1, 0.01, 0.01)

@@ -1,7 +1,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.frontier.pareto import STEP, front, shortfalls
+from thenar.compiler.frontier.pareto import STEP, front
 
 Pair = tuple[int, int]
 PAIRS = st.lists(st.tuples(st.integers(0, 8), st.integers(0, 8)), max_size=12)
@@ -25,18 +25,6 @@ def test_the_front_is_what_no_other_beats(pairs: list[Pair]) -> None:
     found = front(pairs, _price, _worth)
     assert set(found) == best
     assert found == sorted(best)
-
-
-@given(PAIRS)
-def test_a_shortfall_is_what_the_best_no_dearer_one_is_ahead(pairs: list[Pair]) -> None:
-    expected = [max(w for p, w in pairs if p <= price) - worth for price, worth in pairs]
-    assert shortfalls(pairs, _price, _worth) == expected
-
-
-@given(PAIRS)
-def test_what_is_on_the_front_falls_short_of_nothing(pairs: list[Pair]) -> None:
-    short = dict(zip(pairs, shortfalls(pairs, _price, _worth), strict=True))
-    assert all(short[pair] == 0 for pair in front(pairs, _price, _worth))
 
 
 def test_less_than_a_step_is_no_better() -> None:

@@ -2,12 +2,12 @@ import pytest
 
 from thenar.compiler.frontier.beside_points import choices_to_mark
 from thenar.compiler.frontier.candidates import Choice
-from thenar.compiler.frontier.classify_times import Classified
 from thenar.compiler.frontier.points import FrontierError, Way
 from thenar.compiler.frontier.pricing import PricedTables, Tabled, Wired
-from thenar.compiler.frontier.scan_times import ScanTimes, transfer_us
 from thenar.compiler.frontier.screening import fastest_us
 from thenar.compiler.frontier.settings import Search, Shape, available_inputs, curve_ways, ways
+from thenar.compiler.frontier.timing.classify_times import Classified
+from thenar.compiler.frontier.timing.scan_times import ScanTimes, transfer_us
 
 QUICK = (Classified("quick", 40.0, "model", 900, 30), Classified("small", 60.0, "model", 500, 30))
 

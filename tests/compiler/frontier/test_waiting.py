@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thenar.compiler.frontier.streams import stream_of
+from thenar.compiler.frontier.streaming.streams import stream_of
 from thenar.compiler.frontier.waiting import digest
 from thenar.compiler.recordings.graspset import GraspSet
 

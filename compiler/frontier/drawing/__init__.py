@@ -1,0 +1,1 @@
+"""A frontier as pictures, as a table, and in words."""

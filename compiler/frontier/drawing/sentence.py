@@ -1,0 +1,32 @@
+"""The one sentence that reads the frontier's picture."""
+
+from ..points import Frontier, Mark, Point
+from .words import duration, featured, interval, percent, switches
+
+
+def sentence(frontier: Frontier) -> str:
+    """Return so many switches, so much time, so much recognition, against the marks; or that there are no points."""
+    point = featured(frontier)
+    if point is None:
+        return f"Of {frontier.combinations:,} combinations none is a point of the frontier."
+    said = (
+        f"Point {point.number}: {_inputs(frontier, point)}, read and classified in {duration(point.frame.us)} "
+        f"on {frontier.target}, recognise {interval(point.rate)} % of the grasps"
+    )
+    against = [_mark(mark) for mark in frontier.marks]
+    return f"{said}, against {_listed(against)}." if against else f"{said}."
+
+
+def _inputs(frontier: Frontier, point: Point) -> str:
+    some = f"{len(point.switches)} of {frontier.n_switches} switches"
+    joints = f"{frontier.n_joints} joint{'s' if frontier.n_joints != 1 else ''}"
+    return {"switches": some, "joints": joints, "both": f"{some} and {joints}"}[point.setting.inputs]
+
+
+def _mark(mark: Mark) -> str:
+    name = mark.name if str(mark.n_switches) in mark.name else f"{switches(mark.n_switches)} ({mark.name})"
+    return f"{percent(mark.rate)} in {duration(mark.frame_us)} with {name}"
+
+
+def _listed(parts: list[str]) -> str:
+    return ", ".join(parts[:-1]) + (" and " if len(parts) > 1 else "") + parts[-1]

@@ -1,0 +1,1 @@
+"""Questions asked once: answers kept in a file, found in workers."""

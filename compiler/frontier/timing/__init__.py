@@ -1,0 +1,1 @@
+"""What reading and classifying take: predicted, simulated, measured, and held against one another."""

@@ -1,0 +1,112 @@
+"""The model of classify times beside what is measured: layouts compiled and simulated, or Python timed."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import chain, islice, product
+from math import ceil
+from statistics import fmean
+from typing import TypeVar
+
+import numpy as np
+
+from ....runtime.tables import IntegerTables
+from ...firmware.running import toolchain_missing
+from ...firmware.targets import Target
+from ...workers import in_workers
+from ..points import Check, How
+from .avr_scans import run_scan, scan_trials
+from .classify_times import ClassifyModel, fitting
+from .measured_cycles import Outcome, Trial, run_trial
+from .python_times import classify_us
+
+# At least so many points are measured.
+LEAST = 30
+# Of more tables than this, evenly spaced ones give the layouts.
+_TABLES = 10
+# Of the inputs, where more tables are needed: halves, quarters and so on down to 64ths, from the coarsest.
+_SHARES = tuple(step / 2**level for level in range(1, 7) for step in range(2**level - 1, 0, -2))
+
+_T = TypeVar("_T")
+
+
+def check(
+    model: ClassifyModel, several: Sequence[IntegerTables], *, jobs: int = 1, least: int = LEAST
+) -> tuple[Check, ...]:
+    """Return how far the model's times are off, over at least `least` points, evenly spread over the tables and their
+    layouts; where these are too few, over the same tables with fewer inputs as well. On an AVR, also how far scans are.
+
+    The tables should be those of the run. There are no checks where tools are missing (`unchecked` says which), on a
+    Raspberry Pi that is not this machine, or without points. Raises FirmwareError if a layout does not compile or run.
+    """
+    if not several or unchecked(model) is not None:
+        return ()
+    if model.part is None:
+        return (_on_python(model, several, least),)
+    outcomes = list(in_workers(run_trial, _trials(several, model.part, least), jobs))
+    what = "cycles of classify()" if model.part.counted else "instructions of classify()"
+    found = [_judged(f"{what} on {model.part.named}, slowest frame", "simulated", outcomes)] if outcomes else []
+    if model.part.counted:
+        scans = list(in_workers(run_scan, scan_trials(model.target), jobs))
+        found.append(_judged(f"time of a whole scan by the firmware of {model.part.named}", "simulated", scans))
+    return tuple(found)
+
+
+def unchecked(model: ClassifyModel) -> str | None:
+    """Return, in a sentence, what keeps the model from being held against measured times here; None if nothing."""
+    if model.part is None:
+        other = "classify times on pi were not held against measured ones: this machine is no Raspberry Pi"
+        return other if model.factor != 1.0 else None
+    if lack := toolchain_missing(model.part):
+        return f"classify times on {model.target} were not held against a simulator: {lack}"
+    return None
+
+
+def _on_python(model: ClassifyModel, several: Sequence[IntegerTables], least: int) -> Check:
+    assert model.python is not None
+    tables = [*several, *islice(_smaller(several), max(0, least - len(several)))]
+    predicted = [model.python.us(each) for each in tables]
+    outcomes = [Outcome(*pair) for pair in zip(predicted, classify_us(tables), strict=True)]
+    return _judged("time of a frame in runtime.scorer on this machine", "measured", outcomes)
+
+
+def _trials(several: Sequence[IntegerTables], part: Target, least: int) -> list[Trial]:
+    """Return `least` layouts, evenly spread over those of the tables, or as many as there are."""
+    chosen, found = _spread(several, _TABLES), list[Trial]()
+    for number, tables in enumerate(chain(chosen, _smaller(chosen))):
+        if number >= len(chosen) and len(found) >= least:
+            break
+        found += [Trial(option, part) for option in fitting(tables, part)]
+    return _spread(found, least)
+
+
+def _smaller(several: Sequence[IntegerTables]) -> Iterator[IntegerTables]:
+    """Yield the tables with fewer of their inputs, no shape of one table twice."""
+    seen = {(number, each.n_switches, each.n_joints) for number, each in enumerate(several)}
+    for share, (number, each) in product(_SHARES, enumerate(several)):
+        switches, joints = ceil(share * each.n_switches), ceil(share * each.n_joints)
+        if (number, switches, joints) not in seen:
+            seen.add((number, switches, joints))
+            yield _with_fewer(each, switches, joints)
+
+
+def _with_fewer(tables: IntegerTables, switches: int, joints: int) -> IntegerTables:
+    """Return the tables of the first switches and joints alone."""
+    return replace(
+        tables,
+        switch_rows=tables.switch_rows[:switches],
+        switch_means=tables.switch_means[:switches],
+        thresholds=tables.thresholds[:joints],
+        joint_rows=tables.joint_rows[:joints],
+        joint_means=tables.joint_means[:joints],
+    )
+
+
+def _spread(several: Sequence[_T], most: int) -> list[_T]:
+    """Return at most so many of these, evenly spaced, the first and the last among them."""
+    places = np.linspace(0, len(several) - 1, min(most, len(several))).round().astype(int)
+    return [several[place] for place in places.tolist()]
+
+
+def _judged(what: str, how: How, outcomes: Sequence[Outcome]) -> Check:
+    errors = sorted(outcome.error for outcome in outcomes)
+    return Check(what, how, len(errors), fmean(errors), errors[-1])

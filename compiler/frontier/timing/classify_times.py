@@ -1,0 +1,105 @@
+"""What classifying a frame takes on a target, layout by layout, without compiling anything."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from ....runtime.tables import IntegerTables, tables_to_bytes
+from ...firmware.choose import Option, choose, features, flash_shares
+from ...firmware.errors import FirmwareError
+from ...firmware.generate import PLATFORMS
+from ...firmware.targets import Target, target_of
+from ..points import FrontierError, How
+from .beside_wire import on_a_pi
+from .python_times import PythonCost, fit_here
+
+TARGETS = ("avr328p", "avr2560", "cortex-m0plus", "cortex-m4", "host", "pi")
+
+# Clocks of common boards with such a core: SAMD21 (Arduino Zero), nRF52840 (Arduino Nano 33 BLE).
+CORTEX_HZ: Mapping[str, int] = MappingProxyType({"cortex-m0plus": 48_000_000, "cortex-m4": 64_000_000})
+# How many times as long as here Python takes on a Raspberry Pi 4. Doubtful: a guess, and "here" is any machine.
+PI_FACTOR = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class Classified:
+    """What a layout costs: microseconds a frame, bytes of flash and RAM; of the tables alone on host and pi.
+
+    layout  in words; "" where nothing is laid out
+    """
+
+    layout: str
+    us: float
+    how: How
+    flash: int
+    ram: int
+
+
+class ClassifyModel:
+    """Predicts what classifying takes on `target`, one of TARGETS.
+
+    AVR       cycles that classify() takes at most, counted instruction by instruction, at the part's usual clock
+    Cortex-M  instructions that classify() takes, about and at most, at `clock_hz` and one cycle each: no core of these
+              is much faster, and loads, taken branches and slow flash take more cycles, so times are lower bounds
+    host      wall time of the runtime's Scorer here, by a line through many tables that are timed when it is made
+    pi        that times `factor`; as it is, where this machine is a Raspberry Pi
+
+    python is what `fit_here` returned, to be used again; factor and clock_hz are ignored elsewhere than said.
+    Raises FrontierError for another target.
+    """
+
+    def __init__(
+        self, target: str, *, clock_hz: int | None = None, python: PythonCost | None = None, factor: float = PI_FACTOR
+    ) -> None:
+        if target not in TARGETS:
+            raise FrontierError(f"there is no target {target!r}: choose one of {', '.join(TARGETS)}")
+        part = PLATFORMS.get(target)
+        self.target = target
+        self.part: Target | None = None if part is None else target_of(part)
+        self.clock_hz = None if self.part is None else self.part.clock_hz or clock_hz or CORTEX_HZ[target]
+        self.python = (python or fit_here()) if self.part is None else None
+        self.factor = factor if target == "pi" and not on_a_pi() else 1.0
+
+    def options(self, tables: IntegerTables) -> tuple[Classified, ...]:
+        """Return the layouts that fit the part than which none is both faster and smaller, the fastest first.
+
+        None, where none fits. On host and pi there is one, the runtime's own.
+        """
+        if self.part is None:
+            assert self.python is not None
+            size = len(tables_to_bytes(tables))
+            return (Classified("", self.python.us(tables) * self.factor, "model", size, size),)
+        return tuple(
+            Classified(features(layout, self.part), self.us(cost.cycles), "model", cost.flash, cost.ram)
+            for layout, cost in fitting(tables, self.part)
+        )
+
+    def us(self, steps: int) -> float:
+        """Return the microseconds of so many cycles or instructions of the part."""
+        assert self.clock_hz is not None
+        return steps * 1e6 / self.clock_hz
+
+    @property
+    def note(self) -> str:
+        """What has to be said of its times, in a sentence; "" where nothing has."""
+        if self.part is not None and not self.part.counted and self.clock_hz is not None:
+            return (
+                f"on {self.target} times are instructions, counted by qemu, at {self.clock_hz / 1e6:g} MHz and one "
+                "cycle each: a lower bound, for many instructions take more cycles"
+            )
+        if self.target == "pi" and self.factor != 1.0:
+            return (
+                f"Python on a Raspberry Pi is taken to be {self.factor:g} times as slow as on this machine, which is a "
+                "guess: run thenar frontier --target pi on the Pi itself"
+            )
+        return ""
+
+
+def fitting(tables: IntegerTables, part: Target) -> tuple[Option, ...]:
+    """Return the layouts of `tables` worth choosing from that fit three quarters of the part's flash, and its RAM."""
+    try:
+        best = choose(tables, part).frontier
+    except FirmwareError:
+        return ()
+    most = flash_shares(part)[1]
+    return tuple((layout, cost) for layout, cost in best if cost.flash <= most and cost.ram <= part.ram)

@@ -1,0 +1,104 @@
+"""The arithmetic of scan times beside real transactions: the driver on emulated buses, which count SCL periods."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from statistics import fmean
+
+import msgspec
+from msgspec.structs import replace
+
+from ....drivers.emulated.i2c import EmulatedBus, EmulatedChip, EmulatedI2c, WireCounters
+from ....drivers.errors import DeviceError
+from ....runtime.harness.wiring import BusWiring, Harness
+from ....runtime.scanning.timing import free_us, scan_us
+from ....runtime.scanning.whole import whole_scan
+from ..points import Check
+from .wire_client import Order, behind
+from .wirings import BOARD, names_of, wirings
+
+# Numbers of switches on new gloves; the most need muxes.
+_SIZES = (8, 20, 33, 66, 115)
+_SCANS = 2
+
+
+def check_wire(given: Harness | None = None) -> tuple[tuple[Check, ...], str | None]:
+    """Return how far the arithmetic is off on the buses of the given harness, and on those of new gloves of several
+    sizes, in every kind of chip and at every clock that a frontier tries; or what kept it from being seen, in a
+    sentence.
+
+    Each bus is scanned by the driver as on a Raspberry Pi 4: one read a transfer. Takes a few seconds.
+    """
+    buses = _renamed([*([] if given is None else given.buses), *_new_buses()])
+    try:
+        seen_us = _seen_us(buses)
+    except DeviceError as lack:
+        return (), f"scan times were not held against an emulated bus: {lack}"
+    errors = [abs(_predicted_us(bus) - seen) / seen for bus, seen in zip(buses, seen_us, strict=True)]
+    return (Check("time of a whole scan on an emulated bus", "wire", len(errors), fmean(errors), max(errors)),), None
+
+
+def _new_buses() -> Iterator[BusWiring]:
+    for wiring in wirings(None):
+        for size in _SIZES:
+            names = names_of(size)
+            if wiring.name != BOARD and wiring.fits(names):
+                yield from wiring.harness_of(names, joints=False).buses
+
+
+def _renamed(buses: Sequence[BusWiring]) -> tuple[BusWiring, ...]:
+    """Return the buses that have chips, each with a device and switches of its own."""
+    return tuple(
+        replace(
+            bus,
+            device=f"/dev/i2c-{number}",
+            chips=tuple(
+                replace(chip, pins={pin: f"{number} {name}" for pin, name in chip.pins.items()}) for chip in bus.chips
+            ),
+        )
+        for number, bus in enumerate(bus for bus in buses if bus.chips)
+    )
+
+
+def _predicted_us(bus: BusWiring) -> float:
+    harness = Harness(name="predicted", buses=(bus,))
+    return scan_us(whole_scan(harness, harness.switches), harness).us
+
+
+def _seen_us(buses: Sequence[BusWiring]) -> list[float]:
+    """Return what a scan of each bus takes by the SCL periods and the transfers that the bus itself counts."""
+    order = Order(Harness(name="emulated", buses=tuple(buses)), _SCANS)
+    with EmulatedI2c([_emulated(bus) for bus in buses]) as emulated, _client(emulated) as client:
+        _tell(client, msgspec.json.encode(order))
+        before = [emulated.counters(number) for number in range(len(buses))]
+        _tell(client, b"")
+        after = [emulated.counters(number) for number in range(len(buses))]
+    each = zip(before, after, buses, strict=True)
+    return [_between_us(then, now, bus.clock_hz) / _SCANS for then, now, bus in each]
+
+
+def _between_us(before: WireCounters, after: WireCounters, clock_hz: int) -> float:
+    periods, transfers = after.scl_periods - before.scl_periods, after.transfers - before.transfers
+    return periods * 1e6 / clock_hz + transfers * free_us(clock_hz)
+
+
+def _emulated(bus: BusWiring) -> EmulatedBus:
+    chips = (EmulatedChip(chip.kind, chip.address, *behind(chip)) for chip in bus.chips)
+    return EmulatedBus(bus.device, bus.clock_hz, "bcm2835", tuple(chips), paced=False)
+
+
+def _client(emulated: EmulatedI2c) -> "subprocess.Popen[bytes]":
+    command = [sys.executable, "-m", f"{__package__}.wire_client"]
+    seen = os.environ | emulated.environment
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=seen)
+
+
+def _tell(client: "subprocess.Popen[bytes]", line: bytes) -> None:
+    """Send a line and wait until it is done. Raises DeviceError if the client ends over it."""
+    assert client.stdin is not None
+    assert client.stdout is not None
+    client.stdin.write(line + b"\n")
+    client.stdin.flush()
+    if not client.stdout.readline():
+        raise DeviceError("the emulated I2C buses could not be scanned: is another umockdev in the way?")

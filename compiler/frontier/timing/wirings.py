@@ -1,0 +1,147 @@
+"""What a glove may be wired to: as it is, or as a new one would be, with port expanders at a clock or on a board."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from msgspec.structs import replace
+
+from ....drivers.i2c import tca9548a
+from ....drivers.i2c.registry import CHIPS
+from ....runtime.errors import HarnessError
+from ....runtime.harness.wiring import GloveWiring, Harness
+from ....runtime.scanning.costs import Costs
+from ....runtime.scanning.order import Unit, ports_in
+from ....runtime.scanning.propose import propose_board, propose_harness
+from ....runtime.scanning.timing import reading_of, scanner_us
+from ....runtime.scanning.whole import whole_scan
+from ...placement.costaware import PortCosts
+from .beside_wire import WIRE_ONLY, Beside
+
+AS_WIRED, BOARD = "as wired", "board"
+
+# One of each sort: a tca9555 reads as a pca9555 does, and an mcp23008 as half an mcp23017; eight pins of a pcf8574, at
+# 100 kHz, take longer than the sixteen of a pcf8575.
+KINDS = ("mcp23017", "pcf8575", "pca9555", "tca6424a")
+# Standard mode, Fast mode, Fast-mode Plus.
+CLOCKS_HZ = (100_000, 400_000, 1_000_000)
+BAUDS = (115_200, 1_000_000)
+# What an AVR's own bus is allowed in board.toml.
+_AVR_HZ = range(50_000, 400_001)
+
+
+@dataclass(frozen=True, slots=True)
+class Wiring:
+    """A way to wire switches.
+
+    name      "as wired" (the given harness), "board" (a switch scanner), or a kind of port expander for a new glove
+    clock_hz  of the bus, or baud of the board's line
+    harness   the given one, for "as wired"
+    muxes     whether chips may go behind a TCA9548A
+    """
+
+    name: str
+    clock_hz: int
+    harness: Harness | None = None
+    muxes: bool = True
+
+    def harness_of(self, names: Sequence[str], joints: bool) -> Harness:
+        """Return the harness in which the switches `names` are read, with a CyberGlove where `joints` are.
+
+        The given harness is returned as it is. Raises HarnessError where there is no room for so many switches.
+        """
+        if self.harness is not None:
+            return self.harness
+        glove = GloveWiring(port="/dev/ttyS0") if joints else None
+        if self.name == BOARD:
+            proposed = propose_board(names, cyberglove=glove)
+            return replace(proposed, scanners=tuple(replace(each, baud=self.clock_hz) for each in proposed.scanners))
+        proposed = propose_harness(names, self.name, cyberglove=glove)
+        self._check_muxes(proposed)
+        return replace(proposed, buses=tuple(replace(bus, clock_hz=self.clock_hz) for bus in proposed.buses))
+
+    def fits(self, names: Sequence[str]) -> bool:
+        """Return whether there is a place for every one of these switches."""
+        try:
+            return set(names) <= set(self.harness_of(names, joints=False).switches)
+        except HarnessError:
+            return False
+
+    def _check_muxes(self, harness: Harness) -> None:
+        if not any(chip.mux for bus in harness.buses for chip in bus.chips):
+            return
+        if not self.muxes:
+            raise HarnessError(f"so many {self.name} need a TCA9548A, of which the firmware selects no channels")
+        if self.clock_hz > tca9548a.CLOCK_HZ:
+            raise HarnessError(
+                f"so many {self.name} need a TCA9548A, which runs at {tca9548a.CLOCK_HZ} Hz at most: slow the bus down"
+            )
+
+
+def wirings(given: Harness | None, target: str = "host") -> tuple[Wiring, ...]:
+    """Return the wirings worth trying for `target` (a name of `thenar frontier --target`): the given one, and those of
+    a new glove.
+
+    An AVR reads its chips itself: without muxes, with registers, at 50 to 400 kHz, as board.toml has it. What is wired
+    otherwise, a board of its own included, is none of its wirings.
+    """
+    avr = target.startswith("avr")
+    found = [] if given is None or not given.switches or (avr and not _of_an_avr(given)) else [_as_wired(given)]
+    for kind in KINDS:
+        if avr and not CHIPS[kind].registers:
+            continue
+        clocks = (hz for hz in CLOCKS_HZ if hz <= CHIPS[kind].clock_hz and (not avr or hz in _AVR_HZ))
+        found += [Wiring(kind, hz, muxes=not avr) for hz in clocks]
+    return tuple(found if avr else [*found, *(Wiring(BOARD, baud) for baud in BAUDS)])
+
+
+def names_of(count: int) -> list[str]:
+    """Return names for the switches of a glove that is only tried: s0, s1, ..."""
+    return [f"s{number}" for number in range(count)]
+
+
+def port_costs(harness: Harness, names: Sequence[str], beside: Beside = WIRE_ONLY) -> PortCosts:
+    """Return what reading each port costs where all switches `names` hang on the ports of a whole scan.
+
+    A selection of a mux's channel is shared evenly by the ports that need it. A port is charged as a whole even if a
+    shorter reading would show the one switch that is kept. A board is one port: it always sends all its keys. Raises
+    HarnessError if a switch is wired to nothing.
+    """
+    scan = whole_scan(harness, names)
+    costs = Costs(scan.ports, harness)
+    us = [beside.reading_us(reading_of(port, harness)) for port in scan.ports]
+    for unit in costs.units:
+        for place, share_us in _shares(unit, costs):
+            us[place] += share_us
+    port_of: dict[int, int] = {}
+    for number, port in enumerate(scan.ports):
+        port_of |= dict.fromkeys((switch for _, switch in port.switches), number)
+    for board, pairs in zip(harness.scanners, scan.scanners, strict=True):
+        port_of |= dict.fromkeys((switch for _, switch in pairs), len(us))
+        us.append(scanner_us(board))
+    lacking = next((name for number, name in enumerate(names) if number not in port_of), None)
+    if lacking is not None:
+        raise HarnessError(
+            f"harness {harness.name!r} has no pin or key for {lacking!r}: add it to its file, or leave --glove out"
+        )
+    return PortCosts(tuple(port_of[number] for number in range(len(names))), tuple(us))
+
+
+def _shares(unit: Unit, costs: Costs) -> Iterator[tuple[int, float]]:
+    """Yield each port of a unit with its own time and its share of what the whole unit takes beyond those."""
+    ports = ports_in(unit)
+    # After all ports but itself, a port of a shared channel costs itself alone.
+    everything = sum(1 << port for port in ports)
+    alone = [costs.after(everything, port) for port in ports]
+    beyond = (costs.of(unit) - sum(alone)) / len(ports)
+    yield from ((port, (ns + beyond) / 1000) for port, ns in zip(ports, alone, strict=True))
+
+
+def _as_wired(given: Harness) -> Wiring:
+    clocks = [bus.clock_hz for bus in given.buses if bus.chips]
+    return Wiring(AS_WIRED, min(clocks or [board.baud for board in given.scanners]), given)
+
+
+def _of_an_avr(given: Harness) -> bool:
+    chips = [chip for bus in given.buses for chip in bus.chips]
+    plain = all(chip.mux is None and CHIPS[chip.kind].registers for chip in chips)
+    return plain and not given.scanners and len(given.buses) == 1 and given.buses[0].clock_hz in _AVR_HZ

@@ -1,0 +1,90 @@
+import pickle
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from thenar.compiler.firmware.choose import choose, features, flash_shares
+from thenar.compiler.firmware.targets import TARGETS as PARTS
+from thenar.compiler.frontier.points import FrontierError
+from thenar.compiler.frontier.timing.classify_times import CORTEX_HZ, TARGETS, ClassifyModel
+from thenar.compiler.frontier.timing.python_times import PythonCost, classify_us, fit_here, random_tables
+from thenar.runtime.tables import tables_to_bytes
+
+PYTHON = PythonCost(1.0, 0.1, 0.2, 0.3, 0.01, 0.02)
+TABLES = random_tables(33, 16, 14)
+
+
+@pytest.mark.parametrize(("target", "part"), [("avr328p", "atmega328p"), ("avr2560", "atmega2560")])
+def test_on_an_avr_the_options_are_the_layouts_worth_choosing_at_their_bounds_of_cycles(target: str, part: str) -> None:
+    avr, options = PARTS[part], ClassifyModel(target).options(TABLES)
+    best = [(layout, cost) for layout, cost in choose(TABLES, avr).frontier if cost.flash <= flash_shares(avr)[1]]
+    assert [option.layout for option in options] == [features(layout, avr) for layout, _ in best]
+    assert [option.us for option in options] == [cost.cycles / 16 for _, cost in best]
+    assert [(option.flash, option.ram) for option in options] == [(cost.flash, cost.ram) for _, cost in best]
+    assert {option.how for option in options} == {"model"}
+
+
+@pytest.mark.parametrize("target", [target for target in TARGETS if target not in ("host", "pi")])
+def test_of_two_options_the_slower_is_smaller(target: str) -> None:
+    options = ClassifyModel(target).options(TABLES)
+    assert len(options) > 2
+    for faster, slower in pairwise(options):
+        assert faster.us < slower.us
+        assert faster.flash > slower.flash
+
+
+def test_layouts_that_leave_no_room_for_the_rest_of_the_firmware_are_no_options() -> None:
+    part, tables = PARTS["atmega328p"], random_tables(60, 22, 33)
+    most = flash_shares(part)[1]
+    assert any(cost.flash > most for _, cost in choose(tables, part).frontier)
+    assert all(option.flash <= most for option in ClassifyModel("avr328p").options(tables))
+
+
+def test_tables_that_fit_in_no_layout_have_no_option() -> None:
+    assert ClassifyModel("avr328p").options(random_tables(160, 22, 60)) == ()
+
+
+@pytest.mark.parametrize("target", list(CORTEX_HZ))
+def test_instructions_take_a_cycle_each_at_a_clock_that_is_said(target: str) -> None:
+    usual, slow = ClassifyModel(target), ClassifyModel(target, clock_hz=8_000_000)
+    fastest = choose(TABLES, PARTS[target]).frontier[0][1]
+    assert slow.options(TABLES)[0].us == fastest.cycles / 8
+    assert usual.options(TABLES)[0].us == pytest.approx(fastest.cycles * 1e6 / CORTEX_HZ[target])
+    assert "at 8 MHz" in slow.note
+    assert "lower bound" in slow.note
+
+
+def test_on_a_computer_there_is_the_runtime_alone_and_a_line_through_what_it_took() -> None:
+    (option,) = ClassifyModel("host", python=PYTHON).options(TABLES)
+    size = len(tables_to_bytes(TABLES))
+    assert (option.layout, option.flash, option.ram) == ("", size, size)
+    assert option.us == pytest.approx(1 + 3.3 + 3.2 + 4.2 + 0.01 * 33 * 14 + 0.02 * 16 * 14)
+
+
+def test_a_raspberry_pi_elsewhere_is_so_many_times_as_slow_and_that_is_said_to_be_a_guess() -> None:
+    here, there = ClassifyModel("host", python=PYTHON), ClassifyModel("pi", python=PYTHON, factor=3.0)
+    assert there.options(TABLES)[0].us == pytest.approx(3 * here.options(TABLES)[0].us)
+    assert "guess" in there.note
+    assert here.note == ""
+
+
+def test_models_go_to_other_processes() -> None:
+    for target in TARGETS:
+        model = ClassifyModel(target, python=PYTHON)
+        assert pickle.loads(pickle.dumps(model)).options(TABLES) == model.options(TABLES)  # noqa: S301 - our own
+
+
+def test_there_is_no_other_target() -> None:
+    with pytest.raises(FrontierError, match="no target 'arduino'"):
+        ClassifyModel("arduino")
+
+
+def test_what_is_fitted_here_foretells_other_shapes() -> None:
+    """Within a factor of two: who else is on the machine is not known."""
+    fitted = fit_here()
+    others = [random_tables(*shape) for shape in ((24, 16, 10), (50, 0, 20), (100, 22, 14))]
+    for tables, taken in zip(others, classify_us(others), strict=True):
+        assert 0.5 < fitted.us(tables) / taken < 2.0
+    weights = (fitted.constant, fitted.switch, fitted.joint, fitted.klass, fitted.switch_class, fitted.joint_class)
+    assert np.all(np.array(weights) >= 0)

@@ -1,0 +1,130 @@
+from math import fsum
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.compiler.frontier.timing.beside_wire import (
+    Beside,
+    beside_wire,
+    board_beside,
+    firmware_beside,
+    measured_call_us,
+)
+from thenar.compiler.frontier.timing.classify_times import TARGETS
+from thenar.compiler.frontier.timing.python_times import random_tables
+from thenar.compiler.frontier.timing.scan_times import ScanTimes, record_period_us, scan_times, transfer_us
+from thenar.compiler.frontier.timing.wirings import BOARD, Wiring
+from thenar.runtime.errors import HarnessError
+from thenar.runtime.scanning.costs import Costs
+from thenar.runtime.scanning.earlyexit import EarlyExit
+from thenar.runtime.scanning.plan import plan_scan
+from thenar.runtime.scanning.propose import propose_harness
+from thenar.runtime.scanning.timing import scan_us, scanner_us
+
+CALL = Beside("a call", call_us=7.0)
+wired = st.builds(
+    Wiring, st.sampled_from(["mcp23017", "pca9555", "tca6424a", "pcf8575"]), st.sampled_from([100_000, 400_000])
+)
+
+
+def names_of(count: int) -> list[str]:
+    return [f"s{number}" for number in range(count)]
+
+
+def frames(switches: int, joints: int, n: int = 150) -> tuple[np.ndarray, np.ndarray]:
+    random = np.random.default_rng(switches)
+    return random.random((n, switches)) < 0.3, random.integers(0, 255, (n, joints)).astype(np.uint16)
+
+
+@given(st.integers(1, 140), st.sampled_from([0, 16]), wired)
+def test_a_full_scan_takes_what_the_runtime_predicts_with_a_system_call_a_transaction(
+    switches: int, joints: int, wiring: Wiring
+) -> None:
+    tables, names = random_tables(switches, joints, 5), names_of(switches)
+    times = scan_times(names, tables, wiring, *frames(switches, joints, 20), CALL)
+    harness = wiring.harness_of(names, joints=True)
+    scan = plan_scan(names, tables, harness)
+    assert times.full_us == pytest.approx(scan_us(scan, harness, CALL.call_us).us)
+    assert times.early_us <= times.full_us
+    assert (times.ports, times.chips, times.how) == (len(scan.ports), len(harness.buses[0].chips), "wire")
+
+
+@pytest.mark.parametrize("switches", [12, 33, 120])
+def test_a_scan_that_ends_early_takes_what_scanning_the_frames_one_by_one_comes_to(switches: int) -> None:
+    tables, names, wiring = random_tables(switches, 16, 6), names_of(switches), Wiring("mcp23017", 400_000)
+    bits, codes = frames(switches, 16)
+    harness = wiring.harness_of(names, joints=True)
+    # Of no more frames than decide on the order of ports, so that it is the same.
+    scan = plan_scan(names, tables, harness, bits, codes)
+    costs, ports = Costs(scan.ports, harness), [sum(1 << s for _, s in port.switches) for port in scan.ports]
+    early, taken_us, looks = EarlyExit(tables, ports), list[float](), 0
+    for frame, code in zip(bits, codes, strict=True):
+        closed = sum(1 << int(switch) for switch in np.flatnonzero(frame))
+        early.start(code.tolist())
+        read = 0
+        for port, group in enumerate(ports):
+            taken_us.append(costs.after(read, port) / 1000 + CALL.call_us * (1 + _selects(costs, read, port)))
+            read |= 1 << port
+            looks += 1
+            if early.after(port, closed & group):
+                break
+    times = scan_times(names, tables, wiring, bits, codes, CALL)
+    assert times.early_us == pytest.approx(fsum(taken_us) / len(bits))
+    assert times.early_ports == pytest.approx(looks / len(bits))
+    assert switches == 12 or times.early_us < times.full_us
+
+
+def _selects(costs: Costs, read: int, port: int) -> bool:
+    return costs.after(read, port) > costs.after(read | 1 << port, port)
+
+
+def test_on_an_avr_the_firmware_takes_its_time_for_scan_keys_readings_and_bytes() -> None:
+    tables, wiring, names = random_tables(20, 0, 4), Wiring("mcp23017", 400_000), names_of(20)
+    bare = scan_times(names, tables, wiring, *frames(20, 0))
+    there = scan_times(names, tables, wiring, *frames(20, 0), firmware_beside("atmega328p"))
+    cycles = 520 + 40 * 20 + 2 * 530 + (2 + 1) * 560
+    assert there.full_us - bare.full_us == pytest.approx(cycles / 16)
+    assert (bare.how, there.how) == ("wire", "model")
+
+
+def test_a_board_scans_its_keys_and_then_sends_its_whole_frame() -> None:
+    wiring, tables, own = Wiring(BOARD, 115_200), random_tables(33, 0, 4), board_beside()
+    times = scan_times(names_of(33), tables, wiring, *frames(33, 0))
+    line_us = scanner_us(wiring.harness_of(names_of(33), joints=False).scanners[0])
+    assert times.full_us == times.early_us == pytest.approx(line_us + own.scan_us + 33 * own.key_us)
+    assert (times.ports, times.chips, times.how) == (1, 1, "model")
+
+
+def test_without_switches_there_is_nothing_to_read() -> None:
+    none = scan_times((), random_tables(0, 16, 4), Wiring("mcp23017", 400_000), *frames(0, 16))
+    assert none == ScanTimes(0.0, 0.0, 0, 0, "wire", 0.0)
+
+
+def test_a_switch_without_a_place_is_an_error() -> None:
+    wiring = Wiring("as wired", 400_000, propose_harness(["s0"]))
+    with pytest.raises(HarnessError, match="s1"):
+        scan_times(names_of(2), random_tables(2, 0, 4), wiring, *frames(2, 0))
+
+
+@pytest.mark.parametrize(("joints", "sensors"), [(1, 18), (16, 18), (18, 18), (19, 22), (22, 22)])
+def test_a_record_has_18_or_22_sensors_a_letter_a_status_and_an_end(joints: int, sensors: int) -> None:
+    assert transfer_us(joints) == pytest.approx((sensors + 3) * 10 / 115_200 * 1e6)
+    assert record_period_us(joints) == pytest.approx(transfer_us(joints) + 250 * sensors)
+
+
+def test_without_joints_no_record_is_waited_for() -> None:
+    assert transfer_us(0) == record_period_us(0) == 0.0
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_every_target_says_what_its_scans_hold_beside_the_wire(target: str) -> None:
+    beside = beside_wire(target)
+    assert len(beside.what) > 20
+    assert (beside.scan_us > 0) == target.startswith("avr")
+    assert (beside.call_us > 0) == (not target.startswith("cortex"))
+
+
+def test_a_system_call_is_timed() -> None:
+    assert 0.05 < measured_call_us() < 1000.0

@@ -1,0 +1,130 @@
+from math import fsum
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.compiler.firmware import board_checks
+from thenar.compiler.firmware.board import Board, BoardBus
+from thenar.compiler.frontier.timing.beside_wire import Beside
+from thenar.compiler.frontier.timing.wirings import AS_WIRED, BOARD, CLOCKS_HZ, KINDS, Wiring, port_costs, wirings
+from thenar.drivers.i2c.registry import CHIPS
+from thenar.runtime.errors import HarnessError
+from thenar.runtime.harness.checks import faults
+from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.scanning.propose import propose_board, propose_harness
+from thenar.runtime.scanning.timing import scan_us, scanner_us
+from thenar.runtime.scanning.whole import whole_scan
+
+sizes = st.integers(1, 200)
+
+
+def names_of(count: int) -> list[str]:
+    return [f"s{number}" for number in range(count)]
+
+
+@given(sizes, st.booleans())
+def test_every_wiring_that_fits_is_a_sound_harness_of_all_the_switches_at_its_clock(size: int, joints: bool) -> None:
+    for wiring in wirings(None):
+        if wiring.fits(names_of(size)):
+            harness = wiring.harness_of(names_of(size), joints)
+            assert not list(faults(harness))
+            assert sorted(harness.switches) == sorted(names_of(size))
+            assert (harness.cyberglove is not None) == joints
+            rates = [bus.clock_hz for bus in harness.buses] + [board.baud for board in harness.scanners]
+            assert rates == [wiring.clock_hz]
+
+
+@given(st.integers(1, 112))
+def test_a_board_accepts_every_wiring_of_an_avr_that_fits(size: int) -> None:
+    for wiring in wirings(None, "avr328p"):
+        if wiring.fits(names_of(size)):
+            (bus,) = wiring.harness_of(names_of(size), joints=False).buses
+            board = Board(part="atmega328p", bus=BoardBus(clock_hz=bus.clock_hz), chips=bus.chips)
+            assert not list(board_checks.faults(board))
+
+
+def test_a_new_glove_has_every_sort_of_chip_at_every_clock_that_it_allows_or_a_board() -> None:
+    found = [(wiring.name, wiring.clock_hz) for wiring in wirings(None)]
+    chips = [(kind, hz) for kind in KINDS for hz in CLOCKS_HZ if hz <= CHIPS[kind].clock_hz]
+    assert found == [*chips, (BOARD, 115_200), (BOARD, 1_000_000)]
+
+
+def test_the_given_harness_comes_first_and_stays_as_it_is() -> None:
+    harness = propose_harness(names_of(20), "pca9555")
+    first = wirings(harness)[0]
+    assert (first.name, first.clock_hz) == (AS_WIRED, 400_000)
+    assert first.harness_of(names_of(3), joints=True) is harness
+    assert first.fits(names_of(20))
+    assert not first.fits(names_of(21))
+
+
+def test_the_clock_of_a_given_board_is_its_baud() -> None:
+    assert wirings(propose_board(names_of(5)))[0].clock_hz == 1_000_000
+
+
+@pytest.mark.parametrize(
+    "harness",
+    [
+        propose_harness(names_of(20), "pcf8575"),
+        propose_harness(names_of(160), "mcp23017"),
+        propose_board(names_of(20)),
+        Wiring("mcp23017", 1_000_000).harness_of(names_of(20), joints=False),
+        Harness(name="empty"),
+    ],
+    ids=["no registers", "mux", "board", "1 MHz", "nothing"],
+)
+def test_an_avr_has_no_wiring_that_its_firmware_could_not_read(harness: Harness) -> None:
+    assert AS_WIRED not in [wiring.name for wiring in wirings(harness, "avr2560")]
+
+
+def test_an_avr_reads_the_given_chips_where_it_can() -> None:
+    harness = propose_harness(names_of(20))
+    assert wirings(harness, "avr2560")[0] == Wiring(AS_WIRED, 400_000, harness)
+
+
+def test_a_mux_slows_a_bus_down_or_there_is_no_room() -> None:
+    fast = Wiring("mcp23017", 1_000_000)
+    assert fast.fits(names_of(112))
+    with pytest.raises(HarnessError, match="TCA9548A"):
+        fast.harness_of(names_of(113), joints=False)
+    with pytest.raises(HarnessError, match="selects no channels"):
+        Wiring("mcp23017", 400_000, muxes=False).harness_of(names_of(113), joints=False)
+    assert not Wiring("mcp23017", 100_000).fits(names_of(1000))
+
+
+@given(sizes, st.sampled_from(["mcp23017", "pca9555", "tca6424a", "pcf8575"]))
+def test_all_ports_together_cost_what_a_whole_scan_takes(size: int, kind: str) -> None:
+    harness = propose_harness(names_of(size), kind)
+    costs = port_costs(harness, names_of(size))
+    assert fsum(costs.us) == pytest.approx(scan_us(whole_scan(harness, harness.switches), harness).us)
+    assert sorted(set(costs.port_of)) == list(range(len(costs.us)))
+
+
+def test_what_is_beside_the_wire_counts_for_every_port() -> None:
+    harness, names = propose_harness(names_of(20)), names_of(20)
+    plain, dear = port_costs(harness, names), port_costs(harness, names, Beside("", call_us=10.0, byte_us=1.0))
+    # Two bytes of one chip; the other's six switches are on one of its ports.
+    assert [b - a for a, b in zip(plain.us, dear.us, strict=True)] == pytest.approx([12.0, 11.0])
+
+
+def test_ports_behind_a_channel_share_its_selection() -> None:
+    harness = propose_harness(names_of(130))
+    costs = port_costs(harness, names_of(130))
+    channels = [chip.mux and chip.mux.channel for chip in harness.buses[0].chips]
+    assert set(channels) == {None, 0, 1}
+    for port, channel in enumerate(channels[:-1]):
+        share = 0 if channel is None else (20 * 2.5 + 1.3) / channels.count(channel)
+        assert costs.us[port] == pytest.approx(48 * 2.5 + 1.3 + share)
+
+
+def test_a_board_is_one_port_that_costs_its_whole_frame() -> None:
+    harness = propose_board(names_of(50))
+    assert port_costs(harness, ["s3", "s40"]) == port_costs(harness, ["s40", "s3"])
+    costs = port_costs(harness, ["s3", "s40"])
+    assert (costs.port_of, costs.us) == ((0, 0), (scanner_us(harness.scanners[0]),))
+
+
+def test_a_switch_that_is_wired_to_nothing_is_named() -> None:
+    with pytest.raises(HarnessError, match="'thumb'"):
+        port_costs(propose_harness(["index"]), ["index", "thumb"])
