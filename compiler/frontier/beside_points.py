@@ -9,17 +9,18 @@ from .screening import Screening, fastest_us
 from .settings import BEST, Search
 
 # The paper's S.
-_PAPERS = (13.0, 62.0)
+_PAPERS = (62.0,)
 
 
 def choices_to_mark(n_switches: int, n_joints: int) -> dict[Choice, str]:
-    """Return what to mark, with its name: with all inputs, the paper's placements and all switches."""
+    """Return what to mark, with its name: the paper's placement and all switches, alone and with the joints."""
     if not n_switches:
         return {}
     marked = {Way("id3", prune): f"paper, S = {prune:g}" for prune in _PAPERS}
     # Whichever method says so, to keep all of them is the same.
-    marked[Way(BEST, float(n_switches))] = f"all {n_switches} switches"
-    return {Choice(way, "both" if n_joints else "switches"): name for way, name in marked.items()}
+    marked[Way(BEST, float(n_switches))] = f"all of {n_switches}"
+    alone = {Choice(way, "switches"): name for way, name in marked.items()}
+    return alone | ({Choice(way, "both"): f"{name}, joints" for way, name in marked.items()} if n_joints else {})
 
 
 def marks_of(named: dict[Choice, str], closes: Sequence[Close], search: Search, joints: int) -> tuple[Mark, ...]:

@@ -48,7 +48,8 @@ def test_nothing_is_screened_with_more_rounds_than_are_trained() -> None:
 def test_the_papers_placements_are_marked_with_all_inputs_that_there_are() -> None:
     assert Choice(Way("id3", 62.0), "both") in choices_to_mark(14, 3)
     assert Choice(Way("id3", 62.0), "switches") in choices_to_mark(14, 0)
-    assert choices_to_mark(14, 0)[Choice(Way("elimination", 14.0), "switches")] == "all 14 switches"
+    assert choices_to_mark(14, 0)[Choice(Way("elimination", 14.0), "switches")] == "all of 14"
+    assert choices_to_mark(14, 3)[Choice(Way("elimination", 14.0), "both")] == "all of 14, joints"
     assert choices_to_mark(0, 3) == {}
 
 
