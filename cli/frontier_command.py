@@ -27,7 +27,7 @@ TARGETS = ("avr328p", "avr2560", "cortex-m0plus", "cortex-m4", "host", "pi")
 @click.option("--rounds", type=click.IntRange(1, 300), default=300, show_default=True, help="The most rounds to try.")
 @click.option("--repeats", type=click.IntRange(1), default=3, show_default=True, help="Repeats of the folds.")
 @click.option(
-    "--finalists", type=click.IntRange(1), default=9, show_default=True, help="Placements to look at closely."
+    "--finalists", type=click.IntRange(1), default=10, show_default=True, help="Placements to look at closely."
 )
 @click.option("--max-bins", type=click.IntRange(2), help="At most so many bins a joint.  [default: no limit]")
 @click.option("--seed", type=int, default=1, show_default=True, help="Seed of folds and stream.")

@@ -14,7 +14,7 @@ from .points import Rate, Way
 # The placement of inputs without switches.
 NO_SWITCHES = Way("none", 0.0)
 # Of what the best recognises; the least gain that counts on a front of rates that were screened; what is level.
-_USEFUL, _STEP, _LEVEL = 0.5, 0.003, 0.005
+_USEFUL, _STEP, _LEVEL = 0.75, 0.003, 0.005
 # The share of errors below which fewer no longer count: a screening of some hundred rows cannot tell.
 _FEWEST = 0.002
 
@@ -53,8 +53,8 @@ def finalists(screened: Sequence[Screened], wanted: Sequence[Choice], most: int)
 
     They are on a front of rate against frame time or, among the same inputs, against the number of switches, and are
     shared out evenly among the kinds of inputs. Of a kind first the best, then the smallest that is level with it, then
-    always the one whose share of errors is least like that of any chosen. Choices of the same inputs and switches count
-    once; those that recognise less than half of what the best does are of no use.
+    always the one whose share of errors and frame time are least like those of any chosen. Choices of the same inputs
+    and switches count once; those that recognise less than three quarters of what the best does are of no use.
     """
     enough = _USEFUL * max((one.rate.mean for one in screened), default=0.0)
     useful = [one for one in _different(screened) if one.rate.mean >= enough]
@@ -88,9 +88,13 @@ def _spread(mine: list[Screened]) -> list[Screened]:
     order = list(dict.fromkeys([best, min(level, key=lambda one: len(one.columns))]))
     left = [one for one in mine if one not in order]
     while left:
-        order.append(max(left, key=lambda one: min(abs(_errors(one) - _errors(known)) for known in order)))
+        order.append(max(left, key=lambda one: min(_unlike(one, known) for known in order)))
         left.remove(order[-1])
     return order
+
+
+def _unlike(one: Screened, other: Screened) -> float:
+    return abs(_errors(one) - _errors(other)) + abs(log(one.frame_us / other.frame_us))
 
 
 def _errors(one: Screened) -> float:

@@ -17,7 +17,8 @@ _FACTORS = 512
 
 
 def exact_sum(values: Floats) -> float:
-    """Return the sum of `values`, any shape, each of which counts to within 2^-52 of their number times the largest.
+    """Return the sum of `values`, any shape, each of which counts to within 2^-52 of their number times the largest,
+    and no finer than 2^-1000.
 
     They are rounded to a grid on which all partial sums are whole, and so exact.
     """

@@ -145,7 +145,7 @@ def run(folder: Path, numbers: range) -> None:
 RUN = """
 import sys
 from pathlib import Path
-from tests.compiler.frontier.test_resuming import run
+from tests.compiler.frontier.storing.test_resuming import run
 run(Path(sys.argv[1]), range(1000))
 """
 

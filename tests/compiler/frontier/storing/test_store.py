@@ -174,7 +174,7 @@ def test_closing_twice_is_closing_and_nothing_is_put_after_it(tmp_path: Path) ->
 FULL_DISK = """
 import resource, signal, sys
 from pathlib import Path
-from tests.compiler.frontier.test_store import Answer, Question
+from tests.compiler.frontier.storing.test_store import Answer, Question
 from thenar.compiler.frontier.storing.store import Store, StoreError
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
