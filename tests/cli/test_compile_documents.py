@@ -17,6 +17,8 @@ from thenar.compiler.recordings.taxonomy import own
 from thenar.simulator.handmaps.handmap import hand_map
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
+pytestmark = pytest.mark.slow
+
 QUICK = ("--rounds", 3, "--folds", 0)
 TAGS = re.compile(r"<[^>]*>")
 

@@ -9,6 +9,8 @@ from thenar.cli import run
 from thenar.cli.kept_files import kept_names
 from thenar.compiler import GraspSet
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def crowd_file(small_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -19,6 +19,8 @@ from thenar.compiler.cluster import ClusterError
 from thenar.compiler.payloads import SHARED_BYTES
 from thenar.compiler.workers import in_workers
 
+pytestmark = pytest.mark.slow
+
 X = np.arange(4 * SHARED_BYTES, dtype=np.uint16).reshape(-1, 8)
 
 
@@ -148,7 +150,6 @@ def killed_at_first(number: int, folder: Path) -> int:
     raise AssertionError
 
 
-@pytest.mark.slow
 def test_a_worker_that_is_killed_loses_nothing(scheduler: str, tmp_path: Path) -> None:
     (tmp_path / "0").touch()
     (tmp_path / "1").touch()
@@ -159,7 +160,6 @@ def killed(_number: int) -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-@pytest.mark.slow
 def test_work_that_kills_every_worker_it_meets_is_an_error_and_the_cluster_lives_on(scheduler: str) -> None:
     with pytest.raises(ClusterError, match="one piece of work ended 4 workers"):
         list(in_workers(killed, [0], 1, scheduler))
@@ -203,7 +203,6 @@ def served() -> Iterator[Served]:
     processes.end()
 
 
-@pytest.mark.slow
 def test_a_worker_without_thenar_is_named(served: Served, tmp_path: Path) -> None:
     (tmp_path / "thenar.py").write_text("raise ModuleNotFoundError(\"No module named 'thenar'\", name='thenar')")
     served.worker(PYTHONPATH=str(tmp_path))
@@ -211,14 +210,12 @@ def test_a_worker_without_thenar_is_named(served: Served, tmp_path: Path) -> Non
         list(in_workers(operator.neg, [1], 1, served.address))
 
 
-@pytest.mark.slow
 def test_a_scheduler_without_workers_is_told(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(under_test, "WORKERS_S", 0.5)
     with pytest.raises(ClusterError, match="has no workers: start some"):
         list(in_workers(operator.neg, [1], 1, served.address))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("who", "said"), [("worker", "has no workers"), ("scheduler", "is lost")])
 def test_a_cluster_that_is_lost_on_the_way_is_an_error(
     served: Served, who: str, said: str, monkeypatch: pytest.MonkeyPatch
@@ -248,7 +245,6 @@ for number in in_workers(slow_after_the_first, range(2), 1, sys.argv[1]):
 """
 
 
-@pytest.mark.slow
 def test_an_interrupt_ends_the_waiting_at_once(served: Served) -> None:
     served.worker()
     command = [sys.executable, "-c", INTERRUPTED, served.address]

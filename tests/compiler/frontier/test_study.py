@@ -20,6 +20,9 @@ from thenar.runtime.scanning.propose import propose_harness
 Make = Callable[..., GraspSet]
 
 
+pytestmark = pytest.mark.slow
+
+
 def asked(folder: Path, grasp_set: GraspSet, **changes: Any) -> Request:
     folder.mkdir(exist_ok=True)
     grasp_set.save(folder / "set.grasps")
@@ -122,7 +125,6 @@ def test_running_again_finds_everything_in_the_store(first: tuple[Request, Front
     assert again.points == found.points
 
 
-@pytest.mark.slow
 def test_a_run_that_is_interrupted_goes_on_without_repeating_anything(tmp_path: Path, make_set: Make) -> None:
     request = asked(tmp_path, make_set())
     store, counts = request.output / "store.jsonl", list[int]()
@@ -142,7 +144,6 @@ def test_a_run_that_is_interrupted_goes_on_without_repeating_anything(tmp_path: 
     assert found.points
 
 
-@pytest.mark.slow
 def test_the_time_that_is_left_is_told_from_the_start(tmp_path: Path, make_set: Make) -> None:
     told = list[tuple[int, int]]()
     run_frontier(asked(tmp_path, make_set(rows=400, subjects=3)), lambda done, total: told.append((done, total)))
@@ -151,7 +152,6 @@ def test_the_time_that_is_left_is_told_from_the_start(tmp_path: Path, make_set: 
     assert told[-1][0] == told[-1][1]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("switches", "joints", "inputs"),
     [(14, 0, {"switches"}), (0, 3, {"joints"}), (1, 2, {"both", "switches", "joints"})],
@@ -167,12 +167,10 @@ def test_a_set_may_lack_switches_or_joints(
         assert "paper, S = 62" in [mark.name for mark in found.marks]
 
 
-@pytest.mark.slow
 def test_two_rows_of_a_type_are_enough(tmp_path: Path, make_set: Make) -> None:
     assert found_of(asked(tmp_path, make_set(rows=8))).points
 
 
-@pytest.mark.slow
 def test_a_glove_of_fewer_switches_serves_the_placements_within_it(tmp_path: Path, make_set: Make) -> None:
     glove = tmp_path / "glove.toml"
     glove.write_text(harness_to_toml(propose_harness([f"s{number}" for number in range(10)])))
@@ -183,7 +181,6 @@ def test_a_glove_of_fewer_switches_serves_the_placements_within_it(tmp_path: Pat
     assert found.points
 
 
-@pytest.mark.slow
 def test_what_ports_cost_is_part_of_the_question(tmp_path: Path, make_set: Make) -> None:
     methods = ("id3-cost",)
     request = asked(tmp_path, make_set(), methods=methods, rivals=())
@@ -199,7 +196,6 @@ def test_what_ports_cost_is_part_of_the_question(tmp_path: Path, make_set: Make)
     assert len(keys_in(tmp_path / "out" / "store.jsonl")) > len(keys_in(tmp_path / "alone" / "store.jsonl"))
 
 
-@pytest.mark.slow
 def test_another_stream_is_another_question(tmp_path: Path, make_set: Make) -> None:
     request = asked(tmp_path, make_set(), methods=("id3",), rivals=())
     found_of(request)
@@ -218,7 +214,6 @@ def test_recordings_that_are_trained_on_are_no_stream(tmp_path: Path, make_set: 
         found_of(replace(request, stream=request.recordings))
 
 
-@pytest.mark.slow
 def test_a_build_is_marked_with_what_it_recognises(tmp_path: Path, make_set: Make) -> None:
     grasp_set = make_set()
     build = compile_build(grasp_set, tmp_path / "mine", rounds=5, folds=4).folder
@@ -244,7 +239,6 @@ def test_an_unknown_rival_is_told(tmp_path: Path, make_set: Make) -> None:
         found_of(asked(tmp_path, make_set(), rivals=("nonsense",)))
 
 
-@pytest.mark.slow
 def test_two_workers_of_a_cluster_find_the_same(tmp_path: Path, make_set: Make) -> None:
     grasp_set = make_set(subjects=2)
     here = found_of(asked(tmp_path / "here", grasp_set, target="avr328p"))
