@@ -1,5 +1,6 @@
 """Independent pieces of work on the workers of a Dask cluster: same answers as here, each as soon as it is there."""
 
+import asyncio
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
@@ -55,8 +56,7 @@ def _connected(address: str) -> "Iterator[Client]":
             "work on a cluster takes Dask, which is not installed: pip install 'thenar[cluster]'"
         ) from None
     try:
-        if not address:
-            raise ValueError("no address")  # for which Dask would start a cluster here
+        asyncio.run(_greet(address))
         client = Client(address, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError, TypeError, RuntimeError) as reason:
         raise ClusterError(
@@ -67,6 +67,19 @@ def _connected(address: str) -> "Iterator[Client]":
         yield client
     finally:
         client.close(timeout=CONNECT_S)
+
+
+async def _greet(address: str) -> None:
+    """Connect to the scheduler and go.
+
+    A Client that cannot connect stays half made, and its end, whenever it is collected, can take the lock under which
+    the next one starts: none is made where nobody answers. (To one without address, Dask would start a cluster here.)
+    """
+    from distributed import Security
+    from distributed.comm import connect
+
+    greeting = await connect(address, timeout=CONNECT_S, **Security().get_connection_args("client"))
+    await greeting.close()
 
 
 def _check_workers(client: "Client", address: str) -> None:

@@ -1,4 +1,5 @@
 import builtins
+import gc
 import operator
 import os
 import signal
@@ -133,6 +134,13 @@ def test_an_address_where_no_scheduler_answers_is_told_within_seconds(
     monkeypatch.setattr(under_test, "CONNECT_S", 0.5)
     with pytest.raises(ClusterError, match=f"no Dask scheduler answers at '{address}'"):
         list(in_workers(operator.neg, [1], 1, address))
+
+
+def test_where_nobody_answers_no_client_is_left_to_hold_up_the_next() -> None:
+    for address in ("nonsense", "foo://127.0.0.1:1"):
+        with pytest.raises(ClusterError, match="no Dask scheduler answers"):
+            list(in_workers(operator.neg, [1], 1, address))
+    assert not [thing for thing in gc.get_objects() if isinstance(thing, Client) and thing.status == "connecting"]
 
 
 def test_without_dask_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
