@@ -1,13 +1,10 @@
 """What a classifier takes of an AVR: compiled, linked, and run frame by frame in libsimavr."""
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-from firmwaredata import ROUNDS, SEED, SWITCHES
 from firmwarepeers import Peer
 from numpy.typing import NDArray
 
@@ -19,8 +16,7 @@ from thenar.compiler.firmware.errors import FirmwareError
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import Target
 from thenar.compiler.firmware.tools import call, find, workshop
-from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Proof, Source, Switch
-from thenar.runtime.tables import IntegerTables, tables_to_bytes
+from thenar.compiler.frontier.timing.measured_cycles import nameless
 
 # As thenar's Makefiles compile: what is not called is not linked.
 _HOW = ("-Os", "-std=gnu99", "-w", "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections")
@@ -71,25 +67,6 @@ class Limits:
         return f"{', '.join(asked)}: {'kept' if kept else 'NOT KEPT'}"
 
 
-def manifest_of(integers: IntegerTables) -> Manifest:
-    """Return a manifest for tables that belong to no build: names for the comments of the generated C."""
-    data = hashlib.sha256(tables_to_bytes(integers)).hexdigest()
-    return Manifest(
-        schema=SCHEMA,
-        checksum="",
-        thenar=version("thenar"),
-        tables_sha256=data,
-        ensemble_sha256=data,
-        source=Source(data, 0, "kamakura14", SWITCHES),
-        options=Options(0, ROUNDS, "both", 1.0, 0, SEED),
-        grasps=tuple(f"grasp {k}" for k in range(integers.n_classes)),
-        switches=tuple(Switch(s, f"switch {s}", 0.0) for s in range(integers.n_switches)),
-        joints=tuple(Calibration(a, f"joint {a}", "deg", 1, 0.0, 2, 1.0) for a in range(integers.n_joints)),
-        proof=Proof(16, integers.scale, integers.bound, 0.0, 0.0, 0, 0),
-        rates=(),
-    )
-
-
 def _linked(folder: Path, sources: Mapping[str, str], part: str) -> tuple[int, int]:
     """Link `program.elf` of the sources in the folder; return bytes of flash and RAM. Peers' warnings are theirs."""
     code = sorted(path for path in sources if path.endswith((".c", ".S")))
@@ -102,7 +79,7 @@ def of_ours(layout: Layout, target: Target, frames: Frames, expected: Scores, *,
     """Return what thenar's classifier takes for frames whose scores (n, K) are known; with `changes`, update()'s cost
     for every frame but the first, which has nothing to start from.
     """
-    files = classifier_files("glove", manifest_of(layout.tables), layout, avr=True)
+    files = classifier_files("glove", nameless(layout.tables), layout, avr=True)
     called = ("classify", "update") if changes else ("classify",)
     body = " ".join(f"thenar_glove_{function}();" for function in called)
     program = {**files, "main.c": f'#include "thenar_glove.h"\nint main(void) {{ for (;;) {{ {body} }} }}\n'}
@@ -138,7 +115,7 @@ def of_peer(peer: Peer, target: Target) -> Cost:
 
 def instructions(layout: Layout, core: Target, frames: Frames, expected: Scores) -> int:
     """Return the most instructions that a frame takes on a Cortex-M. Raises FirmwareError if any score is wrong."""
-    files = classifier_files("glove", manifest_of(layout.tables), layout, avr=False)
+    files = classifier_files("glove", nameless(layout.tables), layout, avr=False)
     answers = run_cortex(files, "glove", layout, core, frames)
     if answers.cost is None or (answers.scores != expected).any():
         raise FirmwareError(f"{core.part} gives other scores than Python")

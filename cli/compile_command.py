@@ -6,21 +6,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..drivers.i2c.registry import CHIPS
-from .common import any_path, err, existing_file, json_flag, keep_apart, out, output_file, print_json, progress
-from .hand import hand_of
+from .common import any_path, err, existing_file, json_flag, out, output_file, print_json, progress
+from .compile_asked import TABLE_BITS, Asked
 from .scan_tables import print_scan
 
 if TYPE_CHECKING:
     from ..compiler.build.compile import BuildReport
-    from ..runtime.manifest import Inputs, Manifest, TableBits
-    from .compile_documents import Papers, Progress
-    from .from_frontier import Picked
+    from ..runtime.manifest import Manifest
 
 _CHIP = "mcp23017"
 _BOARD = "board"
-# What a point of a frontier says.
-_SETTLED = ("prune", "rounds", "inputs", "table_bits", "max_bins", "placement", "keep", "width")
-_TABLE_BITS: "dict[str, TableBits]" = {"16": 16, "8": 8}
 
 
 @click.command("compile")
@@ -43,7 +38,7 @@ _TABLE_BITS: "dict[str, TableBits]" = {"16": 16, "8": 8}
 @click.option("--seed", type=int, default=1, show_default=True, help="Seed of the folds.")
 @click.option(
     "--table-bits",
-    type=click.Choice(list(_TABLE_BITS)),
+    type=click.Choice(list(TABLE_BITS)),
     default="16",
     show_default=True,
     help="8: coarser steps, so that firmware can store a byte an entry.",
@@ -68,32 +63,7 @@ _TABLE_BITS: "dict[str, TableBits]" = {"16": 16, "8": 8}
 @click.option("--overwrite", is_flag=True, help="Let --propose replace a file that is there.")
 @json_flag
 @click.pass_context
-def command(
-    context: click.Context,
-    recordings: Path,
-    output: Path,
-    prune: int,
-    rounds: int,
-    inputs: "Inputs",
-    shrinkage: float,
-    tolerance: float | None,
-    folds: int,
-    seed: int,
-    table_bits: str,
-    max_bins: int | None,
-    placement: str,
-    keep: int | None,
-    width: int,
-    from_frontier: Path | None,
-    point: int | None,
-    report: bool,
-    hand_length: float | None,
-    glove: Path | None,
-    propose: Path | None,
-    chip: str | None,
-    overwrite: bool,
-    as_json: bool,
-) -> None:
+def command(context: click.Context, /, **options: Any) -> None:
     """Choose the switches, train, and write integer tables with their proof.
 
     The folder holds build.json, tables.bin and ensemble.bin, the classifier in C in firmware/, and with --glove
@@ -106,102 +76,52 @@ def command(
         thenar compile set.grasps -o build/ --glove glove.toml
         thenar compile set.grasps -o build/ --from frontier/frontier.json --point 7
     """
-    from ..compiler.build.compile import compile_build
-    from ..compiler.build.made import no_documents
-    from ..compiler.frontier.timing.whole_glove import ports_of_whole_glove
-    from ..compiler.recordings.graspset import GraspSet
-    from ..runtime.harness.loading import load_harness
-    from .from_frontier import picked
-
-    _check_proposal(glove, propose, chip, overwrite)
-    _check_point(context, from_frontier, point)
-    if hand_length is not None and not report:
-        raise click.UsageError("--hand-length is of the hand in spec/, which --no-report leaves out: give one of them.")
-    keep_apart(recordings, glove, propose, from_frontier)
-    given = None if glove is None else load_harness(glove)
-    grasp_set = GraspSet.load(recordings)
-    if hand_length is not None and hand_of(grasp_set.switch_names) is None:
-        raise click.UsageError(
-            "--hand-length: the switches of these recordings are not those of murakami160, and where they lie is not "
-            "known."
-        )
-    options: dict[str, Any] = {
-        "prune": prune,
-        "rounds": rounds,
-        "inputs": inputs,
-        "table_bits": _TABLE_BITS[table_bits],
-        "max_bins": max_bins,
-        "placement": placement,
-        "keep": keep,
-        "width": width,
-    }
-    chosen = None if from_frontier is None else picked(from_frontier, point, grasp_set)
-    if chosen is not None:
-        options |= chosen.options
-    with progress("compiling, then the paper's tables" if report and folds else "compiling") as told:
-        made = compile_build(
-            grasp_set,
-            output,
-            **options,
-            shrinkage=shrinkage,
-            tolerance=tolerance,
-            folds=folds,
-            seed=seed,
-            harness=given if chosen is None else chosen.wired(given),
-            ports=ports_of_whole_glove(given, grasp_set.switch_names),
-            documents=_papers(chosen, hand_length, told) if report else no_documents,
-            progress=told,
-        )
+    asked = Asked(**options)
+    asked.check(context)
+    made = _made(asked)
     if made.only_answer is not None:
         err().print(
             f"warning: the build recognises every row as {made.only_answer}: no input tells grasp types apart by "
             "itself, and stumps look at one at a time"
         )
-    if propose is not None:
-        _propose(made.manifest, propose, chip or _CHIP)
-    if as_json:
+    if asked.propose is not None:
+        _propose(made.manifest, asked.propose, asked.chip or _CHIP)
+    if asked.as_json:
         print_json(made.manifest)
         return
-    _print(made, output)
+    _print(made, asked.output)
     if made.harness is not None and made.scan is not None:
         print_scan(made.scan, made.harness)
-    if propose is not None:
+    if asked.propose is not None:
         out().print(
-            f"{propose}: a harness for the kept switches; wire the glove so, then compile with --glove {propose}"
+            f"{asked.propose}: a harness for the kept switches; wire the glove so, then compile with "
+            f"--glove {asked.propose}"
         )
 
 
-def _papers(chosen: "Picked | None", hand_length: float | None, told: "Progress") -> "Papers":
-    from .compile_documents import Papers
+def _made(asked: Asked) -> "BuildReport":
+    from ..compiler.build.compile import compile_build
+    from ..compiler.build.made import no_documents
+    from ..compiler.frontier.timing.whole_glove import ports_of_whole_glove
+    from ..compiler.recordings.graspset import GraspSet
+    from ..runtime.harness.loading import load_harness
+    from .compile_documents import BuildDocuments
+    from .from_frontier import picked
 
-    if chosen is None:
-        return Papers(told, hand_length=hand_length)
-    return Papers(told, chosen.frontier, chosen.point.number, hand_length)
-
-
-def _check_point(context: click.Context, frontier: Path | None, point: int | None) -> None:
-    """Refuse options that a point settles, and a point of no frontier."""
-    if frontier is None:
-        if point is not None:
-            raise click.UsageError("--point is one of a frontier: name its file with --from.")
-        return
-    for name in _SETTLED:
-        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
-            raise click.UsageError(
-                f"--{name.replace('_', '-')} is settled by the point that --from names: leave it out."
-            )
-
-
-def _check_proposal(glove: Path | None, propose: Path | None, chip: str | None, overwrite: bool) -> None:
-    """Refuse before the training what could not be done after it."""
-    if propose is None:
-        if chip is not None or overwrite:
-            raise click.UsageError("--chip and --overwrite say how to --propose a harness: name the file to write.")
-        return
-    if glove is not None:
-        raise click.UsageError("--glove reads a wiring, --propose writes a new one: give one of them.")
-    if propose.exists() and not overwrite:
-        raise click.UsageError(f"{propose} is there already: name another file, or add --overwrite.")
+    given = None if asked.glove is None else load_harness(asked.glove)
+    grasp_set = GraspSet.load(asked.recordings)
+    asked.check_hand(grasp_set.switch_names)
+    chosen = None if asked.from_frontier is None else picked(asked.from_frontier, asked.point, grasp_set)
+    with progress("compiling, then the paper's tables" if asked.report and asked.folds else "compiling") as told:
+        return compile_build(
+            grasp_set,
+            asked.output,
+            **(asked.training if chosen is None else asked.training | chosen.options),
+            harness=given if chosen is None else chosen.wired(given),
+            ports=ports_of_whole_glove(given, grasp_set.switch_names),
+            documents=BuildDocuments(told, chosen, asked.hand_length) if asked.report else no_documents,
+            progress=told,
+        )
 
 
 def _propose(manifest: "Manifest", path: Path, chip: str) -> None:

@@ -10,7 +10,7 @@ from .hand import hand_of
 if TYPE_CHECKING:
     from ..compiler.build.made import Made
     from ..compiler.evaluation.study import Study
-    from ..compiler.frontier.points import Frontier
+    from .from_frontier import Picked
 
     Progress = Callable[[int, int], None]
 
@@ -18,17 +18,16 @@ _SMALL = 5000  # rows times rounds
 
 
 @dataclass(frozen=True, slots=True)
-class Papers:
+class BuildDocuments:
     """Writes `report.html` and, where switches are kept, `spec/`.
 
     report       called with what is done and to do of the paper's tables
-    frontier     the frontier that the build was picked from, and the number of its point
+    picked       the point of a frontier that is built, if it is one
     hand_length  of whom the glove is for, mm; None: the usual hand
     """
 
     report: "Progress | None" = None
-    frontier: "Frontier | None" = None
-    point: int | None = None
+    picked: "Picked | None" = None
     hand_length: float | None = None
 
     def __call__(self, made: "Made") -> Mapping[str, bytes]:
@@ -60,8 +59,8 @@ class Papers:
                 confusion=made.confusion,
                 study=study,
                 no_study=no_study,
-                frontier=self.frontier,
-                point=self.point,
+                frontier=None if self.picked is None else self.picked.frontier,
+                point=None if self.picked is None else self.picked.point.number,
                 hand=hand_of(made.grasp_set.switch_names),
                 scan=made.scan,
                 harness=made.harness,

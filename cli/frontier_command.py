@@ -1,16 +1,21 @@
 """`thenar frontier`: what accuracy costs in time."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..compiler.frontier.targets import TARGETS
 from .common import any_path, err, existing_file, existing_folder, json_flag, out, print_json, progress
 
 if TYPE_CHECKING:
     from ..compiler.frontier.points import Frontier
 
-TARGETS = ("avr328p", "avr2560", "cortex-m0plus", "cortex-m4", "host", "pi")
+
+def _names(_context: click.Context, _parameter: click.Parameter, text: str | None) -> tuple[str, ...] | None:
+    if text is None:
+        return None
+    return tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip() and name.strip() != "none"))
 
 
 @click.command("frontier")
@@ -22,8 +27,14 @@ TARGETS = ("avr328p", "avr2560", "cortex-m0plus", "cortex-m4", "host", "pi")
 @click.option("--rate", type=click.FloatRange(0, 1, min_open=True), help="Pick the fastest that recognises this share.")
 @click.option("--build", type=existing_folder, help="A build of yours: mark it on the pictures.")
 @click.option("--stream", type=existing_file, help="A set of whole movements: measure decision latency on it.")
-@click.option("--methods", help="Placements to build from, by commas.  [default: elimination,id3,id3-cost,id3-ccp]")
-@click.option("--rivals", help="Placements to see beside them, by commas, or none.  [default: all installed]")
+@click.option(
+    "--methods",
+    callback=_names,
+    help="Placements to build from, by commas.  [default: elimination,id3,id3-cost,id3-ccp]",
+)
+@click.option(
+    "--rivals", callback=_names, help="Placements to see beside them, by commas, or none.  [default: all installed]"
+)
 @click.option("--rounds", type=click.IntRange(1, 300), default=300, show_default=True, help="The most rounds to try.")
 @click.option("--repeats", type=click.IntRange(1), default=3, show_default=True, help="Repeats of the folds.")
 @click.option(
@@ -32,28 +43,11 @@ TARGETS = ("avr328p", "avr2560", "cortex-m0plus", "cortex-m4", "host", "pi")
 @click.option("--max-bins", type=click.IntRange(2), help="At most so many bins a joint.  [default: no limit]")
 @click.option("--seed", type=int, default=1, show_default=True, help="Seed of folds and stream.")
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Worker processes; -1: all cores.")
-@click.option("--dask", metavar="ADDRESS", help="Work on the cluster of this Dask scheduler, such as tcp://host:8786.")
+@click.option(
+    "--dask", "cluster", metavar="ADDRESS", help="Work on the cluster of this Dask scheduler, such as tcp://host:8786."
+)
 @json_flag
-def command(
-    recordings: Path,
-    output: Path,
-    glove: Path | None,
-    target: str,
-    budget_us: float | None,
-    rate: float | None,
-    build: Path | None,
-    stream: Path | None,
-    methods: str | None,
-    rivals: str | None,
-    rounds: int,
-    repeats: int,
-    finalists: int,
-    max_bins: int | None,
-    seed: int,
-    jobs: int,
-    dask: str | None,
-    as_json: bool,
-) -> int:
+def command(budget_us: float | None, rate: float | None, as_json: bool, **asked: Any) -> int:
     """Show what accuracy costs in time: which switches, joints, rounds, tables, wirings and decisions are worth it.
 
     Every placement is screened by an honest cross-validation; those near the front are looked at closely, priced for
@@ -70,40 +64,17 @@ def command(
 
     if budget_us is not None and rate is not None:
         raise click.UsageError("--budget-us and --rate each pick a point: give one of them.")
-    request = Request(
-        recordings=recordings,
-        output=output,
-        glove=glove,
-        target=target,
-        wanted=Wanted(budget_us, rate),
-        build=build,
-        stream=stream,
-        methods=_names(methods),
-        rivals=_names(rivals),
-        rounds=rounds,
-        repeats=repeats,
-        finalists=finalists,
-        max_bins=max_bins,
-        seed=seed,
-        jobs=jobs,
-        cluster=dask,
-    )
+    request = Request(wanted=Wanted(budget_us, rate), **asked)
     with progress("frontier") as report:
         found = run_frontier(request, report)
     if as_json:
         print_json(found)
     else:
-        _print(found, output)
+        _print(found, request.output)
     if request.wanted.words and found.picked is None:
         err().print(f"no point suits: {request.wanted.words} is beyond this frontier")
         return 1
     return 0
-
-
-def _names(text: str | None) -> tuple[str, ...] | None:
-    if text is None:
-        return None
-    return tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip() and name.strip() != "none"))
 
 
 def _print(found: "Frontier", output: Path) -> None:

@@ -76,7 +76,7 @@ async def _greet(address: str) -> None:
     the next one starts: none is made where nobody answers. (To one without address, Dask would start a cluster here.)
     """
     from distributed import Security
-    from distributed.comm import connect
+    from distributed.comm.core import connect
 
     greeting = await connect(address, timeout=CONNECT_S, **Security().get_connection_args("client"))
     await greeting.close()

@@ -1,6 +1,7 @@
 """Independent pieces of work on all cores, each answer handed over as soon as it is there."""
 
 import signal
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
@@ -13,6 +14,7 @@ Answer = TypeVar("Answer")
 
 # More processes are asked for by a slip only, and would take the machine with them.
 MOST_JOBS = 1024
+_LOKYS_THREAD = "ExecutorManagerThread"
 
 
 def in_workers(
@@ -38,9 +40,10 @@ def in_workers(
     with parallel_config(backend="loky", inner_max_num_threads=1):
         workers = Parallel(n_jobs=min(jobs, MOST_JOBS), return_as="generator_unordered")
         try:
-            with _interrupts_held():
-                answers = workers(delayed(work)(task) for task in tasks)
-            yield from answers
+            with _cancelled_work_forgotten():
+                with _interrupts_held():
+                    answers = workers(delayed(work)(task) for task in tasks)
+                yield from answers
         except (BrokenExecutor, BrokenPipeError) as reason:
             raise BrokenExecutor(
                 "a worker process ended before its work was done, perhaps for want of memory: --jobs 1 takes none"
@@ -68,3 +71,23 @@ def _interrupts_held() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _cancelled_work_forgotten() -> Iterator[None]:
+    """Keep loky's own thread quiet at an early end.
+
+    It cancels what waits, and may then look for a piece of it that it was just about to hand out: a KeyError, which
+    harms nobody and would be printed.
+    """
+    before = threading.excepthook
+
+    def complain(what: threading.ExceptHookArgs) -> None:
+        if not (what.exc_type is KeyError and what.thread is not None and what.thread.name == _LOKYS_THREAD):
+            before(what)
+
+    threading.excepthook = complain
+    try:
+        yield
+    finally:
+        threading.excepthook = before

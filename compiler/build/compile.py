@@ -1,9 +1,7 @@
 """`compile_build`: recordings in, a build folder out."""
 
-import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import get_args
 
@@ -11,20 +9,7 @@ import numpy as np
 
 from ...runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME
 from ...runtime.harness.wiring import Harness
-from ...runtime.manifest import (
-    SCHEMA,
-    Calibration,
-    Inputs,
-    Manifest,
-    Options,
-    Proof,
-    Recognised,
-    Source,
-    Switch,
-    TableBits,
-    manifest_from_bytes,
-    manifest_to_bytes,
-)
+from ...runtime.manifest import Inputs, Manifest, Options, TableBits, manifest_from_bytes, manifest_to_bytes
 from ...runtime.scanning.plan import plan_scan
 from ...runtime.scanning.scanmap import ScanMap, scanmap_to_bytes
 from ...runtime.tables import IntegerTables, tables_to_bytes
@@ -36,6 +21,7 @@ from ..tables.collapse import collapse
 from ..tables.compare import Comparison, compare
 from ..tables.quantise import quantise
 from .carried import made_firmware
+from .describing import describe
 from .ensemble import ensemble_to_bytes
 from .errors import CompileError
 from .made import Documents, Made, no_documents
@@ -112,38 +98,18 @@ def compile_build(
     trained = train(material, options, steps.round_done, ports)
     bits = trained.kept(material)
     integers = quantise(collapse(trained.stumps, len(trained.columns)), bits, material.codes, width, table_bits)
-    switches = _switches(grasp_set, trained)
-    names = [switch.name for switch in switches]
+    names = [grasp_set.switch_names[column] for column in trained.columns]
     wired = harness(names) if callable(harness) else harness
     scan = None if wired is None else plan_scan(names, integers, wired, bits, material.codes)
     comparison = compare(trained.stumps, integers, bits, material.codes)
     tested = cross_validated(material, options, steps.fold_done, ports) if folds else None
-    rates = [_training_rate(comparison, material, options), *([tested.rate] if tested else [])]
     files = _files(integers, trained, scan)
-    digests = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
-    manifest = Manifest(
-        schema=SCHEMA,
-        checksum="",
-        thenar=version("thenar"),
-        tables_sha256=digests[TABLES_NAME],
-        ensemble_sha256=digests[ENSEMBLE_NAME],
-        source=_source(grasp_set),
-        options=options,
-        grasps=material.grasps,
-        switches=switches,
-        joints=_joints(grasp_set) if inputs != "switches" else (),
-        proof=_proof(integers, comparison, width),
-        rates=tuple(rates),
-        stopped_after=trained.stumps.n_rounds if trained.stopped_early else 0,
-        zero_gain_nodes=trained.zero_gain_nodes,
-        scan_sha256=digests.get(SCAN_NAME),
-    )
-    described = manifest_to_bytes(manifest)
-    made_manifest = manifest_from_bytes(described)
-    firmware, note = made_firmware(made_manifest, integers)
+    described = manifest_to_bytes(describe(grasp_set, options, material, trained, integers, comparison, tested, files))
+    manifest = manifest_from_bytes(described)
+    firmware, note = made_firmware(manifest, integers)
     made = Made(
         grasp_set=grasp_set,
-        manifest=made_manifest,
+        manifest=manifest,
         trained=trained,
         tables=integers,
         tables_bytes=len(files[TABLES_NAME]),
@@ -156,7 +122,7 @@ def compile_build(
     )
     written = {path: text.encode() for path, text in firmware.items()}
     publish({**files, **written, **documents(made), MANIFEST_NAME: described}, target)
-    return BuildReport(target, made_manifest, made.tables_bytes, made.only_answer, note, scan, wired)
+    return BuildReport(target, manifest, made.tables_bytes, made.only_answer, note, scan, wired)
 
 
 def _check(options: Options) -> None:
@@ -190,42 +156,3 @@ class _Steps:
 
     def fold_done(self, done: int, _folds: int) -> None:
         self.round_done(self._rounds * (1 + done), self._rounds)
-
-
-def _source(grasp_set: GraspSet) -> Source:
-    return Source(
-        fingerprint=grasp_set.fingerprint(),
-        rows=len(grasp_set),
-        taxonomy=grasp_set.taxonomy.name,
-        switches=len(grasp_set.switch_names),
-        simulated=grasp_set.simulated,
-    )
-
-
-def _switches(grasp_set: GraspSet, trained: Trained) -> tuple[Switch, ...]:
-    pairs = zip(trained.columns, trained.gains, strict=True)
-    return tuple(Switch(column, grasp_set.switch_names[column], gain) for column, gain in pairs)
-
-
-def _joints(grasp_set: GraspSet) -> tuple[Calibration, ...]:
-    return tuple(
-        Calibration(column, joint.name, joint.unit, joint.code_a, joint.value_a, joint.code_b, joint.value_b)
-        for column, joint in enumerate(grasp_set.joints)
-    )
-
-
-def _proof(integers: IntegerTables, comparison: Comparison, width: int) -> Proof:
-    return Proof(
-        width=width,
-        scale=integers.scale,
-        bound=integers.bound,
-        error=comparison.integer_bound,
-        safe_margin=comparison.safe_margin,
-        covered=int(np.count_nonzero(comparison.covered)),
-        changed=len(comparison.changed),
-    )
-
-
-def _training_rate(comparison: Comparison, material: Material, options: Options) -> Recognised:
-    correct = int(np.count_nonzero(comparison.deployed == material.labels))
-    return Recognised("training", 0, options.seed, correct, len(material.labels))

@@ -109,6 +109,7 @@ def test_the_frontier_is_shown_without_writing_anything(thenar: Thenar, build: P
         assert str(row["flash"]) in done.stdout
 
 
+@pytest.mark.slow
 def test_a_flash_limit_is_kept(thenar: Thenar, build: Path, tmp_path: Path) -> None:
     told = json.loads(thenar("firmware", build, "--target", "avr328p", "--frontier", "--json").stdout)
     least, ram = (told["frontier"][-1][key] for key in ("flash", "ram"))

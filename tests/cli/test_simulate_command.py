@@ -116,6 +116,7 @@ def test_explaining_names_every_step_and_what_it_costs_and_writes_nothing(tmp_pa
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_ablation_shows_rates_changes_and_times(tmp_path: Path, capsys: Captured) -> None:
     scene = tmp_path / "one.toml"
     text = shipped()["quick"].read_text()

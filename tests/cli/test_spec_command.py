@@ -80,6 +80,7 @@ def test_machines_get_the_same_as_spec_json(thenar: Thenar, hand_build: Path, tm
     assert json.loads(done.stdout)["hand_length_mm"] == 171
 
 
+@pytest.mark.slow
 def test_a_glove_is_described_as_it_is_wired(thenar: Thenar, hand_set: GraspSet, tmp_path: Path) -> None:
     glove = tmp_path / "bench.toml"
     glove.write_text(harness_to_toml(propose_harness(["spare", *NAMES], "pca9555", name="bench")))

@@ -72,6 +72,7 @@ def test_json_lists_every_changed_row(thenar: Thenar, set_file: Path, build_fold
     assert found["changed"]
 
 
+@pytest.mark.slow
 def test_firmware_is_compiled_and_held_against_python(
     thenar: Thenar, set_file: Path, build_folder: Path, tool: Callable[[str], str]
 ) -> None:

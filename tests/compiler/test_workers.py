@@ -1,8 +1,13 @@
 import os
 import signal
+import threading
+from collections.abc import Generator
 from concurrent.futures import BrokenExecutor
+from itertools import count
+from typing import Any
 
 import pytest
+from joblib.externals.loky.process_executor import _ExecutorManagerThread as Manager
 
 from thenar.compiler.workers import MOST_JOBS, in_workers, workers_of
 
@@ -40,6 +45,26 @@ def test_a_worker_that_is_killed_is_an_error_and_the_next_work_has_new_ones() ->
     with pytest.raises(BrokenExecutor, match="ended before its work was done"):
         list(in_workers(killed, range(3), 2))
     assert len(list(in_workers(squared_where, range(3), 2))) == 3
+
+
+def test_an_end_before_the_last_answer_is_quiet_though_loky_looks_for_what_it_cancelled(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def as_if_work_had_just_been_put_in_line(manager: Any, cancel: Any = Manager.flag_executor_shutting_down) -> None:
+        cancel(manager)
+        stumbled.append(manager.executor_flags.kill_workers)
+        manager.work_ids_queue.put(-1)
+
+    stumbled: list[bool] = []
+    complaints: list[object] = []
+    monkeypatch.setattr(threading, "excepthook", complaints.append)
+    monkeypatch.setattr(Manager, "flag_executor_shutting_down", as_if_work_had_just_been_put_in_line)
+    answers = in_workers(squared_where, count(), 2)
+    assert isinstance(answers, Generator)
+    next(answers)
+    with pytest.raises(KeyboardInterrupt):
+        answers.throw(KeyboardInterrupt)
+    assert (stumbled, complaints) == ([True], [])
 
 
 def test_as_many_processes_work_as_are_asked_for() -> None:

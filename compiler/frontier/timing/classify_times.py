@@ -10,10 +10,9 @@ from ...firmware.errors import FirmwareError
 from ...firmware.generate import PLATFORMS
 from ...firmware.targets import Target, target_of
 from ..points import FrontierError, How
+from ..targets import TARGETS
 from .beside_wire import on_a_pi
 from .python_times import PythonCost, fit_here
-
-TARGETS = ("avr328p", "avr2560", "cortex-m0plus", "cortex-m4", "host", "pi")
 
 # Clocks of common boards with such a core: SAMD21 (Arduino Zero), nRF52840 (Arduino Nano 33 BLE).
 CORTEX_HZ: Mapping[str, int] = MappingProxyType({"cortex-m0plus": 48_000_000, "cortex-m4": 64_000_000})

@@ -195,6 +195,7 @@ def test_the_command_offers_what_can_be_made() -> None:
     assert firmware_command.MODES == MODES
 
 
+@pytest.mark.slow
 def test_a_build_too_large_for_an_uno_is_laid_out_for_what_holds_it(
     make_tables: MakeTables, describe: Describe
 ) -> None:

@@ -11,7 +11,8 @@ from thenar.compiler.placement.counting import Counter
 from thenar.compiler.placement.digits import Digits
 from thenar.compiler.placement.gain import Node, best_position, compare_scores, gain_bits
 
-SETS = ("bin14", "bin16", "bin3", "dup", "multi", "paper14_bits", "rare")
+LARGEST = "paper14_bits"
+SETS = ("bin14", "bin16", "bin3", "dup", "multi", LARGEST, "rare")
 
 
 class Walk:
@@ -58,7 +59,7 @@ class Walk:
 
 
 @pytest.mark.parametrize("half", [False, True], ids=["all", "half"])
-@pytest.mark.parametrize("name", SETS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name == LARGEST)) for name in SETS])
 def test_weka_took_an_input_of_the_largest_gain_at_every_node(weka_data: Path, name: str, half: bool) -> None:
     with np.load(weka_data / "id3" / f"id3_{name}.npz") as file:
         data = {key: file[key] for key in file.files}

@@ -75,6 +75,7 @@ def test_of_very_many_joints_the_first_are_drawn_and_the_rest_counted(
     assert b"<!-- wrist -->" not in picture
 
 
+@pytest.mark.slow
 def test_a_picture_is_no_taller_than_can_be_opened(small: GraspSet, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_TALLEST", 300)
     picture = draw(small, "png")

@@ -54,6 +54,7 @@ def plainly(learning: Learning) -> Columns:
     return tuple(left + gone[::-1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "joints", "switches"), [(0, 0, 9), (1, 0, 9), (2, 2, 9), (3, 1, 25)])
 def test_what_goes_is_what_raises_the_loss_least_when_its_mean_takes_its_place(
     seed: int, joints: int, switches: int

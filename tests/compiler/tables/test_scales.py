@@ -57,6 +57,7 @@ def test_the_next_finer_scale_would_not_do(
     assert reach(tables, finer) > 32767 or span(tables, finer) > 2**entry_bits - 1 or finer >= FINEST
 
 
+@pytest.mark.slow
 @given(seed=seeds, shape=shapes)
 def test_coarse_steps_are_those_that_change_the_fewest_rows(
     make_stumps: MakeStumps, make_rows: MakeRows, seed: int, shape: tuple[int, int]

@@ -113,6 +113,7 @@ def test_every_answer_follows_from_the_newest_frames_and_their_ages_alone(
         assert {name: getattr(found, name) for name in expected} == expected
 
 
+@pytest.mark.slow
 @given(schedule=schedules(), again=st.integers(0, 3))
 def test_frames_that_are_handed_over_again_grow_no_younger(
     make_build: MakeBuild, schedule: list[Arrival], again: int
@@ -257,6 +258,7 @@ def test_after_unknown_the_first_candidate_is_decided_on_at_once(make_build: Mak
     assert found.grasp == found.candidate == held.candidate
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 20), schedule=schedules(unread=True))
 def test_switches_left_unread_too_early_count_as_lost(
     make_build: MakeBuild, seed: int, schedule: list[Arrival]

@@ -107,6 +107,7 @@ def test_the_usual_lengths_are_planned_whatever_hands_there_are(bead: Planned) -
     assert [held.length_mm for held in bead.entry.held] == LENGTHS
 
 
+@pytest.mark.slow
 def test_what_is_told_of_an_object_is_the_worst_of_all_lengths_and_halfway_between() -> None:
     (golf_ball,) = (item for item in load_scene("cutkosky").objects if item.name == "golf ball")
     type_of_it = shipped_prehensions("cutkosky16")[golf_ball.grasp]
@@ -126,6 +127,7 @@ def test_further_hands_are_planned_besides_and_leave_the_others_as_they_are(bead
         assert max(worst(average_hand(length), further)) < 1.0
 
 
+@pytest.mark.slow
 def test_a_thing_for_large_hands_is_planned_for_large_hands_alone() -> None:
     ball = Thing("ball", Sphere(180.0), 0.2)
     entry = plan_object(Work("CMF", TYPES["CMF"], ball, 195.0, 210.0)).entry
@@ -136,6 +138,7 @@ def test_a_thing_for_large_hands_is_planned_for_large_hands_alone() -> None:
         plan_object(Work("CMF", TYPES["CMF"], ball, 150.0, 210.0))
 
 
+@pytest.mark.slow
 def test_of_two_ways_to_hold_a_thing_all_lengths_take_the_better() -> None:
     # Planned outwards alone, a finger lies on the other side of the spoon at 195 mm than at 180 and 210.
     types = shipped_prehensions("cutkosky16")

@@ -159,6 +159,7 @@ def test_two_objects_of_one_shape_and_type_are_planned_once(make_scene: MakeScen
     assert len(plan_scene(make_scene(objects=(PEA, twin)), 1)[1]) == 1
 
 
+@pytest.mark.slow
 def test_the_result_does_not_depend_on_the_number_of_jobs(make_scene: MakeScene, tmp_path: Path) -> None:
     scene = make_scene(objects=(PEA, BALL, BEAN))  # the ball is done first
     saved = []

@@ -122,6 +122,7 @@ def peak_bytes(scene: Scene) -> int:
     return peak
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["quick", "faulty-glove"])
 def test_memory_grows_by_what_is_kept_of_a_repetition_and_no_more(name: str) -> None:
     few, many = (scene_of(name, repetitions, ("PoS",)) for repetitions in (16, 64))

@@ -147,6 +147,7 @@ print(len(found) > 10, *[finding for finding in found if "mujoco" in finding.che
 """
 
 
+@pytest.mark.slow
 def test_without_mujoco_the_case_runs_and_leaves_out_what_needs_it() -> None:
     ran = subprocess.run(
         [sys.executable, "-W", "error", "-c", WITHOUT_MUJOCO], capture_output=True, text=True, check=False

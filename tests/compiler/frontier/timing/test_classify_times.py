@@ -7,7 +7,8 @@ import pytest
 from thenar.compiler.firmware.choose import choose, features, flash_shares
 from thenar.compiler.firmware.targets import TARGETS as PARTS
 from thenar.compiler.frontier.points import FrontierError
-from thenar.compiler.frontier.timing.classify_times import CORTEX_HZ, TARGETS, ClassifyModel
+from thenar.compiler.frontier.targets import TARGETS
+from thenar.compiler.frontier.timing.classify_times import CORTEX_HZ, ClassifyModel
 from thenar.compiler.frontier.timing.python_times import PythonCost, classify_us, fit_here, random_tables
 from thenar.runtime.tables import tables_to_bytes
 

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from thenar.compiler.frontier.targets import TARGETS
 from thenar.compiler.frontier.timing.beside_wire import (
     Beside,
     beside_wire,
@@ -12,7 +13,6 @@ from thenar.compiler.frontier.timing.beside_wire import (
     firmware_beside,
     measured_call_us,
 )
-from thenar.compiler.frontier.timing.classify_times import TARGETS
 from thenar.compiler.frontier.timing.python_times import random_tables
 from thenar.compiler.frontier.timing.scan_times import ScanTimes, record_period_us, scan_times, transfer_us
 from thenar.compiler.frontier.timing.wirings import BOARD, Wiring

@@ -1,4 +1,4 @@
-"""A small set of grasps that can be learnt, with switches and joints."""
+"""Small sets of grasps that can be learnt, with switches and joints."""
 
 from collections.abc import Callable
 
@@ -9,7 +9,9 @@ from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import own
 
 
-def _make_set(seed: int = 0, rows: int = 96, switches: int = 14, joints: int = 3, types: int = 4) -> GraspSet:
+def _make_set(
+    seed: int = 0, rows: int = 96, switches: int = 14, joints: int = 3, types: int = 4, subjects: int = 1
+) -> GraspSet:
     random = np.random.default_rng(seed)
     labels = np.arange(rows) % types
     closed = np.random.default_rng(99).random((types, switches)) < 0.5
@@ -18,11 +20,11 @@ def _make_set(seed: int = 0, rows: int = 96, switches: int = 14, joints: int = 3
     return GraspSet(
         switches=closed[labels] ^ (random.random((rows, switches)) < 0.12),
         switch_names=tuple(f"s{number}" for number in range(switches)),
-        codes=np.clip(centres[labels] + random.normal(0, 25, (rows, joints)), 0, 255).astype(np.uint16),
+        codes=np.clip(centres[labels] + random.normal(0, 25, (rows, joints)), 0, 254).astype(np.uint16),
         joints=tuple(Joint(f"j{number}", "deg", 0, 0.0, 255, 127.5) for number in range(joints)),
         grasps=np.array(names)[labels],
         taxonomy=own([*names, "never seen"]),
-        subjects=np.full(rows, "A"),
+        subjects=np.array([f"S{row // types % subjects}" for row in range(rows)]),
         objects=np.full(rows, "thing"),
         trials=np.arange(rows),
     )
@@ -30,6 +32,7 @@ def _make_set(seed: int = 0, rows: int = 96, switches: int = 14, joints: int = 3
 
 @pytest.fixture(scope="session")
 def make_set() -> Callable[..., GraspSet]:
+    """Return what makes a small set of grasps that can be learnt, with switches and joints."""
     return _make_set
 
 

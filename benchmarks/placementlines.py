@@ -1,0 +1,156 @@
+"""What every placement reaches on a set: at given numbers of switches, and with the fewest that recognise enough."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from time import process_time
+
+import numpy as np
+from placementtables import CONSOLE, MOST, SHOWN, WITHIN, Line, Point
+from rich.progress import track
+
+from thenar.compiler.boosting.boost import boost
+from thenar.compiler.boosting.stumps import winners
+from thenar.compiler.evaluation.folds import Fold
+from thenar.compiler.frontier.timing.wirings import port_costs
+from thenar.compiler.selection.learning import Columns, Learning
+from thenar.compiler.selection.pairs import Pairs
+from thenar.compiler.selection.rivals import available
+from thenar.compiler.selection.subset import Subset, best_subset
+from thenar.compiler.selection.ways import METHODS, Chooser, chooser
+from thenar.compiler.workers import in_workers
+from thenar.runtime.scanning.propose import propose_harness
+from thenar.runtime.scanning.timing import scan_us
+from thenar.runtime.scanning.whole import whole_scan
+
+STEP, ROUNDS = 2, 100
+PAPERS, BOUNDED = "id3", "elimination"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Data:
+    """A set, switches alone or with joints, its folds, and the S that the paper would take."""
+
+    learning: Learning
+    names: tuple[str, ...]
+    folds: tuple[Fold, ...]
+    prune: int
+
+    @property
+    def joints(self) -> bool:
+        """Whether the joints are read too."""
+        return bool(self.learning.codes.size)
+
+    @property
+    def shown(self) -> tuple[int, ...]:
+        """Return the sizes whose rates are shown."""
+        return SHOWN[self.joints]
+
+
+@dataclass(slots=True)
+class Ways:
+    """One method on all folds; what was measured is known."""
+
+    data: Data
+    method: str
+    chosen: list[Chooser] = field(init=False)
+    seconds: float = field(init=False)
+    _known: dict[int, Point] = field(default_factory=dict)
+    _rates: dict[tuple[int, frozenset[int]], float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        names = self.data.names
+        ports = port_costs(propose_harness(names), names)
+        start = process_time()
+        learnt = (self.data.learning.rows(np.sort(fold.train)) for fold in self.data.folds)
+        self.chosen = [chooser(self.method, learning, ports) for learning in learnt]
+        self.seconds = (process_time() - start) / len(self.data.folds)
+
+    def pruned(self) -> Point:
+        """Return what the paper's ID3 reaches under its S."""
+        return self._mean([choose(self.data.prune) for choose in self.chosen])
+
+    def at(self, most: int) -> Point:
+        """Return what is reached with at most so many switches; ID3's S is the smallest that leaves no more."""
+        if most not in self._known:
+            self._known[most] = self._mean([self._kept(choose, most) for choose in self.chosen])
+        return self._known[most]
+
+    def smallest(self, wanted: float) -> Point | None:
+        """Return the smallest placement found that recognises as much."""
+        enough = next((size for size in (*self.data.shown, MOST) if self.at(size).rate >= wanted), None)
+        if enough is None:
+            return None
+        short = max(size for size in (0, *self.data.shown) if size < enough)
+        while enough - short > STEP:
+            middle = (enough + short) // 2
+            if self.at(middle).rate >= wanted:
+                enough = middle
+            else:
+                short = middle
+        return self.at(enough)
+
+    def _kept(self, choose: Chooser, most: int) -> Columns:
+        if METHODS[self.method].parameter == "switches":
+            return choose(most)
+        low, high = 0, len(self.data.learning.labels) + 1
+        while low < high:
+            middle = (low + high) // 2
+            low, high = (low, middle) if len(choose(middle)) <= most else (middle + 1, high)
+        return choose(low)
+
+    def _mean(self, placements: Sequence[Columns]) -> Point:
+        harness = propose_harness(self.data.names)
+        found = []
+        for number, columns in enumerate(placements):
+            names = [self.data.names[column] for column in columns]
+            new = propose_harness(names)
+            new_us, wired_us = (scan_us(whole_scan(one, names), one).us for one in (new, harness))
+            found.append((self._rate(number, columns), len(columns), new_us, wired_us))
+        return Point(*np.mean(found, axis=0).tolist())
+
+    def _rate(self, number: int, columns: Columns) -> float:
+        key = (number, frozenset(columns))
+        if key not in self._rates:
+            self._rates[key] = rate(self.data.learning, self.data.folds[number], columns)
+        return self._rates[key]
+
+
+def rate(learning: Learning, fold: Fold, columns: Columns) -> float:
+    """Return the share of the test rows that LogitBoost recognises."""
+    X = np.hstack([learning.switches[:, sorted(columns)].astype(np.uint16), learning.codes])
+    stumps, _ = boost(X[fold.train], learning.labels[fold.train], learning.n_classes, rounds=ROUNDS)
+    return float((winners(stumps.scores(X[fold.test])) == learning.labels[fold.test]).mean())
+
+
+def measure(task: tuple[Data, str, float | None]) -> Line:
+    """Return what one method reaches on a set, where a rate is wanted (None: rates at the sizes SHOWN alone)."""
+    data, method, wanted = task
+    ways = Ways(data, method)
+    shown = tuple(ways.at(size) for size in data.shown)
+    return Line(method, data.joints, shown, None if wanted is None else ways.smallest(wanted), ways.seconds)
+
+
+def papers(data: Data) -> tuple[bool, Point]:
+    """Return what the paper's placement reaches, and whether with joints."""
+    return data.joints, Ways(data, PAPERS).pruned()
+
+
+def bounded(task: tuple[Data, int]) -> tuple[int, int, Subset]:
+    """Return m, the pairs alike in m switches that elimination keeps of all rows, and what bounded search says."""
+    data, m = task
+    columns = chooser(BOUNDED, data.learning)(m)
+    return m, Pairs(data.learning).alike(columns), best_subset(data.learning, m, starts=(columns,))
+
+
+def measured(alone: Data, with_joints: Data, paper: dict[bool, Point], jobs: int) -> list[Line]:
+    """Return every method's line, switches alone first. Joints are no matter to rivals."""
+    ours = [name for name, method in METHODS.items() if method.ours]
+    wanted = {joints: point.rate - WITHIN for joints, point in paper.items()}
+    # What takes longest begins first.
+    tasks: list[tuple[Data, str, float | None]] = [
+        (data, name, wanted[data.joints]) for data in (with_joints, alone) for name in reversed(ours)
+    ]
+    tasks += [(alone, name, None) for name in available()]
+    lines = track(in_workers(measure, tasks, jobs), "methods", total=len(tasks), console=CONSOLE, transient=True)
+    order = [*ours, *available()]
+    return sorted(lines, key=lambda line: (line.joints, order.index(line.method)))

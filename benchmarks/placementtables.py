@@ -1,0 +1,91 @@
+"""The tables of `placement.py`: what each placement reaches beside the paper's."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rich.console import Console
+from rich.table import Table
+
+from thenar.compiler.selection.subset import Subset
+from thenar.compiler.selection.ways import METHODS
+
+# Beside the joints, 33 switches are left out: that saves a fifth of the time.
+SHOWN = {False: (8, 16, 33), True: (8, 16)}
+MOST, WITHIN = 40, 0.005
+CONSOLE = Console(width=150)
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """Means over the folds: recognition rate, number of switches, scan time of a new glove and as wired."""
+
+    rate: float
+    size: float
+    new_us: float
+    wired_us: float
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """What one method reaches: at the sizes SHOWN, and with the fewest switches that recognise enough (None: none up to
+    MOST, or not asked); processor seconds of choosing, for a fold.
+    """
+
+    method: str
+    joints: bool
+    shown: tuple[Point, ...]
+    smallest: Point | None
+    seconds: float
+
+
+def saved(lines: Sequence[Line], joints: bool, paper: Point) -> Table:
+    """Return the table of smallest placements within half a point of the paper's."""
+    title = f"{kind(joints)}: fewest switches within {100 * WITHIN:g} points of the paper's"
+    times = ("scan, new glove, us", "less", "as wired, us", "less")
+    table = Table("method", "switches", "recognition, %", "fewer switches", *times, title=title)
+    cells = (f"{paper.size:.1f}", f"{100 * paper.rate:.2f}", "", f"{paper.new_us:.0f}", "", f"{paper.wired_us:.0f}", "")
+    table.add_row("the paper's pruned ID3", *cells, end_section=True)
+    for line in lines:
+        if line.joints != joints or not METHODS[line.method].ours:
+            continue
+        point = line.smallest
+        if point is None:
+            table.add_row(line.method, f"none up to {MOST}", f"{100 * line.shown[-1].rate:.2f} at {SHOWN[joints][-1]}")
+            continue
+        fewer = f"{1 - point.size / paper.size:.0%}"
+        new = (f"{point.new_us:.0f}", f"{1 - point.new_us / paper.new_us:.0%}")
+        wired = (f"{point.wired_us:.0f}", f"{1 - point.wired_us / paper.wired_us:.0%}")
+        table.add_row(line.method, f"{point.size:.1f}", f"{100 * point.rate:.2f}", fewer, *new, *wired)
+    return table
+
+
+def compared(lines: Sequence[Line], joints: bool) -> Table:
+    """Return the table of rates at given numbers of switches; numbers that a tree misses stand beside."""
+    heads = (f"{size} switches, %" for size in SHOWN[joints])
+    table = Table("method", *heads, "seconds to choose", title=kind(joints))
+    for line in lines:
+        if line.joints == joints:
+            cells = (cell(point, size) for point, size in zip(line.shown, SHOWN[joints], strict=True))
+            table.add_row(line.method, *cells, f"{line.seconds:.1f}")
+    return table
+
+
+def cell(point: Point, size: int) -> str:
+    """Return a rate, with the mean number of switches if that is another."""
+    return f"{100 * point.rate:.2f}" + ("" if point.size == size else f" ({point.size:.1f})")
+
+
+def kind(joints: bool) -> str:
+    """Return what is read, in words."""
+    return "switches and joints" if joints else "switches alone"
+
+
+def bounds(found: Sequence[tuple[int, int, Subset]]) -> Table:
+    """Return the table of how far elimination is from the best subset of few switches, chosen from all rows."""
+    found_pairs = ("elimination, %", "best found, %", "none below, %")
+    heads = ("switches", *found_pairs, "at most from the best, points", "programs")
+    table = Table(*heads, title="pairs of rows of different types that look alike, switches alone")
+    for m, alike, best in sorted(found, key=lambda one: one[0]):
+        shares = [100 * count / best.pairs for count in (alike, best.alike, best.least)]
+        table.add_row(str(m), *(f"{share:.3f}" for share in shares), f"{shares[0] - shares[2]:.3f}", str(best.nodes))
+    return table
