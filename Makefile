@@ -11,6 +11,9 @@ WORKERS = $(shell expr $(CORES) \* 3 / 2)
 # The scene that `make demo` simulates: a shipped one by its name, or a file.
 SCENE ?= quick
 
+# Tests start hundreds of programs, each of which would compile all that it imports.
+unexport PYTHONDONTWRITEBYTECODE
+
 PACKAGES := cli compiler drivers firmware_templates reference runtime simulator stability
 
 .PHONY: help demo test test-slow test-all pythons mutants lint format types bench soak docs check clean

@@ -3,6 +3,7 @@
 import ast
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -122,12 +123,23 @@ WORKSTATION_ONLY = {
 }
 
 
-def modules() -> Iterator[tuple[str, ast.Module]]:
+def sources() -> dict[str, Path]:
+    """Return path by name of every module."""
+    found = {}
     for package in PACKAGES:
         for path in sorted(FOLDERS[package].rglob("*.py")):
             parts = path.relative_to(FOLDERS[package]).with_suffix("").parts
-            name = ".".join([package, *parts]).removesuffix(".__init__")
-            yield name, ast.parse(path.read_text())
+            found[".".join([package, *parts]).removesuffix(".__init__")] = path
+    return found
+
+
+SOURCES = sources()
+EACH = pytest.mark.parametrize("name", SOURCES)
+
+
+@cache
+def tree_of(name: str) -> ast.Module:
+    return ast.parse(SOURCES[name].read_text())
 
 
 def resolve(name: str, is_package: bool, node: ast.ImportFrom) -> str:
@@ -140,8 +152,7 @@ def resolve(name: str, is_package: bool, node: ast.ImportFrom) -> str:
 
 
 def imports(name: str, tree: ast.Module) -> Iterator[str]:
-    package, *inner = name.split(".")
-    is_package = (FOLDERS[package] / Path(*inner) / "__init__.py").exists()
+    is_package = SOURCES[name].name == "__init__.py"
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -153,30 +164,30 @@ def fits(name: str, rooms: tuple[str, ...]) -> bool:
     return any(name == room or name.startswith(room + ".") for room in rooms)
 
 
-@pytest.mark.parametrize(("name", "tree"), list(modules()), ids=lambda value: value if isinstance(value, str) else "")
-def test_a_module_imports_only_what_its_room_may(name: str, tree: ast.Module) -> None:
+@EACH
+def test_a_module_imports_only_what_its_room_may(name: str) -> None:
     room = max((key for key in ALLOWED if fits(name, (key,))), key=len)
-    ours = {imported for imported in imports(name, tree) if imported.split(".")[0] in (*PACKAGES, "thenar")}
+    ours = {imported for imported in imports(name, tree_of(name)) if imported.split(".")[0] in (*PACKAGES, "thenar")}
     assert not {imported for imported in ours if not fits(imported, (*ALLOWED[room], name))}
 
 
-@pytest.mark.parametrize(("name", "tree"), list(modules()), ids=lambda value: value if isinstance(value, str) else "")
-def test_the_boards_side_names_no_workstation_package_at_the_top(name: str, tree: ast.Module) -> None:
+@EACH
+def test_the_boards_side_names_no_workstation_package_at_the_top(name: str) -> None:
     if not fits(name, ("runtime", "drivers", "cli", "compiler.recordings")):
         return
-    top = ast.Module([node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)], [])
+    top = ast.Module([node for node in tree_of(name).body if isinstance(node, ast.Import | ast.ImportFrom)], [])
     assert not WORKSTATION_ONLY & {imported.split(".")[0] for imported in imports(name, top)}
 
 
 def test_the_reference_is_written_from_the_formulas_and_nothing_else() -> None:
     named = {
         imported.split(".")[0]
-        for name, tree in modules()
+        for name in SOURCES
         if fits(name, ("reference",))
-        for imported in imports(name, tree)
+        for imported in imports(name, tree_of(name))
     }
     assert named - {"reference"} <= {"mpmath", *sys.stdlib_module_names}
 
 
 def test_the_sources_are_found_at_all() -> None:
-    assert len(list(modules())) > 40
+    assert len(SOURCES) > 40

@@ -12,6 +12,8 @@ from thenar.simulator.effects.contact_quasistatic import Parameters
 from thenar.simulator.pipeline.registry import load
 from thenar.simulator.scenes.scene import Listed, Scene
 
+pytestmark = pytest.mark.slow
+
 KEPT = ("hand.posture", "joint.noise")
 # So much noise that it matters to joints, and to nothing else.
 NOISE = Listed("joint.noise", load("joint.noise").Parameters(sd_deg=40.0))

@@ -124,6 +124,7 @@ def test_a_flash_limit_is_kept(thenar: Thenar, build: Path, tmp_path: Path) -> N
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", ["avr328p", "cortex-m0plus"])
 def test_what_was_measured_stands_in_the_header_beside_its_bounds(
     thenar: Thenar, build: Path, tmp_path: Path, tool: Tool, target: str

@@ -106,6 +106,7 @@ def test_a_scene_that_names_the_file_before_it_is_there_is_planned_and_simulated
     assert (tmp_path / "again.json").read_bytes() == postures.read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_an_object_that_no_hand_can_hold_is_one_sentence_and_no_file(
     jobs: str, tmp_path: Path, capsys: Captured

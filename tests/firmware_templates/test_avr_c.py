@@ -117,6 +117,7 @@ def written(files: dict[str, str], folder: Path) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("part", "case"), ALL, ids=[f"{part}: {case}" for part, case in ALL])
 def test_every_board_compiles_without_a_warning_and_fits(part: str, case: str, tool: Tool, tmp_path: Path) -> None:
     """-std=c99 -Wall -Wextra -Wconversion -pedantic, as the Makefile has it, and -Werror."""

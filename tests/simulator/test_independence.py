@@ -96,6 +96,7 @@ def test_all_that_can_draw_do(alone: dict[str, tuple[Pipeline, Words, Batch]]) -
     assert silent == {*CONTACTS, "contact.ramp", "hand.transition", "switch.ghosting"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_adding_any_other_effect_leaves_its_draws_as_they_were(
     name: str, record: Callable[..., tuple[Pipeline, Words, Batch]], alone: dict[str, tuple[Pipeline, Words, Batch]]

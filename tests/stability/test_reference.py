@@ -301,6 +301,7 @@ def test_an_ensembles_scores_are_the_sum_of_its_steps() -> None:
             assert all(near(a, b) for a, b in zip(by_tables, truth, strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["twoclass", "missing", "dupfeat"])
 def test_ten_rounds_are_wekas(weka_data: Path, name: str) -> None:
     arrays = np.load(weka_data / "open" / f"{name}.npz")

@@ -97,7 +97,10 @@ def arranged(make_tables: MakeTables) -> Callable[[Case], Layout]:
 
 
 @NAMED
-@pytest.mark.parametrize(("compiler", "incremental"), [("gcc", False), ("clang", True)], ids=["gcc", "clang, update"])
+@pytest.mark.parametrize(
+    ("compiler", "incremental"),
+    [pytest.param("gcc", False, id="gcc"), pytest.param("clang", True, id="clang, update", marks=pytest.mark.slow)],
+)
 def test_portable_c_scores_as_python_does(
     tool: Tool,
     arranged: Callable[[Case], Layout],

@@ -160,6 +160,7 @@ def test_an_avr_s_flash_is_what_the_model_allows_for_or_a_little_less(
         assert updating > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("bins", "lowest"), [("direct", 0), ("trimmed", 0), ("trimmed", 40), ("trimmed", 600), ("search", 600)]
 )

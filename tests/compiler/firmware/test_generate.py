@@ -98,6 +98,7 @@ def test_the_folder_of_a_classifier_compiles_without_a_warning_and_tests_itself(
     assert {path.name for path in folder.iterdir()} == {*classifier(build, platform), "SHA256SUMS"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", BOARDS)
 def test_the_folder_of_a_board_compiles_without_a_warning(build: Build, case: str, tmp_path: Path, tool: Tool) -> None:
     tool("avr-gcc")

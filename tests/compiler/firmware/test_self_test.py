@@ -63,6 +63,7 @@ def make(tool: Callable[[str], str], tmp_path: Path) -> Make:
     return make
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", list(SHAPES))
 @pytest.mark.parametrize("part", PARTS)
 def test_a_folder_checks_itself_without_a_warning(

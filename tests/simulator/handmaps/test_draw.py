@@ -54,6 +54,7 @@ def test_numbers_are_written_into_the_circles_on_demand() -> None:
     assert b'id="mark-0-159"' in draw(all_switches(numbered=True), "svg")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["svg", "png"])
 def test_the_same_picture_gives_the_same_bytes(kind: str, two_types: GraspSet) -> None:
     assert draw(contacts(two_types, per_grasp=True), kind) == draw(contacts(two_types, per_grasp=True), kind)

@@ -48,6 +48,7 @@ def test_all_pads_of_a_shipped_posture_touch_and_nothing_sinks_in(entry: Entry) 
     assert (found <= PLANNED_MM).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("entry", [entry for _, entry in SHIPPED], ids=NAMES)
 def test_so_it_is_between_the_planned_lengths(entry: Entry) -> None:
     found = np.array([worst(average_hand(length), entry) for length in np.arange(150.0, 225.1, 1.25)])

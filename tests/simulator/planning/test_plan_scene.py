@@ -171,6 +171,7 @@ def test_the_result_does_not_depend_on_the_number_of_jobs(make_scene: MakeScene,
     assert len(set(saved)) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_the_first_object_that_cannot_be_held_is_told_and_the_others_named(make_scene: MakeScene, jobs: int) -> None:
     with pytest.raises(PlanError) as refusal:
@@ -185,6 +186,7 @@ def test_what_a_hand_of_the_scene_need_not_hold_is_no_error(make_scene: MakeScen
     assert not planned.entry.covers(160.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("lengths", "first", "last"),
     [

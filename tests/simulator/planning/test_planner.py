@@ -96,6 +96,7 @@ NOT_HELD: list[tuple[str, Shape, str]] = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("grasp", "shape", "wrong"), NOT_HELD, ids=[f"{g} {type(s).__name__}" for g, s, _ in NOT_HELD])
 def test_an_object_that_no_hand_can_hold_is_refused_with_what_is_wrong_and_what_to_do(
     grasp: str, shape: Shape, wrong: str

@@ -48,6 +48,7 @@ def quick() -> Simulated:
     return simulate(QUICK, jobs=1, keep_unsettled=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("jobs", "block"), [(1, 1), (1, 7), (2, 1), (2, 7), (2, 64)])
 def test_any_number_of_processes_and_any_blocks_give_the_same_bytes(
     quick: Simulated, jobs: int, block: int, tmp_path: Path

@@ -51,6 +51,7 @@ def path(name: str, tmp_path: Path) -> Path:
     return tmp_path / "set.grasps"
 
 
+@pytest.mark.slow
 def test_info_tells_what_is_there(name: str, path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = command(capsys, "info", path)
     assert code == 0
@@ -82,6 +83,7 @@ def test_evaluate_gives_rates_or_a_reason(
                 assert 0 <= row["average"]["low"] <= row["average"]["mean"] <= row["average"]["high"] <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folds", [0, 2])
 def test_a_build_is_made_verified_and_run_or_refused(
     name: str, path: Path, folds: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch

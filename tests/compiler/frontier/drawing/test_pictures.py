@@ -65,6 +65,7 @@ def _crowded(frontier: Frontier, several: int) -> Frontier:
     return msgspec.structs.replace(frontier, points=tuple(points))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["svg", "png"])
 def test_equal_frontiers_give_equal_bytes(examples: Any, kind: Any) -> None:
     first, second = (pictures(examples.example_frontier(), kind) for _ in range(2))

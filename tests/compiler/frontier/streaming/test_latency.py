@@ -100,6 +100,7 @@ def played_live(tables: IntegerTables, stream: Stream, step_us: int, decider: De
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joints", [0, JOINTS])
 @pytest.mark.parametrize("kind", KINDS)
 @settings(max_examples=40)

@@ -85,6 +85,7 @@ def touches(shape: Shape, sunk: float, skin: Skin) -> Iterator[Balance]:
             yield balance
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ROUND, ids=lambda shape: type(shape).__name__)
 def test_a_light_touch_is_resisted_exactly_as_differences_say(shape: Shape) -> None:
     found = list(islice(touches(shape, 1e-3, HARD), 15))
@@ -104,6 +105,7 @@ def test_shifting_an_object_is_resisted_exactly_even_where_its_surface_bends(sha
     assert all((balance.bent > 0.0).any() != straight for balance in found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", ["kamakura", "cutkosky"])
 def test_on_planned_grasps_the_matrix_is_near_the_differences(
     scene: str, planned: dict[str, tuple[Condition, ...]], make_case: Callable[..., Case], skin: Skin
