@@ -22,7 +22,7 @@ from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import scan_us
 from thenar.runtime.scanning.whole import whole_scan
 
-STEP, ROUNDS = 2, 100
+ROUNDS = 100
 PAPERS, BOUNDED = "id3", "elimination"
 
 
@@ -81,7 +81,7 @@ class Ways:
         if enough is None:
             return None
         short = max(size for size in (0, *self.data.shown) if size < enough)
-        while enough - short > STEP:
+        while enough - short > 1:
             middle = (enough + short) // 2
             if self.at(middle).rate >= wanted:
                 enough = middle

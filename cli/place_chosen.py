@@ -8,6 +8,7 @@ import msgspec
 from .common import out, progress
 
 if TYPE_CHECKING:
+    from ..compiler.placement.costaware import PortCosts
     from ..compiler.recordings.graspset import GraspSet
     from ..compiler.selection.learning import Columns, Learning
 
@@ -62,13 +63,18 @@ def named(grasp_set: "GraspSet", columns: "Columns") -> tuple[Kept, ...]:
     return tuple(Kept(number, grasp_set.switch_names[number]) for number in columns)
 
 
-def chosen(grasp_set: "GraspSet", method: str, parameter: float, *, joints: bool, exact: bool) -> Choice:
-    """Return what `method` chooses from all rows. Raises PlacementError, for a name that is no method's too."""
+def chosen(
+    grasp_set: "GraspSet", method: str, parameter: float, *, joints: bool, exact: bool, ports: "PortCosts | None"
+) -> Choice:
+    """Return what `method` chooses from all rows, where reading takes what `ports` say (None: every switch alike).
+
+    Raises PlacementError, for a name that is no method's too.
+    """
     from ..compiler.selection.ways import METHODS, chooser
 
     learning = learning_of(grasp_set, joints=joints)
     with progress(f"choosing switches by {method}"):
-        columns = chooser(method, learning)(parameter)
+        columns = chooser(method, learning, ports)(parameter)
     return Choice(
         method,
         METHODS[method].what,

@@ -26,6 +26,7 @@ class _Options:
     exact: bool
     crowd: bool
     joints: bool
+    glove: Path | None
     jobs: int | None
     show_tree: bool
     draw: Path | None
@@ -42,6 +43,10 @@ class _Options:
             (self.crowd and self.method == _PAPERS, "--crowd takes a method that is told how many switches to --keep"),
             (self.joints and self.of_tree, "--joints is for the methods beside the paper's ID3"),
             (
+                self.glove is not None and (self.of_tree or self.crowd),
+                "--glove says what scans cost: for one placement by a --method whose name ends in -cost",
+            ),
+            (
                 self.by_size and self.prune is not None,
                 "--prune is for ID3: this method takes --keep",
             ),
@@ -50,7 +55,7 @@ class _Options:
         ):
             if wrong:
                 raise click.UsageError(reason)
-        keep_apart(self.grasps, self.draw, self.output)
+        keep_apart(self.grasps, self.glove, self.draw, self.output)
 
     @property
     def of_tree(self) -> bool:
@@ -69,6 +74,11 @@ class _Options:
 @click.option("--prune", type=click.IntRange(min=0), metavar="S", help="ID3: end nodes of fewer than S rows.")
 @click.option("--keep", type=click.IntRange(min=1), metavar="M", help="Other methods: keep at most M switches.")
 @click.option("--joints", is_flag=True, help="Choose what helps beside the joints (default: switches alone).")
+@click.option(
+    "--glove",
+    type=existing_file,
+    help="A glove.toml: its ports' costs for methods that heed them.  [default: MCP23017]",
+)
 @click.option("--exact", is_flag=True, help="Also say how far the placement is from the best of as many switches.")
 @click.option("--crowd", is_flag=True, help="One standard placement for many subjects, the worst-served included.")
 @click.option("--jobs", type=click.IntRange(min=1), help="Processes for --crowd.  [default: all cores]")
@@ -87,6 +97,7 @@ def command(**options: Any) -> None:
         thenar place set.grasps
         thenar place set.grasps --prune 13 --draw tree.svg -o placement.json
         thenar place set.grasps --method elimination --keep 16 --exact
+        thenar place set.grasps --method id3-cost --keep 16 --glove glove.toml
         thenar place crowd.grasps --crowd --keep 16 --draw subjects.svg
     """
     from ..compiler.recordings.graspset import GraspSet
@@ -127,10 +138,18 @@ def _of_tree(asked: _Options, grasp_set: "GraspSet") -> Any:
 
 
 def _of_method(asked: _Options, grasp_set: "GraspSet") -> Any:
+    from ..compiler.frontier.timing.whole_glove import ports_of_whole_glove
+    from ..runtime.harness.loading import load_harness
     from .place_chosen import chosen, print_chosen
 
     method, parameter = asked.method or _PAPERS, asked.keep if asked.by_size else asked.prune
-    choice = chosen(grasp_set, method, float(parameter or 0), joints=asked.joints, exact=asked.exact)
+    harness = None if asked.glove is None else load_harness(asked.glove)
+    ports = ports_of_whole_glove(harness, grasp_set.switch_names)
+    if harness is not None and ports is None:
+        raise click.UsageError(
+            f"{asked.glove} lacks switches of {asked.grasps}: name the glove.toml of the whole glove."
+        )
+    choice = chosen(grasp_set, method, float(parameter or 0), joints=asked.joints, exact=asked.exact, ports=ports)
     if not asked.as_json:
         print_chosen(choice)
     return choice

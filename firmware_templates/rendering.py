@@ -1,4 +1,4 @@
-"""The one place where jinja2 is touched: a template and values in, text out."""
+"""A template of C and values in, text out."""
 
 from functools import lru_cache
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from .building import Design, best_designs
+from .designs import Design, best_designs
 from .pareto import front
 from .points import DecisionKind, Latency, Point, Setting, Time
 from .waiting import DECISIONS

@@ -9,7 +9,7 @@ from msgspec import Struct
 from ...runtime.tables import IntegerTables, tables_from_bytes
 from ..firmware.choose import Option, features
 from ..firmware.targets import Target
-from .building import Design
+from .designs import Design
 from .equipment import Equipment
 from .points import Check, FrontierError, Time
 from .storing.asking import Desk
@@ -47,10 +47,11 @@ class CountTask:
 
 
 class TimeKey(Struct, frozen=True):
-    """Which wall times: of the runtime with these tables, on a machine."""
+    """Which wall times: of the runtime with these tables, on a machine, at the pace that its yardstick says."""
 
     contents: tuple[bytes, ...]
     machine: str
+    yardstick: float
 
 
 class Timed(Struct, frozen=True):
@@ -132,12 +133,14 @@ def run_checks(task: CheckTask) -> Checked:
 
 def time_here(task: TimeTask) -> Timed:
     """Return what `task` asks for."""
-    return Timed(tuple(classify_us([tables_from_bytes(content) for content in task.key.contents])))
+    several = [tables_from_bytes(content) for content in task.key.contents]
+    return Timed(tuple(classify_us(several, task.key.yardstick)))
 
 
 def _timed(designs: Sequence[Design], model: ClassifyModel, desk: Desk) -> dict[TrialKey, Time]:
+    assert model.python is not None
     contents = tuple(dict.fromkeys(design.tables.content for design in designs))
-    task = TimeTask(TimeKey(contents, platform.node()))
+    task = TimeTask(TimeKey(contents, platform.node(), model.python.yardstick))
     us = dict(zip(contents, desk.here().ask("simulations", [task], time_here, Timed)[task.key].us, strict=True))
     return {_key(design, model.target): Time(us[design.tables.content], "measured") for design in designs}
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from importlib.metadata import version
 
 from .beside_points import choices_to_mark, marks_of, tried
-from .building import best_designs, designs
 from .built import EARLY, Built, Waits, points_of, with_whole_scans
 from .candidates import Choice, finalists
 from .closeup import look_closely
+from .designs import best_designs, designs
 from .equipment import Equipment
 from .material import Cuts, Material
 from .measured import measure_designs

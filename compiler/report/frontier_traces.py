@@ -64,7 +64,9 @@ def _hover(point: Point) -> str:
 
 
 def best_line(points: Sequence[Point], name: str, cost: Cost) -> Trace:
-    """Return the line through the points of a front; one that is best of its kind alone may lie below it."""
+    """Return the line of a front: level from each point until a better one; one that is best of its kind alone may lie
+    below it.
+    """
     there = [(cost(point), point.rate.mean) for point in points if name in point.fronts]
     best = front(there, lambda place: place[0], lambda place: place[1], step=0.0)
     return {
@@ -74,7 +76,7 @@ def best_line(points: Sequence[Point], name: str, cost: Cost) -> Trace:
         "x": [short(x) for x, _ in best],
         "y": [short(100 * y) for _, y in best],
         "hoverinfo": "skip",
-        "line": {"color": "var(--soft)", "width": 2},
+        "line": {"color": "var(--soft)", "width": 2, "shape": "hv"},
     }
 
 

@@ -8,6 +8,8 @@ import pytest
 from thenar.cli import run
 from thenar.cli.kept_files import kept_names
 from thenar.compiler import GraspSet
+from thenar.runtime.harness.writing import harness_to_toml
+from thenar.runtime.scanning.propose import propose_harness
 
 pytestmark = pytest.mark.slow
 
@@ -31,6 +33,33 @@ def test_a_method_keeps_so_many_switches_in_its_order(
     assert kept_names(stored) == tuple(kept["name"] for kept in choice["switches"])
     assert (choice["method"], choice["parameter"], choice["n_switches"], choice["exact"]) == (method, 3, 6, None)
     assert 0 < len(choice["switches"]) <= 3
+
+
+def glove_of(names: tuple[str, ...], folder: Path) -> Path:
+    """Write a harness of eight switches a chip, the last of `names` on a chip of its own."""
+    path, others = folder / "glove.toml", [f"other {number}" for number in range(9 - len(names))]
+    path.write_text(harness_to_toml(propose_harness([*names[:-1], *others, names[-1]], "mcp23008")))
+    return path
+
+
+@pytest.mark.parametrize("wired", [False, True], ids=["no harness", "harness"])
+def test_a_method_that_heeds_cost_chooses_as_compile_does(
+    small_set: GraspSet, set_file: Path, tmp_path: Path, wired: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    how = ["--glove", str(glove_of(small_set.switch_names, tmp_path))] if wired else []
+    assert run(["place", str(set_file), "--method", "id3-cost", "--keep", "3", "--json", *how]) == 0
+    chosen = [kept["name"] for kept in json.loads(capsys.readouterr().out)["switches"]]
+    built = ["--placement", "id3-cost", "--keep", "3", "--inputs", "switches", "--rounds", "5", "--no-report", "--json"]
+    assert run(["compile", str(set_file), "-o", str(tmp_path / "build"), *built, *how]) == 0
+    assert [switch["name"] for switch in json.loads(capsys.readouterr().out)["switches"]] == chosen
+
+
+def test_a_glove_that_lacks_switches_says_nothing_of_their_cost(
+    small_set: GraspSet, set_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    reduced = str(glove_of(small_set.switch_names[1:], tmp_path))
+    assert run(["place", str(set_file), "--method", "id3-cost", "--keep", "3", "--glove", reduced]) == 2
+    assert "lacks switches of" in capsys.readouterr().err
 
 
 def test_the_paper_s_placement_is_held_beside_the_best_of_as_many(

@@ -65,7 +65,8 @@ def _on_python(model: ClassifyModel, several: Sequence[IntegerTables], least: in
     assert model.python is not None
     tables = [*several, *islice(_smaller(several), max(0, least - len(several)))]
     predicted = [model.python.us(each) for each in tables]
-    outcomes = [Outcome(*pair) for pair in zip(predicted, classify_us(tables), strict=True)]
+    found = classify_us(tables, model.python.yardstick)
+    outcomes = [Outcome(*pair) for pair in zip(predicted, found, strict=True)]
     return _judged("time of a frame in runtime.scorer on this machine", "measured", outcomes)
 
 

@@ -14,13 +14,17 @@ from ...firmware.probes import random_frames
 
 # Shapes that are timed: switches, joints, grasp types.
 _SWITCHES, _JOINTS, _CLASSES = (0, 1, 4, 8, 16, 33, 66, 160), (0, 16, 22), (4, 14, 33)
+YARDSTICK = (33, 16, 14)
 _BINS, _REACH, _HIGHEST = 8, 60, 254
 _FRAMES, _PASSES = 20, 20
 
 
 @dataclass(frozen=True, slots=True)
 class PythonCost:
-    """Microseconds a frame: a constant, and of each switch, joint, class, and class of a switch and of a joint."""
+    """Microseconds a frame: a constant, and of each switch, joint, class, and class of a switch and of a joint.
+
+    yardstick  what tables of the shape YARDSTICK took when these were found: the machine's pace
+    """
 
     constant: float
     switch: float
@@ -28,6 +32,7 @@ class PythonCost:
     klass: float
     switch_class: float
     joint_class: float
+    yardstick: float
 
     def us(self, tables: IntegerTables) -> float:
         """Return what `runtime.scorer` and finding the best class take, on average over frames."""
@@ -49,21 +54,25 @@ def fit_here() -> PythonCost:
     taken = np.array(classify_us([random_tables(*shape) for shape in shapes]))
     rows = np.array([_features(*shape) for shape in shapes])
     weights, _ = nnls(rows / taken[:, np.newaxis], np.ones(len(taken)))
-    return PythonCost(*weights.tolist())
+    return PythonCost(*(*weights.tolist(), float(taken[shapes.index(YARDSTICK)])))
 
 
-def classify_us(several: Sequence[IntegerTables]) -> list[float]:
+def classify_us(several: Sequence[IntegerTables], yardstick: float | None = None) -> list[float]:
     """Return what classifying a frame takes here with each of the tables, as `Build.classify` does it: the mean over
     random frames.
 
+    yardstick  microseconds that tables of the shape YARDSTICK take at the pace for which is asked; None: as it is now
+
     Of every frame the least of some passes over all tables: other work on the machine only ever adds, and a moment in
-    which there is much of it meets all of them.
+    which there is much of it meets all of them. But clocks, and neighbours of a virtual machine, change its pace for
+    minutes, by half and more: so the yardstick is timed in the same passes.
     """
-    timed = [_Timed(tables) for tables in several]
+    timed = [_Timed(tables) for tables in (*several, random_tables(*YARDSTICK))]
     for _ in range(_PASSES):
         for each in timed:
             each.run()
-    return [1e6 * sum(each.least_s) / _FRAMES for each in timed]
+    *found, now = (1e6 * sum(each.least_s) / _FRAMES for each in timed)
+    return [us if yardstick is None else us * yardstick / now for us in found]
 
 
 class _Timed:

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from thenar.compiler.frontier.building import Design
 from thenar.compiler.frontier.candidates import Choice, Screened
 from thenar.compiler.frontier.closeup import Close
+from thenar.compiler.frontier.designs import Design
 from thenar.compiler.frontier.equipment import Equipment
 from thenar.compiler.frontier.measured import measure_designs
 from thenar.compiler.frontier.points import Rate, Way
@@ -23,7 +23,7 @@ from thenar.compiler.frontier.timing.python_times import PythonCost, random_tabl
 from thenar.compiler.frontier.timing.scan_times import ScanTimes
 from thenar.runtime.tables import tables_to_bytes
 
-PYTHON = PythonCost(5.0, 0.1, 0.5, 0.1, 0.01, 0.01)
+PYTHON = PythonCost(5.0, 0.1, 0.5, 0.1, 0.01, 0.01, 10.0)
 
 
 def design_of(model: ClassifyModel) -> Design:

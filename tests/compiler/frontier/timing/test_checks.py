@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from dataclasses import asdict, replace
 
 import pytest
 
@@ -10,7 +11,7 @@ from thenar.compiler.frontier.timing.classify_times import ClassifyModel, fittin
 from thenar.compiler.frontier.timing.measured_cycles import Outcome, Trial, run_trial
 from thenar.compiler.frontier.timing.python_times import PythonCost, random_tables
 
-PYTHON = PythonCost(2.0, 0.03, 0.15, 0.03, 0.0002, 0.0009)
+PYTHON = PythonCost(2.0, 0.03, 0.15, 0.03, 0.0002, 0.0009, 10.0)
 TABLES = [random_tables(33, 16, 14), random_tables(20, 0, 14), random_tables(8, 0, 5)]
 
 
@@ -66,7 +67,7 @@ def test_python_is_timed_on_thirty_tables_even_where_one_is_given() -> None:
 
 
 def test_a_model_that_is_off_is_found_out() -> None:
-    tenfold = PythonCost(*(10 * weight for weight in (2.0, 0.03, 0.15, 0.03, 0.0002, 0.0009)))
+    tenfold = replace(PYTHON, **{name: 10 * weight for name, weight in asdict(PYTHON).items() if name != "yardstick"})
     (found,) = check(ClassifyModel("host", python=tenfold), TABLES)
     assert found.mean_error > 1.0
 

@@ -9,10 +9,10 @@ from thenar.compiler.firmware.targets import TARGETS as PARTS
 from thenar.compiler.frontier.points import FrontierError
 from thenar.compiler.frontier.targets import TARGETS
 from thenar.compiler.frontier.timing.classify_times import CORTEX_HZ, ClassifyModel
-from thenar.compiler.frontier.timing.python_times import PythonCost, classify_us, fit_here, random_tables
+from thenar.compiler.frontier.timing.python_times import YARDSTICK, PythonCost, classify_us, fit_here, random_tables
 from thenar.runtime.tables import tables_to_bytes
 
-PYTHON = PythonCost(1.0, 0.1, 0.2, 0.3, 0.01, 0.02)
+PYTHON = PythonCost(1.0, 0.1, 0.2, 0.3, 0.01, 0.02, 10.0)
 TABLES = random_tables(33, 16, 14)
 
 
@@ -81,11 +81,19 @@ def test_there_is_no_other_target() -> None:
         ClassifyModel("arduino")
 
 
+@pytest.mark.parametrize("pace", [1.0, 40.0])
+def test_times_are_those_of_the_pace_that_the_yardstick_says(pace: float) -> None:
+    """Half as long and twice as long are within it: who else is on the machine is not known."""
+    same, larger = classify_us([random_tables(*YARDSTICK), random_tables(160, 22, 33)], pace)
+    assert 0.5 < same / pace < 2.0
+    assert larger > same
+
+
 def test_what_is_fitted_here_foretells_other_shapes() -> None:
     """Within a factor of two: who else is on the machine is not known."""
     fitted = fit_here()
     others = [random_tables(*shape) for shape in ((24, 16, 10), (50, 0, 20), (100, 22, 14))]
-    for tables, taken in zip(others, classify_us(others), strict=True):
+    for tables, taken in zip(others, classify_us(others, fitted.yardstick), strict=True):
         assert 0.5 < fitted.us(tables) / taken < 2.0
     weights = (fitted.constant, fitted.switch, fitted.joint, fitted.klass, fitted.switch_class, fitted.joint_class)
     assert np.all(np.array(weights) >= 0)

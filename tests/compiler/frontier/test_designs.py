@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from thenar.compiler.frontier.building import Design, best_designs, designs
 from thenar.compiler.frontier.built import Built, points_of, with_whole_scans
 from thenar.compiler.frontier.candidates import Choice, Screened
 from thenar.compiler.frontier.closeup import Close
+from thenar.compiler.frontier.designs import Design, best_designs, designs
 from thenar.compiler.frontier.points import Latency, Rate, Time, Way
 from thenar.compiler.frontier.pricing import Priced, PricedTables, Tabled, Wired
 from thenar.compiler.frontier.settings import Shape
