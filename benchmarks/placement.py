@@ -5,9 +5,9 @@
 Each set is cut into stratified folds (Weka's, seed 1); placement and classifier (LogitBoost, 100 rounds) are learnt
 from the training part alone, and rates are means over the folds. Without files the scenes kamakura and cutkosky are
 simulated. S of the paper is 29 for 16 grasp types, else 62 where the set has so many rows a type, else 13. The smallest
-placement is looked for by halving between sizes that recognise enough and sizes that do not. Scan
-times are wire times of whole scans: of a new glove of the kept switches alone, on MCP23017 at 400 kHz, and of the whole
-glove's chips as wired, of which only the ports that hold kept switches are read (the methods named -cost know these).
+placement is looked for by halving between sizes that recognise enough and sizes that do not. Scan times are wire times
+of whole scans: of a new glove of the kept switches alone, on MCP23017 at 400 kHz, and of the whole glove's chips as
+wired, of which only the ports that hold kept switches are read (the methods named -cost know these).
 """
 
 import argparse
@@ -17,8 +17,8 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from placementlines import Data, bounded, measured, papers
-from placementtables import CONSOLE, bounds, compared, saved
+from placementlines import CONSOLE, Data, bounded, measured, papers
+from placementtables import bounds, compared, saved
 
 from thenar.compiler.evaluation.folds import weka_folds
 from thenar.compiler.recordings.graspset import GraspSet

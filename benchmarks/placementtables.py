@@ -1,41 +1,12 @@
 """The tables of `placement.py`: what each placement reaches beside the paper's."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
-from rich.console import Console
+from placementlines import BOUNDED, MOST, SHOWN, WITHIN, Line, Point
 from rich.table import Table
 
 from thenar.compiler.selection.subset import Subset
 from thenar.compiler.selection.ways import METHODS
-
-# Beside the joints, 33 switches are left out: that saves a fifth of the time.
-SHOWN = {False: (8, 16, 33), True: (8, 16)}
-MOST, WITHIN = 40, 0.005
-CONSOLE = Console(width=150)
-
-
-@dataclass(frozen=True, slots=True)
-class Point:
-    """Means over the folds: recognition rate, number of switches, scan time of a new glove and as wired."""
-
-    rate: float
-    size: float
-    new_us: float
-    wired_us: float
-
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """What one method reaches: at the sizes SHOWN, and with the fewest switches that recognise enough (None: none up to
-    MOST, or not asked); processor seconds of choosing, for a fold.
-    """
-
-    method: str
-    joints: bool
-    shown: tuple[Point, ...]
-    smallest: Point | None
-    seconds: float
 
 
 def saved(lines: Sequence[Line], joints: bool, paper: Point) -> Table:
@@ -82,7 +53,7 @@ def kind(joints: bool) -> str:
 
 def bounds(found: Sequence[tuple[int, int, Subset]]) -> Table:
     """Return the table of how far elimination is from the best subset of few switches, chosen from all rows."""
-    found_pairs = ("elimination, %", "best found, %", "none below, %")
+    found_pairs = (f"{BOUNDED}, %", "best found, %", "none below, %")
     heads = ("switches", *found_pairs, "at most from the best, points", "programs")
     table = Table(*heads, title="pairs of rows of different types that look alike, switches alone")
     for m, alike, best in sorted(found, key=lambda one: one[0]):

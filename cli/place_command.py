@@ -43,10 +43,6 @@ class _Options:
             (self.crowd and self.method == _PAPERS, "--crowd takes a method that is told how many switches to --keep"),
             (self.joints and self.of_tree, "--joints is for the methods beside the paper's ID3"),
             (
-                self.glove is not None and (self.of_tree or self.crowd),
-                "--glove says what scans cost: for one placement by a --method whose name ends in -cost",
-            ),
-            (
                 self.by_size and self.prune is not None,
                 "--prune is for ID3: this method takes --keep",
             ),
@@ -55,7 +51,17 @@ class _Options:
         ):
             if wrong:
                 raise click.UsageError(reason)
+        if self.glove is not None:
+            self._check_priced()
         keep_apart(self.grasps, self.glove, self.draw, self.output)
+
+    def _check_priced(self) -> None:
+        from ..compiler.frontier.settings import PRICED_METHODS
+
+        if self.crowd or self.method not in PRICED_METHODS:
+            raise click.UsageError(
+                f"--glove says what scans cost: take it with a --method that heeds it: {', '.join(PRICED_METHODS)}"
+            )
 
     @property
     def of_tree(self) -> bool:
@@ -144,11 +150,12 @@ def _of_method(asked: _Options, grasp_set: "GraspSet") -> Any:
 
     method, parameter = asked.method or _PAPERS, asked.keep if asked.by_size else asked.prune
     harness = None if asked.glove is None else load_harness(asked.glove)
-    ports = ports_of_whole_glove(harness, grasp_set.switch_names)
-    if harness is not None and ports is None:
+    lacking = set() if harness is None else set(grasp_set.switch_names) - set(harness.switches)
+    if lacking:
         raise click.UsageError(
-            f"{asked.glove} lacks switches of {asked.grasps}: name the glove.toml of the whole glove."
+            f"{asked.glove} has no place for {min(lacking)!r} of {asked.grasps}: name the whole glove's glove.toml."
         )
+    ports = ports_of_whole_glove(harness, grasp_set.switch_names)
     choice = chosen(grasp_set, method, float(parameter or 0), joints=asked.joints, exact=asked.exact, ports=ports)
     if not asked.as_json:
         print_chosen(choice)

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import BrokenExecutor
+from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from itertools import islice
 from queue import Empty, SimpleQueue
@@ -12,7 +12,7 @@ from ..drivers.errors import ThenarError
 from .payloads import SharedArrays, UnreadableError, answered, installed
 
 if TYPE_CHECKING:
-    from distributed import Client, Future
+    from distributed import Client, Future, Security
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
@@ -56,8 +56,11 @@ def _connected(address: str) -> "Iterator[Client]":
             "work on a cluster takes Dask, which is not installed: pip install 'thenar[cluster]'"
         ) from None
     try:
-        asyncio.run(_greet(address))
-        client = Client(address, timeout=CONNECT_S, set_as_default=False)
+        security = _security(address)
+        # A loop of its own: the caller's thread may run one.
+        with ThreadPoolExecutor(1) as thread:
+            thread.submit(asyncio.run, _greet(address, security)).result()
+        client = Client(address, timeout=CONNECT_S, set_as_default=False, security=security)
     except (OSError, ValueError, TypeError, RuntimeError) as reason:
         raise ClusterError(
             f"no Dask scheduler answers at {address!r}: start one there (dask scheduler), or mend the address, "
@@ -69,16 +72,25 @@ def _connected(address: str) -> "Iterator[Client]":
         client.close(timeout=CONNECT_S)
 
 
-async def _greet(address: str) -> None:
+def _security(address: str) -> "Security":
+    """Return what the user's configuration of Dask says of TLS."""
+    import dask
+    from distributed import Security
+    from distributed.utils import import_term
+
+    loader = dask.config.get("distributed.client.security-loader")
+    return import_term(loader)({"address": address}) if loader else Security()
+
+
+async def _greet(address: str, security: "Security") -> None:
     """Connect to the scheduler and go.
 
-    A Client that cannot connect stays half made, and its end, whenever it is collected, can take the lock under which
-    the next one starts: none is made where nobody answers. (To one without address, Dask would start a cluster here.)
+    A Client of an address that is none stays half made, and its end, whenever it is collected, can take the lock under
+    which the next one starts: none is made where nobody answers. (For no address Dask would start a cluster here.)
     """
-    from distributed import Security
     from distributed.comm.core import connect
 
-    greeting = await connect(address, timeout=CONNECT_S, **Security().get_connection_args("client"))
+    greeting = await connect(address, timeout=CONNECT_S, **security.get_connection_args("client"))
     await greeting.close()
 
 

@@ -14,7 +14,6 @@ Answer = TypeVar("Answer")
 
 # More processes are asked for by a slip only, and would take the machine with them.
 MOST_JOBS = 1024
-_LOKYS_THREAD = "ExecutorManagerThread"
 
 
 def in_workers(
@@ -75,7 +74,7 @@ def _interrupts_held() -> Iterator[None]:
 
 @contextmanager
 def _cancelled_work_forgotten() -> Iterator[None]:
-    """Keep loky's own thread quiet at an early end.
+    """Keep loky's own thread quiet as it ends the workers early.
 
     It cancels what waits, and may then look for a piece of it that it was just about to hand out: a KeyError, which
     harms nobody and would be printed.
@@ -83,7 +82,8 @@ def _cancelled_work_forgotten() -> Iterator[None]:
     before = threading.excepthook
 
     def complain(what: threading.ExceptHookArgs) -> None:
-        if not (what.exc_type is KeyError and what.thread is not None and what.thread.name == _LOKYS_THREAD):
+        ending = getattr(getattr(what.thread, "executor_flags", None), "kill_workers", False)
+        if not (ending and what.exc_type is KeyError):
             before(what)
 
     threading.excepthook = complain

@@ -12,8 +12,6 @@ from thenar.simulator.effects.contact_quasistatic import Parameters
 from thenar.simulator.pipeline.registry import load
 from thenar.simulator.scenes.scene import Listed, Scene
 
-pytestmark = pytest.mark.slow
-
 KEPT = ("hand.posture", "joint.noise")
 # So much noise that it matters to joints, and to nothing else.
 NOISE = Listed("joint.noise", load("joint.noise").Parameters(sd_deg=40.0))
@@ -35,6 +33,7 @@ def ablation() -> Ablation:
     return ablate(scene_of(8, subjects=2), jobs=1)
 
 
+@pytest.mark.slow
 def test_every_effect_is_removed_in_turn_from_the_whole_scene(ablation: Ablation) -> None:
     assert [variant.without for variant in ablation.variants] == [None, *KEPT]
     assert ablation.simulated
@@ -45,6 +44,7 @@ def test_every_effect_is_removed_in_turn_from_the_whole_scene(ablation: Ablation
         assert all((one.change is None) == (variant.without is None) for one in variant.rates)
 
 
+@pytest.mark.slow
 def test_rates_are_those_of_the_evaluation_with_all_switches(ablation: Ablation) -> None:
     made = simulate(scene_of(8, subjects=2), jobs=1).grasp_set
     options = Options(repeats=1, tables=("compositions",), protocols=("paper",))
@@ -54,6 +54,7 @@ def test_rates_are_those_of_the_evaluation_with_all_switches(ablation: Ablation)
         assert one.rate.total == len(made)
 
 
+@pytest.mark.slow
 def test_what_an_effect_does_not_touch_does_not_change(ablation: Ablation) -> None:
     without_noise = ablation.variants[2].rates[0]
     assert without_noise.rate == ablation.variants[0].rates[0].rate
@@ -62,6 +63,7 @@ def test_what_an_effect_does_not_touch_does_not_change(ablation: Ablation) -> No
     assert without_noise.change.low < 0.0 < without_noise.change.high
 
 
+@pytest.mark.slow
 def test_a_change_is_what_the_rate_of_the_same_inputs_gained(ablation: Ablation) -> None:
     whole, _, without_noise = ablation.variants
     assert without_noise.rates[1].rate.mean > whole.rates[1].rate.mean
@@ -77,6 +79,7 @@ def test_a_scene_of_every_frame_is_judged_by_the_frames_that_are_read_out() -> N
     assert [variant.rows + variant.unsettled for variant in found.variants] == [8]
 
 
+@pytest.mark.slow
 def test_progress_counts_fits_up_to_all_of_them() -> None:
     seen: list[tuple[int, int]] = []
     scene = scene_of(4)

@@ -8,10 +8,11 @@ import pytest
 from thenar.cli import run
 from thenar.cli.kept_files import kept_names
 from thenar.compiler import GraspSet
+from thenar.compiler.recordings.taxonomy import own
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.scanning.propose import propose_harness
 
-pytestmark = pytest.mark.slow
+Captured = pytest.CaptureFixture[str]
 
 
 @pytest.fixture(scope="module")
@@ -35,33 +36,57 @@ def test_a_method_keeps_so_many_switches_in_its_order(
     assert 0 < len(choice["switches"]) <= 3
 
 
-def glove_of(names: tuple[str, ...], folder: Path) -> Path:
-    """Write a harness of eight switches a chip, the last of `names` on a chip of its own."""
-    path, others = folder / "glove.toml", [f"other {number}" for number in range(9 - len(names))]
-    path.write_text(harness_to_toml(propose_harness([*names[:-1], *others, names[-1]], "mcp23008")))
+@pytest.fixture(scope="module")
+def near_and_far(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Store four types that two bits tell apart: s0 is the one, s8 the other, and s1 the other but for one row."""
+    types = np.arange(80) % 4
+    switches = np.zeros((80, 10), bool)
+    switches[:, 0], switches[:, 1], switches[:, 8] = types & 1, (types >> 1) ^ (np.arange(80) == 27), types >> 1
+    path = tmp_path_factory.mktemp("near and far") / "set.grasps"
+    GraspSet(
+        switches=switches,
+        switch_names=tuple(f"s{number}" for number in range(10)),
+        codes=np.zeros((80, 0), np.uint16),
+        joints=(),
+        grasps=np.array(["cup", "pen", "rod", "key"])[types],
+        taxonomy=own(["cup", "pen", "rod", "key"]),
+        subjects=np.full(80, "A"),
+        objects=np.full(80, "thing"),
+        trials=np.arange(80),
+    ).save(path)
     return path
 
 
-@pytest.mark.parametrize("wired", [False, True], ids=["no harness", "harness"])
-def test_a_method_that_heeds_cost_chooses_as_compile_does(
-    small_set: GraspSet, set_file: Path, tmp_path: Path, wired: bool, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("order", "kept"),
+    [(None, ["s0", "s1"]), ((0, 8, 2, 3, 4, 5, 6, 7, 1, 9), ["s0", "s8"])],
+    ids=["as the names stand", "wired otherwise"],
+)
+def test_a_switch_on_a_port_that_is_read_anyway_is_preferred_as_compile_does(
+    near_and_far: Path, tmp_path: Path, order: tuple[int, ...] | None, kept: list[str], capsys: Captured
 ) -> None:
-    how = ["--glove", str(glove_of(small_set.switch_names, tmp_path))] if wired else []
-    assert run(["place", str(set_file), "--method", "id3-cost", "--keep", "3", "--json", *how]) == 0
-    chosen = [kept["name"] for kept in json.loads(capsys.readouterr().out)["switches"]]
-    built = ["--placement", "id3-cost", "--keep", "3", "--inputs", "switches", "--rounds", "5", "--no-report", "--json"]
-    assert run(["compile", str(set_file), "-o", str(tmp_path / "build"), *built, *how]) == 0
-    assert [switch["name"] for switch in json.loads(capsys.readouterr().out)["switches"]] == chosen
+    how = ["--keep", "2"]
+    if order is not None:
+        harness = propose_harness([f"s{number}" for number in order], "mcp23008")  # eight switches a chip
+        (tmp_path / "glove.toml").write_text(harness_to_toml(harness))
+        how += ["--glove", str(tmp_path / "glove.toml")]
+    assert run(["place", str(near_and_far), "--method", "id3-cost", "--json", *how]) == 0
+    assert sorted(switch["name"] for switch in json.loads(capsys.readouterr().out)["switches"]) == kept
+    how += ["--placement", "id3-cost", "--inputs", "switches", "--rounds", "5", "--folds", "0", "--no-report", "--json"]
+    assert run(["compile", str(near_and_far), "-o", str(tmp_path / "build"), *how]) == 0
+    assert sorted(switch["name"] for switch in json.loads(capsys.readouterr().out)["switches"]) == kept
 
 
-def test_a_glove_that_lacks_switches_says_nothing_of_their_cost(
-    small_set: GraspSet, set_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_a_glove_that_lacks_a_switch_says_nothing_of_its_cost(
+    near_and_far: Path, tmp_path: Path, capsys: Captured
 ) -> None:
-    reduced = str(glove_of(small_set.switch_names[1:], tmp_path))
-    assert run(["place", str(set_file), "--method", "id3-cost", "--keep", "3", "--glove", reduced]) == 2
-    assert "lacks switches of" in capsys.readouterr().err
+    (tmp_path / "glove.toml").write_text(harness_to_toml(propose_harness([f"s{number}" for number in range(9)])))
+    how = ["--keep", "2", "--glove", str(tmp_path / "glove.toml")]
+    assert run(["place", str(near_and_far), "--method", "id3-cost", *how]) == 2
+    assert "has no place for 's9'" in " ".join(capsys.readouterr().err.split())
 
 
+@pytest.mark.slow
 def test_the_paper_s_placement_is_held_beside_the_best_of_as_many(
     set_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -74,6 +99,7 @@ def test_the_paper_s_placement_is_held_beside_the_best_of_as_many(
     assert len(exact["best"]) == len(choice["switches"])
 
 
+@pytest.mark.slow
 def test_people_read_how_far_a_placement_is_from_the_best(set_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["place", str(set_file), "--method", "random", "--keep", "2", "--exact"]) == 0
     said = capsys.readouterr().out
@@ -81,6 +107,7 @@ def test_people_read_how_far_a_placement_is_from_the_best(set_file: Path, capsys
         assert words in said
 
 
+@pytest.mark.slow
 def test_a_standard_placement_is_printed_stored_and_drawn(
     crowd_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -111,12 +138,17 @@ def test_a_standard_placement_is_printed_stored_and_drawn(
         (["--crowd", "--method", "id3", "--keep", "3"], "--crowd takes a method that is told"),
         (["--crowd", "--keep", "3"], "the set has 1 subject(s)"),
         (["--joints"], "--joints is for the methods"),
+        (["--glove", "GLOVE"], "--glove says what scans cost"),
+        (["--method", "elimination", "--keep", "3", "--glove", "GLOVE"], "heeds it: elimination-cost, id3-cost"),
+        (["--crowd", "--method", "id3-cost", "--keep", "3", "--glove", "GLOVE"], "--glove says what scans cost"),
     ],
 )
 def test_what_does_not_go_together_is_one_sentence_and_code_two(
-    set_file: Path, options: list[str], reason: str, capsys: pytest.CaptureFixture[str]
+    set_file: Path, tmp_path: Path, options: list[str], reason: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(["place", str(set_file), *options]) == 2
+    (tmp_path / "glove.toml").touch()
+    given = [str(tmp_path / "glove.toml") if option == "GLOVE" else option for option in options]
+    assert run(["place", str(set_file), *given]) == 2
     said = " ".join(capsys.readouterr().err.split())
     assert reason in said
     assert "Traceback" not in said

@@ -1,3 +1,4 @@
+import asyncio
 import builtins
 import gc
 import operator
@@ -28,7 +29,7 @@ X = np.arange(4 * SHARED_BYTES, dtype=np.uint16).reshape(-1, 8)
 @pytest.fixture(scope="module")
 def scheduler() -> Iterator[str]:
     """Serve a cluster of two worker processes; yields its address."""
-    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0") as cluster:
         yield cluster.scheduler_address
 
 
@@ -136,11 +137,19 @@ def test_an_address_where_no_scheduler_answers_is_told_within_seconds(
         list(in_workers(operator.neg, [1], 1, address))
 
 
-def test_where_nobody_answers_no_client_is_left_to_hold_up_the_next() -> None:
+def test_where_nobody_answers_no_client_is_left_to_hold_up_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(under_test, "CONNECT_S", 0.5)
     for address in ("nonsense", "foo://127.0.0.1:1"):
         with pytest.raises(ClusterError, match="no Dask scheduler answers"):
             list(in_workers(operator.neg, [1], 1, address))
-    assert not [thing for thing in gc.get_objects() if isinstance(thing, Client) and thing.status == "connecting"]
+    assert not [thing for thing in gc.get_objects() if type(thing) is Client and thing.status == "connecting"]
+
+
+def test_a_cluster_works_for_who_runs_a_loop_of_their_own(scheduler: str) -> None:
+    async def asked() -> list[int]:
+        return sorted(in_workers(operator.neg, range(3), 1, scheduler))
+
+    assert asyncio.run(asked()) == [-2, -1, 0]
 
 
 def test_without_dask_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -52,13 +52,20 @@ def test_an_end_before_the_last_answer_is_quiet_though_loky_looks_for_what_it_ca
 ) -> None:
     def as_if_work_had_just_been_put_in_line(manager: Any, cancel: Any = Manager.flag_executor_shutting_down) -> None:
         cancel(manager)
-        stumbled.append(manager.executor_flags.kill_workers)
         manager.work_ids_queue.put(-1)
+
+    def hand_out(manager: Any, looks_for_it: Any = Manager.add_call_item_to_queue) -> None:
+        try:
+            looks_for_it(manager)
+        except KeyError:
+            stumbled.append(True)
+            raise
 
     stumbled: list[bool] = []
     complaints: list[object] = []
     monkeypatch.setattr(threading, "excepthook", complaints.append)
     monkeypatch.setattr(Manager, "flag_executor_shutting_down", as_if_work_had_just_been_put_in_line)
+    monkeypatch.setattr(Manager, "add_call_item_to_queue", hand_out)
     answers = in_workers(squared_where, count(), 2)
     assert isinstance(answers, Generator)
     next(answers)

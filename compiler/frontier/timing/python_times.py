@@ -54,7 +54,7 @@ def fit_here() -> PythonCost:
     taken = np.array(classify_us([random_tables(*shape) for shape in shapes]))
     rows = np.array([_features(*shape) for shape in shapes])
     weights, _ = nnls(rows / taken[:, np.newaxis], np.ones(len(taken)))
-    return PythonCost(*(*weights.tolist(), float(taken[shapes.index(YARDSTICK)])))
+    return PythonCost(*[*weights.tolist(), float(taken[shapes.index(YARDSTICK)])])
 
 
 def classify_us(several: Sequence[IntegerTables], yardstick: float | None = None) -> list[float]:

@@ -107,7 +107,6 @@ def test_an_average_stays_within_0_to_1_and_around_its_mean(correct: list[tuple[
     assert 0 <= average.low <= average.mean <= average.high <= 1
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("freedom", range(1, 51))
 def test_the_quantile_of_students_t_is_scipys_within_a_few_ulp(freedom: int) -> None:
     # 21 at 6 degrees of freedom, which a percentage never shows; the case of the statistics relies on 4 up to 3.

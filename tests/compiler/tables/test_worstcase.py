@@ -51,7 +51,6 @@ def _small(make_stumps: MakeStumps, make_rows: MakeRows, seed: int, width: int) 
     return tables, quantise(tables, *make_rows(seed, switches=3, joints=2), width)
 
 
-@pytest.mark.slow
 @settings(deadline=None, max_examples=40)
 @given(seed=st.integers(0, 10_000), width=widths)
 def test_of_all_frames_none_loses_more_and_the_witness_as_much(

@@ -64,7 +64,7 @@ def test_every_answer_comes_once_in_the_order_of_the_tasks_on_any_number_of_jobs
 def test_a_cluster_finds_the_same_answers(tmp_path: Path) -> None:
     tasks = tasks_in(tmp_path, range(9))
     with (
-        LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
+        LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0") as cluster,
         Store(tmp_path / "cluster", "set") as store,
     ):
         there = resumed(store, tasks, squared, Found, cluster=cluster.scheduler_address)
