@@ -38,7 +38,7 @@ def _names(_context: click.Context, _parameter: click.Parameter, text: str | Non
 @click.option("--rounds", type=click.IntRange(1, 300), default=300, show_default=True, help="The most rounds to try.")
 @click.option("--repeats", type=click.IntRange(1), default=3, show_default=True, help="Repeats of the folds.")
 @click.option(
-    "--finalists", type=click.IntRange(1), default=8, show_default=True, help="Placements to look at closely."
+    "--finalists", type=click.IntRange(1), default=12, show_default=True, help="Placements to look at closely."
 )
 @click.option("--max-bins", type=click.IntRange(2), help="At most so many bins a joint.  [default: no limit]")
 @click.option("--seed", type=int, default=1, show_default=True, help="Seed of folds and stream.")

@@ -1,6 +1,6 @@
 """What a frontier's stages will cost, told before any has begun: so the time that is left does not grow on the way."""
 
-from .closeup import PRICE_S
+from .closeup import PRICE_S, further, papers_depth
 from .material import Cuts, Material
 from .measured import TRIAL_S
 from .screening import QUICK_PRICE_S
@@ -24,13 +24,15 @@ def foreseen(search: Search, material: Material, cuts: Cuts, simulated: bool) ->
     rivals = sum(len(curve_ways(name, n_switches)) for name in search.rivals)
     last = min(search.finalists + _MARKED, choices)
     designs = last * _DESIGNS
+    few = papers_depth(search)
     return {
         "placements": sum(path_s(name, n) for name in methods for n in (rows, *train)),
         "rivals": sum(path_s(name, n) for name in search.rivals for n in train) if wired else 0.0,
         "screening": (_DIFFERENT * choices + rivals) * sum(fit_s(search.screened, 0, n) for n in train),
         "times": _DIFFERENT * choices * QUICK_PRICE_S,
         "finalists' placements": sum(path_s(name, n) for name in methods for n in more),
-        "finalists": last * sum(fit_s(search.rounds, len(search.tabled) * len(SHAPES), n) for n in (*train, *more)),
+        "finalists": last * sum(fit_s(search.rounds, len(search.tabled) * len(SHAPES), n) for n in train),
+        further(few.rounds): last * sum(fit_s(few.rounds, len(few.tabled) * len(SHAPES), n) for n in more),
         "prices": last * PRICE_S,
         "simulations": designs * TRIAL_S * simulated,
         "checks": _CHECKED * TRIAL_S * simulated,

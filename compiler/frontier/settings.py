@@ -55,7 +55,7 @@ class Search:
     seed: int = 1
     screening: int = 60
     rounds: int = 300
-    finalists: int = 8
+    finalists: int = 12
     max_bins: int | None = None
 
     def __post_init__(self) -> None:

@@ -12,8 +12,8 @@ Box = tuple[float, float, float, float]  # left, bottom, right, top
 
 # What a label costs, beside its distance in points: for every point of something drawn that it covers ...
 MARKER, LINE, FAINT = 60.0, 6.0, 0.5
-# ... for crossing labels and markers with the line that leads to it ...
-_CROSSING = 150.0
+# ... for every marker, and for every label, that the line which leads to it crosses ...
+_MARKER_CROSSED, _LABEL_CROSSED = 150.0, 600.0
 # ... and for covering a label or leaving the picture, which is out of the question.
 _FORBIDDEN = 1e6
 
@@ -77,7 +77,7 @@ class Room:
         lows, highs = centres - half - _APART, centres + half + _APART
         costs = radius + self._covered(lows, highs) + _FORBIDDEN * self._outside(lows, highs)
         if radius >= LED_FROM:
-            costs += _CROSSING * self._crossed(starts, centres)
+            costs += self._crossed(starts, centres)
         least = int(np.argmin(costs))
         return Place(least // len(_DIRECTIONS), tuple(centres[least].tolist()), radius, float(costs[least]))
 
@@ -95,7 +95,7 @@ class Room:
         return np.logical_or((lows < (left, bottom)).any(axis=1), (highs > (right, top)).any(axis=1))
 
     def _crossed(self, starts: Floats, centres: Floats) -> Floats:
-        """Return how many labels and markers the lines from `starts` to `centres` cross."""
+        """Return what the lines from `starts` to `centres` cost for the labels and markers that they cross."""
         x, y = (starts + (centres - starts) * _ALONG[:, None]).T[:, :, :, None]  # (candidates, steps, 1)
         taken = np.array(self._taken).reshape(-1, 4)
         on_labels = (x > taken[:, 0]) & (x < taken[:, 2]) & (y > taken[:, 1]) & (y < taken[:, 3])
@@ -103,10 +103,9 @@ class Room:
         markers = drawn[drawn[:, 2] >= MARKER, :2]
         on_markers = (x - markers[:, 0]) ** 2 + (y - markers[:, 1]) ** 2 < _BESIDE**2
         own = ((starts[:, None] - markers) ** 2).sum(axis=2) < 1
-        crossed: Floats = on_labels.any(axis=1).sum(axis=1) + (on_markers.any(axis=1) & ~own).sum(axis=1).astype(
-            np.float64
-        )
-        return crossed
+        labels, crossed = on_labels.any(axis=1).sum(axis=1), (on_markers.any(axis=1) & ~own).sum(axis=1)
+        costs: Floats = _LABEL_CROSSED * labels + _MARKER_CROSSED * crossed
+        return costs
 
     def _drawn_points(self) -> Floats:
         return np.concatenate(self._drawn) if self._drawn else np.empty((0, 3))

@@ -1,4 +1,7 @@
-from thenar.compiler.frontier.closeup import papers_tables, worthwhile
+import pytest
+
+from thenar.compiler.frontier.closeup import depth_of, papers_depth, papers_tables, worthwhile
+from thenar.compiler.frontier.learnt import Fit
 from thenar.compiler.frontier.points import Rate
 from thenar.compiler.frontier.pricing import Tabled
 from thenar.compiler.frontier.settings import Search, Shape
@@ -20,3 +23,24 @@ def test_the_papers_tables_have_a_hundred_rounds_or_as_many_as_there_are() -> No
     for most in (300, 100, 50, 1):
         search = Search(methods=("id3",), rivals=(), rounds=most)
         assert papers_tables(search).rounds in search.tabled
+
+
+@pytest.mark.parametrize(("late", "rounds"), [(0, 100), (2, 100), (3, 300)])
+def test_rounds_beyond_the_papers_are_followed_where_they_win_more_than_a_fifth_of_a_percent(
+    late: int, rounds: int
+) -> None:
+    search = Search(methods=("id3",), rivals=())
+    correct = [450 + (late if stage > 100 else 0) for stage in search.stages]
+    fits = [Fit(500, tuple(correct), ()), Fit(500, tuple(450 for _ in correct), ())]
+    assert depth_of(search, fits).rounds == rounds
+
+
+def test_a_search_of_few_rounds_is_followed_to_its_end() -> None:
+    search = Search(methods=("id3",), rivals=(), rounds=50)
+    assert depth_of(search, [Fit(10, tuple(range(len(search.stages))), ())]) == search
+
+
+def test_what_is_followed_less_far_is_the_beginning_of_what_is() -> None:
+    few, all_rounds = papers_depth(Search()), Search()
+    assert all_rounds.stages[: len(few.stages)] == few.stages
+    assert all_rounds.tabled[: len(few.tabled)] == few.tabled
