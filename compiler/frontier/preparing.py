@@ -62,6 +62,8 @@ def run_frontier(request: Request, report: Callable[[int, int], None]) -> Fronti
     grasp_set = GraspSet.load(request.recordings)
     harness = None if request.glove is None else load_harness(request.glove)
     search, lacking = _search(request)
+    if request.output.exists() and not request.output.is_dir():
+        raise FrontierError(f"{request.output} is a file: name a folder for the frontier")
     request.output.mkdir(parents=True, exist_ok=True)
     with Store(request.output / STORE_NAME, _scope(grasp_set)) as store:
         effort = Effort(report)

@@ -6,7 +6,6 @@ import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -117,23 +116,6 @@ def test_a_frontier_of_other_recordings_is_refused(
     done = thenar("compile", other, "-o", tmp_path / "b", "--from", found_folder / "frontier.json", "--point", 1)
     assert done.returncode == 2
     assert "found for other recordings" in done.stderr
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("--methods", "nonsense"), "there is no method 'nonsense'"),
-        (("--budget-us", 5, "--rate", 0.5), "give one of them"),
-        (("--dask", "nowhere:1"), "nowhere:1"),
-    ],
-)
-def test_what_is_wrong_is_said_in_a_sentence(
-    thenar: Thenar, set_file: Path, tmp_path: Path, arguments: tuple[Any, ...], said: str
-) -> None:
-    done = thenar("frontier", set_file, "-o", tmp_path / "f", *QUICK[:2], *arguments)
-    assert done.returncode == 2
-    assert said in done.stderr
-    assert "Traceback" not in done.stderr
 
 
 def test_a_point_that_does_not_exist_is_told(

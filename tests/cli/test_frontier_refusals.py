@@ -1,0 +1,32 @@
+from pathlib import Path
+
+import pytest
+
+from thenar.cli import run
+
+Captured = pytest.CaptureFixture[str]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--methods", "nonsense"), "there is no method 'nonsense'"),
+        (("--budget-us", "5", "--rate", "0.5"), "give one of them"),
+        (("--rate", "1.5"), "1.5 is not in the range"),
+        (("--dask", "nowhere"), "no Dask scheduler answers at 'nowhere'"),
+    ],
+)
+def test_what_is_wrong_is_said_in_a_sentence(
+    set_file: Path, tmp_path: Path, arguments: tuple[str, ...], said: str, capsys: Captured
+) -> None:
+    assert run(["frontier", str(set_file), "-o", str(tmp_path / "found"), *arguments]) == 2
+    complaint = " ".join(capsys.readouterr().err.split())
+    assert said in complaint
+    assert "Traceback" not in complaint
+
+
+def test_a_file_is_no_folder_and_is_left_alone(set_file: Path, tmp_path: Path, capsys: Captured) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    assert run(["frontier", str(set_file), "-o", str(tmp_path / "notes.txt")]) == 2
+    assert "notes.txt is a file: name a folder for the frontier" in " ".join(capsys.readouterr().err.split())
+    assert (tmp_path / "notes.txt").read_text() == "mine"
