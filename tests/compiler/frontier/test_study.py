@@ -6,18 +6,28 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from distributed import LocalCluster
+from numpy.typing import NDArray
 
+from thenar.compiler.boosting.boost import boost
 from thenar.compiler.build.compile import compile_build
-from thenar.compiler.frontier.points import Frontier, FrontierError, frontier_from_bytes
+from thenar.compiler.evaluation.folds import weka_folds
+from thenar.compiler.frontier.points import Frontier, FrontierError, Point, frontier_from_bytes
 from thenar.compiler.frontier.preparing import Request, run_frontier
 from thenar.compiler.frontier.study import Wanted
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.selection.learning import Learning
+from thenar.compiler.selection.ways import chooser
+from thenar.compiler.tables.collapse import collapse
+from thenar.compiler.tables.quantise import quantise
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.scanning.propose import propose_harness
+from thenar.runtime.scorer import Scorer
 
 Make = Callable[..., GraspSet]
+Rows = NDArray[np.intp]
 
 
 pytestmark = pytest.mark.slow
@@ -96,6 +106,44 @@ def test_scans_that_end_early_decide_on_single_frames(first: tuple[Request, Fron
 def test_subjects_are_left_out_where_there_are_several(first: tuple[Request, Frontier]) -> None:
     assert first[1].subjects == 2
     assert all(point.left_out is not None for point in first[1].points)
+
+
+def rows_recognised(grasp_set: GraspSet, point: Point, train: Rows, test: Rows) -> int:
+    """Choose, train and cut integers from some rows alone, and let the runtime answer the others."""
+    setting, joints = point.setting, point.setting.inputs != "switches"
+    labels = np.unique(grasp_set.labels, return_inverse=True)[1]
+    codes = grasp_set.codes if joints else grasp_set.codes[:, :0]
+    columns: tuple[int, ...] = ()
+    if setting.inputs != "joints":
+        beside = codes if setting.way.method == "elimination" else codes[:, :0]
+        learning = Learning(grasp_set.switches[train], beside[train], labels[train], 4)
+        columns = chooser(setting.way.method, learning)(setting.way.parameter)
+    bits = grasp_set.switches[:, list(columns)]
+    X = np.hstack([bits.astype(np.uint16), codes])
+    stumps, _ = boost(X[train], labels[train], 4, rounds=setting.rounds)
+    tables = collapse(stumps, len(columns))
+    scorer = Scorer(quantise(tables, bits[train], codes[train], setting.width, setting.table_bits))
+    answers = [scorer.lanes(bits[row], codes[row]) for row in test]
+    return sum(lanes.index(max(lanes)) == labels[row] for lanes, row in zip(answers, test, strict=True))
+
+
+def test_rates_are_those_of_rows_that_neither_placement_nor_training_saw(tmp_path: Path, make_set: Make) -> None:
+    """Two repeats of stratified folds, and each subject from the others; all of it done here once more, one by one."""
+    grasp_set = make_set(subjects=3)
+    found = found_of(asked(tmp_path, grasp_set, repeats=2, rivals=()))
+    labels = np.unique(grasp_set.labels, return_inverse=True)[1]
+    for point in found.points:
+        repeats = [
+            sum(rows_recognised(grasp_set, point, fold.train, fold.test) for fold in weka_folds(labels, 4, seed))
+            for seed in (1, 2)
+        ]
+        assert point.rate.mean == pytest.approx(np.mean(repeats) / len(grasp_set))
+        others = [np.flatnonzero(grasp_set.subjects == subject) for subject in ("S0", "S1", "S2")]
+        alone = [
+            rows_recognised(grasp_set, point, np.setdiff1d(np.arange(len(grasp_set)), test), test) for test in others
+        ]
+        assert point.left_out is not None
+        assert point.left_out.mean == pytest.approx(sum(alone) / len(grasp_set))
 
 
 def test_no_placement_without_switches_is_tried_but_the_joints_alone(first: tuple[Request, Frontier]) -> None:
