@@ -176,8 +176,15 @@ def test_names_are_no_formulas_and_no_markup(examples: Any) -> None:
     ids=["nothing", "points alone", "no points", "nothing picked"],
 )
 def test_what_is_missing_is_left_out(examples: Any, changes: dict[str, object]) -> None:
-    for svg in pictures(examples.example_frontier(**changes), "svg").values():
+    frontier = examples.example_frontier(**changes)
+    drawn = pictures(frontier, "svg")
+    for svg in drawn.values():
         ElementTree.fromstring(svg)
+    against_time = drawn["frontier"]
+    assert (b"<!-- tried -->" in against_time) == bool(frontier.tried)
+    assert (b"<!-- switches alone -->" in against_time) == bool(frontier.points)
+    assert (b"<!-- paper, S = 62 " in against_time) == bool(frontier.marks)
+    assert (b"<!-- point " in against_time) == bool(frontier.points)
 
 
 def test_other_kinds_of_files_are_refused(examples: Any) -> None:
