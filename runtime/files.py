@@ -1,9 +1,13 @@
-"""Files that are written whole or not at all."""
+"""Files that are written whole or not at all, and read within a limit."""
 
 import errno
 import os
 import tempfile
 from pathlib import Path
+
+from ..drivers.files import open_file, read_file
+
+__all__ = ["is_special", "open_file", "read_file", "sync_folder", "write_atomically"]
 
 
 def write_atomically(path: Path, data: bytes) -> None:

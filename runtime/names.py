@@ -1,10 +1,29 @@
-"""Names: what would not survive a file format, and how messages list names and suggest the nearest."""
+"""Names: what would not survive a file format, and how messages show, list and suggest them."""
 
 import difflib
 import unicodedata
 from collections.abc import Sequence
 
 SHOWN = 5
+# The longest piece of a foreign file that a message repeats.
+LONGEST_SHOWN = 80
+
+# Control and format characters (a terminal obeys some, others reorder a line), halves of surrogate pairs, private and
+# unassigned ones, and the separators of lines and paragraphs.
+_UNPRINTABLE = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"})
+
+
+def printable(text: str) -> str:
+    """Return `text` with every character that is no glyph written as Python would, so that no terminal obeys it."""
+    return "".join(
+        letter.encode("unicode_escape").decode() if unicodedata.category(letter) in _UNPRINTABLE else letter
+        for letter in text
+    )
+
+
+def shortened(text: str, longest: int = LONGEST_SHOWN) -> str:
+    """Return what a message repeats of a foreign `text`: printable, and cut behind `longest` characters."""
+    return printable(text) if len(text) <= longest else f"{printable(text[:longest])}..."
 
 
 def nearest(name: str, names: Sequence[str]) -> str:
