@@ -52,7 +52,7 @@ def forest(X: Rows, y: Labels, trees: int, leaves: int) -> Any:
 
 def emlearn_forest(model: Any, rows: Rows, name: str) -> Peer:
     """Return emlearn's C, in line, hard votes, of a forest on doubled features; rows are those to answer."""
-    import emlearn
+    import emlearn  # pyright: ignore[reportMissingImports]
 
     converted = emlearn.convert(model, method="inline", dtype="int16_t")
     code = converted.save(name="forest", format="c", include_proba=False)
@@ -67,8 +67,8 @@ int predict(void) {{ return (int)forest_predict(input, {rows.shape[1]}); }}
 
 def m2cgen_stumps(X: Rows, y: Labels, rows: Rows, rounds: int) -> Peer:
     """Return m2cgen's C of XGBoost's boosted stumps, as floating-point code of the AVR's four-byte doubles."""
-    import m2cgen
-    from xgboost import XGBClassifier
+    import m2cgen  # pyright: ignore[reportMissingImports]
+    from xgboost import XGBClassifier  # pyright: ignore[reportMissingImports]
 
     classes = int(y.max()) + 1
     model = XGBClassifier(

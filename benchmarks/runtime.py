@@ -70,8 +70,8 @@ def onnx_call(model: GradientBoostingClassifier, row: np.ndarray) -> Callable[[]
     """Return a call of onnxruntime on `row` (1, d) float32, or None where it or skl2onnx is not installed."""
     if not all(importlib.util.find_spec(name) for name in ("onnxruntime", "skl2onnx")):
         return None
-    import onnxruntime
-    from skl2onnx import to_onnx
+    import onnxruntime  # pyright: ignore[reportMissingImports]
+    from skl2onnx import to_onnx  # pyright: ignore[reportMissingImports]
 
     session = onnxruntime.InferenceSession(to_onnx(model, row, options={"zipmap": False}).SerializeToString())
     return lambda: session.run(None, {"X": row})

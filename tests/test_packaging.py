@@ -16,24 +16,24 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
-FOLDERS = PROJECT["tool"]["setuptools"]["package-dir"]
+LINKS = ROOT / "src" / "thenar"
+# No package by itself: a namespace, so that every room is found wherever it is installed.
+ROOMS = sorted(path.name for path in LINKS.iterdir() if path.is_dir() and path.name != "__pycache__")
 
 
-def test_every_folder_with_python_in_it_is_listed_as_a_package() -> None:
-    found = set()
-    for name, folder in FOLDERS.items():
-        for init in (ROOT / folder).rglob("__init__.py"):
-            inner = init.parent.relative_to(ROOT / folder).parts
-            found.add(".".join([name, *inner]))
-    assert found == set(PROJECT["tool"]["setuptools"]["packages"])
+def test_every_room_stands_at_the_top_and_is_linked_under_its_import_name() -> None:
+    assert ROOMS == sorted(path.parent.name for path in ROOT.glob("*/__init__.py"))
+    assert all((LINKS / room).is_symlink() and (LINKS / room).resolve() == ROOT / room for room in ROOMS)
 
 
-def test_every_package_is_marked_as_typed() -> None:
-    assert all((ROOT / folder / "py.typed").exists() for folder in FOLDERS.values())
+def test_every_folder_with_python_in_it_is_a_package() -> None:
+    folders = {path.parent for room in ROOMS for path in (ROOT / room).rglob("*.py")}
+    assert len(folders) > 30
+    assert not [folder for folder in folders if not (folder / "__init__.py").exists()]
 
 
-def test_no_top_level_package_of_a_common_name_is_installed() -> None:
-    assert all(name.startswith("thenar.") for name in PROJECT["tool"]["setuptools"]["packages"])
+def test_every_room_is_marked_as_typed() -> None:
+    assert all((ROOT / room / "py.typed").exists() for room in ROOMS)
 
 
 def base_distributions() -> set[str]:
@@ -57,8 +57,9 @@ def board(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the Python of a virtual environment with the wheel and its base dependencies and nothing else."""
     folder = tmp_path_factory.mktemp("board")
     source = folder / "source"
-    for name in FOLDERS.values():
-        shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for name in (*ROOMS, "src"):
+        leave_out = shutil.ignore_patterns("__pycache__", "*.egg-info")
+        shutil.copytree(ROOT / name, source / name, symlinks=True, ignore=leave_out)
     for name in ("pyproject.toml", "README.md", "LICENSE", "MANIFEST.in"):
         shutil.copy(ROOT / name, source / name)
     pip = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation"]
@@ -94,9 +95,8 @@ def test_the_wheel_holds_every_module_and_no_other(board: Path) -> None:
         "print(*sorted(p.relative_to(r).as_posix() for p in r.rglob('*.py')))",
     )
     expected = []
-    for name, folder in FOLDERS.items():
-        short = name.removeprefix("thenar.")
-        expected += [f"{short}/{p.relative_to(ROOT / folder).as_posix()}" for p in (ROOT / folder).rglob("*.py")]
+    for room in ROOMS:
+        expected += [p.relative_to(ROOT).as_posix() for p in (ROOT / room).rglob("*.py")]
     assert listed.split() == sorted(expected)
 
 
@@ -108,10 +108,9 @@ def test_the_wheel_holds_what_the_modules_read_beside_them_such_as_every_templat
         "print(*sorted(p.relative_to(r).as_posix() for p in r.rglob('*') if p.is_file() and p.suffix[:3] != '.py'))",
     )
     expected = []
-    for name, folder in FOLDERS.items():
-        short = name.removeprefix("thenar.")
-        beside = (p for p in (ROOT / folder).rglob("*") if p.is_file() and p.suffix not in (".py", ".pyc"))
-        expected += [f"{short}/{p.relative_to(ROOT / folder).as_posix()}" for p in beside]
+    for room in ROOMS:
+        beside = (p for p in (ROOT / room).rglob("*") if p.is_file() and p.suffix not in (".py", ".pyc"))
+        expected += [p.relative_to(ROOT).as_posix() for p in beside]
     assert listed.split() == sorted(expected)
     assert any(path.startswith("firmware_templates/") and path.endswith(".j2") for path in expected)
 

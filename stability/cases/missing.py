@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.tables.collapse import HIGHEST_CODE
-from ...reference.numbers import precisely
+from ..reference.numbers import precisely
 from ...runtime.recognizer import Frame, Recognizer
 from ...runtime.scorer import LANE_OFFSET
 from ..checks.exact_means import ExactMeans

@@ -5,7 +5,7 @@ from itertools import permutations
 
 from ...compiler.tables.compare import float_slack
 from ...compiler.tables.worstcase import Rounding
-from ...reference.numbers import precisely, ratio
+from ..reference.numbers import precisely, ratio
 from ...runtime.tables import MAX_SWITCHES
 from ..checks.exact_frames import BothWays, lost
 from ..checks.integer_sums import furthest_sums, largest

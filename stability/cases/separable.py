@@ -18,9 +18,9 @@ from ...compiler.boosting.boost import History, boost
 from ...compiler.boosting.stumps import Stumps, winners
 from ...compiler.tables.collapse import collapse
 from ...compiler.tables.quantise import quantise
-from ...reference.logistic import mean_loss
-from ...reference.numbers import distance
-from ...reference.tables import table_scores
+from ..reference.logistic import mean_loss
+from ..reference.numbers import distance
+from ..reference.tables import table_scores
 from ...runtime.tables import LIMIT, IntegerTables
 from ..checks.integer_sums import largest_sum
 from ..checks.roundings import ROUNDING, loss_error, part_of

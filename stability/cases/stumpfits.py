@@ -9,8 +9,8 @@ from mpmath import mpf
 
 from ...compiler.boosting.binning import bin_columns, midpoints
 from ...compiler.boosting.stumpfit import FittedStumps, Targets, fit_stumps
-from ...reference import stumps as truth
-from ...reference.numbers import precisely
+from ..reference import stumps as truth
+from ..reference.numbers import precisely
 from ..checks.class_rounds import ClassRound, branches
 from ..checks.trainings import trainings
 from ..finding import Case, Finding, Worst

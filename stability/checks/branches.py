@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import mpmath
 from mpmath import mpf
 
-from ...reference.numbers import precisely
+from ..reference.numbers import precisely
 from .roundings import ROUNDING
 
 # A branch counts as empty below a share of 2^-38 of the weight, of which both are known to a few roundings.

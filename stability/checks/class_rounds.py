@@ -12,9 +12,9 @@ from mpmath import mpf
 from numpy.typing import NDArray
 
 from ...compiler.boosting.stumps import Stumps
-from ...reference import stumps as truth
-from ...reference.logistic import softmax, target
-from ...reference.numbers import precisely
+from ..reference import stumps as truth
+from ..reference.logistic import softmax, target
+from ..reference.numbers import precisely
 from ..finding import Worst
 from ..inputs.hard_data import Floats, HardSet
 from .branches import Sums, choice_error, sums

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from mpmath import mpf
 
 from ...compiler.tables.collapse import ScoreTables
-from ...reference.numbers import precisely
-from ...reference.tables import table_scores
+from ..reference.numbers import precisely
+from ..reference.tables import table_scores
 from ...runtime.scorer import LANE_OFFSET, Scorer
 from ...runtime.tables import IntegerTables
 

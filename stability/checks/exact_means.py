@@ -5,8 +5,8 @@ from typing import TypeVar
 
 from mpmath import mpf
 
-from ...reference.numbers import precisely
-from ...reference.tables import mean_row, mean_switch, table_scores
+from ..reference.numbers import precisely
+from ..reference.tables import mean_row, mean_switch, table_scores
 from ..inputs.small_build import SmallBuild
 from .lost_inputs import Loss
 

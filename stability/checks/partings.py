@@ -6,7 +6,7 @@ import numpy as np
 
 from ...compiler.boosting.boost import boost
 from ...compiler.boosting.stumps import TIE, Stumps
-from ...reference.numbers import precisely
+from ..reference.numbers import precisely
 from ..finding import Finding, Worst
 from ..inputs.changes import Change
 from ..inputs.hard_data import Floats, HardSet

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import mpmath
 from mpmath import mpf
 
-from ...reference.logistic import loss
-from ...reference.numbers import precisely
+from ..reference.logistic import loss
+from ..reference.numbers import precisely
 
 ROUNDING = 2.0**-53  # the largest relative error of one rounding
 SMALLEST = mpf(2) ** -1074

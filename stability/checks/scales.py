@@ -4,7 +4,7 @@ import math
 
 from ...compiler.tables.balance import balance
 from ...compiler.tables.collapse import ScoreTables
-from ...reference.tables import steps
+from ..reference.tables import steps
 from ..finding import Finding, Worst
 from ..inputs.hard_tables import dominated, drawn, quantised, rows_of
 from .integer_sums import largest_sum

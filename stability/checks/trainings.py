@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ...compiler.boosting.boost import boost
 from ...compiler.boosting.stumps import Stumps
-from ...reference.ensembles import Round, boost_rounds
-from ...reference.numbers import precisely
+from ..reference.ensembles import Round, boost_rounds
+from ..reference.numbers import precisely
 from ..finding import Finding, Worst
 from .branches import choice_error
 from .class_rounds import ClassRound, branches, class_rounds, see_stump

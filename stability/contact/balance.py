@@ -6,7 +6,7 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
-from ...reference.numbers import precisely
+from ..reference.numbers import precisely
 from ...simulator.body.hand import LIMITS_DEG
 from ...simulator.body.pose import rotation
 from ...simulator.contact.grip import GRAVITY, STIFFNESS

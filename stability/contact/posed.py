@@ -10,8 +10,8 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
-from ...reference.linear import turn
-from ...reference.numbers import precisely
+from ..reference.linear import turn
+from ..reference.numbers import precisely
 from ...simulator.body.axes import ABDUCTORS, BETWEEN, REST
 from ...simulator.body.hand import Hand
 from ...simulator.body.shapes import Box, Cylinder, Shape, Sphere

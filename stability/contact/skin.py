@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from mpmath import mpf
 
-from ...reference.numbers import precisely
+from ..reference.numbers import precisely
 from ...simulator.contact.quasistatic import Case, Skin
 from ..checks.roundings import ROUNDING
 from .posed import surface

@@ -9,8 +9,8 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from ...reference.linear import turn
-from ...reference.numbers import precisely
+from ..reference.linear import turn
+from ..reference.numbers import precisely
 from ...simulator.body.hand import CAPSULES
 from ...simulator.body.layout import Switches, murakami160
 from ...simulator.body.pose import rotation, rotation_vector

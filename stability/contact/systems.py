@@ -9,8 +9,8 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from ...reference.linear import solve
-from ...reference.numbers import precisely
+from ..reference.linear import solve
+from ..reference.numbers import precisely
 from ...simulator.contact.quasistatic import Skin
 from ...simulator.contact.quasistatic.balance import Balance
 from ...simulator.contact.quasistatic.case import command

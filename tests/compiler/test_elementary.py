@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from thenar.compiler.elementary import _log_of_one_and, add_up, exp, log, sincos, softmax_and_loss
-from thenar.reference import logistic
-from thenar.reference.numbers import exact, precisely, ulps
+from thenar.stability.reference import logistic
+from thenar.stability.reference.numbers import exact, precisely, ulps
 
 
 @given(st.floats(-708.0, 709.0))

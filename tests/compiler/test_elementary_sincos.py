@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from thenar.compiler.elementary import sincos
-from thenar.reference import linear
-from thenar.reference.numbers import ulps
+from thenar.stability.reference import linear
+from thenar.stability.reference.numbers import ulps
 
 FURTHEST = 1000.0
 QUARTERS = 636  # so many quarter turns fit

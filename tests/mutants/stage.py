@@ -7,19 +7,16 @@ FOLDER/thenar/... comes before the installed thenar when FOLDER is on PYTHONPATH
 
 import shutil
 import sys
-import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def stage(folder: Path) -> None:
-    """Copy every package of pyproject.toml to where its name says, and the tests, into the new or empty `folder`."""
-    settings = tomllib.loads((ROOT / "pyproject.toml").read_text())
-    places = settings["tool"]["setuptools"]["package-dir"]
+    """Copy the package, its links followed, and the tests into the new or empty `folder`."""
     leave_out = shutil.ignore_patterns("__pycache__")
-    for name, place in {**places, "tests": "tests"}.items():
-        shutil.copytree(ROOT / place, folder.joinpath(*name.split(".")), ignore=leave_out)
+    for name, place in {"thenar": "src/thenar", "tests": "tests"}.items():
+        shutil.copytree(ROOT / place, folder / name, ignore=leave_out)
     shutil.copy(ROOT / "pyproject.toml", folder)
 
 

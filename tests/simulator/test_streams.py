@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.reference.intervals import normal_quantile
-from thenar.reference.numbers import distance
+from thenar.stability.reference.intervals import normal_quantile
+from thenar.stability.reference.numbers import distance
 from thenar.simulator.deviates import Numbers
 from thenar.simulator.streams import Draw, Draws, Site
 

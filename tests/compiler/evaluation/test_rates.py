@@ -6,8 +6,8 @@ from scipy.special import stdtrit
 from scipy.stats import binomtest, t
 
 from thenar.compiler.evaluation.rates import Average, Rate
-from thenar.reference.intervals import student_quantile
-from thenar.reference.numbers import ulps
+from thenar.stability.reference.intervals import student_quantile
+from thenar.stability.reference.numbers import ulps
 
 totals = st.integers(1, 2000)
 

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from thenar.compiler.placement.gain import Counts, Node, best_position, compare_scores, entropy_bits, gain_bits
-from thenar.reference.information import compare_gains
+from thenar.stability.reference.information import compare_gains
 
 tables = arrays(np.int64, st.tuples(st.integers(1, 5), st.integers(2, 4)), elements=st.integers(0, 30))
 large_tables = arrays(np.int64, (3, 2), elements=st.integers(1, 10**9))

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.placement.logsums import sign_of_f_sum, sign_of_log_sum
-from thenar.reference import information
+from thenar.stability.reference import information
 
 multiples = st.dictionaries(st.integers(1, 60), st.integers(-8, 8), max_size=8)
 

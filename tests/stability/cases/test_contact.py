@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from mpmath import mpf
 
-from thenar.reference.numbers import exact, precisely
+from thenar.stability.reference.numbers import exact, precisely
 from thenar.simulator.body.hand import CAPSULES
 from thenar.simulator.body.layout import Switches, murakami160
 from thenar.simulator.body.pose import rotation
