@@ -22,7 +22,7 @@ ROOMS = sorted(path.name for path in LINKS.iterdir() if path.is_dir() and path.n
 
 
 def test_every_room_stands_at_the_top_and_is_linked_under_its_import_name() -> None:
-    assert ROOMS == sorted(path.parent.name for path in ROOT.glob("*/__init__.py"))
+    assert sorted(path.parent.name for path in ROOT.glob("*/__init__.py")) == ROOMS
     assert all((LINKS / room).is_symlink() and (LINKS / room).resolve() == ROOT / room for room in ROOMS)
 
 

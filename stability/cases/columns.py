@@ -11,10 +11,10 @@ from ...compiler.boosting.boost import boost
 from ...compiler.placement.gain import Counts, best_position, compare_scores
 from ...compiler.placement.id3 import grow_id3
 from ...compiler.placement.tree import Tree
-from ..reference.information import compare_gains
 from ..finding import Case, Finding, Worst
 from ..inputs.hard_counts import node_of
 from ..inputs.small_sets import parity
+from ..reference.information import compare_gains
 
 CASE = Case(
     title="Columns that say nothing, or the same",

@@ -12,13 +12,13 @@ import numpy as np
 
 from ...compiler.boosting.boost import boost
 from ...compiler.boosting.stumps import winners
-from ..reference.logistic import mean_loss
-from ..reference.numbers import distance
 from ..checks.class_rounds import see_round
 from ..checks.counted import entropy_left, idle_loss, resting_error
 from ..checks.rounds import loss_rounding, moments, rise_rounding
 from ..finding import Case, Finding, Worst
 from ..inputs.hard_data import HardSet, contradictory, imbalanced, noisy, repeated
+from ..reference.logistic import mean_loss
+from ..reference.numbers import distance
 
 CASE = Case(
     title="Contradictions",

@@ -16,10 +16,10 @@ from ...compiler.evaluation.study import Options, evaluate
 from ...compiler.placement.placement import place
 from ...compiler.recordings.graspset import GraspSet
 from ...drivers.errors import ThenarError
-from ..reference.numbers import precisely, ulps
 from ...runtime.build import Build
 from ..finding import Case, Finding, Worst
 from ..inputs.small_sets import make_set, one_hot
+from ..reference.numbers import precisely, ulps
 
 CASE = Case(
     title="Degenerate sets",

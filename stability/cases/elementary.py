@@ -8,11 +8,11 @@ from mpmath import mpf
 from numpy.typing import NDArray
 
 from ...compiler.elementary import add_exactly, add_up, exp, log, sincos, softmax, softmax_and_loss
-from ..reference import linear, logistic
-from ..reference.numbers import precisely, ulps
 from ..checks.roundings import ROUNDING, loss_error, part_of, share_error
 from ..finding import Case, Finding, Worst
 from ..inputs.hard_scores import hard_scores
+from ..reference import linear, logistic
+from ..reference.numbers import precisely, ulps
 
 CASE = Case(
     title="Elementary functions",

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiler.tables.collapse import HIGHEST_CODE
-from ..reference.numbers import precisely
 from ...runtime.recognizer import Frame, Recognizer
 from ...runtime.scorer import LANE_OFFSET
 from ..checks.exact_means import ExactMeans
@@ -16,6 +15,7 @@ from ..checks.ties import first_best
 from ..finding import Case, Finding, Worst
 from ..inputs.hard_tables import Bits, Codes
 from ..inputs.small_build import SmallBuild, small_build, small_set
+from ..reference.numbers import precisely
 
 CASE = Case(
     title="Missing ports and silent joints",

@@ -5,7 +5,6 @@ from itertools import permutations
 
 from ...compiler.tables.compare import float_slack
 from ...compiler.tables.worstcase import Rounding
-from ..reference.numbers import precisely, ratio
 from ...runtime.tables import MAX_SWITCHES
 from ..checks.exact_frames import BothWays, lost
 from ..checks.integer_sums import furthest_sums, largest
@@ -15,6 +14,7 @@ from ..checks.ties import first_best, ties
 from ..finding import Case, Finding, Worst
 from ..inputs.hard_tables import Quantised, dominated, drawn, every_frame, half_a_step_off, quantised, sized
 from ..inputs.small_build import small_build, small_set
+from ..reference.numbers import precisely, ratio
 
 CASE = Case(
     title="Integers of 4 to 16 bits",

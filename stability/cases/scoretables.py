@@ -12,13 +12,13 @@ from ...compiler.boosting.stumps import Stumps
 from ...compiler.tables.balance import balance
 from ...compiler.tables.collapse import ScoreTables, collapse
 from ...compiler.tables.quantise import quantise
-from ..reference import ensembles as truth
-from ..reference import tables
-from ..reference.numbers import precisely
 from ..checks.roundings import ROUNDING, SMALLEST, part_of
 from ..finding import Case, Finding, Worst
 from ..inputs.hard_ensembles import SWITCHES, ensembles, frames
 from ..inputs.hard_tables import half_a_step_off
+from ..reference import ensembles as truth
+from ..reference import tables
+from ..reference.numbers import precisely
 
 CASE = Case(
     title="Score tables",

@@ -18,9 +18,6 @@ from ...compiler.boosting.boost import History, boost
 from ...compiler.boosting.stumps import Stumps, winners
 from ...compiler.tables.collapse import collapse
 from ...compiler.tables.quantise import quantise
-from ..reference.logistic import mean_loss
-from ..reference.numbers import distance
-from ..reference.tables import table_scores
 from ...runtime.tables import LIMIT, IntegerTables
 from ..checks.integer_sums import largest_sum
 from ..checks.roundings import ROUNDING, loss_error, part_of
@@ -28,6 +25,9 @@ from ..checks.rounds import Moment, loss_rounding, moments, rise_rounding
 from ..finding import Case, Finding, Worst
 from ..inputs.hard_data import HardSet, intervals, separable, words
 from ..inputs.hard_tables import rows_of
+from ..reference.logistic import mean_loss
+from ..reference.numbers import distance
+from ..reference.tables import table_scores
 
 CASE = Case(
     title="Separable classes",

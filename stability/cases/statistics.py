@@ -9,11 +9,11 @@ from mpmath import mpf
 from ...compiler.evaluation.folds import Fold, weka_folds
 from ...compiler.evaluation.rates import Average, Rate
 from ...compiler.evaluation.study import Options, evaluate
-from ..reference.intervals import Interval, student, student_quantile, wilson
-from ..reference.numbers import distance, precisely
 from ..checks.roundings import ROUNDING
 from ..finding import Case, Finding, Worst
 from ..inputs.lopsided import differs, guessed_untrained, lopsided, parts_of, tested_labels
+from ..reference.intervals import Interval, student, student_quantile, wilson
+from ..reference.numbers import distance, precisely
 
 CASE = Case(
     title="Rates and folds at their ends",

@@ -9,12 +9,12 @@ from mpmath import mpf
 
 from ...compiler.boosting.binning import bin_columns, midpoints
 from ...compiler.boosting.stumpfit import FittedStumps, Targets, fit_stumps
-from ..reference import stumps as truth
-from ..reference.numbers import precisely
 from ..checks.class_rounds import ClassRound, branches
 from ..checks.trainings import trainings
 from ..finding import Case, Finding, Worst
 from ..inputs.hard_stumps import Problem, neighbours, problems, tied
+from ..reference import stumps as truth
+from ..reference.numbers import precisely
 
 CASE = Case(
     title="Stump fits",

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from ...compiler.boosting.boost import weights_and_responses
 from ...compiler.boosting.exactsums import on_grids
 from ...compiler.elementary import softmax
-from ..reference import logistic
-from ..reference.numbers import precisely
 from ..checks.roundings import ROUNDING, SMALLEST, share_error
 from ..finding import Case, Finding, Worst
 from ..inputs.hard_scores import hard_scores
+from ..reference import logistic
+from ..reference.numbers import precisely
 
 CASE = Case(
     title="Weights and working responses",

@@ -12,11 +12,11 @@ from mpmath import mpf
 from numpy.typing import NDArray
 
 from ...compiler.boosting.stumps import Stumps
+from ..finding import Worst
+from ..inputs.hard_data import Floats, HardSet
 from ..reference import stumps as truth
 from ..reference.logistic import softmax, target
 from ..reference.numbers import precisely
-from ..finding import Worst
-from ..inputs.hard_data import Floats, HardSet
 from .branches import Sums, choice_error, sums
 from .roundings import ROUNDING, SMALLEST, share_error
 

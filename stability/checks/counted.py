@@ -6,9 +6,9 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
+from ..inputs.hard_data import HardSet
 from ..reference.information import entropy_bits
 from ..reference.numbers import precisely
-from ..inputs.hard_data import HardSet
 from .roundings import ROUNDING, share_error
 from .rounds import Moment
 

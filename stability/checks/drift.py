@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from ...compiler.boosting.boost import boost
 from ...compiler.boosting.stumps import Stumps, centred
 from ...compiler.elementary import add_up
-from ..reference import ensembles
-from ..reference.numbers import precisely
 from ..finding import Finding, Worst
 from ..inputs.hard_data import Floats, noisy
+from ..reference import ensembles
+from ..reference.numbers import precisely
 from .roundings import ROUNDING
 from .rounds import mean_score
 

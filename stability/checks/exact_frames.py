@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from mpmath import mpf
 
 from ...compiler.tables.collapse import ScoreTables
-from ..reference.numbers import precisely
-from ..reference.tables import table_scores
 from ...runtime.scorer import LANE_OFFSET, Scorer
 from ...runtime.tables import IntegerTables
+from ..reference.numbers import precisely
+from ..reference.tables import table_scores
 
 
 class BothWays:

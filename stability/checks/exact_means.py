@@ -5,9 +5,9 @@ from typing import TypeVar
 
 from mpmath import mpf
 
+from ..inputs.small_build import SmallBuild
 from ..reference.numbers import precisely
 from ..reference.tables import mean_row, mean_switch, table_scores
-from ..inputs.small_build import SmallBuild
 from .lost_inputs import Loss
 
 _T = TypeVar("_T")

@@ -6,10 +6,10 @@ import numpy as np
 
 from ...compiler.boosting.boost import boost
 from ...compiler.boosting.stumps import TIE, Stumps
-from ..reference.numbers import precisely
 from ..finding import Finding, Worst
 from ..inputs.changes import Change
 from ..inputs.hard_data import Floats, HardSet
+from ..reference.numbers import precisely
 from .class_rounds import ClassRound, branches, class_rounds
 from .growth import Step, grown, step_of
 

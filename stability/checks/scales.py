@@ -4,9 +4,9 @@ import math
 
 from ...compiler.tables.balance import balance
 from ...compiler.tables.collapse import ScoreTables
-from ..reference.tables import steps
 from ..finding import Finding, Worst
 from ..inputs.hard_tables import dominated, drawn, quantised, rows_of
+from ..reference.tables import steps
 from .integer_sums import largest_sum
 
 # Products of a row and the scale are doubles: relative 2^-53 off, so the scale at which one passes half a step is off

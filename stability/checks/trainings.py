@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from ...compiler.boosting.boost import boost
 from ...compiler.boosting.stumps import Stumps
+from ..finding import Finding, Worst
 from ..reference.ensembles import Round, boost_rounds
 from ..reference.numbers import precisely
-from ..finding import Finding, Worst
 from .branches import choice_error
 from .class_rounds import ClassRound, branches, class_rounds, see_stump
 from .growth import Step, grown, step_of

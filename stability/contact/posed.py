@@ -10,11 +10,11 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
-from ..reference.linear import turn
-from ..reference.numbers import precisely
 from ...simulator.body.axes import ABDUCTORS, BETWEEN, REST
 from ...simulator.body.hand import Hand
 from ...simulator.body.shapes import Box, Cylinder, Shape, Sphere
+from ..reference.linear import turn
+from ..reference.numbers import precisely
 from .vectors import Vector, column, length, matrix, plus, product
 
 _Y, _Z = (0, 1, 0), (0, 0, 1)

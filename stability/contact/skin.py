@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from mpmath import mpf
 
-from ..reference.numbers import precisely
 from ...simulator.contact.quasistatic import Case, Skin
 from ..checks.roundings import ROUNDING
+from ..reference.numbers import precisely
 from .posed import surface
 from .vectors import Matrix, Vector, plus, times
 

@@ -9,8 +9,6 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from ..reference.linear import turn
-from ..reference.numbers import precisely
 from ...simulator.body.hand import CAPSULES
 from ...simulator.body.layout import Switches, murakami160
 from ...simulator.body.pose import rotation, rotation_vector
@@ -18,6 +16,8 @@ from ...simulator.body.shapes import Box, Cylinder, Shape, Sphere
 from ...simulator.contact.split import split
 from ..checks.roundings import ROUNDING
 from ..finding import Finding, Worst
+from ..reference.linear import turn
+from ..reference.numbers import precisely
 from .grasps import HAND
 from .posed import surface
 from .vectors import length, matrix, plus

@@ -9,8 +9,6 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from ..reference.linear import solve
-from ..reference.numbers import precisely
 from ...simulator.contact.quasistatic import Skin
 from ...simulator.contact.quasistatic.balance import Balance
 from ...simulator.contact.quasistatic.case import command
@@ -18,6 +16,8 @@ from ...simulator.contact.quasistatic.linear import solve_arrow
 from ...simulator.contact.quasistatic.newton import stiffness
 from ..checks.roundings import ROUNDING
 from ..finding import Finding, Worst
+from ..reference.linear import solve
+from ..reference.numbers import precisely
 from .grasps import case_of, hard
 
 Floats = NDArray[np.float64]

@@ -6,13 +6,13 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
-from ..reference.numbers import precisely
 from ...simulator.body.hand import CAPSULES, Hand
 from ...simulator.body.shapes import Sphere
 from ...simulator.contact.grip import GRAVITY
 from ...simulator.contact.model import Contact, ContactModel, Load
 from ...simulator.effects.contact_mujoco import Parameters
 from ..finding import Finding, Worst
+from ..reference.numbers import precisely
 from .grasps import held
 from .posed import digits
 from .vectors import Vector, dot, length, plus

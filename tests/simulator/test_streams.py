@@ -6,10 +6,10 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.stability.reference.intervals import normal_quantile
-from thenar.stability.reference.numbers import distance
 from thenar.simulator.deviates import Numbers
 from thenar.simulator.streams import Draw, Draws, Site
+from thenar.stability.reference.intervals import normal_quantile
+from thenar.stability.reference.numbers import distance
 
 NAME = st.text(alphabet="abc", max_size=3)
 

@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from thenar.compiler.placement.gain import Counts, best_position, compare_scores, gain_bits
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.placement.rivals import forward_cmim, top_mutual_information
-from thenar.stability.reference.information import compare_gains
 from thenar.stability.cases.columns import hard_columns, large_tables, small_tables, table_of
 from thenar.stability.inputs.hard_counts import node_of
 from thenar.stability.inputs.small_sets import parity
+from thenar.stability.reference.information import compare_gains
 
 seeds = st.integers(0, 10_000)
 # Three classes at up to four values: two tables with the same classes are columns of one node.

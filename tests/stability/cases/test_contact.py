@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from mpmath import mpf
 
-from thenar.stability.reference.numbers import exact, precisely
 from thenar.simulator.body.hand import CAPSULES
 from thenar.simulator.body.layout import Switches, murakami160
 from thenar.simulator.body.pose import rotation
@@ -28,6 +27,7 @@ from thenar.stability.contact.surfaces import MOST_SWITCHES
 from thenar.stability.contact.systems import errors, near_singular
 from thenar.stability.contact.vectors import length
 from thenar.stability.finding import Worst
+from thenar.stability.reference.numbers import exact, precisely
 
 GRASPS = list(hard(full=False))
 LENGTHS = st.sampled_from((5e-324, 1e-300, 1e-150)) | st.floats(1e-12, 2000.0)

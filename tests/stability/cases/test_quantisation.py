@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from thenar.compiler.tables.compare import float_slack
 from thenar.compiler.tables.worstcase import Rounding
-from thenar.stability.reference.numbers import precisely, ratio
 from thenar.runtime.scorer import LANE_OFFSET, Scorer
 from thenar.runtime.tables import IntegerTables
 from thenar.stability.checks.exact_frames import BothWays, lost
@@ -27,6 +26,7 @@ from thenar.stability.inputs.hard_tables import (
     quantised,
     whole_numbers,
 )
+from thenar.stability.reference.numbers import precisely, ratio
 
 Frames = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # bits, lost switches, codes, lost joints
 RunC = Callable[[IntegerTables, Frames], "subprocess.CompletedProcess[bytes]"]
