@@ -1,0 +1,81 @@
+"""What the commands write keeps its bytes: digests of sets, builds, firmware and recordings, kept in tests/golden.
+
+A change of one of them is a change of what users store and deploy. `pytest --update-golden` writes them anew; the
+commit says why.
+"""
+
+import hashlib
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from thenar.cli import run
+from thenar.runtime.live.frames import GloveFrame, SwitchFrame
+from thenar.runtime.live.published import LiveGrasp
+from thenar.runtime.recording import writer
+from thenar.runtime.recording.session import Session
+
+GOLDEN = Path(__file__).parent / "golden" / "written-bytes.json"
+COLUMNS = Path(__file__).resolve().parents[1] / "examples" / "columns"
+SCENES = ("quick", "kamakura", "kamakura-def", "cutkosky", "cutkosky-def", "continuous", "faulty-glove", "crowd")
+
+
+def digests(folder: Path) -> Iterator[tuple[str, str]]:
+    """Yield the path below `folder` and the SHA-256 of every file in it, in order."""
+    for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+        yield path.relative_to(folder).as_posix(), hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def kept(name: str, written: dict[str, str], update: bool) -> None:
+    golden = json.loads(GOLDEN.read_text())
+    if update:
+        GOLDEN.write_text(json.dumps(golden | {name: written}, indent=1, sort_keys=True) + "\n")
+    else:
+        assert written == golden[name]
+
+
+def builds_of(grasps: Path, folder: Path) -> dict[str, str]:
+    """Compile `grasps` with sums of 16 bits and a wiring, and with tables of 8 bits; return the digests of all files."""
+    whole, small, glove = folder / "whole", folder / "small", folder / "glove.toml"
+    common = ["compile", str(grasps), "--folds", "0", "--no-report", "--rounds", "10"]
+    assert run([*common, "-o", str(folder / "first"), "--propose", str(glove)]) == 0
+    assert run([*common, "-o", str(whole), "--glove", str(glove)]) == 0
+    assert run([*common, "-o", str(small), "--table-bits", "8", "--max-bins", "8"]) == 0
+    return {"set.grasps": hashlib.sha256(grasps.read_bytes()).hexdigest()} | {
+        f"{build.name}/{name}": digest for build in (whole, small) for name, digest in digests(build)
+    }
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_shipped_scene_gives_the_same_set_and_the_same_builds(
+    tmp_path: Path, scene: str, update_golden: bool
+) -> None:
+    assert run(["simulate", scene, "-o", str(tmp_path / "set.grasps")]) == 0
+    kept(scene, builds_of(tmp_path / "set.grasps", tmp_path), update_golden)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["icub", "aml"])
+def test_a_real_table_gives_the_same_set_and_the_same_builds(
+    tmp_path: Path, name: str, icub_table: Path, aml_table: Path, update_golden: bool
+) -> None:
+    table = {"icub": icub_table, "aml": aml_table}[name]
+    grasps = tmp_path / "set.grasps"
+    assert run(["import", str(table), "-o", str(grasps), "--columns", str(COLUMNS / f"{name}.toml")]) == 0
+    kept(name, builds_of(grasps, tmp_path), update_golden)
+
+
+def test_a_recording_keeps_its_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, update_golden: bool) -> None:
+    monkeypatch.setattr(writer.time, "time_ns", lambda: 10**18)
+    monkeypatch.setattr(writer.time, "monotonic_ns", lambda: 10**15)
+    path = tmp_path / "run.mcap"
+    glove = GloveFrame(20, b"\x01\xff", 3)
+    with writer.Recorder(path, Session(thenar="0.0.1", switches=("a", "b"), sensors=("thumb", "index"))) as recorder:
+        recorder.switches(SwitchFrame(10, 0b10, lost=0b1))
+        recorder.glove(glove)
+        recorder.switches(SwitchFrame(25, 0b1, unread=0b10, glove=glove))
+        recorder.grasp(LiveGrasp(30, 1, 0, "cup", "cup", 0.75, 3, "ok", 30, 20, 10))
+    kept("recording", {path.name: hashlib.sha256(path.read_bytes()).hexdigest()}, update_golden)
