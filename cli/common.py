@@ -11,6 +11,8 @@ import msgspec
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from ..runtime.names import shortened
+
 if TYPE_CHECKING:
     from ..runtime.harness.wiring import Harness
 
@@ -43,11 +45,25 @@ class _PictureFile(_OutputFile):
         return path
 
 
+class _Port(click.ParamType):
+    """A serial line, by the rule that holds for the ports in files."""
+
+    name = "port"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        from ..drivers.ports import port_fault
+
+        if fault := port_fault(value):
+            self.fail(f"{shortened(repr(value))} {fault}", param, ctx)
+        return str(value)
+
+
 existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
 existing_folder = click.Path(exists=True, file_okay=False, path_type=Path)
 any_path = click.Path(path_type=Path)
 output_file = _OutputFile(dir_okay=False, writable=True, path_type=Path)
 picture_file = _PictureFile(dir_okay=False, writable=True, path_type=Path)
+serial_port = _Port()
 
 json_flag = click.option("--json", "as_json", is_flag=True, help="Print one JSON document for machines instead.")
 

@@ -5,7 +5,8 @@ from collections.abc import Iterable, Iterator
 from ...drivers.errors import SettingError
 from ...drivers.i2c import tca9548a
 from ...drivers.i2c.registry import CHIPS
-from ..names import fault, nearest
+from ...drivers.ports import device_fault, port_fault
+from ..names import fault, nearest, shortened
 from ..toml_source import Place, spelled
 from .wiring import BusWiring, ChipWiring, GloveWiring, Harness
 
@@ -41,6 +42,8 @@ def _of_devices(harness: Harness) -> Iterator[Fault]:
         places.insert(0, (("cyberglove", "port"), harness.cyberglove.port))
     seen: dict[str, Place] = {}
     for place, device in places:
+        if reason := (device_fault if place[-1] == "device" else port_fault)(device):
+            yield place, f"{shortened(repr(device))} {reason}"
         if device in seen:
             yield place, f"{device} is {spelled(seen[device])} already: one device, one entry"
         seen[device] = place

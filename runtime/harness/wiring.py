@@ -23,7 +23,7 @@ class _Table(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit
 
 
 class GloveWiring(_Table, frozen=True):
-    """The CyberGlove: its port (anything that pyserial opens), and how it is asked.
+    """The CyberGlove: its port (a device, socket:// or rfc2217://), and how it is asked.
 
     baud         "auto" tries the usual ones
     rate_hz      None: as fast as it can
