@@ -41,12 +41,16 @@ def command(port: str, output: Path, subject: str | None, baud: int | None, sens
     """
     from ..drivers.cyberglove import CyberGlove
     from ..runtime.files import write_atomically
+    from ..runtime.names import fault, shortened
     from .calibrate_dialogue import Guide
 
+    wearer = subject or output.stem
+    if reason := fault(wearer):
+        raise click.UsageError(f"subject {shortened(repr(wearer))} {reason}: give another with --subject")
     glove = CyberGlove(port, baud=baud, sensors=int(sensors) if sensors else None)
     try:
         guide = Guide(glove, glove.open(), hold)
-        calibrated = _calibrated(guide, subject or output.stem)
+        calibrated = _calibrated(guide, wearer)
     finally:
         glove.close()
     if not calibrated.sensors:

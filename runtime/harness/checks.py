@@ -18,6 +18,8 @@ _PULLED_UP = tuple(CHIPS[kind] for kind in ("pcf8574", "pcf8574a", "pcf8575"))
 
 def faults(harness: Harness) -> Iterator[Fault]:
     """Yield what is wrong with `harness` and where; what comes after a fault may be wrong because of it."""
+    if reason := fault(harness.name):
+        yield ("name",), f"{shortened(repr(harness.name))} is no name of a glove: it {reason}"
     if harness.cyberglove is not None:
         yield from _of_glove(harness.cyberglove)
     yield from _of_devices(harness)
@@ -111,7 +113,7 @@ def _of_names(named: Iterable[tuple[Place, str]], what: str) -> Iterator[Fault]:
     seen: dict[str, Place] = {}
     for place, name in named:
         if reason := fault(name):
-            yield place, f"{name!r} is no name of a {what}: it {reason}"
+            yield place, f"{shortened(repr(name))} is no name of a {what}: it {reason}"
         if name in seen:
             yield place, f"{what} {name!r} is {spelled(seen[name])} already: a {what} has one place"
         seen[name] = place
