@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .common import output_file, serial_port
+from .lines import echo
 
 if TYPE_CHECKING:
     from ..drivers.calibration import GloveCalibration
@@ -56,7 +57,7 @@ def command(port: str, output: Path, subject: str | None, baud: int | None, sens
     if not calibrated.sensors:
         raise click.ClickException(f"no sensor moved, so there is nothing to calibrate by: {output} is not written")
     write_atomically(output, calibrated.to_toml().encode("utf-8"))
-    click.echo(f"{output}: {len(calibrated.sensors)} sensors of {calibrated.subject}")
+    echo(f"{output}: {len(calibrated.sensors)} sensors of {calibrated.subject}")
 
 
 def _calibrated(guide: "Guide", subject: str) -> "GloveCalibration":

@@ -11,6 +11,7 @@ from importlib import import_module
 import click
 
 from ..drivers.errors import ThenarError
+from .lines import echo
 
 COMMANDS = (
     *("simulate", "plan", "import", "export", "info", "place", "draw", "evaluate", "frontier", "compile", "verify"),
@@ -72,11 +73,11 @@ def run_group(arguments: Sequence[str]) -> int:
         extra = _EXTRAS.get(lack.name or "", "compiler")
         return _complain(f"{lack.name} is not installed: pip install 'thenar[{extra}]'")
     except (KeyboardInterrupt, click.Abort):
-        click.echo("thenar: interrupted", err=True)
+        echo("thenar: interrupted", err=True)
         return 130
     return code if isinstance(code, int) else 0
 
 
 def _complain(message: str) -> int:
-    click.echo(f"thenar: {message}", err=True)
+    echo(f"thenar: {message}", err=True)
     return 2

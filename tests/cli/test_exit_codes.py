@@ -55,6 +55,15 @@ def test_an_unknown_option_is_one_sentence(thenar: Thenar, set_file: Path) -> No
     assert "--wings" in _one_sentence(thenar("compile", set_file, "--wings", "2"))
 
 
+def test_no_terminal_obeys_a_name_in_a_complaint(thenar: Thenar, tmp_path: Path) -> None:
+    (tmp_path / "a\x1b[2J\u202e.grasps").write_bytes(b"")
+    for name in ("a\x1b[2J\u202e.grasps", "none\x1b[2J\u202e"):
+        said = thenar("info", tmp_path / name)
+        assert said.returncode == 2
+        assert r"\x1b[2J\u202e" in said.stderr
+        assert said.stderr[:-1].isprintable()
+
+
 def test_a_missing_file_is_one_sentence(thenar: Thenar, tmp_path: Path) -> None:
     assert "does not exist" in _one_sentence(thenar("compile", tmp_path / "no.grasps", "-o", tmp_path / "b"))
 
