@@ -63,6 +63,7 @@ ALLOWED = {
         "drivers",
         "compiler.hand",
         "compiler.recordings.graspset",
+        "compiler.recordings.spreadsheet",
         "compiler.spec",
     ),
     "compiler.evaluation": (

@@ -8,9 +8,9 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..spreadsheet import text_of
 from .graspset import CODES
 from .names import fault
+from .spreadsheet import text_of
 from .table import Column
 
 MISSING_NUMBERS = frozenset({"", "?", "na", "nan"})

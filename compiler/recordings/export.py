@@ -8,10 +8,10 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from ...runtime.files import write_atomically
-from ..spreadsheet import cell
 from .columns_of import Heads, heads_of
 from .errors import TableError
 from .graspset import GraspSet, Joint
+from .spreadsheet import cell
 
 # What Weka reads without quotes; everything else it writes in quotes itself.
 _BARE = re.compile(r"[A-Za-z0-9_.+-]+")

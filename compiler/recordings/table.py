@@ -15,10 +15,10 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from ..spreadsheet import text_of
 from .arrays import UNREADABLE
 from .errors import RecordingError, TableError
 from .names import check_names
+from .spreadsheet import text_of
 
 Column = Sequence[str] | NDArray[np.float64]
 

@@ -4,7 +4,7 @@ import csv
 import io
 from collections.abc import Iterable, Sequence
 
-from ..spreadsheet import cell
+from ..recordings.spreadsheet import cell
 from .glove_spec import Summary
 from .materials import Material
 

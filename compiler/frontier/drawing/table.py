@@ -4,7 +4,7 @@ import csv
 import io
 from collections.abc import Iterable, Iterator
 
-from ...spreadsheet import cell
+from ...recordings.spreadsheet import cell
 from ..points import Frontier, Point, Rate, Time
 
 COLUMNS = (

@@ -9,7 +9,7 @@ import pytest
 
 from thenar.compiler.frontier.drawing.table import COLUMNS, csv_bytes
 from thenar.compiler.frontier.points import Frontier
-from thenar.compiler.spreadsheet import text_of
+from thenar.compiler.recordings.spreadsheet import text_of
 
 
 def _rows(frontier: Frontier) -> list[dict[str, str]]:

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.spreadsheet import cell, text_of
+from thenar.compiler.recordings.spreadsheet import cell, text_of
 
 TEXTS = st.text("'=+-@\t\ra1", max_size=5) | st.text(max_size=5)
 
