@@ -36,6 +36,11 @@ def fault(name: str, longest: int = LONGEST_NAME) -> str:
     return f"holds a control character (U+{ord(found):04X})" if found else ""
 
 
+def sound_name(name: str, otherwise: str) -> str:
+    """Return `name`, or `otherwise` where it is none: the stem of a file may be anything."""
+    return otherwise if fault(name) else name
+
+
 def printable(text: str) -> str:
     """Return `text` with every character that is no glyph written as Python would, so that no terminal obeys it."""
     if text.isprintable():

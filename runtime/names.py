@@ -3,9 +3,19 @@
 import difflib
 from collections.abc import Sequence
 
-from ..drivers.names import LONGEST_NAME, LONGEST_SHOWN, fault, printable, shortened
+from ..drivers.names import LONGEST_NAME, LONGEST_SHOWN, fault, printable, shortened, sound_name
 
-__all__ = ["LONGEST_NAME", "LONGEST_SHOWN", "SHOWN", "fault", "list_names", "nearest", "printable", "shortened"]
+__all__ = [
+    "LONGEST_NAME",
+    "LONGEST_SHOWN",
+    "SHOWN",
+    "fault",
+    "list_names",
+    "nearest",
+    "printable",
+    "shortened",
+    "sound_name",
+]
 
 SHOWN = 5
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from ..errors import HarnessError
-from ..names import fault
+from ..names import sound_name
 from ..toml_source import Source, read_source
 from ..toml_struct import check_finite, convert
 from .checks import faults
@@ -32,7 +32,7 @@ def parse_harness(text: str, name: str) -> Harness:
 def _harness_of(source: Source, name: str) -> Harness:
     tables = source.tables()
     check_finite(source, (), tables)
-    harness = convert(source, (), {"name": "glove" if fault(name) else name} | tables, Harness)
+    harness = convert(source, (), {"name": sound_name(name, "glove")} | tables, Harness)
     for place, reason in faults(harness):
         raise source.error(place, reason)
     return harness
