@@ -14,7 +14,9 @@ def run(arguments: Sequence[str]) -> int:
     try:
         # In here, so that a Ctrl-C while the libraries load is one like any other.
         from .group import run_group
+        from .lines import escape_the_unencodable
 
+        escape_the_unencodable()
         return run_group(arguments)
     except KeyboardInterrupt:
         sys.stderr.write("thenar: interrupted\n")

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import output_file
+from .common import output_file, serial_port
+from .lines import echo
 
 if TYPE_CHECKING:
     from ..drivers.calibration import GloveCalibration
@@ -23,7 +24,7 @@ def _rate(_context: click.Context, _option: click.Parameter, text: str) -> int |
 
 
 @click.command("calibrate")
-@click.argument("port")
+@click.argument("port", type=serial_port)
 @click.option("-o", "--output", type=output_file, required=True, help="The calibration to write, a .toml file.")
 @click.option("--subject", help="Whose hand it is; without it, the file's name.")
 @click.option("--baud", callback=_rate, default="115200", show_default=True, help="Bits a second, or auto to try.")
@@ -41,18 +42,22 @@ def command(port: str, output: Path, subject: str | None, baud: int | None, sens
     """
     from ..drivers.cyberglove import CyberGlove
     from ..runtime.files import write_atomically
+    from ..runtime.names import fault, shortened
     from .calibrate_dialogue import Guide
 
+    wearer = subject or output.stem
+    if reason := fault(wearer):
+        raise click.UsageError(f"subject {shortened(repr(wearer))} {reason}: give another with --subject")
     glove = CyberGlove(port, baud=baud, sensors=int(sensors) if sensors else None)
     try:
         guide = Guide(glove, glove.open(), hold)
-        calibrated = _calibrated(guide, subject or output.stem)
+        calibrated = _calibrated(guide, wearer)
     finally:
         glove.close()
     if not calibrated.sensors:
         raise click.ClickException(f"no sensor moved, so there is nothing to calibrate by: {output} is not written")
     write_atomically(output, calibrated.to_toml().encode("utf-8"))
-    click.echo(f"{output}: {len(calibrated.sensors)} sensors of {calibrated.subject}")
+    echo(f"{output}: {len(calibrated.sensors)} sensors of {calibrated.subject}")
 
 
 def _calibrated(guide: "Guide", subject: str) -> "GloveCalibration":

@@ -8,8 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 import msgspec
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.segment import Segment
+from rich.text import Text
+
+from ..drivers.names import shortened
+from .lines import echo_json, shown
 
 if TYPE_CHECKING:
     from ..runtime.harness.wiring import Harness
@@ -43,11 +48,25 @@ class _PictureFile(_OutputFile):
         return path
 
 
+class _Port(click.ParamType):
+    """A serial line, by the rule that holds for the ports in files."""
+
+    name = "port"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        from ..drivers.ports import port_fault
+
+        if fault := port_fault(value):
+            self.fail(f"{shortened(repr(value))} {fault}", param, ctx)
+        return str(value)
+
+
 existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
 existing_folder = click.Path(exists=True, file_okay=False, path_type=Path)
 any_path = click.Path(path_type=Path)
 output_file = _OutputFile(dir_okay=False, writable=True, path_type=Path)
 picture_file = _PictureFile(dir_okay=False, writable=True, path_type=Path)
+serial_port = _Port()
 
 json_flag = click.option("--json", "as_json", is_flag=True, help="Print one JSON document for machines instead.")
 
@@ -69,6 +88,18 @@ def check_devices(harness: "Harness", path: Path) -> None:
         raise click.UsageError(f"{path.name} names no device: it takes a [cyberglove], a [[scanner]] or a [[bus]]")
 
 
+class _Console(Console):
+    """A console that escapes whatever a name might order a terminal to do; styles are rich's own."""
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        # Escaped before it is measured, so that columns are as wide as what is in them.
+        return super().render_str(shown(text), **options)
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterator[Segment]:
+        for segment in super().render(renderable, options):
+            yield segment if segment.control else Segment(shown(segment.text), segment.style)
+
+
 def out() -> Console:
     """Return the console for results. Wide tables are not cut when piped into a file."""
     console = _console()
@@ -82,12 +113,12 @@ def err() -> Console:
 
 def _console(stderr: bool = False, width: int | None = None) -> Console:
     # The names of the user's columns and files may hold brackets and colons, which are no markup.
-    return Console(stderr=stderr, width=width, highlight=False, markup=False, emoji=False)
+    return _Console(stderr=stderr, width=width, highlight=False, markup=False, emoji=False)
 
 
 def print_json(result: Any) -> None:
     """Print `result` (msgspec struct, dataclass or builtin) as one indented JSON document on stdout."""
-    click.echo(msgspec.json.format(msgspec.json.encode(result), indent=2))
+    echo_json(msgspec.json.format(msgspec.json.encode(result), indent=2).decode())
 
 
 @contextmanager

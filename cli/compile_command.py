@@ -128,14 +128,16 @@ def _propose(manifest: "Manifest", path: Path, chip: str) -> None:
     from ..runtime.files import write_atomically
     from ..runtime.harness.wiring import GloveWiring
     from ..runtime.harness.writing import harness_to_toml
+    from ..runtime.names import sound_name
     from ..runtime.scanning.propose import propose_board, propose_harness
 
     names = [switch.name for switch in manifest.switches]
+    called = sound_name(path.stem, "proposed")
     glove = GloveWiring(port="/dev/ttyUSB0") if manifest.joints else None
     if chip == _BOARD:
-        harness = propose_board(names, name=path.stem, cyberglove=glove)
+        harness = propose_board(names, name=called, cyberglove=glove)
     else:
-        harness = propose_harness(names, chip, name=path.stem, cyberglove=glove)
+        harness = propose_harness(names, chip, name=called, cyberglove=glove)
     write_atomically(path, harness_to_toml(harness).encode())
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .common import existing_file, keep_apart, picture_file, progress
+from .lines import echo
 
 if TYPE_CHECKING:
     from ..compiler.recordings.graspset import GraspSet
@@ -132,4 +133,4 @@ def _write(picture: "Picture", path: Path) -> None:
         data = draw(picture, path.suffix.lower()[1:])
     write_atomically(path, data)
     hands = len(picture.panels)
-    click.echo(f"{path}: {hands} hand{'s' if hands > 1 else ''}")
+    echo(f"{path}: {hands} hand{'s' if hands > 1 else ''}")

@@ -15,6 +15,7 @@ import msgspec
 
 from .common import check_devices, existing_file, keep_apart, output_file, progress
 from .ending import ended_by_signals
+from .lines import echo
 
 if TYPE_CHECKING:
     from ..simulator.playing.bench import Bench
@@ -98,7 +99,7 @@ def command(
     keep_apart(glove, Path(source), calibration, folder / _HARNESS, folder / _CALIBRATION, log)
     performance, cable = _performance(source, subject, period_ms)
     if missing := [name for name in harness.switches if name not in performance.switch_names]:
-        click.echo(f"warning: {source} has no switch {list_names(missing)}: open all the time", err=True)
+        echo(f"warning: {source} has no switch {list_names(missing)}: open all the time", err=True)
     with ExitStack() as stack:
         stop = stack.enter_context(ended_by_signals())
         folder.mkdir(parents=True, exist_ok=True)
@@ -163,10 +164,10 @@ def _write_harness(bench: "Bench", performance: "Performance", folder: Path) -> 
 
 def _tell_how(bench: "Bench", emulated: Path) -> None:
     """Say on stderr how to meet the emulated glove."""
-    click.echo(f"emulated glove: {emulated}; run it with: thenar run BUILD --glove {emulated}", err=True)
+    echo(f"emulated glove: {emulated}; run it with: thenar run BUILD --glove {emulated}", err=True)
     if bench.environment:
         settings = " ".join(f"{name}={value}" for name, value in bench.environment.items())
-        click.echo(f"for its I2C buses, put before that command: {settings}", err=True)
+        echo(f"for its I2C buses, put before that command: {settings}", err=True)
 
 
 @contextmanager

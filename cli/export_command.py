@@ -6,6 +6,7 @@ import click
 from msgspec import Struct
 
 from .common import existing_file, json_flag, keep_apart, output_file, print_json, progress
+from .lines import echo
 
 
 class Exported(Struct, frozen=True):
@@ -46,4 +47,4 @@ def command(grasps: Path, output: Path, codes: bool, meta: bool, columns: Path |
     if as_json:
         print_json(Exported(str(output), None if columns is None else str(columns), len(grasp_set)))
     else:
-        click.echo(f"{output}: {len(grasp_set)} grasps")
+        echo(f"{output}: {len(grasp_set)} grasps")

@@ -4,21 +4,28 @@ Each sub-command is loaded only when it is called. A reader that goes away (`| h
 click's exit code 1.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from importlib import import_module
 
 import click
 
 from ..drivers.errors import ThenarError
+from .lines import echo
 
 COMMANDS = (
     *("simulate", "plan", "import", "export", "info", "place", "draw", "evaluate", "frontier", "compile", "verify"),
     *("firmware", "spec", "run", "calibrate", "record", "emulate", "doctor", "stability"),
 )
 
-# Packages that another extra than `compiler` brings.
-_EXTRAS = {"mpmath": "stability", "jinja2": "stability"}
+# What the extras of pyproject.toml bring, by the names that are imported.
+EXTRAS: Mapping[str, tuple[str, ...]] = {
+    "compiler": ("sklearn", "scipy", "joblib", "matplotlib", "threadpoolctl", "jinja2", "plotly", "ezdxf"),
+    "cluster": ("dask", "distributed"),
+    "sim": ("mujoco",),
+    "stability": ("mpmath", "jinja2"),
+    "ros": ("cyclonedds",),
+}
 
 
 class _LazyGroup(click.Group):
@@ -69,14 +76,21 @@ def run_group(arguments: Sequence[str]) -> int:
     except MemoryError as lack:
         return _complain(f"not enough memory ({lack}): take fewer rows or columns")
     except ModuleNotFoundError as lack:
-        extra = _EXTRAS.get(lack.name or "", "compiler")
-        return _complain(f"{lack.name} is not installed: pip install 'thenar[{extra}]'")
+        return _complain(f"{lack.name} is not installed: pip install '{_brought_by(lack, arguments)}'")
     except (KeyboardInterrupt, click.Abort):
-        click.echo("thenar: interrupted", err=True)
+        echo("thenar: interrupted", err=True)
         return 130
     return code if isinstance(code, int) else 0
 
 
+def _brought_by(lack: ModuleNotFoundError, arguments: Sequence[str]) -> str:
+    """Return what to install: thenar with the extra that brings the package, the command's own first; or thenar."""
+    package = (lack.name or "").partition(".")[0]
+    bringing = [extra for extra, packages in EXTRAS.items() if package in packages]
+    bringing.sort(key=lambda extra: extra not in arguments[:1])
+    return f"thenar[{bringing[0]}]" if bringing else "thenar"
+
+
 def _complain(message: str) -> int:
-    click.echo(f"thenar: {message}", err=True)
+    echo(f"thenar: {message}", err=True)
     return 2

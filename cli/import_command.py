@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .common import existing_file, json_flag, keep_apart, out, output_file, print_json, progress
+from .lines import echo
 
 if TYPE_CHECKING:
     from ..compiler.recordings.graspset import GraspSet
@@ -61,14 +62,14 @@ def _print(report: "ImportReport", output: Path) -> None:
     from rich.table import Table
 
     for warning in report.warnings:
-        click.echo(f"warning: {warning.message}", err=True)
+        echo(f"warning: {warning.message}", err=True)
     if report.coding:
         table = Table("joint", "unit", "step", "largest error", "rms error", "values before", "after", title="Coding")
         for cost in report.coding:
             errors = (f"{cost.step:g}", f"{cost.largest_error:.3g}", f"{cost.rms_error:.3g}")
             table.add_row(cost.joint, cost.unit, *errors, str(cost.distinct_before), str(cost.distinct_after))
         out().print(table)
-    click.echo(
+    echo(
         f"{output}: {report.rows} grasps of {report.grasp_types} types ({report.taxonomy}); "
         f"subjects {report.subjects}, objects {report.objects}, switches {report.switches}, joints {report.joints}"
     )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .common import existing_file, json_flag, keep_apart, out, picture_file, print_json, progress
+from .lines import echo
 
 if TYPE_CHECKING:
     from ..compiler.recordings.graspset import GraspSet
@@ -51,18 +52,18 @@ def _draw(grasp_set: "GraspSet", path: Path) -> None:
 
 
 def _print(summary: "Summary", path: Path) -> None:
-    click.echo(
+    echo(
         f"{path}: {summary.rows} grasps of {len(summary.grasps)} types ({summary.taxonomy}); "
         f"subjects {len(summary.subjects)}, objects {len(summary.objects)}, "
         f"switches {len(summary.switches)}, joints {len(summary.joints)}"
     )
     if summary.simulated:
-        click.echo(f"simulated: {summary.simulated}")
+        echo(f"simulated: {summary.simulated}")
     _print_counts(summary)
     _print_joints(summary)
     _print_separability(summary)
     for warning in summary.warnings:
-        click.echo(f"warning: {warning.message}")
+        echo(f"warning: {warning.message}")
 
 
 def _print_counts(summary: "Summary") -> None:
@@ -72,9 +73,9 @@ def _print_counts(summary: "Summary") -> None:
     for grasp in summary.grasps:
         table.add_row(grasp.name, str(grasp.rows), f"{grasp.rows / summary.rows:.1%}")
     out().print(table)
-    click.echo(f"balance (rarest type over commonest): {summary.balance:.2f}")
+    echo(f"balance (rarest type over commonest): {summary.balance:.2f}")
     for what, counts in (("subjects", summary.subjects), ("objects", summary.objects)):
-        click.echo(f"{what}: " + ", ".join(f"{count.name} ({count.rows})" for count in counts))
+        echo(f"{what}: " + ", ".join(f"{count.name} ({count.rows})" for count in counts))
 
 
 def _print_joints(summary: "Summary") -> None:

@@ -6,6 +6,7 @@ import msgspec
 
 from ..drivers.errors import ThenarError
 from ..runtime.build import load_manifest
+from ..runtime.names import fault, shortened
 
 _LARGEST = 4_000_000  # bytes; a placement of the largest set has fewer
 _WANTED = "take a build's folder, the file of `thenar place -o`, or a text of one name a line"
@@ -32,6 +33,9 @@ def kept_names(path: Path) -> tuple[str, ...]:
     line. Raises KeptError if it is none of these or names no switch, BuildError if it is a damaged build.
     """
     names = _of_build(path) if path.is_dir() else _of_text(_text(path), path)
+    for name in names:
+        if reason := fault(name):
+            raise KeptError(f"{path}: switch {shortened(repr(name))} {reason}")
     if not names:
         raise KeptError(f"{path} keeps no switches: there is nothing to draw")
     return names

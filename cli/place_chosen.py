@@ -2,10 +2,10 @@
 
 from typing import TYPE_CHECKING
 
-import click
 import msgspec
 
 from .common import out, progress
+from .lines import echo
 
 if TYPE_CHECKING:
     from ..compiler.placement.costaware import PortCosts
@@ -108,28 +108,26 @@ def print_chosen(choice: Choice) -> None:
     out().print(table)
     share = len(choice.switches) / choice.n_switches
     beside = ", beside the joints" if choice.joints else ""
-    click.echo(f"{len(choice.switches)} of {choice.n_switches} switches ({share:.0%}){beside}. {choice.what}")
+    echo(f"{len(choice.switches)} of {choice.n_switches} switches ({share:.0%}){beside}. {choice.what}")
     if choice.exact is not None:
         _print_exactly(choice.exact, len(choice.switches))
 
 
 def _print_exactly(exact: Exactly, m: int) -> None:
     if not exact.pairs:
-        click.echo("all rows are of one grasp type: there is nothing to tell apart")
+        echo("all rows are of one grasp type: there is nothing to tell apart")
         return
-    click.echo(
+    echo(
         f"of {exact.pairs:,} pairs of rows of different grasp types, {exact.alike / exact.pairs:.3%} look alike in "
         f"these {m} switches: no classifier tells them apart"
     )
     if exact.proved:
-        click.echo(f"the best {m} switches leave {exact.best_found / exact.pairs:.3%}, which is proved")
+        echo(f"the best {m} switches leave {exact.best_found / exact.pairs:.3%}, which is proved")
     else:
-        click.echo(
+        echo(
             f"the best {m} switches found leave {exact.best_found / exact.pairs:.3%}; no {m} switches leave less than "
             f"{exact.least / exact.pairs:.3%}"
         )
-    click.echo(
-        f"so this placement is at most {100 * (exact.alike - exact.least) / exact.pairs:.3f} points from the best"
-    )
+    echo(f"so this placement is at most {100 * (exact.alike - exact.least) / exact.pairs:.3f} points from the best")
     names = ", ".join(kept.name for kept in exact.best)
-    click.echo(f"the best found: {names}")
+    echo(f"the best found: {names}")

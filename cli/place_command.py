@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .common import existing_file, json_flag, keep_apart, output_file, picture_file, print_json, progress
+from .lines import echo
 
 if TYPE_CHECKING:
     from ..compiler.recordings.graspset import GraspSet
@@ -135,7 +136,7 @@ def _of_tree(asked: _Options, grasp_set: "GraspSet") -> Any:
 
         draw_tree(tree, asked.draw, grasp_set.switch_names, types)
     if asked.show_tree:
-        click.echo(tree.text(grasp_set.switch_names, types))
+        echo(tree.text(grasp_set.switch_names, types))
     if not asked.as_json:
         from .place_tree import print_placement
 

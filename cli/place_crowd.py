@@ -3,10 +3,10 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
 import msgspec
 
 from .common import out, progress
+from .lines import echo
 from .place_chosen import Kept, learning_of, named
 
 if TYPE_CHECKING:
@@ -61,12 +61,12 @@ def print_crowd(placement: CrowdPlacement) -> None:
         rates = (point.served.mean, point.served.worst_tenth, point.served.lowest)
         served.add_row(str(point.subjects), _BETTERED[point.aim], *(f"{100 * rate:.1f}" for rate in rates))
     out().print(served)
-    click.echo(
+    echo(
         f"{len(placement.switches)} of {placement.n_switches} switches, chosen by {study.method}, "
         f"{_BETTERED[study.aim]}: this did best within the subjects learnt from. Learnt again from {study.rows} rows "
         f"of all {study.subjects} subjects"
     )
-    click.echo(
+    echo(
         "bettered: the switches chosen last exchanged for the next ones, where half of the subjects learnt from then "
         "recognise the other half better. Counting badly served subjects more often was tried on 80 simulated hands, "
         "gained no more than another draw of rows did, and is not done"

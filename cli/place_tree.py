@@ -3,9 +3,8 @@
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-import click
-
 from .common import out
+from .lines import echo
 
 if TYPE_CHECKING:
     from ..compiler.placement.placement import Placement
@@ -21,13 +20,13 @@ def print_placement(placement: "Placement") -> None:
         table.add_row(str(chosen.number), chosen.name, f"{chosen.gain_bits:.4f}", share)
     out().print(table)
     pruned = f", pruned at S = {placement.prune}" if placement.prune else ""
-    click.echo(
+    echo(
         f"{len(placement.switches)} of {placement.n_switches} switches ({placement.kept_share:.0%}) bring "
         f"{placement.gain_bits:.3f} of {placement.entropy_bits:.3f} bits; the tree has {placement.decision_nodes} "
         f"decisions, {placement.leaves} leaves, depth {placement.depth}{pruned}"
     )
     for remark in _remarks(placement):
-        click.echo(remark)
+        echo(remark)
 
 
 def _remarks(placement: "Placement") -> Iterator[str]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .common import check_devices, existing_file, keep_apart, output_file, progress
+from .lines import echo
 
 if TYPE_CHECKING:
     from ..runtime.recording.session import Collection
@@ -110,12 +111,12 @@ def _write(recording: Path, output: Path, accepted: int, planned: int) -> None:
     from ..compiler.recordings.mcap_recording import import_recordings
 
     if not accepted:
-        click.echo(f"no trial was accepted: {output} is not written; the same command goes on")
+        echo(f"no trial was accepted: {output} is not written; the same command goes on")
         return
     with progress(f"importing {recording.name}"):
         grasp_set, report = import_recordings([recording])
     grasp_set.save(output)
     for warning in report.warnings:
-        click.echo(f"warning: {warning.message}", err=True)
+        echo(f"warning: {warning.message}", err=True)
     rest = "" if accepted == planned else "; the same command goes on"
-    click.echo(f"{output}: {len(grasp_set)} grasps; {accepted} of {planned} trials are done{rest}")
+    echo(f"{output}: {len(grasp_set)} grasps; {accepted} of {planned} trials are done{rest}")

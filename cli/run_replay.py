@@ -5,13 +5,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
 import msgspec
 
 from ..runtime.build import Build
 from ..runtime.live.policy import Policy
 from ..runtime.live.replay import replayed
 from ..runtime.sinks.line import encode
+from .lines import echo
 
 if TYPE_CHECKING:
     from ..compiler.recordings.graspset import GraspSet
@@ -39,7 +39,7 @@ def replay_set(build: Build, replay: Path, period_us: int) -> None:
         stdout.write(msgspec.json.encode(line) + b"\n")
     stdout.flush()
     rows = len(grasp_set)
-    click.echo(f"{correct} of {rows} frames recognised as recorded ({correct / max(rows, 1):.1%})", err=True)
+    echo(f"{correct} of {rows} frames recognised as recorded ({correct / max(rows, 1):.1%})", err=True)
 
 
 def replay_recording(build: Build, replay: Path, policy: Policy | None) -> None:
@@ -53,7 +53,7 @@ def replay_recording(build: Build, replay: Path, policy: Policy | None) -> None:
         frames += 1
         stdout.write(encode(now, None, None))
     stdout.flush()
-    click.echo(f"{same} of {frames} frames recognised as they were recorded", err=True)
+    echo(f"{same} of {frames} frames recognised as they were recorded", err=True)
 
 
 def _rows(build: Build, grasp_set: "GraspSet", period_us: int) -> Iterator[Line]:

@@ -9,6 +9,7 @@ import click
 import msgspec
 
 from .common import json_flag, keep_apart, output_file, print_json, progress
+from .lines import echo
 
 if TYPE_CHECKING:
     from ..simulator.scenes.scene import Scene
@@ -170,4 +171,4 @@ def _list(*, as_json: bool) -> None:
         print_json(found)
         return
     for scene in found:
-        click.echo(f"{scene.name:<16}{scene.what}")
+        echo(f"{scene.name:<16}{scene.what}")

@@ -83,8 +83,10 @@ def _harness(folder: Path, loaded: "Build", glove: Path | None, board: Path | No
     if board is not None:
         from ..compiler.firmware.board_keys import glove_toml
         from ..compiler.firmware.board_loading import load_board
+        from ..runtime.names import sound_name
 
-        return parse_harness(glove_toml(board.stem, load_board(board), loaded.manifest), board.stem)
+        name = sound_name(board.stem, "board")
+        return parse_harness(glove_toml(name, load_board(board), loaded.manifest), name)
     own = folder / _FOLDER / _WIRING
     return load_harness(own) if loaded.scan is not None and own.is_file() else None
 

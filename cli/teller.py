@@ -3,8 +3,6 @@
 from contextlib import suppress
 from threading import Event
 
-import click
-
 from ..runtime.live.frames import GloveFrame, now_us
 from ..runtime.live.health import Health, HealthReport
 from ..runtime.live.keeper import NOT_YET
@@ -17,6 +15,7 @@ from ..runtime.recording.writer import Recorder
 from ..runtime.sinks.angles import AngleReader
 from ..runtime.sinks.fanout import Fanout
 from .common import of_device
+from .lines import echo
 from .live_view import LiveView, health_lines
 
 _REPORT_US = 1_000_000
@@ -89,4 +88,4 @@ class Teller:
 def say(line: str) -> None:
     """Say it on stderr, where that is still there: a terminal that was closed is told nothing."""
     with suppress(OSError):
-        click.echo(line, err=True)
+        echo(line, err=True)

@@ -16,6 +16,7 @@ from typing import Annotated, Literal, Self
 import msgspec
 
 from .errors import SettingError
+from .names import fault, shortened
 
 Raw = Annotated[int, msgspec.Meta(ge=1, le=255)]
 Name = Annotated[str, msgspec.Meta(min_length=1)]
@@ -34,6 +35,8 @@ class SensorCalibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
     value_b: float
 
     def __post_init__(self) -> None:
+        if reason := fault(self.name):
+            raise SettingError(f"sensor {shortened(repr(self.name))} {reason}")
         if self.raw_a == self.raw_b:
             raise SettingError(f"{self.name}: raw_a and raw_b are both {self.raw_a}, which makes no line")
         if not (isfinite(self.value_a) and isfinite(self.value_b)):
@@ -54,6 +57,8 @@ class GloveCalibration(
     sensors: tuple[SensorCalibration, ...]
 
     def __post_init__(self) -> None:
+        if self.subject and (reason := fault(self.subject)):
+            raise SettingError(f"subject {shortened(repr(self.subject))} {reason}")
         names = [sensor.name for sensor in self.sensors]
         twice = next((name for name in names if names.count(name) > 1), None)
         if twice is not None:

@@ -24,7 +24,7 @@ Mode = Literal["stream", "poll"]
 
 
 class CyberGlove:
-    """A glove at `url`, a port or what else pySerial opens (socket://HOST:PORT, rfc2217://HOST:PORT).
+    """A glove at `url`: a device, socket://HOST:PORT or rfc2217://HOST:PORT.
 
     baud     bits a second; None tries the rates that a box can be set to
     mode     "stream": the box sends by its own clock; "poll": it is asked for each record

@@ -1,4 +1,4 @@
-"""A serial line, whatever carries it: a port, a pty, or what pySerial's URLs name (socket://, rfc2217://, spy://).
+"""A serial line, whatever carries it: a port, a pty, socket://HOST:PORT or rfc2217://HOST:PORT.
 
 8 data bits, no parity, one stop bit, no handshake; DTR and RTS stay as opening leaves them. Nothing here waits without
 a limit, and whatever pySerial or the kernel says of a line that is gone becomes a `DeviceError`.
@@ -11,6 +11,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from .errors import DeviceError, SettingError
+from .ports import check_node, port_fault
 
 if TYPE_CHECKING:
     from serial import Serial
@@ -20,13 +21,14 @@ _CHUNK = 4096
 _WRITE_TIMEOUT_S = 1.0
 # A port without a file descriptor is asked again this often: its reading may be that much late in giving up.
 _SLICE_S = 0.005
+# So much of what is no port a message repeats.
+_SHOWN = 80
 
 _ADVICE = {
     errno.ENOENT: "there is no such port: is the cable plugged in? `ls /dev/serial/by-id` shows what is",
     errno.EACCES: "no permission: add yourself to the port's group (`sudo usermod -aG dialout $USER`), log in again",
     errno.EAGAIN: "another program has it open: close that first",
     errno.EBUSY: "another program has it open: close that first",
-    errno.EISDIR: "is a folder, no serial port",
 }
 
 
@@ -39,8 +41,10 @@ class SerialLine:
     def __init__(self, url: str, baud: int) -> None:
         """Open `url`, for this program alone where the system can see to that.
 
-        Raises DeviceError if that fails, SettingError for a baud rate below 1.
+        Raises DeviceError if that fails, SettingError for a baud rate below 1 and for what is no port.
         """
+        if fault := port_fault(url):
+            raise SettingError(f"{url[:_SHOWN]!r} {fault}")
         if baud < 1:
             raise SettingError(f"{url}: a baud rate is at least 1, not {baud}")
         self.url, self.baud = url, baud
@@ -104,6 +108,8 @@ class SerialLine:
 def _opened(url: str, baud: int) -> "Serial":
     from serial import serial_for_url
 
+    if "://" not in url:
+        check_node(url)
     # pySerial knows no write timeout there; that connection's own is 5 s.
     write_timeout = None if url.lower().startswith("rfc2217:") else _WRITE_TIMEOUT_S
     try:

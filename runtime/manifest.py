@@ -5,6 +5,7 @@ path, no host. `checksum` is the SHA-256 of those bytes with that field empty.
 """
 
 import hashlib
+from collections.abc import Iterable
 from typing import Annotated, Literal, TypeVar
 
 import msgspec
@@ -12,6 +13,7 @@ from msgspec import Meta, Struct
 from msgspec.structs import replace
 
 from .errors import BuildError
+from .names import LONGEST_NAME, fault, shortened
 
 SCHEMA = 1
 MAX_BYTES = 16 << 20
@@ -167,7 +169,18 @@ def manifest_from_bytes(data: bytes, what: str = "build.json") -> Manifest:
     ):
         if len(set(names)) < len(names):
             raise BuildError(f"{what} names two {kind} alike: compile the build again")
+        _check_names(what, kind, names)
+    source = manifest.source
+    _check_names(what, "units", (joint.unit for joint in manifest.joints))
+    _check_names(what, "texts", (manifest.thenar, source.taxonomy, manifest.options.placement))
+    _check_names(what, "texts", filter(None, [source.simulated]), 2 * LONGEST_NAME)
     return manifest
+
+
+def _check_names(what: str, kind: str, names: Iterable[str], longest: int = LONGEST_NAME) -> None:
+    for name in names:
+        if reason := fault(name, longest):
+            raise BuildError(f"{what}: {shortened(repr(name))}, one of its {kind}, {reason}: compile the build again")
 
 
 def _decode(data: bytes, kind: type[_T], what: str) -> _T:

@@ -1,29 +1,23 @@
-"""Names: what would not survive a file format, and how messages show, list and suggest them."""
+"""Names: the rule for them, and how messages show, list and suggest them."""
 
 import difflib
-import unicodedata
 from collections.abc import Sequence
 
+from ..drivers.names import LONGEST_NAME, LONGEST_SHOWN, fault, printable, shortened, sound_name
+
+__all__ = [
+    "LONGEST_NAME",
+    "LONGEST_SHOWN",
+    "SHOWN",
+    "fault",
+    "list_names",
+    "nearest",
+    "printable",
+    "shortened",
+    "sound_name",
+]
+
 SHOWN = 5
-# The longest piece of a foreign file that a message repeats.
-LONGEST_SHOWN = 80
-
-# Control and format characters (a terminal obeys some, others reorder a line), halves of surrogate pairs, private and
-# unassigned ones, and the separators of lines and paragraphs.
-_UNPRINTABLE = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"})
-
-
-def printable(text: str) -> str:
-    """Return `text` with every character that is no glyph written as Python would, so that no terminal obeys it."""
-    return "".join(
-        letter.encode("unicode_escape").decode() if unicodedata.category(letter) in _UNPRINTABLE else letter
-        for letter in text
-    )
-
-
-def shortened(text: str, longest: int = LONGEST_SHOWN) -> str:
-    """Return what a message repeats of a foreign `text`: printable, and cut behind `longest` characters."""
-    return printable(text) if len(text) <= longest else f"{printable(text[:longest])}..."
 
 
 def nearest(name: str, names: Sequence[str]) -> str:
@@ -40,17 +34,3 @@ def list_names(names: Sequence[str], count: int | None = None) -> str:
     total = len(names) if count is None else count
     more = f" and {total - SHOWN} more" if total > SHOWN else ""
     return ", ".join(names[:SHOWN]) + more
-
-
-def fault(name: str) -> str:
-    """Return why `name` would not survive every file format, or nothing."""
-    if not name:
-        return "is empty"
-    if name == "?":
-        return "means a missing value in every table"
-    if name != name.strip():
-        return "begins or ends with a blank"
-    # Cc: control characters; Cs: halves of surrogate pairs, which UTF-8 cannot hold.
-    if any(unicodedata.category(letter) in ("Cc", "Cs") for letter in name):
-        return "holds a control character"
-    return ""

@@ -62,6 +62,7 @@ ALLOWED = {
         "drivers",
         "compiler.hand",
         "compiler.recordings.graspset",
+        "compiler.recordings.spreadsheet",
         "compiler.spec",
     ),
     "compiler.evaluation": (

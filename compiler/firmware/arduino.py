@@ -6,7 +6,7 @@ Layout and fields are those of the Arduino library specification, revision 1.5.
 from ...firmware_templates.rendering import render
 from ...runtime.manifest import Manifest
 from .layout import Layout
-from .words import comment, inputs_in_words
+from .words import comment, inputs_in_words, markdown
 
 _VERSION = "1.0.0"
 _LED = 13  # has the board's LED and its resistor to ground, which outdo a pull-up on some boards
@@ -29,7 +29,7 @@ def arduino_files(name: str, manifest: Manifest, layout: Layout, *, avr: bool) -
     grasps = [comment(grasp) for grasp in manifest.grasps]
     architectures = "avr" if avr else "*"
     properties = {"version": _VERSION, "classes": len(grasps), "architectures": architectures, "inputs": inputs}
-    readme = {"thenar": manifest.thenar, "grasps": grasps, "inputs": inputs, **counts}
+    readme = {"thenar": markdown(manifest.thenar), "grasps": grasps, "inputs": inputs, **counts}
     return {
         "library.properties": render("arduino/library.properties.j2", name=name, **properties),
         "keywords.txt": render("arduino/keywords.txt.j2", words=_keywords(name)),

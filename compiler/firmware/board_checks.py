@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from ...drivers.i2c.registry import CHIPS
 from ...runtime.harness import checks
 from ...runtime.harness.wiring import BusWiring, Harness
-from ...runtime.names import fault, nearest
+from ...runtime.names import fault, nearest, shortened
 from ...runtime.toml_source import Place, spelled
 from .baud import best_setting, near_rates
 from .board import Board, GloveUart, Matrix
@@ -145,6 +145,12 @@ def _used(board: Board) -> Iterator[tuple[Place, str]]:
 
 def _of_names(board: Board) -> Iterator[Fault]:
     """Names must be good; those in TOML keys stand once anyway, and those of chips were seen to."""
+    joints: list[tuple[Place, str]] = [(("analog", name), name) for name in board.analog]
+    if board.cyberglove is not None:
+        joints += [(("cyberglove", "joints", n), name) for n, name in enumerate(board.cyberglove.joints) if name]
+    for place, name in joints:
+        if reason := fault(name):
+            yield place, f"{shortened(repr(name))} is no name of a joint: it {reason}"
     named: list[tuple[Place, str]] = [(("pins", name), name) for name in board.pins]
     if board.matrix is not None:
         rows = enumerate(board.matrix.switches)
@@ -152,7 +158,7 @@ def _of_names(board: Board) -> Iterator[Fault]:
     seen: dict[str, Place] = {}
     for place, name in named:
         if reason := fault(name):
-            yield place, f"{name!r} is no name of a switch: it {reason}"
+            yield place, f"{shortened(repr(name))} is no name of a switch: it {reason}"
         if name in seen:
             yield place, f"switch {name!r} is {spelled(seen[name])} already: a switch has one place"
         seen[name] = place

@@ -29,6 +29,11 @@ def comment(text: str) -> str:
     return escaped.replace("*/", "* /").replace("/*", "/ *").replace("??/", "? ?/")
 
 
+def markdown(text: str) -> str:
+    """Return `text` in one line of ASCII that Markdown shows as it is, and takes for nothing else."""
+    return re.sub(r"([\\`*_{}\[\]<>()#!|&~])", r"\\\1", comment(text))
+
+
 def string(text: str) -> str:
     """Return the literal of C that is `text` in UTF-8."""
     return '"' + "".join(_in_literal(byte) for byte in text.encode()) + '"'

@@ -7,6 +7,7 @@ from msgspec import Meta, Struct
 
 from ...drivers.errors import ThenarError
 from ...runtime.manifest import Inputs, TableBits
+from ...runtime.names import fault, shortened
 
 SCHEMA = 1
 MAX_BYTES = 64 << 20
@@ -205,7 +206,11 @@ def frontier_from_bytes(data: bytes, what: str = "frontier.json") -> Frontier:
     schema = _decode(data, _Version, what).schema
     if schema > SCHEMA:
         raise FrontierError(f"{what} has schema {schema}, this thenar reads up to {SCHEMA}: update thenar")
-    return _decode(data, Frontier, what)
+    frontier = _decode(data, Frontier, what)
+    for name in {*frontier.grasps, *(name for point in frontier.points for name in point.switches)}:
+        if reason := fault(name):
+            raise FrontierError(f"{what}: the name {shortened(repr(name))} {reason}")
+    return frontier
 
 
 def _decode(data: bytes, kind: type[_T], what: str) -> _T:

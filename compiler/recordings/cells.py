@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .graspset import CODES
 from .names import fault
+from .spreadsheet import text_of
 from .table import Column
 
 MISSING_NUMBERS = frozenset({"", "?", "na", "nan"})
@@ -56,8 +57,9 @@ def codes(column: Column) -> Parsed[np.float64]:
     return Parsed(parsed.values, parsed.missing, parsed.wrong | (parsed.values < 0) | (parsed.values >= CODES))
 
 
-def names(column: Column) -> Parsed[np.str_]:
-    """Read `column` as names without outer blanks; missing: empty and ?, wrong: with control characters.
+def names(column: Column, cells: bool = False) -> Parsed[np.str_]:
+    """Read `column` as names without outer blanks; missing: empty and ?, wrong: what is no good name. With `cells` they
+    are written as cells of a spreadsheet.
 
     Numbers are names too, but for NaN, which is missing, and infinity, which is wrong. Whole ones read as such: 3, not
     3.0.
@@ -66,7 +68,7 @@ def names(column: Column) -> Parsed[np.str_]:
         texts = list(map(_name_of_number, column.tolist()))
         faulty = {text for text in texts if text.endswith("inf")}
     else:
-        texts = [cell.strip() for cell in column]
+        texts = [text_of(cell.strip()) if cells else cell.strip() for cell in column]
         # Looked up as str: an array of them would lose NULs at their ends.
         faulty = {text for text in {*texts} - MISSING_NAMES if fault(text)}
     missing, wrong = (np.array([text in found for text in texts], np.bool_) for found in (MISSING_NAMES, faulty))

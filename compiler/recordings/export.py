@@ -11,6 +11,7 @@ from ...runtime.files import write_atomically
 from .columns_of import Heads, heads_of
 from .errors import TableError
 from .graspset import GraspSet, Joint
+from .spreadsheet import cell
 
 # What Weka reads without quotes; everything else it writes in quotes itself.
 _BARE = re.compile(r"[A-Za-z0-9_.+-]+")
@@ -33,11 +34,16 @@ def export(grasp_set: GraspSet, path: Path, codes: bool = False, meta: bool = Fa
 
 
 def to_csv(grasp_set: GraspSet, codes: bool = False) -> str:
-    """Return grasp type, subject, object, trial, switches and joints as CSV with one header row."""
+    """Return grasp type, subject, object, trial, switches and joints as CSV with one header row.
+
+    A name that a spreadsheet would take for a formula has an apostrophe before it, which importing takes away.
+    """
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
-    writer.writerow((*heads_of(grasp_set), *grasp_set.switch_names, *grasp_set.joint_names))
-    writer.writerows(zip(grasp_set.grasps.tolist(), *_meta(grasp_set), *_inputs(grasp_set, codes), strict=True))
+    writer.writerow(map(cell, (*heads_of(grasp_set), *grasp_set.switch_names, *grasp_set.joint_names)))
+    subjects, objects, trials = _meta(grasp_set)
+    grasps, subjects, objects = (list(map(cell, names)) for names in (grasp_set.grasps.tolist(), subjects, objects))
+    writer.writerows(zip(grasps, subjects, objects, trials, *_inputs(grasp_set, codes), strict=True))
     return file.getvalue()
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import RecordingError
-from .names import check_names
+from .names import check_names, check_simulated
 from .taxonomy import Taxonomy
 
 CODES = 65536
@@ -100,7 +100,7 @@ class GraspSet:
             self._freeze(name, np.str_, (rows,))
             check_names(name[:-1], np.unique(getattr(self, name)).tolist())
         self._freeze("trials", np.int64, (rows,))
-        check_names("simulated", filter(None, [self.simulated]))
+        check_simulated(self.simulated)
         object.__setattr__(self, "labels", self._label())
         self.labels.setflags(write=False)
 

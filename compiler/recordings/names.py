@@ -5,21 +5,27 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.names import SHOWN, fault, list_names, nearest
+from ...runtime.names import LONGEST_NAME, SHOWN, fault, list_names, nearest, shortened
 from .errors import RecordingError
 
-__all__ = ["SHOWN", "check_names", "fault", "list_names", "list_rows", "nearest"]
+__all__ = ["SHOWN", "check_names", "check_simulated", "fault", "list_names", "list_rows", "nearest"]
 
 
 def check_names(what: str, names: Iterable[str]) -> None:
-    """Raise RecordingError unless `names` are distinct, not empty, and free of control characters and outer blanks."""
+    """Raise RecordingError unless `names` are distinct, and good by the one rule for names, `fault`."""
     seen: set[str] = set()
     for name in names:
         if reason := fault(name):
-            raise RecordingError(f"{what} {name!r} {reason}")
+            raise RecordingError(f"{what} {shortened(repr(name))} {reason}")
         if name in seen:
-            raise RecordingError(f"{what} {name!r} occurs twice")
+            raise RecordingError(f"{what} {shortened(repr(name))} occurs twice")
         seen.add(name)
+
+
+def check_simulated(text: str) -> None:
+    """Raise RecordingError unless `text`, which says what simulated a set and contains its name, is good or empty."""
+    if text and (reason := fault(text, 2 * LONGEST_NAME)):
+        raise RecordingError(f"simulated {shortened(repr(text))} {reason}")
 
 
 def list_rows(rows: NDArray[np.int64]) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from operator import itemgetter
 
 import numpy as np
@@ -82,7 +83,7 @@ class _Reader:
         return (
             np.full(len(self.table.rows), "1")
             if column is None
-            else self.read(column, names, "names that can be printed")
+            else self.read(column, partial(names, cells=self.table.cells), "names that can be printed")
         )
 
     def complete(self, drop: bool) -> NDArray[np.bool_]:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from .arrays import UNREADABLE
 from .errors import RecordingError, TableError
 from .names import check_names
+from .spreadsheet import text_of
 
 Column = Sequence[str] | NDArray[np.float64]
 
@@ -26,12 +27,14 @@ Column = Sequence[str] | NDArray[np.float64]
 class Table:
     """Named columns of equal length: text as it was read, or numbers with NaN where one is missing.
 
-    `rows` are the rows' numbers as the user sees them: the line in a CSV, counted from 1 elsewhere.
+    `rows` are the rows' numbers as the user sees them: the line in a CSV, counted from 1 elsewhere. `cells` says that
+    names are written as cells of a spreadsheet.
     """
 
     what: str
     columns: Mapping[str, Column]
     rows: NDArray[np.int64]
+    cells: bool = False
 
 
 def read_table(path: Path, delimiter: str = ",") -> Table:
@@ -80,7 +83,7 @@ def _read_csv(what: str, lines: TextIO, delimiter: str) -> Table:
     cells: list[list[str]] = []
     try:
         filled = filter(None, reader)
-        names = [name.strip() for name in next(filled, [])]
+        names = [text_of(name.strip()) for name in next(filled, [])]
         for row in filled:
             if len(row) != len(names):
                 raise TableError(f"{what} row {reader.line_num} has {len(row)} cells, its header {len(names)}")
@@ -91,7 +94,9 @@ def _read_csv(what: str, lines: TextIO, delimiter: str) -> Table:
     if "" in names:
         raise TableError(f"{what}: column {names.index('') + 1} has no name in the header: give it one")
     check_names("column", names)
-    return Table(what, dict(zip(names, zip(*cells, strict=True), strict=bool(cells))), np.array(rows, np.int64))
+    return Table(
+        what, dict(zip(names, zip(*cells, strict=True), strict=bool(cells))), np.array(rows, np.int64), cells=True
+    )
 
 
 def _read_npz(path: Path) -> Table:

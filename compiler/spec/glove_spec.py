@@ -127,7 +127,7 @@ def _portable(harness: Harness) -> Harness:
     if glove is None or glove.calibration is None:
         return harness
     name = glove.calibration.replace("\\", "/").rsplit("/", 1)[-1]
-    return replace(harness, cyberglove=replace(glove, calibration=name))
+    return replace(harness, cyberglove=replace(glove, calibration=name or None))
 
 
 def _readers(ends: Sequence[End]) -> tuple[Reader, ...]:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from fcntl import ioctl
 from typing import TYPE_CHECKING
 
-from ..errors import DeviceError
+from ..errors import DeviceError, SettingError
+from ..ports import check_node, device_fault
 
 if TYPE_CHECKING:
     from smbus2 import SMBus, i2c_msg
@@ -44,6 +45,9 @@ class Node:
     """
 
     def __init__(self, device: str) -> None:
+        """Raise SettingError for what is no path of a device."""
+        if fault := device_fault(device):
+            raise SettingError(f"{device!r} {fault}")
         self.device = device
         self.transfers = 0
         self.plain_i2c = True
@@ -64,14 +68,13 @@ class Node:
         from smbus2 import SMBus
 
         self.close()
+        check_node(self.device)
         bus = self._bus = self._bus or SMBus()
         try:
             bus.open(self.device)
         except OSError as error:
             bus.close()
             raise DeviceError(f"{self.device} cannot be opened: {_cause(error)}") from None
-        except ValueError:  # a NUL in the name
-            raise DeviceError(f"{self.device!r} cannot be opened: that is no name of a device node") from None
 
     def close(self) -> None:
         """Close the node; there are no transfers until it is opened again."""

@@ -5,7 +5,8 @@ from collections.abc import Iterable, Iterator
 from ...drivers.errors import SettingError
 from ...drivers.i2c import tca9548a
 from ...drivers.i2c.registry import CHIPS
-from ..names import fault, nearest
+from ...drivers.ports import device_fault, port_fault
+from ..names import fault, nearest, shortened
 from ..toml_source import Place, spelled
 from .wiring import BusWiring, ChipWiring, GloveWiring, Harness
 
@@ -17,6 +18,8 @@ _PULLED_UP = tuple(CHIPS[kind] for kind in ("pcf8574", "pcf8574a", "pcf8575"))
 
 def faults(harness: Harness) -> Iterator[Fault]:
     """Yield what is wrong with `harness` and where; what comes after a fault may be wrong because of it."""
+    if reason := fault(harness.name):
+        yield ("name",), f"{shortened(repr(harness.name))} is no name of a glove: it {reason}"
     if harness.cyberglove is not None:
         yield from _of_glove(harness.cyberglove)
     yield from _of_devices(harness)
@@ -41,6 +44,8 @@ def _of_devices(harness: Harness) -> Iterator[Fault]:
         places.insert(0, (("cyberglove", "port"), harness.cyberglove.port))
     seen: dict[str, Place] = {}
     for place, device in places:
+        if reason := (device_fault if place[-1] == "device" else port_fault)(device):
+            yield place, f"{shortened(repr(device))} {reason}"
         if device in seen:
             yield place, f"{device} is {spelled(seen[device])} already: one device, one entry"
         seen[device] = place
@@ -108,7 +113,7 @@ def _of_names(named: Iterable[tuple[Place, str]], what: str) -> Iterator[Fault]:
     seen: dict[str, Place] = {}
     for place, name in named:
         if reason := fault(name):
-            yield place, f"{name!r} is no name of a {what}: it {reason}"
+            yield place, f"{shortened(repr(name))} is no name of a {what}: it {reason}"
         if name in seen:
             yield place, f"{what} {name!r} is {spelled(seen[name])} already: a {what} has one place"
         seen[name] = place

@@ -5,6 +5,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from ..errors import HarnessError
+from ..names import sound_name
 from ..toml_source import Source, read_source
 from ..toml_struct import check_finite, convert
 from .checks import faults
@@ -12,7 +13,7 @@ from .wiring import Harness
 
 
 def load_harness(path: str | Path) -> Harness:
-    """Return the harness in a TOML file; its name, where it has none, is the file's.
+    """Return the harness in a TOML file; its name, where it has none, is the file's, or "glove" where that is no name.
 
     The path of the calibration comes back absolute. Raises HarnessError with file, line and key.
     """
@@ -31,7 +32,7 @@ def parse_harness(text: str, name: str) -> Harness:
 def _harness_of(source: Source, name: str) -> Harness:
     tables = source.tables()
     check_finite(source, (), tables)
-    harness = convert(source, (), {"name": name} | tables, Harness)
+    harness = convert(source, (), {"name": sound_name(name, "glove")} | tables, Harness)
     for place, reason in faults(harness):
         raise source.error(place, reason)
     return harness

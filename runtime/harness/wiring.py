@@ -13,6 +13,8 @@ from msgspec import Meta, Struct, field
 from ...drivers.i2c.chip import Chip
 from ...drivers.i2c.registry import CHIPS
 
+# A board's bitmap has no room for more.
+MOST_KEYS = 2000
 Text = Annotated[str, Meta(min_length=1)]
 Baud = Annotated[int, Meta(ge=1, le=12_000_000)]
 Milliseconds = Annotated[float, Meta(ge=0.0, le=1000.0)]
@@ -23,7 +25,7 @@ class _Table(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit
 
 
 class GloveWiring(_Table, frozen=True):
-    """The CyberGlove: its port (anything that pyserial opens), and how it is asked.
+    """The CyberGlove: its port (a device, socket:// or rfc2217://), and how it is asked.
 
     baud         "auto" tries the usual ones
     rate_hz      None: as fast as it can
@@ -45,7 +47,7 @@ class ScannerWiring(_Table, frozen=True):
     """A switch-scanner board: key k of the board is switches[k], "" where there is none."""
 
     port: Text
-    switches: Annotated[tuple[str, ...], Meta(max_length=2000)]
+    switches: Annotated[tuple[str, ...], Meta(max_length=MOST_KEYS)]
     baud: Baud = 1_000_000
 
 

@@ -24,7 +24,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from ..names import nearest
+from ..names import fault, nearest, shortened
 from ..toml_source import Place, Source, read_source
 from ..toml_struct import check_finite, convert
 from .preshape import Preshape, PreshapeError
@@ -85,12 +85,18 @@ def _find(name: str | os.PathLike[str]) -> Traversable:
     return path
 
 
+def _check_name(source: Source, place: Place, name: str) -> None:
+    if reason := fault(name):
+        raise source.error(place, f"{shortened(repr(name))} {reason}")
+
+
 def _check_joints(source: Source, content: _File) -> None:
     if not content.joints:
         raise source.error(("joints",), "must name at least one joint")
     seen: set[str] = set()
     for number, joint in enumerate(content.joints):
         place: Place = ("joints", number)
+        _check_name(source, (*place, "name"), joint.name)
         if joint.name in seen:
             raise source.error((*place, "name"), f"joint {joint.name!r} is there already")
         seen.add(joint.name)
@@ -103,11 +109,13 @@ def _check_preshapes(source: Source, content: _File) -> None:
     grasps: dict[str, str] = {}
     for number, entry in enumerate(content.preshapes):
         place: Place = ("preshapes", number)
+        _check_name(source, (*place, "name"), entry.name)
         if entry.name in names:
             raise source.error((*place, "name"), f"preshape {entry.name!r} is there already")
         names.add(entry.name)
         _check_positions(source, (*place, "positions"), entry, content.joints)
         for index, grasp in enumerate(entry.grasps):
+            _check_name(source, (*place, "grasps", index), grasp)
             if grasp in grasps:
                 raise source.error((*place, "grasps", index), f"{grasp!r} takes preshape {grasps[grasp]!r} already")
             grasps[grasp] = entry.name

@@ -12,6 +12,7 @@ from msgspec.structs import fields
 
 from ...drivers.calibration import GloveCalibration
 from ..live.policy import Policy
+from ..names import fault, shortened
 from .errors import McapError
 
 METADATA = "thenar"
@@ -96,7 +97,19 @@ def from_metadata(texts: dict[str, str]) -> Session:
         raise McapError(f"its version is {version[:20]!r}, not a number: it was not recorded by thenar")
     if int(version) > VERSION:
         raise McapError(f"it is of version {version}, this thenar reads up to {VERSION}: update thenar")
-    return Session(**{field.name: _value(field, texts) for field in fields(Session) if field.name in _need(texts)})
+    session = Session(**{field.name: _value(field, texts) for field in fields(Session) if field.name in _need(texts)})
+    _check_names(session)
+    return session
+
+
+def _check_names(session: Session) -> None:
+    names = {*session.switches, *session.sensors}
+    if (collected := session.collection) is not None:
+        names |= {collected.subject, collected.taxonomy, *collected.types}
+        names |= {name for task in collected.tasks for name in (task.grasp, *task.objects)}
+    for name in sorted(names):
+        if reason := fault(name):
+            raise McapError(f"its metadata name {shortened(repr(name))}, which {reason}")
 
 
 def _need(texts: dict[str, str]) -> dict[str, str]:

@@ -7,7 +7,7 @@ from ...drivers.i2c import tca9548a
 from ...drivers.i2c.chip import Chip
 from ...drivers.i2c.registry import CHIPS
 from ..errors import HarnessError
-from ..harness.wiring import BusWiring, ChipWiring, GloveWiring, Harness, MuxChannel, ScannerWiring
+from ..harness.wiring import MOST_KEYS, BusWiring, ChipWiring, GloveWiring, Harness, MuxChannel, ScannerWiring
 from ..names import nearest
 
 # What every board's I2C does, and most chips; slower where the chip is.
@@ -49,7 +49,14 @@ def propose_board(
     port: str = "/dev/ttyACM0",
     cyberglove: GloveWiring | None = None,
 ) -> Harness:
-    """Return a harness with all the switches on one scanner board, a key each, in their order."""
+    """Return a harness with all the switches on one scanner board, a key each, in their order.
+
+    Raises HarnessError if no board has so many keys.
+    """
+    if len(switch_names) > MOST_KEYS:
+        raise HarnessError(
+            f"{len(switch_names)} switches, one board has {MOST_KEYS} keys: share them between boards by hand"
+        )
     board = ScannerWiring(port=port, switches=tuple(switch_names))
     return Harness(name=name, cyberglove=cyberglove, scanners=(board,) if switch_names else ())
 

@@ -10,6 +10,7 @@ import msgspec
 from msgspec import Meta, Struct
 
 from ..errors import BuildError
+from ..names import fault, shortened
 
 SCHEMA = 1
 MAX_BYTES = 4 << 20
@@ -87,6 +88,9 @@ def check_switches(scan: ScanMap, switches: int, what: str = "scan.json") -> Non
 
 
 def _check_once(scan: ScanMap, what: str) -> None:
+    for port in scan.ports:
+        if reason := fault(port.reading):
+            raise BuildError(f"{what}: the reading {shortened(repr(port.reading))} {reason}: compile the build again")
     readings = [(port.bus, port.chip, port.reading) for port in scan.ports]
     if len(set(readings)) < len(readings):
         raise BuildError(f"{what} reads a port twice: compile the build again")

@@ -55,6 +55,21 @@ def test_a_port_that_is_not_there_is_exit_code_1(thenar: Thenar, tmp_path: Path)
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.parametrize("table", ["[cyberglove]\nport = {}", "[[scanner]]\nswitches = ['s']\nport = {}"])
+def test_a_port_that_would_write_to_a_file_is_refused_and_the_file_kept(
+    thenar: Thenar, tmp_path: Path, table: str
+) -> None:
+    path, victim = tmp_path / "glove.toml", tmp_path / "victim"
+    victim.write_text("kept")
+    path.write_text(table.format(f'"spy:///dev/null?file={victim}"'))
+    done = thenar("doctor", path)
+    assert done.returncode == 2
+    assert "port: 'spy:///dev/null?file=" in done.stderr
+    path.write_text(table.format(f'"{victim}"'))
+    assert thenar("doctor", path).returncode == 1
+    assert victim.read_text() == "kept"
+
+
 def test_a_calibration_that_cannot_be_read_is_found(thenar: Thenar, harness: Path) -> None:
     harness.write_text(harness.read_text() + 'calibration = "anna.toml"\n')
     done = thenar("doctor", harness)

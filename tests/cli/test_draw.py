@@ -112,6 +112,8 @@ def test_a_set_of_another_glove_is_refused_by_its_first_strange_switch(
         (b"", "keeps no switches"),
         (b"[]", "keeps no switches"),
         (b'{"rates": []}', "is no list of switches (Object missing required field `switches`)"),
+        (b'["a", "\\u001b[2J"]', r"switch '\x1b[2J' holds a control character (U+001B)"),
+        (b"palm_heel_1\n\x1b[2J", r"switch '\x1b[2J' holds a control character (U+001B)"),
         (b"[1, 2]", "is no list of switches (Expected `str`, got `int` - at `$[0]`)"),
         (b'["palm_heel_1", ', "is no list of switches (Input data was truncated)"),
         (b"\xff\xfe\x00", "is no text"),

@@ -1,13 +1,15 @@
 import os
+import re
 import signal
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from thenar.cli.group import COMMANDS
+from thenar.cli.group import COMMANDS, EXTRAS
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
 HEAVY = ("sklearn", "scipy", "joblib", "matplotlib", "numpy")
@@ -53,6 +55,15 @@ def test_an_unknown_command_is_one_sentence(thenar: Thenar) -> None:
 
 def test_an_unknown_option_is_one_sentence(thenar: Thenar, set_file: Path) -> None:
     assert "--wings" in _one_sentence(thenar("compile", set_file, "--wings", "2"))
+
+
+def test_no_terminal_obeys_a_name_in_a_complaint(thenar: Thenar, tmp_path: Path) -> None:
+    (tmp_path / "a\x1b[2J\u202e.grasps").write_bytes(b"")
+    for name in ("a\x1b[2J\u202e.grasps", "none\x1b[2J\u202e"):
+        said = thenar("info", tmp_path / name)
+        assert said.returncode == 2
+        assert r"\x1b[2J\u202e" in said.stderr
+        assert said.stderr[:-1].isprintable()
 
 
 def test_a_missing_file_is_one_sentence(thenar: Thenar, tmp_path: Path) -> None:
@@ -125,3 +136,68 @@ def test_ctrl_c_while_the_libraries_load_is_one_like_any_other() -> None:
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "thenar: interrupted\n")
+
+
+# A base install: of the packages of all extras, none can be imported but those in EXCEPT.
+BASE = """
+import os, sys
+from thenar.cli.group import EXTRAS
+lacking = {package for packages in EXTRAS.values() for package in packages} - set(os.environ["EXCEPT"].split())
+class Lacking:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in lacking:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+sys.meta_path.insert(0, Lacking())
+from thenar.cli import main
+main()
+"""
+
+
+def _on_a_base_install(*arguments: object, but: str = "") -> "subprocess.CompletedProcess[str]":
+    command = [sys.executable, "-c", BASE, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, env={**os.environ, "EXCEPT": but})
+
+
+def test_the_extras_in_hints_are_those_of_the_project() -> None:
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+    called = {"scikit-learn": "sklearn", "mujoco-core": "mujoco"}
+    needed = {
+        extra: {called.get(name, name) for name in (re.split("[>=<]", package)[0] for package in packages)}
+        for extra, packages in project["optional-dependencies"].items()
+    }
+    assert {extra: set(packages) for extra, packages in EXTRAS.items()} == needed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("line", "but", "extra"),
+    [
+        ("compile {set} -o {new}", "", "compiler"),
+        ("compile {set} -o {new} --no-report", "", "compiler"),
+        ("verify {build} {set}", "", "compiler"),
+        ("firmware {build} --target host -o {new}", "", "compiler"),
+        ("frontier {set} -o {new}", "", "compiler"),
+        ("evaluate {set}", "", "compiler"),
+        ("place {set} --method elimination --keep 2", "", "compiler"),
+        ("place {set} --draw {new}.svg", "", "compiler"),
+        ("simulate quick -o {new}.grasps", "", "compiler"),
+        ("stability", "", "stability"),
+        ("stability -o {new}.html", "mpmath sklearn scipy joblib matplotlib threadpoolctl plotly ezdxf", "stability"),
+    ],
+)
+def test_what_is_not_installed_is_named_with_the_extra_that_brings_it(
+    set_file: Path, build_folder: Path, tmp_path: Path, line: str, but: str, extra: str
+) -> None:
+    words = line.format(set=set_file, build=build_folder, new=tmp_path / "new").split()
+    done = _on_a_base_install(*words, but=but)
+    assert done.returncode == 2
+    assert done.stderr.endswith(f": pip install 'thenar[{extra}]'\n")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "line", ["info {set}", "place {set}", "run {build} --replay {set}", "export {set} -o {new}.csv"]
+)
+def test_a_base_install_does_what_needs_no_extra(set_file: Path, build_folder: Path, tmp_path: Path, line: str) -> None:
+    done = _on_a_base_install(*line.format(set=set_file, build=build_folder, new=tmp_path / "new").split())
+    assert done.returncode == 0, done.stderr

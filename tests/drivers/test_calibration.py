@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import pytest
@@ -6,19 +7,20 @@ from hypothesis import strategies as st
 
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration, load_calibration
 from thenar.drivers.errors import SettingError
+from thenar.drivers.names import fault
 
 VALUES = st.floats(-1e6, 1e6)
 RAW = st.integers(1, 255)
 LINES = st.builds(
     lambda name, raws, value_a, value_b: SensorCalibration(name, raws[0], value_a, raws[1], value_b),
-    st.text(min_size=1),
+    st.text().filter(lambda name: not fault(name)),
     st.lists(RAW, min_size=2, max_size=2, unique=True),
     VALUES,
     VALUES,
 )
 CALIBRATIONS = st.builds(
     lambda subject, lines: GloveCalibration(subject=subject, sensors=tuple(lines)),
-    st.text(),
+    st.text().filter(lambda name: not name or not fault(name)),
     st.lists(LINES, unique_by=lambda line: line.name, max_size=5),
 )
 SENSOR = '{ name = "index_mpj", raw_a = 96, value_a = 0.0, raw_b = 161, value_b = 90.0 }'
@@ -27,6 +29,15 @@ SENSOR = '{ name = "index_mpj", raw_a = 96, value_a = 0.0, raw_b = 161, value_b 
 @given(CALIBRATIONS)
 def test_a_file_gives_back_every_digit(calibration: GloveCalibration) -> None:
     assert GloveCalibration.of_toml(calibration.to_toml()) == calibration
+
+
+@pytest.mark.parametrize("name", ["", "\x1b[2J", "a\u202eb", "two\nlines", "s" * 201])
+def test_a_name_that_would_deceive_or_get_lost_is_refused(name: str) -> None:
+    line = SensorCalibration("index_mpj", 96, 0.0, 161, 90.0)
+    text = GloveCalibration(subject="anna", sensors=(line,)).to_toml()
+    for good in ("anna", "index_mpj")[not name :]:  # no subject is given in many files
+        with pytest.raises(SettingError, match=r"length >= 1|holds a control character|at most 200"):
+            GloveCalibration.of_toml(text.replace(f'"{good}"', json.dumps(name)))
 
 
 @given(LINES, RAW)

@@ -1,3 +1,4 @@
+import fcntl
 import os
 import pty
 import socket
@@ -47,19 +48,12 @@ def test_every_byte_passes_both_ways(echo: EchoLine) -> None:
         assert read_exactly(line, 256) == EVERY_BYTE
 
 
-@pytest.mark.parametrize("url", ["port", "loop://"])
-def test_reading_gives_up_at_its_timeout(echo: EchoLine, url: str) -> None:
-    with SerialLine(str(echo.link) if url == "port" else url, 115_200) as line:
+def test_reading_gives_up_at_its_timeout(echo: EchoLine) -> None:
+    with SerialLine(str(echo.link), 115_200) as line:
         began = monotonic()
         assert line.read(0.05) == b""
         assert 0.05 <= monotonic() - began < SOON_S
         assert line.read(0.0) == line.read(-1.0) == b""
-
-
-def test_what_has_no_descriptor_is_read_as_well() -> None:
-    with SerialLine("loop://", 115_200) as line:
-        line.write(EVERY_BYTE)
-        assert read_exactly(line, 256) == EVERY_BYTE
 
 
 def test_draining_takes_its_time_and_returns_what_came(echo: EchoLine) -> None:
@@ -76,12 +70,27 @@ def test_a_port_that_is_not_there_is_named_with_what_to_check(tmp_path: Path) ->
     assert isinstance(raised.value, OSError)
 
 
-def test_a_folder_a_file_and_nonsense_are_no_ports(tmp_path: Path) -> None:
-    (tmp_path / "file").write_bytes(b"")
-    odd = [str(tmp_path), str(tmp_path / "file"), "", "a\0b", "telnet://x", "socket://127.0.0.1", "rfc2217://?x=y"]
-    for url in odd:
-        with pytest.raises(DeviceError):
+def test_a_folder_and_a_file_are_no_ports_and_stay_as_they_are(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_bytes(EVERY_BYTE)
+    before = file.stat()
+    with file.open("r+b") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)  # opening it to try would find it in use
+        for path in (file, tmp_path):
+            with pytest.raises(DeviceError, match=rf"{path.name} is a (file|folder), no device"):
+                SerialLine(str(path), 115_200)
+    assert file.read_bytes() == EVERY_BYTE
+    assert (file.stat().st_mtime_ns, file.stat().st_ctime_ns) == (before.st_mtime_ns, before.st_ctime_ns)
+
+
+@pytest.mark.parametrize("scheme", ["spy", "SPY", "alt", "loop", "hwgrep", "cp2110", "telnet", "file"])
+def test_a_url_of_any_other_kind_is_refused_and_touches_no_file(tmp_path: Path, scheme: str) -> None:
+    victim = tmp_path / "victim"
+    victim.write_bytes(b"kept")
+    for url in (f"{scheme}://{os.devnull}?file={victim}", f"{scheme}://{victim}", f"{scheme}://?file={victim}"):
+        with pytest.raises(SettingError, match="is no port that is opened: a port is a device such as"):
             SerialLine(url, 115_200)
+    assert victim.read_bytes() == b"kept"
 
 
 def test_a_baud_rate_of_nought_would_hang_up_and_is_refused(echo: EchoLine) -> None:
@@ -215,4 +224,7 @@ def test_a_port_behind_rfc_2217_is_a_line(echo: EchoLine) -> None:
     with redirected(echo.link) as url, SerialLine(url, 38_400) as line:
         line.write(EVERY_BYTE)
         assert read_exactly(line, 256) == EVERY_BYTE
-        assert line.read(0.01) == b""
+        began = monotonic()
+        assert line.read(0.05) == b""
+        assert 0.05 <= monotonic() - began < SOON_S
+        assert line.read(0.0) == line.read(-1.0) == b""

@@ -93,3 +93,28 @@ def test_deep_nesting_is_refused() -> None:
 def test_an_oversized_document_is_refused() -> None:
     with pytest.raises(BuildError, match="at most"):
         manifest_from_bytes(b" " * (MAX_BYTES + 1))
+
+
+@pytest.mark.parametrize(
+    "name", ["\x1b]0;owned\x07", "two\nlines", "a\u202eb", "\u2028", " a", "?", "x" * 201, "\x9b31m"]
+)
+@pytest.mark.parametrize(
+    "where", ["grasps", "switches", "joints", "unit", "thenar", "taxonomy", "placement", "simulated"]
+)
+def test_a_sealed_build_whose_names_would_deceive_is_refused(manifest: Manifest, where: str, name: str) -> None:
+    source, options, (joint, *joints) = manifest.source, manifest.options, manifest.joints
+    changes: dict[str, object] = {
+        "grasps": {"grasps": (name, *manifest.grasps[1:])},
+        "switches": {"switches": (replace(manifest.switches[0], name=name), *manifest.switches[1:])},
+        "joints": {"joints": (replace(joint, name=name), *joints)},
+        "unit": {"joints": (replace(joint, unit=name), *joints)},
+        "thenar": {"thenar": name},
+        "taxonomy": {"source": replace(source, taxonomy=name)},
+        "placement": {"options": replace(options, placement=name)},
+        "simulated": {"source": replace(source, simulated=name * (1 + len(name) // 200))},
+    }
+    sealed = manifest_to_bytes(replace(manifest, **changes[where]))
+    with pytest.raises(BuildError, match=r"one of its .*: compile the build again") as refused:
+        manifest_from_bytes(sealed)
+    assert str(refused.value).isprintable()
+    assert len(str(refused.value)) < 250

@@ -4,6 +4,7 @@ import csv
 import io
 from collections.abc import Iterable, Iterator
 
+from ...recordings.spreadsheet import cell
 from ..points import Frontier, Point, Rate, Time
 
 COLUMNS = (
@@ -24,7 +25,8 @@ def csv_bytes(frontier: Frontier) -> bytes:
     file = io.StringIO(newline="")
     rows = csv.writer(file, lineterminator="\n")
     rows.writerow(COLUMNS)
-    rows.writerows(_cells(point) for point in frontier.points)
+    for point in frontier.points:
+        rows.writerow(cell(value) if isinstance(value, str) else value for value in _cells(point))
     return file.getvalue().encode()
 
 
@@ -49,6 +51,6 @@ def _time(time: Time) -> tuple[object, ...]:
 
 
 def _list(names: Iterable[str]) -> str:
-    cell = io.StringIO(newline="")
-    csv.writer(cell, delimiter=";", lineterminator="").writerow(names)
-    return cell.getvalue()
+    listed = io.StringIO(newline="")
+    csv.writer(listed, delimiter=";", lineterminator="").writerow(names)
+    return listed.getvalue()

@@ -75,6 +75,8 @@ def test_what_is_left_out_has_its_default_and_debouncing_is_off() -> None:
         (UNO + '[pins]\na = "PD1"', "pins.a: PD1 is a pin of UART 0, the host's, already"),
         (MEGA + '[pins]\na = "PD3"\n[cyberglove]', "pins.a: PD3 is a pin of UART 1, the glove's, already"),
         (UNO + '[pins]\n" a" = "PD3"', "' a' is no name of a switch: it begins or ends with a blank"),
+        (UNO + PINS + '[analog]\n"j\\u202e" = "ADC0"', "no name of a joint: it holds a control character (U+202E)"),
+        (MEGA + '[pins]\na = "PC2"\n[cyberglove]\njoints = ["\\u001b"]', "1 names for 18 sensors"),
         (UNO + '[pins]\na = "PC0"\n[analog]\nj = "ADC0"', "analog.j: PC0 is that of pins.a already"),
         (UNO + PINS + '[analog]\nj = "ADC8"', "an atmega328p has no channel 'ADC8'"),
         (UNO + PINS + '[analog]\nj = "ADC0"\nk = "ADC0"', "line 7: analog.k: ADC0 is that of j already"),

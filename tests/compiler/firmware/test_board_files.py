@@ -283,7 +283,7 @@ def test_the_same_board_gives_the_same_files_and_no_line_is_too_long(generate: G
 
 
 def test_names_that_are_long_or_end_comments_do_no_harm(make_tables: MakeTables, describe: Describe) -> None:
-    names = ("*/ int main(void) /*", "x" * 300, "\u00fcber")
+    names = ("*/ int main(void) /*", "x" * 200, "\u00fcber")
     tables = make_tables(switches=3, joints=0)
     described = describe(tables)
     switches = tuple(replace(switch, name=name) for switch, name in zip(described.switches, names, strict=True))

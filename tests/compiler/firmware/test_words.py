@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.firmware.errors import FirmwareError
-from thenar.compiler.firmware.words import check_name, comment, inputs_in_words, string
+from thenar.compiler.firmware.words import check_name, comment, inputs_in_words, markdown, string
 
 ANY_TEXT = st.text(max_size=60)
 
@@ -54,6 +54,20 @@ def test_a_comment_is_one_line_of_ascii_that_neither_ends_nor_opens_one(text: st
 
 def test_a_comment_escapes_what_is_not_ascii() -> None:
     assert comment("Griff ü 手 🖐\n*/") == "Griff \\xfc \\u624b \\U0001f590\\x0a* /"
+
+
+@given(ANY_TEXT)
+def test_a_text_in_markdown_is_one_line_in_which_every_mark_is_escaped(text: str) -> None:
+    said = markdown(text)
+    assert said.isascii()
+    assert said.isprintable()
+    assert re.fullmatch(r"(\\[\\`*_{}\[\]<>()#!|&~]|[^\\`*_{}\[\]<>()#!|&~])*", said)
+    assert re.sub(r"\\(.)", r"\1", said) == comment(text)
+
+
+def test_a_version_stays_as_it_is_in_markdown() -> None:
+    assert markdown("0.1.0-rc.1+g12ab") == "0.1.0-rc.1+g12ab"
+    assert markdown("1 <img src=x> [a](b)") == r"1 \<img src=x\> \[a\]\(b\)"
 
 
 def test_a_literal_is_the_text_in_utf_8(tool: Callable[[str], str], tmp_path: Path) -> None:

@@ -19,7 +19,9 @@ def _is_name(text: str) -> bool:
 
 
 NAMES = st.one_of(
-    st.sampled_from(["grasp", "trial", "a[1]", "it's", '50 % "x"', "a, b", "\\n", "ä*", "{0}"]), st.text(max_size=6)
+    st.sampled_from(["grasp", "trial", "a[1]", "it's", '50 % "x"', "a, b", "\\n", "ä*", "{0}"]),
+    st.text(max_size=6),
+    st.text("'=+-@a1", max_size=4),
 )
 NAMES = NAMES.map(str.strip).filter(_is_name)
 VALUES = st.floats(-1e6, 1e6)

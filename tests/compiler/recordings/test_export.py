@@ -1,3 +1,4 @@
+import csv
 import gzip
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +13,7 @@ from thenar.compiler.recordings.errors import TableError
 from thenar.compiler.recordings.export import export, to_arff, to_csv
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import import_file
+from thenar.compiler.recordings.taxonomy import own
 
 
 @pytest.fixture(scope="session")
@@ -40,6 +42,22 @@ def test_a_csv_holds_values_or_codes(small: GraspSet) -> None:
         "PoH,A,mug,1,0,1,0,0,-9,3.5",
     ]
     assert to_csv(small, codes=True).splitlines()[1] == "PoS,A,mug,0,0,0,1,1,1,7"
+
+
+def test_no_cell_of_a_csv_is_a_formula_and_numbers_stay_as_they_are(small: GraspSet) -> None:
+    types = own(["=cmd|' /C calc'!A0", "@SUM(1)", "-1+1"])
+    odd = replace(
+        small,
+        switch_names=("=1+1", "+thumb", "palm", "'-palm"),
+        grasps=np.array([*types.types, *types.types]),
+        taxonomy=types,
+        subjects=np.array(["-2", "A", "'A", "+", "=", "'=x"]),
+    )
+    header, *rows = csv.reader(to_csv(odd).splitlines())
+    assert header == ["grasp", "subject", "object", "trial", "'=1+1", "'+thumb", "palm", "''-palm", "index", "wrist"]
+    assert [row[0] for row in rows[:3]] == ["'=cmd|' /C calc'!A0", "'@SUM(1)", "'-1+1"]
+    assert [row[1] for row in rows] == ["'-2", "A", "'A", "'+", "'=", "''=x"]
+    assert [row[8] for row in rows] == ["-9.5", "-9", "-9", "-9.5", "-8.5", "-8"]
 
 
 def test_an_arff_is_switches_joints_and_the_class_last(small: GraspSet) -> None:

@@ -58,8 +58,8 @@ def test_a_set_without_rows_cannot_be_drawn(small: GraspSet) -> None:
 
 
 def test_names_are_drawn_as_they_are_and_cut_when_they_are_long(small: GraspSet) -> None:
-    joints = (replace(small.joints[0], name="$x^$ [/b]", unit="$"), replace(small.joints[1], name="w" * 300))
-    names = ("親指", "s" * 300, *small.switch_names[2:])
+    joints = (replace(small.joints[0], name="$x^$ [/b]", unit="$"), replace(small.joints[1], name="w" * 200))
+    names = ("親指", "s" * 200, *small.switch_names[2:])
     picture = draw(replace_inputs(small, small.switches, names, small.codes, joints), "svg")
     for words in ("$x^$ [/b]", "w" * 29 + "…", "s" * 29 + "…"):
         assert f"<!-- {words} -->".encode() in picture

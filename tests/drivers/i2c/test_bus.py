@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -155,6 +156,18 @@ def test_a_bus_that_is_not_there_or_is_no_bus_says_what_to_check(tmp_path: Any) 
         I2cBus("/dev/i2c-99", []).open()
     with pytest.raises(DeviceError, match="is it an I2C device"):
         I2cBus("/dev/null", []).open()
+    with pytest.raises(SettingError, match="is no path of a device"):
+        I2cBus("spy:///dev/i2c-1", [])
+
+
+def test_a_file_is_no_bus_and_is_not_even_opened(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_bytes(b"kept")
+    file.chmod(0)  # opening it would be refused, but for root
+    before = file.stat()
+    with pytest.raises(DeviceError, match="file is a file, no device: it was left as it is"):
+        I2cBus(str(file), []).open()
+    assert file.stat() == before
 
 
 def test_a_bus_that_was_not_opened_or_was_closed_says_so(rig: MakeRig) -> None:

@@ -60,6 +60,20 @@ def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> No
     [
         ("[cyberglove]\n", "line 1: cyberglove: the key port is missing"),
         ("[cyberglove]\nport = ''", "line 2: cyberglove.port: must be text of length >= 1"),
+        (
+            "[cyberglove]\nport = 'spy:///dev/null?file=a'",
+            "line 2: cyberglove.port: 'spy:///dev/null?file=a' is no port that is opened: a port is a device such as",
+        ),
+        (
+            "[[scanner]]\nswitches = []\nport = 'loop://'",
+            "line 3: scanner[0].port: 'loop://' is no port that is opened",
+        ),
+        (
+            "[[scanner]]\nport = 'socket://a:1?x'\nswitches = []",
+            "port: 'socket://a:1?x' has the option 'x', which is not",
+        ),
+        ("[[bus]]\ndevice = 'spy://a'", "line 2: bus[0].device: 'spy://a' is no path of a device, such as"),
+        ("[[bus]]\ndevice = 'a\\u001bb'".replace("'", '"'), "bus[0].device: 'a\\x1bb' is no path of a device"),
         ("[cyberglove]\nport = 'x'\nbaud = 'fast'", "line 3: cyberglove.baud: 'fast' is not among its values (did"),
         ("[cyberglove]\nport = 'x'\nbaud = 0", "line 3: cyberglove.baud: must be at least 1, not 0"),
         ("[cyberglove]\nport = 'x'\nsensors = 20", "line 3: cyberglove.sensors: 20 is not among its values"),

@@ -61,6 +61,11 @@ def fault(path: Path, old: str, new: str) -> str:
     return str(found.value)
 
 
+@pytest.mark.parametrize("good", ["turns", "open", "PoS"])
+def test_a_name_that_a_terminal_would_obey_is_refused(own: Path, good: str) -> None:
+    assert "holds a control character (U+001B)" in fault(own, f'"{good}"', r'"a\u001b[2J"')
+
+
 @pytest.mark.parametrize(("grasps", "spread"), SPREADS)
 def test_the_barrett_hand_spreads_as_graspit_does_and_opens_its_fingers(grasps: tuple[str, ...], spread: int) -> None:
     table = load_preshapes("barrett_bh8")

@@ -1,3 +1,5 @@
+import json
+
 import pytest
 from msgspec.structs import replace
 
@@ -50,6 +52,23 @@ def test_a_session_that_cannot_be_read_is_refused_by_its_key(
 ) -> None:
     with pytest.raises(McapError, match=said):
         from_metadata({**to_metadata(session), **change})
+
+
+@pytest.mark.parametrize(
+    ("key", "good", "name"),
+    [
+        *(
+            (key, good, "\x1b[2J")
+            for key, good in [("switches", "s007"), ("sensors", "index"), ("calibration", "thumb")]
+        ),
+        *(("collection", good, name) for good in ("A", "cup", "jar", "own") for name in ("a\u202eb", "x" * 201)),
+    ],
+)
+def test_a_name_in_a_session_that_would_deceive_is_refused(session: Session, key: str, good: str, name: str) -> None:
+    texts = to_metadata(session)
+    assert f'"{good}"' in texts[key]
+    with pytest.raises(McapError, match=r"holds a control character|at most 200"):
+        from_metadata({**texts, key: texts[key].replace(f'"{good}"', json.dumps(name))})
 
 
 @pytest.mark.parametrize("key", ["version", "thenar", "switches", "sensors"])

@@ -1,0 +1,62 @@
+"""Names from files and devices: which are good, and how they are shown so that no terminal obeys them.
+
+It lives in `drivers` for the same reason as `errors`: everybody meets names, and this room imports nobody.
+"""
+
+import unicodedata
+
+LONGEST_NAME = 200
+# The longest piece of a foreign file that a message repeats.
+LONGEST_SHOWN = 80
+
+# Control and format characters (a terminal obeys some, others reorder a line), halves of surrogate pairs, and the
+# separators of lines and paragraphs.
+_UNSOUND = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
+# Private and unassigned ones have no glyph, but do nothing either.
+_UNPRINTABLE = _UNSOUND | {"Co", "Cn"}
+# Persian, Hindi and many other languages spell words with these two, and emoji are joined by one.
+_JOINERS = frozenset("\u200c\u200d")
+
+
+def fault(name: str, longest: int = LONGEST_NAME) -> str:
+    """Return why `name` would not survive every file format, or would deceive who reads it; or nothing.
+
+    It is the one rule for names of switches, joints, grasp types, taxonomies, subjects, objects, sensors and gloves.
+    `longest` is for texts that contain a name.
+    """
+    if not name:
+        return "is empty"
+    if name == "?":
+        return "means a missing value in every table"
+    if len(name) > longest:
+        return f"has {len(name)} characters: at most {longest}"
+    if name != name.strip():
+        return "begins or ends with a blank"
+    found = next(filter(_unsound, "" if name.isprintable() else name), None)
+    return f"holds a control character (U+{ord(found):04X})" if found else ""
+
+
+def sound_name(name: str, otherwise: str) -> str:
+    """Return `name`, or `otherwise` where it is none: the stem of a file may be anything."""
+    return otherwise if fault(name) else name
+
+
+def printable(text: str) -> str:
+    """Return `text` with every character that is no glyph written as Python would, so that no terminal obeys it."""
+    if text.isprintable():
+        return text
+    return "".join(
+        letter.encode("unicode_escape").decode() if unicodedata.category(letter) in _UNPRINTABLE else letter
+        for letter in text
+    )
+
+
+def shortened(text: str, longest: int = LONGEST_SHOWN) -> str:
+    """Return what a message repeats of a foreign `text`: printable, and cut behind `longest` characters."""
+    return printable(text) if len(text) <= longest else f"{printable(text[:longest])}..."
+
+
+def _unsound(letter: str) -> bool:
+    # The last two of every plane are no characters: XML, HTML and SVG refuse them.
+    none = ord(letter) & 0xFFFE == 0xFFFE or 0xFDD0 <= ord(letter) <= 0xFDEF
+    return none or (unicodedata.category(letter) in _UNSOUND and letter not in _JOINERS)

@@ -1,0 +1,75 @@
+"""Ports: which texts name one, and what must be there when it is opened. Files of others name ports, too.
+
+pySerial takes more for a port than a line: `spy://` writes to any file, `alt://` loads any of its classes.
+"""
+
+import re
+import stat
+from pathlib import Path
+from urllib.parse import parse_qsl, urlsplit
+
+from .errors import DeviceError
+
+_SCHEMES = ("socket", "rfc2217")
+_HOST = re.compile(r"[A-Za-z0-9._-]+|[0-9A-Fa-f:.]+(%[A-Za-z0-9._-]+)?")
+# What pySerial's connection to a redirector may be asked for: an option, and what it may be.
+_OPTIONS = {
+    "ign_set_control": re.compile(""),
+    "poll_modem": re.compile(""),
+    "timeout": re.compile(r"\d{1,4}(\.\d{1,6})?"),
+}
+_WAYS = "a port is a device such as /dev/ttyUSB0, socket://HOST:PORT or rfc2217://HOST:PORT"
+
+
+def port_fault(port: str) -> str:
+    """Return why `port` names no serial line, or nothing."""
+    scheme, found, _ = port.partition("://")
+    if not found:
+        return device_fault(port)
+    if scheme.lower() not in _SCHEMES:
+        return f"is no port that is opened: {_WAYS}"
+    return _url_fault(port)
+
+
+def device_fault(path: str) -> str:
+    """Return why `path` cannot be that of a device node, or nothing."""
+    if not path:
+        return f"is empty: {_WAYS}"
+    if "://" in path or not path.isprintable():
+        return "is no path of a device, such as /dev/ttyUSB0 or /dev/i2c-1"
+    return ""
+
+
+def check_node(path: str) -> None:
+    """Raise DeviceError unless a device is at `path`: a file would be locked, or taken for a device, by its opening.
+
+    What is not there, or may not be looked at, is left for its opening to tell.
+    """
+    try:
+        mode = Path(path).stat().st_mode
+    except OSError:
+        return
+    if not stat.S_ISCHR(mode):
+        kind = "a folder" if stat.S_ISDIR(mode) else "a file" if stat.S_ISREG(mode) else "no character device"
+        raise DeviceError(f"{path} is {kind}, no device: it was left as it is")
+
+
+def _url_fault(url: str) -> str:
+    if not (url.isascii() and url.isprintable()):  # urlsplit leaves line breaks out
+        return f"is no address of a line: {_WAYS}"
+    try:
+        parts = urlsplit(url)
+        host, port = parts.hostname, parts.port
+        options = parse_qsl(parts.query, keep_blank_values=True, max_num_fields=8)
+    except ValueError as reason:
+        return f"is no address of a line ({reason}): {_WAYS}"
+    if not host or not port or not _HOST.fullmatch(host) or parts.path not in ("", "/") or parts.fragment:
+        return f"is no address of a line: {_WAYS}"
+    if parts.username is not None or parts.password is not None:
+        return f"names a user, which no line asks for: {_WAYS}"
+    known = _OPTIONS if parts.scheme == "rfc2217" else {}
+    for option, value in options:
+        if option not in known or not known[option].fullmatch(value):
+            allowed = f": there are {', '.join(known)}" if known else ": a socket has none"
+            return f"has the option {option!r}, which is not for it{allowed}"
+    return ""

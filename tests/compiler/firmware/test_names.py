@@ -1,0 +1,88 @@
+"""Names of every kind that the one rule lets in, in all the C that is made of them."""
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from thenar.compiler.firmware.arduino import arduino_files
+from thenar.compiler.firmware.classifier import classifier_files
+from thenar.compiler.firmware.host_files import host_files
+from thenar.compiler.firmware.layout import arrange
+from thenar.compiler.firmware.protocol import decided_files
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.names import fault
+from thenar.runtime.tables import IntegerTables
+
+MakeTables = Callable[..., IntegerTables]
+Describe = Callable[[IntegerTables], Manifest]
+
+PIECES = [
+    "*/",
+    "/*",
+    "//",
+    "??/",
+    "\\",
+    '"',
+    "'",
+    "%s",
+    "%n",
+    "{{",
+    "}}",
+    "{%",
+    "#error",
+    "$(shell x)",
+    "`",
+    "<b>",
+    "é",
+]
+HOSTILE = st.lists(st.sampled_from(PIECES) | st.text(max_size=3), min_size=1, max_size=60).map("".join)
+NAMES = HOSTILE.filter(lambda name: not fault(name))
+STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-fsyntax-only")
+
+
+@pytest.mark.slow
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(names=st.lists(NAMES, min_size=12, max_size=12, unique=True), thenar=NAMES)
+def test_whatever_names_hold_the_c_compiles_without_a_warning(
+    tool: Callable[[str], str],
+    make_tables: MakeTables,
+    describe: Describe,
+    tmp_path: Path,
+    names: list[str],
+    thenar: str,
+) -> None:
+    tables = make_tables(classes=5, switches=5, joints=2)
+    plain, layout = describe(tables), arrange(tables)
+    manifest = replace(
+        plain,
+        thenar=thenar,
+        grasps=tuple(names[:5]),
+        switches=tuple(replace(switch, name=name) for switch, name in zip(plain.switches, names[5:10], strict=True)),
+        joints=tuple(replace(joint, name=name) for joint, name in zip(plain.joints, names[10:], strict=True)),
+    )
+    files = classifier_files("hand", manifest, layout, avr=True, notes=names)
+    files |= host_files("hand", layout, manifest.grasps)
+    files |= decided_files("hand", tables, manifest.grasps, [(0, 1), (2, 3, 4)])
+    arduino = arduino_files("hand", manifest, layout, avr=True)
+    for name, text in (files | arduino).items():
+        assert text.isascii(), name
+        assert all(line.isprintable() or name == "Makefile" for line in text.replace("\t", " ").splitlines()), name
+    assert len(arduino["README.md"].splitlines()) == len(
+        arduino_files("hand", plain, layout, avr=True)["README.md"].splitlines()
+    )
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    sources = sorted(name for name in files if name.endswith(".c"))
+    done = subprocess.run([tool("gcc"), *STRICT, *sources], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    # The sketch needs Arduino's headers to compile: its comments are all that names may change.
+    sketches = [
+        made["examples/Recognise/Recognise.ino"] for made in (arduino, arduino_files("hand", plain, layout, avr=True))
+    ]
+    uncommented = ["".join(piece.partition("*/")[2] for piece in f"*/{text}".split("/*")) for text in sketches]
+    assert uncommented[0] == uncommented[1]

@@ -1,0 +1,81 @@
+"""Names of every kind that the one rule lets in, in all the files of a spec."""
+
+import csv
+import io
+import json
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from thenar.compiler.recordings.spreadsheet import text_of
+from thenar.compiler.spec.files import spec_files
+from thenar.runtime.harness.loading import parse_harness
+from thenar.runtime.harness.wiring import GloveWiring
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.names import fault
+from thenar.runtime.scanning.propose import propose_board, propose_harness
+
+if TYPE_CHECKING:
+    from .conftest import Netlist
+
+PIECES = [
+    "=cmd|' /C calc'!A0",
+    "@",
+    "+",
+    "-",
+    "'",
+    '"',
+    "\\",
+    ")",
+    "(net",
+    "[[bus]]",
+    "#",
+    "\u200d",
+    ",",
+    ";",
+    "]]>",
+    "é",
+]
+NAMES = (
+    st.lists(st.sampled_from(PIECES) | st.text(max_size=3), min_size=1, max_size=20)
+    .map("".join)
+    .filter(lambda name: not fault(name))
+)
+
+
+@settings(deadline=None, max_examples=20)
+@given(
+    names=st.lists(NAMES, min_size=1, max_size=6, unique=True),
+    glove=NAMES,
+    wired=st.sampled_from([propose_board, propose_harness]),
+)
+def test_every_file_is_well_formed_and_gives_the_names_back(
+    read_netlist: "Callable[[bytes], Netlist]",
+    manifest_of: Callable[..., Manifest],
+    names: list[str],
+    glove: str,
+    wired: Callable[..., object],
+) -> None:
+    harness = wired(names, name=glove, cyberglove=GloveWiring(port="/dev/ttyUSB0"))
+    files = spec_files(manifest_of(names), None, harness)  # type: ignore[arg-type]  # both return a Harness
+    assert parse_harness(files["glove.toml"].decode(), "x") == harness
+    assert json.loads(files["spec.json"])["glove"] == glove
+    rows = list(csv.DictReader(io.StringIO(files["switches.csv"].decode())))
+    assert [text_of(row["name"]) for row in rows] == names
+    for file in ("switches.csv", "wiring.csv", "bom.csv"):
+        cells = [cell for row in csv.reader(io.StringIO(files[file].decode())) for cell in row]
+        assert not [cell for cell in cells if cell.startswith(("=", "+", "-", "@", "\t", "\r"))]
+    components = read_netlist(files["glove.net"]).components
+    assert {f"SW{number}" for number in range(1, len(names) + 1)} <= components.keys()
+    for name in names:
+        escaped = name.replace("\\", "\\\\").replace('"', '\\"')
+        assert f'"{escaped}"' in files["glove.net"].decode()
+
+
+def test_no_board_is_proposed_that_its_own_loader_would_refuse() -> None:
+    assert len(propose_board([f"s{n}" for n in range(2000)]).switches) == 2000
+    with pytest.raises(ValueError, match="2001 switches, one board has 2000 keys"):
+        propose_board([f"s{n}" for n in range(2001)])
