@@ -16,9 +16,8 @@ from mcap.writer import CompressionType, Writer
 from thenar.runtime.live.frames import GloveFrame, SwitchFrame
 from thenar.runtime.live.published import LiveGrasp
 from thenar.runtime.recording.errors import McapError
-from thenar.runtime.recording.layout import CHANNELS, MAGIC
+from thenar.runtime.recording.layout import CHANNELS, LARGEST_RECORD, MAGIC
 from thenar.runtime.recording.reader import Reader
-from thenar.runtime.recording.records import LARGEST_READ
 from thenar.runtime.recording.session import Label, Session
 
 Entry = SwitchFrame | GloveFrame | LiveGrasp | Label
@@ -80,7 +79,7 @@ def test_the_rest_of_a_file_that_a_power_cut_filled_with_zeros_is_left_out(
     assert (reader.end.whole, reader.end.reason) == (end, "no record begins there")
 
 
-@pytest.mark.parametrize("claimed", [2**63, 2**40, 2**31, LARGEST_READ + 1, 10_000])
+@pytest.mark.parametrize("claimed", [2**63, 2**40, 2**31, LARGEST_RECORD + 1, 10_000])
 def test_a_length_that_is_damaged_takes_no_memory(recording: Path, claimed: int) -> None:
     data = bytearray(recording.read_bytes())
     place = data.index(b"\x05", ends_of_records(bytes(data))[8])
@@ -103,9 +102,9 @@ def test_a_record_too_large_to_be_one_is_passed_over_unread(recording: Path, ent
     data = recording.read_bytes()
     first = next(end for end in ends_of_records(data) if data[end] == 5)
     with recording.open("wb") as file:
-        file.write(data[:first] + pack("<BQ", 5, LARGEST_READ + 1))
+        file.write(data[:first] + pack("<BQ", 5, LARGEST_RECORD + 1))
         # A hole: it is as long as it says and takes no disk.
-        file.seek(LARGEST_READ + 1, 1)
+        file.seek(LARGEST_RECORD + 1, 1)
         file.write(data[first:])
     tracemalloc.start()
     found, reader = read(recording)
