@@ -81,8 +81,10 @@ def err() -> Console:
 
 
 def warning(sentence: str) -> None:
-    """Say on stderr what is odd about what was read."""
-    click.echo(f"warning: {sentence}", err=True)
+    """Say on stderr what is odd about what was read; no name in it commands the terminal."""
+    from ..runtime.names import printable
+
+    click.echo(f"warning: {printable(sentence)}", err=True)
 
 
 def _console(stderr: bool = False, width: int | None = None) -> Console:

@@ -44,4 +44,7 @@ def _system(build: Build, reader: Reader, policy: Policy | None) -> System:
         raise SettingError(f"{reader.path.name} was recorded with another build: its frames hold other switches")
     harness = parse_harness(session.harness, reader.path.name)
     scan = System.map_of(build, harness)
-    return System(build, harness, scan, session.sensors, session.calibration, policy or session.policy or Policy())
+    system = System(build, harness, scan, session.sensors, session.calibration, policy or session.policy or Policy())
+    if session.switches != system.switch_names:
+        raise SettingError(f"{reader.path.name} names other switches than its build has: it is damaged")
+    return system
