@@ -25,6 +25,11 @@ class Outlet:
         self._rest = b""
         self.written = 0
 
+    @property
+    def waiting(self) -> int:
+        """How many bytes of the newest line are still to be written."""
+        return len(self._rest)
+
     def send(self, line: bytes) -> bool:
         """Send `line` if the reader keeps up; return whether it went out or began to. Raises OSError if it is gone."""
         if self._rest and not self._push(self._rest):
