@@ -76,11 +76,11 @@ class Decoder:
     def entries(self, record: RawRecord) -> Iterator[Entry]:
         """Yield what the record holds. Raises McapError, which goes on from "the record at byte 17 "."""
         # Indices of its messages follow a chunk. They repeat what it holds.
-        self._indexed = record.opcode == Opcode.CHUNK or (self._indexed and record.opcode == Opcode.MESSAGE_INDEX)
+        self._indexed = self._indexed and record.opcode == Opcode.MESSAGE_INDEX
         content = record.content
         if content is None or (record.opcode != Opcode.CHUNK and len(content) > LARGEST_RECORD):
             self.foreign = True
-            if not self._indexed or record.opcode != Opcode.MESSAGE_INDEX:
+            if not self._indexed:
                 self.passed.add(kind_of(record.opcode), record.offset)
         elif record.opcode == Opcode.MESSAGE:
             entry = self._message(content)
@@ -167,6 +167,7 @@ class Decoder:
             self.broken = offset
         for record in inside(chunk.data, offset):
             yield from self.entries(record)
+        self._indexed = True
 
 
 class _Whole(ReadDataStream):
