@@ -14,7 +14,7 @@ from rich.segment import Segment
 from rich.text import Text
 
 from ..drivers.names import shortened
-from .lines import echo_json, shown
+from .lines import echo, echo_json, shown
 
 if TYPE_CHECKING:
     from ..runtime.harness.wiring import Harness
@@ -109,6 +109,11 @@ def out() -> Console:
 def err() -> Console:
     """Return the console for warnings and progress."""
     return _console(stderr=True)
+
+
+def warning(sentence: str) -> None:
+    """Say on stderr what is odd about what was read."""
+    echo(f"warning: {sentence}", err=True)
 
 
 def _console(stderr: bool = False, width: int | None = None) -> Console:
