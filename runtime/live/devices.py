@@ -11,6 +11,7 @@ from ...drivers.scanner import Scanner
 from ..harness.wiring import Debounce, GloveWiring, ScannerWiring
 from .frames import GloveFrame, SwitchFrame
 from .health import Count
+from .newest import PERIODS
 from .pauses import Pauses
 from .rewiring import Rewired
 
@@ -79,6 +80,11 @@ class ScannerDevice:
         self.owned = self._switches.targets
         self.period_us = STATE_US
         self._debounce, self._debouncer, self._pauses = debounce, debouncer_of(debounce), Pauses(pause_us(debounce))
+
+    @property
+    def longest_us(self) -> int:
+        """For how long a frame counts."""
+        return PERIODS * self.period_us
 
     def open(self) -> None:
         """Open the board, and see to it that it is not silent for long while all is well."""
