@@ -1,4 +1,4 @@
-"""Hysteresis and dwell: a decision that does not flicker, that follows what persists, and that rests on whole frames."""
+"""Hysteresis and dwell: a decision that does not flicker, follows what persists, and rests on whole frames."""
 
 from dataclasses import dataclass
 
