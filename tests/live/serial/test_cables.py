@@ -119,7 +119,7 @@ def test_a_line_that_delays_everything_makes_its_switches_old_and_never_ok(run: 
     delayed_us = running.now_us()
     scene.show(5)
     scene.grasps.wait(lambda grasp: grasp.time_us > delayed_us + 1_500_000, delayed_us)
-    since = [grasp for grasp in scene.grasps.since(delayed_us + 100_000)]
+    since = scene.grasps.since(delayed_us + 100_000)
     assert all(set(running.scene.truth.switch_names) <= set(grasp.lost) for grasp in since)
     late = [grasp.switch_age_us for grasp in since if grasp.time_us > delayed_us + 500_000]
     assert min(late) >= 400_000
