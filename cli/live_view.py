@@ -18,7 +18,7 @@ Devices = Callable[[], Sequence[DeviceHealth]]
 _Shown = tuple[LiveGrasp, Devices, Sequence[str]]
 
 _REDRAW_S = 0.1
-_STYLES = {"ok": "bold green", "degraded": "bold yellow", "unknown": "bold red"}
+_STYLES = {"ok": "bold green", "changing": "bold cyan", "degraded": "bold yellow", "unknown": "bold red"}
 _BAR = 30
 _SHOWN = 6
 
@@ -100,8 +100,9 @@ def health_lines(report: HealthReport | None) -> tuple[str, ...]:
         "drifting": [f"{drift.joint} by {drift.codes:+d} codes" for drift in report.drifting],
     }
     rates = f"switches {report.switch_hz:.0f}/s, glove {report.glove_hz:.0f}/s; {report.frames} frames"
-    share = f", {report.degraded} degraded, {report.unknown} unknown"
-    lines = [rates + share, *(f"{what}: {', '.join(names)}" for what, names in found.items() if names)]
+    share = f", {report.changing} changing, {report.degraded} degraded, {report.unknown} unknown"
+    late = f", {report.overflowed} frames not taken in time" if report.overflowed else ""
+    lines = [rates + share + late, *(f"{what}: {', '.join(names)}" for what, names in found.items() if names)]
     for device in report.devices:
         counts = ", ".join(f"{count.name} {count.value}" for count in device.counts if count.value)
         lines.append(f"{device.name}: {counts or 'nothing counted'}")

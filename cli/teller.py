@@ -60,7 +60,7 @@ class Teller:
             self._view.show(grasp, self._sources.health, self._lines)
 
     def _look(self) -> None:
-        self._report = self._health.report(now_us(), self._sources.health())
+        self._report = self._health.report(now_us(), self._sources.health(), self._sources.overflowed)
         if self._status:
             self._fanout.health(self._report)
             self._lines = health_lines(self._report)

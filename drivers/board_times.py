@@ -5,9 +5,10 @@ from time import monotonic_ns
 from .board_clock import BoardClock
 from .scanner_messages import FromBoard, Hello, Lost, Ping, State
 
-# What comes in later than this had to wait somewhere, or the clocks lost each other: a PING tells, once a second.
-_LATE_US = 250_000
-_PING_AGAIN_US = 1_000_000
+# So often a PING bounds the delay that all messages share; between two of them clocks drift apart by 2 ms at most.
+_PING_US = 250_000
+# So many PINGs may be under way: an answer that takes longer than they do says nothing.
+_UNDER_WAY = 64
 _TOKENS = 0xFFFF
 
 
@@ -16,33 +17,41 @@ class BoardTimes:
 
     late_us  how late the last message with a time of its own came in, which those without one are taken to share
     pings    how often the board's time was asked for
+    answered whether it was ever told
     """
 
     def __init__(self) -> None:
         self._clock = BoardClock()
         self.late_us = 0
         self._time_us = self._asked_us = 0
+        self._asked: dict[int, int] = {}
         self.pings = 0
+        self.answered = False
 
     def ping(self) -> Ping:
-        """Return a message that asks for the time; the one before counts no more."""
-        self._asked_us = monotonic_ns() // 1000
+        """Return a message that asks for the time."""
+        token = self.pings % _TOKENS + 1
+        self._asked_us = self._asked[token] = monotonic_ns() // 1000
         self.pings += 1
-        return Ping(self._token)
+        if len(self._asked) > _UNDER_WAY:
+            del self._asked[next(iter(self._asked))]
+        return Ping(token)
 
-    def doubtful(self, came_us: int) -> bool:
-        """Whether what last came in was so late that the time should be asked for, and it was not just now."""
-        return self.late_us > _LATE_US and came_us - self._asked_us >= _PING_AGAIN_US
+    @property
+    def due(self) -> bool:
+        """Whether the time should be asked for again."""
+        return monotonic_ns() // 1000 - self._asked_us >= _PING_US
+
+    @property
+    def trip_us(self) -> int:
+        """By how much a message may have been sent before the time that it was given: a delay that all share."""
+        return self._clock.trip_us
 
     def stamp(self, message: FromBoard | None, came_us: int) -> int:
         """Return the time of what came in. What carries none is taken to be as late as the last that did."""
         if message is not None and not isinstance(message, State | Lost):
-            answer = isinstance(message, Hello) and self.pings > 0 and message.token == self._token
-            asked_us = self._asked_us if answer else None
+            asked_us = self._asked.get(message.token) if isinstance(message, Hello) else None
+            self.answered |= asked_us is not None
             self.late_us = came_us - self._clock.host_us(message.time_us, came_us, asked_us)
         self._time_us = max(self._time_us, came_us - self.late_us)
         return self._time_us
-
-    @property
-    def _token(self) -> int:
-        return (self.pings - 1) % _TOKENS + 1

@@ -72,7 +72,7 @@ class CyberGlove:
         """Return the oldest record not yet returned, as (time_us, Record); None if none is in by the timeout.
 
         time_us is when its last byte was in, in microseconds of the monotonic clock. A record with the fault
-        "unplugged" holds no measurement. Raises DeviceError when the line is gone, or the glove silent for a second.
+        "unplugged" holds no measurement. Raises DeviceError when the line is gone, or no record comes any more.
         """
         return self._opened()[1].read(timeout_s)
 

@@ -12,8 +12,10 @@ from .serial_line import SerialLine
 
 # When a poll is taken for lost: a record takes 27 ms at 9600 baud, an FTDI adapter adds 16.
 _POLLED_S = 0.2
-# When a glove is taken for dead, which streams or answers no more.
-_SILENT_S = 1.0
+# When a glove is taken for dead of which no byte comes: soon, for it must be read again within a second of its return.
+_SILENT_S = 0.5
+# And when bytes come, but no record.
+_NOISY_S = 1.0
 _SILENT_PERIODS = 4
 # More than any line brings between two readings: what stood in buffers while the host was held up. It is read up to its
 # end, so far as that comes, before it is given times.
@@ -29,7 +31,8 @@ class Records:
     def __init__(self, line: SerialLine, info: GloveInfo, wanted: Wanted, counts: Counts) -> None:
         self._line, self._info, self._counts = line, info, counts
         self._poll, self._period_s = wanted.poll, told_us(wanted.words) / 1e6
-        self._silent_s = max(_SILENT_S, _SILENT_PERIODS * info.period_us / 1e6)
+        periods_s = _SILENT_PERIODS * info.period_us / 1e6
+        self._silent_s, self._noisy_s = max(_SILENT_S, periods_s), max(_NOISY_S, periods_s)
         self._last_us = 0
         self.start()
 
@@ -37,7 +40,7 @@ class Records:
         """Begin, or begin again after the box was asked for something else."""
         self._decoder = Decoder(self._info.sensors, self._counts, self._info.status)
         self._ready: deque[Timed] = deque()
-        self._quiet_from = self._due = self._poll_at = monotonic()
+        self._heard_at = self._quiet_from = self._due = self._poll_at = monotonic()
         self._asked = False
         if not self._poll:
             self._line.write(STREAM)
@@ -48,14 +51,14 @@ class Records:
         Of records that come in together each is a period older than the next, and a polled one was in before it was to
         be asked for again: what stood in a buffer while the host was held up is not taken for new.
 
-        None if none is in by the timeout. Raises DeviceError when the line is gone, or no record came for a second
-        (or for four periods, where these are longer).
+        None if none is in by the timeout. Raises DeviceError when the line is gone, or no byte came for half a second,
+        or no record for a second (or for four periods, where these are longer).
         """
         end = monotonic() + timeout_s
         while not self._ready:
             self._ask()
             now = monotonic()
-            self._receive(min(end, self._quiet_from + self._silent_s, self._next_poll()) - now)
+            self._receive(min(end, self._given_up_at, self._next_poll()) - now)
             if not self._ready and now >= end:
                 return None
         return self._ready.popleft()
@@ -66,27 +69,34 @@ class Records:
             return
         self._line.write(POLL)
         if not self._asked:
-            self._asked, self._quiet_from = True, now
+            self._asked, self._heard_at, self._quiet_from = True, now, now
         self._poll_at = now + _POLLED_S
         self._due = max(self._due + self._period_s, now)
 
     def _next_poll(self) -> float:
         return self._poll_at if self._poll else float("inf")
 
+    @property
+    def _given_up_at(self) -> float:
+        """When the glove is taken for dead if nothing more comes."""
+        return min(self._heard_at + self._silent_s, self._quiet_from + self._noisy_s)
+
     def _receive(self, seconds: float) -> None:
-        records = self._decoder.feed(self._waiting(seconds))
+        data = self._waiting(seconds)
+        records = self._decoder.feed(data)
         now_us = monotonic_ns() // 1000
+        if data:
+            self._heard_at = now_us / 1e6
         if records:
             newest_us = min(now_us, round((self._quiet_from + _POLLED_S) * 1e6)) if self._poll else now_us
             for behind, record in zip(reversed(range(len(records))), records, strict=True):
                 self._last_us = max(self._last_us, newest_us - behind * self._info.period_us)
                 self._ready.append((self._last_us, record))
             self._quiet_from, self._asked, self._poll_at = now_us / 1e6, False, self._due
-        elif monotonic() - self._quiet_from > self._silent_s and self._is_expected():
-            raise DeviceError(
-                f"{self._line.url}: the CyberGlove has sent no record for {self._silent_s:g} s: check its power and"
-                " the cable"
-            )
+        elif now_us / 1e6 > self._given_up_at and self._is_expected():
+            silent = now_us / 1e6 - self._heard_at > self._silent_s
+            said = f"no byte for {self._silent_s:g}" if silent else f"no record for {self._noisy_s:g}"
+            raise DeviceError(f"{self._line.url}: the CyberGlove has sent {said} s: check its power and the cable")
 
     def _waiting(self, seconds: float) -> bytes:
         """Return what has come in, a backlog up to its end; its last record is then the newest there is."""

@@ -89,6 +89,11 @@ class Scanner:
         return ScannerCounts(*received, self._keys.gaps, self._misfits, self._asked, self._times.pings)
 
     @property
+    def trip_us(self) -> int:
+        """By how much the last reading may be older than its time: the line's delay, as far as PINGs leave it open."""
+        return self._times.trip_us
+
+    @property
     def late_us(self) -> int:
         """How late the last message with a time of its own came in: what the last reading's time allows for."""
         return self._times.late_us
@@ -96,6 +101,8 @@ class Scanner:
     def read(self, timeout_s: float) -> ScannerReading | None:
         """Return the next reading, None if there was none in time. Raises DeviceError."""
         link, end = self._open_link(), monotonic() + timeout_s
+        if self._times.due:
+            self._send(self._times.ping())
         reading = self._next()
         while reading is None:
             left = end - monotonic()
@@ -145,7 +152,9 @@ class Scanner:
             while self._waiting:
                 came_us, received = self._waiting.popleft()
                 if received is not None and received.kind == Hello.KIND:
-                    return self._meet(received, came_us)
+                    hello = self._meet(received, came_us)
+                    if self._times.answered:
+                        return hello
         raise DeviceError(
             f"{self.url}: no scanner board answered at {self.baud} baud in {_BOOT_S:g} s ({link.received_bytes} bytes"
             f" came, {link.counts.frames} sound frames): check port, baud rate, power, and the board's firmware"
@@ -173,8 +182,6 @@ class Scanner:
         was_trusted = keys.trusted
         message = self._message(received)
         time_us = self._times.stamp(message, came_us)
-        if self._times.doubtful(came_us):
-            self._send(self._times.ping())
         if isinstance(message, Hello):
             self._same(message)
             if received is not None and received.sequence == 0 and not message.token:  # it has booted

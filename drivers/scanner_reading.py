@@ -40,7 +40,7 @@ class ScannerCounts:
     """What came in since the board was opened.
 
     Sound frames; damaged, too short and too long ones; gaps in the numbers of the sound ones; misfits, which were sound
-    but said what this board cannot say. And how often the state and the time were asked for, something being amiss.
+    but said what this board cannot say. And how often the state was asked for, something being amiss, and the time.
     """
 
     frames: int

@@ -5,6 +5,7 @@ a limit, and whatever pySerial or the kernel says of a line that is gone becomes
 """
 
 import errno
+import os
 import select
 from time import monotonic
 from types import TracebackType
@@ -23,6 +24,8 @@ _WRITE_TIMEOUT_S = 1.0
 _SLICE_S = 0.005
 # So much of what is no port a message repeats.
 _SHOWN = 80
+# So often an open line looks whether its name still leads to the port that it has open.
+_LOOK_S = 0.2
 
 _ADVICE = {
     errno.ENOENT: "there is no such port: is the cable plugged in? `ls /dev/serial/by-id` shows what is",
@@ -52,6 +55,8 @@ class SerialLine:
         self._sliced = not _has_descriptor(self._port)
         if self._sliced:
             self._port.timeout = _SLICE_S
+        self._node = None if self._sliced else _node(self._port.fileno())
+        self._look_at = 0.0
         _lower_latency(self._port)
 
     def __enter__(self) -> Self:
@@ -63,8 +68,10 @@ class SerialLine:
     def read(self, timeout_s: float) -> bytes:
         """Return what has come in, after waiting for something until the timeout: b"" if nothing came.
 
-        Raises DeviceError when the line is gone, as soon as that shows.
+        Raises DeviceError when the line is gone, as soon as that shows, or when its name has come to lead to another
+        port: the one that is open is then no longer the one that was meant.
         """
+        self._look()
         try:
             return self._in_slices(timeout_s) if self._sliced else self._when_ready(timeout_s)
         except (OSError, TypeError, ValueError) as reason:  # the latter two: closed meanwhile by another thread
@@ -87,6 +94,14 @@ class SerialLine:
     def close(self) -> None:
         """Close the line; what was written is given to the system already."""
         self._port.close()
+
+    def _look(self) -> None:
+        now = monotonic()
+        if self._node is None or now < self._look_at:
+            return
+        self._look_at = now + _LOOK_S
+        if _node(self.url) not in (None, self._node):
+            raise DeviceError(f"{self.url}: it has come to be another port than the one that was opened")
 
     def _when_ready(self, timeout_s: float) -> bytes:
         ready, _, _ = select.select([self._port.fileno()], [], [], max(0.0, timeout_s))
@@ -117,6 +132,14 @@ def _opened(url: str, baud: int) -> "Serial":
     except Exception as reason:  # termios.error is no OSError, and every kind of URL raises errors of its own
         advice = _ADVICE.get(getattr(reason, "errno", None) or 0, f"cannot be opened at {baud} baud ({reason})")
         raise DeviceError(f"{url}: {advice}") from reason
+
+
+def _node(port: str | int) -> int | None:
+    """Return which device a path or a descriptor leads to, None for what is none."""
+    try:
+        return os.stat(port).st_rdev or None  # noqa: PTH116 - of a descriptor, too
+    except (OSError, ValueError):
+        return None
 
 
 def _has_descriptor(port: "Serial") -> bool:

@@ -1,4 +1,4 @@
-"""Write a sink of one's own: this one says what keeps a grasp from being sure. python own_sink.py build/ glove.toml"""
+"""Write a sink of one's own: this one says what a grasp had to do without. python own_sink.py build/ glove.toml"""
 
 import sys
 from threading import Event
@@ -15,7 +15,7 @@ class Doubts(Sink):
 
     def publish(self, grasp, preshape, angles):
         """Take one frame's result: never wait here, and never raise."""
-        if grasp.health != "ok":
+        if grasp.lost:
             print(grasp.number, grasp.health, *grasp.lost, flush=True)
 
 

@@ -24,8 +24,9 @@ class PtyLine:
     paced  False: bytes take no time
 
     `receive` is called from the line's own thread with what the client sent; `damage` makes of every message that goes
-    out what a bad cable would, nothing at all included. Both may be set at any time. Of messages that wait for the
-    line, or for a client that does not read, 4096 bytes are kept, the newest; older ones are dropped whole.
+    out what a bad cable would, nothing at all included; `delay_s` is how much later than it was sent a message goes
+    out. All may be set at any time. Of messages that wait for the line, or for a client that does not read, 4096 bytes
+    are kept, the newest; older ones are dropped whole.
 
     Raises DeviceError where no link can be made or the system has no pty left.
     """
@@ -34,6 +35,7 @@ class PtyLine:
         self.link, self.baud = link, baud
         self.receive: Callable[[bytes], None] | None = None
         self.sent_bytes = 0
+        self.delay_s = 0.0
         self._outgoing = Outgoing(BITS_PER_BYTE / baud if paced else 0.0, _MOST_WAITING)
         self._unplugged = 0
         self._lock = Lock()
@@ -65,7 +67,7 @@ class PtyLine:
         if wire is None:
             self._unplugged += 1
             return
-        self._outgoing.put(monotonic(), data)
+        self._outgoing.put(monotonic() + self.delay_s, data)
         wire.wake()
 
     def unplug(self) -> None:

@@ -24,30 +24,36 @@ class Taken:
 class Arrivals:
     """Frames from the threads of the devices, for the one thread that takes them.
 
+    What these methods share is only touched under the condition. `switches`, `glove` and `overflowed` may be read
+    without it: each is one value that is replaced whole.
+
     switches, glove  the newest frames, None before the first
+    overflowed       frames that nobody took in time, and that are therefore missing from what is recorded
     """
 
     def __init__(self, parts: Parts) -> None:
         self.switches: SwitchFrame | None = None
         self.glove: GloveFrame | None = None
+        self.overflowed = 0
         self._parts = parts
         self._waiting: deque[SwitchFrame | GloveFrame] = deque(maxlen=_MOST_WAITING)
         self._condition = Condition()
 
-    def put_switches(self, part: Part, frame: SwitchFrame, period_us: int) -> None:
-        """Take in a frame of the switches of `part`, which should come every period_us from now on."""
+    def put_switches(self, part: Part, frame: SwitchFrame, longest_us: int) -> None:
+        """Take in a frame of the switches of `part`, which counts for longest_us from the time at which it was read."""
         with self._condition:
-            part.newest, part.period_us = frame, period_us
-            self.switches = self._parts.joined(now_us())
+            now = now_us()
+            part.take(frame, now, longest_us)
+            self.switches = self._parts.joined(now)
             if self.switches is not None:
-                self._waiting.append(self.switches)
+                self._wait_for_taking(self.switches)
             self._condition.notify_all()
 
     def put_glove(self, frame: GloveFrame) -> None:
         """Take in a record of the glove."""
         with self._condition:
             self.glove = frame
-            self._waiting.append(frame)
+            self._wait_for_taking(frame)
             self._condition.notify_all()
 
     def wait(self, timeout_s: float) -> bool:
@@ -57,11 +63,11 @@ class Arrivals:
 
     def fresh_for_us(self, now_us: int, glove_period_us: int | None) -> int | None:
         """Return after how many microseconds the first of the fresh frames is too old; None: none is fresh."""
-        ages = [(part.newest.time_us, part.period_us) for part in self._parts.parts if part.newest is not None]
-        if self.glove is not None and glove_period_us is not None:
-            ages.append((self.glove.time_us, glove_period_us))
-        left = [time_us + PERIODS * period_us + 1 - now_us for time_us, period_us in ages]
-        return min((us for us in left if us > 0), default=None)
+        with self._condition:
+            last = [part.expires_us for part in self._parts.parts if part.newest is not None]
+            if self.glove is not None and glove_period_us is not None:
+                last.append(self.glove.time_us + PERIODS * glove_period_us)
+        return min((last_us + 1 - now_us for last_us in last if last_us >= now_us), default=None)
 
     def take(self) -> Taken:
         """Return the newest frames, and all that arrived since the last call.
@@ -72,7 +78,11 @@ class Arrivals:
             switches = self._parts.joined(now_us())
             if switches is not None and switches != self.switches:
                 self.switches = switches
-                self._waiting.append(switches)
+                self._wait_for_taking(switches)
             arrived = tuple(self._waiting)
             self._waiting.clear()
             return Taken(self.switches, self.glove, arrived)
+
+    def _wait_for_taking(self, frame: SwitchFrame | GloveFrame) -> None:
+        self.overflowed += len(self._waiting) == _MOST_WAITING
+        self._waiting.append(frame)

@@ -2,15 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import fields
+from math import ceil
 from typing import Any
 
 from ...drivers.cyberglove import CyberGlove
-from ...drivers.cyberglove_timing import shortest_us
+from ...drivers.cyberglove_timing import BITS_A_BYTE, shortest_us
 from ...drivers.debounce import Debouncer
 from ...drivers.scanner import Scanner
 from ..harness.wiring import Debounce, GloveWiring, ScannerWiring
 from .frames import GloveFrame, SwitchFrame
 from .health import Count
+from .newest import PERIODS
 from .pauses import Pauses
 from .rewiring import Rewired
 
@@ -19,6 +21,10 @@ from .rewiring import Rewired
 SHORTEST_US = 10_000
 # A board that speaks less often is asked for a heartbeat, beside an event for every change: silence is missed sooner.
 STATE_US = SHORTEST_US
+
+# What a good line makes of a PING: the 16 ms of an adapter, what a board takes to answer; and so many bytes both ways.
+_ANSWERED_US = 20_000
+_PING_BYTES = 8 + 41
 
 _SLOWEST_BAUD = 9_600
 _SENSORS = 18
@@ -78,7 +84,13 @@ class ScannerDevice:
         self._switches = Rewired((key, number[name]) for key, name in enumerate(wiring.switches) if name in number)
         self.owned = self._switches.targets
         self.period_us = STATE_US
+        self._usual_us, self._time_us = usual_trip_us(wiring), 0
         self._debounce, self._debouncer, self._pauses = debounce, debouncer_of(debounce), Pauses(pause_us(debounce))
+
+    @property
+    def longest_us(self) -> int:
+        """For how long a frame counts: it may be older than two periods by the round trip of a good line, no more."""
+        return PERIODS * self.period_us + min(self.driver.trip_us, self._usual_us)
 
     def open(self) -> None:
         """Open the board, and see to it that it is not silent for long while all is well."""
@@ -91,7 +103,7 @@ class ScannerDevice:
             self.driver.set_rate(hello.scan_us, 0, STATE_US)
 
     def read(self, timeout_s: float) -> SwitchFrame | None:
-        """Return the next reading."""
+        """Return the next reading, at the earliest time at which the board can have sent it."""
         reading = self.driver.read(timeout_s)
         if reading is None:
             return None
@@ -99,7 +111,8 @@ class ScannerDevice:
         if self._debouncer is not None:
             self._debouncer.forget(self._pauses.over(reading.time_us, known))
             closed = self._debouncer.update(reading.time_us, closed, known) & known
-        return SwitchFrame(reading.time_us, closed, self.owned & ~known)
+        self._time_us = max(self._time_us, reading.time_us - self.driver.trip_us)
+        return SwitchFrame(self._time_us, closed, self.owned & ~known)
 
     def counts(self) -> tuple[Count, ...]:
         """Return what the driver counts."""
@@ -132,6 +145,16 @@ def pause_us(debounce: Debounce) -> int:
     What was closed before such a pause may have opened: it is no reason to believe it closed.
     """
     return round(2000 * max(debounce.press_lockout_ms, debounce.release_ms))
+
+
+def usual_trip_us(wiring: ScannerWiring) -> int:
+    """Return how long a PING to a board so wired and its answer may take on a good line."""
+    return _ANSWERED_US + round(_PING_BYTES * BITS_A_BYTE * 1e6 / wiring.baud)
+
+
+def board_period_us(wiring: ScannerWiring) -> int:
+    """Return how often a board so wired should be heard of at least, the round trip of a good line included."""
+    return STATE_US + ceil(usual_trip_us(wiring) / PERIODS)
 
 
 def glove_period_us(wiring: GloveWiring) -> int:

@@ -1,5 +1,6 @@
 """How the glove fares: what `thenar run --status` shows and what is published beside the grasps."""
 
+from collections import Counter
 from collections.abc import Sequence
 
 import msgspec
@@ -42,7 +43,8 @@ class HealthReport(msgspec.Struct, frozen=True):
     chattering                 switches that changed more often in the last second than a hand can (rates.py)
     drifting                   joints whose codes have moved since the first minute (drift.py)
     switch_hz, glove_hz        frames per second over the last whole second
-    frames, degraded, unknown  what was published so far
+    frames, changing, degraded, unknown  how many grasps were published so far, and how many of them with that health
+    overflowed                 frames that came in and were not taken in time: a recording lacks them
     devices                    as their drivers have it
     """
 
@@ -54,8 +56,10 @@ class HealthReport(msgspec.Struct, frozen=True):
     switch_hz: float
     glove_hz: float
     frames: int
+    changing: int
     degraded: int
     unknown: int
+    overflowed: int = 0
     devices: tuple[DeviceHealth, ...] = ()
 
 
@@ -72,7 +76,7 @@ class Health:
         self._switch_rate, self._glove_rate = FrameRate(), FrameRate()
         self._grasp = UNKNOWN
         self._switches_us = self._glove_us = -1
-        self._published = {"ok": 0, "degraded": 0, "unknown": 0}
+        self._published = Counter[str]()
 
     def update(
         self,
@@ -98,7 +102,7 @@ class Health:
             if codes:
                 self._drift.frame(glove_us, codes)
 
-    def report(self, now_us: int, devices: Sequence[DeviceHealth] = ()) -> HealthReport:
+    def report(self, now_us: int, devices: Sequence[DeviceHealth] = (), overflowed: int = 0) -> HealthReport:
         """Return how things stand."""
         drifts = zip(self._joint_names, self._drift.codes, strict=False)
         return HealthReport(
@@ -109,9 +113,11 @@ class Health:
             drifting=tuple(Drift(joint, codes) for joint, codes in drifts if codes),
             switch_hz=self._switch_rate.hz(now_us),
             glove_hz=self._glove_rate.hz(now_us),
-            frames=sum(self._published.values()),
+            frames=self._published.total(),
+            changing=self._published["changing"],
             degraded=self._published["degraded"],
             unknown=self._published["unknown"],
+            overflowed=overflowed,
             devices=tuple(devices),
         )
 

@@ -58,6 +58,7 @@ class I2cDevice:
         ports = [port for port in scan.ports if port.bus == number]
         self.name = f"i2c at {wiring.device}"
         self.period_us = bus_period_us(scan, harness)
+        self.longest_us = PERIODS * self.period_us
         self._ports = [_PortSwitches(port, harness.debounce) for port in ports]
         self.owned: Mask = sum(port.switches.targets for port in self._ports)
         chips = sorted({port.chip for port in ports})
@@ -86,7 +87,7 @@ class I2cDevice:
             if self._early is None or self._scout is None
             else self._until_decided(self._early, self._scout)
         )
-        if frame.time_us - began_us > PERIODS * self.period_us:
+        if frame.time_us - began_us > self.longest_us:
             # A chip held the bus up: what was read before it is no news any more.
             frame = SwitchFrame(frame.time_us, 0, self.owned)
         elif not self.owned & ~(frame.lost | frame.unread):

@@ -13,7 +13,7 @@ from .frames import GloveFrame, Mask, SwitchFrame
 from .missing import Missing, MissingInputs
 from .newest import Newest
 from .policy import Policy
-from .published import UNKNOWN, LiveGrasp
+from .published import UNKNOWN, Health, LiveGrasp
 from .scores import LiveScores
 from .sequential import SequentialTest
 from .standing import Standing
@@ -22,8 +22,8 @@ from .standing import Standing
 class Decider(Protocol):
     """What turns frames into a grasp type: `Decision` or `SequentialTest`."""
 
-    def update(self, time_us: int, standing: Standing) -> int | None:
-        """Return the class decided on."""
+    def update(self, time_us: int, standing: Standing, *, whole: bool) -> int | None:
+        """Return the class decided on. After a whole frame, one with no input lost, it rests on whole frames alone."""
 
     def forget(self) -> None:
         """Decide on nothing."""
@@ -62,7 +62,7 @@ class LiveRecognizer:
         self._glove = Newest[GloveFrame](glove_period_us if tables.n_joints else None)
         self._scores, self._reach = LiveScores(tables), Reach(tables)
         self._missing = MissingInputs(build, self._policy.max_lost)
-        self._decider = _decider(build, self._policy)
+        self._decider, self._lead = _decider(build, self._policy), self._policy.lead_steps(tables.scale)
         self._number = 0
 
     def early_exit(self, ports: Sequence[Mask]) -> EarlyExit | None:
@@ -72,8 +72,7 @@ class LiveRecognizer:
         """
         if self._policy.error_rate is not None:
             return None
-        tables = self._build.tables
-        return EarlyExit(tables, ports, lead=self._policy.lead_steps(tables.scale))
+        return EarlyExit(self._build.tables, ports, lead=self._lead)
 
     def codes(self, now_us: int, glove: GloveFrame | None) -> list[int] | None:
         """Take a glove frame, as `step` does; return the joints' codes, None while they are lost. Raises FrameError."""
@@ -119,7 +118,14 @@ class LiveRecognizer:
         if missing.too_much:
             self._decider.forget()
             return None
-        return self._decider.update(self._seen_us() or 0, standing)
+        return self._decider.update(self._seen_us() or 0, standing, whole=not missing.names)
+
+    def _health(self, standing: Standing, missing: Missing, decided: int | None) -> Health:
+        if missing.too_much:
+            return "unknown"
+        if missing.names:
+            return "degraded"
+        return "changing" if decided is None or standing.contradicts(decided, self._lead) else "ok"
 
     def _published(
         self, now_us: int, unix_us: int, standing: Standing, missing: Missing, decided: int | None
@@ -135,7 +141,7 @@ class LiveRecognizer:
             candidate=UNKNOWN if unknown else grasps[standing.candidate],
             probability=0.0 if decided is None else standing.probability(decided, self._build.tables.scale),
             margin=0 if unknown else standing.margin,
-            health="unknown" if unknown else "degraded" if missing.names else "ok",
+            health=self._health(standing, missing, decided),
             switch_age_us=_age(now_us, self._switches.time_us),
             glove_age_us=_age(now_us, self._glove.time_us),
             latency_us=_age(now_us, seen_us) or 0,

@@ -15,13 +15,14 @@ class Policy:
     """Raises SettingError if a value is out of range.
 
     lead        a new grasp type must lead the one decided on by so much: natural logarithm of the ratio of their
-                probabilities (score units)
+                probabilities (score units); a frame whose candidate does is never "ok"
     dwell_us    and must do so in every frame for so long
-    hold_us     the longest that a grasp type is kept while frames speak for others; at least dwell_us
+    hold_us     the longest that a grasp type is kept while frames speak for others, or while none is whole; at least
+                dwell_us
     max_lost    the largest share of the tables' weight (missing.py) that may be lost before the answer is "unknown"
     error_rate  None: hysteresis and dwell (decision.py) decide. A rate: a sequential test (sequential.py) does, which
-                ends wrong no more often, under the assumptions that it states; `lead` and `dwell_us` are not used
-                then, `hold_us` is the longest that one test may take and that its answer stands
+                ends wrong no more often, under the assumptions that it states; `dwell_us` is not used then, and
+                `hold_us` is the longest that one test may take and that its answer holds
     spacing_us  sequential test: frames count only if they are so far apart
     """
 

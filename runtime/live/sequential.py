@@ -15,6 +15,10 @@ That holds under assumptions, and no longer than they do:
   - frames are independent, given the type. Successive frames are not: a hand that rests sends nearly the same frame
     again, which is no new evidence. `spacing_us` leaves out frames nearer than that to the last one that counted; take
     the time after which two frames of one grasp are no more alike than frames of two grasps of that type.
+
+Whole frames and frames with lost inputs are never evidence in one test. While an answer or a test that rests on whole
+frames is no older than the longest test, frames with lost inputs are left aside; after that they have tests of their
+own, whose answers and evidence are dropped at the next whole frame.
 """
 
 import math
@@ -25,7 +29,9 @@ from .standing import Standing
 
 @dataclass(slots=True)
 class SequentialTest:
-    """Decides test after test; the answer of one stands until the next has one, or `longest_us` have gone.
+    """Decides test after test; an answer holds until the next test has one, or `longest_us` have gone.
+
+    After a whole frame, one with no input lost, both the answer and the evidence rest on whole frames.
 
     error_rate lies between 0 and 1, scale is in steps per unit of score, times are in microseconds.
     """
@@ -41,15 +47,22 @@ class SequentialTest:
     _began_us: int = 0
     _counted_us: int | None = None
     _decided_us: int = 0
+    _whole: bool = True
 
     def __post_init__(self) -> None:
         self.threshold = math.ceil(self.scale * math.log((self.classes - 1) / self.error_rate))
 
-    def update(self, time_us: int, standing: Standing) -> int | None:
-        """Return the class of the last test that ended, None if none did lately; the frame must be a whole one."""
+    def update(self, time_us: int, standing: Standing, *, whole: bool = True) -> int | None:
+        """Return the class of the last test that ended, None if none did lately; `whole`: no input is lost.
+
+        No switch of the frame may have been left unread.
+        """
         if self.held is not None and time_us - self._decided_us > self.longest_us:
             self.held = None
-        if self._counts(time_us):
+        if whole != self._whole and (whole or not self._lasts(time_us)):
+            self.forget()
+            self._whole = whole
+        if whole == self._whole and self._counts(time_us):
             self._counted_us = time_us
             self._add(time_us, standing.lanes)
         return self.held
@@ -57,6 +70,10 @@ class SequentialTest:
     def forget(self) -> None:
         """Drop evidence and answer: too little can be read."""
         self.held, self._sums, self._counted_us = None, (), None
+
+    def _lasts(self, time_us: int) -> bool:
+        """Return whether there is an answer, or a test under way that is not too old."""
+        return self.held is not None or (bool(self._sums) and time_us - self._began_us <= self.longest_us)
 
     def _counts(self, time_us: int) -> bool:
         return self._counted_us is None or time_us - self._counted_us >= max(self.spacing_us, 1)

@@ -35,8 +35,9 @@ class Sources:
         alone = scout if len(buses) == 1 and not any(scanner.owned for scanner in self.scanners) else None
         self.buses = tuple(I2cDevice(harness, bus, scan, alone, self.glove) for bus in buses)
         switch_devices: tuple[ScannerDevice | I2cDevice, ...] = (*self.scanners, *self.buses)
-        self._parts = Parts(len(switch_names), [Part(device.owned, device.period_us) for device in switch_devices])
+        self._parts = Parts(len(switch_names), [Part(device.owned) for device in switch_devices])
         self._arrivals = Arrivals(self._parts)
+        self._readers = switch_devices
         self._devices = (*switch_devices, *self.gloves)
         self._keepers: list[Keeper[Any]] = [
             Keeper(device.name, device, self._taking(part, device))
@@ -72,7 +73,7 @@ class Sources:
     @property
     def switch_period_us(self) -> int | None:
         """How often the switches should come at least; None where nothing reads them."""
-        return max((part.period_us for part in self._parts.parts), default=None)
+        return max((device.period_us for device in self._readers), default=None)
 
     @property
     def glove_period_us(self) -> int | None:
@@ -89,6 +90,11 @@ class Sources:
             DeviceHealth(state.name, state.connected, state.error or device.trouble(), device.counts())
             for state, device in zip(self.devices(), self._devices, strict=True)
         )
+
+    @property
+    def overflowed(self) -> int:
+        """How many frames came in that nobody took in time; a recording lacks them."""
+        return self._arrivals.overflowed
 
     @property
     def failed(self) -> bool:
@@ -116,4 +122,4 @@ class Sources:
             keeper.close()
 
     def _taking(self, part: Part, device: ScannerDevice | I2cDevice) -> Callable[[SwitchFrame], None]:
-        return lambda frame: self._arrivals.put_switches(part, frame, device.period_us)
+        return lambda frame: self._arrivals.put_switches(part, frame, device.longest_us)

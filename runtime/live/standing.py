@@ -37,6 +37,15 @@ class Standing:
         """Return how many steps the candidate leads class `held` by."""
         return self.lanes[self.candidate] - self._rivals[held]
 
+    def contradicts(self, held: int, lead: int) -> bool:
+        """Return whether the candidate is not `held` and leads it by `lead` steps, as far as may be: with unread
+        switches, whether any state of them gives that lead.
+        """
+        if self.candidate == held:
+            return False
+        most = self._reach.of(held, self._unread)[self.candidate] if self._unread else 0
+        return self.lanes[self.candidate] - self.lanes[held] + most >= lead
+
     def probability(self, number: int, scale: float) -> float:
         """Return the softmax of class `number`, at `scale` steps per unit."""
         return softmax(self._rivals if number == self.candidate else self._nearest(number), number, scale)

@@ -9,7 +9,7 @@ from ..build import Build
 from ..harness.wiring import GloveWiring, Harness
 from ..scanning.plan import check_harness, plan_scan
 from ..scanning.scanmap import ScanMap
-from .devices import STATE_US, glove_period_us, sensors_of
+from .devices import board_period_us, glove_period_us, sensors_of
 from .i2c_device import bus_period_us
 from .joiner import LiveRecognizer
 from .policy import Policy
@@ -59,7 +59,9 @@ class System:
         """
         glove = self.harness.cyberglove
         buses = {port.bus for port in self.scan.ports}
-        periods = [bus_period_us(self.scan, self.harness)] * len(buses) + [STATE_US] * any(self.scan.scanners)
+        periods = [bus_period_us(self.scan, self.harness)] * len(buses)
+        boards = zip(self.harness.scanners, self.scan.scanners, strict=True)
+        periods += [board_period_us(wiring) for wiring, keys in boards if keys]
         return LiveRecognizer(
             self.build,
             sensor_names=self.sensor_names,

@@ -2,13 +2,14 @@ from collections.abc import Sequence
 from io import StringIO
 from queue import Queue
 from threading import Event
+from typing import get_args
 
 from msgspec.structs import replace
 from rich.console import Console
 
 from thenar.cli.live_view import LiveView, drawn
 from thenar.runtime.live.health import DeviceHealth
-from thenar.runtime.live.published import LiveGrasp
+from thenar.runtime.live.published import Health, LiveGrasp
 
 LONG_S = 10.0
 
@@ -75,6 +76,11 @@ def test_the_picture_says_what_is_held_how_sure_that_is_and_how_every_device_far
         "120 frames",
         "drifting: none",
     ]
+
+
+def test_every_health_can_be_drawn() -> None:
+    for health in get_args(Health):
+        assert f"health {health}" in picture(replace(grasp("Tripod"), health=health))
 
 
 def test_what_is_missing_is_named_six_of_it_at_most() -> None:

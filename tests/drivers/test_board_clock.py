@@ -58,3 +58,45 @@ def test_a_board_that_starts_again_is_followed_at_once() -> None:
     clock.host_us(60_000_000, START + 60_000_000)
     assert clock.host_us(0, START + 62_000_000) == START + 62_000_000
     assert clock.host_us(1000, START + 62_003_000) == START + 62_001_000 + 1000 // 128
+
+
+# How much later than the one before, how long on its way, and whether it answers a question asked so much before it.
+ANSWERED = st.lists(
+    st.tuples(st.integers(0, 200_000), st.integers(0, 30_000), st.none() | st.integers(0, 30_000)),
+    min_size=1,
+    max_size=60,
+)
+
+
+@given(ANSWERED, st.integers(0, WRAP - 1), st.integers(0, 1_000_000), st.integers(-5000, 5000))
+@example([(0, 0, 0), (100_000, 0, None)], WRAP - 1, 400_000, 0)
+def test_once_a_frame_was_asked_for_the_truth_lies_within_the_trip_whatever_delay_all_frames_share(
+    sent: list[tuple[int, int, int | None]], board_at_start: int, shared_us: int, millionths: int
+) -> None:
+    clock, now, asked = BoardClock(), START, False
+    for passed, delay, before in sent:
+        now += passed
+        board = (board_at_start + now - START + (now - START) * millionths // 1_000_000) % WRAP
+        time = clock.host_us(board, now + shared_us + delay, None if before is None else now - before)
+        asked |= before is not None
+        assert (clock.trip_us >= 0) and (asked or clock.trip_us == 0)
+        if asked:
+            assert time - clock.trip_us <= now + 1 <= time + 2
+
+
+def test_between_questions_the_trip_grows_no_faster_than_clocks_drift_apart() -> None:
+    clock = BoardClock()
+    clock.host_us(0, START + 700, START - 300)
+    assert clock.trip_us == 1000
+    clock.host_us(128_000, START + 128_700)
+    assert clock.trip_us == 2000
+    clock.host_us(129_000, START + 129_700, START + 128_700)
+    assert clock.trip_us == 1000
+
+
+def test_a_board_that_starts_again_does_so_on_the_same_line() -> None:
+    clock = BoardClock()
+    clock.host_us(60_000_000, START + 400_000, START)
+    assert clock.trip_us == 400_000
+    clock.host_us(0, START + 500_000)
+    assert clock.trip_us == 400_000

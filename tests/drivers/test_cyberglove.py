@@ -355,11 +355,21 @@ def test_a_pulled_plug_is_seen_at_once_and_the_glove_opened_again_after_it(line:
 
 
 @pytest.mark.parametrize("mode", ["stream", "poll"])
-def test_a_glove_that_falls_silent_is_taken_for_dead_after_a_second(line: PtyLine, mode: str) -> None:
+def test_a_glove_that_falls_silent_is_taken_for_dead_after_half_a_second(line: PtyLine, mode: str) -> None:
     emulated = EmulatedCyberGlove(line)
     with CyberGlove(str(line.link), mode="poll" if mode == "poll" else "stream") as glove:
         read(glove)
         emulated.close()
+        began = monotonic()
+        with pytest.raises(DeviceError, match=r"no byte for 0.5 s: check its power"):
+            read(glove, lambda record: False)
+        assert 0.4 < monotonic() - began < SOON_S / 2
+
+
+def test_a_glove_of_which_only_noise_comes_is_taken_for_dead_after_a_second(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line), CyberGlove(str(line.link)) as glove:
+        read(glove)
+        line.damage = lambda message: b"\x55" * len(message)
         began = monotonic()
         with pytest.raises(DeviceError, match=r"no record for 1 s: check its power"):
             read(glove, lambda record: False)

@@ -395,7 +395,7 @@ def test_a_backlog_keeps_its_age_and_states_share_that_of_the_frame_before(line:
         state = until(scanner, lambda reading: reading.closed == 0b11)
         assert beat.time_us < opened_us + 50_000
         assert state.time_us - beat.time_us < 100_000
-        assert scanner.counts.pings == 2  # at the opening; and because it is so late
+        assert scanner.counts.pings == 2  # at the opening; and when it was read again
 
 
 def test_the_state_is_asked_for_again_while_it_does_not_come(line: PtyLine) -> None:
@@ -426,6 +426,7 @@ def test_a_flood_of_zeros_or_of_noise_ends_no_later_than_asked(tmp_path: Path) -
     with PtyLine(tmp_path / "board", paced=False) as line:
         board = Scripted(line)
         with driver(line) as scanner:
+            board.answers_pings = False  # one that is lost in the flood would be missed
             stop = threading.Event()
 
             def flood() -> None:
@@ -447,3 +448,49 @@ def test_a_flood_of_zeros_or_of_noise_ends_no_later_than_asked(tmp_path: Path) -
             line.send(b"\0")
             board.say(Heartbeat(1, 0b10, KEYS))
             until(scanner, lambda reading: reading.closed == 0b10)
+
+
+def age_us(scanner: Scanner, reading: ScannerReading) -> int:
+    """How old the reading is at most, as far as the driver knows."""
+    return now_us() - reading.time_us + scanner.trip_us
+
+
+@pytest.mark.parametrize("settings", [{"heartbeat_us": 10_000}, {"heartbeat_us": 10_000, "state_us": 5000}])
+def test_a_delay_that_all_frames_share_shows_in_their_age(
+    line: PtyLine, start: Callable[..., EmulatedScanner], settings: dict[str, int]
+) -> None:
+    """From the opening on, after the board has started again, and no longer than it lasts."""
+    line.delay_s = 0.4
+    board = start(1, 40, **settings)
+    with driver(line) as scanner:
+        for _ in range(20):
+            assert age_us(scanner, until(scanner, lambda _: True)) >= 400_000
+        board.reboot(ScannerBoard(1, 40, **settings))
+        begun_us = now_us()
+        while now_us() < begun_us + 800_000:
+            if (reading := scanner.read(0.1)) is not None:
+                assert age_us(scanner, reading) >= 400_000
+        line.delay_s = 0.0
+        until(scanner, lambda reading: age_us(scanner, reading) < 100_000)
+
+
+def test_a_delay_that_begins_while_the_board_is_read_shows_for_as_long_as_it_lasts(
+    line: PtyLine, start: Callable[..., EmulatedScanner]
+) -> None:
+    """The clocks might drift apart and have it forgotten, but for the PINGs."""
+    start(1, 40, heartbeat_us=10_000)
+    with driver(line) as scanner:
+        until(scanner, lambda reading: age_us(scanner, reading) < 100_000)
+        line.delay_s, begun_us = 0.2, now_us()
+        until(scanner, lambda reading: age_us(scanner, reading) >= 200_000)
+        while now_us() < begun_us + 1_500_000:
+            if (reading := scanner.read(0.1)) is not None:
+                assert age_us(scanner, reading) >= 200_000
+
+
+def test_the_trip_of_a_good_line_is_that_of_a_ping(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:
+    start(1, 40, heartbeat_us=10_000)
+    with driver(line) as scanner:
+        found = [until(scanner, lambda _: True) and scanner.trip_us for _ in range(100)]
+        on_the_wire_us = (8 + 41) * 10 * 1_000_000 // BAUD
+        assert on_the_wire_us <= min(found) < 20_000

@@ -228,3 +228,19 @@ def test_a_port_behind_rfc_2217_is_a_line(echo: EchoLine) -> None:
         assert line.read(0.05) == b""
         assert 0.05 <= monotonic() - began < SOON_S
         assert line.read(0.0) == line.read(-1.0) == b""
+
+
+def test_a_name_that_comes_to_lead_to_another_port_is_an_error_and_one_that_is_gone_is_none(tmp_path: Path) -> None:
+    """The port that is open may be there still: it is another device's."""
+    with PtyLine(tmp_path / "first") as first, PtyLine(tmp_path / "second") as second:
+        link = tmp_path / "port"
+        link.symlink_to(first.link.readlink())
+        with SerialLine(str(link), 115_200) as line:
+            link.unlink()
+            assert line.read(0.3) == line.read(0.0) == b""
+            link.symlink_to(second.link.readlink())
+            began = monotonic()
+            with pytest.raises(DeviceError, match="another port than the one that was opened"):
+                while monotonic() - began < SOON_S:
+                    line.read(0.05)
+            assert monotonic() - began < 1.0

@@ -28,6 +28,8 @@ from thenar.simulator.playing.performance import Performance, of_scene
 # From showing a frame until it is all that the devices have sent: 10 ms of debounce, 2 to 9 ms on the wires, and what
 # threads and processes of a busy computer need to be woken.
 SETTLE_US = 150_000
+# By so much more a frame of a scanner board may seem to be older than it is: the round trip of a PING.
+TRIP_US = 20_000
 # What such a computer adds to a time that is promised.
 SLACK_US = 300_000
 LONG_S = 20.0
@@ -108,17 +110,18 @@ class Truth:
     def check(self, grasps: Sequence[LiveGrasp], shown: Sequence[Shown]) -> int:
         """Hold every grasp against what was shown when its frames were read; return how many could be.
 
-        In the first SETTLE_US of a row there may be some of the row before.
+        In the first SETTLE_US of a row there may be some of the row before. A scanner's age is the most that it may be:
+        a frame may be younger by TRIP_US.
         """
         checked = 0
         for grasp in grasps:
             if grasp.health == "unknown":
                 assert (grasp.grasp, grasp.probability, grasp.margin) == (UNKNOWN, 0.0, 0), grasp
                 continue
-            assert (grasp.health == "ok") == (not grasp.lost), grasp
+            assert (grasp.health in ("ok", "changing")) == (not grasp.lost), grasp
             ages = grasp.switch_age_us, grasp.glove_age_us
             rows = [
-                0 if set(names) <= set(grasp.lost) else _row_at(shown, grasp.time_us - (age or 0))
+                0 if set(names) <= set(grasp.lost) else _row_at(shown, grasp.time_us - (age or 0), grasp.time_us)
                 for names, age in zip((self.switch_names, self.joint_names), ages, strict=True)
             ]
             if rows[0] is not None and rows[1] is not None:
@@ -127,10 +130,12 @@ class Truth:
         return checked
 
 
-def _row_at(shown: Sequence[Shown], time_us: int) -> int | None:
-    """Return the row that was being shown, None while it was new."""
+def _row_at(shown: Sequence[Shown], time_us: int, latest_us: int) -> int | None:
+    """Return the row that was being shown, None while it was new, and where it was over by TRIP_US or latest_us."""
     number = bisect_right(shown, time_us, key=lambda one: one.begun_us) - 1
     if number < 0 or time_us < shown[number].done_us + SETTLE_US:
+        return None
+    if number + 1 < len(shown) and shown[number + 1].begun_us <= min(time_us + TRIP_US, latest_us):
         return None
     return shown[number].row
 
@@ -161,7 +166,7 @@ class Stage:
         shown = [Shown(start_us + row * period_us, time_us, row) for time_us, row in played]
         assert truth.check(grasps, shown) > 0
         settled = [grasp for grasp in grasps if grasp.health == "ok"]
-        rows = {_row_at(shown, oldest_us(grasp)) for grasp in settled} - {None}
+        rows = {_row_at(shown, oldest_us(grasp), grasp.time_us) for grasp in settled} - {None}
         return {row for row in rows if row is not None}
 
     def truth(self, inputs: str) -> Truth:

@@ -108,3 +108,23 @@ def test_a_silent_board_is_missed_though_its_port_is_there(run: MakeRun, outage:
         period_us=PERIOD_US,
     )
     assert running.device("cyberglove").opened == 1
+
+
+def test_a_line_that_delays_everything_makes_its_switches_old_and_never_ok(run: MakeRun) -> None:
+    """The delay shows in their age, and what is older than it may be is lost."""
+    running = run("both", "glove", "scanner")
+    scene, cable = running.scene, running.bench.lines[1]
+    scene.settled(0)
+    cable.delay_s = 0.4
+    delayed_us = running.now_us()
+    scene.show(5)
+    scene.grasps.wait(lambda grasp: grasp.time_us > delayed_us + 1_500_000, delayed_us)
+    since = scene.grasps.since(delayed_us + 100_000)
+    assert all(set(running.scene.truth.switch_names) <= set(grasp.lost) for grasp in since)
+    late = [grasp.switch_age_us for grasp in since if grasp.time_us > delayed_us + 500_000]
+    assert min(late) >= 400_000
+    cable.delay_s = 0.0
+    mended_us = running.now_us()
+    assert scene.well(mended_us).time_us - mended_us <= RECOVERY_US + SLACK_US
+    scene.settled(5, mended_us)
+    assert scene.check() > 0

@@ -102,3 +102,47 @@ def test_after_unknown_the_first_candidate_is_taken_at_once(reach: Reach) -> Non
     assert decision.held is None
     assert decision.update(2, Standing((0, 0, 1), reach)) == 2
     assert decision.update(50, Standing((0, 9, 0), reach)) == 2
+
+
+A, B, C = (110, 100, 100), (100, 110, 100), (100, 100, 110)
+
+
+def follow(frames: list[tuple[int, tuple[int, ...], bool]], reach: Reach) -> list[int]:
+    """What is decided after each frame of a time, scores, and whether it is whole."""
+    decision = Decision(LEAD, DWELL, HOLD)
+    return [decision.update(time_us, Standing(scores, reach), whole=whole) for time_us, scores, whole in frames]
+
+
+def test_frames_with_lost_inputs_never_displace_a_decision_on_whole_frames(reach: Reach) -> None:
+    lost = [(time_us, B, False) for time_us in range(10, HOLD, 10)]
+    assert set(follow([(0, A, True), *lost, (HOLD, A, True)], reach)) == {0}
+
+
+def test_after_the_hold_without_a_whole_frame_frames_with_lost_inputs_decide(reach: Reach) -> None:
+    """At once, and from then on by hysteresis and dwell among themselves."""
+    lost = [(HOLD - 1, B, False), (HOLD, B, False), (HOLD + 10, C, False), (HOLD + 10 + DWELL, C, False)]
+    assert follow([(0, A, True), *lost], reach) == [0, 0, 1, 1, 2]
+
+
+def test_the_first_whole_frame_displaces_at_once_what_rests_on_frames_with_lost_inputs(reach: Reach) -> None:
+    assert follow([(0, B, False), (10, B, False), (20, A, True)], reach) == [1, 1, 0]
+
+
+def test_a_dwell_is_made_of_whole_frames_in_a_row(reach: Reach) -> None:
+    frames = [(0, A, True), (10, B, True), (10 + DWELL - 1, B, False), (10 + DWELL, B, True)]
+    assert follow(frames, reach) == [0, 0, 0, 0]
+    assert follow([*frames, (10 + 2 * DWELL, B, True)], reach)[-1] == 1
+
+
+def test_a_whole_frame_of_any_kind_keeps_the_decision_from_getting_too_old(reach: Reach) -> None:
+    """Too old is what had no whole frame for the hold, not what had none for it."""
+    frames = [(0, A, True), (HOLD - 1, (100, 104, 100), True), (HOLD + 10, B, False)]
+    assert follow(frames, reach) == [0, 0, 0]
+
+
+def test_what_was_forgotten_is_not_kept_against_frames_with_lost_inputs(reach: Reach) -> None:
+    decision = Decision(LEAD, DWELL, HOLD)
+    decision.update(0, Standing(A, reach))
+    decision.forget()
+    assert decision.update(10, Standing(B, reach), whole=False) == 1
+    assert decision.update(20, Standing(A, reach), whole=True) == 0

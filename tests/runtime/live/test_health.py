@@ -171,11 +171,11 @@ def test_rates_are_those_of_the_last_second_and_fall_when_frames_stay_away(build
 
 def test_a_report_counts_answers_and_carries_what_drivers_count(build: Build) -> None:
     health = Health(build)
-    for kind, times in (("ok", 3), ("degraded", 2), ("unknown", 1)):
+    for kind, times in (("ok", 3), ("changing", 4), ("degraded", 2), ("unknown", 1)):
         for _ in range(times):
             health.update(grasp(UNKNOWN, kind), None)
     devices = [DeviceHealth("scanner", connected=False, error="gone", counts=(Count("crc", 4),))]
     report = health.report(77, devices)
-    assert (report.time_us, report.frames, report.degraded, report.unknown) == (77, 6, 2, 1)
+    assert (report.time_us, report.frames, report.changing, report.degraded, report.unknown) == (77, 10, 4, 2, 1)
     assert report.devices == tuple(devices)
     assert msgspec.json.decode(msgspec.json.encode(report), type=HealthReport) == report

@@ -303,7 +303,7 @@ def test_a_sequential_test_answers_once_it_has_decided(make_build: MakeBuild) ->
         found = live.step(now, 0, SwitchFrame(now, 0b101), GloveFrame(now, b"\x05\x06\x07\x08"))
         answers.append(found.grasp)
         assert (found.probability == 0) == (found.grasp == UNKNOWN)
-        assert found.health == "ok"
+        assert found.health == ("changing" if found.grasp == UNKNOWN else "ok")
     assert answers[0] == UNKNOWN
     assert answers[-1] == found.candidate
 

@@ -127,3 +127,34 @@ def test_forgetting_drops_the_answer_and_the_evidence(reach: Reach) -> None:
     assert test.held is None
     assert test.update(1, Standing((2, 0), reach)) is None
     assert test.update(2, Standing((2, 0), reach)) == 0
+
+
+FOR_0, FOR_1 = (2, 0), (0, 2)
+
+
+def follow(frames: list[tuple[int, tuple[int, int], bool]], reach: Reach) -> list[int | None]:
+    """Return what two frames in agreement decide on, for up to 100 us, after each frame, whole or not."""
+    test = SequentialTest(2, 1.0, 0.1, 100)
+    return [test.update(time_us, Standing(scores, reach), whole=whole) for time_us, scores, whole in frames]
+
+
+def test_frames_with_lost_inputs_end_no_test_while_an_answer_of_whole_frames_holds(reach: Reach) -> None:
+    whole = [(0, FOR_0, True), (10, FOR_0, True)]
+    lost = [(time_us, FOR_1, False) for time_us in (20, 110, 111, 112)]
+    assert follow(whole + lost, reach) == [None, 0, 0, 0, None, 1]
+
+
+def test_frames_with_lost_inputs_are_left_aside_while_a_test_of_whole_frames_is_under_way(reach: Reach) -> None:
+    frames = [(0, FOR_0, True), (10, FOR_1, False), (20, FOR_1, False), (30, FOR_0, True)]
+    assert follow(frames, reach) == [None, None, None, 0]
+
+
+def test_a_test_of_whole_frames_that_takes_too_long_makes_room_for_frames_with_lost_inputs(reach: Reach) -> None:
+    frames = [(0, FOR_0, True), (100, FOR_1, False), (101, FOR_1, False), (102, FOR_1, False)]
+    assert follow(frames, reach) == [None, None, None, 1]
+
+
+def test_a_whole_frame_drops_answer_and_evidence_of_frames_with_lost_inputs(reach: Reach) -> None:
+    answered = [(0, FOR_1, False), (10, FOR_1, False), (20, FOR_1, False)]
+    assert follow([*answered, (30, FOR_0, True), (40, FOR_0, True)], reach) == [None, 1, 1, None, 0]
+    assert follow([*answered, (30, FOR_1, True), (40, FOR_1, True)], reach) == [None, 1, 1, None, 1]

@@ -45,6 +45,9 @@ def test_with_unread_switches_it_says_what_holds_in_any_case(
     for number in range(5):
         gaps = [other.lanes[candidate] - other.lanes[number] for other in whole]
         assert standing.lead(number) == min(gaps)
+        for lead in (0, 40, 300):
+            leads = [gap >= lead for gap in gaps]
+            assert standing.contradicts(number, lead) == (number != candidate and any(leads))
         least = min(other.probability(number, 100.0) for other in whole)
         assert standing.probability(number, 100.0) <= least * (1 + 1e-12)
     if standing.certain:

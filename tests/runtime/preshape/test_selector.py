@@ -13,7 +13,7 @@ WRAP = Preshape("wrap", ("a",), (0.0,), 1.0)
 PINCH = Preshape("pinch", ("a",), (1.0,), 1.0)
 TABLE = PreshapeTable("test", {"PoS": WRAP, "PoI": WRAP, "Tip": PINCH})
 SETTLE_MS = 30
-HEALTHS: tuple[Health, ...] = ("ok", "ok", "ok", "degraded", "unknown")
+HEALTHS: tuple[Health, ...] = ("ok", "ok", "changing", "degraded", "unknown")
 
 
 def frame(time_ms: float, grasp: str, probability: float = 0.95, health: Health = "ok") -> LiveGrasp:

@@ -59,4 +59,6 @@ def angles() -> JointAngles:
 @pytest.fixture(scope="session")
 def health() -> HealthReport:
     glove = DeviceHealth("cyberglove", True, "", (Count("resyncs", 2),))
-    return HealthReport(7, ("s001",), (), ("s002",), (Drift("index_mpj", -3),), 100.0, 99.5, 600, 10, 1, (glove,))
+    return HealthReport(
+        7, ("s001",), (), ("s002",), (Drift("index_mpj", -3),), 100.0, 99.5, 600, 25, 10, 1, 0, (glove,)
+    )

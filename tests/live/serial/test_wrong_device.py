@@ -1,0 +1,133 @@
+"""A wrong device in a port, and then the right one."""
+
+from collections.abc import Callable
+from pathlib import Path
+from queue import Empty, Queue
+from threading import Event, Thread
+from time import monotonic
+from typing import Any, Protocol
+
+import pytest
+
+from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
+from thenar.drivers.emulated.pty_line import PtyLine
+from thenar.drivers.emulated.scanner import EmulatedScanner
+from thenar.drivers.emulated.scanner_board import ScannerBoard
+from thenar.runtime.harness.wiring import Debounce, GloveWiring, ScannerWiring
+from thenar.runtime.live.devices import GloveDevice, ScannerDevice
+from thenar.runtime.live.keeper import Keeper
+
+pytestmark = pytest.mark.slow
+
+NAMES = tuple(f"s{number}" for number in range(16))
+LONG_S = 10.0
+RECOVERY_S, SLACK_S = 1.0, 0.2
+
+
+class Wrong(Protocol):
+    """Something at the end of a line."""
+
+    def close(self) -> None:
+        """End."""
+
+
+class Talker:
+    """Says the same again and again, every so many seconds, to nobody."""
+
+    def __init__(self, line: PtyLine, every_s: float) -> None:
+        line.receive = lambda _data: None
+        self._line, self._every_s, self._stop = line, every_s, Event()
+        self._thread = Thread(target=self._talk)
+        self._thread.start()
+
+    def _talk(self) -> None:
+        while not self._stop.wait(self._every_s):
+            self._line.send(b"$GPGGA,123519,4807.038,N\r\n")
+
+    def close(self) -> None:
+        self._stop.set()
+        self._thread.join()
+        self._line.receive = None
+
+
+class Listener:
+    """Says what it is given to each message, or nothing."""
+
+    def __init__(self, line: PtyLine, answer: bytes = b"") -> None:
+        self._line = line
+        line.receive = lambda _data: line.send(answer)
+
+    def close(self) -> None:
+        self._line.receive = None
+
+
+def board(line: PtyLine, number: int = 1, **settings: Any) -> EmulatedScanner:
+    return EmulatedScanner(line, len(NAMES), board=ScannerBoard(1, len(NAMES), board=number, **settings))
+
+
+WRONG: dict[str, Callable[[PtyLine], Wrong]] = {
+    "silence": Listener,
+    "one that complains": lambda line: Listener(line, b"ERROR\r\n"),
+    "one that talks": lambda line: Talker(line, 0.02),
+    "one that talks slowly": lambda line: Talker(line, 0.12),
+    "another board": lambda line: board(line, number=7, heartbeat_us=100_000),
+    "a board that sends states": lambda line: board(line, number=7, state_us=1000),
+    "a glove of 22 sensors": lambda line: EmulatedCyberGlove(line, sensors=22),
+}
+RIGHT: dict[str, Callable[[PtyLine], Wrong]] = {"glove": EmulatedCyberGlove, "scanner": board}
+
+
+def device(kind: str, port: Path) -> GloveDevice | ScannerDevice:
+    if kind == "glove":
+        return GloveDevice(GloveWiring(port=str(port)))
+    return ScannerDevice(ScannerWiring(port=str(port), baud=115_200, switches=NAMES), NAMES, Debounce())
+
+
+def lead(link: Path, line: PtyLine) -> None:
+    """Let the port's name lead to this line, as another cable in the same socket does."""
+    fresh = link.with_name("fresh")
+    fresh.symlink_to(line.link.readlink())
+    fresh.replace(link)
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+@pytest.mark.parametrize("kind", RIGHT)
+@pytest.mark.parametrize("same_line", [True, False], ids=["on the same line", "on another line"])
+def test_the_right_device_is_read_again_within_a_second_of_its_return(
+    kind: str, wrong: str, same_line: bool, tmp_path: Path
+) -> None:
+    frames, link = Queue[float](), tmp_path / "port"
+    with PtyLine(tmp_path / "right") as line, PtyLine(tmp_path / "wrong") as elsewhere:
+        lead(link, line)
+        right = RIGHT[kind](line)
+        keeper = Keeper("device", device(kind, link), lambda _frame: frames.put(monotonic()))
+        keeper.start()
+        try:
+            frames.get(timeout=LONG_S)
+            right.close()
+            if not same_line:
+                lead(link, elsewhere)
+            at_its_place = WRONG[wrong](line if same_line else elsewhere)
+            Event().wait(0.8)
+            if same_line:
+                at_its_place.close()
+            right = RIGHT[kind](line)
+            returned = monotonic()
+            if not same_line:
+                lead(link, line)
+            assert first_after(frames, returned) - returned < RECOVERY_S + SLACK_S
+            if not same_line:
+                at_its_place.close()
+        finally:
+            keeper.close()
+            right.close()
+
+
+def first_after(frames: "Queue[float]", since: float) -> float:
+    """Wait for the first frame that came after a moment."""
+    try:
+        while (came := frames.get(timeout=LONG_S)) < since:
+            pass
+    except Empty:
+        raise AssertionError("it never came back") from None
+    return came

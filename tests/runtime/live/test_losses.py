@@ -1,0 +1,169 @@
+"""Inputs that are lost and come back in any pattern: what an "ok" line then says of the grasp that it carries."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from random import Random
+
+import numpy as np
+import pytest
+
+from thenar.runtime import Build
+from thenar.runtime.live.frames import GloveFrame, SwitchFrame
+from thenar.runtime.live.joiner import LiveRecognizer
+from thenar.runtime.live.policy import Policy
+from thenar.runtime.live.published import UNKNOWN, LiveGrasp
+from thenar.runtime.scorer import Scorer
+
+MakeBuild = Callable[..., Build]
+
+SWITCHES, JOINTS = 6, 3
+ALL = (1 << SWITCHES) - 1
+PORTS = (0b000011, 0b001100, 0b110000)
+FRAME_US = 10_000
+ROWS = 240
+SHAKY = Policy(max_lost=1.0)
+
+
+@dataclass(frozen=True)
+class Row:
+    """A frame of a recording, and the scores that it has with everything read."""
+
+    closed: int
+    sensors: bytes
+    lanes: tuple[int, ...]
+
+
+def recording(build: Build, seed: int) -> list[Row]:
+    """Grasps that are held for some frames each, with a switch or a joint that moves now and then."""
+    random, scorer, rows = Random(seed), Scorer(build.tables), []
+    closed, sensors = 0, bytes(JOINTS)
+    while len(rows) < ROWS:
+        if random.random() < 0.1:
+            closed, sensors = random.getrandbits(SWITCHES), random.randbytes(JOINTS)
+        elif random.random() < 0.3:
+            closed ^= 1 << random.randrange(SWITCHES)
+        bits = np.array([closed >> switch & 1 for switch in range(SWITCHES)], bool)
+        whole = scorer.lanes_without(bits, list(sensors), np.zeros(SWITCHES, bool), np.zeros(JOINTS, bool))
+        rows.append(Row(closed, sensors, tuple(whole)))
+    return rows
+
+
+def recognizer(build: Build, policy: Policy) -> LiveRecognizer:
+    names = tuple(f"j{number}" for number in range(JOINTS))
+    return LiveRecognizer(build, sensor_names=names, switch_period_us=FRAME_US, glove_period_us=FRAME_US, policy=policy)
+
+
+def losses(random: Random, frames: int) -> Iterator[tuple[int, bool]]:
+    """Which switches are lost, and whether the joints are, in bursts of any length."""
+    lost, unplugged = 0, False
+    for _ in range(frames):
+        if random.random() < 0.3:
+            lost = random.choice((0, 0, ALL, random.getrandbits(SWITCHES)))
+            unplugged = random.random() < 0.2
+        yield lost, unplugged
+
+
+class Player:
+    """Plays sequences of rows on one recogniser, and counts the "ok" lines that are wrong."""
+
+    def __init__(self, build: Build, policy: Policy, *, early: bool = False) -> None:
+        self._live, self._grasps = recognizer(build, policy), build.grasps
+        self._lead = policy.lead_steps(build.tables.scale)
+        self._exit = self._live.early_exit(PORTS) if early else None
+        self._now, self._last, self._confirmed = 0, UNKNOWN, False
+        self.ok = self.changing = self.wrong = 0
+
+    def play(self, rows: list[Row], patterns: Iterator[tuple[int, bool]]) -> None:
+        """Play a sequence; nothing is decided on when it begins."""
+        self._now += 10 * FRAME_US
+        self._last = self._live.step(self._now, 0, None, None).grasp
+        assert self._last == UNKNOWN
+        for row, (lost, unplugged) in zip(rows, patterns, strict=True):
+            self._now += FRAME_US
+            glove = GloveFrame(self._now, row.sensors, 0 if unplugged else 1)
+            unread = self._unread(row, lost, glove)  # what is left unread is not missed
+            frame = SwitchFrame(self._now, row.closed & ~unread, lost & ~unread, unread, glove)
+            self._check(row, self._live.step(self._now, 0, frame, glove), whole=not (frame.lost or unplugged))
+
+    def _unread(self, row: Row, lost: int, glove: GloveFrame) -> int:
+        if self._exit is None:
+            return 0
+        self._exit.start(self._live.codes(self._now, glove))
+        last = next(port for port in range(3) if self._exit.after(port, row.closed, lost) or port == 2)
+        return self._exit.unread(last)
+
+    def _check(self, row: Row, found: LiveGrasp, *, whole: bool) -> None:
+        if found.grasp != self._last:
+            self._last, self._confirmed = found.grasp, whole
+        self._confirmed |= whole and row.lanes.index(max(row.lanes)) == self._index(found.grasp)
+        self.changing += found.health == "changing"
+        if found.health == "ok":
+            behind = max(row.lanes) - row.lanes[self._grasps.index(found.grasp)]
+            self.ok += 1
+            self.wrong += behind > self._lead or not self._confirmed
+
+    def _index(self, grasp: str) -> int:
+        return -1 if grasp == UNKNOWN else self._grasps.index(grasp)
+
+
+POLICIES = {
+    "hysteresis": (Policy(), False),
+    "anything may be lost": (SHAKY, False),
+    "early exit": (SHAKY, True),
+    "no lead": (Policy(lead=0.0, dwell_us=30_000, hold_us=60_000, max_lost=1.0), True),
+    "sequential test": (Policy(error_rate=0.2, max_lost=1.0), False),
+}
+
+
+def played(build: Build, policy: Policy, early: bool, sequences: int, seed: int) -> Player:
+    """Play as many sequences, of which one at least begins at every row of a recording."""
+    rows, random, player = recording(build, seed), Random(seed), Player(build, policy, early=early)
+    for number in range(sequences):
+        first, frames = number % ROWS, random.randint(2, 24)
+        taken = [rows[(first + place) % ROWS] for place in range(frames)]
+        player.play(taken, losses(random, frames))
+    return player
+
+
+@pytest.mark.parametrize("name", POLICIES)
+def test_no_ok_line_is_contradicted_by_its_own_frame_or_rests_on_frames_with_lost_inputs(
+    make_build: MakeBuild, name: str
+) -> None:
+    player = played(make_build(), *POLICIES[name], sequences=2 * ROWS, seed=1)
+    assert player.ok > ROWS
+    assert player.changing > ROWS / 4
+    assert player.wrong == 0
+
+
+@pytest.mark.slow
+def test_in_a_hundred_thousand_sequences_there_is_no_wrong_ok_line(make_build: MakeBuild) -> None:
+    wrong = ok = 0
+    for seed in range(4):
+        for policy, early in POLICIES.values():
+            player = played(make_build(seed), policy, early, 5000, seed)
+            wrong, ok = wrong + player.wrong, ok + player.ok
+    assert ok > 100_000
+    assert wrong == 0
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("error_rate", [None, 0.05])
+def test_a_hand_held_still_keeps_its_grasp_in_every_ok_line_while_all_switches_are_lost_and_found(
+    make_build: MakeBuild, seed: int, error_rate: float | None
+) -> None:
+    """150 ms of whole frames, 100 ms without switches, and whole frames again, of every state of the switches."""
+    build, policy, other, ok = make_build(seed), Policy(max_lost=1.0, error_rate=error_rate), 0, 0
+    for closed in range(ALL + 1):
+        live, lines = recognizer(build, policy), []
+        for number in range(40):
+            lost = ALL if 15 <= number < 25 else 0
+            now = number * FRAME_US
+            lines.append(live.step(now, 0, SwitchFrame(now, closed, lost), GloveFrame(now, bytes((9, 99, 200)))))
+        other += lines[20].candidate != lines[0].candidate
+        assert {line.health for line in lines[15:25]} == {"degraded"}
+        sure = [line for line in lines if line.health == "ok"]
+        assert all(line.grasp == lines[0].candidate for line in sure)
+        ok += len(sure)
+        assert len(sure) == 30 or error_rate
+    assert other > 0
+    assert ok > 30
