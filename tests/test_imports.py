@@ -27,6 +27,7 @@ ALLOWED = {
     "compiler.cluster": ("drivers.errors", "compiler.payloads"),
     "compiler.workers": ("compiler.cluster",),
     "compiler.hand": (),
+    "compiler.publication": ("runtime.files", "drivers.errors"),
     "compiler.recordings": ("runtime", "drivers.errors", "compiler.recordings", "compiler.pictures"),
     "compiler.placement": (
         "runtime",
@@ -44,6 +45,7 @@ ALLOWED = {
         "compiler.boosting",
         "compiler.elementary",
         "compiler.firmware",
+        "compiler.publication",
         "compiler.tables",
         "firmware_templates",
     ),
@@ -62,6 +64,7 @@ ALLOWED = {
         "runtime",
         "drivers",
         "compiler.hand",
+        "compiler.publication",
         "compiler.recordings.graspset",
         "compiler.spec",
     ),
