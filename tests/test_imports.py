@@ -26,6 +26,7 @@ ALLOWED = {
     "compiler.cluster": ("drivers.errors", "compiler.payloads"),
     "compiler.workers": ("compiler.cluster",),
     "compiler.hand": (),
+    "compiler.publication": ("runtime.files", "drivers.errors"),
     "compiler.recordings": ("runtime", "drivers.errors", "compiler.recordings", "compiler.pictures"),
     "compiler.placement": (
         "runtime",
@@ -43,6 +44,7 @@ ALLOWED = {
         "compiler.boosting",
         "compiler.elementary",
         "compiler.firmware",
+        "compiler.publication",
         "compiler.tables",
         "firmware_templates",
     ),
@@ -61,6 +63,7 @@ ALLOWED = {
         "runtime",
         "drivers",
         "compiler.hand",
+        "compiler.publication",
         "compiler.recordings.graspset",
         "compiler.recordings.spreadsheet",
         "compiler.spec",
