@@ -24,7 +24,7 @@ def _rate(_context: click.Context, _option: click.Parameter, text: str) -> int |
 
 
 @click.command("calibrate")
-@click.argument("port", type=serial_port)
+@click.argument("port", callback=serial_port)
 @click.option("-o", "--output", type=output_file, required=True, help="The calibration to write, a .toml file.")
 @click.option("--subject", help="Whose hand it is; without it, the file's name.")
 @click.option("--baud", callback=_rate, default="115200", show_default=True, help="Bits a second, or auto to try.")

@@ -48,27 +48,22 @@ class _PictureFile(_OutputFile):
         return path
 
 
-class _Port(click.ParamType):
-    """A serial line, by the rule that holds for the ports in files."""
-
-    name = "port"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        from ..drivers.ports import port_fault
-
-        if fault := port_fault(value):
-            self.fail(f"{shortened(repr(value))} {fault}", param, ctx)
-        return str(value)
-
-
 existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
 existing_folder = click.Path(exists=True, file_okay=False, path_type=Path)
 any_path = click.Path(path_type=Path)
 output_file = _OutputFile(dir_okay=False, writable=True, path_type=Path)
 picture_file = _PictureFile(dir_okay=False, writable=True, path_type=Path)
-serial_port = _Port()
 
 json_flag = click.option("--json", "as_json", is_flag=True, help="Print one JSON document for machines instead.")
+
+
+def serial_port(context: click.Context, parameter: click.Parameter, text: str) -> str:
+    """Return `text` if it is a port, by the rule that holds for those in files."""
+    from ..drivers.ports import port_fault
+
+    if fault := port_fault(text):
+        raise click.BadParameter(f"{shortened(repr(text))} {fault}")
+    return text
 
 
 def keep_apart(*paths: Path | None) -> None:

@@ -201,3 +201,11 @@ def test_what_is_not_installed_is_named_with_the_extra_that_brings_it(
 def test_a_base_install_does_what_needs_no_extra(set_file: Path, build_folder: Path, tmp_path: Path, line: str) -> None:
     done = _on_a_base_install(*line.format(set=set_file, build=build_folder, new=tmp_path / "new").split())
     assert done.returncode == 0, done.stderr
+
+
+def test_a_port_on_the_command_line_is_held_to_the_rule_for_those_in_files(thenar: Thenar, tmp_path: Path) -> None:
+    victim = tmp_path / "victim"
+    victim.write_text("kept")
+    said = _one_sentence(thenar("calibrate", f"spy:///dev/null?file={victim}", "-o", tmp_path / "anna.toml"))
+    assert "is no port that is opened: a port is a device such as /dev/ttyUSB0" in said
+    assert victim.read_text() == "kept"
