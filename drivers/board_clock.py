@@ -20,6 +20,7 @@ class BoardClock:
         self._board: int | None = None
         self._offset = 0
         self._least: int | None = None
+        self._guessed = False
 
     @property
     def trip_us(self) -> int:
@@ -39,10 +40,13 @@ class BoardClock:
         self._offset = min(came_us - self._board, self._offset + drift_us)
         if self._least is not None:
             self._least -= drift_us
-            if self._least > self._offset:  # the board has started again, on the same line
-                self._least = self._offset - trip_us
+            # Where the bounds cross, the board has started again: on the same line, until it is asked anew.
+            self._guessed |= self._least > self._offset
+            if self._guessed:
+                self._least = min(self._least, self._offset - trip_us)
         if asked_us is not None:
             asked = asked_us - self._board
             self._offset = max(self._offset, asked)
-            self._least = asked if self._least is None else max(self._least, asked)
+            self._least = asked if self._least is None or self._guessed else max(self._least, asked)
+            self._guessed = False
         return self._board + self._offset

@@ -79,7 +79,8 @@ def test_once_a_frame_was_asked_for_the_truth_lies_within_the_trip_whatever_dela
         board = (board_at_start + now - START + (now - START) * millionths // 1_000_000) % WRAP
         time = clock.host_us(board, now + shared_us + delay, None if before is None else now - before)
         asked |= before is not None
-        assert (clock.trip_us >= 0) and (asked or clock.trip_us == 0)
+        assert clock.trip_us >= 0
+        assert asked or clock.trip_us == 0
         if asked:
             assert time - clock.trip_us <= now + 1 <= time + 2
 
@@ -100,3 +101,8 @@ def test_a_board_that_starts_again_does_so_on_the_same_line() -> None:
     assert clock.trip_us == 400_000
     clock.host_us(0, START + 500_000)
     assert clock.trip_us == 400_000
+    # The first frame from then on was late by another 50 ms.
+    clock.host_us(1000, START + 451_000)
+    assert clock.trip_us == 400_000
+    clock.host_us(2000, START + 452_000, START + 40_000)
+    assert clock.trip_us == 412_000

@@ -29,7 +29,7 @@ from thenar.simulator.playing.performance import Performance, of_scene
 # threads and processes of a busy computer need to be woken.
 SETTLE_US = 150_000
 # By so much more a frame of a scanner board may seem to be older than it is: the round trip of a PING.
-TRIP_US = 20_000
+TRIP_US = 25_000
 # What such a computer adds to a time that is promised.
 SLACK_US = 300_000
 LONG_S = 20.0

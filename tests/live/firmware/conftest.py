@@ -23,6 +23,8 @@ from thenar.runtime.build import Build
 from thenar.runtime.sinks.line import Line
 
 ENDING_S = 20.0
+# By so much a frame may be younger than its age says.
+TRIP_US = 25_000
 # Of the wires of a matrix; the firmware waits 20 us for them.
 RISE_US = 16
 _HARNESS = Path(__file__).parents[2] / "simavr" / "simulated.py"
@@ -88,13 +90,13 @@ class Firmware:
     def show(self, row: int) -> None:
         """Put a row on the switches. What the board tells of them has its own time, which may be behind.
 
-        The row before stays until the board's own time is later than whatever was published of it: each row that was
-        waited for counts, however busy the computer is.
+        The row before stays until the board's own time is later than whatever was published of it can be: each row that
+        was waited for counts, however busy the computer is.
         """
         grasps = self.scene.grasps.since(0)
         last_us = max((grasp.time_us - (grasp.switch_age_us or 0) for grasp in grasps), default=0)
         end = monotonic() + ENDING_S
-        while self.board.do("now").board_us <= last_us:
+        while self.board.do("now").board_us <= last_us + TRIP_US:
             assert monotonic() < end, "the board's time stands still"
         self._show(row)
         shown = self.scene.shown[-1]
