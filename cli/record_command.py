@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     show_default=True,
     help="Seconds before a grasp is captured.",
 )
-@click.option("--seed", type=click.IntRange(0), help="Of the random order; one is drawn otherwise.")
+@click.option("--seed", type=click.IntRange(0, 2**63 - 1), help="Of the random order; one is drawn otherwise.")
 @click.option("-o", "--output", type=output_file, required=True, help="The .grasps file to write.")
 def command(
     glove: Path,
@@ -104,7 +104,9 @@ def _resumed(journal: "Journal", wanted: "Collection", seed: int | None) -> "Col
 
 def _both(begun: object, wanted: object) -> str:
     """Return the two values, where they are short enough to be told."""
-    return f" ({begun}, not {wanted})" if isinstance(begun, str | int) else ""
+    from ..runtime.names import shortened
+
+    return f" ({shortened(str(begun))}, not {shortened(str(wanted))})" if isinstance(begun, str | int) else ""
 
 
 def _write(recording: Path, output: Path, accepted: int, planned: int) -> None:

@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     "sinks",
     metavar="SINK",
     multiple=True,
-    help="Where grasps go: jsonl:FILE (- is stdout), unix:PATH, tcp:127.0.0.1:PORT, ros:/NAMESPACE. May be repeated.",
+    help="Where grasps go: jsonl:FILE (- is stdout), unix:PATH, tcp:127.0.0.1:PORT, ros:/NAMESPACE, on this machine; "
+    "tcp-public:ADDRESS:PORT and ros:/NAMESPACE?public let others read. May be repeated.",
 )
 @click.option(
     "--preshape", metavar="NAME", help="Preshapes to send along: barrett_bh8, parallel_gripper or a .toml file."

@@ -15,7 +15,8 @@ from mcap.records import Channel, DataEnd, Footer, Header, McapRecord, Metadata,
 
 from ...drivers.errors import SettingError
 from .cdr import BYTES, DEFINITIONS, STRING
-from .session import METADATA, Session, to_metadata
+from .errors import McapError
+from .session import METADATA, Session, from_metadata, to_metadata
 
 MAGIC = b"\x89MCAP0\r\n"
 # More than any record of ours holds. Read as JSON a record takes some twenty times its length.
@@ -70,8 +71,13 @@ def beginning(version: str) -> bytes:
 
 
 def session_record(session: Session) -> bytes:
-    """Return the record that begins a session. Raises SettingError if it is longer than a reader takes."""
-    record = _written(Metadata(METADATA, to_metadata(session)))
+    """Return the record that begins a session. Raises SettingError if no reader would take it."""
+    texts = to_metadata(session)
+    try:
+        from_metadata(texts)
+    except McapError as wrong:
+        raise SettingError(f"this cannot be recorded: {wrong}") from None
+    record = _written(Metadata(METADATA, texts))
     if len(record) > LARGEST_RECORD:
         raise SettingError(
             f"the description of this glove takes {len(record)} bytes, {LARGEST_RECORD} at most are recorded: "

@@ -27,7 +27,7 @@ from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.recordings.mcap_recording import import_recordings
 from thenar.compiler.recordings.taxonomy import own
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
-from thenar.drivers.errors import ThenarError
+from thenar.drivers.errors import SettingError, ThenarError
 from thenar.runtime.build import Build
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, GloveWiring, Harness
 from thenar.runtime.harness.writing import harness_to_toml
@@ -282,3 +282,29 @@ def test_no_mutant_raises_anything_but_our_errors(
     # Most mutants are read by most readers: the fuzz goes deep.
     assert all(many > len(seeds) for many in made), made
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kb < 200_000
+
+
+def test_a_replay_and_an_emulation_tell_of_damage(build: Build, records: list[Record], tmp_path: Path) -> None:
+    path, said = tmp_path / "damaged.mcap", list[str]()
+    path.write_bytes(sealed(records))
+    list(replayed(build, path, warn=said.append))
+    assert said == []
+    data = bytearray(path.read_bytes())
+    place = data.rindex(b'{"time_us"')
+    data[place + len('{"time_us":')] ^= 1
+    path.write_bytes(data)
+    list(replayed(build, path, warn=said.append))
+    of_recording(path, 10_000, warn=said.append)
+    assert said == ["damaged.mcap is altered: the checksum of its data does not match"] * 2
+
+
+def test_a_replay_of_other_switches_than_the_builds_is_refused(
+    build: Build, records: list[Record], tmp_path: Path
+) -> None:
+    path = tmp_path / "others.mcap"
+    kept = ",".join(f'"{switch.name}"' for switch in build.manifest.switches).encode()
+    others = kept.replace(b"s", b"t")
+    renamed = [(opcode, content.replace(b"[" + kept + b"]", b"[" + others + b"]")) for opcode, content in records]
+    path.write_bytes(sealed(renamed))
+    with pytest.raises(SettingError, match="names other switches than its build has"):
+        list(replayed(build, path))

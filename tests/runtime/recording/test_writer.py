@@ -170,6 +170,8 @@ def test_nobody_else_may_read_a_recording(tmp_path: Path, session: Session) -> N
 def test_a_glove_whose_description_no_reader_would_take_is_refused(tmp_path: Path, session: Session) -> None:
     with pytest.raises(SettingError, match="16777216 at most are recorded: shorten glove"):
         Recorder(tmp_path / "a.mcap", replace(session, harness="#" * LARGEST_RECORD))
+    with pytest.raises(SettingError, match="this cannot be recorded: its metadata 'sensors' cannot be read"):
+        Recorder(tmp_path / "a.mcap", replace(session, sensors=tuple(f"j{number}" for number in range(256))))
     assert not list(tmp_path.iterdir())
 
 
