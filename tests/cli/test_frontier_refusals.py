@@ -30,3 +30,11 @@ def test_a_file_is_no_folder_and_is_left_alone(set_file: Path, tmp_path: Path, c
     assert run(["frontier", str(set_file), "-o", str(tmp_path / "notes.txt")]) == 2
     assert "notes.txt is a file: name a folder" in " ".join(capsys.readouterr().err.split())
     assert (tmp_path / "notes.txt").read_text() == "mine"
+
+
+def test_a_folder_that_holds_other_things_is_left_alone(set_file: Path, tmp_path: Path, capsys: Captured) -> None:
+    (tmp_path / "found").mkdir()
+    (tmp_path / "found" / "notes.txt").write_text("mine")
+    assert run(["frontier", str(set_file), "-o", str(tmp_path / "found")]) == 2
+    assert "is not empty and holds no frontier: name another folder" in " ".join(capsys.readouterr().err.split())
+    assert [path.name for path in (tmp_path / "found").iterdir()] == ["notes.txt"]
