@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.names import SHOWN, fault, list_names, nearest
+from ...runtime.names import SHOWN, fault, list_names, nearest, shortened
 from .errors import RecordingError
 
 __all__ = ["SHOWN", "check_names", "fault", "list_names", "list_rows", "nearest"]
@@ -16,12 +16,12 @@ def check_names(what: str, names: Iterable[str]) -> None:
     seen: set[str] = set()
     for name in names:
         if reason := fault(name):
-            raise RecordingError(f"{what} {name!r} {reason}")
+            raise RecordingError(f"{what} {shortened(repr(name))} {reason}")
         if name in seen:
-            raise RecordingError(f"{what} {name!r} occurs twice")
+            raise RecordingError(f"{what} {shortened(repr(name))} occurs twice")
         seen.add(name)
 
 
 def list_rows(rows: NDArray[np.int64]) -> str:
     """Return "row 3" or "rows 3, 4, 5, 6, 7 and 7 more"."""
-    return f"row{'s' if len(rows) > 1 else ''} {list_names(rows.astype(str).tolist())}"
+    return f"row{'s' if len(rows) > 1 else ''} {list_names(rows[:SHOWN].astype(str).tolist(), len(rows))}"

@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...drivers.calibration import GloveCalibration, load_calibration
+from ...drivers.calibration import GloveCalibration
 from ...drivers.cyberglove_sensors import SENSORS_18, SENSORS_22
 from ..build import Build
+from ..calibration import load_calibration
 from ..harness.wiring import GloveWiring, Harness
 from ..scanning.plan import check_harness, plan_scan
 from ..scanning.scanmap import ScanMap

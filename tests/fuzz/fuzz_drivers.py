@@ -13,13 +13,14 @@ import sys
 import atheris
 
 with atheris.instrument_imports(include=["thenar"]):
-    from thenar.drivers import calibration, cyberglove_commands, cyberglove_frame, scanner_frame, scanner_messages
+    from thenar.drivers import cyberglove_commands, cyberglove_frame, scanner_frame, scanner_messages
     from thenar.drivers.board_keys import BoardKeys
     from thenar.drivers.board_times import BoardTimes
     from thenar.drivers.emulated.cyberglove_box import CyberGloveBox, Doubts
     from thenar.drivers.emulated.cyberglove_state import GloveState
     from thenar.drivers.emulated.scanner_board import ScannerBoard
     from thenar.drivers.errors import ThenarError
+    from thenar.runtime.calibration import parse_calibration
 
 KEYS = 40
 RECORD = cyberglove_frame.Record(b"S" * 18)
@@ -39,7 +40,7 @@ def one_input(data: bytes) -> None:
     answers(data)
     emulated(data)
     with contextlib.suppress(ThenarError):
-        calibration.GloveCalibration.of_toml(data.decode("utf-8", "replace"))
+        parse_calibration(data.decode("utf-8", "replace"), "glove")
 
 
 def records(data: bytes) -> None:
