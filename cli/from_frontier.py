@@ -58,9 +58,9 @@ class Picked:
 def picked(path: Path, number: int | None, grasp_set: "GraspSet") -> Picked:
     """Return point `number` of the frontier in `path`, or the one that it picked. Raises FrontierError, UsageError."""
     from ..compiler.frontier.points import MAX_BYTES, FrontierError, frontier_from_bytes
+    from ..runtime.files import read_file
 
-    with path.open("rb") as file:
-        found = frontier_from_bytes(file.read(MAX_BYTES + 1), str(path))
+    found = frontier_from_bytes(read_file(path, MAX_BYTES, FrontierError), str(path))
     wanted = found.picked if number is None else number
     if wanted is None:
         raise click.UsageError(f"{path} has points 1 to {len(found.points)}: say with --point which to build.")

@@ -14,7 +14,7 @@ import msgspec
 from ...runtime.toml_source import read_source
 from ...runtime.toml_struct import convert
 from .errors import ColumnsError
-from .names import nearest
+from .names import nearest, shortened
 
 DEFAULT_GRID = 0.5
 
@@ -101,9 +101,10 @@ def select(columns: Columns, names: Sequence[str]) -> Selection:
         "object": columns.object,
         "trial": columns.trial,
     }
+    there = set(names)
     for key, column in meta.items():
-        if column is not None and column not in names:
-            raise ColumnsError(f"{key}: the table has no column {column!r}{nearest(column, names)}")
+        if column is not None and column not in there:
+            raise ColumnsError(f"{key}: the table has no column {shortened(repr(column))}{nearest(column, names)}")
     switches = tuple(_matches("switches", columns.switches, names))
     joints = tuple((name, entry) for entry in columns.joints for name in _matches("joints", entry.columns, names))
     used = Counter([*filter(None, meta.values()), *switches, *(name for name, _ in joints)])

@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from ...runtime.names import SHOWN, fault, list_names, nearest, shortened
 from .errors import RecordingError
+from .limits import NAMES, NAMES_EACH
 
-__all__ = ["SHOWN", "check_names", "fault", "list_names", "list_rows", "nearest"]
+__all__ = ["SHOWN", "check_names", "check_room", "fault", "list_names", "list_rows", "nearest", "shortened"]
 
 
 def check_names(what: str, names: Iterable[str]) -> None:
@@ -20,6 +21,15 @@ def check_names(what: str, names: Iterable[str]) -> None:
         if name in seen:
             raise RecordingError(f"{what} {shortened(repr(name))} occurs twice")
         seen.add(name)
+
+
+def check_room(rows: int, longest: int, size: int) -> None:
+    """Raise RecordingError where names of `longest` characters at most, one a row, need too much memory.
+
+    An array of text gives every row the room of the longest. `size` is how many bytes their file has.
+    """
+    if 4 * rows * longest > NAMES + NAMES_EACH * size:
+        raise RecordingError(f"a name of {longest} characters is too long in a table of {rows} rows: shorten it")
 
 
 def list_rows(rows: NDArray[np.int64]) -> str:
