@@ -24,6 +24,7 @@ The payload of `tables.bin`, inside the envelope of `sealed.py`, all little-endi
 
 import math
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -127,6 +128,12 @@ def _check_shapes(tables: IntegerTables) -> None:
             raise BuildError(f"{name} is {rows.dtype} {rows.shape}, it must be int16 {shape}")
 
 
+def payload_bytes(n_classes: int, n_switches: int, thresholds: Sequence[int]) -> int:
+    """Return the length of the payload of tables of so many classes and switches; `thresholds` of each joint."""
+    rows = 1 + 2 * n_switches + sum(2 + count for count in thresholds)
+    return _COUNTS.size + 2 * (len(thresholds) + sum(thresholds) + n_classes * rows)
+
+
 def tables_to_bytes(tables: IntegerTables) -> bytes:
     """Return the content of `tables.bin`. Raises BuildError if it would be larger than 16 MiB."""
     header = _COUNTS.pack(tables.n_classes, tables.n_switches, tables.n_joints, 0, tables.scale)
@@ -167,7 +174,7 @@ def _parse(payload: bytes) -> IntegerTables:
         raise BuildError(f"{len(payload)} bytes of content are too few for {j} joints")
     counts = np.frombuffer(payload, "<u2", j, _COUNTS.size).tolist()
     sizes = [K, s * K, s * K, j * K, *counts, *((T + 1) * K for T in counts)]
-    expected = _COUNTS.size + 2 * (j + sum(sizes))
+    expected = payload_bytes(K, s, counts)
     if len(payload) != expected:
         raise BuildError(f"{len(payload)} bytes of content, its counts call for {expected}")
     words = np.frombuffer(payload, "<u2", offset=_COUNTS.size + 2 * j).astype(np.uint16)

@@ -16,6 +16,9 @@ KIND = b"THNRENSM"
 VERSION = 1
 MAX_BYTES = 1 << 30
 
+# Some hundred bytes less than these make a gigabyte: a column, a threshold and three values each.
+MAX_STUMPS = 29_000_000
+
 _DTYPES = {"columns": "<i4", "thresholds": "<f8", "values": "<f8"}
 
 
