@@ -1,10 +1,8 @@
 """`thenar emulate`: a glove that is not there, on real ports, playing a scene or a recording."""
 
 import os
-import signal
-import subprocess
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from threading import Event, Thread
@@ -15,8 +13,11 @@ import msgspec
 
 from .common import check_devices, existing_file, keep_apart, output_file, progress
 from .ending import ended_by_signals
+from .family import Family
 
 if TYPE_CHECKING:
+    import subprocess
+
     from ..simulator.playing.bench import Bench
     from ..simulator.playing.cable import Cable
     from ..simulator.playing.performance import Performance
@@ -187,23 +188,22 @@ def _write(file: IO[bytes], played: Played) -> None:
 def _beside(
     client: tuple[str, ...], emulated: Path, bench: "Bench", stop: Event
 ) -> Iterator["subprocess.Popen[bytes]"]:
-    """Run the command beside the emulated glove, for no longer than this context; `stop` is set when it ends."""
+    """Run the command, and what it starts, for no longer than this context; `stop` is set when the command ends."""
     arguments = [argument.replace("{glove}", str(emulated)) for argument in client]
     try:
-        # In our process group, so that it has the terminal: it may ask for keys.
-        child = subprocess.Popen(arguments, env={**os.environ, **bench.environment})
+        family = Family(arguments, {**os.environ, **bench.environment})
     except OSError as wrong:
         raise click.UsageError(f"{arguments[0]} cannot be run: {wrong.strerror}") from None
 
     def watch() -> None:
-        child.wait()
+        family.command.wait()
         stop.set()
 
     Thread(target=watch, name="thenar client", daemon=True).start()
     try:
-        yield child
+        yield family.command
     finally:
-        _end(child, _BY_ITSELF_S if stop.is_set() else 0.0)
+        family.end(_BY_ITSELF_S if stop.is_set() else 0.0, _GRACE_S)
 
 
 def _play(bench: "Bench", performance: "Performance", note: "Log", stop: Event, *, repeat: bool) -> None:
@@ -212,16 +212,3 @@ def _play(bench: "Bench", performance: "Performance", note: "Log", stop: Event, 
     player = Player(performance, bench.show, note)
     while player.play(stop) and repeat:
         pass
-
-
-def _end(child: "subprocess.Popen[bytes]", patience_s: float) -> None:
-    """End the command, unless it does so by itself in that time; whatever happens here, it does not outlive this."""
-    with ExitStack() as stack:
-        stack.callback(child.wait)
-        stack.callback(child.kill)
-        with suppress(subprocess.TimeoutExpired):
-            child.wait(patience_s)
-            return
-        child.send_signal(signal.SIGINT)
-        with suppress(subprocess.TimeoutExpired):
-            child.wait(_GRACE_S)

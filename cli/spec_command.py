@@ -8,8 +8,6 @@ import click
 from .common import any_path, existing_file, existing_folder, json_flag, out, print_json
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from ..compiler.hand import HandShape
     from ..compiler.spec.ends import BoardPins
     from ..runtime.build import Build
@@ -18,7 +16,6 @@ if TYPE_CHECKING:
 
 _FOLDER = "spec"
 _WIRING = "glove.toml"
-_MARK = "spec.json"
 
 
 @click.command("spec")
@@ -42,19 +39,21 @@ def command(
         thenar spec build/ --hand-length 182 --glove glove.toml -o spec/
     """
     from ..compiler.spec.files import files_of
+    from ..compiler.spec.folder import check_output, write_spec
     from ..compiler.spec.glove_spec import glove_spec
     from ..runtime.build import Build
     from .spec_tables import print_spec
 
     loaded = Build.load(build)
-    _check_output(output)
+    if output is not None:
+        check_output(output)
     hand = _hand(loaded.manifest, hand_length)
     pins = () if board is None else (_board_pins(board, loaded.manifest),)
     harness = _harness(build, loaded, glove, board)
     spec = glove_spec(loaded.manifest, loaded.scan, harness, hand, pins)
     if output is not None:
         files = files_of(spec)
-        _write(files, output)
+        write_spec(files, output)
     if as_json:
         print_json(spec.summary)
         return
@@ -105,21 +104,3 @@ def _board_pins(path: Path, manifest: "Manifest") -> "BoardPins":
         return BoardPins(tuple(board.pins[name] for name in key_names(board, names)), ("",) * len(names))
     rows, columns = board.matrix.rows, board.matrix.columns
     return BoardPins(columns * len(rows), tuple(row for row in rows for _ in columns), board.matrix.diodes)
-
-
-def _check_output(output: Path | None) -> None:
-    if output is None or not output.exists():
-        return
-    if not output.is_dir() or (any(output.iterdir()) and not (output / _MARK).is_file()):
-        raise click.UsageError(f"{output} is there already and is no spec: name another folder.")
-
-
-def _write(files: "Mapping[str, bytes]", folder: Path) -> None:
-    """Write the files, the mark of a spec last, and remove the pattern of another one."""
-    from ..runtime.files import write_atomically
-
-    folder.mkdir(parents=True, exist_ok=True)
-    for stale in {"cutting.svg", "cutting.dxf"} - files.keys():
-        (folder / stale).unlink(missing_ok=True)
-    for name in sorted(files, key=lambda name: (name == _MARK, name)):
-        write_atomically(folder / name, files[name])

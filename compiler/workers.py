@@ -1,7 +1,11 @@
 """Independent pieces of work on all cores, each answer handed over as soon as it is there."""
 
+import os
+import select
 import signal
+import sys
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
@@ -15,6 +19,10 @@ Answer = TypeVar("Answer")
 # More processes are asked for by a slip only, and would take the machine with them.
 MOST_JOBS = 1024
 
+_SAFE_PATH = "PYTHONSAFEPATH"
+# Where a process cannot be waited for by a stranger, it is looked for so often.
+_LOOK_S = 0.5
+
 
 def in_workers(
     work: Callable[[Task], Answer], tasks: Iterable[Task], jobs: int, cluster: str | None = None
@@ -24,6 +32,8 @@ def in_workers(
     jobs     worker processes, as joblib counts them: -1 for all cores, 1 for this process alone; no more than
              MOST_JOBS. A worker runs one thread.
     cluster  address of a Dask scheduler, such as tcp://10.0.0.5:8786: all of its workers do the work, and none here
+
+    Workers end when this process does, however it ends.
 
     Raises BrokenExecutor if a worker is killed or cannot start, ClusterError (which is one) if the cluster cannot do
     the work, and whatever the work raises.
@@ -36,7 +46,8 @@ def in_workers(
         return
     from joblib import Parallel, delayed, parallel_config
 
-    with parallel_config(backend="loky", inner_max_num_threads=1):
+    ending = {"initializer": _end_with_parent, "initargs": (os.getpid(),)}
+    with _safe_paths(), parallel_config(backend="loky", inner_max_num_threads=1, **ending):
         workers = Parallel(n_jobs=min(jobs, MOST_JOBS), return_as="generator_unordered")
         try:
             with _cancelled_work_forgotten():
@@ -91,3 +102,44 @@ def _cancelled_work_forgotten() -> Iterator[None]:
         yield
     finally:
         threading.excepthook = before
+
+
+@contextmanager
+def _safe_paths() -> Iterator[None]:
+    """Keep the current folder off the paths of the Pythons that are started: its modules are none of ours.
+
+    loky and multiprocessing start them with -m and -c, and pass on no option of this one.
+    """
+    before = os.environ.get(_SAFE_PATH)
+    os.environ[_SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[_SAFE_PATH]
+        else:
+            os.environ[_SAFE_PATH] = before
+
+
+def _end_with_parent(parent: int) -> None:
+    """Let this worker end as soon as process `parent`, which has started it, has ended.
+
+    A thread waits for that. Linux could send a signal instead, but does so when the thread that started the worker
+    ends, and loky starts some in threads that end before the work does.
+    """
+    threading.Thread(target=_end_after, args=(parent,), name="thenar parent", daemon=True).start()
+
+
+def _end_after(parent: int) -> None:
+    try:
+        if sys.platform == "linux":
+            ended = select.poll()
+            ended.register(os.pidfd_open(parent), select.POLLIN)
+            # By now the number may be another process's.
+            if os.getppid() == parent:
+                ended.poll()
+    except OSError:  # no such process, or a kernel before 5.3
+        pass
+    while os.getppid() == parent:
+        time.sleep(_LOOK_S)
+    os._exit(1)

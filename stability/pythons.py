@@ -43,7 +43,7 @@ def _candidates(version: str) -> Iterator[Path]:
 
 
 def _runs(python: Path, version: str) -> bool:
-    answer = subprocess.run([python, "-c", _RUNS], capture_output=True, text=True, check=False)
+    answer = subprocess.run([python, "-I", "-c", _RUNS], capture_output=True, text=True, check=False)
     return answer.returncode == 0 and answer.stdout.startswith(version + ".")
 
 

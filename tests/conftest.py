@@ -5,7 +5,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NoReturn
 
@@ -90,3 +90,36 @@ def icub_table() -> Path:
 @pytest.fixture(scope="session")
 def aml_table() -> Path:
     return need(SHARED_DATA / "aml_flex6_grasptypes" / "trials.csv.gz")
+
+
+# What our children import before anything of ours, or soon after.
+SHADOWED = (
+    "argparse",
+    "collections",
+    "ctypes",
+    "ensurepip",
+    "json",
+    "msgspec",
+    "pickle",
+    "platform",
+    "runpy",
+    "signal",
+)
+SHADOWED += ("struct", "subprocess", "threading", "typing", "joblib", "numpy", "gi", "drivers", "thenar")
+HOSTILE = """
+from pathlib import Path
+with open(Path(__file__).with_name("mark"), "a") as mark:
+    print(__name__, file=mark)
+"""
+
+
+@pytest.fixture
+def hostile_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Make a folder of modules by the names of others the current one; at the end none of them may have run."""
+    folder = tmp_path / "downloads"
+    folder.mkdir()
+    for name in SHADOWED:
+        (folder / f"{name}.py").write_text(HOSTILE)
+    monkeypatch.chdir(folder)
+    yield folder
+    assert not (folder / "mark").exists(), (folder / "mark").read_text()

@@ -28,6 +28,7 @@ ALLOWED = {
     "compiler.workers": ("compiler.cluster",),
     "compiler.hand": (),
     "compiler.limits": ("runtime.tables", "drivers.errors"),
+    "compiler.publication": ("runtime.files", "drivers.errors"),
     "compiler.recordings": ("runtime", "drivers.errors", "compiler.recordings", "compiler.pictures"),
     "compiler.placement": (
         "runtime",
@@ -46,6 +47,7 @@ ALLOWED = {
         "compiler.boosting",
         "compiler.elementary",
         "compiler.firmware",
+        "compiler.publication",
         "compiler.tables",
         "firmware_templates",
     ),
@@ -65,6 +67,7 @@ ALLOWED = {
         "runtime",
         "drivers",
         "compiler.hand",
+        "compiler.publication",
         "compiler.recordings.graspset",
         "compiler.spec",
     ),

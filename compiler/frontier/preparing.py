@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ...runtime.files import write_atomically
 from ...runtime.harness.loading import load_harness
 from ...runtime.harness.wiring import Harness
+from ..publication import check_folder, entries, publish_folder
 from ..recordings.graspset import GraspSet
 from ..selection.rivals import RIVALS, available
 from .calibrating import equipment_for
-from .drawing.pictures import pictures
+from .drawing.pictures import PICTURES, pictures
 from .drawing.table import csv_bytes
 from .foreseeing import foreseen
 from .material import Cuts, Material
@@ -31,6 +31,7 @@ from .timing.whole_glove import ports_of_whole_glove
 from .timing.wirings import wirings
 
 FRONTIER_NAME, TABLE_NAME, STORE_NAME = "frontier.json", "frontier.csv", "store.jsonl"
+_DOCUMENTS = frozenset({FRONTIER_NAME, TABLE_NAME, *(f"{name}.svg" for name in PICTURES)})
 # Answers of another version are not mixed with these: raise it where a method changes what it answers.
 _VERSION = 1
 
@@ -62,16 +63,17 @@ def run_frontier(request: Request, report: Callable[[int, int], None]) -> Fronti
     grasp_set = GraspSet.load(request.recordings)
     harness = None if request.glove is None else load_harness(request.glove)
     search, lacking = _search(request)
-    if request.output.exists() and not request.output.is_dir():
-        raise FrontierError(f"{request.output} is a file: name a folder for the frontier")
-    request.output.mkdir(parents=True, exist_ok=True)
+    request.output.parent.mkdir(parents=True, exist_ok=True)
+    check_folder(request.output, _kept, FrontierError)
+    request.output.mkdir(exist_ok=True)
     with Store(request.output / STORE_NAME, _scope(grasp_set)) as store:
         effort = Effort(report)
         desk = Desk(store, effort, request.jobs, request.cluster)
         study = _study(request, grasp_set, harness, search, desk)
         effort.foresee(foreseen(search, study.material, study.cuts, study.equipment.model.part is not None))
         found = find_frontier(replace(study, skipped=lacking), desk)
-    _write(found, request.output)
+        # The store goes into the new folder as the same file, and nobody else may have it meanwhile.
+        publish_folder(_documents(found), request.output, _kept, FrontierError)
     return found
 
 
@@ -137,8 +139,14 @@ def _stream(request: Request, grasp_set: GraspSet, material: Material, cuts: Cut
     return stream_of(played, labels, seed=request.seed)
 
 
-def _write(found: Frontier, folder: Path) -> None:
-    write_atomically(folder / FRONTIER_NAME, frontier_to_bytes(found))
-    write_atomically(folder / TABLE_NAME, csv_bytes(found))
-    for name, data in pictures(found, "svg").items():
-        write_atomically(folder / f"{name}.svg", data)
+def _documents(found: Frontier) -> dict[str, bytes]:
+    drawn = {f"{name}.svg": data for name, data in pictures(found, "svg").items()}
+    return {FRONTIER_NAME: frontier_to_bytes(found), TABLE_NAME: csv_bytes(found), **drawn}
+
+
+def _kept(folder: Path) -> list[str]:
+    """Return what is in the folder of a frontier besides its documents: the store, and what is the user's."""
+    there = entries(folder)
+    if there and not {FRONTIER_NAME, STORE_NAME} & set(there):
+        raise FrontierError(f"{folder} is not empty and holds no frontier: name another folder")
+    return [path for path in there if path not in _DOCUMENTS]

@@ -5,7 +5,6 @@ must be a process of its own, started with `EmulatedI2c.environment`; kernel mod
 """
 
 import json
-import os
 import shutil
 import subprocess
 from collections.abc import Sequence
@@ -21,6 +20,8 @@ from ..errors import DeviceError, SettingError
 from .i2c_models import MODELS
 
 _PYTHON = "/usr/bin/python3"
+# Isolated, it has neither the current folder nor the user's on its path, whose modules are none of ours.
+_SERVE = "import runpy, sys; sys.path.insert(0, sys.argv[1]); runpy.run_module(sys.argv[2], run_name='__main__')"
 _INSTALL = "install the packages umockdev, gir1.2-umockdev-1.0 and python3-gi (Debian, Ubuntu)"
 
 AdapterKind = Literal["any", "bcm2835", "designware", "i2c-gpio", "smbus-only"]
@@ -90,13 +91,12 @@ class EmulatedI2c:
         self._levels = [[(1 << 24) - 1 for _ in bus.chips] for bus in buses]
         self._errors = TemporaryFile("w+")  # noqa: SIM115 - it lives as long as the server; a pipe would fill up
         self._server = subprocess.Popen(
-            [wrapper, _PYTHON, "-m", "drivers.emulated.i2c_server"],
+            [wrapper, _PYTHON, "-I", "-c", _SERVE, str(Path(__file__).parents[2]), "drivers.emulated.i2c_server"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
             text=True,
             start_new_session=True,  # Ctrl-C is for us; the server ends when its stdin does
-            env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
         )
         self._lock = Lock()
         self._root: str | None = None

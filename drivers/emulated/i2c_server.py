@@ -1,7 +1,7 @@
 """Serves emulated I2C buses as device nodes through umockdev; spoken to in JSON lines on stdin and stdout.
 
-Started as `umockdev-wrapper /usr/bin/python3 -m drivers.emulated.i2c_server`: it needs the system's Python, which has
-PyGObject, and no other package. Each line in is [verb, arguments...] of `Server`; each line out is the answer.
+Started by `umockdev-wrapper /usr/bin/python3 -I` as `drivers.emulated.i2c_server`: it needs the system's Python, which
+has PyGObject, and no other package. Each line in is [verb, arguments...] of `Server`; each line out is the answer.
 """
 
 import errno

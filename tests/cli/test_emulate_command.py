@@ -194,3 +194,29 @@ def test_a_harness_without_devices_is_not_emulated(thenar: Thenar, scene: Path, 
     assert done.returncode == 2
     assert "glove.toml names no device" in done.stderr
     assert not (tmp_path / "em").exists()
+
+
+LEAVES_ONE_BEHIND = {
+    "behind itself": "{python} -c {waits!r} & read line < {pipe}",
+    "in a session of its own": "setsid {python} -c {waits!r} & wait $!",
+    "deaf to what is polite": "{python} -c {deaf!r} & read line < {pipe}",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")
+@pytest.mark.parametrize("leaves", LEAVES_ONE_BEHIND.values(), ids=LEAVES_ONE_BEHIND)
+def test_what_a_command_starts_ends_with_it(scene: Path, glove: Path, tmp_path: Path, leaves: str) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    waits = f"import pathlib, signal; pathlib.Path('{pipe}').write_text('begun\\n'); signal.pause()"
+    deaf = waits.replace("pathlib.Path", "[signal.signal(n, signal.SIG_IGN) for n in (2, 15)]; pathlib.Path")
+    client = leaves.format(python=sys.executable, waits=waits, deaf=deaf, pipe=pipe)
+    arguments = ["emulate", scene, "--glove", glove, "--dir", tmp_path / "em", "--repeat", "--", "sh", "-c", client]
+    command = [sys.executable, "-m", "thenar.cli", *map(str, arguments)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        if "read" not in leaves:
+            assert pipe.read_text() == "begun\n"
+            process.send_signal(signal.SIGINT)
+        # Its stdout ends only when everybody who holds it is gone.
+        assert process.communicate(timeout=LONG_S)[0] == ""

@@ -28,5 +28,5 @@ def test_what_is_wrong_is_said_in_a_sentence(
 def test_a_file_is_no_folder_and_is_left_alone(set_file: Path, tmp_path: Path, capsys: Captured) -> None:
     (tmp_path / "notes.txt").write_text("mine")
     assert run(["frontier", str(set_file), "-o", str(tmp_path / "notes.txt")]) == 2
-    assert "notes.txt is a file: name a folder for the frontier" in " ".join(capsys.readouterr().err.split())
+    assert "notes.txt is a file: name a folder" in " ".join(capsys.readouterr().err.split())
     assert (tmp_path / "notes.txt").read_text() == "mine"

@@ -1,9 +1,13 @@
 import os
 import signal
+import subprocess
+import sys
 import threading
+import time
 from collections.abc import Generator
 from concurrent.futures import BrokenExecutor
 from itertools import count
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -82,3 +86,70 @@ def test_as_many_processes_work_as_are_asked_for() -> None:
 def test_a_slip_of_the_finger_does_not_start_a_million_processes() -> None:
     assert workers_of(10**30) == MOST_JOBS
     assert list(in_workers(squared_where, [], 10**30)) == []
+
+
+BUSY = """
+import os, signal, sys
+from pathlib import Path
+from thenar.compiler.workers import in_workers
+
+def work(number):
+    (Path(sys.argv[1]) / str(os.getpid())).touch()
+    while True:
+        {step}
+
+if __name__ == "__main__":
+    list(in_workers(work, range(2), 2))
+"""
+
+
+def runs(process: int) -> bool:
+    """Return whether a process is there, and is no zombie."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def wait_until(limit_s: float, condition: Any) -> bool:
+    end = time.monotonic() + limit_s
+    while not condition() and time.monotonic() < end:
+        os.sched_yield()
+    return bool(condition())
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+@pytest.mark.parametrize("step", ["signal.pause()", "pass"])
+def test_workers_end_when_their_parent_is_killed(tmp_path: Path, step: str) -> None:
+    script, folder = tmp_path / "busy.py", tmp_path / "workers"
+    script.write_text(BUSY.format(step=step))
+    folder.mkdir()
+    parent = subprocess.Popen([sys.executable, script, folder])
+    try:
+        assert wait_until(60, lambda: len(list(folder.iterdir())) == 2)
+        workers = [int(path.name) for path in folder.iterdir()]
+        assert all(map(runs, workers))
+    finally:
+        parent.kill()
+        parent.wait()
+    try:
+        assert wait_until(5, lambda: not any(map(runs, workers)))
+    finally:
+        for worker in filter(runs, workers):
+            os.kill(worker, signal.SIGKILL)
+
+
+@pytest.mark.usefixtures("hostile_folder")
+def test_no_module_of_the_current_folder_runs_in_a_worker() -> None:
+    work = "from math import sqrt; from thenar.compiler.workers import in_workers; print(*in_workers(sqrt, [4, 4], 2))"
+    done = subprocess.run([sys.executable, "-P", "-c", work], capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("2.0 2.0\n", "")
+
+
+def test_the_environment_is_as_it_was_after_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    for before in (None, "", "1"):
+        monkeypatch.delenv("PYTHONSAFEPATH", raising=False)
+        if before is not None:
+            monkeypatch.setenv("PYTHONSAFEPATH", before)
+        list(in_workers(squared_where, range(3), 2))
+        assert os.environ.get("PYTHONSAFEPATH") == before

@@ -73,3 +73,8 @@ def test_asked_by_make_it_prints_what_it_finds(machine: Path) -> None:
     python = program(machine / "bin" / f"python{OTHERS[0]}", f"echo {OTHERS[0]}.0")
     command = [sys.executable, "-m", "thenar.stability.pythons"]
     assert subprocess.run(command, check=True, capture_output=True, text=True).stdout == f"{OTHERS[0]} {python}\n"
+
+
+@pytest.mark.usefixtures("hostile_folder")
+def test_no_module_of_the_current_folder_runs_when_a_python_is_tried() -> None:
+    assert pythons._runs(Path(sys.executable), f"{sys.version_info.major}.{sys.version_info.minor}")

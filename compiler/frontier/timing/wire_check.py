@@ -89,7 +89,8 @@ def _emulated(bus: BusWiring) -> EmulatedBus:
 
 
 def _client(emulated: EmulatedI2c) -> "subprocess.Popen[bytes]":
-    command = [sys.executable, "-m", f"{__package__}.wire_client"]
+    # -P: the modules of the current folder are none of ours.
+    command = [sys.executable, "-P", "-m", f"{__package__}.wire_client"]
     seen = os.environ | emulated.environment
     return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=seen)
 

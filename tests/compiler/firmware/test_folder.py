@@ -49,23 +49,6 @@ def test_what_the_user_put_there_stays(folder: Path) -> None:
     assert (folder / "link").is_symlink()
 
 
-@pytest.mark.parametrize("path", ["Makefile", "examples/one/one.ino"])
-def test_a_users_file_where_one_of_ours_is_to_stand_is_not_replaced(tmp_path: Path, path: str) -> None:
-    folder = write_folder({"gone.h": "old\n"}, tmp_path / "firmware")
-    (folder / path).parent.mkdir(parents=True, exist_ok=True)
-    (folder / path).write_text("mine")
-    with pytest.raises(FirmwareError, match=f"holds {path}, which thenar has not written"):
-        write_folder(NEW, folder, overwrite=True)
-    assert (folder / path).read_text() == "mine"
-
-
-def test_a_users_file_where_a_folder_of_ours_is_to_stand_is_not_replaced(tmp_path: Path) -> None:
-    folder = write_folder({"gone.h": "old\n"}, tmp_path / "firmware")
-    (folder / "examples").write_text("mine")
-    with pytest.raises(FirmwareError, match="holds examples, which thenar has not written"):
-        write_folder(NEW, folder, overwrite=True)
-
-
 def test_what_was_changed_since_is_not_replaced(folder: Path) -> None:
     (folder / "thenar_glove.c").write_text("better\n")
     with pytest.raises(FirmwareError, match=r"thenar_glove\.c was changed since thenar wrote it"):
@@ -87,40 +70,3 @@ def test_a_place_that_cannot_be_is_named(tmp_path: Path) -> None:
         write_folder(NEW, tmp_path / "file")
     with pytest.raises(FirmwareError, match="nowhere is no folder: make it first"):
         write_folder(NEW, tmp_path / "nowhere" / "firmware")
-
-
-@pytest.mark.parametrize("interrupted", [1, 2])
-def test_interrupted_at_either_rename_the_old_folder_stays(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, interrupted: int
-) -> None:
-    renames, rename = [], Path.rename
-
-    def counting(self: Path, target: Path) -> Path:
-        renames.append(target)
-        if len(renames) == interrupted:
-            raise KeyboardInterrupt
-        return rename(self, target)
-
-    monkeypatch.setattr(Path, "rename", counting)
-    with pytest.raises(KeyboardInterrupt):
-        write_folder(NEW, folder, overwrite=True)
-    assert content(folder) == {**OLD, SUMS: sums(OLD)}
-    assert [path.name for path in folder.parent.iterdir()] == ["firmware"]
-
-
-def test_a_full_disk_leaves_the_old_folder(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(_descriptor: int) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("os.fsync", full)
-    with pytest.raises(OSError, match="No space left"):
-        write_folder(NEW, folder, overwrite=True)
-    assert content(folder) == {**OLD, SUMS: sums(OLD)}
-    assert [path.name for path in folder.parent.iterdir()] == ["firmware"]
-
-
-def test_through_a_link_the_folder_behind_it_is_written(tmp_path: Path, folder: Path) -> None:
-    (tmp_path / "link").symlink_to(folder)
-    assert write_folder(NEW, tmp_path / "link", overwrite=True) == folder
-    assert (tmp_path / "link").is_symlink()
-    assert content(folder) == {**NEW, SUMS: sums(NEW)}

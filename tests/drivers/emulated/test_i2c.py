@@ -141,3 +141,9 @@ def test_a_chip_that_cannot_be_emulated_is_refused_by_name() -> None:
     bus = EmulatedBus("/dev/i2c-3", 400_000, "any", (EmulatedChip("mcp23s17", 0x20),))
     with pytest.raises(SettingError, match="cannot emulate mcp23s17; what can be emulated: mcp23017"):
         EmulatedI2c([bus])
+
+
+@pytest.mark.usefixtures("umockdev", "hostile_folder")
+def test_no_module_of_the_current_folder_runs_in_the_server_of_the_buses() -> None:
+    with EmulatedI2c([EmulatedBus("/dev/i2c-3", 400_000, "any", (MCP,))]) as emulated:
+        assert emulated.counters(0).transfers == 0

@@ -3,7 +3,7 @@ from collections.abc import Callable
 import pytest
 from msgspec.structs import replace
 
-from thenar.compiler.frontier.timing.wire_check import check_wire
+from thenar.compiler.frontier.timing.wire_check import _seen_us, check_wire
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel
 from thenar.runtime.scanning.propose import propose_board
 
@@ -42,3 +42,8 @@ def test_without_umockdev_it_is_said_what_to_install(monkeypatch: pytest.MonkeyP
     assert checks == ()
     assert lack is not None
     assert "umockdev" in lack
+
+
+@pytest.mark.usefixtures("umockdev", "hostile_folder")
+def test_no_module_of_the_current_folder_runs_in_the_client_of_the_buses() -> None:
+    assert _seen_us([replace(bus, device="/dev/i2c-0") for bus in two_muxes().buses])
