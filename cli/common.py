@@ -80,6 +80,13 @@ def err() -> Console:
     return _console(stderr=True)
 
 
+def warning(sentence: str) -> None:
+    """Say on stderr what is odd about what was read; no name in it commands the terminal."""
+    from ..runtime.names import printable
+
+    click.echo(f"warning: {printable(sentence)}", err=True)
+
+
 def _console(stderr: bool = False, width: int | None = None) -> Console:
     # The names of the user's columns and files may hold brackets and colons, which are no markup.
     return Console(stderr=stderr, width=width, highlight=False, markup=False, emoji=False)

@@ -11,7 +11,7 @@ from typing import IO, TYPE_CHECKING, Literal
 import click
 import msgspec
 
-from .common import check_devices, existing_file, keep_apart, output_file, progress
+from .common import check_devices, existing_file, keep_apart, output_file, progress, warning
 from .ending import ended_by_signals
 from .family import Family
 
@@ -130,7 +130,7 @@ def _performance(source: str, subject: str | None, period_ms: float | None) -> t
         if path.suffix == ".mcap":
             from ..simulator.playing.recorded import of_recording
 
-            return of_recording(path, given_us or _FRAME_US), _no_cable
+            return of_recording(path, given_us or _FRAME_US, warning), _no_cable
         from ..compiler.recordings.graspset import GraspSet
 
         return performance.of_set(GraspSet.load(path), given_us or _FRAME_US), _no_cable

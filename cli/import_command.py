@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import existing_file, json_flag, keep_apart, out, output_file, print_json, progress
+from .common import existing_file, json_flag, keep_apart, out, output_file, print_json, progress, warning
 
 if TYPE_CHECKING:
     from ..compiler.recordings.graspset import GraspSet
@@ -60,8 +60,8 @@ def _imported(tables: tuple[Path, ...], columns: Path | None) -> "tuple[GraspSet
 def _print(report: "ImportReport", output: Path) -> None:
     from rich.table import Table
 
-    for warning in report.warnings:
-        click.echo(f"warning: {warning.message}", err=True)
+    for finding in report.warnings:
+        warning(finding.message)
     if report.coding:
         table = Table("joint", "unit", "step", "largest error", "rms error", "values before", "after", title="Coding")
         for cost in report.coding:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import check_devices, existing_file, keep_apart, output_file, progress
+from .common import check_devices, existing_file, keep_apart, output_file, progress, warning
 
 if TYPE_CHECKING:
     from ..runtime.recording.session import Collection
@@ -115,7 +115,7 @@ def _write(recording: Path, output: Path, accepted: int, planned: int) -> None:
     with progress(f"importing {recording.name}"):
         grasp_set, report = import_recordings([recording])
     grasp_set.save(output)
-    for warning in report.warnings:
-        click.echo(f"warning: {warning.message}", err=True)
+    for finding in report.warnings:
+        warning(finding.message)
     rest = "" if accepted == planned else "; the same command goes on"
     click.echo(f"{output}: {len(grasp_set)} grasps; {accepted} of {planned} trials are done{rest}")

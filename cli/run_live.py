@@ -95,7 +95,8 @@ def _say_what_came_of_it(frames: int, fanout: Fanout, recorder: Recorder | None)
     for report in fanout.reports():
         if report.lost or report.error:
             why = f": {report.error}" if report.error else ""
-            say(f"{report.where}: {report.sent} frames sent, {report.lost} lost{why}")
+            dropped = f", {report.dropped} readers dropped" if report.dropped else ""
+            say(f"{report.where}: {report.sent} frames sent, {report.lost} lost{dropped}{why}")
     if recorder is not None:
         failed = f"; {recorder.failure}" if recorder.failure else ""
         say(f"{recorder.path}: {recorder.messages} messages{failed}")

@@ -12,6 +12,7 @@ from ..runtime.build import Build
 from ..runtime.live.policy import Policy
 from ..runtime.live.replay import replayed
 from ..runtime.sinks.line import encode
+from .common import warning
 
 if TYPE_CHECKING:
     from ..compiler.recordings.graspset import GraspSet
@@ -48,7 +49,7 @@ def replay_recording(build: Build, replay: Path, policy: Policy | None) -> None:
     One JSON line each on stdout, as the live run wrote it; on stderr, how many came out as they did then.
     """
     stdout, same, frames = sys.stdout.buffer, 0, 0
-    for then, now in replayed(build, replay, policy):
+    for then, now in replayed(build, replay, policy, warning):
         same += then == now
         frames += 1
         stdout.write(encode(now, None, None))

@@ -10,30 +10,31 @@ from ..drivers.files import open_file, read_file
 __all__ = ["is_special", "open_file", "read_file", "sync_folder", "write_atomically"]
 
 
-def write_atomically(path: Path, data: bytes) -> None:
+def write_atomically(path: Path, data: bytes, mode: int = 0o666) -> None:
     """Write `data` to `path`: temporary file beside it, fsync, rename, fsync of the folder.
 
     A reader sees the old file or the new one, never a part; after a kill or a full disk the old one is still there.
+    The file's mode is `mode` without the bits of the umask.
     Raises OSError as the operating system gives it, with `path` as its file; also where `path` is a device or a pipe,
     which a rename would replace.
     """
     if is_special(path):
         raise OSError(errno.EINVAL, "is a device or a pipe, not a file that could be replaced", str(path))
     try:
-        _write_beside_and_rename(path, data)
+        _write_beside_and_rename(path, data, mode)
     except OSError as reason:
         # The user has never heard of the temporary file.
         raise OSError(reason.errno, reason.strerror, str(path)) from reason
 
 
-def _write_beside_and_rename(path: Path, data: bytes) -> None:
+def _write_beside_and_rename(path: Path, data: bytes, mode: int) -> None:
     descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
     try:
         with os.fdopen(descriptor, "wb") as file:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
-        Path(temporary).chmod(0o666 & ~_umask())
+        Path(temporary).chmod(mode & ~_umask())
         Path(temporary).replace(path)
     except BaseException:
         Path(temporary).unlink(missing_ok=True)

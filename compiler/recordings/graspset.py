@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...runtime.names import shortened
 from .errors import RecordingError
 from .names import check_names
 from .taxonomy import Taxonomy
@@ -124,7 +125,8 @@ class GraspSet:
         for grasp in found.tolist():
             if grasp not in number:
                 row = int(np.flatnonzero(self.grasps == grasp)[0])
-                raise RecordingError(f"row {row}: {grasp!r} is not a type of taxonomy {self.taxonomy.name}")
+                name = shortened(self.taxonomy.name)
+                raise RecordingError(f"row {row}: {shortened(grasp)!r} is not a type of taxonomy {name}")
         return np.array([number[grasp] for grasp in found.tolist()], dtype=np.intp)[where]
 
     def __len__(self) -> int:

@@ -12,8 +12,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.live.frames import GloveFrame, Mask, SwitchFrame
-from ...runtime.recording.reader import Reader
+from ...runtime.live.frames import GloveFrame, SwitchFrame
+from ...runtime.names import shortened
+from ...runtime.recording.frame_bytes import switch_matrix
+from ...runtime.recording.reader import Reader, check_made
 from ...runtime.recording.session import Collection, Label, Session
 from .coding import CodingCost, code_joint
 from .columns import Calibration, JointColumns
@@ -61,16 +63,19 @@ def import_recordings(paths: Sequence[Path]) -> tuple[GraspSet, ImportReport]:
     """
     parts: list[_Part] = []
     findings: list[Finding] = []
+    size = 0
     for path in paths:
         reader = Reader(path)
         parts += _parts(reader)
-        findings += _state(reader)
+        findings += [Finding(fault.kind, fault.count, fault.message) for fault in reader.faults()]
+        size += reader.end.size if reader.end is not None else 0
     what = ", ".join(path.name for path in paths)
     _check_alike(parts)
     grasps = [(part, grasp) for part in parts for grasp in part.grasps if grasp.whole(part.session)]
     findings += _left_out(parts)
     if not grasps:
         raise TableError(f"{what}: no trial was accepted; `thenar record` makes recordings with labelled trials")
+    check_made(f"{what}: its trials", _bytes_of(grasps), size)
     grasp_set, costs = _joined(grasps)
     return grasp_set, report_of(what, grasp_set, costs, (*findings, *find_oddities(grasp_set, grasp_set.trials)))
 
@@ -107,16 +112,6 @@ def _accepted(reader: Reader) -> Iterator[tuple[Session, _Grasp | None]]:
     yield session, None
 
 
-def _state(reader: Reader) -> Iterator[Finding]:
-    name, end = reader.path.name, reader.end
-    if end is not None and not end.closed and end.whole < end.size:
-        message = f"{name} is whole up to byte {end.whole} of {end.size}, the rest was left out: {end.reason}"
-        yield Finding("cut recordings", 1, message)
-    if reader.altered:
-        message = f"{name} is altered: the checksum of its data does not match, so some frame is not as it was recorded"
-        yield Finding("altered recordings", 1, message)
-
-
 def _left_out(parts: Sequence[_Part]) -> Iterator[Finding]:
     trials = [grasp.label.trial for part in parts for grasp in part.grasps if not grasp.whole(part.session)]
     if trials:
@@ -146,6 +141,13 @@ def _unit(session: Session) -> str:
     return "raw" if session.calibration is None else session.calibration.unit
 
 
+def _bytes_of(grasps: Sequence[tuple[_Part, _Grasp]]) -> int:
+    """Return how much memory the arrays of a set of these grasps take: an array of texts is as wide as its longest."""
+    session, labels = grasps[0][0].session, [grasp.label for _, grasp in grasps]
+    letters = sum(max(len(getattr(label, name)) for label in labels) for name in ("grasp", "subject", "object"))
+    return len(grasps) * (len(session.switches) + 2 * len(session.sensors) + 4 * letters)
+
+
 def _joined(grasps: Sequence[tuple[_Part, _Grasp]]) -> tuple[GraspSet, tuple[CodingCost, ...]]:
     first = grasps[0][0]
     trials = np.array([grasp.label.trial for _, grasp in grasps], np.int64)
@@ -153,7 +155,7 @@ def _joined(grasps: Sequence[tuple[_Part, _Grasp]]) -> tuple[GraspSet, tuple[Cod
     labels = [grasp.label for _, grasp in grasps]
     closed = [0 if grasp.switches is None else grasp.switches.closed for _, grasp in grasps]
     grasp_set = GraspSet(
-        switches=_bits(closed, len(first.session.switches)),
+        switches=switch_matrix(closed, len(first.session.switches)),
         switch_names=first.session.switches,
         codes=np.stack([codes for codes, _, _ in joints], axis=1) if joints else np.zeros((len(grasps), 0), np.uint16),
         joints=tuple(joint for _, joint, _ in joints),
@@ -164,10 +166,6 @@ def _joined(grasps: Sequence[tuple[_Part, _Grasp]]) -> tuple[GraspSet, tuple[Cod
         trials=trials,
     )
     return grasp_set, tuple(cost for _, _, cost in joints)
-
-
-def _bits(masks: Sequence[Mask], switches: int) -> NDArray[np.bool_]:
-    return np.array([[mask >> place & 1 for place in range(switches)] for mask in masks], np.bool_)
 
 
 def _joint(
@@ -188,5 +186,7 @@ def _value(name: str, part: _Part, grasp: _Grasp) -> float:
         return raw
     line = next((line for line in calibration.sensors if line.name == name), None)
     if line is None:
-        raise TableError(f"{part.what}: its calibration has no sensor {name!r}: `thenar calibrate` makes a whole one")
+        raise TableError(
+            f"{part.what}: its calibration has no sensor {shortened(name)!r}: `thenar calibrate` makes a whole one"
+        )
     return line.value(raw)

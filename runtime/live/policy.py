@@ -5,6 +5,10 @@ from dataclasses import dataclass
 
 from ...drivers.errors import SettingError
 
+# Beyond them no frames that a hand can hold ever decide.
+_LARGEST_LEAD = 1e6
+_LEAST_RATE = 1e-100
+
 
 @dataclass(frozen=True, slots=True)
 class Policy:
@@ -29,14 +33,14 @@ class Policy:
     spacing_us: int = 0
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.lead) and self.lead >= 0):
-            raise SettingError(f"a lead of {self.lead}: it is 0 or more, in score units")
+        if not 0 <= self.lead <= _LARGEST_LEAD:
+            raise SettingError(f"a lead of {self.lead}: it is 0 to {_LARGEST_LEAD}, in score units")
         if not 0 <= self.dwell_us <= self.hold_us:
             raise SettingError(f"a dwell of {self.dwell_us} us and a hold of {self.hold_us} us: 0 <= dwell <= hold")
         if not 0 <= self.max_lost <= 1:
             raise SettingError(f"a share of {self.max_lost} that may be lost: it is 0 to 1")
-        if self.error_rate is not None and not 0 < self.error_rate < 1:
-            raise SettingError(f"an error rate of {self.error_rate}: it lies between 0 and 1")
+        if self.error_rate is not None and not _LEAST_RATE <= self.error_rate < 1:
+            raise SettingError(f"an error rate of {self.error_rate}: it lies between 0 and 1, from {_LEAST_RATE} on")
         if self.spacing_us < 0:
             raise SettingError(f"frames {self.spacing_us} us apart: it is 0 or more")
 

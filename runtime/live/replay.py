@@ -1,6 +1,6 @@
 """A live recording run through once more."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from ...drivers.errors import SettingError
@@ -13,10 +13,13 @@ from .published import LiveGrasp
 from .system import System
 
 
-def replayed(build: Build, recording: Path, policy: Policy | None = None) -> Iterator[tuple[LiveGrasp, LiveGrasp]]:
+def replayed(
+    build: Build, recording: Path, policy: Policy | None = None, warn: Callable[[str], None] = lambda _: None
+) -> Iterator[tuple[LiveGrasp, LiveGrasp]]:
     """Yield what was recognised and what is now, moment by moment, decided as it was then or by another `policy`.
 
-    The newest frames at each moment are those that stand before it in the recording, as the live loop wrote them.
+    The newest frames at each moment are those that stand before it in the recording, as the live loop wrote them. At
+    the end `warn` takes a sentence on each fault of the file.
 
     Raises McapError if it is no recording, SettingError if it is of another build.
     """
@@ -31,6 +34,8 @@ def replayed(build: Build, recording: Path, policy: Policy | None = None) -> Ite
             glove = entry
         elif isinstance(entry, LiveGrasp):
             yield entry, recognizer.step(entry.time_us, entry.unix_us, switches, glove)
+    for fault in reader.faults():
+        warn(fault.message)
 
 
 def _system(build: Build, reader: Reader, policy: Policy | None) -> System:
@@ -39,4 +44,7 @@ def _system(build: Build, reader: Reader, policy: Policy | None) -> System:
         raise SettingError(f"{reader.path.name} was recorded with another build: its frames hold other switches")
     harness = parse_harness(session.harness, reader.path.name)
     scan = System.map_of(build, harness)
-    return System(build, harness, scan, session.sensors, session.calibration, policy or session.policy or Policy())
+    system = System(build, harness, scan, session.sensors, session.calibration, policy or session.policy or Policy())
+    if session.switches != system.switch_names:
+        raise SettingError(f"{reader.path.name} names other switches than its build has: it is damaged")
+    return system

@@ -6,6 +6,8 @@ them: its time in microseconds of the host's monotonic clock (8 bytes, little-en
 glove are its sensors in wire order, then its status byte if it sends one.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -65,6 +67,14 @@ def glove_frame(time_us: int, data: bytes, sensors: int) -> GloveFrame:
     if len(data) - sensors not in (0, 1):
         raise McapError(f"holds {len(data)} bytes, its session names {sensors} sensors")
     return GloveFrame(time_us, data[:sensors], data[sensors] if len(data) > sensors else None)
+
+
+def switch_matrix(masks: Sequence[Mask], switches: int) -> NDArray[np.bool_]:
+    """Return (len(masks), switches) bool: bit s of every mask."""
+    length = (switches + 7) // 8
+    rows = np.frombuffer(b"".join(mask.to_bytes(length, "little") for mask in masks), np.uint8)
+    bits = np.unpackbits(rows.reshape(len(masks), length), axis=1, count=switches, bitorder="little")
+    return bits.view(np.bool_)
 
 
 def _spread(mask: Mask, switches: int) -> bytes:

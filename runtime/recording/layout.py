@@ -13,10 +13,15 @@ from zlib import crc32
 from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, DataEnd, Footer, Header, McapRecord, Metadata, MetadataIndex, Schema, Statistics
 
+from ...drivers.errors import SettingError
 from .cdr import BYTES, DEFINITIONS, STRING
 from .session import METADATA, Session, to_metadata
 
 MAGIC = b"\x89MCAP0\r\n"
+# More than any record of ours holds. Read as JSON a record takes some twenty times its length.
+LARGEST_RECORD = 16 << 20
+# What the name of the program in the file's header begins with.
+WRITER = "thenar "
 
 SWITCHES, GLOVE, GRASP, RECOGNITION, TRIALS = range(1, 6)
 # Channel number: (topic, type of its messages).
@@ -61,12 +66,18 @@ class Tail:
 
 def beginning(version: str) -> bytes:
     """Return what a recording by this version of thenar begins with, up to its first session."""
-    return MAGIC + _written(Header("ros2", f"thenar {version}"), *_schemas(), *_channels())
+    return MAGIC + _written(Header("ros2", f"{WRITER}{version}"), *_schemas(), *_channels())
 
 
 def session_record(session: Session) -> bytes:
-    """Return the record that begins a session."""
-    return _written(Metadata(METADATA, to_metadata(session)))
+    """Return the record that begins a session. Raises SettingError if it is longer than a reader takes."""
+    record = _written(Metadata(METADATA, to_metadata(session)))
+    if len(record) > LARGEST_RECORD:
+        raise SettingError(
+            f"the description of this glove takes {len(record)} bytes, {LARGEST_RECORD} at most are recorded: "
+            "shorten glove.toml, or the names in it"
+        )
+    return record
 
 
 def ending(tail: Tail) -> bytes:

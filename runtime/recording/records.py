@@ -1,33 +1,54 @@
-"""The records of an MCAP file, one after the other, up to the last whole one. No length in the file is believed."""
+"""The records of an MCAP file, one after the other, up to the last whole one. No length in the file is believed.
+
+Every byte counts in the checksums, also those of records that nobody here knows or that are too long to be kept.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from io import BytesIO
+from io import SEEK_END, BytesIO
 from pathlib import Path
 from struct import Struct
 from typing import BinaryIO
+from zlib import crc32
 
 from mcap.opcode import Opcode
 
+from ..files import open_file
 from .errors import McapError
-from .layout import MAGIC
+from .layout import LARGEST_RECORD, MAGIC
 
 _OPENING = Struct("<BQ")
-# More than any record of ours or any usual chunk holds; a longer one is passed over unread.
-LARGEST_READ = 64 << 20
+# Other programs' chunks are usually of 1 to 4 MB. Longer ones are passed over.
+LARGEST_CHUNK = 64 << 20
+_PIECE = 1 << 20
 _READ = frozenset(
-    {Opcode.HEADER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.METADATA, Opcode.CHUNK, Opcode.DATA_END}
+    {
+        Opcode.HEADER,
+        Opcode.SCHEMA,
+        Opcode.CHANNEL,
+        Opcode.MESSAGE,
+        Opcode.METADATA,
+        Opcode.CHUNK,
+        Opcode.DATA_END,
+        Opcode.FOOTER,
+    }
 )
 
 
 @dataclass(frozen=True, slots=True)
 class RawRecord:
-    """A whole record: where it begins and what it is. `content` is None where it was not worth reading."""
+    """A whole record: where it begins and what it is.
+
+    content        None where it is of no use here, or longer than any that is
+    before, after  CRC-32 of all bytes from the beginning of its section to its own beginning, and to its end
+    """
 
     offset: int
     opcode: int
     content: bytes | None
     end: int
+    before: int
+    after: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,29 +62,36 @@ class End:
 
 
 class RecordStream:
-    """Iterates over the whole records of `path`; `end` is known afterwards. No file makes it take much memory."""
+    """Iterates over the whole records of `path`; `end` is known afterwards. No file makes it take much memory.
+
+    A section begins with the file; another one wherever `begin_section` is called.
+    """
 
     def __init__(self, path: Path) -> None:
-        """Raises McapError if the file does not begin as MCAP does, OSError as it comes."""
+        """Raises McapError if the file is no regular one or does not begin as MCAP does, OSError as it comes."""
         self.end: End | None = None
-        self.size = path.stat().st_size
+        self._crc = crc32(MAGIC)
         self._path = path
-        with path.open("rb") as file:
+        with open_file(path, McapError) as file:
+            self.size = file.seek(0, SEEK_END)
+            file.seek(0)
             if file.read(len(MAGIC)) != MAGIC:
                 raise McapError(
                     f"{path.name} does not begin as an MCAP file does: it is another kind of file, or empty"
                 )
 
     def __iter__(self) -> Iterator[RawRecord]:
-        with self._path.open("rb") as file:
+        with open_file(self._path, McapError) as file:
             file.seek(len(MAGIC))
             while (record := self._next(file)) is not None:
                 yield record
                 if record.opcode == Opcode.FOOTER:
-                    closed = file.read(len(MAGIC)) == MAGIC
-                    whole = record.end + len(MAGIC) * closed
-                    self.end = End(closed, whole, self.size, "" if closed else "its last 8 bytes are missing")
+                    self.end = self._ended(record.end, file.read(len(MAGIC)))
                     return
+
+    def begin_section(self) -> None:
+        """Count the checksum from the end of the newest record on."""
+        self._crc = 0
 
     def _next(self, file: BinaryIO) -> RawRecord | None:
         offset = file.tell()
@@ -72,11 +100,31 @@ class RecordStream:
             self.end = End(False, offset, self.size, reason)
             return None
         opcode, length = _OPENING.unpack(opening)
+        before = self._crc
+        self._crc = crc32(opening, before)
+        content = self._content(file, opcode, length)
         end = offset + _OPENING.size + length
-        if opcode not in _READ or length > LARGEST_READ:
-            file.seek(end)
-            return RawRecord(offset, opcode, None, end)
-        return RawRecord(offset, opcode, file.read(length), end)
+        if file.tell() != end:
+            self.end = End(False, offset, self.size, "the file became shorter while it was read")
+            return None
+        return RawRecord(offset, opcode, content, end, before, self._crc)
+
+    def _content(self, file: BinaryIO, opcode: int, length: int) -> bytes | None:
+        """Return the next `length` bytes, or nothing of a record that is passed over. Its bytes count all the same."""
+        if opcode in _READ and length <= (LARGEST_CHUNK if opcode == Opcode.CHUNK else LARGEST_RECORD):
+            content = file.read(length)
+            self._crc = crc32(content, self._crc)
+            return content
+        while length and (piece := file.read(min(length, _PIECE))):
+            self._crc = crc32(piece, self._crc)
+            length -= len(piece)
+        return None
+
+    def _ended(self, whole: int, magic: bytes) -> End:
+        if magic != MAGIC:
+            return End(False, whole, self.size, "its last 8 bytes are missing or damaged")
+        whole += len(MAGIC)
+        return End(True, whole, self.size, "bytes follow the end of the recording" if whole < self.size else "")
 
     def _fault(self, offset: int, opening: bytes) -> str:
         """Return why no whole record begins at `offset` with the bytes `opening`, or nothing."""
@@ -89,6 +137,14 @@ class RecordStream:
         return f"a record claims {length} bytes and {left} are left" if length > left else ""
 
 
+def kind_of(opcode: int) -> str:
+    """Return what a record of this kind is called."""
+    try:
+        return Opcode(opcode).name.lower().replace("_", " ")
+    except ValueError:
+        return f"record of unknown kind {opcode:#04x}"
+
+
 def inside(chunk: bytes, offset: int) -> Iterator[RawRecord]:
     """Return the records inside a chunk's data, all of them said to be at the chunk's `offset`. Raises McapError."""
     file = BytesIO(chunk)
@@ -98,4 +154,4 @@ def inside(chunk: bytes, offset: int) -> Iterator[RawRecord]:
             raise McapError("is a chunk that ends inside a record")
         if opcode not in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
             raise McapError(f"is a chunk that holds a record of kind {opcode}, which no chunk may")
-        yield RawRecord(offset, opcode, file.read(length), offset)
+        yield RawRecord(offset, opcode, file.read(length), offset, 0, 0)

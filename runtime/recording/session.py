@@ -5,24 +5,30 @@ was resumed holds one for every time that it was begun, each with its own clock.
 """
 
 import re
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec.structs import fields
 
 from ...drivers.calibration import GloveCalibration
 from ..live.policy import Policy
+from ..names import shortened
 from .errors import McapError
 
 METADATA = "thenar"
 VERSION = 1
+# No glove, no taxonomy and no patience goes beyond them. A file that does is damaged, or made to fill the memory.
+_MOST_SWITCHES, _MOST_SENSORS, _MOST_TYPES, _MOST_OBJECTS = 65_536, 255, 10_000, 1000
+MOST_TRIALS = 1_000_000
+
+Number = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]
 
 
 class Task(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A grasp type to collect, and the objects to grasp so, by turns."""
 
     grasp: str
-    objects: tuple[str, ...]
+    objects: Annotated[tuple[str, ...], msgspec.Meta(min_length=1, max_length=_MOST_OBJECTS)]
 
 
 class Collection(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -33,10 +39,10 @@ class Collection(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     subject: str
     taxonomy: str
-    types: tuple[str, ...]
-    tasks: tuple[Task, ...]
-    repetitions: int
-    seed: int
+    types: Annotated[tuple[str, ...], msgspec.Meta(max_length=_MOST_TYPES)]
+    tasks: Annotated[tuple[Task, ...], msgspec.Meta(max_length=_MOST_TYPES)]
+    repetitions: Annotated[int, msgspec.Meta(ge=1, le=MOST_TRIALS)]
+    seed: Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]
 
 
 Event = Literal["captured", "accepted", "redone"]
@@ -49,9 +55,9 @@ class Label(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     not. time_us is the host's monotonic clock.
     """
 
-    time_us: int
+    time_us: Number
     event: Event
-    trial: int
+    trial: Number
     grasp: str
     subject: str
     object: str
@@ -72,14 +78,14 @@ class Session(msgspec.Struct, frozen=True, kw_only=True):
     """
 
     thenar: str
-    switches: tuple[str, ...]
-    sensors: tuple[str, ...]
+    switches: Annotated[tuple[str, ...], msgspec.Meta(max_length=_MOST_SWITCHES)]
+    sensors: Annotated[tuple[str, ...], msgspec.Meta(max_length=_MOST_SENSORS)]
     build: str = ""
     harness: str = ""
     calibration: GloveCalibration | None = None
     policy: Policy | None = None
     collection: Collection | None = None
-    clock_ns: int = 0
+    clock_ns: Number = 0
 
 
 def to_metadata(session: Session) -> dict[str, str]:
@@ -93,7 +99,7 @@ def from_metadata(texts: dict[str, str]) -> Session:
     version = texts.get("version", "")
     # No more digits than any version will have, and than int() takes.
     if not re.fullmatch("[0-9]{1,9}", version):
-        raise McapError(f"its version is {version[:20]!r}, not a number: it was not recorded by thenar")
+        raise McapError(f"its version is {shortened(version, 20)!r}, not a number: it was not recorded by thenar")
     if int(version) > VERSION:
         raise McapError(f"it is of version {version}, this thenar reads up to {VERSION}: update thenar")
     return Session(**{field.name: _value(field, texts) for field in fields(Session) if field.name in _need(texts)})
@@ -117,4 +123,4 @@ def _value(field: Any, texts: dict[str, str]) -> Any:
     try:
         return msgspec.json.decode(text, type=field.type)
     except (msgspec.DecodeError, ValueError, RecursionError) as wrong:
-        raise McapError(f"its metadata {field.name!r} cannot be read: {wrong}") from None
+        raise McapError(f"its metadata {field.name!r} cannot be read: {shortened(str(wrong), 200)}") from None

@@ -7,7 +7,7 @@ from pathlib import Path
 from ...drivers.errors import SettingError
 from .layout import Tail
 from .reader import Reader
-from .session import Collection, Label, Session
+from .session import MOST_TRIALS, Collection, Label, Session
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,13 @@ def planned(collection: Collection) -> tuple[Trial, ...]:
     """Return the trials of a collection: every task so many times, its objects by turns, all in one random order.
 
     So the paper collected: each type 100 times with two objects, in random order. Equal collections give equal plans.
+    Raises SettingError if there are more than a million trials.
     """
+    if len(collection.tasks) * collection.repetitions > MOST_TRIALS:
+        raise SettingError(
+            f"{len(collection.tasks)} grasp types of {collection.repetitions} repetitions each are more than "
+            f"{MOST_TRIALS} trials: take fewer repetitions"
+        )
     grasps = [
         (task.grasp, task.objects[repetition % len(task.objects)])
         for task in collection.tasks
@@ -52,6 +58,8 @@ def read_journal(path: Path) -> Journal:
     if first.collection is None:
         raise SettingError(f"{path} is a recording without trials: name another output")
     accepted = [entry.trial for entry in reader if isinstance(entry, Label) and entry.event == "accepted"]
-    if reader.foreign:
-        raise SettingError(f"{path} was changed by another program: import it, and collect the rest into another file")
+    if reader.foreign or reader.altered:
+        raise SettingError(
+            f"{path} was changed by another program, or is damaged: import it, and collect the rest into another file"
+        )
     return Journal(path, first, frozenset(accepted), reader.tail)

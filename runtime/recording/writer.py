@@ -21,6 +21,8 @@ from .session import Label, Session
 # Opcode, length of the rest, channel, sequence, log time, publish time (MCAP specification, Message).
 _MESSAGE = Struct("<BQHIQQ")
 _MESSAGE_OPCODE, _OPENING = 5, 9
+# A recording tells how somebody's hand moves.
+_PRIVATE = 0o600
 _json = msgspec.json.Encoder().encode
 
 
@@ -113,7 +115,7 @@ def _begun(path: Path, session: Session) -> Tail:
         raise SettingError(f"{path} exists, and a recording is never written over: name another file")
     first, record = beginning(session.thenar), session_record(session)
     # Whole or not at all, so that there is no file without a session.
-    write_atomically(path, first + record)
+    write_atomically(path, first + record, mode=_PRIVATE)
     tail = Tail()
     tail.add_bytes(first + record)
     tail.add_session(len(record))

@@ -5,8 +5,9 @@
     NAMESPACE/angles    sensor_msgs/JointState           every frame with angles: the glove's joints, in rad
     NAMESPACE/health    std_msgs/String                  once a second, if asked for: how the glove fares, as JSON
 
-Reliable, volatile, the last 10 kept: the default of ROS 2, which serves reliable and best-effort readers alike. Which
-network Cyclone DDS uses is said by its own CYCLONEDDS_URI, which domain by ROS_DOMAIN_ID, as for a ROS 2 node.
+Reliable, volatile, the last 10 kept: the default of ROS 2, which serves reliable and best-effort readers alike. Nodes
+of this machine can read, others where CYCLONEDDS_URI or `?public` lets them; ROS_DOMAIN_ID says which domain, as for a
+ROS 2 node.
 """
 
 from collections.abc import Callable
@@ -35,12 +36,15 @@ _DEPTH = 10
 class RosTopics:
     """Publishes under a namespace of ROS. What DDS refuses is counted as lost and told in the report."""
 
-    def __init__(self, name: str = "/thenar") -> None:
-        """Raise SettingError about a name or a domain that ROS cannot have, SinkError if DDS does not start."""
-        self._where = f"ros:{namespace(name)}"
+    def __init__(self, name: str = "/thenar", *, public: bool = False) -> None:
+        """Publish under `name` to this machine, or to all networks that Cyclone DDS finds if `public`.
+
+        Raise SettingError about a name or a domain that ROS cannot have, SinkError if DDS does not start.
+        """
+        self._where = f"ros:{namespace(name)}" + "?public" * public
         number = domain()
         try:
-            self._domain, participant = join(number)
+            self._domain, participant = join(number, public=public)
             self._grasp = _writer(participant, f"{name}/grasp", String)
             self._preshape = _writer(participant, f"{name}/preshape", JointTrajectory)
             self._angles = _writer(participant, f"{name}/angles", JointState)
@@ -49,6 +53,11 @@ class RosTopics:
             raise SinkError(
                 f"{self._where} cannot be opened in domain {number}: {reason} "
                 "Look at CYCLONEDDS_URI, and at the network interfaces that it names."
+            ) from None
+        except OSError as reason:
+            raise SinkError(
+                f"{self._where} cannot be kept to this machine: {reason.strerror}. That takes Linux 5.7 or newer; "
+                f"ros:{name}?public lets other machines read"
             ) from None
         self._closed = False
         self._strings: dict[str, PackedString] = {}

@@ -1,7 +1,9 @@
 """JSON lines into a file: stdout, a pipe, a file on disk, anything that takes bytes."""
 
 import os
+import stat
 import sys
+from contextlib import suppress
 from io import UnsupportedOperation
 from pathlib import Path
 from typing import BinaryIO
@@ -51,7 +53,18 @@ class JsonLines:
             return self._outlet.send(line)
         except (OSError, ValueError) as reason:  # ValueError: somebody closed the file
             self._error = getattr(reason, "strerror", None) or str(reason)
+            self._take_back(len(line) - self._outlet.waiting)
             return False
+
+    def _take_back(self, torn: int) -> None:
+        """Cut off the part of a line that a full disk had room for, unless somebody else has written behind it."""
+        if not (torn > 0 and self._owned):
+            return
+        with suppress(OSError, ValueError):
+            descriptor = self._file.fileno()
+            end = os.lseek(descriptor, 0, os.SEEK_CUR)
+            if os.fstat(descriptor).st_size == end:
+                os.ftruncate(descriptor, end - torn)
 
     def report(self) -> SinkReport:
         """Return how this sink is doing."""
@@ -92,6 +105,23 @@ def open_jsonlines(path: str, *, wait: bool = False) -> JsonLines:
     except OSError as reason:
         hint = ": is its reader running?" if Path(path).is_fifo() else ""
         raise SinkError(f"{where} cannot be written: {reason.strerror}{hint}") from None
+    try:
+        _finish_line(descriptor, path)
+    except OSError as reason:
+        os.close(descriptor)
+        raise SinkError(f"{where} cannot be written: {reason.strerror}") from None
     if wait:
         os.set_blocking(descriptor, True)
     return JsonLines(os.fdopen(descriptor, "wb", buffering=0), wait=wait, where=where, owned=True)
+
+
+def _finish_line(descriptor: int, path: str) -> None:
+    """End the line that whoever wrote the file last was killed in, so that the next one begins a line."""
+    found = os.fstat(descriptor)
+    if not (stat.S_ISREG(found.st_mode) and found.st_size):
+        return
+    with Path(path).open("rb") as file:
+        file.seek(-1, os.SEEK_END)
+        whole = file.read(1) == b"\n"
+    if not whole:
+        os.write(descriptor, b"\n")

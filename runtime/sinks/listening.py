@@ -6,7 +6,9 @@ import os
 import re
 import socket
 import stat
+from collections.abc import Callable
 from pathlib import Path
+from time import monotonic
 
 from ...drivers.errors import SettingError
 from .sink import SinkError
@@ -15,7 +17,7 @@ from .sockets import SocketLines
 _BACKLOG = 16
 
 
-def open_unix(path: str) -> SocketLines:
+def open_unix(path: str, clock: Callable[[], float] = monotonic) -> SocketLines:
     """Return lines on a Unix socket at `path`.
 
     The socket that a process left behind when it was killed is replaced; anything else that is there stays. Raises
@@ -39,7 +41,7 @@ def open_unix(path: str) -> SocketLines:
         if _same(path, made):
             Path(path).unlink()
 
-    return SocketLines(listener, where, tidy)
+    return SocketLines(listener, where, tidy, clock)
 
 
 def _make_way(path: str, where: str) -> None:
@@ -79,7 +81,7 @@ def _unix_error(where: str, reason: OSError) -> Exception:
     return SinkError(f"{where} cannot be opened: {reason.strerror}{hint}")
 
 
-def open_tcp(place: str, *, public: bool = False) -> SocketLines:
+def open_tcp(place: str, *, public: bool = False, clock: Callable[[], float] = monotonic) -> SocketLines:
     """Return lines on a TCP port: "127.0.0.1:7777", "localhost:7777", "[::1]:7777" or, on 127.0.0.1, "7777".
 
     Whoever can connect reads along; so only addresses of this machine itself are taken unless `public`. Port 0 is any
@@ -101,7 +103,7 @@ def open_tcp(place: str, *, public: bool = False) -> SocketLines:
         listener.close()
         hint = ": another process serves that port; take another" if reason.errno == errno.EADDRINUSE else ""
         raise SinkError(f"{where} cannot be opened: {reason.strerror}{hint}") from None
-    return SocketLines(listener, where)
+    return SocketLines(listener, where, clock=clock)
 
 
 def _resolve(place: str, where: str) -> tuple[socket.AddressFamily, tuple[str, int]]:

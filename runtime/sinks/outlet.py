@@ -13,13 +13,22 @@ Writer = Callable[[bytes], int]
 
 
 class Outlet:
-    """One reader's end: at most the rest of one line waits here, what else waits stands in the system's own buffer."""
+    """One reader's end: at most the rest of one line waits here, what else waits stands in the system's own buffer.
 
-    __slots__ = ("_rest", "_write")
+    written   how many bytes it has taken
+    """
+
+    __slots__ = ("_rest", "_write", "written")
 
     def __init__(self, write: Writer) -> None:
         self._write = write
         self._rest = b""
+        self.written = 0
+
+    @property
+    def waiting(self) -> int:
+        """How many bytes of the newest line are still to be written."""
+        return len(self._rest)
 
     def send(self, line: bytes) -> bool:
         """Send `line` if the reader keeps up; return whether it went out or began to. Raises OSError if it is gone."""
@@ -37,7 +46,9 @@ class Outlet:
         self._rest = data
         try:
             while self._rest:
-                self._rest = self._rest[self._write(self._rest) :]
+                taken = self._write(self._rest)
+                self.written += taken
+                self._rest = self._rest[taken:]
         except BlockingIOError:
             return False
         return True

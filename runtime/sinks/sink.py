@@ -24,6 +24,7 @@ class SinkReport(msgspec.Struct, frozen=True):
     lost      what did not: a reader was slow, was gone, or the system refused
     error     what went wrong last, or nothing
     over      whether nothing will go out any more: its only reader is gone, the disk is full, it broke
+    dropped   how many readers were dropped, for they took nothing, or were the slowest when all places were taken
     """
 
     where: str
@@ -32,6 +33,7 @@ class SinkReport(msgspec.Struct, frozen=True):
     lost: int
     error: str = ""
     over: bool = False
+    dropped: int = 0
 
 
 class Sink(Protocol):

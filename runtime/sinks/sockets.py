@@ -3,12 +3,18 @@
 Everything happens inside `publish`, without threads and without waiting: new readers are let in, each gets the line if
 it keeps up. A slow reader loses whole lines, sees it by the gaps in `number`, and holds nobody up. What waits for it is
 the rest of one line and what the system buffers, which is kept small so that it does not read the past.
+
+Places are few, and a reader that only holds one is no reader: it is dropped when it takes nothing for five seconds, and
+earlier when somebody new finds no place.
 """
 
+import ipaddress
 import select
 import socket
 from collections.abc import Callable
 from contextlib import suppress
+from time import monotonic
+from typing import Any
 
 from ..live.health import HealthReport
 from ..live.published import LiveGrasp
@@ -19,24 +25,52 @@ from .outlet import Outlet
 from .sink import SinkReport
 
 MAX_READERS = 32
+# Of one other machine, so that it cannot take every place.
+MAX_OF_ONE = 8
+# A reader that takes not one byte for so long hangs.
+HANGING_S = 5.0
 # Some fifty lines; the kernel doubles it for its own bookkeeping.
 SEND_BUFFER = 16384
+# A reader that has lost a line is slow until it has lost none for so long.
+_LEVEL_S = 1.0
+# Let in at one frame, so that a crowd at the door does not hold it up.
+_KNOCKS = 16
+_HERE = frozenset({"127.0.0.1", "::1"})
 
 
 class SocketLines:
     """Serves the readers of a listening socket, which it takes over; `tidy` is called once, at the end."""
 
-    __slots__ = ("_error", "_knocks", "_listener", "_lost", "_readers", "_sent", "_tidy", "_where")
+    __slots__ = (
+        "_clock",
+        "_dropped",
+        "_error",
+        "_knocks",
+        "_listener",
+        "_lost",
+        "_readers",
+        "_sent",
+        "_tidy",
+        "_where",
+    )
 
-    def __init__(self, listener: socket.socket, where: str, tidy: Callable[[], None] = lambda: None) -> None:
+    def __init__(
+        self,
+        listener: socket.socket,
+        where: str,
+        tidy: Callable[[], None] = lambda: None,
+        clock: Callable[[], float] = monotonic,
+    ) -> None:
+        """Serve `listener`; `clock` gives seconds."""
         listener.setblocking(False)
         self._listener = listener
         self._knocks = select.poll()
         self._knocks.register(listener, select.POLLIN)
         self._where = where
         self._tidy = tidy
-        self._readers: dict[socket.socket, Outlet] = {}
-        self._sent = self._lost = 0
+        self._clock = clock
+        self._readers: list[_Reader] = []
+        self._sent = self._lost = self._dropped = 0
         self._error = ""
 
     @property
@@ -61,35 +95,61 @@ class SocketLines:
             return
         try:
             with suppress(BlockingIOError):
-                while True:
-                    self._seat(self._listener.accept()[0])
+                for _ in range(_KNOCKS):
+                    self._seat(*self._listener.accept())
         except OSError as reason:  # gone between knocking and entering, or no descriptors left
             self._error = reason.strerror or str(reason)
 
-    def _seat(self, reader: socket.socket) -> None:
-        if len(self._readers) >= MAX_READERS:
-            self._error = f"more than {MAX_READERS} readers: the newest were turned away"
-            reader.close()
+    def _seat(self, reader: socket.socket, peer: Any) -> None:
+        host = _host(reader, peer)
+        if self._has_room(host):
+            self._readers.append(_Reader(reader, host))
         else:
-            self._readers[reader] = _outlet(reader)
+            reader.close()
+
+    def _has_room(self, host: str) -> bool:
+        """Return whether one more reader of `host` has a place; the slowest reader is dropped if that makes one."""
+        alike = [reader for reader in self._readers if host and reader.host == host]
+        if len(alike) >= MAX_OF_ONE:
+            crowd, full = alike, f"more than {MAX_OF_ONE} readers on {host}"
+        elif len(self._readers) >= MAX_READERS:
+            crowd, full = self._readers, f"more than {MAX_READERS} readers"
+        else:
+            return True
+        slow = [(reader.slow_since_s, place) for place, reader in enumerate(crowd) if reader.slow_since_s is not None]
+        if not slow:
+            self._error = f"{full}: the newest were turned away"
+            return False
+        self._drop(crowd[min(slow)[1]], f"{full}: the slowest was dropped for a new one")
+        return True
+
+    def _drop(self, reader: "_Reader", why: str) -> None:
+        self._readers.remove(reader)
+        reader.close()
+        self._dropped += 1
+        self._error = why
 
     def _send_all(self, line: bytes) -> None:
+        now_s = self._clock()
         for reader in tuple(self._readers):
-            self._send(reader, line)
+            sent = self._send(reader, line, now_s)
+            self._sent += sent
+            self._lost += not sent
 
-    def _send(self, reader: socket.socket, line: bytes) -> None:
+    def _send(self, reader: "_Reader", line: bytes, now_s: float) -> bool:
         try:
-            sent = self._readers[reader].send(line)
+            sent = reader.send(line, now_s)
         except OSError:
-            del self._readers[reader]
+            self._readers.remove(reader)
             reader.close()
-            sent = False
-        self._sent += sent
-        self._lost += not sent
+            return False
+        if reader.hangs(now_s):
+            self._drop(reader, f"a reader that took nothing for {HANGING_S:g} s was dropped")
+        return sent
 
     def report(self) -> SinkReport:
         """Return how this sink is doing."""
-        return SinkReport(self._where, len(self._readers), self._sent, self._lost, self._error)
+        return SinkReport(self._where, len(self._readers), self._sent, self._lost, self._error, dropped=self._dropped)
 
     def close(self) -> None:
         """Close the socket and every reader's."""
@@ -102,9 +162,58 @@ class SocketLines:
         self._tidy()
 
 
-def _outlet(reader: socket.socket) -> Outlet:
-    reader.setblocking(False)
-    reader.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
-    if reader.family != socket.AF_UNIX:
-        reader.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    return Outlet(reader.send)
+class _Reader:
+    """Somebody who reads.
+
+    host          the machine it is on; "" for this one
+    slow_since_s  when it began to lose lines; None while it keeps up
+    """
+
+    __slots__ = ("_missed_s", "_outlet", "_socket", "_stalled_s", "host", "slow_since_s")
+
+    def __init__(self, reader: socket.socket, host: str) -> None:
+        reader.setblocking(False)
+        reader.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
+        if reader.family != socket.AF_UNIX:
+            reader.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.host = host
+        self.slow_since_s: float | None = None
+        self._socket = reader
+        self._outlet = Outlet(reader.send)
+        self._stalled_s: float | None = None
+        self._missed_s = 0.0
+
+    def send(self, line: bytes, now_s: float) -> bool:
+        """Send `line` if there is room for it; return whether it went out. Raises OSError if the reader is gone."""
+        before = self._outlet.written
+        sent = self._outlet.send(line)
+        if self._outlet.written > before:
+            self._stalled_s = None
+        elif self._stalled_s is None:
+            self._stalled_s = now_s
+        if not sent:
+            self._missed_s = now_s
+            self.slow_since_s = now_s if self.slow_since_s is None else self.slow_since_s
+        elif self.slow_since_s is not None and now_s - self._missed_s >= _LEVEL_S:
+            self.slow_since_s = None
+        return sent
+
+    def hangs(self, now_s: float) -> bool:
+        """Return whether lines were offered to it for so long, and it took not a byte."""
+        return self._stalled_s is not None and now_s - self._stalled_s >= HANGING_S
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._socket.close()
+
+
+def _host(reader: socket.socket, peer: Any) -> str:
+    """Return what is one machine, as far as its address says: all of a network's 64 bits in IPv6; "" for this one."""
+    if reader.family == socket.AF_UNIX:
+        return ""
+    address = ipaddress.ip_address(peer[0].partition("%")[0])
+    mapped = getattr(address, "ipv4_mapped", None)
+    address = address if mapped is None else mapped
+    if str(address) in _HERE:
+        return ""
+    return str(address if address.version == 4 else ipaddress.ip_network((address, 64), strict=False))

@@ -1,13 +1,14 @@
 """What an emulated glove plays of a live recording."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 
 from ...runtime.live.frames import GloveFrame, SwitchFrame
 from ...runtime.live.published import UNKNOWN, LiveGrasp
-from ...runtime.recording.reader import Reader
+from ...runtime.recording.frame_bytes import switch_matrix
+from ...runtime.recording.reader import Reader, check_made
 from ...runtime.recording.session import Label
 from ..errors import SceneError
 from .performance import Performance, resting, typical
@@ -16,21 +17,25 @@ from .performance import Performance, resting, typical
 Moment = tuple[int, bytes, str]
 
 
-def of_recording(path: Path, period_us: int) -> Performance:
+def of_recording(path: Path, period_us: int, warn: Callable[[str], None] = lambda _: None) -> Performance:
     """Return the newest frames of a recording every `period_us`, with the grasp type recognised, or collected, by then.
 
-    Where there was no CyberGlove its sensors rest. Raises McapError if it is no recording, SceneError if it holds no
-    frames.
+    Where there was no CyberGlove its sensors rest. `warn` takes a sentence on each fault of the file. Raises McapError
+    if it is no recording, SceneError if it holds no frames.
     """
     reader = Reader(path)
     calibration = reader.session.calibration or typical()
     rows = list(_ticks(reader, resting(calibration).tobytes(), period_us))
+    for fault in reader.faults():
+        warn(fault.message)
     if not rows:
         raise SceneError(f"{path.name}: holds no frame of a glove")
     names = reader.session.switches
-    bits = [[bool(closed >> number & 1) for number in range(len(names))] for closed, _, _ in rows]
+    assert reader.end is not None
+    width = len(names) + len(rows[0][1]) + 4 * max(len(grasp) for _, _, grasp in rows)
+    check_made(f"{path.name}: what it plays", len(rows) * width, reader.end.size)
     return Performance(
-        switches=np.array(bits, np.bool_).reshape(len(rows), len(names)),
+        switches=switch_matrix([closed for closed, _, _ in rows], len(names)),
         switch_names=names,
         sensors=np.frombuffer(b"".join(sensors for _, sensors, _ in rows), np.uint8).reshape(len(rows), -1),
         grasps=np.array([grasp for _, _, grasp in rows]),

@@ -203,6 +203,21 @@ def test_an_altered_recording_is_told(write: Write) -> None:
     assert "altered recordings" in [warning.kind for warning in report.warnings]
 
 
+def test_what_is_passed_over_is_told_with_its_place(write: Write) -> None:
+    path = write()
+    data = bytearray(path.read_bytes())
+    place = data.index(b'"time_us":3,"event":"captured"') - 40
+    assert data[place] == 5
+    data[place] ^= 0x80
+    path.write_bytes(data)
+    _, report = import_recordings([path])
+    messages = {warning.kind: warning.message for warning in report.warnings}
+    assert messages["records passed over"] == (
+        f"a.mcap holds what thenar does not read, passed over: record of unknown kind 0x85 at byte {place}"
+    )
+    assert messages["altered recordings"] == "a.mcap is altered: the checksum of its data does not match"
+
+
 def test_a_recording_without_trials_says_what_makes_some(write: Write) -> None:
     for session, trials in ((replace(SESSION, collection=None), ()), (SESSION, ())):
         path = write(f"{len(str(session))}.mcap", session, trials)

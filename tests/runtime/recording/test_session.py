@@ -4,6 +4,11 @@ from msgspec.structs import replace
 from thenar.runtime.recording.errors import McapError
 from thenar.runtime.recording.session import Session, from_metadata, to_metadata
 
+PLAN = (
+    '{"subject":"A","taxonomy":"own","types":["cup"],"tasks":[{"grasp":"cup","objects":["mug","jar"]}],'
+    '"repetitions":3,"seed":7}'
+)
+
 
 def test_a_session_comes_back_from_its_texts(session: Session) -> None:
     assert from_metadata(to_metadata(session)) == session
@@ -43,6 +48,14 @@ def test_what_has_a_default_may_be_missing(session: Session) -> None:
             "calibration",
         ),
         ({"clock_ns": "1e400"}, "clock_ns"),
+        ({"clock_ns": "9" * 30}, "clock_ns"),
+        ({"switches": "[" + ",".join(['"s"'] * 65_537) + "]"}, "of length <= 65536"),
+        ({"sensors": "[" + ",".join(['"s"'] * 256) + "]"}, "of length <= 255"),
+        ({"collection": PLAN.replace('["mug","jar"]', "[]")}, "of length >= 1 - at `\\$.tasks"),
+        ({"collection": PLAN.replace('"repetitions":3', '"repetitions":1000000000000')}, "<= 1000000"),
+        ({"collection": PLAN.replace('"repetitions":3', '"repetitions":0')}, ">= 1"),
+        ({"collection": PLAN.replace('"seed":7', '"seed":-1')}, ">= 0"),
+        ({"version": "\x1b[2J"}, r"its version is '\\\\x1b\[2J'"),
     ],
 )
 def test_a_session_that_cannot_be_read_is_refused_by_its_key(

@@ -85,3 +85,17 @@ def test_behind_what_another_program_added_nothing_is_recorded(tmp_path: Path, s
     path.write_bytes(data[:end] + b"\x80" + (5).to_bytes(8, "little") + b"12345" + data[end:])
     with pytest.raises(SettingError, match="was changed by another program"):
         read_journal(path)
+
+
+def test_behind_what_is_damaged_nothing_is_recorded(tmp_path: Path, session: Session) -> None:
+    """A new checksum over it would hide the damage for good."""
+    path = tmp_path / "a.mcap"
+    begun(path, session, [("captured", 1)])
+    path.write_bytes(path.read_bytes().replace(b'"object":"mug"', b'"object":"jug"'))
+    with pytest.raises(SettingError, match="or is damaged: import it"):
+        read_journal(path)
+
+
+def test_more_trials_than_anybody_takes_are_refused() -> None:
+    with pytest.raises(SettingError, match="3 grasp types of 400000 repetitions each are more than 1000000 trials"):
+        planned(collection(400_000))

@@ -1,6 +1,7 @@
 import os
 import resource
 import signal
+import stat
 import subprocess
 import sys
 import textwrap
@@ -23,8 +24,9 @@ from thenar.drivers.errors import SettingError
 from thenar.runtime.errors import FrameError
 from thenar.runtime.live.frames import GloveFrame, SwitchFrame, now_us
 from thenar.runtime.live.published import LiveGrasp
+from thenar.runtime.recording.layout import LARGEST_RECORD
 from thenar.runtime.recording.reader import Reader
-from thenar.runtime.recording.session import Label, Session
+from thenar.runtime.recording.session import Collection, Label, Session
 from thenar.runtime.recording.trials import read_journal
 from thenar.runtime.recording.writer import Recorder
 
@@ -154,6 +156,21 @@ def test_a_recording_is_never_written_over(recording: Path, session: Session) ->
 def test_a_folder_that_is_not_there_is_an_error_before_anything_starts(tmp_path: Path, session: Session) -> None:
     with pytest.raises(FileNotFoundError):
         Recorder(tmp_path / "no" / "a.mcap", session)
+
+
+def test_nobody_else_may_read_a_recording(tmp_path: Path, session: Session) -> None:
+    path = tmp_path / "a.mcap"
+    with Recorder(path, replace(session, collection=Collection("A", "own", (), (), 1, 0))):
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    with Recorder(path, session, tail=read_journal(path).tail):
+        pass
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+
+
+def test_a_glove_whose_description_no_reader_would_take_is_refused(tmp_path: Path, session: Session) -> None:
+    with pytest.raises(SettingError, match="16777216 at most are recorded: shorten glove"):
+        Recorder(tmp_path / "a.mcap", replace(session, harness="#" * LARGEST_RECORD))
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_frame_of_another_glove_is_refused_and_the_file_stays_whole(tmp_path: Path, session: Session) -> None:

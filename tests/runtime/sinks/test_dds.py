@@ -1,13 +1,16 @@
 """Topics of ROS 2, read by another process that knows their types from elsewhere (ros_listener.py), over loopback."""
 
 import json
+import os
 import queue
 import signal
+import socket
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from itertools import count
 from pathlib import Path
 from types import ModuleType
@@ -260,3 +263,33 @@ def test_a_domain_that_ros_cannot_have_is_refused(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setenv("ROS_DOMAIN_ID", number)
     with pytest.raises(SettingError, match="from 0 to 232"):
         open_sink(f"ros:{name}")
+
+
+def devices() -> set[bytes]:
+    """Return to which network devices the datagram sockets of this process are bound; empty: to all."""
+    found = set()
+    for link in Path("/proc/self/fd").iterdir():
+        with suppress(OSError):
+            if str(link.readlink()).startswith("socket:"):
+                with socket.socket(fileno=os.dup(int(link.name))) as one:
+                    if one.type == socket.SOCK_DGRAM and one.family in (socket.AF_INET, socket.AF_INET6):
+                        found.add(one.getsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, 16).rstrip(b"\0"))
+    return found
+
+
+def test_unless_it_is_asked_for_no_other_machine_can_read(
+    monkeypatch: pytest.MonkeyPatch, name: str, listen: Listen, make_grasp: MakeGrasp
+) -> None:
+    listener = listen()
+    monkeypatch.delenv("CYCLONEDDS_URI")
+    sink = open_sink(f"ros:{name}")
+    assert devices() == {b"lo"}
+    memberships = Path("/proc/net/igmp").read_text()
+    assert "0100FFEF" not in memberships  # 239.255.0.1, where participants call for each other
+    heard = listener.hear("topic", "grasp", lambda: sink.publish(make_grasp(0), None, None))
+    assert heard["message"] == {"data": "PoS"}
+    sink.close()
+    sink = open_sink(f"ros:{name}?public")
+    assert sink.report().where == f"ros:{name}?public"
+    assert b"" in devices()
+    sink.close()

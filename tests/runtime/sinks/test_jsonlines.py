@@ -2,6 +2,7 @@
 
 import io
 import os
+import resource
 import subprocess
 import sys
 import threading
@@ -40,6 +41,40 @@ def test_a_file_on_disk_grows_and_keeps_what_it_has(make_grasp: MakeGrasp, tmp_p
         sink.close()
         sink.close()
     assert numbers(path.read_bytes()) == [1, 2]
+
+
+def test_behind_a_torn_line_the_first_frame_begins_a_line(make_grasp: MakeGrasp, tmp_path: Path) -> None:
+    path = tmp_path / "run.jsonl"
+    sink = open_sink(f"jsonl:{path}")
+    sink.publish(make_grasp(1), None, None)
+    sink.close()
+    whole = path.read_bytes()
+    for cut in range(1, len(whole)):
+        path.write_bytes(whole + whole[:cut])
+        sink = open_sink(f"jsonl:{path}")
+        sink.publish(make_grasp(2), None, None)
+        sink.close()
+        first, torn, *rest = path.read_bytes().splitlines(keepends=True)
+        assert (first, torn) == (whole, whole[:cut] + b"\n")
+        assert numbers(b"".join(rest)) == [2]
+
+
+@pytest.mark.parametrize("room", range(0, 400, 7))
+def test_a_full_disk_leaves_whole_lines_alone(make_grasp: MakeGrasp, tmp_path: Path, room: int) -> None:
+    path = tmp_path / "run.jsonl"
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    sink = open_sink(f"jsonl:{path}")
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000 + room, before[1]))
+    try:
+        for number in range(20):
+            sink.publish(make_grasp(number), None, None)
+        report = sink.report()
+        sink.close()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert (report.error, report.over) == ("File too large", True)
+    assert numbers(path.read_bytes()) == list(range(report.sent))
+    assert path.read_bytes().endswith(b"\n")
 
 
 def test_a_slow_pipe_loses_whole_lines_and_holds_nobody_up(make_grasp: MakeGrasp) -> None:

@@ -22,7 +22,14 @@ def test_every_kind_is_opened_by_its_name(tmp_path: Path) -> None:
         sink.close()
 
 
-@pytest.mark.parametrize("where", ["", "jsonl", "jsonl:", "mqtt:broker", "ros", "ros:thenar", "ros:/a//b", "ros:/2nd"])
+@pytest.mark.parametrize(
+    "where", ["", "jsonl", "jsonl:", "mqtt:broker", "ros", "ros:thenar", "ros:/a//b", "ros:/2nd", "ros:?public"]
+)
 def test_a_name_that_means_nothing_is_told_how_to_write_it(where: str) -> None:
     with pytest.raises(SettingError, match=r"unix:PATH|ros:/thenar"):
         open_sink(where)
+
+
+def test_behind_the_name_of_ros_topics_only_public_means_something() -> None:
+    with pytest.raises(SettingError, match=r"'ros:/a\?open': behind the question mark can only be `public`"):
+        open_sink("ros:/a?open")

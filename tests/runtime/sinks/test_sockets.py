@@ -13,14 +13,32 @@ from thenar.runtime.live.published import LiveGrasp
 from thenar.runtime.preshape import Preshape
 from thenar.runtime.sinks import HealthLine, JointAngles, Line, SocketLines
 from thenar.runtime.sinks.listening import open_tcp, open_unix
-from thenar.runtime.sinks.sockets import MAX_READERS
+from thenar.runtime.sinks.sockets import HANGING_S, MAX_OF_ONE, MAX_READERS
 
 MakeGrasp = Callable[..., LiveGrasp]
 
 
+class Clock:
+    """A clock that goes when it is set."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
 @pytest.fixture(params=["unix", "tcp"])
-def sink(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[SocketLines]:
-    made = open_unix(str(tmp_path / "grasps")) if request.param == "unix" else open_tcp("127.0.0.1:0")
+def sink(request: pytest.FixtureRequest, tmp_path: Path, clock: Clock) -> Iterator[SocketLines]:
+    if request.param == "unix":
+        made = open_unix(str(tmp_path / "grasps"), clock)
+    else:
+        made = open_tcp("127.0.0.1:0", clock=clock)
     yield made
     made.close()
 
@@ -158,16 +176,112 @@ def test_what_readers_say_is_not_listened_to(sink: SocketLines, connect: Connect
     assert reader.number() == 1
 
 
-def test_too_many_readers_are_turned_away(sink: SocketLines, connect: Connect, make_grasp: MakeGrasp) -> None:
+def test_where_all_keep_up_the_newest_is_turned_away(
+    sink: SocketLines, connect: Connect, make_grasp: MakeGrasp
+) -> None:
     readers = []
     for _ in range(MAX_READERS + 1):
         readers.append(connect())
         sink.publish(make_grasp(3), None, None)
+        assert {reader.number() for reader in readers[:MAX_READERS]} == {3}
     assert sink.report().readers == MAX_READERS
     assert "turned away" in sink.report().error
     assert not sink.report().over
     assert readers[-1].socket.recv(1) == b""
-    assert readers[0].number() == 3
+    assert sink.report().dropped == 0
+
+
+def hang(sink: SocketLines, connect: Connect, make_grasp: MakeGrasp, many: int) -> list[Reader]:
+    """Let in readers that never read, and publish until not one of them takes anything more."""
+    hanging = []
+    for _ in range(many):
+        hanging.append(connect())
+        sink.publish(make_grasp(0), None, None)
+    sent = -1
+    while sent < sink.report().sent:
+        sent = sink.report().sent
+        for _ in range(20):
+            sink.publish(make_grasp(0, lost=("s001",) * 100), None, None)
+    return hanging
+
+
+def test_one_that_takes_nothing_for_5_s_is_dropped_and_counted(
+    sink: SocketLines, connect: Connect, make_grasp: MakeGrasp, clock: Clock
+) -> None:
+    [hanging] = hang(sink, connect, make_grasp, 1)
+    honest = connect()
+    clock.now_s = 0.99 * HANGING_S
+    sink.publish(make_grasp(1), None, None)
+    assert (sink.report().readers, sink.report().dropped) == (2, 0)
+    clock.now_s = HANGING_S
+    sink.publish(make_grasp(2), None, None)
+    report = sink.report()
+    assert (report.readers, report.dropped, report.error) == (1, 1, "a reader that took nothing for 5 s was dropped")
+    assert [honest.number(), honest.number()] == [1, 2]
+    # It sees the end, behind what it had been sent.
+    while hanging.socket.recv(1 << 16):
+        pass
+
+
+def test_one_that_takes_a_little_in_5_s_stays(
+    sink: SocketLines, connect: Connect, make_grasp: MakeGrasp, clock: Clock
+) -> None:
+    [slow] = hang(sink, connect, make_grasp, 1)
+    for step in range(1, 10):
+        clock.now_s = 0.9 * HANGING_S * step
+        # More than TCP holds back before it says that there is room again.
+        for _ in range(40):
+            slow.socket.recv(1 << 16)
+            sink.publish(make_grasp(step), None, None)
+            if slow.socket.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT):
+                break
+    assert (sink.report().readers, sink.report().dropped) == (1, 0)
+
+
+def test_a_glove_that_is_silent_makes_no_reader_hang(
+    sink: SocketLines, connect: Connect, make_grasp: MakeGrasp, clock: Clock
+) -> None:
+    reader = connect()
+    for number in range(5):
+        clock.now_s = 100.0 * number
+        sink.publish(make_grasp(number), None, None)
+        assert reader.number() == number
+    assert sink.report().dropped == 0
+
+
+def test_where_readers_hang_on_every_place_honest_ones_have_the_next(
+    sink: SocketLines, connect: Connect, make_grasp: MakeGrasp
+) -> None:
+    hang(sink, connect, make_grasp, MAX_READERS)
+    honest: list[Reader] = []
+    for number in range(MAX_READERS):
+        honest.append(connect())
+        sink.publish(make_grasp(number), None, None)
+        assert {reader.number() for reader in honest} == {number}
+        assert (sink.report().readers, sink.report().dropped) == (MAX_READERS, number + 1)
+    assert sink.report().error == "more than 32 readers: the slowest was dropped for a new one"
+
+
+def test_one_other_machine_never_takes_every_place(make_grasp: MakeGrasp) -> None:
+    sink = open_tcp("127.0.0.1:0")
+    assert isinstance(sink.address, tuple)
+
+    def crowd(host: str) -> list[socket.socket]:
+        return [socket.create_connection(sink.address, source_address=(host, 0)) for _ in range(MAX_OF_ONE + 1)]
+
+    # Any address in 127.0.0.0/8 but that of this machine is another machine's, for want of one.
+    there = crowd("127.0.0.2")
+    sink.publish(make_grasp(1), None, None)
+    assert sink.report().readers == MAX_OF_ONE
+    assert sink.report().error == "more than 8 readers on 127.0.0.2: the newest were turned away"
+    elsewhere = crowd("127.0.0.3")
+    sink.publish(make_grasp(2), None, None)
+    here = crowd("127.0.0.1")
+    sink.publish(make_grasp(3), None, None)
+    assert sink.report().readers == 2 * MAX_OF_ONE + len(here)
+    sink.close()
+    for reader in (*there, *elsewhere, *here):
+        reader.close()
 
 
 def test_closing_ends_every_reader_and_may_be_done_twice(
