@@ -16,7 +16,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 PACKAGES := cli compiler drivers firmware_templates reference runtime simulator stability
 
-.PHONY: help demo test test-slow test-all pythons mutants lint format types bench soak docs check clean
+.PHONY: help demo test test-slow test-all pythons mutants lint format types bench soak fuzz docs check clean
 
 help:           ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 16
@@ -76,7 +76,7 @@ types: $(VENV)/installed  ## mypy --strict on an installed copy
 	$(BIN)/python -m pip install --quiet --no-deps --target .types .
 	rm -rf build
 	$(BIN)/mypy $(foreach package,$(PACKAGES),-p thenar.$(package))
-	MYPYPATH=.types:benchmarks:tests/mutants $(BIN)/mypy --explicit-package-bases tests benchmarks
+	MYPYPATH=.types:benchmarks:tests/fuzz:tests/mutants $(BIN)/mypy --explicit-package-bases tests benchmarks
 
 $(VENV)/bench: $(VENV)/installed
 	$(BIN)/python -m pip install --quiet --group bench
@@ -103,10 +103,14 @@ bench: $(VENV)/bench  ## the benchmarks, as ratios against a peer or a bound in 
 soak: $(VENV)/installed  ## an hour of live recognition on emulated devices: does anything grow?
 	$(BIN)/python benchmarks/soak.py
 
+# FUZZ="--minutes 60 --formats npz,mcap"; without, until Ctrl-C.
+fuzz: $(VENV)/installed  ## hostile files of every format, guided by coverage, until Ctrl-C: does anything fail?
+	$(BIN)/python tests/fuzz/run.py $(FUZZ)
+
 docs: $(VENV)/installed  ## the documentation as a site in site/, offline
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 check: lint types test  ## what a commit should pass
 
 clean:          ## remove everything that the targets make
-	rm -rf $(VENV) .venv-3.* $(OUT) .types .mutants build site *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .venv-3.* $(OUT) .types .mutants build site *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .fuzz

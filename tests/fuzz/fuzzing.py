@@ -17,7 +17,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
-from time import monotonic
 from types import FrameType
 from typing import NamedTuple
 
@@ -244,12 +243,12 @@ class Fuzzer:
 
         def one_input(data: bytes) -> None:
             # Instrumented code is several times slower.
-            self.read(form, f"guided, round {round_}", data, 5 * CPU_S)
+            self.read(form, "", data, 5 * CPU_S)
 
         def mutator(data: bytes, largest: int, seed: int) -> bytes:
             return form.mutate(data, Random(seed))[:largest]
 
-        limits = (f"-max_total_time={seconds}", f"-seed={self._seed + round_}", "-max_len=200000", "-verbosity=0")
+        limits = (f"-max_total_time={seconds}", f"-seed={self._seed + round_}", "-max_len=200000")
         ends = (f"-timeout={STUCK_S}", "-rss_limit_mb=0", "-handle_int=0", f"-artifact_prefix={self._folder}/")
         folders = [str(grown), *(str(path) for path in [self._corpus / form.name] if path.is_dir())]
         os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
@@ -261,15 +260,3 @@ class Fuzzer:
 
     def _set_count(self, count: int) -> None:
         self._begun[:] = count.to_bytes(8, "little")
-
-
-class Clock:
-    """Mutants a second since it was made."""
-
-    def __init__(self) -> None:
-        self._began = monotonic()
-
-    @property
-    def seconds(self) -> float:
-        """How long it has run."""
-        return monotonic() - self._began

@@ -275,35 +275,44 @@ class _Member(NamedTuple):
 
 def npz_file(data: bytes, random: Random) -> bytes:
     """Change arrays in a zip: their names, headers, bytes and packing, and the zip's own bytes now and then."""
+    members = _members(data)
+    if not members or random.random() < 0.1:
+        return altered(data, random)
+    for _ in range(random.choice((1, 1, 2))):
+        _change_member(members, random)
+    return _zip(members)
+
+
+def _members(data: bytes) -> list[_Member]:
+    """Return what is in a zip; nothing where that is a lot, or cannot be read."""
     try:
         with ZipFile(BytesIO(data)) as file:
             infos = file.infolist()
             if sum(info.file_size for info in infos) > _LARGEST:
-                return altered(data, random)
-            members = [_Member(info.filename, file.read(info), info.compress_type) for info in infos]
+                return []
+            return [_Member(info.filename, file.read(info), info.compress_type) for info in infos]
     except Exception:  # whatever a mutant makes of zipfile
-        return altered(data, random)
-    if not members or random.random() < 0.1:
-        return altered(data, random)
-    for _ in range(random.choice((1, 1, 2))):
-        at = random.randrange(len(members))
-        name, content, method = members[at]
-        match random.randrange(10):
-            case 0:
-                members[at] = _Member(random.choice((*TEXTS, members[0].name, "x.npy")), content, method)
-            case 1:
-                members[at] = _Member(name, content, random.choice(_METHODS))
-            case 2:
-                members.insert(at, members[at])
-            case 3 if len(members) > 1:
-                del members[at]
-            case 4:
-                members[at] = _Member(name, content + bytes(random.choice((1, 1000, 20_000_000))), ZIP_DEFLATED)
-            case 5:
-                members[at] = _Member(name, _json_in_array(content, random), method)
-            case _:
-                members[at] = _Member(name, npy_file(content, random), method)
-    return _zip(members)
+        return []
+
+
+def _change_member(members: list[_Member], random: Random) -> None:
+    at = random.randrange(len(members))
+    name, content, method = members[at]
+    match random.randrange(10):
+        case 0:
+            members[at] = _Member(random.choice((*TEXTS, members[0].name, "x.npy")), content, method)
+        case 1:
+            members[at] = _Member(name, content, random.choice(_METHODS))
+        case 2:
+            members.insert(at, members[at])
+        case 3 if len(members) > 1:
+            del members[at]
+        case 4:
+            members[at] = _Member(name, content + bytes(random.choice((1, 1000, 20_000_000))), ZIP_DEFLATED)
+        case 5:
+            members[at] = _Member(name, _json_in_array(content, random), method)
+        case _:
+            members[at] = _Member(name, npy_file(content, random), method)
 
 
 def _zip(members: list[_Member]) -> bytes:

@@ -7,7 +7,7 @@ from struct import Struct
 from tempfile import TemporaryDirectory
 
 import msgspec
-from material import GLOVE_TOML, GRASPS, SWITCHES, Format, build_files, make_folder
+from material import GLOVE_TOML, GRASPS, SWITCHES, Format, build_files, harness, make_folder
 from mutating_mcap import mcap_file
 
 from thenar.compiler.recordings.mcap_recording import import_recordings
@@ -17,18 +17,11 @@ from thenar.drivers.errors import ThenarError
 from thenar.runtime.build import Build
 from thenar.runtime.live.frames import GloveFrame, SwitchFrame
 from thenar.runtime.live.replay import replayed
+from thenar.runtime.live.system import System
+from thenar.runtime.recording import layout
 from thenar.runtime.recording.cdr import encode_bytes, encode_text
 from thenar.runtime.recording.frame_bytes import glove_bytes, switch_bytes
-from thenar.runtime.recording.layout import (
-    GLOVE,
-    RECOGNITION,
-    SWITCHES as SWITCH_CHANNEL,
-    TRIALS,
-    Tail,
-    beginning,
-    ending,
-    session_record,
-)
+from thenar.runtime.recording.layout import Tail, beginning, ending, session_record
 from thenar.runtime.recording.session import Collection, Label, Session, Task
 from thenar.runtime.recording.trials import planned, read_journal
 
@@ -79,15 +72,15 @@ def _collected() -> bytes:
     messages: list[Message] = []
     for number, (event, trial) in enumerate(events):
         label = Label(1000 * number + 2, event, trial, GRASPS[trial], "anna", "mug")  # type: ignore[arg-type]
-        messages += [*_frames(1000 * number), (TRIALS, label.time_us, encode_text(msgspec.json.encode(label)))]
+        messages += [*_frames(1000 * number), (layout.TRIALS, label.time_us, encode_text(msgspec.json.encode(label)))]
     return _recording(session, messages)
 
 
 def _frames(time_us: int) -> Iterator[Message]:
     glove = GloveFrame(time_us, bytes(range(60, 78)), 3)
     frame = SwitchFrame(time_us, closed=time_us // 1000 % 64, lost=0)
-    yield GLOVE, time_us, encode_bytes(glove_bytes(glove, 18))
-    yield SWITCH_CHANNEL, time_us + 1, encode_bytes(switch_bytes(frame, len(SWITCHES), 18))
+    yield layout.GLOVE, time_us, encode_bytes(glove_bytes(glove, 18))
+    yield layout.SWITCHES, time_us + 1, encode_bytes(switch_bytes(frame, len(SWITCHES), 18))
 
 
 def _recognised() -> bytes:
@@ -102,9 +95,6 @@ def _recognised() -> bytes:
         harness=GLOVE_TOML,
         clock_ns=_CLOCK_NS,
     )
-    from thenar.runtime.live.system import System
-    from material import harness
-
     recognizer = System.of(build, harness()).recognizer()
     messages: list[Message] = []
     for number in range(4):
@@ -113,9 +103,9 @@ def _recognised() -> bytes:
         frame = SwitchFrame(time_us, closed=number % (1 << len(names)), lost=number == 2, unread=0, glove=glove)
         found = recognizer.step(time_us + 5, _CLOCK_NS // 1000 + time_us, frame, glove)
         messages += [
-            (GLOVE, time_us, encode_bytes(glove_bytes(glove, 18))),
-            (SWITCH_CHANNEL, time_us, encode_bytes(switch_bytes(frame, len(names), 18))),
-            (RECOGNITION, time_us + 5, encode_text(msgspec.json.encode(found))),
+            (layout.GLOVE, time_us, encode_bytes(glove_bytes(glove, 18))),
+            (layout.SWITCHES, time_us, encode_bytes(switch_bytes(frame, len(names), 18))),
+            (layout.RECOGNITION, time_us + 5, encode_text(msgspec.json.encode(found))),
         ]
     return _recording(session, messages)
 

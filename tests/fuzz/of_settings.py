@@ -14,9 +14,10 @@ from thenar.compiler.firmware.library import Fit
 from thenar.compiler.frontier.timing.whole_glove import ports_of_whole_glove
 from thenar.compiler.recordings.objects import collected
 from thenar.compiler.spec.files import spec_files
-from thenar.drivers.calibration import GloveCalibration, SensorCalibration, load_calibration
+from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.cyberglove_sensors import SENSORS_18
 from thenar.runtime.build import Build
+from thenar.runtime.calibration import load_calibration
 from thenar.runtime.harness.loading import load_harness, parse_harness
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.live.codes import codes_of_bytes
@@ -69,7 +70,7 @@ _BOARDS = (
     f'[debounce]\npress_us = 5000\nrelease_us = 10000\n[pins]\n{_PINS}\nfinger_4 = "PD2"\nfinger_5 = "PD3"\n',
     'part = "atmega2560"\n[matrix]\nrows = ["PA0", "PA1"]\ncolumns = ["PC0", "PC1", "PC2"]\ndiodes = true\n'
     'settle_us = 20\nswitches = [["finger_0", "finger_1", "finger_2"], ["finger_3", "finger_4", "finger_5"]]\n'
-    f'[cyberglove]\nuart = 1\nbaud = 115200\nsensors = 18\nrate_hz = 90\n',
+    "[cyberglove]\nuart = 1\nbaud = 115200\nsensors = 18\nrate_hz = 90\n",
     'part = "atmega328p"\nearly_exit = true\nscan_us = 3000\n[bus]\nclock_hz = 400000\n[[chip]]\nkind = "mcp23017"\n'
     'address = 0x20\npins = { GPA0 = "finger_0", GPB0 = "finger_1", GPA2 = "finger_2" }\n[[chip]]\n'
     'kind = "tca6424a"\naddress = 0x22\nclosed = "high"\n'
@@ -108,7 +109,8 @@ def _calibration(data: bytes, folder: Path) -> None:
     path = folder / "anna.toml"
     path.write_bytes(data)
     calibration = load_calibration(path)
-    GloveCalibration.of_toml(calibration.to_toml())
+    (folder / "again.toml").write_text(calibration.to_toml())
+    load_calibration(folder / "again.toml")
     AngleReader(SENSORS_18, calibration).angles(bytes(18))
     codes_of_bytes(Calibration(0, SENSORS[0], "deg", 0, -250.0, 1000, 250.0), calibration)
 

@@ -4,7 +4,7 @@
     python tests/fuzz/run.py --minutes 60 --formats npz,mcap
 
 With a number of mutants, the same ones come every time. By time, coverage guides where atheris is installed: inputs
-that reach new code are kept in .fuzz/ and go on from there the next time. What fails goes into tests/fuzz/corpus/, which
+that reach new code are kept in .fuzz/, from where the next run goes on. What fails goes into tests/fuzz/corpus/, which
 every run replays first. Exits with 1 if anything failed.
 """
 
@@ -12,9 +12,15 @@ import argparse
 import importlib.util
 import os
 import sys
-from contextlib import nullcontext
+from contextlib import nullcontext, redirect_stderr
+from io import StringIO
 from pathlib import Path
 from time import monotonic
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fuzzing import Fuzzer
+    from material import Format
 
 # Before numpy is loaded: its threads would neither be counted nor forked.
 os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
@@ -44,6 +50,7 @@ def main() -> int:
     asked = arguments()
     guided = asked.mutants is None and not asked.plain and importlib.util.find_spec("atheris") is not None
     formats = _formats(asked.formats, guided)
+    # Not before the formats: what is imported before cannot be instrumented any more.
     from fuzzing import Fuzzer, healthy
 
     for form in formats:
@@ -70,7 +77,7 @@ def _formats(names: str | None, guided: bool) -> "list[Format]":
         instrumented = atheris.instrument_imports(include=["thenar"])
     else:
         instrumented = nullcontext()
-    with instrumented:
+    with instrumented, redirect_stderr(StringIO()):
         import of_builds
         import of_devices
         import of_recordings
@@ -87,14 +94,14 @@ def _formats(names: str | None, guided: bool) -> "list[Format]":
 def _by_time(fuzzer: "Fuzzer", minutes: float, first: int, guided: bool) -> None:
     """Give every format its turn, again and again."""
     ends, turn = monotonic() + 60 * minutes, 0
+    turn_s = min(_TURN_S, max(1, round(60 * minutes / len(fuzzer.formats)))) if minutes < 600 else _TURN_S
     while monotonic() < ends:
         for form in fuzzer.formats:
-            left = ends - monotonic()
-            if left <= 0:
+            if monotonic() > ends:
                 break
             before, began = fuzzer.mutants[form.name], monotonic()
             if guided:
-                fuzzer.guide(form, max(1, round(min(left, _TURN_S))), turn)
+                fuzzer.guide(form, turn_s, turn)
             else:
                 fuzzer.mutate(form, first + turn * _TURN, _TURN)
             done = fuzzer.mutants[form.name] - before
@@ -106,8 +113,9 @@ def _by_time(fuzzer: "Fuzzer", minutes: float, first: int, guided: bool) -> None
 def _told(fuzzer: "Fuzzer", seconds: float) -> int:
     for failure in fuzzer.failures.values():
         print(f"\nFAILED {failure.format}: {failure.place}\n{failure.trace}")
-        print(f"again: python tests/fuzz/run.py {failure.numbers}" if failure.numbers else "")
-        print(f"saved: {failure.saved}" if failure.saved else "too large to be saved")
+        if failure.numbers:
+            print(f"again: python tests/fuzz/run.py {failure.numbers}")
+        print(f"saved: {failure.saved or 'no, it is too large'}")
     print(", ".join(f"{name} {count}" for name, count in fuzzer.mutants.items()))
     total = sum(fuzzer.mutants.values())
     print(f"{total} mutants of {len(fuzzer.formats)} formats in {seconds:.0f} s, {len(fuzzer.failures)} failures")
@@ -115,7 +123,4 @@ def _told(fuzzer: "Fuzzer", seconds: float) -> int:
 
 
 if __name__ == "__main__":
-    from fuzzing import Fuzzer
-    from material import Format
-
     sys.exit(main())
