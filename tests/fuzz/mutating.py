@@ -8,9 +8,10 @@ import gzip
 import json
 import tomllib
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from io import BytesIO
+from itertools import islice
 from random import Random
 from struct import Struct
 from typing import Any, NamedTuple
@@ -69,9 +70,15 @@ SPELLINGS = (
 )
 
 
+_QUOTES = ('"', "'", "\\" * 3000, "'" + "\\'" * 3000, '"' + '""' * 20_000, "{" * 2000)
+_NUMERALS = ("9" * 5_000, "1e400", "-0", "0x1F", "1_0", "٣", "nan", "1" + "0" * 400)
+
+
 def altered(data: bytes, random: Random) -> bytes:
     """Change a few bytes, anywhere."""
     changed = bytearray(data)
+    if data and random.random() < 0.4:
+        return _overwritten(changed, random)
     for _ in range(random.choice((1, 1, 1, 2, 4, 16))):
         at = random.randrange(len(changed) + 1)
         end = at + random.choice((1, 1, 2, 4, 8, 50))
@@ -91,6 +98,36 @@ def altered(data: bytes, random: Random) -> bytes:
             case _:
                 del changed[at + random.randrange(1000) :]
     return bytes(changed)
+
+
+def _overwritten(changed: bytearray, random: Random) -> bytes:
+    """Change bytes or words in their places, so that all lengths stay right."""
+    for _ in range(random.choice((1, 1, 2, 8))):
+        size = random.choice((1, 1, 2, 2, 4, 8))
+        at = random.randrange(len(changed)) // size * size
+        if at + size <= len(changed):
+            number = int.from_bytes(changed[at : at + size], "little")
+            number = random.choice(
+                (number + 1, number - 1, 2 * number, number ^ 1 << random.randrange(8 * size), *INTEGERS)
+            )
+            changed[at : at + size] = (number % (1 << 8 * size)).to_bytes(size, "little")
+    return bytes(changed)
+
+
+def _likely(value: Any, alike: Sequence[Any], random: Random) -> Any:
+    """Return another value of the kind of `value`, such as might well be there."""
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, int | float):
+        near = (value + 1, value - 1, 2 * value, value / 2, -value, 0, 1)
+        return type(value)(random.choice((*near, *(other for other in alike if abs(other) < 1e18))))
+    if isinstance(value, list):
+        changed = list(value)
+        random.shuffle(changed)
+        return random.choice((changed, value[1:], value[:-1], [*value, *value[:1]], []))
+    if isinstance(value, str):
+        return random.choice((*alike, value + "x", value[1:], value.upper(), f"{value} {value}"))
+    return value
 
 
 def _hostile(kind: type, random: Random) -> Any:
@@ -132,15 +169,20 @@ def changed_tree(tree: Any, random: Random) -> dict[str, str]:
     """Change a tree of dicts and lists in place; return which marks in its text stand for what."""
     marks: dict[str, str] = {}
     for _ in range(random.choice((1, 1, 1, 2, 3))):
-        spots = list(_spots(tree))
+        spots = list(islice(_spots(tree), 5_000))
         if not spots:
             break
-        _change(random.choice(spots), random.choice(spots), random, marks)
+        _change(spots, random, marks)
     return marks
 
 
-def _change(spot: _Spot, other: _Spot, random: Random, marks: dict[str, str]) -> None:
+def _change(spots: list[_Spot], random: Random, marks: dict[str, str]) -> None:
+    spot, other = random.choice(spots), random.choice(spots)
     holder, key = spot
+    if random.random() < 0.5:
+        alike = [one.value for one in spots if type(one.value) is type(spot.value)]
+        holder[key] = _likely(spot.value, alike, random)
+        return
     match random.randrange(9):
         case 0:
             del holder[key]
@@ -180,7 +222,7 @@ def _spelled(text: str, marks: dict[str, str]) -> bytes:
 def json_file(data: bytes, random: Random) -> bytes:
     """Change a JSON document: its values mostly, its text now and then."""
     try:
-        tree = json.loads(data)
+        tree = json.loads(data[:_LARGEST])
         if not isinstance(tree, dict | list) or random.random() < 0.1:
             return altered(data, random)
         marks = changed_tree(tree, random)
@@ -192,7 +234,7 @@ def json_file(data: bytes, random: Random) -> bytes:
 def toml_file(data: bytes, random: Random) -> bytes:
     """Change a TOML document: its values mostly, its text now and then."""
     try:
-        tree = tomllib.loads(data.decode())
+        tree = tomllib.loads(data[:50_000].decode())
         if random.random() < 0.15:
             return altered(data, random)
         marks = changed_tree(tree, random)
@@ -203,31 +245,39 @@ def toml_file(data: bytes, random: Random) -> bytes:
 
 def table_file(data: bytes, random: Random) -> bytes:
     """Change a text of lines and of cells between commas: cells, rows, columns, quotes."""
+    if len(data) > _LARGEST or random.random() < 0.1:
+        return altered(data, random)
     rows = [line.split(",") for line in data.decode("utf-8", "surrogateescape").split("\n")]
     for _ in range(random.choice((1, 1, 2, 3))):
-        row = random.choice(rows)
-        at = random.randrange(len(row))
-        match random.randrange(9):
-            case 0:
-                rows.remove(row)
-                rows = rows or [[""]]
-            case 1:
-                rows[0:0] = [row] * random.choice((1, 3, 300))
-            case 2:
-                random.shuffle(rows)
-            case 3:
-                rows = [[*row, row[at] if at < len(row) else ""] for row in rows]
-            case 4:
-                row[at] = random.choice(('"', "'", "\\" * 3000, "'" + "\\'" * 3000, '"' + '""' * 20_000, "{" * 2000))
-            case 5:
-                row[at] = random.choice(("9" * 5_000, "1e400", "-0", "0x1F", "1_0", "٣", "nan", "1" + "0" * 400))
-            case 6:
-                return altered(data, random)
-            case 7:
-                row[at:at] = [random.choice(TEXTS)] * random.choice((1, 1, 5, 5_000))
-            case _:
-                row[at] = str(random.choice((*INTEGERS, *FLOATS, *TEXTS)))
+        rows = _changed_rows(rows, random)
     return "\n".join(map(",".join, rows)).encode("utf-8", "surrogatepass" if random.random() < 0.5 else "replace")
+
+
+def _changed_rows(rows: list[list[str]], random: Random) -> list[list[str]]:
+    row = random.choice(rows)
+    at = random.randrange(len(row))
+    match random.randrange(16):
+        case 0:
+            return [other for other in rows if other is not row] or [[""]]
+        case 1:
+            return [row] * random.choice((1, 3, 30_000 // (1 + sum(map(len, row))))) + rows
+        case 2:
+            random.shuffle(rows)
+        case 3:
+            return [[*other, other[at] if at < len(other) else ""] for other in rows]
+        case 4:
+            row[at] = random.choice(_QUOTES)
+        case 5:
+            row[at] = random.choice(_NUMERALS)
+        case 6:
+            text = random.choice(TEXTS)
+            row[at:at] = [text] * random.choice((1, 1, 5, 20_000 // (1 + len(text))))
+        case 7:
+            row[at] = str(random.choice((*INTEGERS, *FLOATS, *TEXTS)))
+        case _:
+            other = random.choice(rows)
+            row[at] = other[at] if at < len(other) else random.choice(other)
+    return rows
 
 
 def zipped(mutate: Mutate) -> Mutate:
@@ -330,10 +380,13 @@ _NPY = Struct("<6sBBH")
 
 def npy_file(data: bytes, random: Random) -> bytes:
     """Change an array: its header mostly, as text and by what it says."""
-    if len(data) < _NPY.size or random.random() < 0.2:
+    if len(data) < _NPY.size or random.random() < 0.1:
         return altered(data, random)
     magic, major, minor, length = _NPY.unpack_from(data)
-    header, content = data[_NPY.size : _NPY.size + length], data[_NPY.size + length :]
+    header, content = data[: _NPY.size + length], data[_NPY.size + length :]
+    if content and random.random() < 0.4:
+        return header + _overwritten(bytearray(content), random)
+    header = header[_NPY.size :]
     try:
         said = dict(_literal(header.decode("latin-1")))
     except (ValueError, SyntaxError, TypeError, RecursionError, MemoryError):
