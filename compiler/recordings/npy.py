@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 _MAGIC = b"\x93NUMPY"
 _LARGEST = 10_000  # bytes
+# Every length ends in a comma or at the bracket: where neither follows, no other way to cut the digits is tried.
 _HEAD = re.compile(
-    r"\{'descr': '([^']{1,40})', 'fortran_order': (True|False), 'shape': \(((?:[0-9]{1,18},? ?)*)\), ?\}\s*"
+    r"\{'descr': '([^']{1,40})', 'fortran_order': (True|False), "
+    r"'shape': \(((?:[0-9]{1,18}+(?:, ?|(?=\))))*+)\), ?\}\s*"
 )
 _PLAIN = re.compile(r"[<>|=]?[biufSU][0-9]{1,9}")
 
