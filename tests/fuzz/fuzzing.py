@@ -14,6 +14,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
@@ -141,26 +142,25 @@ class Fuzzer:
     def replay(self) -> int:
         """Read every input of the corpus; return how many there are."""
         for form in self.formats:
-            saved = self._saved(form)
-            self._in_child(form, lambda form=form, saved=saved: self._replay(form, saved))
+            self._in_child(form, partial(self._replay, form))
         return sum(len(self._saved(form)) for form in self.formats)
 
     def mutate(self, form: Format, first: int, count: int) -> None:
         """Read the mutants of these numbers; the same numbers make the same mutants of the same corpus."""
-        self._in_child(form, lambda: self._plain(form, first, count))
+        self._in_child(form, partial(self._plain, form, first, count))
         self.mutants[form.name] += self._count()
 
     def guide(self, form: Format, seconds: int, round_: int) -> None:
         """Read mutants for so long, and mutate again what reaches new code (atheris)."""
-        self._in_child(form, lambda: self._guided(form, seconds, round_))
+        self._in_child(form, partial(self._guided, form, seconds, round_))
         self.mutants[form.name] += self._count()
 
     def _saved(self, form: Format) -> list[Path]:
         return sorted(path for path in (self._corpus / form.name).glob("*") if path.is_file())
 
-    def _replay(self, form: Format, saved: Sequence[Path]) -> Iterator[tuple[str, bytes]]:
-        for path in saved:
-            yield f"corpus {path.name}", path.read_bytes()
+    def _replay(self, form: Format) -> Iterator[tuple[str, bytes]]:
+        for path in self._saved(form):
+            yield "", path.read_bytes()
 
     def _plain(self, form: Format, first: int, count: int) -> Iterator[tuple[str, bytes]]:
         pool = [*form.seeds(), *(path.read_bytes() for path in self._saved(form))]

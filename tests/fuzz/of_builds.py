@@ -11,6 +11,7 @@ from pathlib import Path
 from random import Random
 
 import msgspec
+import numpy as np
 from material import GRASPS, SWITCHES, Format, build_files, grasp_set, harness, make_folder
 from mutating import Mutate, altered, json_file, npz_file, sealed
 
@@ -71,9 +72,10 @@ def _described(files: dict[str, bytes]) -> dict[str, bytes]:
 def _use_build(folder: Path) -> None:
     """Do what the commands do with a build: classify, verify, scan, lay out firmware, tell its spec."""
     build = Build.load(folder)
-    closed, codes = [1] * build.tables.n_switches, [65535] * build.tables.n_joints
+    switches, joints = build.tables.n_switches, build.tables.n_joints
+    closed, codes = np.ones(switches, np.bool_), np.full(joints, 65535, np.uint16)
     build.classify(closed, codes)
-    Recognizer(build).recognise(Frame(0, closed, codes, [True] * len(closed), [False] * len(codes)))
+    Recognizer(build).recognise(Frame(0, closed, codes, closed, np.zeros(joints, np.bool_)))
     for step in (_live, _verified, _spec, _firmware):
         _allowed(step, build, folder)
 

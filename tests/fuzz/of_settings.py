@@ -92,7 +92,7 @@ def _board(data: bytes, folder: Path) -> None:
     board = load_board(path)
     platform = _PLATFORMS[board.part]
     for mode in ("scan", "glove"):
-        request = Request(_build(), platform, mode, board=board)  # type: ignore[arg-type]
+        request = Request(_build(), platform, mode, board=board)
         firmware_files(request, _fit(platform))
 
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from functools import cache
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from material import GRASPS, SENSORS, Format, grasp_set
@@ -55,16 +56,16 @@ def _arff() -> bytes:
 @cache
 def _npz() -> bytes:
     grasps = grasp_set()
-    file = BytesIO()
-    np.savez_compressed(
-        file,
-        grasp=grasps.grasps,
-        subject=np.char.encode(grasps.subjects, "utf-8"),
-        object=grasps.objects,
-        trial=grasps.trials,
+    arrays: dict[str, Any] = {
+        "grasp": grasps.grasps,
+        "subject": np.char.encode(grasps.subjects, "utf-8"),
+        "object": grasps.objects,
+        "trial": grasps.trials,
         **{name: grasps.switches[:, number] for number, name in enumerate(grasps.switch_names)},
         **{joint.name: grasps.codes[:, number] for number, joint in enumerate(grasps.joints)},
-    )
+    }
+    file = BytesIO()
+    np.savez_compressed(file, **arrays)
     return file.getvalue()
 
 
