@@ -38,7 +38,8 @@ def _seal(folder: Path, tables: IntegerTables) -> None:
     data = tables_to_bytes(tables)
     manifest = manifest_from_bytes((folder / "build.json").read_bytes())
     (folder / "tables.bin").write_bytes(data)
-    described = replace_fields(manifest, tables_sha256=hashlib.sha256(data).hexdigest())
+    proof = replace_fields(manifest.proof, scale=tables.scale, bound=tables.bound)
+    described = replace_fields(manifest, tables_sha256=hashlib.sha256(data).hexdigest(), proof=proof)
     (folder / "build.json").write_bytes(manifest_to_bytes(described))
 
 
