@@ -87,7 +87,9 @@ def _unpack(cls: type[AnyGraspSet], size: int, header_bytes: bytes, arrays: dict
     header = msgspec.json.decode(header_bytes, type=_Header)
     _check_arrays(header, arrays)
     # Viewed and frozen, so that the set takes it without a copy.
-    switches = np.unpackbits(arrays["switches"], axis=1, count=len(header.switches)).view(np.bool_)
+    switches = np.unpackbits(arrays["switches"].astype(np.uint8, copy=False), axis=1, count=len(header.switches)).view(
+        np.bool_
+    )
     switches.setflags(write=False)
     return cls(
         switches=switches,

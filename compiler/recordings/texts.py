@@ -111,8 +111,8 @@ class TextColumn(Sequence[str]):
             yield piece
 
 
-def pieces(column: "Sequence[str] | NDArray[np.str_] | NDArray[np.bytes_]") -> Iterator[list[str]]:
-    """Yield the cells of any column of text in lists of some thousands."""
+def pieces(column: Sequence[str] | NDArray[np.generic]) -> Iterator[list[str]]:
+    """Yield the cells of a column of text, in whatever it is, in lists of some thousands."""
     if isinstance(column, TextColumn):
         yield from column.pieces()
         return
