@@ -16,7 +16,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 PACKAGES := cli compiler drivers firmware_templates runtime simulator stability
 
-.PHONY: help demo test test-slow test-all pythons mutants lint format types bench soak docs check clean
+.PHONY: help demo test test-slow test-all pythons mutants lint format types bench soak fuzz docs check clean
 
 help:           ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 16
@@ -72,7 +72,7 @@ format: $(VENV)/installed  ## let ruff mend what it can
 
 types: $(VENV)/installed  ## mypy --strict, and pyright: no import of ours that an editor cannot follow
 	$(BIN)/mypy $(foreach package,$(PACKAGES),-p thenar.$(package))
-	MYPYPATH=src:benchmarks:tests/mutants $(BIN)/mypy --explicit-package-bases tests benchmarks
+	MYPYPATH=src:benchmarks:tests/fuzz:tests/mutants $(BIN)/mypy --explicit-package-bases tests benchmarks
 	$(BIN)/pyright --pythonpath $(BIN)/python
 
 $(VENV)/bench: $(VENV)/installed
@@ -100,10 +100,14 @@ bench: $(VENV)/bench  ## the benchmarks, as ratios against a peer or a bound in 
 soak: $(VENV)/installed  ## an hour of live recognition on emulated devices: does anything grow?
 	$(BIN)/python benchmarks/soak.py
 
+# FUZZ="--minutes 60 --formats npz,mcap"; without, until Ctrl-C.
+fuzz: $(VENV)/installed  ## hostile files of every format, guided by coverage, until Ctrl-C: does anything fail?
+	$(BIN)/python tests/fuzz/run.py $(FUZZ)
+
 docs: $(VENV)/installed  ## the documentation as a site in site/, offline
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 check: lint types test  ## what a commit should pass
 
 clean:          ## remove everything that the targets make
-	rm -rf $(VENV) .venv-3.* $(OUT) .mutants build site *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .venv-3.* $(OUT) .mutants build site *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .fuzz

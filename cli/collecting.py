@@ -11,8 +11,10 @@ import click
 
 from ..compiler.recordings.names import check_names
 from ..compiler.recordings.taxonomy import Taxonomy
-from ..drivers.calibration import GloveCalibration, load_calibration
+from ..drivers.calibration import GloveCalibration
 from ..drivers.errors import SettingError
+from ..runtime.calibration import load_calibration
+from ..runtime.errors import HarnessError
 from ..runtime.harness.wiring import GloveWiring, Harness
 from ..runtime.live.arrivals import Taken
 from ..runtime.live.frames import now_us
@@ -24,6 +26,7 @@ from ..runtime.recording.session import Collection, Session
 from ..runtime.recording.trials import Journal, Trial
 from ..runtime.recording.writer import Recorder
 from ..runtime.scanning.whole import whole_scan
+from ..runtime.toml_source import read_source
 from .common import err
 from .ending import ended_by_signals
 from .guide_keys import GuideKeys
@@ -70,7 +73,7 @@ def collect(
             thenar=version("thenar"),
             switches=switches,
             sensors=sensors,
-            harness=file.read_text("utf-8"),
+            harness=read_source(file, HarnessError).text,
             calibration=_calibration(harness.cyberglove),
             collection=collection,
         )

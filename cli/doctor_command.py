@@ -53,8 +53,8 @@ def command(glove: Path, build: Path | None, as_json: bool) -> None:
 
 def _calibration(harness: "Harness", build: "Build | None") -> "Iterator[Finding]":
     """Yield what is wrong with the CyberGlove's calibration: `thenar run` and `record` would end with it."""
-    from ..drivers.calibration import load_calibration
     from ..drivers.errors import ThenarError
+    from ..runtime.calibration import load_calibration
     from ..runtime.live.checkup import Finding
     from ..runtime.live.system import System
 

@@ -86,8 +86,8 @@ def command(
     from ..compiler.firmware.folder import write_folder
     from ..compiler.firmware.generate import Request, firmware_files, fit_of
     from ..compiler.firmware.one_hand import for_one_hand
-    from ..drivers.calibration import load_calibration
     from ..runtime.build import Build
+    from ..runtime.calibration import load_calibration
 
     _check(target, mode, writes=output is not None, counts=measure or frontier, calibrated=calibration is not None)
     loaded = Build.load(build)

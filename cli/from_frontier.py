@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from ..runtime.harness.wiring import Harness
 
 
+_LEAST_HZ = 1000  # of the clock of a bus in glove.toml
+
+
 @dataclass(frozen=True, slots=True)
 class Picked:
     """A frontier, and the point of it that is to be built."""
@@ -58,9 +61,9 @@ class Picked:
 def picked(path: Path, number: int | None, grasp_set: "GraspSet") -> Picked:
     """Return point `number` of the frontier in `path`, or the one that it picked. Raises FrontierError, UsageError."""
     from ..compiler.frontier.points import MAX_BYTES, FrontierError, frontier_from_bytes
+    from ..runtime.files import read_file
 
-    with path.open("rb") as file:
-        found = frontier_from_bytes(file.read(MAX_BYTES + 1), str(path))
+    found = frontier_from_bytes(read_file(path, MAX_BYTES, FrontierError), str(path))
     wanted = found.picked if number is None else number
     if wanted is None:
         raise click.UsageError(f"{path} has points 1 to {len(found.points)}: say with --point which to build.")
@@ -68,4 +71,28 @@ def picked(path: Path, number: int | None, grasp_set: "GraspSet") -> Picked:
         raise FrontierError(
             f"{path} was found for other recordings ({found.source}): run thenar frontier on these, or compile those"
         )
-    return Picked(found, found.point(wanted))
+    point = found.point(wanted)
+    _check_point(point, grasp_set, path)
+    return Picked(found, point)
+
+
+def _check_point(point: "Point", grasp_set: "GraspSet", path: Path) -> None:
+    """Raise FrontierError where a point cannot be built here: before the training, not after it."""
+    from ..compiler.frontier.points import FrontierError
+    from ..compiler.frontier.timing.wirings import AS_WIRED, BOARD, Wiring
+    from ..compiler.selection.ways import METHODS
+    from ..drivers.i2c.registry import CHIPS
+    from ..runtime.names import shortened
+
+    setting, there = point.setting, set(grasp_set.switch_names)
+    what = f"{path}: point {point.number}"
+    if not there.issuperset(point.switches):
+        raise FrontierError(f"{what} keeps switches that the recordings do not have: run thenar frontier on these")
+    if setting.inputs != "joints" and setting.way.method not in METHODS:
+        raise FrontierError(f"{what} takes a method that is not there: {shortened(setting.way.method)!r}")
+    if setting.wiring not in ("", AS_WIRED, BOARD, *CHIPS):
+        raise FrontierError(f"{what} takes a wiring that is not there: {shortened(setting.wiring)!r}")
+    if setting.wiring in CHIPS and not _LEAST_HZ <= setting.clock_hz <= CHIPS[setting.wiring].clock_hz:
+        raise FrontierError(f"{what} runs its {setting.wiring} at {setting.clock_hz} Hz, which it cannot")
+    if setting.wiring not in ("", AS_WIRED) and not Wiring(setting.wiring, setting.clock_hz).fits(point.switches):
+        raise FrontierError(f"{what} has no room for its {len(point.switches)} switches on {setting.wiring}")

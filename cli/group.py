@@ -1,9 +1,12 @@
-"""The group of sub-commands, and what becomes of errors: a sentence and an exit code.
+"""The group of sub-commands, and what becomes of errors: a sentence and an exit code, also of unexpected ones.
 
 Each sub-command is loaded only when it is called. A reader that goes away (`| head`) ends a command in silence, with
 click's exit code 1.
 """
 
+import os
+import tempfile
+import traceback
 from collections.abc import Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from importlib import import_module
@@ -80,6 +83,8 @@ def run_group(arguments: Sequence[str]) -> int:
     except (KeyboardInterrupt, click.Abort):
         echo("thenar: interrupted", err=True)
         return 130
+    except Exception as fault:
+        return _complain(_kept(fault))
     return code if isinstance(code, int) else 0
 
 
@@ -89,6 +94,18 @@ def _brought_by(lack: ModuleNotFoundError, arguments: Sequence[str]) -> str:
     bringing = [extra for extra, packages in EXTRAS.items() if package in packages]
     bringing.sort(key=lambda extra: extra not in arguments[:1])
     return f"thenar[{bringing[0]}]" if bringing else "thenar"
+
+
+def _kept(fault: Exception) -> str:
+    """Write the traceback of an error that nobody expected to a file that only its owner reads; return what to say."""
+    what = f"unexpected {type(fault).__name__}: this is a mistake in thenar"
+    try:
+        descriptor, path = tempfile.mkstemp(prefix="thenar-", suffix=".txt")
+        with os.fdopen(descriptor, "w", encoding="utf-8", errors="backslashreplace") as file:
+            file.write("".join(traceback.format_exception(fault)))
+    except OSError as reason:
+        return f"{what}, and its traceback could not be written ({reason.strerror}); please report it"
+    return f"{what}; please report it with the file {path}, which says where"
 
 
 def _complain(message: str) -> int:

@@ -6,7 +6,9 @@ import msgspec
 
 from ..drivers.errors import ThenarError
 from ..runtime.build import load_manifest
+from ..runtime.files import read_file
 from ..runtime.names import fault, shortened
+from ..runtime.nesting import check_json
 
 _LARGEST = 4_000_000  # bytes; a placement of the largest set has fewer
 _WANTED = "take a build's folder, the file of `thenar place -o`, or a text of one name a line"
@@ -46,12 +48,8 @@ def _of_build(folder: Path) -> tuple[str, ...]:
 
 
 def _text(path: Path) -> str:
-    with path.open("rb") as file:
-        data = file.read(_LARGEST + 1)
-    if len(data) > _LARGEST:
-        raise KeptError(f"{path} is larger than {_LARGEST} bytes: {_WANTED}")
     try:
-        return data.decode()
+        return read_file(path, _LARGEST, KeptError).decode()
     except UnicodeDecodeError:
         raise KeptError(f"{path} is no text: {_WANTED}") from None
 
@@ -60,7 +58,8 @@ def _of_text(text: str, path: Path) -> tuple[str, ...]:
     if text.lstrip()[:1] not in ("{", "["):
         return tuple(filter(None, map(str.strip, text.splitlines())))
     try:
+        check_json(text.encode())
         found = msgspec.json.decode(text, type=_Placement | tuple[str, ...])
-    except msgspec.MsgspecError as reason:
-        raise KeptError(f"{path} is no list of switches ({reason}): {_WANTED}") from None
+    except ValueError as reason:
+        raise KeptError(f"{path} is no list of switches ({shortened(str(reason))}): {_WANTED}") from None
     return tuple(chosen.name for chosen in found.switches) if isinstance(found, _Placement) else found

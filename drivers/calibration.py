@@ -10,8 +10,7 @@ Two points say what an offset and a gain only say together with the order in whi
 """
 
 from math import isfinite
-from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
 import msgspec
 
@@ -38,9 +37,9 @@ class SensorCalibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
         if reason := fault(self.name):
             raise SettingError(f"sensor {shortened(repr(self.name))} {reason}")
         if self.raw_a == self.raw_b:
-            raise SettingError(f"{self.name}: raw_a and raw_b are both {self.raw_a}, which makes no line")
+            raise SettingError(f"{self.name!r}: raw_a and raw_b are both {self.raw_a}, which makes no line")
         if not (isfinite(self.value_a) and isfinite(self.value_b)):
-            raise SettingError(f"{self.name}: value_a and value_b must be finite numbers")
+            raise SettingError(f"{self.name!r}: value_a and value_b must be finite numbers")
 
     def value(self, raw: float) -> float:
         """Return the value at a raw byte."""
@@ -59,29 +58,12 @@ class GloveCalibration(
     def __post_init__(self) -> None:
         if self.subject and (reason := fault(self.subject)):
             raise SettingError(f"subject {shortened(repr(self.subject))} {reason}")
-        names = [sensor.name for sensor in self.sensors]
-        twice = next((name for name in names if names.count(name) > 1), None)
-        if twice is not None:
-            raise SettingError(f"sensor {twice} is calibrated twice: keep one")
+        seen: set[str] = set()
+        for sensor in self.sensors:
+            if sensor.name in seen:
+                raise SettingError(f"sensor {sensor.name!r} is calibrated twice: keep one")
+            seen.add(sensor.name)
 
     def to_toml(self) -> str:
         """Return the calibration as the text of its file; numbers keep every digit."""
         return msgspec.toml.encode(self).decode("utf-8")
-
-    @classmethod
-    def of_toml(cls, text: str) -> Self:
-        """Return the calibration in the text of a file. Raises SettingError if there is none in it."""
-        try:
-            return msgspec.toml.decode(text, type=cls)
-        except (msgspec.MsgspecError, ValueError) as reason:
-            raise SettingError(f"no calibration: {reason}") from reason
-
-
-def load_calibration(path: Path) -> GloveCalibration:
-    """Return the calibration in a file. Raises SettingError, which names the file, if there is none in it."""
-    try:
-        return GloveCalibration.of_toml(path.read_text("utf-8"))
-    except OSError as reason:
-        raise SettingError(f"{path}: the calibration cannot be read: {reason.strerror}") from reason
-    except (SettingError, UnicodeDecodeError) as reason:
-        raise SettingError(f"{path}: {reason}; `thenar calibrate` writes such files") from reason

@@ -11,6 +11,8 @@ from typing import BinaryIO
 
 from .errors import ThenarError
 
+_PIECE = 1 << 20
+
 
 def open_file(path: Path, raises: type[ThenarError]) -> BinaryIO:
     """Open a regular file for reading bytes. The caller closes it.
@@ -37,8 +39,12 @@ def read_file(path: Path, limit: int, raises: type[ThenarError]) -> bytes:
 
     Raises `raises` where the file is larger or no regular file, OSError as the operating system gives it.
     """
+    pieces, left = [], limit + 1
     with open_file(path, raises) as file:
-        data = file.read(limit + 1)
-    if len(data) > limit:
+        # read() sets aside all the memory that it is asked for, however short the file.
+        while piece := file.read(min(left, _PIECE)):
+            pieces.append(piece)
+            left -= len(piece)
+    if not left:
         raise raises(f"{path} is larger than {limit} bytes, the most that is read of such a file")
-    return data
+    return b"".join(pieces)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import manifest as manifest_file
 from . import tables as tables_file
 from .errors import BuildError
+from .files import read_file
 from .manifest import Manifest, manifest_from_bytes
 from .scanning import scanmap as scan_file
 from .scanning.scanmap import ScanMap, check_switches, scanmap_from_bytes
@@ -37,6 +38,12 @@ class Build:
             raise BuildError(
                 f"{MANIFEST_NAME} names {named[0]} grasp types, {named[1]} switches and {named[2]} joints, "
                 f"{TABLES_NAME} holds {held[0]}, {held[1]} and {held[2]}: compile the build again"
+            )
+        proved = manifest.proof.scale, manifest.proof.bound
+        if proved != (tables.scale, tables.bound):
+            raise BuildError(
+                f"{MANIFEST_NAME} proves a scale of {proved[0]!r} and a bound of {proved[1]}, {TABLES_NAME} has "
+                f"{tables.scale!r} and {tables.bound}: compile the build again"
             )
         if scan is not None:
             check_switches(scan, tables.n_switches)
@@ -95,12 +102,9 @@ def _load_scan(folder: Path, manifest: Manifest) -> ScanMap | None:
 def read_member(path: Path, largest: int, sha256: str | None = None) -> bytes:
     """Return the bytes of one file of a build, at most `largest` of them, whose SHA-256 must be `sha256` if given."""
     try:
-        with path.open("rb") as file:
-            data = file.read(largest + 1)
+        data = read_file(path, largest, BuildError)
     except OSError as wrong:
         raise BuildError(f"{path} cannot be read: {wrong.strerror}; is {path.parent} a build?") from None
-    if len(data) > largest:
-        raise BuildError(f"{path} is larger than {largest} bytes: it is not of a build")
     if sha256 is not None and hashlib.sha256(data).hexdigest() != sha256:
         raise BuildError(f"{path} is not the one that {MANIFEST_NAME} describes: damaged, or from another build")
     return data

@@ -5,7 +5,7 @@ path, no host. `checksum` is the SHA-256 of those bytes with that field empty.
 """
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Annotated, Literal, TypeVar
 
 import msgspec
@@ -20,7 +20,11 @@ MAX_BYTES = 16 << 20
 
 Inputs = Literal["both", "switches", "joints"]
 TableBits = Literal[8, 16]
-Count = Annotated[int, Meta(ge=0)]
+Count = Annotated[int, Meta(ge=0, le=2**53)]
+Code = Annotated[int, Meta(ge=0, le=65535)]
+# No more than this of what is told in steps or bits, and of what a joint's values are.
+Amount = Annotated[float, Meta(ge=0.0, le=1e9)]
+Value = Annotated[float, Meta(ge=-1e300, le=1e300)]
 Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 _T = TypeVar("_T")
 Name = Annotated[str, Meta(min_length=1)]
@@ -47,16 +51,16 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     """
 
     prune: Count
-    rounds: Count
+    rounds: Annotated[int, Meta(ge=1, le=2**53)]
     inputs: Inputs
-    shrinkage: float
+    shrinkage: Annotated[float, Meta(gt=0.0, le=1.0)]
     folds: Count
     seed: int
-    tolerance: float | None = None
+    tolerance: Annotated[float, Meta(ge=0.0)] | None = None
     table_bits: TableBits = 16
-    max_bins: Annotated[int, Meta(ge=2)] | None = None
+    max_bins: Annotated[int, Meta(ge=2, le=2**53)] | None = None
     placement: Name = "id3"
-    keep: Annotated[int, Meta(ge=1)] | None = None
+    keep: Annotated[int, Meta(ge=1, le=2**53)] | None = None
     width: Annotated[int, Meta(ge=4, le=16)] = 16
 
 
@@ -67,7 +71,7 @@ class Switch(Struct, frozen=True, forbid_unknown_fields=True):
 
     column: Count
     name: Name
-    gain: float
+    gain: Value
 
 
 class Calibration(Struct, frozen=True, forbid_unknown_fields=True):
@@ -76,10 +80,10 @@ class Calibration(Struct, frozen=True, forbid_unknown_fields=True):
     column: Count
     name: Name
     unit: str
-    code_a: Count
-    value_a: float
-    code_b: Count
-    value_b: float
+    code_a: Code
+    value_a: Value
+    code_b: Code
+    value_b: Value
 
 
 class Proof(Struct, frozen=True, forbid_unknown_fields=True):
@@ -88,11 +92,11 @@ class Proof(Struct, frozen=True, forbid_unknown_fields=True):
     on; `changed` of them have another grasp type than the ensemble gives.
     """
 
-    width: int
-    scale: float
+    width: Annotated[int, Meta(ge=4, le=16)]
+    scale: Annotated[float, Meta(gt=0.0)]
     bound: Count
-    error: float
-    safe_margin: float
+    error: Amount
+    safe_margin: Amount
     covered: Count
     changed: Count
 
@@ -104,7 +108,7 @@ class Recognised(Struct, frozen=True, forbid_unknown_fields=True):
     folds: Count
     seed: int
     correct: Count
-    total: Count
+    total: Annotated[int, Meta(ge=1, le=2**53)]
 
     @property
     def rate(self) -> float:
@@ -162,31 +166,55 @@ def manifest_from_bytes(data: bytes, what: str = "build.json") -> Manifest:
     manifest = _decode(data, Manifest, what)
     if data != _encode(manifest) or manifest.checksum != _checksum(manifest):
         raise BuildError(f"{what} is altered: its checksum does not match; compile the build again")
+    for wrong in _contradictions(manifest):
+        raise BuildError(f"{what} {wrong}: compile the build again")
+    return manifest
+
+
+def _contradictions(manifest: Manifest) -> Iterator[str]:
+    """Yield what the manifest says of itself that cannot all be true."""
     for kind, names in (
         ("grasp types", manifest.grasps),
         ("switches", tuple(switch.name for switch in manifest.switches)),
         ("joints", tuple(joint.name for joint in manifest.joints)),
     ):
         if len(set(names)) < len(names):
-            raise BuildError(f"{what} names two {kind} alike: compile the build again")
-        _check_names(what, kind, names)
+            yield f"names two {kind} alike"
+        yield from _wrong_names(kind, names)
     source = manifest.source
-    _check_names(what, "units", (joint.unit for joint in manifest.joints))
-    _check_names(what, "texts", (manifest.thenar, source.taxonomy, manifest.options.placement))
-    _check_names(what, "texts", filter(None, [source.simulated]), 2 * LONGEST_NAME)
-    return manifest
+    yield from _wrong_names("units", (joint.unit for joint in manifest.joints))
+    yield from _wrong_names("texts", (manifest.thenar, source.taxonomy, manifest.options.placement))
+    yield from _wrong_names("texts", filter(None, [source.simulated]), 2 * LONGEST_NAME)
+    yield from _wrong_columns(manifest)
+    for joint in manifest.joints:
+        if joint.code_a == joint.code_b or joint.value_a == joint.value_b:
+            yield "gives a joint two points that make no line"
+    proof, options = manifest.proof, manifest.options
+    if proof.width != options.width or max(proof.covered, proof.changed) > manifest.source.rows:
+        yield "proves something of other tables than it describes"
+    if any(rate.correct > rate.total for rate in manifest.rates) or manifest.stopped_after > options.rounds:
+        yield "counts more than there is"
 
 
-def _check_names(what: str, kind: str, names: Iterable[str], longest: int = LONGEST_NAME) -> None:
+def _wrong_columns(manifest: Manifest) -> Iterator[str]:
+    switches = [switch.column for switch in manifest.switches]
+    for columns in (switches, [joint.column for joint in manifest.joints]):
+        if len(set(columns)) < len(columns):
+            yield "takes two inputs from one column"
+    if max(switches, default=-1) >= manifest.source.switches:
+        yield "keeps a switch that the recordings do not have"
+
+
+def _wrong_names(kind: str, names: Iterable[str], longest: int = LONGEST_NAME) -> Iterator[str]:
     for name in names:
         if reason := fault(name, longest):
-            raise BuildError(f"{what}: {shortened(repr(name))}, one of its {kind}, {reason}: compile the build again")
+            yield f"has {shortened(repr(name))}, one of its {kind}, which {reason}"
 
 
 def _decode(data: bytes, kind: type[_T], what: str) -> _T:
     try:
         return msgspec.json.decode(data, type=kind)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as wrong:
+    except (ValueError, RecursionError) as wrong:
         raise BuildError(f"{what} is not a build's: {wrong}") from None
 
 

@@ -18,12 +18,16 @@ __all__ = [
 ]
 
 SHOWN = 5
+# So many names are compared with one that is not among them.
+MOST_COMPARED = 1000
 
 
 def nearest(name: str, names: Sequence[str]) -> str:
     """Return " (did you mean ...?)" with the names most like `name`, or the first of `names` when none is near."""
-    near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
-    return f" (did you mean {' or '.join(map(repr, near))}?)" if near else f" (there are: {list_names(names)})"
+    near = difflib.get_close_matches(name[:LONGEST_SHOWN], names[:MOST_COMPARED], n=3, cutoff=0.5)
+    if near:
+        return f" (did you mean {' or '.join(map(repr, near))}?)"
+    return f" (there are: {list_names([shortened(known) for known in names[:SHOWN]], len(names))})"
 
 
 def list_names(names: Sequence[str], count: int | None = None) -> str:

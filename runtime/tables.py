@@ -12,7 +12,7 @@ The payload of `tables.bin`, inside the envelope of `sealed.py`, all little-endi
     2       2           s, at most 4096
     4       2           j, at most 256
     6       2           zero
-    8       8           scale: steps per unit of score, IEEE double, positive
+    8       8           scale: steps per unit of score, IEEE double, 2^-64 to 2^30
     16      2 j         T_a: number of thresholds of each joint, uint16
             2 K         bias, int16
             2 s K       switch_rows, int16, a row of K per switch
@@ -22,8 +22,8 @@ The payload of `tables.bin`, inside the envelope of `sealed.py`, all little-endi
             2 sum(T+1)K joint_rows, int16, joint after joint, bin after bin, a row of K each
 """
 
-import math
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,6 +37,9 @@ VERSION = 1
 LIMIT = 32767
 MAX_CLASSES, MAX_SWITCHES, MAX_JOINTS = 1024, 4096, 256
 MAX_BYTES = 16 << 20
+# Steps per unit of score. At the finest the least safe margin, 2 steps, is still more than what the ensemble takes for
+# a tie (stumps.TIE): a row that is safe is never one that the ensemble decided by the number of the class.
+COARSEST_SCALE, FINEST_SCALE = 2.0**-64, 2.0**30
 _COUNTS = struct.Struct("<HHHHd")
 
 Rows = NDArray[np.int16]
@@ -61,8 +64,8 @@ class IntegerTables:
     def __post_init__(self) -> None:
         _check_counts(self.n_classes, self.n_switches, self.n_joints)
         _check_shapes(self)
-        if not (math.isfinite(self.scale) and self.scale > 0):
-            raise BuildError(f"the scale is {self.scale!r}, it must be a positive number of steps per unit")
+        if not COARSEST_SCALE <= self.scale <= FINEST_SCALE:
+            raise BuildError(f"the scale is {self.scale!r}, it must be from 2^-64 to 2^30 steps per unit")
         for number, thresholds in enumerate(self.thresholds):
             if np.any(thresholds[1:] <= thresholds[:-1]):
                 raise BuildError(f"the thresholds of joint {number} are not strictly increasing")
@@ -127,6 +130,12 @@ def _check_shapes(tables: IntegerTables) -> None:
             raise BuildError(f"{name} is {rows.dtype} {rows.shape}, it must be int16 {shape}")
 
 
+def payload_bytes(n_classes: int, n_switches: int, thresholds: Sequence[int]) -> int:
+    """Return the length of the payload of tables of so many classes and switches; `thresholds` of each joint."""
+    rows = 1 + 2 * n_switches + sum(2 + count for count in thresholds)
+    return _COUNTS.size + 2 * (len(thresholds) + sum(thresholds) + n_classes * rows)
+
+
 def tables_to_bytes(tables: IntegerTables) -> bytes:
     """Return the content of `tables.bin`. Raises BuildError if it would be larger than 16 MiB."""
     header = _COUNTS.pack(tables.n_classes, tables.n_switches, tables.n_joints, 0, tables.scale)
@@ -167,7 +176,7 @@ def _parse(payload: bytes) -> IntegerTables:
         raise BuildError(f"{len(payload)} bytes of content are too few for {j} joints")
     counts = np.frombuffer(payload, "<u2", j, _COUNTS.size).tolist()
     sizes = [K, s * K, s * K, j * K, *counts, *((T + 1) * K for T in counts)]
-    expected = _COUNTS.size + 2 * (j + sum(sizes))
+    expected = payload_bytes(K, s, counts)
     if len(payload) != expected:
         raise BuildError(f"{len(payload)} bytes of content, its counts call for {expected}")
     words = np.frombuffer(payload, "<u2", offset=_COUNTS.size + 2 * j).astype(np.uint16)

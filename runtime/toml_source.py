@@ -1,4 +1,4 @@
-"""A TOML file with its lines: what is wrong in it is told with its line and its keys."""
+"""A TOML file with its lines: an error names its line and its keys. All TOML that thenar reads is read here."""
 
 import codecs
 import re
@@ -7,8 +7,17 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from importlib.resources.abc import Traversable
+from pathlib import Path
 
 from .errors import ThenarError
+from .files import read_file
+from .names import shortened
+from .nesting import check_toml
+
+# Bytes. A harness of 4,096 switches has a third of it; what can be longer is cheaper to refuse than to read.
+LARGEST = 1_000_000
+# Characters of an error's reason, which may repeat what the file says.
+_LONGEST_REASON = 400
 
 # Where something stands: keys, and numbers in lists from 0.
 Place = tuple[str | int, ...]
@@ -29,17 +38,20 @@ class Source:
     raises: type[ThenarError]
 
     def tables(self) -> dict[str, object]:
-        """Return what the file holds; raises its error, with the line, where it is no TOML."""
+        """Return what the file holds; raises its error, with the line, where it is no TOML or too much of it."""
+        if len(self.text) > LARGEST:
+            raise self.raises(f"{self.name} is longer than {LARGEST} characters, the most that is read of TOML")
         try:
+            check_toml(self.text)
             return tomllib.loads(self.text)
-        # tomllib lets Python's own limits through: numbers of thousands of digits, lists a thousand deep.
-        except (ValueError, RecursionError) as reason:
-            raise self.raises(f"{self.name} is not valid TOML: {reason}") from reason
+        except ValueError as reason:
+            raise self.raises(f"{self.name} is not valid TOML: {shortened(str(reason), _LONGEST_REASON)}") from reason
 
     def error(self, place: Place, reason: str) -> ThenarError:
         """Return an error about what stands at `place`: "scene.toml, line 7: subjects[0].name: ..."."""
         where = f"{spelled(place)}: " if place else ""
-        return self.raises(f"{self.name}, line {self.line(place)}: {where}{reason}")
+        shown = shortened(reason, _LONGEST_REASON)
+        return self.raises(f"{self.name}, line {self.line(place)}: {where}{shown}")
 
     def line(self, place: Place) -> int:
         """Return the line of `place`, counted from 1, or of the innermost table round it that is there."""
@@ -48,9 +60,11 @@ class Source:
 
 
 def read_source(file: Traversable, raises: type[ThenarError]) -> Source:
-    """Read a TOML file. Raises an error of the kind `raises` if it cannot be opened or is not UTF-8."""
+    """Read a TOML file. Raises an error of the kind `raises` if it cannot be opened, is too large or not UTF-8."""
     try:
-        return Source(file.name, file.read_bytes().removeprefix(codecs.BOM_UTF8).decode(), raises)
+        # What ships with thenar may lie in a zip, where no path leads.
+        data = read_file(file, LARGEST, raises) if isinstance(file, Path) else file.read_bytes()
+        return Source(file.name, data.removeprefix(codecs.BOM_UTF8).decode(), raises)
     except UnicodeDecodeError as reason:
         before = reason.object[: reason.start].count(b"\n")
         raise raises(f"{file.name}, line {before + 1}: the text is not UTF-8: save it as UTF-8") from reason
@@ -60,7 +74,7 @@ def read_source(file: Traversable, raises: type[ThenarError]) -> Source:
 
 def spelled(place: Place) -> str:
     """Return `place` in TOML's words: ("subjects", 0, "name") is "subjects[0].name"."""
-    return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in place).removeprefix(".")
+    return "".join(f"[{key}]" if isinstance(key, int) else f".{shortened(key)}" for key in place).removeprefix(".")
 
 
 def _tokens(text: str) -> Iterator[tuple[str, int]]:
@@ -145,4 +159,4 @@ class _Lines:
 
 def _unquoted(key: str) -> str:
     """Return what a bare or quoted key says."""
-    return next(iter(tomllib.loads(f"{key} = 0")))
+    return next(iter(tomllib.loads(f"{key} = 0"))) if key[0] in "\"'" else key

@@ -12,7 +12,7 @@ import msgspec
 from msgspec import inspect
 
 from .errors import ThenarError
-from .names import list_names, nearest
+from .names import list_names, nearest, shortened
 from .toml_source import Place, Source
 
 S = TypeVar("S", bound=msgspec.Struct)
@@ -134,7 +134,7 @@ def _sentence(reason: str, value: object, kind: type[S], inner: Place) -> str:
         return f"must be {wanted}, not {_shown(value)}"
     if found := re.fullmatch(r"Expected `.+` ([<>]=?) (.+)", reason):
         bound = found[2] if found[2].lstrip("-").isdigit() else f"{float(found[2]):.15g}"
-        return f"must be {_BOUNDS[found[1]]} {bound}, not {value}"
+        return f"must be {_BOUNDS[found[1]]} {bound}, not {_shown(value)}"
     if reason.startswith("Invalid enum value"):
         choices = [
             str(choice) for member in _members(_type_at(kind, inner)) for choice in getattr(member, "values", ())
@@ -171,4 +171,6 @@ def _shown(value: object) -> str:
         return "a table"
     if isinstance(value, list):
         return "a list" if value else "an empty list"
-    return str(value).lower() if isinstance(value, bool) else repr(value) if isinstance(value, str) else str(value)
+    if isinstance(value, bool):
+        return str(value).lower()
+    return shortened(repr(value) if isinstance(value, str) else str(value))

@@ -37,7 +37,7 @@ def kept(name: str, written: dict[str, str], update: bool) -> None:
 
 
 def builds_of(grasps: Path, folder: Path) -> dict[str, str]:
-    """Compile `grasps` with sums of 16 bits and a wiring, and with tables of 8 bits; return the digests of all files."""
+    """Compile `grasps` with sums of 16 bits and a wiring, and with tables of 8 bits; return the digest of each file."""
     whole, small, glove = folder / "whole", folder / "small", folder / "glove.toml"
     common = ["compile", str(grasps), "--folds", "0", "--no-report", "--rounds", "10"]
     assert run([*common, "-o", str(folder / "first"), "--propose", str(glove)]) == 0

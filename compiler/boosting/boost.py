@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from ...drivers.errors import ThenarError
 from ..elementary import add_exactly, softmax_and_loss
-from .binning import bin_columns
+from ..limits import check_memory
+from .binning import TwoValued, bin_columns
 from .stumpfit import Targets, fit_stumps
 from .stumps import Stumps, centred
 
@@ -62,6 +63,8 @@ def boost(
         # By a power of two, which changes no answer: now sums of huge weights stay finite, and of tiny ones exact.
         weights = np.ldexp(weights, -np.frexp(weights.max())[1])
     binned = bin_columns(X, max_bins)
+    many = sum(len(group.columns) for group in binned.groups if not isinstance(group, TwoValued))
+    check_memory(len(X), n_classes, BoostingError, len(binned.home) - many, many)
     member = labels == np.arange(n_classes)[:, np.newaxis]
     scores = carry = np.zeros((n_classes, len(X)))
     probability, loss = softmax_and_loss(scores, labels, weights)

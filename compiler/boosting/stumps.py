@@ -76,6 +76,15 @@ def centred(answers: Floats, shrinkage: float) -> Floats:
     return (g - add_up(g) / k) * (k - 1) / k
 
 
+def spread(answers: Floats, n_classes: int, shrinkage: float) -> tuple[Floats, Floats]:
+    """Return what `centred` makes of answers (n,) of one stump each where all others answer 0: what it adds to the
+    stump's own class, and to each other class, both (n,); to the last bit.
+    """
+    g = answers * shrinkage
+    mean = g / n_classes
+    return (g - mean) * (n_classes - 1) / n_classes, (0.0 - mean) * (n_classes - 1) / n_classes
+
+
 def winners(scores: Floats) -> NDArray[np.intp]:
     """Return the class (n,) of the largest score of each row of (n, K); of tied ones the lowest number."""
     best: NDArray[np.intp] = (scores >= scores.max(axis=1, keepdims=True) - TIE).argmax(axis=1)

@@ -101,9 +101,9 @@ def compile_build(
     names = [grasp_set.switch_names[column] for column in trained.columns]
     wired = harness(names) if callable(harness) else harness
     scan = None if wired is None else plan_scan(names, integers, wired, bits, material.codes)
+    files = _files(integers, trained, scan)
     comparison = compare(trained.stumps, integers, bits, material.codes)
     tested = cross_validated(material, options, steps.fold_done, ports) if folds else None
-    files = _files(integers, trained, scan)
     described = manifest_to_bytes(describe(grasp_set, options, material, trained, integers, comparison, tested, files))
     manifest = manifest_from_bytes(described)
     firmware, note = made_firmware(manifest, integers)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ...runtime.manifest import Options
 from ..boosting.boost import boost
 from ..boosting.stumps import Stumps
+from ..limits import check_inputs, check_memory, check_types
 from ..placement.cooccurrence import Cooccurrence
 from ..placement.costaware import PortCosts
 from ..placement.id3 import grow_id3
@@ -16,6 +17,7 @@ from ..placement.tree import Tree
 from ..recordings.graspset import GraspSet
 from ..selection.learning import Columns, Learning
 from ..selection.ways import METHODS, chooser
+from .ensemble import MAX_STUMPS
 from .errors import CompileError
 
 PAPERS = "id3"  # the method of the paper
@@ -69,12 +71,26 @@ def material_of(grasp_set: GraspSet, options: Options) -> Material:
     found, labels = np.unique(grasp_set.labels, return_inverse=True)
     if len(found) < 2:
         raise CompileError(f"the recordings hold {len(found)} grasp type(s): there is nothing to tell apart")
+    switches = grasp_set.switches[:, : None if wanted != "joints" else 0]
+    codes = grasp_set.codes[:, : None if wanted != "switches" else 0]
+    _check_size(len(found), min(options.keep or 0, switches.shape[1]), codes, options.rounds)
     return Material(
-        switches=grasp_set.switches[:, : None if wanted != "joints" else 0],
-        codes=grasp_set.codes[:, : None if wanted != "switches" else 0],
+        switches=switches,
+        codes=codes,
         labels=labels,
         grasps=tuple(grasp_set.taxonomy.types[label] for label in found),
     )
+
+
+def _check_size(types: int, kept: int, codes: NDArray[np.uint16], rounds: int) -> None:
+    check_types(types, CompileError)
+    check_inputs(types, kept, codes.shape[1], CompileError)
+    check_memory(len(codes), types, CompileError)
+    if rounds * types > MAX_STUMPS:
+        raise CompileError(
+            f"{rounds} rounds of {types} grasp types are {rounds * types} stumps, a build has at most {MAX_STUMPS}: "
+            "boost for fewer rounds"
+        )
 
 
 def train(
@@ -87,6 +103,7 @@ def train(
     columns, gains, tree = _placed(material, options, ports)
     if not columns and not material.codes.shape[1]:
         raise CompileError("no switch is worth keeping: lower --prune, or record switches that differ between grasps")
+    check_inputs(len(material.grasps), len(columns), material.codes.shape[1], CompileError)
     X = np.hstack([material.switches[:, list(columns)], material.codes])
     stumps, history = boost(
         X,

@@ -131,7 +131,13 @@ def _load_ensemble(folder: Path, build: Build) -> Stumps:
     path = folder / ENSEMBLE_NAME
     stumps = ensemble_from_bytes(read_member(path, MAX_BYTES, build.manifest.ensemble_sha256), str(path))
     inputs = build.tables.n_switches + build.tables.n_joints
-    if (stumps.n_inputs, stumps.n_classes) != (inputs, build.tables.n_classes):
+    options = build.manifest.options
+    belongs = (stumps.n_inputs, stumps.n_classes, stumps.shrinkage) == (
+        inputs,
+        build.tables.n_classes,
+        options.shrinkage,
+    )
+    if not belongs or stumps.n_rounds > options.rounds:
         raise BuildError(f"{path} is the ensemble of another build: compile the build again")
     return stumps
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..limits import check_memory, check_types
 from ..recordings.graspset import GraspSet
 from .compositions import inputs
 from .concerns import concerns
@@ -106,7 +107,11 @@ def _of_subjects(grasp_set: GraspSet, subjects: tuple[str, ...]) -> GraspSet:
     unknown = [name for name in subjects if name not in known]
     if unknown:
         raise EvaluationError(f"no subject {unknown[0]!r} in the set; its subjects are {', '.join(known)}")
-    return grasp_set.rows(np.isin(grasp_set.subjects, subjects)) if subjects else grasp_set
+    chosen = grasp_set.rows(np.isin(grasp_set.subjects, subjects)) if subjects else grasp_set
+    types = len(np.unique(chosen.labels))
+    check_types(types, EvaluationError)
+    check_memory(len(chosen), types, EvaluationError)
+    return chosen
 
 
 def _why_not(name: TableName, grasp_set: GraspSet, parts: tuple[Population, ...], scheme: Scheme) -> str | None:

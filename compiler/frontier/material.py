@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..evaluation.folds import Fold, Rows, check_cut, weka_folds
 from ..evaluation.groups import leave_one_out
+from ..limits import check_inputs, check_memory, check_types
 from ..placement.costaware import PortCosts
 from ..recordings.graspset import GraspSet
 from ..selection.learning import Learning
@@ -36,6 +37,10 @@ class Material:
         found, labels = np.unique(grasp_set.labels, return_inverse=True)
         if len(found) < 2:
             raise FrontierError(f"the recordings hold {len(found)} grasp type(s): there is nothing to tell apart")
+        check_types(len(found), FrontierError)
+        # All switches at once are tried as well.
+        check_inputs(len(found), len(grasp_set.switch_names), len(grasp_set.joints), FrontierError)
+        check_memory(len(grasp_set), len(found), FrontierError)
         grasps = tuple(grasp_set.taxonomy.types[label] for label in found)
         return cls(
             grasp_set.switches,

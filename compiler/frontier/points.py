@@ -1,5 +1,6 @@
 """`frontier.json`: the points that were found, what each costs and recognises, and how every number came about."""
 
+from collections.abc import Iterator
 from typing import Annotated, Literal, TypeVar
 
 import msgspec
@@ -18,6 +19,10 @@ How = Literal["measured", "simulated", "wire", "model"]
 Scan = Literal["full", "early"]
 DecisionKind = Literal["single", "dwell", "sequential"]
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+Count = Annotated[int, Meta(ge=0, le=2**53)]
+# Microseconds; a day has 1e11 of them.
+Microseconds = Annotated[float, Meta(ge=0.0, le=1e12)]
+Amount = Annotated[float, Meta(ge=0.0, le=1e12)]
 _T = TypeVar("_T")
 
 
@@ -36,7 +41,7 @@ class Rate(Struct, frozen=True, forbid_unknown_fields=True):
 class Time(Struct, frozen=True, forbid_unknown_fields=True):
     """A time in microseconds, and how it came about."""
 
-    us: float
+    us: Microseconds
     how: How
 
 
@@ -44,7 +49,7 @@ class Way(Struct, frozen=True, forbid_unknown_fields=True):
     """How switches are chosen: a method of `selection.ways`, and its parameter (S, or a number of switches)."""
 
     method: str
-    parameter: float
+    parameter: Annotated[float, Meta(ge=0.0, le=1e6)]
 
 
 class Setting(Struct, frozen=True, forbid_unknown_fields=True):
@@ -58,15 +63,15 @@ class Setting(Struct, frozen=True, forbid_unknown_fields=True):
 
     way: Way
     inputs: Inputs
-    rounds: int
-    width: int
+    rounds: Annotated[int, Meta(ge=1, le=10**6)]
+    width: Annotated[int, Meta(ge=4, le=16)]
     layout: str
     scan: Scan
     decision: DecisionKind
     wiring: str
-    clock_hz: int
+    clock_hz: Annotated[int, Meta(ge=0, le=12_000_000)]
     table_bits: TableBits = 16
-    max_bins: int | None = None
+    max_bins: Annotated[int, Meta(ge=2, le=2**53)] | None = None
 
 
 class Latency(Struct, frozen=True, forbid_unknown_fields=True):
@@ -76,8 +81,8 @@ class Latency(Struct, frozen=True, forbid_unknown_fields=True):
     wrong   the share of the time for which grasps were held, decided on once, that another type was decided on
     """
 
-    mean_us: float
-    p99_us: float
+    mean_us: Microseconds
+    p99_us: Microseconds
     missed: Share
     wrong: Share = 0.0
 
@@ -104,11 +109,11 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     classify: Time
     frame: Time
     latency: Latency
-    flash: int
-    ram: int
-    ports: int
-    chips: int
-    compile_s: float
+    flash: Count
+    ram: Count
+    ports: Count
+    chips: Count
+    compile_s: Amount
     fronts: tuple[str, ...] = ()
 
 
@@ -117,10 +122,10 @@ class Tried(Struct, frozen=True, forbid_unknown_fields=True):
 
     way: Way
     inputs: Inputs
-    n_switches: int
-    rounds: int
+    n_switches: Count
+    rounds: Count
     rate: Rate
-    frame_us: float
+    frame_us: Microseconds
 
 
 class Curve(Struct, frozen=True, forbid_unknown_fields=True):
@@ -129,7 +134,7 @@ class Curve(Struct, frozen=True, forbid_unknown_fields=True):
     method: str
     what: str
     ours: bool
-    sizes: tuple[float, ...]
+    sizes: tuple[Amount, ...]
     rates: tuple[Rate, ...]
 
 
@@ -138,19 +143,19 @@ class Check(Struct, frozen=True, forbid_unknown_fields=True):
 
     what: str
     how: How
-    n: int
-    mean_error: float
-    worst_error: float
+    n: Count
+    mean_error: Amount
+    worst_error: Amount
 
 
 class Mark(Struct, frozen=True, forbid_unknown_fields=True):
     """Something to see on the pictures beside the points: the paper's choices, all switches, the user's build."""
 
     name: str
-    n_switches: int
+    n_switches: Count
     rate: Rate
-    frame_us: float
-    latency_us: float | None = None
+    frame_us: Microseconds
+    latency_us: Microseconds | None = None
 
 
 class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -164,15 +169,15 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     thenar: str
     source: str
     fingerprint: str
-    rows: int
-    subjects: int
-    n_switches: int
-    n_joints: int
+    rows: Count
+    subjects: Count
+    n_switches: Count
+    n_joints: Count
     grasps: tuple[str, ...]
     target: str
-    folds: int
-    repeats: int
-    combinations: int
+    folds: Count
+    repeats: Count
+    combinations: Count
     points: tuple[Point, ...]
     tried: tuple[Tried, ...]
     curves: tuple[Curve, ...]
@@ -200,7 +205,10 @@ def frontier_to_bytes(frontier: Frontier) -> bytes:
 
 
 def frontier_from_bytes(data: bytes, what: str = "frontier.json") -> Frontier:
-    """Return the frontier of a `frontier.json`, which messages call `what`. Raises FrontierError."""
+    """Return the frontier of a `frontier.json`, which messages call `what`.
+
+    Raises FrontierError if it is oversized, no such document, of a newer schema, or contradicts itself.
+    """
     if len(data) > MAX_BYTES:
         raise FrontierError(f"{what} has {len(data)} bytes, a frontier has at most {MAX_BYTES}")
     schema = _decode(data, _Version, what).schema
@@ -210,11 +218,38 @@ def frontier_from_bytes(data: bytes, what: str = "frontier.json") -> Frontier:
     for name in {*frontier.grasps, *(name for point in frontier.points for name in point.switches)}:
         if reason := fault(name):
             raise FrontierError(f"{what}: the name {shortened(repr(name))} {reason}")
+    for wrong in _contradictions(frontier):
+        raise FrontierError(f"{what} {wrong}: run thenar frontier again")
     return frontier
+
+
+def _contradictions(frontier: Frontier) -> Iterator[str]:
+    """Yield what cannot all be true, or can be built by nobody."""
+    if [point.number for point in frontier.points] != list(range(1, len(frontier.points) + 1)):
+        yield "does not number its points 1, 2, 3 and so on"
+    if frontier.picked is not None and not 1 <= frontier.picked <= len(frontier.points):
+        yield f"picked point {frontier.picked}, which it does not have"
+    if any(len(curve.sizes) != len(curve.rates) for curve in frontier.curves):
+        yield "has a curve of more sizes than rates, or fewer"
+    for point in frontier.points:
+        if fault := _fault(point, frontier):
+            yield f"has a point {point.number} that {fault}"
+
+
+def _fault(point: Point, frontier: Frontier) -> str:
+    """Return what is wrong with a point's setting, or nothing."""
+    setting = point.setting
+    if len(set(point.switches)) < len(point.switches) or len(point.switches) > frontier.n_switches:
+        return "keeps a switch twice, or more than there are"
+    if point.switches and not (setting.wiring and setting.clock_hz):
+        return "has switches without a wiring or its clock"
+    if (setting.inputs == "joints") != (not point.switches):
+        return f"keeps {len(point.switches)} switches for inputs {setting.inputs!r}"
+    return ""
 
 
 def _decode(data: bytes, kind: type[_T], what: str) -> _T:
     try:
         return msgspec.json.decode(data, type=kind)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as wrong:
+    except (ValueError, RecursionError) as wrong:
         raise FrontierError(f"{what} is not a frontier's: {wrong}") from None

@@ -4,7 +4,9 @@ from itertools import accumulate
 from typing import TYPE_CHECKING
 
 import msgspec
+import numpy as np
 
+from ..limits import check_types
 from .errors import PlacementError
 from .gain import entropy_bits
 from .id3 import grow_id3
@@ -55,10 +57,11 @@ def place(grasp_set: "GraspSet", prune: int = 0) -> tuple[Placement, Tree]:
     """Choose switches of `grasp_set` with ID3, pruned by S = `prune`; return the placement and the tree.
 
     The tree's classes are numbers of grasp types in the taxonomy, so that a tie goes to the lowest of these.
-    Raises PlacementError if the set has no switches or no rows.
+    Raises PlacementError if the set has no switches, no rows, or more grasp types than a build can hold.
     """
     if not grasp_set.switch_names:
         raise PlacementError("the set has no switches to place: it holds joints only")
+    check_types(len(np.unique(grasp_set.labels)), PlacementError)
     tree = grow_id3(grasp_set.switches, grasp_set.labels, min_samples=prune)
     entropy = entropy_bits(list(tree.nodes[0].counts))
     chosen = tuple(

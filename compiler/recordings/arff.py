@@ -9,11 +9,17 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from .errors import TableError
+from .limits import COLUMNS, ROWS
+from .names import shortened
 from .table import Table
+from .texts import TextRows
 
-# A value: quoted, where a backslash takes the next character as it is, or a word. Commas and blanks part values.
-_VALUE = re.compile(r"""'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*"|[^\s,{}'"%]+""")
-_ATTRIBUTE = re.compile(rf"@attribute\s+({_VALUE.pattern})\s+(.+)", re.IGNORECASE)
+# A value: quoted, where a backslash takes the next character as it is, or a word; a quote that nothing closes takes the
+# rest of the line. Commas and blanks part values. No quantifier gives back what it took: so the time is linear.
+_QUOTED = r"""'(?:\\.|[^'\\])*+'|"(?:\\.|[^"\\])*+\""""
+_VALUE = re.compile(rf"""{_QUOTED}|['"].*+|[^\s,{{}}'"%]++""")
+_CLOSED = re.compile(_QUOTED)
+_ATTRIBUTE = re.compile(rf"@attribute\s++({_VALUE.pattern})\s++(.+)", re.IGNORECASE)
 _NUMERIC = ("numeric", "real", "integer")
 
 # The values an attribute may have; None for numbers.
@@ -28,19 +34,27 @@ def read_arff(what: str, text: Iterable[str]) -> Table:
     """
     lines = enumerate(text, start=1)
     kinds = _header(what, lines)
-    data = [line for _, line in lines if line.strip() and not line.lstrip().startswith("%")]
-    rows = [_values(f"{what} row {number}", line.strip(), len(kinds)) for number, line in enumerate(data, start=1)]
-    columns = dict(zip(kinds, zip(*rows, strict=True), strict=True)) if rows else dict.fromkeys(kinds, ())
+    cells, count = TextRows(len(kinds)), 0
+    for _, line in lines:
+        data = line.strip()
+        if data and not data.startswith("%"):
+            count += 1
+            if count > ROWS:
+                raise TableError(f"{what} has more than {ROWS} rows, the most that are read of a table")
+            cells.append(_values(f"{what} row {count}", data, len(kinds)))
+    columns = dict(zip(kinds, cells.columns(), strict=True))
     for name, values in kinds.items():
-        for number, cell in enumerate(columns[name], start=1):
-            if values and cell != "?" and cell not in values:
-                raise TableError(f"{what} row {number}: {cell!r} is not among the values of attribute {name!r}")
-    return Table(what, columns, np.arange(1, len(rows) + 1))
+        for number, cell in enumerate(columns[name] if values else (), start=1):
+            if cell != "?" and cell not in (values or ()):
+                shown = f"{shortened(repr(cell))} is not among the values of attribute {shortened(repr(name))}"
+                raise TableError(f"{what} row {number}: {shown}")
+    return Table(what, columns, np.arange(1, count + 1))
 
 
 def _header(what: str, lines: Iterator[tuple[int, str]]) -> _Kinds:
     """Read up to @data."""
     kinds: _Kinds = {}
+    listed = 0
     for number, line in lines:
         word = line.strip().split(maxsplit=1)[0].lower() if line.strip() else "%"
         if word == "@data":
@@ -48,23 +62,28 @@ def _header(what: str, lines: Iterator[tuple[int, str]]) -> _Kinds:
         if word == "@attribute":
             name, kind = _attribute(f"{what} line {number}", line.strip())
             if name in kinds:
-                raise TableError(f"{what} line {number}: attribute {name!r} occurs twice")
+                raise TableError(f"{what} line {number}: attribute {shortened(repr(name))} occurs twice")
             kinds[name] = kind
+            listed += len(kind or ())
+            if len(kinds) > COLUMNS or listed > ROWS:
+                raise TableError(f"{what} line {number}: more than {COLUMNS} attributes, or {ROWS} values of them")
         elif word != "@relation" and not word.startswith("%"):
-            raise TableError(f"{what} line {number}: {word!r} stands where @attribute or @data should")
+            shown = shortened(repr(word))
+            raise TableError(f"{what} line {number}: {shown} stands where @attribute or @data should")
     raise TableError(f"{what} is no ARFF: it has no line @data")
 
 
 def _attribute(where: str, line: str) -> tuple[str, frozenset[str] | None]:
     match = _ATTRIBUTE.match(line)
     if match is None:
-        raise TableError(f"{where}: an attribute has a name and a type: {line!r}")
-    name, kind = _unquote(match[1]), match[2].strip()
-    if kind.split()[0].lower() in _NUMERIC:
+        raise TableError(f"{where}: an attribute has a name and a type: {shortened(repr(line))}")
+    name, kind = _unquote(where, match[1]), match[2].strip()
+    if kind.split(maxsplit=1)[0].lower() in _NUMERIC:
         return name, None
     if not kind.startswith("{") or "}" not in kind:
-        raise TableError(f"{where}: attribute {name!r} is {kind}; only numeric and nominal ones are read")
-    return name, frozenset(map(_unquote, _VALUE.findall(kind)))
+        shown = f"attribute {shortened(repr(name))} is {shortened(kind)}"
+        raise TableError(f"{where}: {shown}; only numeric and nominal ones are read")
+    return name, frozenset(_unquote(where, value) for value in _VALUE.findall(kind))
 
 
 def _values(where: str, line: str, width: int) -> list[str]:
@@ -72,13 +91,17 @@ def _values(where: str, line: str, width: int) -> list[str]:
         values = line.replace(",", " ").split()
     elif _VALUE.sub("", line).strip(", \t"):
         sparse = ": sparse rows are not read" if line.startswith("{") else ""
-        raise TableError(f"{where} cannot be read as values{sparse}: {line[:60]!r}")
+        raise TableError(f"{where} cannot be read as values{sparse}: {shortened(repr(line))}")
     else:
-        values = list(map(_unquote, _VALUE.findall(line)))
+        values = [_unquote(where, value) for value in _VALUE.findall(line)]
     if len(values) != width:
         raise TableError(f"{where} has {len(values)} values, the header {width} attributes")
     return values
 
 
-def _unquote(value: str) -> str:
-    return re.sub(r"\\(.)", r"\1", value[1:-1]) if value[0] in "'\"" else value
+def _unquote(where: str, value: str) -> str:
+    if value[0] not in "'\"":
+        return value
+    if not _CLOSED.fullmatch(value):
+        raise TableError(f"{where} cannot be read as values: nothing closes the quote of {shortened(repr(value))}")
+    return re.sub(r"\\(.)", r"\1", value[1:-1])

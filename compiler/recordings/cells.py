@@ -1,23 +1,26 @@
 """Cells of a table as numbers, bits or names; what is missing and what is wrong is marked, not raised."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import AnyArray
 from .graspset import CODES
-from .names import fault
+from .names import check_room, fault
 from .spreadsheet import text_of
 from .table import Column
+from .texts import pieces
 
 MISSING_NUMBERS = frozenset({"", "?", "na", "nan"})
 MISSING_NAMES = frozenset({"", "?"})
 
 _BITS = {"true": 1.0, "false": 0.0}
-
+_PIECE = 1 << 14
 
 Value = TypeVar("Value", bound=np.generic)
 
@@ -33,15 +36,14 @@ class Parsed(Generic[Value]):
 
 def numbers(column: Column) -> Parsed[np.float64]:
     """Read `column` as finite numbers; missing: empty, ?, NA, NaN; wrong: anything else, and infinity."""
-    values = _floats(column, {})
-    return _parsed(values, column)
+    return _parsed(column, {})
 
 
-def bits(column: Column) -> Parsed[np.float64]:
+def bits(column: Column) -> Parsed[np.bool_]:
     """Read `column` as bits: 0, 1, 0.0, 1.0, true, false; missing as in `numbers`, wrong: anything else."""
-    values = _floats(column, _BITS)
-    parsed = _parsed(values, column)
-    return Parsed(values, parsed.missing, parsed.wrong | ~(parsed.missing | (values == 0) | (values == 1)))
+    parsed = _parsed(column, _BITS)
+    values = parsed.values == 1
+    return Parsed(values, parsed.missing, parsed.wrong | ~(parsed.missing | values | (parsed.values == 0)))
 
 
 def integers(column: Column) -> Parsed[np.float64]:
@@ -57,22 +59,40 @@ def codes(column: Column) -> Parsed[np.float64]:
     return Parsed(parsed.values, parsed.missing, parsed.wrong | (parsed.values < 0) | (parsed.values >= CODES))
 
 
-def names(column: Column, cells: bool = False) -> Parsed[np.str_]:
+def names(column: Column, cells: bool = False, size: int = 0) -> Parsed[np.str_]:
     """Read `column` as names without outer blanks; missing: empty and ?, wrong: what is no good name. With `cells` they
     are written as cells of a spreadsheet.
 
     Numbers are names too, but for NaN, which is missing, and infinity, which is wrong. Whole ones read as such: 3, not
-    3.0.
+    3.0. Raises RecordingError where the names are too long for so many rows of a file of `size` bytes.
     """
-    if isinstance(column, np.ndarray):
-        texts = list(map(_name_of_number, column.tolist()))
-        faulty = {text for text in texts if text.endswith("inf")}
-    else:
-        texts = [text_of(cell.strip()) if cells else cell.strip() for cell in column]
+    missing, wrong = (np.zeros(len(column), np.bool_) for _ in range(2))
+    found: list[NDArray[np.str_]] = []
+    start = longest = 0
+    for texts, faulty in _names(column, cells):
+        longest = max(longest, *map(len, texts))
+        check_room(len(column), longest, size)
+        found.append(np.array(texts, np.str_))
+        end = start + len(texts)
+        for mask, these in (missing, MISSING_NAMES), (wrong, faulty):
+            if not these.isdisjoint(texts):
+                mask[start:end] = [text in these for text in texts]
+        start = end
+    return Parsed(np.concatenate(found) if found else np.zeros(0, np.str_), missing, wrong)
+
+
+def _names(column: Column, cells: bool) -> Iterator[tuple[list[str], set[str]]]:
+    """Yield the names in a column, piece by piece, and those of the piece that are wrong."""
+    if isinstance(column, np.ndarray) and column.dtype.kind != "U":
+        values = _floats(column)
+        for start in range(0, len(values), _PIECE):
+            texts = list(map(_name_of_number, values[start : start + _PIECE].tolist()))
+            yield texts, {text for text in texts if text.endswith("inf")}
+        return
+    for piece in pieces(column):
+        texts = [text_of(cell.strip()) if cells else cell.strip() for cell in piece]
         # Looked up as str: an array of them would lose NULs at their ends.
-        faulty = {text for text in {*texts} - MISSING_NAMES if fault(text)}
-    missing, wrong = (np.array([text in found for text in texts], np.bool_) for found in (MISSING_NAMES, faulty))
-    return Parsed(np.array(texts, np.str_), missing, wrong)
+        yield texts, {text for text in {*texts} - MISSING_NAMES if fault(text)}
 
 
 def _name_of_number(number: float) -> str:
@@ -82,34 +102,45 @@ def _name_of_number(number: float) -> str:
     return np.format_float_positional(number + 0.0, trim="-")
 
 
-def _parsed(values: NDArray[np.float64], column: Column) -> Parsed[np.float64]:
-    """Tell the missing cells from the wrong ones, both of which `_floats` left as NaN."""
-    doubtful = np.isnan(values)
-    missing = doubtful.copy()
-    if not isinstance(column, np.ndarray):
-        for row in np.flatnonzero(doubtful).tolist():
-            missing[row] = column[row].strip().casefold() in MISSING_NUMBERS
-    return Parsed(values, missing, (doubtful & ~missing) | np.isinf(values))
+def _parsed(column: Column, words: dict[str, float]) -> Parsed[np.float64]:
+    """Return the cells as floats, NaN where one is missing or wrong; `words` are read besides numbers."""
+    if isinstance(column, np.ndarray) and column.dtype.kind != "U":
+        values = _floats(column)
+        missing = np.isnan(values)
+    else:
+        values, missing = np.empty(len(column)), np.zeros(len(column), np.bool_)
+        start = 0
+        for texts in pieces(column):
+            end = start + len(texts)
+            values[start:end] = _numbers(texts, words)
+            for row in np.flatnonzero(np.isnan(values[start:end])).tolist():
+                missing[start + row] = texts[row].strip().casefold() in MISSING_NUMBERS
+            start = end
+    return Parsed(values, missing, (np.isnan(values) & ~missing) | np.isinf(values))
 
 
-def _floats(column: Column, words: dict[str, float]) -> NDArray[np.float64]:
-    """Return the cells as floats, NaN where one is none; `words` are read besides numbers."""
-    if isinstance(column, np.ndarray):
-        return column
+def _floats(column: AnyArray) -> NDArray[np.float64]:
+    # What is too large for a double becomes infinite, and is refused with its row.
+    with np.errstate(over="ignore"):
+        return column.astype(np.float64)
+
+
+def _numbers(cells: list[str], words: dict[str, float]) -> NDArray[np.float64]:
     try:
-        # The whole column at once is several times faster; float() would read 1_000 as a thousand.
-        values = np.array(column, dtype=np.float64)
-        return values if not any("_" in cell for cell in column) else _one_by_one(column, words)
+        # All at once is several times faster; float() would read 1_000 as a thousand.
+        values = np.array(cells, dtype=np.float64)
+        return values if not any("_" in cell for cell in cells) else _one_by_one(cells, words)
     except ValueError:
-        return _one_by_one(column, words)
+        return _one_by_one(cells, words)
 
 
-def _one_by_one(column: Sequence[str], words: dict[str, float]) -> NDArray[np.float64]:
-    values = np.full(len(column), np.nan)
-    for row, cell in enumerate(column):
-        try:
-            word = cell.strip().casefold()
-            values[row] = words[word] if word in words else float("nan" if "_" in cell else cell)
-        except ValueError:
-            continue
+def _one_by_one(cells: list[str], words: dict[str, float]) -> NDArray[np.float64]:
+    values = np.full(len(cells), np.nan)
+    for row, cell in enumerate(cells):
+        word = cell.strip().casefold()
+        if word in words:
+            values[row] = words[word]
+        elif word not in MISSING_NUMBERS and "_" not in word:
+            with suppress(ValueError):
+                values[row] = float(word)
     return values

@@ -1,6 +1,5 @@
 """`columns.toml`: which column of a table is the label, the subject, a switch, a joint, and how joints become codes."""
 
-import codecs
 import glob
 import math
 from collections import Counter
@@ -12,8 +11,10 @@ from typing import Literal
 
 import msgspec
 
+from ...runtime.toml_source import read_source
+from ...runtime.toml_struct import convert
 from .errors import ColumnsError
-from .names import nearest
+from .names import nearest, shortened
 
 DEFAULT_GRID = 0.5
 
@@ -84,26 +85,9 @@ class Selection:
 
 
 def read_columns(path: Path) -> Columns:
-    """Read a columns.toml; raises ColumnsError naming the key that is wrong."""
-    try:
-        return msgspec.toml.decode(path.read_bytes().removeprefix(codecs.BOM_UTF8), type=Columns)
-    except (msgspec.DecodeError, UnicodeDecodeError) as reason:
-        raise ColumnsError(f"{path.name}: {_in_toml_words(str(reason))}") from reason
-
-
-def _in_toml_words(reason: str) -> str:
-    """Return msgspec's sentence with TOML's words and `joints[0]` for its path `$.joints[0]`."""
-    words = {
-        "Object ": "table ",
-        "field": "key",
-        "`$.": "`",
-        "`str`": "text",
-        "`object`": "table",
-        "Expected": "expected",
-    }
-    for theirs, ours in words.items():
-        reason = reason.replace(theirs, ours)
-    return reason.removesuffix(" - at `$`")
+    """Read a columns.toml; raises ColumnsError with file, line and key."""
+    source = read_source(path, ColumnsError)
+    return convert(source, (), source.tables(), Columns)
 
 
 def select(columns: Columns, names: Sequence[str]) -> Selection:
@@ -117,9 +101,10 @@ def select(columns: Columns, names: Sequence[str]) -> Selection:
         "object": columns.object,
         "trial": columns.trial,
     }
+    there = set(names)
     for key, column in meta.items():
-        if column is not None and column not in names:
-            raise ColumnsError(f"{key}: the table has no column {column!r}{nearest(column, names)}")
+        if column is not None and column not in there:
+            raise ColumnsError(f"{key}: the table has no column {shortened(repr(column))}{nearest(column, names)}")
     switches = tuple(_matches("switches", columns.switches, names))
     joints = tuple((name, entry) for entry in columns.joints for name in _matches("joints", entry.columns, names))
     used = Counter([*filter(None, meta.values()), *switches, *(name for name, _ in joints)])

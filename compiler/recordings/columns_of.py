@@ -64,7 +64,9 @@ def _alike(joints: Iterable[Joint]) -> Iterable[list[Joint]]:
 
 
 def _free(name: str, taken: set[str]) -> str:
-    return name if name not in taken else _free(f"{name}_", taken)
+    while name in taken:
+        name += "_"
+    return name
 
 
 def _text(text: str) -> str:

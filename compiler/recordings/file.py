@@ -15,15 +15,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...runtime.errors import SealError
-from ...runtime.files import write_atomically
+from ...runtime.files import read_file, write_atomically
+from ...runtime.nesting import check_json
 from ...runtime.sealed import seal, unseal
 from .arrays import AnyArray, pack, unpack
 from .errors import RecordingError
 from .graspset import GraspSet, Joint
+from .limits import LARGEST
+from .names import check_room
 from .taxonomy import Taxonomy
 
 KIND = b"THNRGRSP"
 VERSION = 1
+# Rows, columns and grasp types of a set.
+MOST = 10_000_000
 
 _DTYPES = {"switches": "u1", "codes": "<u2", "grasps": "<u4", "subjects": "<u4", "objects": "<u4", "trials": "<i8"}
 
@@ -47,10 +52,10 @@ def save(grasp_set: GraspSet, path: Path) -> None:
 
 def load(cls: type[AnyGraspSet], path: Path) -> AnyGraspSet:
     """Read `path`; raises SealError with the reason if it is foreign, cut, altered, too new or inconsistent."""
-    _, payload = unseal(path.read_bytes(), KIND, VERSION, path.name)
+    _, payload = unseal(read_file(path, LARGEST, SealError), KIND, VERSION, path.name)
     try:
-        return _unpack(cls, *unpack(payload, path.name))
-    except (RecordingError, msgspec.DecodeError, UnicodeDecodeError) as reason:
+        return _unpack(cls, len(payload), *unpack(payload, path.name))
+    except (RecordingError, msgspec.DecodeError, ValueError) as reason:
         raise SealError(f"{path.name} contradicts itself: {reason}") from reason
 
 
@@ -77,25 +82,32 @@ def _pack(grasp_set: GraspSet) -> bytes:
     return pack(msgspec.json.encode(header), {name: array.astype(_DTYPES[name]) for name, array in arrays.items()})
 
 
-def _unpack(cls: type[AnyGraspSet], header_bytes: bytes, arrays: dict[str, AnyArray]) -> AnyGraspSet:
+def _unpack(cls: type[AnyGraspSet], size: int, header_bytes: bytes, arrays: dict[str, AnyArray]) -> AnyGraspSet:
+    check_json(header_bytes)
     header = msgspec.json.decode(header_bytes, type=_Header)
     _check_arrays(header, arrays)
-    switches = np.unpackbits(arrays["switches"].astype(np.uint8), axis=1, count=len(header.switches)).astype(np.bool_)
+    # Viewed and frozen, so that the set takes it without a copy.
+    switches = np.unpackbits(arrays["switches"].astype(np.uint8, copy=False), axis=1, count=len(header.switches)).view(
+        np.bool_
+    )
+    switches.setflags(write=False)
     return cls(
         switches=switches,
         switch_names=header.switches,
         codes=arrays["codes"].astype(np.uint16),
         joints=header.joints,
-        grasps=_names("grasps", header.taxonomy.types, arrays),
+        grasps=_names("grasps", header.taxonomy.types, arrays, size),
         taxonomy=header.taxonomy,
-        subjects=_names("subjects", header.subjects, arrays),
-        objects=_names("objects", header.objects, arrays),
+        subjects=_names("subjects", header.subjects, arrays, size),
+        objects=_names("objects", header.objects, arrays, size),
         trials=arrays["trials"].astype(np.int64),
         simulated=header.simulated,
     )
 
 
 def _check_arrays(header: _Header, arrays: dict[str, AnyArray]) -> None:
+    if max(header.rows, len(header.switches) + len(header.joints), len(header.taxonomy.types)) > MOST:
+        raise RecordingError(f"it has more than {MOST} rows, columns or grasp types")
     if arrays.keys() != _DTYPES.keys():
         raise RecordingError(f"it holds the arrays {sorted(arrays)}, not {sorted(_DTYPES)}")
     widths = {"switches": -(-len(header.switches) // 8), "codes": len(header.joints)}
@@ -105,8 +117,11 @@ def _check_arrays(header: _Header, arrays: dict[str, AnyArray]) -> None:
             raise RecordingError(f"{name} is {array.dtype} {array.shape}, not {_DTYPES[name]} {shape}")
 
 
-def _names(what: str, names: tuple[str, ...], arrays: dict[str, AnyArray]) -> NDArray[np.str_]:
+def _names(what: str, names: tuple[str, ...], arrays: dict[str, AnyArray], size: int) -> NDArray[np.str_]:
     index = arrays[what].astype(np.intp)
     if index.size and int(index.max()) >= len(names):
         raise RecordingError(f"{what} refers to name {int(index.max())} of {len(names)}")
-    return np.array(names, dtype=np.str_)[index]
+    check_room(max(len(index), len(names)), max(map(len, names), default=0), size)
+    found: NDArray[np.str_] = np.array(names, dtype=np.str_)[index]
+    found.setflags(write=False)
+    return found

@@ -89,10 +89,12 @@ def _odd_frames(grasp_set: GraspSet, rows: NDArray[np.int64]) -> Iterator[Findin
 
 
 def _gaps(grasp_set: GraspSet) -> Iterator[Finding]:
-    present = np.unique(grasp_set.grasps).tolist()
-    gaps = []
-    for subject in np.unique(grasp_set.subjects).tolist():
-        own = set(grasp_set.grasps[grasp_set.subjects == subject].tolist())
-        gaps += [f"subject {subject} has no {grasp}" for grasp in present if grasp not in own]
-    if gaps:
-        yield Finding("grasp types that a subject lacks", len(gaps), list_names(gaps))
+    subjects, subject = np.unique(grasp_set.subjects, return_inverse=True)
+    present, grasp = np.unique(grasp_set.grasps, return_inverse=True)
+    # Pairs as numbers: far more can be absent than there are rows, so only those that are shown are listed.
+    pairs = np.unique(subject * len(present) + grasp)
+    count = len(subjects) * len(present) - len(pairs)
+    if count:
+        absent = np.setdiff1d(np.arange(min(len(pairs) + SHOWN, len(subjects) * len(present))), pairs)[:SHOWN]
+        shown = [f"subject {subjects[pair // len(present)]} has no {present[pair % len(present)]}" for pair in absent]
+        yield Finding("grasp types that a subject lacks", count, list_names(shown, count))

@@ -11,7 +11,8 @@ from .columns import Columns, read_columns, select
 from .errors import ColumnsError, RecordingError, TableError
 from .findings import Finding, find_oddities
 from .graspset import GraspSet
-from .names import list_names, list_rows
+from .limits import TYPES
+from .names import check_room, list_names, list_rows, shortened
 from .reading import Readings, read_cells
 from .table import Table, read_table
 from .taxonomy import Taxonomy, own, published
@@ -45,7 +46,7 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
     """Import `table` as `columns` says; raises TableError, ColumnsError or RecordingError."""
     selection = select(columns, list(table.columns))
     readings, dropped = read_cells(table, columns, selection)
-    grasps, taxonomy, aliases = _labels(table.what, columns, readings)
+    grasps, taxonomy, aliases = _labels(table, columns, readings)
     joints = [
         code_joint(name, entry, readings.joints[:, column], readings.rows)
         for column, (name, entry) in enumerate(selection.joints)
@@ -84,22 +85,31 @@ def report_of(
     )
 
 
-def _labels(what: str, columns: Columns, readings: Readings) -> tuple[NDArray[np.str_], Taxonomy, list[Finding]]:
+def _labels(table: Table, columns: Columns, readings: Readings) -> tuple[NDArray[np.str_], Taxonomy, list[Finding]]:
     """Return each row's grasp type, the taxonomy, and the aliases that nobody needed."""
     found, where = np.unique(readings.labels, return_inverse=True)
+    if len(found) > TYPES:
+        raise TableError(
+            f"{table.what}: column {shortened(repr(columns.label))} holds {len(found)} different labels, "
+            f"more than {TYPES}: is it the label?"
+        )
     aliased = [columns.labels.get(label, label) for label in found.tolist()]
     taxonomy = _taxonomy(columns, aliased)
-    unknown = np.array([taxonomy.find(label) is None for label in aliased])[where]
+    find = taxonomy.finder()
+    types = [find(label) for label in aliased]
+    unknown = np.array([name is None for name in types])[where]
     if unknown.any():
         label = aliased[where[np.flatnonzero(unknown)[0]]]
         raise TableError(
-            f"{what}: {unknown.sum()} unknown labels in {columns.label!r}, {list_rows(readings.rows[unknown])}; "
-            f"{label!r} is no grasp type of {taxonomy.name}{taxonomy.suggestion(label)}; [labels] can translate it"
+            f"{table.what}: {unknown.sum()} unknown labels in {columns.label!r}, {list_rows(readings.rows[unknown])}; "
+            f"{shortened(repr(label))} is no grasp type of {taxonomy.name}{taxonomy.suggestion(label)}; "
+            "[labels] can translate it"
         )
     unused = sorted(columns.labels.keys() - set(found.tolist()))
     message = f"{len(unused)} entries of [labels] occur in no row: {list_names(unused)}"
+    check_room(len(where), max(map(len, filter(None, types))), table.size)
     return (
-        np.array([taxonomy.require(label) for label in aliased])[where],
+        np.array(types, np.str_)[where],
         taxonomy,
         [Finding("unused aliases", len(unused), message)] if unused else [],
     )

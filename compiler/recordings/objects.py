@@ -32,18 +32,23 @@ def collected(taxonomy: str, objects: Path | None) -> tuple[Taxonomy, tuple[Task
     if len(tables) < 2:
         raise ColumnsError(f"{objects.name} names {len(tables)} grasp types: a collection takes two at least")
     types = own(tables) if taxonomy == "own" else published(taxonomy)
-    tasks = tuple(_task(source, types, key, value) for key, value in tables.items())
-    for number, task in enumerate(tasks):
-        if task.grasp in (before.grasp for before in tasks[:number]):
-            raise source.error((list(tables)[number],), f"is {task.grasp}, which is there already: list it once")
-    return types, tasks
+    find = types.finder()
+    tasks: dict[str, Task] = {}
+    for key, value in tables.items():
+        grasp = find(key)
+        if grasp is None:
+            raise source.error((key,), types.unknown(key))
+        if grasp in tasks:
+            raise source.error((key,), f"is {grasp}, which is there already: list it once")
+        tasks[grasp] = Task(grasp, _objects(source, key, value))
+    return types, tuple(tasks.values())
 
 
-def _task(source: Source, taxonomy: Taxonomy, key: str, value: object) -> Task:
+def _objects(source: Source, key: str, value: object) -> tuple[str, ...]:
     try:
         if not isinstance(value, list) or not value or not all(isinstance(name, str) for name in value):
             raise RecordingError("must be a list of the names of objects, at least one")
         check_names("object", value)
-        return Task(taxonomy.require(key), tuple(value))
+        return tuple(value)
     except RecordingError as wrong:
         raise source.error((key,), str(wrong)) from None

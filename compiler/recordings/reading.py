@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from heapq import nsmallest
 from operator import itemgetter
 
 import numpy as np
@@ -10,9 +11,9 @@ from numpy.typing import NDArray
 
 from .cells import Parsed, Value, bits, codes, integers, names, numbers
 from .columns import Columns, Selection
-from .errors import TableError
+from .errors import RecordingError, TableError
 from .findings import Finding
-from .names import SHOWN, list_names, list_rows
+from .names import SHOWN, list_names, list_rows, shortened
 from .table import Column, Table
 
 
@@ -41,26 +42,38 @@ def read_cells(table: Table, columns: Columns, selection: Selection) -> tuple[Re
     trials = np.ones(len(table.rows))
     if columns.trial is not None:
         trials = reader.read(columns.trial, integers, "whole numbers")
-    switches = [reader.read(name, bits, "0 or 1") for name in selection.switches]
-    joints = [
-        reader.read(name, codes, "codes 0..65535") if entry.codes else reader.read(name, numbers, "finite numbers")
-        for name, entry in selection.joints
-    ]
+    # Read into place, and in columns: what is wide and long is there once.
+    rows = len(table.rows)
+    switches = np.empty((rows, len(selection.switches)), np.bool_, order="F")
+    for number, name in enumerate(selection.switches):
+        switches[:, number] = reader.read(name, bits, "0 or 1")
+    joints = np.empty((rows, len(selection.joints)), order="F")
+    for number, (name, entry) in enumerate(selection.joints):
+        parse, expected = (codes, "codes 0..65535") if entry.codes else (numbers, "finite numbers")
+        joints[:, number] = reader.read(name, parse, expected)
     keep = reader.complete(drop=columns.missing == "drop")
     readings = Readings(
-        rows=table.rows[keep],
-        labels=labels[keep],
-        subjects=subjects[keep],
-        objects=objects[keep],
-        trials=trials[keep].astype(np.int64),
-        switches=_side_by_side(switches, len(keep))[keep] == 1,
-        joints=_side_by_side(joints, len(keep))[keep],
+        rows=_kept(table.rows, keep),
+        labels=_kept(labels, keep),
+        subjects=_kept(subjects, keep),
+        objects=_kept(objects, keep),
+        trials=_kept(trials, keep).astype(np.int64),
+        switches=_kept(switches, keep),
+        joints=_kept(joints, keep),
     )
     return readings, reader.dropped(keep)
 
 
-def _side_by_side(columns: list[NDArray[np.float64]], rows: int) -> NDArray[np.float64]:
-    return np.stack(columns, axis=1) if columns else np.zeros((rows, 0))
+def _kept(array: NDArray[Value], keep: NDArray[np.bool_]) -> NDArray[Value]:
+    """Return the rows of a 1-D or 2-D `array` that are to be kept; the array itself where all are."""
+    if keep.all():
+        return array
+    if array.ndim == 1:
+        return array[keep]
+    count = int(keep.sum())
+    for column in array.T:
+        column[:count] = column[keep]
+    return array[:count]
 
 
 class _Reader:
@@ -80,11 +93,13 @@ class _Reader:
         return parsed.values
 
     def names(self, column: str | None) -> NDArray[np.str_]:
-        return (
-            np.full(len(self.table.rows), "1")
-            if column is None
-            else self.read(column, partial(names, cells=self.table.cells), "names that can be printed")
-        )
+        if column is None:
+            return np.full(len(self.table.rows), "1")
+        parse = partial(names, cells=self.table.cells, size=self.table.size)
+        try:
+            return self.read(column, parse, "names that can be printed")
+        except RecordingError as reason:
+            raise TableError(f"{self.table.what}: column {shortened(repr(column))}: {reason}") from reason
 
     def complete(self, drop: bool) -> NDArray[np.bool_]:
         """Return which rows miss nothing; raises TableError on wrong cells, and on missing ones unless `drop`."""
@@ -111,7 +126,8 @@ class _Reader:
     def _list(self, columns: dict[str, NDArray[np.bool_]]) -> str:
         """Return "3 cells, ...": how many cells, and the first of them in the order of rows, then of columns."""
         count = sum(int(faulty.sum()) for faulty in columns.values())
-        first = [(row, name) for name, faulty in columns.items() for row in np.flatnonzero(faulty)[:SHOWN].tolist()]
-        first.sort(key=itemgetter(0))
-        shown = [f"row {self.table.rows[row]} {name!r} ({str(self.table.columns[name][row])!r})" for row, name in first]
+        each = ((row, name) for name, faulty in columns.items() for row in np.flatnonzero(faulty)[:SHOWN].tolist())
+        first = nsmallest(SHOWN, each, key=itemgetter(0))
+        cells = [(row, name, shortened(repr(str(self.table.columns[name][row])))) for row, name in first]
+        shown = [f"row {self.table.rows[row]} {shortened(repr(name))} ({cell})" for row, name, cell in cells]
         return f"{count} cell{'s' if count > 1 else ''}, {list_names(shown, count)}"

@@ -6,9 +6,11 @@ underscores and punctuation do not count.
 
 import difflib
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from unicodedata import decimal
 
+from ...runtime.names import LONGEST_SHOWN, MOST_COMPARED, shortened
 from .errors import RecordingError
 from .names import check_names
 
@@ -77,24 +79,35 @@ class Taxonomy:
         """The types written out, in the same order."""
         return tuple(_KAMAKURA.values()) if self.name == "kamakura14" else self.types
 
+    def finder(self) -> Callable[[str], str | None]:
+        """Return what finds the type that a label means, or None: made once for many labels."""
+        types, aliases = frozenset(self.types), self._aliases()
+        return lambda label: label if label in types else aliases.get(_plain(label))
+
     def find(self, label: str) -> str | None:
         """Return the type that `label` means, or None."""
-        return label if label in self.types else self._aliases().get(_plain(label))
+        return self.finder()(label)
 
     def require(self, label: str) -> str:
         """Return the type that `label` means; raises RecordingError naming the types that look most like it."""
         found = self.find(label)
         if found is None:
-            raise RecordingError(f"{label!r} is not a grasp type of {self.name}{self.suggestion(label)}")
+            raise RecordingError(self.unknown(label))
         return found
+
+    def unknown(self, label: str) -> str:
+        """Return what to say of a `label` that means no type, with those that look most like it."""
+        return f"{shortened(repr(label))} is not a grasp type of {self.name}{self.suggestion(label)}"
 
     def suggestion(self, label: str) -> str:
         """Return " (did you mean ...?)" with the nearest types, or the types to choose from when none is near."""
         aliases = self._aliases()
-        near = {aliases[alias]: None for alias in difflib.get_close_matches(_plain(label), aliases, n=3)}
+        # Comparing takes the time of the label's length times a type's, for every type.
+        plain, compared = _plain(label[:LONGEST_SHOWN]), list(aliases)[:MOST_COMPARED]
+        near = {aliases[alias]: None for alias in difflib.get_close_matches(plain, compared, n=3)}
         if near:
             return f" (did you mean {' or '.join(map(repr, near))}?)"
-        shown = ", ".join(self.types[:5]) + (", ..." if len(self.types) > 5 else "")
+        shown = ", ".join(map(shortened, self.types[:5])) + (", ..." if len(self.types) > 5 else "")
         return f" (its types: {shown})"
 
     def _aliases(self) -> dict[str, str]:
@@ -110,7 +123,10 @@ class Taxonomy:
 def _plain(label: str) -> str:
     """Return `label` with case, underscores and punctuation levelled: "Sphere_4_finger" -> "sphere 4 finger"."""
     words = re.sub(r"[\W_]+", " ", label.casefold()).strip()
-    return str(int(words)) if words.isdecimal() else words or label
+    # Without int(), which takes no more than 4,300 digits; other scripts' digits count as ours.
+    if words.isdecimal():
+        return "".join(str(decimal(digit)) for digit in words).lstrip("0") or "0"
+    return words or label
 
 
 def own(types: Iterable[str]) -> Taxonomy:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..limits import check_types
 from ..placement.errors import PlacementError
 
 Columns = tuple[int, ...]
@@ -37,6 +38,7 @@ class Learning:
             raise PlacementError("no placement can be learnt from a set without rows")
         if self.labels.min() < 0 or self.labels.max() >= self.n_classes:
             raise PlacementError(f"labels must be class numbers 0 to {self.n_classes - 1}")
+        check_types(self.n_classes, PlacementError)
 
     @property
     def n_switches(self) -> int:

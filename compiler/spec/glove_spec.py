@@ -111,7 +111,7 @@ def _harness(manifest: Manifest, scan: ScanMap | None, harness: Harness | None, 
         glove = GloveWiring(port=_GLOVE_PORT) if manifest.joints else None
         return propose_harness(names, cyberglove=glove)
     if scan is not None:
-        check_harness(scan, harness)
+        check_harness(scan, harness, names)
     wired = set(harness.switches)
     if lacking := [name for name in names if name not in wired]:
         raise HarnessError(

@@ -5,15 +5,20 @@ of class j, which looks at one input. So everything that the rounds ever add bec
 input alone: for a switch a constant and a row to be added if it is closed, for a joint a row per interval of its codes.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..boosting.stumps import Stumps, centred
+from ..boosting.stumps import Stumps, spread
 from ..elementary import add_exactly
 
 HIGHEST_CODE = 65535
+
+# Rows of answers that are written out at a time: of 1000 classes, 2 MB.
+_WRITTEN_OUT = 256
 
 Floats = NDArray[np.float64]
 
@@ -61,10 +66,10 @@ def collapse(stumps: Stumps, n_switches: int) -> ScoreTables:
     for column in range(stumps.n_inputs):
         mine = np.flatnonzero(columns == column)
         if column < n_switches:
-            opened = np.where(floors[mine, np.newaxis] >= 0, left[mine], right[mine])
-            closed = np.where(floors[mine, np.newaxis] >= 1, left[mine], right[mine])
+            opened = _where(floors[mine] >= 0, left[mine], right[mine])
+            closed = _where(floors[mine] >= 1, left[mine], right[mine])
             bias += _sums(opened, [len(mine)])[0].sum(axis=0)
-            switch_rows[column] = _sums(closed - opened, [len(mine)])[0].sum(axis=0)
+            switch_rows[column] = _sums(closed.less(opened), [len(mine)])[0].sum(axis=0)
         else:
             steps, rows = _joint(floors[mine], left[mine], right[mine])
             thresholds.append(steps)
@@ -72,14 +77,48 @@ def collapse(stumps: Stumps, n_switches: int) -> ScoreTables:
     return ScoreTables(bias, switch_rows, tuple(thresholds), tuple(joint_rows))
 
 
-def _answers(stumps: Stumps, branch: int) -> Floats:
-    """Return what each stump adds to every class in a branch, (M K, K): centring spreads it from its own class."""
-    own = np.einsum("mk,kc->mkc", stumps.values[:, :, branch], np.eye(stumps.n_classes))
-    spread = centred(own.reshape(-1, stumps.n_classes).T, stumps.shrinkage)
-    return np.ascontiguousarray(spread.T)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Answers:
+    """What n stumps add to K classes: `own` (n,) to the stump's own class, one of `classes` (n,), and `others` (n,) to
+    each other class. Written out they would be (n, K), gigabytes of a thousand classes.
+    """
+
+    own: Floats
+    others: Floats
+    classes: NDArray[np.intp]
+    n_classes: int
+
+    def __len__(self) -> int:
+        return len(self.own)
+
+    def __getitem__(self, chosen: NDArray[np.intp] | slice) -> "_Answers":
+        return _Answers(self.own[chosen], self.others[chosen], self.classes[chosen], self.n_classes)
+
+    def less(self, other: "_Answers") -> "_Answers":
+        """Return these less the answers of the same stumps in another branch."""
+        return _Answers(self.own - other.own, self.others - other.others, self.classes, self.n_classes)
+
+    def rows(self) -> Iterator[Floats]:
+        """Yield a row (K,) of each stump."""
+        for start in range(0, len(self), _WRITTEN_OUT):
+            part = self[start : start + _WRITTEN_OUT]
+            written = np.repeat(part.others[:, np.newaxis], self.n_classes, axis=1)
+            written[np.arange(len(part)), part.classes] = part.own
+            yield from written
 
 
-def _joint(floors: Floats, left: Floats, right: Floats) -> tuple[NDArray[np.uint16], Floats]:
+def _answers(stumps: Stumps, branch: int) -> _Answers:
+    """Return what each of the M K stumps adds in a branch: centring spreads it from its own class."""
+    own, others = spread(stumps.values[:, :, branch].ravel(), stumps.n_classes, stumps.shrinkage)
+    return _Answers(own, others, np.tile(np.arange(stumps.n_classes), stumps.n_rounds), stumps.n_classes)
+
+
+def _where(chosen: NDArray[np.bool_], one: _Answers, other: _Answers) -> _Answers:
+    own, others = np.where(chosen, one.own, other.own), np.where(chosen, one.others, other.others)
+    return _Answers(own, others, one.classes, one.n_classes)
+
+
+def _joint(floors: Floats, left: _Answers, right: _Answers) -> tuple[NDArray[np.uint16], Floats]:
     """Return (thresholds (T,), rows (T + 1, K)) of one joint's stumps; a threshold beyond the codes needs no bin."""
     order = np.argsort(floors, kind="stable")
     steps = np.unique(floors[(floors >= 0) & (floors < HIGHEST_CODE)])
@@ -91,12 +130,12 @@ def _joint(floors: Floats, left: Floats, right: Floats) -> tuple[NDArray[np.uint
     return steps.astype(np.uint16), high + (low + answer_left[:, 1])
 
 
-def _sums(rows: Floats, stops: list[int]) -> Floats:
-    """Return the sums of the first n of rows (N, K) for each n in `stops`, ascending, in two parts: (stops, 2, K)."""
-    total = carry = np.zeros(rows.shape[1])
-    sums, done = [], 0
+def _sums(answers: _Answers, stops: list[int]) -> Floats:
+    """Return the sums of the first n answers for each n in `stops`, ascending, in two parts: (stops, 2, K)."""
+    total = carry = np.zeros(answers.n_classes)
+    sums, done, rows = [], 0, answers.rows()
     for stop in stops:
-        for row in rows[done:stop]:
+        for row in islice(rows, stop - done):
             total, carry = add_exactly(total, carry, row)
         sums.append((total, carry))
         done = stop

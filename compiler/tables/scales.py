@@ -8,12 +8,9 @@ scale for that is some 4 steps per unit of score, where one for 16 bits is some 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...runtime.tables import FINEST_SCALE
 from ..boosting.stumps import winners
 from .collapse import Floats, ScoreTables
-
-# Steps per unit. At this scale the least safe margin, 2 steps, is still more than what the ensemble takes for a tie
-# (stumps.TIE): a row that is safe is never one that the ensemble decided by the number of the class.
-FINEST = 2.0**30
 
 # The most consecutive switches that firmware looks up together in tables of narrow entries. Any so many, wherever a
 # group of them may begin, keep the span; so fewer do as well.
@@ -24,8 +21,8 @@ TRIED, _TRIED_OF_ALL = 32, 160
 
 
 def finest_scale(tables: ScoreTables, limit: int, widest: int) -> float:
-    """Return the largest double below FINEST at which no sum of rounded rows exceeds `limit` and no look-up spans more
-    than `widest`; 1 for tables of zeros.
+    """Return the largest double below FINEST_SCALE at which no sum of rounded rows exceeds `limit` and no look-up
+    spans more than `widest`; 1 for tables of zeros.
 
     Rounded terms never fall as the scale grows, so neither do sums and spans, and bisection over the doubles is exact.
     """
@@ -33,7 +30,7 @@ def finest_scale(tables: ScoreTables, limit: int, widest: int) -> float:
     if whole == 0:
         return 1.0
     outer = _outermost(tables)
-    fits, too_fine = 0.0, min((limit + tables.n_inputs + 2) / whole, FINEST)
+    fits, too_fine = 0.0, min((limit + tables.n_inputs + 2) / whole, FINEST_SCALE)
     while (middle := (fits + too_fine) / 2) not in (fits, too_fine):
         if reach(outer, middle) <= limit and span(outer, middle) <= widest:
             fits = middle

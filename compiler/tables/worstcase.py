@@ -20,6 +20,9 @@ from .collapse import HIGHEST_CODE, Floats, ScoreTables
 
 Exact = NDArray[np.object_]  # of Python's integers
 
+# Differences that are held at a time: what a processor's own memory holds.
+_WORDS = 1 << 16
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorstFrame:
@@ -38,28 +41,30 @@ class WorstFrame:
 class Rounding:
     """What rounding took from the rows of score tables when it made integer tables of them."""
 
-    __slots__ = ("_errors", "_losses", "_n_switches", "_step", "_values")
+    __slots__ = ("_n_switches", "_pairs", "_step", "_values")
 
     def __init__(self, tables: ScoreTables, integers: IntegerTables) -> None:
         """Compare the two, bin by bin of either. They must have the same classes and inputs."""
         choices = list(_choices(tables, integers))
         self._n_switches = integers.n_switches
         self._values = [choice.values for choice in choices[1:]]
-        self._errors, self._step = _errors(choices, integers.scale)
-        self._losses: Exact = np.add.reduce([_pairs(errors) for errors in self._errors])
+        errors, self._step = _errors(choices, integers.scale)
+        self._pairs = _Pairs(errors)
 
     def worst(self, leader: int, rival: int) -> WorstFrame:
         """Return the frame that takes most from the lead of class `leader` over class `rival`."""
-        taken = [errors[:, leader] - errors[:, rival] for errors in self._errors]
+        taken = self._pairs.taken(leader, rival)
         # Of equal ones the first: an open switch, the lowest code.
-        values = [values[int(np.argmax(most))] for values, most in zip(self._values, taken[1:], strict=True)]
+        picked = [choice.index(max(choice)) for choice in taken]
+        values = [values[pick] for values, pick in zip(self._values, picked[1:], strict=True)]
         bits, codes = values[: self._n_switches], values[self._n_switches :]
-        loss = Fraction(self._losses[leader, rival], self._step)
+        loss = Fraction(sum(map(max, taken)), self._step)
         return WorstFrame(leader, rival, loss, np.array(bits, bool), np.array(codes, np.uint16))
 
     def worst_of_all(self) -> WorstFrame:
         """Return the worst frame of the pair of classes that has the worst; of equal pairs of the first."""
-        return self.worst(*self._greatest(self._losses))
+        _, leader, rival = self._pairs.greatest(0)
+        return self.worst(leader, rival)
 
     def safe_margin(self) -> Fraction:
         """Return the least margin, in steps, of which this is proved: a frame whose best score leads by more keeps it.
@@ -67,14 +72,87 @@ class Rounding:
         Where class k leads and the integers say l, I_l - I_k is at least 0, or 1 if l has the higher number and so
         loses ties; and the lead of k over l is the loss less that.
         """
-        must_be_better = np.triu(np.ones(self._losses.shape, bool), 1).astype(object)
-        overturned = self._losses - must_be_better * self._step
-        return max(Fraction(overturned[self._greatest(overturned)], self._step), Fraction(0))
+        return max(Fraction(self._pairs.greatest(self._step)[0], self._step), Fraction(0))
 
-    @staticmethod
-    def _greatest(pairs: Exact) -> tuple[int, int]:
-        others = ((k, other) for k in range(len(pairs)) for other in range(len(pairs)) if k != other)
-        return max(others, key=lambda pair: pairs[pair])
+
+class _Pairs:
+    """The most that every ordered pair of classes can lose: the sum over inputs of the greatest difference of errors.
+
+    Errors have a hundred bits and more, pairs are a million where there are a thousand classes. So errors are cut into
+    parts of so many bits that sums of differences fit machine words. The first parts alone bound every loss to within a
+    unit an input on either side; the few pairs that may then have the greatest are worked out with all parts.
+    """
+
+    def __init__(self, errors: list[Exact]) -> None:
+        """Take the errors (c, K) of all inputs, c choices each."""
+        self._inputs, self._n_classes = len(errors), errors[0].shape[1]
+        self._bits = 61 - self._inputs.bit_length()
+        longest = max(max(int(each.max()), -int(each.min())).bit_length() for each in errors)
+        # Zeros behind all errors, so that the first part is a full one.
+        self._padding = -(longest + 1) % self._bits
+        self._shifts = range(longest + 1 + self._padding - self._bits, -1, -self._bits)
+        self._parts = [self._cut(each << self._padding) for each in errors]
+        by_choices: dict[int, list[NDArray[np.int64]]] = {}
+        for parts in self._parts:
+            by_choices.setdefault(parts.shape[1], []).append(parts)
+        self._alike = [np.stack(group, axis=1) for group in by_choices.values()]
+        self._first = np.stack([self._losses(k, slice(None), 1)[0] for k in range(self._n_classes)])
+
+    def taken(self, leader: int, rival: int) -> list[list[int]]:
+        """Return what each choice of each input takes from the lead of `leader` over `rival`."""
+        return [self._whole(parts[:, :, leader] - parts[:, :, rival]) for parts in self._parts]
+
+    def greatest(self, tie: int) -> tuple[int, int, int]:
+        """Return the greatest loss, less `tie` of pairs whose rival has the higher number, and its leader and rival; of
+        equal ones the first pair.
+        """
+        classes = np.arange(self._n_classes)
+        # Sums are below 2^61: what is a quarter of a word off is further off than any two of them.
+        off = min(tie << self._padding >> self._shifts[0], 1 << 62)
+        near = self._first - off * (classes[:, np.newaxis] < classes)
+        np.fill_diagonal(near, np.iinfo(np.int64).min)
+        likely = near >= int(near.max()) - 2 * self._inputs - 2
+        found = []
+        for leader in np.flatnonzero(likely.any(axis=1)).tolist():
+            rivals = np.flatnonzero(likely[leader])
+            losses = self._whole(self._losses(leader, rivals, len(self._shifts)))
+            pairs = zip(losses, rivals.tolist(), strict=True)
+            found += [(loss - tie * (leader < rival), leader, rival) for loss, rival in pairs]
+        return max(found, key=lambda pair: pair[0])
+
+    def _losses(self, leader: int, rivals: slice | NDArray[np.intp], parts: int) -> NDArray[np.int64]:
+        """Return the losses of `leader` to m rivals in their first parts, (parts, m); only the first has a sign."""
+        totals = np.zeros((parts, len(np.arange(self._n_classes)[rivals])), np.int64)
+        for group in self._alike:
+            at_once = max(1, _WORDS // (group.shape[2] * totals.shape[1]))
+            for start in range(0, group.shape[1], at_once):
+                piece = group[:parts, start : start + at_once]
+                apart = self._carried(piece[..., leader, np.newaxis] - piece[..., rivals])
+                for part, differences in enumerate(apart):
+                    most = differences.max(axis=1, keepdims=True)
+                    totals[part] += most.sum(axis=(0, 1))
+                    for later in apart[part + 1 :]:
+                        # What is less in an earlier part is less: below anything that a later part can be.
+                        later[differences < most] = -1
+        return self._carried(totals)
+
+    def _cut(self, errors: Exact) -> NDArray[np.int64]:
+        """Return the parts (parts, c, K) of errors (c, K): the first with the sign, the others at least 0."""
+        first, *others = self._shifts
+        parts = [errors >> first, *(errors >> shift & (1 << self._bits) - 1 for shift in others)]
+        return np.array(parts, np.int64)
+
+    def _carried(self, parts: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Bring all parts but the first back to 0 or more and below 2^bits, in place."""
+        for part in range(len(parts) - 1, 0, -1):
+            parts[part - 1] += parts[part] >> self._bits
+            parts[part] &= (1 << self._bits) - 1
+        return parts
+
+    def _whole(self, parts: NDArray[np.int64]) -> list[int]:
+        """Return the whole numbers of all parts (parts, m)."""
+        padded = (zip(self._shifts, column, strict=True) for column in zip(*parts.tolist(), strict=True))
+        return [sum(part << shift for shift, part in column) >> self._padding for column in padded]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,20 +180,13 @@ def _choices(tables: ScoreTables, integers: IntegerTables) -> Iterator[_Choice]:
 
 def _errors(choices: list[_Choice], scale: float) -> tuple[list[Exact], int]:
     """Return scale * rows - steps of every choice, (c, K), as whole numbers; and how many of them make a step."""
-    ratios = [[value.as_integer_ratio() for value in choice.rows.ravel().tolist()] for choice in choices]
-    # Denominators of doubles are powers of two: the greatest is a multiple of all.
-    grid = max(below for values in ratios for _, below in values)
+    cut = [np.frexp(choice.rows) for choice in choices]
+    # Doubles are whole numbers below 2^53 times a power of two: the least power is a grid for all.
+    lowest = min(0, *(int(powers.min()) - 53 for _, powers in cut))
     above, below = scale.as_integer_ratio()
-    step = grid * below
+    step = below << -lowest
     errors = []
-    for choice, values in zip(choices, ratios, strict=True):
-        scaled = [number * (grid // denominator) * above for number, denominator in values]
-        exact = [one - steps * step for one, steps in zip(scaled, choice.steps.ravel().tolist(), strict=True)]
-        errors.append(np.array(exact, object).reshape(choice.rows.shape))
+    for choice, (mantissas, powers) in zip(choices, cut, strict=True):
+        whole = np.ldexp(mantissas, 53).astype(np.int64).astype(object) << (powers - 53 - lowest).astype(object)
+        errors.append(whole * above - choice.steps.astype(object) * step)
     return errors, step
-
-
-def _pairs(errors: Exact) -> Exact:
-    """Return, for every ordered pair of classes, the most by which the first column of (c, K) exceeds the second."""
-    most: Exact = np.stack([(errors[:, [k]] - errors).max(axis=0) for k in range(errors.shape[1])])
-    return most

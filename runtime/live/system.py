@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...drivers.calibration import GloveCalibration, load_calibration
+from ...drivers.calibration import GloveCalibration
 from ...drivers.cyberglove_sensors import SENSORS_18, SENSORS_22
 from ..build import Build
+from ..calibration import load_calibration
 from ..harness.wiring import GloveWiring, Harness
 from ..scanning.plan import check_harness, plan_scan
 from ..scanning.scanmap import ScanMap
@@ -42,10 +43,11 @@ class System:
     @staticmethod
     def map_of(build: Build, harness: Harness) -> ScanMap:
         """Return the build's own scan map, or one that is planned now. Raises HarnessError if the two do not fit."""
+        names = [switch.name for switch in build.manifest.switches]
         if build.scan is not None:
-            check_harness(build.scan, harness)
+            check_harness(build.scan, harness, names)
             return build.scan
-        return plan_scan([switch.name for switch in build.manifest.switches], build.tables, harness)
+        return plan_scan(names, build.tables, harness)
 
     @property
     def switch_names(self) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from ..tables import IntegerTables
 from .costs import Costs
 from .decided import Decided, reach_of
 from .order import Order, Unit, arranged, ports_in
-from .scanmap import ScanMap
+from .scanmap import Port, ScanMap
 from .whole import whole_scan
 
 # Of more recorded frames than this, evenly spaced ones decide on the order.
@@ -54,13 +54,44 @@ def plan_scan(
     return replace(scan, ports=tuple(scan.ports[port] for port in order))
 
 
-def check_harness(scan: ScanMap, harness: Harness) -> None:
-    """Raise HarnessError unless `scan` was made for `harness`; ports, devices and clocks may have changed since."""
+def check_harness(scan: ScanMap, harness: Harness, switch_names: Sequence[str]) -> None:
+    """Raise HarnessError unless `scan` was made for `harness`; ports, devices and clocks may have changed since.
+
+    Every port is then a reading of a chip that there is, and every bit and key the switch of the build, by its name.
+    """
     if scan.harness != harness.fingerprint:
         raise HarnessError(
             f"the build's scan map was made for another wiring than that of harness {harness.name!r}: "
             "compile again with --glove"
         )
+    # Whoever sealed the map may have written into it what he wanted.
+    wired = whole_scan(harness, switch_names)
+    where = {
+        (port.bus, port.chip, pin): (switch, port.closed_high)
+        for port in wired.ports
+        for pin, switch in _pins(port, harness)
+    }
+    right = scan.scanners == wired.scanners and all(
+        0 <= port.bus < len(harness.buses)
+        and port.chip < len(harness.buses[port.bus].chips)
+        and _pins(port, harness)
+        and all(
+            where.get((port.bus, port.chip, pin)) == (switch, port.closed_high) for pin, switch in _pins(port, harness)
+        )
+        for port in scan.ports
+    )
+    if not right:
+        raise HarnessError(
+            f"the build's scan map reads other pins or keys than harness {harness.name!r} has switches on: "
+            "compile again with --glove"
+        )
+
+
+def _pins(port: Port, harness: Harness) -> list[tuple[int, int]]:
+    """Return the pins that a port's bits show, each with its switch; nothing if there is no such reading or bit."""
+    readings = harness.buses[port.bus].chips[port.chip].chip.readings
+    pins = next((reading.pins for reading in readings if reading.name == port.reading), ())
+    return [] if any(bit >= len(pins) for bit, _ in port.switches) else [(pins[bit], n) for bit, n in port.switches]
 
 
 def _by_reach(unit: Unit, reaches: Sequence[int], costs: Costs) -> Order:

@@ -103,5 +103,5 @@ def _check_once(scan: ScanMap, what: str) -> None:
 def _decode(data: bytes, kind: type[_T], what: str) -> _T:
     try:
         return msgspec.json.decode(data, type=kind)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as wrong:
+    except (ValueError, RecursionError) as wrong:
         raise BuildError(f"{what} is not a build's: {wrong}") from None

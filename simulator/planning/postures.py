@@ -16,7 +16,9 @@ from typing import Annotated, Self
 import msgspec
 import numpy as np
 
-from ...runtime.files import write_atomically
+from ...runtime.files import read_file, write_atomically
+from ...runtime.names import shortened
+from ...runtime.nesting import check_json
 from ..body.anthropometry import Size
 from ..body.condition import Held, Pad, Thing
 from ..body.hand import Hand
@@ -26,6 +28,7 @@ from ..errors import SceneError
 from ..scenes.scene import Scene
 
 FORMAT = 1
+LARGEST = 10_000_000  # bytes; what ships has a two-hundredth of it
 _SPHERES = len(Hand(Size(1.0, 1.0)).sphere_capsules)
 
 _Share = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
@@ -98,7 +101,7 @@ class Postures:
     def load(cls, path: Path) -> Self:
         """Return the postures that `save` wrote. Raises SceneError if the file is missing or none of those."""
         try:
-            content = path.read_bytes()
+            content = read_file(path, LARGEST, SceneError)
         except FileNotFoundError:
             raise SceneError(f"{path}: there is no such file of planned postures: `thenar plan` makes it") from None
         except OSError as reason:
@@ -109,12 +112,16 @@ class Postures:
     def decode(cls, content: bytes, name: str) -> Self:
         """Return the postures in the content of file `name`."""
         try:
+            check_json(content)
             head = msgspec.json.decode(content, type=_Head)
             if head.format != FORMAT:
                 raise SceneError(f"{name} holds postures of format {head.format}, not {FORMAT}: plan them anew")
             known = msgspec.json.decode(content, type=_File)
-        except (msgspec.MsgspecError, UnicodeDecodeError) as wrong:
-            raise SceneError(f"{name} holds no planned postures: {wrong}: `thenar plan` makes such a file") from wrong
+        except SceneError:
+            raise
+        except ValueError as wrong:
+            why = shortened(str(wrong), 300)
+            raise SceneError(f"{name} holds no planned postures: {why}: `thenar plan` makes such a file") from wrong
         return cls(known.taxonomy, known.entries)
 
     @classmethod

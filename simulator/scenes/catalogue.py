@@ -70,12 +70,14 @@ def objects_of(source: Source, tables: object, taxonomy: Taxonomy) -> tuple[Scen
 
 def check_names(source: Source, place: Place, names: list[str]) -> None:
     """Raise SceneError about the first of the tables at `place` whose name is taken or would not survive a file."""
+    first: dict[str, int] = {}
     for number, name in enumerate(names):
         if reason := fault(name):
             raise source.error((*place, number, "name"), f"{name!r} {reason}")
-        if name in names[:number]:
-            first = source.line((*place, names.index(name)))
-            raise source.error((*place, number, "name"), f"{name!r} is taken (line {first}): give every one its own")
+        if name in first:
+            line = source.line((*place, first[name]))
+            raise source.error((*place, number, "name"), f"{name!r} is taken (line {line}): give every one its own")
+        first[name] = number
 
 
 def _object(source: Source, place: Place, value: object, taxonomy: Taxonomy) -> SceneObject:

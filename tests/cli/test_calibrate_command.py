@@ -11,11 +11,11 @@ from threading import Timer
 
 import pytest
 
-from thenar.drivers.calibration import load_calibration
 from thenar.drivers.calibration_poses import FLAT, POSES
 from thenar.drivers.cyberglove_sensors import SENSORS_18, SENSORS_22
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.pty_line import PtyLine
+from thenar.runtime.calibration import load_calibration
 
 # Dialogues over a pty, in real time.
 pytestmark = pytest.mark.slow

@@ -74,7 +74,7 @@ def test_a_calibration_that_cannot_be_read_is_found(thenar: Thenar, harness: Pat
     harness.write_text(harness.read_text() + 'calibration = "anna.toml"\n')
     done = thenar("doctor", harness)
     assert done.returncode == 1
-    assert "the calibration cannot be read" in done.stdout
+    assert "anna.toml: cannot be read" in done.stdout
 
 
 def test_what_a_build_needs_of_the_calibration_is_found(

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from thenar.compiler import GraspSet
-from thenar.drivers.calibration import load_calibration
+from thenar.runtime.calibration import load_calibration
 from thenar.runtime.harness.loading import load_harness
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]

@@ -1,26 +1,10 @@
 """What `thenar frontier` prints of what it found."""
 
-import importlib.util
-import sys
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from thenar.cli.frontier_tables import print_frontier
-
-_EXAMPLE = Path(__file__).parents[1] / "compiler" / "frontier" / "example_frontier.py"
-
-
-@pytest.fixture(scope="module")
-def examples() -> Any:
-    spec = importlib.util.spec_from_file_location("example_frontier", _EXAMPLE)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 def _printed(frontier: Any, capsys: pytest.CaptureFixture[str]) -> list[str]:

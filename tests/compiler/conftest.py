@@ -16,7 +16,7 @@ def _make_set(
     labels = np.arange(rows) % types
     closed = np.random.default_rng(99).random((types, switches)) < 0.5
     centres = np.random.default_rng(98).integers(40, 200, (types, joints))
-    names = ("cup", "pen", "plate", "rod", "ball", "key")[:types]
+    names = ("cup", "pen", "plate", "rod", "ball", "key", *(f"g{number}" for number in range(6, types)))[:types]
     return GraspSet(
         switches=closed[labels] ^ (random.random((rows, switches)) < 0.12),
         switch_names=tuple(f"s{number}" for number in range(switches)),

@@ -1,12 +1,8 @@
-import json
-from pathlib import Path
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.calibration import GloveCalibration, SensorCalibration, load_calibration
-from thenar.drivers.errors import SettingError
+from thenar.drivers.calibration import SensorCalibration
 from thenar.drivers.names import fault
 
 VALUES = st.floats(-1e6, 1e6)
@@ -18,26 +14,6 @@ LINES = st.builds(
     VALUES,
     VALUES,
 )
-CALIBRATIONS = st.builds(
-    lambda subject, lines: GloveCalibration(subject=subject, sensors=tuple(lines)),
-    st.text().filter(lambda name: not name or not fault(name)),
-    st.lists(LINES, unique_by=lambda line: line.name, max_size=5),
-)
-SENSOR = '{ name = "index_mpj", raw_a = 96, value_a = 0.0, raw_b = 161, value_b = 90.0 }'
-
-
-@given(CALIBRATIONS)
-def test_a_file_gives_back_every_digit(calibration: GloveCalibration) -> None:
-    assert GloveCalibration.of_toml(calibration.to_toml()) == calibration
-
-
-@pytest.mark.parametrize("name", ["", "\x1b[2J", "a\u202eb", "two\nlines", "s" * 201])
-def test_a_name_that_would_deceive_or_get_lost_is_refused(name: str) -> None:
-    line = SensorCalibration("index_mpj", 96, 0.0, 161, 90.0)
-    text = GloveCalibration(subject="anna", sensors=(line,)).to_toml()
-    for good in ("anna", "index_mpj")[not name :]:  # no subject is given in many files
-        with pytest.raises(SettingError, match=r"length >= 1|holds a control character|at most 200"):
-            GloveCalibration.of_toml(text.replace(f'"{good}"', json.dumps(name)))
 
 
 @given(LINES, RAW)
@@ -46,43 +22,3 @@ def test_a_line_goes_through_its_first_point_and_rises_by_one_stated_formula(lin
     assert line.value(raw) == line.value_a + (raw - line.raw_a) * gain
     assert line.value(line.raw_a) == line.value_a
     assert line.value(line.raw_b) == pytest.approx(line.value_b, rel=1e-12, abs=1e-6)
-
-
-def test_a_file_is_as_its_docstring_shows_it(tmp_path: Path) -> None:
-    path = tmp_path / "anna.toml"
-    path.write_text(f'subject = "anna"\nunit = "deg"\nsensor = [\n    {SENSOR},\n]\n')
-    calibration = load_calibration(path)
-    assert calibration == GloveCalibration(
-        subject="anna", sensors=(SensorCalibration("index_mpj", 96, 0.0, 161, 90.0),)
-    )
-    assert calibration.to_toml() == path.read_text()
-
-
-@pytest.mark.parametrize(
-    ("text", "complaint"),
-    [
-        ("subject = ", "Invalid value"),
-        ('subject = "anna"', "required field `sensor`"),
-        (f"sensor = [{SENSOR}]\nunit = 'rad'", r"\$\.unit"),
-        (f"sensor = [{SENSOR}]\nhand = 'left'", "unknown field `hand`"),
-        (f"sensor = [{SENSOR}, {SENSOR}]", "index_mpj is calibrated twice"),
-        (f"sensor = [{SENSOR.replace('96', '0')}]", r"sensor\[0\]\.raw_a"),
-        (f"sensor = [{SENSOR.replace('96', '256')}]", r"sensor\[0\]\.raw_a"),
-        (f"sensor = [{SENSOR.replace('96', '161')}]", "index_mpj: raw_a and raw_b are both 161"),
-        (f"sensor = [{SENSOR.replace('90.0', 'inf')}]", "index_mpj: value_a and value_b must be finite"),
-        (f"sensor = [{SENSOR.replace('index_mpj', '')}]", r"sensor\[0\]\.name"),
-    ],
-)
-def test_a_wrong_file_is_named_with_what_is_wrong(tmp_path: Path, text: str, complaint: str) -> None:
-    path = tmp_path / "wrong.toml"
-    path.write_text(text)
-    with pytest.raises(SettingError, match=rf"wrong\.toml: .*{complaint}.*thenar calibrate"):
-        load_calibration(path)
-
-
-def test_a_file_that_is_not_there_or_no_text_is_named(tmp_path: Path) -> None:
-    with pytest.raises(SettingError, match=r"none\.toml: .*No such file"):
-        load_calibration(tmp_path / "none.toml")
-    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(SettingError, match=r"binary\.toml"):
-        load_calibration(tmp_path / "binary.toml")

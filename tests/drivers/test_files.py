@@ -1,4 +1,5 @@
 import os
+import tracemalloc
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,18 @@ def test_a_larger_file_is_refused_with_the_limit(tmp_path: Path) -> None:
     path.write_bytes(b"x" * 11)
     with pytest.raises(SettingError, match="larger than 10 bytes"):
         read_file(path, 10, SettingError)
+
+
+def test_a_short_file_takes_little_memory_whatever_the_limit(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(b"x" * 3_000_000)
+    tracemalloc.start()
+    try:
+        assert read_file(path, 1 << 30, SettingError) == b"x" * 3_000_000
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 9_000_000
 
 
 @pytest.mark.parametrize("special", ["/dev/zero", "pipe", "link"])

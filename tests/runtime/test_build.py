@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from thenar.runtime import Build
 from thenar.runtime.build import MANIFEST_NAME, TABLES_NAME
@@ -78,3 +79,10 @@ def test_an_oversized_file_is_not_read_to_its_end(folder: Path) -> None:
 def test_names_and_tables_must_agree(describe: Describe, make_tables: MakeTables) -> None:
     with pytest.raises(BuildError, match="names 5 grasp types, 9 switches and 3 joints"):
         Build(describe(make_tables()), make_tables(switches=8))
+
+
+@pytest.mark.parametrize("change", [{"scale": 99.0}, {"bound": 1}])
+def test_a_proof_of_other_tables_is_refused(build: Build, change: dict[str, float]) -> None:
+    proof = replace(build.manifest.proof, **change)
+    with pytest.raises(BuildError, match=r"build\.json proves a scale of .* and a bound of .*, tables\.bin has"):
+        Build(replace(build.manifest, proof=proof), build.tables)

@@ -118,3 +118,38 @@ def test_a_sealed_build_whose_names_would_deceive_is_refused(manifest: Manifest,
         manifest_from_bytes(sealed)
     assert str(refused.value).isprintable()
     assert len(str(refused.value)) < 250
+
+
+_WRONG: list[Callable[[Manifest], Manifest]] = [
+    lambda m: replace(m, switches=(replace(m.switches[0], column=m.source.switches), *m.switches[1:])),
+    lambda m: replace(m, switches=(replace(m.switches[0], column=m.switches[1].column), *m.switches[1:])),
+    lambda m: replace(m, joints=(replace(m.joints[0], column=m.joints[1].column), *m.joints[1:])),
+    lambda m: replace(m, joints=(replace(m.joints[0], code_b=m.joints[0].code_a), *m.joints[1:])),
+    lambda m: replace(m, joints=(replace(m.joints[0], code_b=65536), *m.joints[1:])),
+    lambda m: replace(m, joints=(replace(m.joints[0], value_b=1e301), *m.joints[1:])),
+    lambda m: replace(m, switches=(replace(m.switches[0], gain=1e308), *m.switches[1:])),
+    lambda m: replace(m, proof=replace(m.proof, width=m.options.width - 1)),
+    lambda m: replace(m, proof=replace(m.proof, covered=m.source.rows + 1)),
+    lambda m: replace(m, proof=replace(m.proof, error=1e308)),
+    lambda m: replace(m, rates=(replace(m.rates[0], total=0, correct=0),)),
+    lambda m: replace(m, rates=(replace(m.rates[0], correct=m.rates[0].total + 1),)),
+    lambda m: replace(m, stopped_after=m.options.rounds + 1),
+    lambda m: replace(m, options=replace(m.options, rounds=0)),
+    lambda m: replace(m, options=replace(m.options, shrinkage=1e308)),
+]
+
+
+@pytest.mark.parametrize("change", _WRONG)
+def test_what_cannot_all_be_true_is_refused_whoever_sealed_it(
+    manifest: Manifest, change: Callable[[Manifest], Manifest]
+) -> None:
+    with pytest.raises(BuildError):
+        manifest_from_bytes(manifest_to_bytes(change(manifest)))
+
+
+@pytest.mark.parametrize("part", [b"[" * 200_000, b"9" * 10_000, b"1e999", b'"\xff"', b'{"a":' * 100_000])
+def test_json_that_is_deep_or_long_is_refused(part: bytes) -> None:
+    with pytest.raises(BuildError, match=r"build\.json is not a build's"):
+        manifest_from_bytes(b'{"schema": ' + part)
+    with pytest.raises(BuildError, match=r"build\.json is not a build's"):
+        manifest_from_bytes(b'{"schema": 1, "checksum": ' + part)

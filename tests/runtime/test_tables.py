@@ -92,7 +92,7 @@ def test_thresholds_that_do_not_increase_are_refused(make_tables: MakeTables) ->
         replace(tables, thresholds=(tables.thresholds[0], tables.thresholds[1][::-1], tables.thresholds[2]))
 
 
-@pytest.mark.parametrize("scale", [0.0, -1.0, float("nan"), float("inf")])
+@pytest.mark.parametrize("scale", [0.0, -1.0, float("nan"), float("inf"), 1e308, 2.0**31, 2.0**-65])
 def test_a_scale_that_is_no_scale_is_refused(make_tables: MakeTables, scale: float) -> None:
     with pytest.raises(BuildError, match="scale"):
         replace(make_tables(), scale=scale)

@@ -89,6 +89,11 @@ def test_what_is_not_there_has_the_line_of_the_table_that_lacks_it() -> None:
     assert source.line(("nothing", 3, "at all")) == 1
 
 
+def _depth(value: object) -> int:
+    inside = value.values() if isinstance(value, dict) else value if isinstance(value, list) else None
+    return 0 if inside is None else 1 + max(map(_depth, inside), default=0)
+
+
 keys = st.text(min_size=1, max_size=8).filter(lambda key: key.isprintable())
 
 
@@ -115,14 +120,33 @@ def test_an_error_names_file_line_and_keys() -> None:
         ("a = 1\na = 2\n", "line 2"),
         ("a = [", "end of document"),
         ("a = " + "9" * 5000, "digits"),
-        ("a = " + "[" * 2000, "recursion"),
+        ("a = 0x" + "f" * 5000, "digits"),
+        ("a = " + "[" * 11 + "]" * 11, "nest deeper than 10 levels"),
+        ("a = " + "[" * 400_000, "nest deeper than 10 levels"),
+        ("a" + ".a" * 400_000 + " = 1", "nest deeper than 10 levels"),
+        ("a = '''\n'''" + "[" * 2000, "nest deeper than 10 levels"),
+        ("a = {b = " * 2000, "nest deeper than 10 levels"),
+        ("a = 1\n" * 200_000, "is longer than 1000000 characters"),
+        ("a = " + '"' * 900_000, "is not valid TOML"),
     ],
-    ids=["no value", "twice", "cut off", "endless number", "endless list"],
+    ids=range(12),
 )
 def test_what_is_no_toml_is_refused_with_the_reason(text: str, reason: str) -> None:
     with pytest.raises(OwnError, match=reason) as caught:
         Source("a.toml", text, OwnError).tables()
-    assert str(caught.value).startswith("a.toml is not valid TOML: ")
+    assert str(caught.value).startswith("a.toml is ")
+    assert len(str(caught.value)) < 500
+
+
+@given(st.text("[]{}=,.\n\"'# \\a1", max_size=60))
+def test_only_the_brackets_that_tomllib_reads_count_as_levels(text: str) -> None:
+    source = Source("a.toml", f"a = [{text}", OwnError)
+    try:
+        deep = _depth(tomllib.loads(source.text))
+    except ValueError:
+        return
+    if deep <= 10:
+        source.tables()
 
 
 def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path: Path) -> None:
@@ -136,6 +160,25 @@ def test_text_that_is_not_utf8_is_refused_with_its_line(tmp_path: Path) -> None:
     path.write_bytes("a = 1\nname = 'Stra\u00dfe'\n".encode("latin-1"))
     with pytest.raises(OwnError, match=r"a\.toml, line 2: the text is not UTF-8"):
         read_source(path, OwnError)
+
+
+def test_a_file_beyond_the_limit_and_an_endless_device_are_refused_unread(tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    path.write_bytes(b"#" * 1_000_001)
+    with pytest.raises(OwnError, match="larger than 1000000 bytes"):
+        read_source(path, OwnError)
+    endless = tmp_path / "endless.toml"
+    endless.symlink_to("/dev/zero")
+    with pytest.raises(OwnError, match="is a device or a pipe"):
+        read_source(endless, OwnError)
+
+
+def test_what_an_error_repeats_of_a_file_is_short_and_printable() -> None:
+    key, value = "k" * 100_000, "v" * 100_000
+    source = Source("a.toml", f'{key} = "{value}"', OwnError)
+    said = str(source.error((key,), f"{value} is no value"))
+    assert len(said) < 600
+    assert "\x1b" not in str(source.error((), "obeyed \x1b[2J"))
 
 
 def test_a_folder_is_refused_as_what_cannot_be_read(tmp_path: Path) -> None:

@@ -86,7 +86,7 @@ class Store:
             return None
         try:
             return msgspec.json.decode(data, type=kind)
-        except msgspec.ValidationError:
+        except (ValueError, RecursionError):
             return None
 
     def put(self, key: msgspec.Struct, answer: msgspec.Struct) -> None:
@@ -119,7 +119,7 @@ class Store:
     def _take(self, line: bytes) -> bool:
         try:
             read = msgspec.json.decode(line, type=_Line)
-        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        except (ValueError, RecursionError):
             return False
         data = bytes(read.answer)
         if read.crc != _crc(read.key, data):

@@ -40,6 +40,10 @@ def test_what_was_written_is_read_again_bit_for_bit() -> None:
         {"thresholds": np.zeros((2, 2))},
         {"thresholds": np.full((3, 2), np.nan)},
         {"values": np.full((3, 2, 3), np.inf)},
+        {"values": np.full((3, 2, 3), -1e300)},
+        {"thresholds": np.full((3, 2), 1e300)},
+        {"columns": np.zeros((0, 2), "<i4"), "thresholds": np.zeros((0, 2)), "values": np.zeros((0, 2, 3))},
+        {"columns": np.zeros((3, 1), "<i4"), "thresholds": np.zeros((3, 1)), "values": np.zeros((3, 1, 3))},
         {"values": np.zeros((3, 2, 3), "<f4")},
         {"more": np.zeros(1)},
     ],
@@ -47,6 +51,23 @@ def test_what_was_written_is_read_again_bit_for_bit() -> None:
 def test_a_sealed_file_that_contradicts_itself_is_refused(change: dict[str, np.ndarray]) -> None:
     with pytest.raises(ThenarError, match=r"ensemble\.bin is damaged"):
         ensemble_from_bytes(seal(KIND, 1, pack(HEADER, _arrays() | change)))
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        HEADER.replace(b"shrinkage", b"shrink\xffge"),
+        HEADER.replace(b"5", b"9" * 10_000),
+        HEADER.replace(b"5", b"[" * 200_000),
+        HEADER.replace(b"5", b"0"),
+        HEADER.replace(b"5", b"5000"),
+        HEADER.replace(b"0.5", b"1e308"),
+        HEADER.replace(b"0.5", b"-1"),
+    ],
+)
+def test_a_sealed_header_of_anything_but_an_ensemble_is_refused(header: bytes) -> None:
+    with pytest.raises(ThenarError, match=r"ensemble\.bin is damaged"):
+        ensemble_from_bytes(seal(KIND, 1, pack(header, _arrays())))
 
 
 @given(data=st.data())

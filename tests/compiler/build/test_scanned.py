@@ -43,7 +43,7 @@ def test_the_build_holds_a_map_of_the_harness_and_says_its_checksum(
     assert files[SCAN_NAME] == scanmap_to_bytes(report.scan)
     build = Build.load(tmp_path / "build")
     assert build.scan == report.scan
-    check_harness(report.scan, harness)
+    check_harness(report.scan, harness, [switch.name for switch in build.manifest.switches])
 
 
 def test_all_but_the_map_is_as_without_a_harness(grasp_set: GraspSet, harness: Harness, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from thenar.compiler.recordings.cells import numbers
 from thenar.compiler.recordings.errors import TableError
 from thenar.compiler.recordings.table import Table, read_table
 
@@ -17,6 +18,10 @@ from thenar.compiler.recordings.table import Table, read_table
 def csv(content: bytes, folder: Path, delimiter: str = ",") -> Table:
     (folder / "table.csv").write_bytes(content)
     return read_table(folder / "table.csv", delimiter)
+
+
+def texts(table: Table) -> dict[str, list[str]]:
+    return {name: list(map(str, column)) for name, column in table.columns.items()}
 
 
 def test_a_csv_is_columns_of_text_and_rows_by_their_line(tmp_path: Path) -> None:
@@ -27,13 +32,13 @@ def test_a_csv_is_columns_of_text_and_rows_by_their_line(tmp_path: Path) -> None
 
 def test_blank_lines_before_the_header_are_skipped(tmp_path: Path) -> None:
     table = csv(b"\n\na\n1\n", tmp_path)
-    assert (dict(table.columns), table.rows.tolist()) == ({"a": ("1",)}, [4])
+    assert (texts(table), table.rows.tolist()) == ({"a": ["1"]}, [4])
 
 
 def test_a_gzipped_csv_is_the_same_table(tmp_path: Path) -> None:
     path = tmp_path / "t.b.csv.gz"
     path.write_bytes(gzip.compress(b"a;b\n1;2\n"))
-    assert dict(read_table(path, ";").columns) == {"a": ("1",), "b": ("2",)}
+    assert texts(read_table(path, ";")) == {"a": ["1"], "b": ["2"]}
 
 
 @pytest.mark.parametrize(
@@ -89,12 +94,12 @@ def test_arrays_of_an_npz_are_columns(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arrays", "reason"),
     [
-        ({"a": np.zeros(2), "b": np.zeros(3)}, r"its arrays have \[2, 3\] rows"),
-        ({"a": np.zeros((2, 2, 2))}, "array 'a' has 3 dimensions"),
-        ({"a": np.zeros(2, complex)}, "array 'a' holds complex128"),
-        ({"a": np.array([{}, {}])}, "cannot be read as npz: Object arrays cannot be loaded"),
+        ({"a": np.zeros(2), "b": np.zeros(3)}, "its arrays have 2, 3 rows"),
+        ({"a": np.zeros((2, 2, 2))}, "array a.npy: it has 3 dimensions"),
+        ({"a": np.zeros(2, complex)}, "array a.npy: it holds '<c16', neither numbers nor text"),
+        ({"a": np.array([{}, {}])}, r"cannot be read as npz: array a\.npy: it holds '\|O', neither"),
         ({"a": np.zeros(0)}, "has no rows"),
-        ({}, r"its arrays have \[\] rows"),
+        ({}, "it holds no arrays"),
     ],
 )
 def test_an_npz_that_is_no_table_is_refused(arrays: dict[str, Any], reason: str, tmp_path: Path) -> None:
@@ -129,10 +134,10 @@ HUGE = ONE.replace(b"(1,), }             ", b"(999999999999,), }  ")
         (b"a,b\n1,2\n", "File is not a zip file"),
         (ONE, "File is not a zip file"),
         (_zip({"a.npy": ONE})[:-30], "File is not a zip file"),
-        (_zip({"readme.txt": b"no array at all"}), "magic string is not correct"),
-        (_zip({"a.npy": ONE[:-1]}), "EOF"),
-        (_zip({"a.npy": ONE.replace(b")", b"(")}), "EOF in multi-line statement"),
-        (_zip({"a.npy": HUGE}), "Unable to allocate"),
+        (_zip({"readme.txt": b"no array at all"}), "it does not begin as a .npy file does"),
+        (_zip({"a.npy": ONE[:-1]}), r"array a\.npy: it is of other length than its shape \(1,\) takes"),
+        (_zip({"a.npy": ONE.replace(b")", b"(")}), "its head is not what numpy writes"),
+        (_zip({"a.npy": HUGE}), "it has more than 1000000 rows"),
         (_zip({"a.npy": ONE}, zipfile.ZIP_BZIP2), r"a\.npy is not compressed as numpy\.savez does"),
         (_zip({"a.0.npy": ONE, "a.npy": _npy(np.ones((1, 2)))}), r"two arrays make a column 'a\.0'"),
     ],
@@ -192,5 +197,5 @@ def test_any_bytes_are_a_table_or_refused_and_never_crash(
 def test_a_number_too_large_for_a_double_becomes_infinite_in_its_row(tmp_path: Path) -> None:
     largest = np.finfo(np.longdouble).max  # on some machines a double's
     np.savez(tmp_path / "t.npz", a=np.array([1, largest, -largest], np.longdouble))
-    column = np.asarray(read_table(tmp_path / "t.npz").columns["a"])
+    column = numbers(read_table(tmp_path / "t.npz").columns["a"]).values
     assert column.tolist() == [1.0, float(largest), -float(largest)]

@@ -1,3 +1,4 @@
+import tracemalloc
 from collections.abc import Callable
 
 import numpy as np
@@ -5,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.boosting.stumps import Stumps
+from thenar.compiler.boosting.stumps import Stumps, centred, spread
 from thenar.compiler.tables.collapse import _answers, _joint, collapse
 
 MakeStumps = Callable[..., Stumps]
@@ -118,5 +119,26 @@ def test_answers_at_one_threshold_are_added_in_the_order_of_the_rounds() -> None
     thresholds = np.array(random.integers(0, 3, (rounds, 2)) + 0.5, np.float64)
     stumps = Stumps(1, np.zeros((rounds, 2), np.int32), thresholds, random.normal(0, 1e3, (rounds, 2, 3)), 1.0)
     order = np.argsort(thresholds.ravel(), kind="mergesort")
-    by_threshold = _joint(np.floor(thresholds.ravel())[order], _answers(stumps, 0)[order], _answers(stumps, 1)[order])
+    by_threshold = _joint(np.floor(thresholds.ravel())[order], *(_answers(stumps, side)[order] for side in (0, 1)))
     assert collapse(stumps, 0).joint_rows[0].tobytes() == by_threshold[1].tobytes()
+
+
+def test_what_a_stump_adds_is_what_centring_makes_of_its_answer_alone_to_the_last_bit() -> None:
+    random = np.random.default_rng(3)
+    values = np.concatenate([random.normal(0, 2, 40), [0.0, -0.0, 5e-324, -5e-324, 3.0, -3.0]])
+    for n_classes, shrinkage in ((2, 1.0), (3, 0.1), (33, 1.0)):
+        own, others = spread(values, n_classes, shrinkage)
+        for value, mine, other in zip(values, own, others, strict=True):
+            alone = centred(np.array([[value], *[[0.0 * value]] * (n_classes - 1)]), shrinkage)[:, 0]
+            assert alone.tobytes() == np.array([mine, *[other] * (n_classes - 1)]).tobytes()
+
+
+def test_a_thousand_classes_are_collapsed_without_every_stump_writing_to_every_class() -> None:
+    random = np.random.default_rng(4)
+    stumps = Stumps(9, random.integers(0, 9, (10, 1000)).astype(np.int32), random.random((10, 1000)),
+                    random.normal(0, 1, (10, 1000, 3)), 1.0)  # fmt: skip
+    tracemalloc.start()
+    collapse(stumps, 9)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 10 * 1000**2  # written out, the answers of one branch alone are 80 MB

@@ -11,8 +11,8 @@ from thenar.compiler.tables.balance import balance
 from thenar.compiler.tables.collapse import ScoreTables, collapse
 from thenar.compiler.tables.compare import compare
 from thenar.compiler.tables.quantise import quantise
-from thenar.compiler.tables.scales import FINEST, reach
-from thenar.runtime.tables import tables_to_bytes
+from thenar.compiler.tables.scales import reach
+from thenar.runtime.tables import FINEST_SCALE, tables_to_bytes
 
 MakeStumps = Callable[..., Stumps]
 MakeRows = Callable[..., tuple[np.ndarray, np.ndarray]]
@@ -82,7 +82,7 @@ def test_a_threshold_that_rounding_makes_meaningless_is_dropped(make_rows: MakeR
 
 def test_a_nearly_empty_ensemble_has_a_finite_scale(make_rows: MakeRows) -> None:
     tables = ScoreTables(np.array([1e-300, -1e-300]), np.zeros((6, 2)), (), ())
-    assert quantise(tables, *make_rows(joints=0)).scale <= FINEST
+    assert quantise(tables, *make_rows(joints=0)).scale <= FINEST_SCALE
 
 
 @given(seed=st.integers(0, 10_000))

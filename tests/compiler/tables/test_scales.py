@@ -11,9 +11,9 @@ from thenar.compiler.tables.balance import balance
 from thenar.compiler.tables.collapse import ScoreTables, collapse
 from thenar.compiler.tables.compare import compare
 from thenar.compiler.tables.quantise import quantise
-from thenar.compiler.tables.scales import FINEST, GROUP_SIZE, TRIED, finest_scale, kindest_scale, reach, span
+from thenar.compiler.tables.scales import GROUP_SIZE, TRIED, finest_scale, kindest_scale, reach, span
 from thenar.compiler.tables.worstcase import Rounding
-from thenar.runtime.tables import IntegerTables, tables_to_bytes
+from thenar.runtime.tables import FINEST_SCALE, IntegerTables, tables_to_bytes
 
 MakeStumps = Callable[..., Stumps]
 MakeRows = Callable[..., tuple[np.ndarray, np.ndarray]]
@@ -55,7 +55,7 @@ def test_the_next_finer_scale_would_not_do(
     finer = float(np.nextafter(scale, np.inf))
     assert reach(tables, scale) <= 32767
     assert span(tables, scale) <= 2**entry_bits - 1
-    assert reach(tables, finer) > 32767 or span(tables, finer) > 2**entry_bits - 1 or finer >= FINEST
+    assert reach(tables, finer) > 32767 or span(tables, finer) > 2**entry_bits - 1 or finer >= FINEST_SCALE
 
 
 @given(seed=seeds, shape=shapes)

@@ -1,3 +1,4 @@
+import tracemalloc
 from collections.abc import Callable, Iterator
 from fractions import Fraction
 from itertools import permutations, product
@@ -11,7 +12,7 @@ from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.tables.collapse import ScoreTables, collapse
 from thenar.compiler.tables.compare import float_slack, rounding_error
 from thenar.compiler.tables.quantise import quantise
-from thenar.compiler.tables.worstcase import Rounding
+from thenar.compiler.tables.worstcase import Rounding, _Pairs
 from thenar.runtime.tables import IntegerTables
 
 MakeStumps = Callable[..., Stumps]
@@ -169,3 +170,35 @@ def test_integers_of_other_inputs_are_not_compared(
     others = collapse(make_stumps(switches=switches, joints=joints), switches)
     with pytest.raises(ValueError, match="zip"):
         Rounding(collapse(make_stumps(), 6), quantise(others, *make_rows(switches=switches, joints=joints)))
+
+
+_long = st.integers(-(2**200), 2**200)
+# Of few numbers, so that pairs tie, also in all but their last bits.
+_alike = st.sampled_from([0, 1, -1, 2**150, 2**150 + 1, 2**150 - 1, -(2**150), 2**61, 2**61 - 1])
+
+
+@settings(max_examples=150)
+@given(data=st.data(), classes=st.integers(2, 6), numbers=st.sampled_from([_long, _alike, st.integers(-9, 9)]))
+def test_the_worst_pair_is_the_first_of_the_worst_however_many_bits_part_it_from_the_next(
+    data: st.DataObject, classes: int, numbers: st.SearchStrategy[int]
+) -> None:
+    choices = data.draw(st.lists(st.integers(1, 3), min_size=1, max_size=4))
+    rows = [[[data.draw(numbers) for _ in range(classes)] for _ in range(count)] for count in choices]
+    tie = data.draw(st.sampled_from([0, 1, 2**61, 2**150, 2**1100]))
+    losses = {
+        (leader, rival): sum(max(row[leader] - row[rival] for row in each) for each in rows) - tie * (leader < rival)
+        for leader, rival in permutations(range(classes), 2)
+    }
+    worst = max(losses, key=losses.__getitem__)
+    assert _Pairs([np.array(each, object) for each in rows]).greatest(tie) == (losses[worst], *worst)
+
+
+def test_a_thousand_classes_take_no_more_memory_than_their_pairs_need() -> None:
+    random = np.random.default_rng(0)
+    tables = ScoreTables(np.zeros(1000), random.normal(0, 1, (20, 1000)), (), ())
+    integers = quantise(tables, random.random((50, 20)) < 0.5, np.zeros((50, 0), np.uint16))
+    tracemalloc.start()
+    assert Rounding(tables, integers).worst_of_all().loss > 5
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 100 * 1000**2

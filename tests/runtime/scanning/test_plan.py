@@ -14,6 +14,7 @@ from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxCha
 from thenar.runtime.scanning import plan
 from thenar.runtime.scanning.earlyexit import EarlyExit
 from thenar.runtime.scanning.plan import check_harness, plan_scan
+from thenar.runtime.scanning.propose import propose_board
 from thenar.runtime.scanning.scanmap import Port, ScanMap, check_switches, scanmap_from_bytes, scanmap_to_bytes
 from thenar.runtime.scanning.timing import port_us, reading_of, scan_us
 from thenar.runtime.tables import IntegerTables
@@ -177,9 +178,41 @@ def test_switches_that_are_wired_to_nothing_are_named(make_tables: MakeTables, e
 def test_a_map_goes_with_the_wiring_that_it_was_made_for(make_tables: MakeTables, eight_chips: EightChips) -> None:
     harness = eight_chips(2)
     scan = plan_scan(names_of(28), make_tables(switches=28), harness)
-    check_harness(scan, replace(harness, name="renamed"))
+    check_harness(scan, replace(harness, name="renamed"), names_of(28))
     with pytest.raises(HarnessError, match="made for another wiring than that of harness 'full'"):
-        check_harness(scan, eight_chips(3))
+        check_harness(scan, eight_chips(3), names_of(28))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"bus": 1},
+        {"chip": 9},
+        {"reading": "nonsense"},
+        {"reading": "GPIOB"},
+        {"closed_high": True},
+        {"switches": ((65535, 0),)},
+        {"switches": ((0, 1), (1, 0))},
+    ],
+)
+def test_a_port_that_the_wiring_does_not_have_is_refused_whoever_sealed_the_map(
+    make_tables: MakeTables, eight_chips: EightChips, change: dict[str, object]
+) -> None:
+    harness = eight_chips(2)
+    scan = plan_scan(names_of(28), make_tables(switches=28), harness)
+    for number in range(len(scan.ports)):
+        ports = [replace(port, **change) if place == number else port for place, port in enumerate(scan.ports)]
+        with pytest.raises(HarnessError, match="reads other pins or keys than harness 'full'"):
+            check_harness(replace(scan, ports=tuple(ports)), harness, names_of(28))
+
+
+def test_a_key_that_the_board_does_not_have_is_refused_whoever_sealed_the_map(make_tables: MakeTables) -> None:
+    board = propose_board(names_of(3))
+    scan = plan_scan(names_of(3), make_tables(switches=3), board)
+    check_harness(scan, board, names_of(3))
+    for scanners in ((), (((0, 0), (1, 1), (7, 2)),), (((0, 1), (1, 0), (2, 2)),), (*scan.scanners, ())):
+        with pytest.raises(HarnessError, match="reads other pins or keys than harness"):
+            check_harness(replace(scan, scanners=scanners), board, names_of(3))
 
 
 def test_a_build_without_switches_reads_nothing(make_tables: MakeTables, eight_chips: EightChips) -> None:

@@ -1,0 +1,42 @@
+"""What is checked before the work: how much a build can hold, and whether a training fits into memory."""
+
+import os
+
+from ..drivers.errors import ThenarError
+from ..runtime.tables import MAX_BYTES, MAX_CLASSES, MAX_JOINTS, MAX_SWITCHES, payload_bytes
+
+# Of the arrays (types, rows) that a round of boosting holds, and of a training's columns with two values and with more.
+_BYTES_A_TYPE_AND_ROW, _BYTES_A_SWITCH_AND_ROW, _BYTES_A_JOINT_AND_ROW = 120, 10, 60
+
+
+def check_types(types: int, raises: type[ThenarError]) -> None:
+    """Raise `raises` where the recordings hold more grasp types than a build."""
+    if types > MAX_CLASSES:
+        raise raises(
+            f"the recordings hold {types} grasp types, a build has at most {MAX_CLASSES}: join types, or leave some out"
+        )
+
+
+def check_inputs(types: int, switches: int, joints: int, raises: type[ThenarError]) -> None:
+    """Raise `raises` where a build has no room for so many switches and joints, whatever their rows are."""
+    if switches > MAX_SWITCHES:
+        raise raises(f"{switches} switches, a build has at most {MAX_SWITCHES}: keep fewer")
+    if joints > MAX_JOINTS:
+        raise raises(f"{joints} joints, a build has at most {MAX_JOINTS}: import fewer, or use switches alone")
+    least = payload_bytes(types, switches, [0] * joints)
+    if least > MAX_BYTES:
+        raise raises(
+            f"tables of {types} grasp types, {switches} switches and {joints} joints need {least} bytes at least, a "
+            f"build has at most {MAX_BYTES}: keep fewer switches"
+        )
+
+
+def check_memory(rows: int, types: int, raises: type[ThenarError], switches: int = 0, joints: int = 0) -> None:
+    """Raise `raises` where training on so many rows needs more memory than this machine has."""
+    a_row = _BYTES_A_TYPE_AND_ROW * types + _BYTES_A_SWITCH_AND_ROW * switches + _BYTES_A_JOINT_AND_ROW * joints
+    needed, there = rows * a_row, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    if needed > there:
+        raise raises(
+            f"training on {rows} rows of {types} grasp types needs some {needed / 1e9:.1f} GB of memory, this machine "
+            f"has {there / 1e9:.1f}: take fewer rows or columns"
+        )

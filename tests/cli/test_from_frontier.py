@@ -1,0 +1,80 @@
+"""A frontier.json that no thenar wrote, or a point that cannot be built: refused before the training."""
+
+from collections.abc import Callable
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from thenar.cli import run
+from thenar.compiler import GraspSet
+from thenar.compiler.frontier.points import FrontierError, Point, Way, frontier_from_bytes, frontier_to_bytes
+
+Captured = pytest.CaptureFixture[str]
+Change = Callable[[Point], Point]
+
+
+def _setting(**changes: Any) -> Change:
+    return lambda point: replace(point, setting=replace(point.setting, **changes))
+
+
+@pytest.fixture
+def compiled(examples: Any, set_file: Path, tmp_path: Path, capsys: Captured) -> Callable[[Change], tuple[int, str]]:
+    """Return what compiles a point of a frontier of the set: exit code, and what was complained of."""
+    grasp_set = GraspSet.load(set_file)
+
+    def compile_point(change: Change) -> tuple[int, str]:
+        found = examples.example_frontier(fingerprint=grasp_set.fingerprint())
+        point = replace(found.points[0], switches=grasp_set.switch_names[:6])
+        document = replace(found, points=(change(point),), picked=1)
+        (tmp_path / "frontier.json").write_bytes(frontier_to_bytes(document))
+        asked = ["compile", str(set_file), "-o", str(tmp_path / "build"), "--from", str(tmp_path / "frontier.json")]
+        return run([*asked, "--no-report", "--folds", "0"]), " ".join(capsys.readouterr().err.split())
+
+    return compile_point
+
+
+def test_a_point_that_can_be_built_is(compiled: Callable[[Change], tuple[int, str]]) -> None:
+    assert compiled(lambda point: point)[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (_setting(way=Way("nonsense", 6.0)), "takes a method that is not there: 'nonsense'"),
+        (_setting(clock_hz=0), "has switches without a wiring or its clock"),
+        (_setting(clock_hz=1), "runs its mcp23017 at 1 Hz, which it cannot"),
+        (_setting(clock_hz=12_000_000), "runs its mcp23017 at 12000000 Hz, which it cannot"),
+        (_setting(wiring="nonsense"), "takes a wiring that is not there: 'nonsense'"),
+        (_setting(rounds=0), "is not a frontier's"),
+        (_setting(width=99), "is not a frontier's"),
+        (_setting(inputs="joints"), "keeps 6 switches for inputs 'joints'"),
+        (lambda point: replace(point, switches=("nobody",) * 1), "keeps switches that the recordings do not have"),
+        (lambda point: replace(point, switches=point.switches * 2), "keeps a switch twice"),
+        (lambda point: replace(point, number=2), "does not number its points 1, 2, 3"),
+        (lambda point: replace(point, frame=replace(point.frame, us=1e308)), "is not a frontier's"),
+    ],
+)
+def test_what_cannot_be_built_is_refused_before_the_training(
+    compiled: Callable[[Change], tuple[int, str]], change: Change, said: str, tmp_path: Path
+) -> None:
+    began = process_time()
+    code, complaint = compiled(change)
+    assert (code, said in complaint, "Traceback" in complaint) == (2, True, False), complaint
+    assert process_time() - began < 2
+    assert not (tmp_path / "build").exists()
+
+
+def test_curves_have_as_many_rates_as_sizes(examples: Any) -> None:
+    found = examples.example_frontier()
+    crooked = replace(found, curves=(replace(found.curves[0], sizes=found.curves[0].sizes[1:]), *found.curves[1:]))
+    with pytest.raises(FrontierError, match="has a curve of more sizes than rates, or fewer"):
+        frontier_from_bytes(frontier_to_bytes(crooked))
+
+
+@pytest.mark.parametrize("part", [b"[" * 200_000, b"9" * 10_000, b'"\xff"'])
+def test_json_that_is_deep_or_long_is_refused(part: bytes) -> None:
+    with pytest.raises(FrontierError, match=r"frontier\.json is not a frontier's"):
+        frontier_from_bytes(b'{"schema": 1, "thenar": ' + part)

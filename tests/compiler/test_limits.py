@@ -1,0 +1,101 @@
+"""What is too large is refused in one sentence, and at once."""
+
+from collections.abc import Callable
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+import pytest
+
+from thenar.compiler import GraspSet, compile_build
+from thenar.compiler.boosting.boost import BoostingError, boost
+from thenar.compiler.build.errors import CompileError
+from thenar.compiler.evaluation.errors import EvaluationError
+from thenar.compiler.evaluation.study import evaluate
+from thenar.compiler.frontier.material import Material
+from thenar.compiler.frontier.points import FrontierError
+from thenar.compiler.limits import check_inputs, check_memory
+from thenar.compiler.placement.errors import PlacementError
+from thenar.compiler.placement.placement import place
+from thenar.compiler.selection.learning import Learning
+from thenar.drivers.errors import ThenarError
+
+Make = Callable[..., GraspSet]
+SECONDS = 2.0
+
+
+@pytest.fixture(scope="module")
+def many_types(make_set: Make) -> GraspSet:
+    return make_set(rows=20_000, types=10_000, switches=64)
+
+
+@pytest.mark.parametrize(
+    ("work", "error"),
+    [
+        (lambda grasps, folder: compile_build(grasps, folder / "build"), CompileError),
+        (lambda grasps, _: Material.of(grasps, None), FrontierError),
+        (lambda grasps, _: evaluate(grasps), EvaluationError),
+        (lambda grasps, _: place(grasps), PlacementError),
+        (lambda grasps, _: Learning(grasps.switches, grasps.codes, grasps.labels, 10_000), PlacementError),
+    ],
+    ids=["compile", "frontier", "evaluate", "place", "place --method"],
+)
+def test_more_grasp_types_than_a_build_holds_are_refused_before_the_work(
+    many_types: GraspSet, tmp_path: Path, work: Callable[[GraspSet, Path], object], error: type[ThenarError]
+) -> None:
+    began = process_time()
+    with pytest.raises(error, match="10000 grasp types, a build has at most 1024: join types"):
+        work(many_types, tmp_path)
+    assert process_time() - began < SECONDS
+    assert not (tmp_path / "build").exists()
+
+
+@pytest.mark.parametrize(
+    ("types", "switches", "joints", "said"),
+    [
+        (2, 4097, 0, "4097 switches, a build has at most 4096: keep fewer"),
+        (2, 0, 257, "257 joints, a build has at most 256"),
+        (1024, 4096, 0, "tables of 1024 grasp types, 4096 switches and 0 joints need 16779280 bytes at least"),
+    ],
+)
+def test_inputs_for_which_tables_have_no_room_are_refused(types: int, switches: int, joints: int, said: str) -> None:
+    with pytest.raises(CompileError, match=said):
+        check_inputs(types, switches, joints, CompileError)
+
+
+def test_the_largest_tables_that_there_is_room_for_are_not_refused() -> None:
+    check_inputs(1024, 4094, 0, CompileError)
+    check_inputs(1000, 4096, 96, CompileError)
+
+
+def test_joints_beyond_what_a_build_holds_are_refused_before_the_training(make_set: Make, tmp_path: Path) -> None:
+    with pytest.raises(CompileError, match="300 joints, a build has at most 256"):
+        compile_build(make_set(joints=300), tmp_path / "build", folds=0)
+
+
+def test_more_switches_than_a_build_holds_are_refused_before_a_frontier_and_where_they_would_be_kept(
+    make_set: Make, tmp_path: Path
+) -> None:
+    wide = make_set(switches=5000)
+    with pytest.raises(FrontierError, match="5000 switches, a build has at most 4096"):
+        Material.of(wide, None)
+    with pytest.raises(CompileError, match="4097 switches, a build has at most 4096"):
+        compile_build(wide, tmp_path / "build", placement="elimination", keep=4097, folds=0)
+    assert compile_build(wide, tmp_path / "build", rounds=2, folds=0).manifest.source.switches == 5000
+
+
+def test_more_stumps_than_an_ensemble_holds_are_refused_before_the_training(
+    grasp_set: GraspSet, tmp_path: Path
+) -> None:
+    with pytest.raises(CompileError, match="10000000 rounds of 4 grasp types are 40000000 stumps"):
+        compile_build(grasp_set, tmp_path / "build", rounds=10_000_000)
+
+
+def test_rows_that_do_not_fit_into_memory_are_refused_before_the_training() -> None:
+    labels = np.arange(8_000_000) % 1024
+    with pytest.raises(BoostingError, match=r"8000000 rows of 1024 grasp types needs some 983\.\d GB of memory"):
+        boost((labels % 2 == 0)[:, np.newaxis], labels, 1024, rounds=1)
+
+
+def test_a_training_that_fits_into_memory_is_not_refused() -> None:
+    check_memory(1000, 33, CompileError, switches=160, joints=22)

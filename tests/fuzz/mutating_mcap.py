@@ -1,0 +1,159 @@
+"""Mutants of recordings: records changed, added and packed into chunks, with their lengths and checksums right again.
+
+MCAP specification: https://mcap.dev/spec
+"""
+
+from random import Random
+from struct import Struct, error
+from typing import NamedTuple
+from zlib import crc32
+
+from mutating import INTEGERS, TEXTS, altered, json_file
+
+from thenar.runtime.recording.cdr import decode_text, encode_text
+from thenar.runtime.recording.errors import McapError
+from thenar.runtime.recording.layout import MAGIC
+
+_OPENING = Struct("<BQ")
+_LENGTH = Struct("<I")
+_MESSAGE = Struct("<HIQQ")
+_CHUNK = Struct("<QQQI")
+_MESSAGE_OP, _CHUNK_OP, _METADATA_OP, _DATA_END_OP, _FOOTER_OP = 5, 6, 12, 15, 2
+_COMPRESSIONS = ("", "", "", "zstd", "lz4", "bz2", "\x1b[2J", "a" * 1000)
+
+
+class _Record(NamedTuple):
+    opcode: int
+    content: bytes
+
+
+def mcap_file(data: bytes, random: Random) -> bytes:
+    """Change a recording: what its records hold, their kinds and order; its bytes now and then."""
+    try:
+        records = _records(data)
+    except error:
+        return altered(data, random)
+    if not records or random.random() < 0.1:
+        return altered(data, random)
+    for _ in range(random.choice((1, 1, 1, 2, 4))):
+        _change(records, random)
+    sound = random.random() < 0.9
+    return _joined(records, sound) + (MAGIC if sound else b"")
+
+
+def _records(data: bytes) -> list[_Record]:
+    found, at = [], len(MAGIC)
+    while at < len(data) - len(MAGIC):
+        opcode, length = _OPENING.unpack_from(data, at)
+        at += _OPENING.size
+        found.append(_Record(opcode, data[at : at + length]))
+        at += length
+    return found
+
+
+def _joined(records: list[_Record], sound: bool) -> bytes:
+    """Return the records as a file; with `sound`, the checksum at the end of its data is that of its data."""
+    data = MAGIC
+    for opcode, content in records:
+        if opcode == _DATA_END_OP and sound:
+            content = _LENGTH.pack(crc32(data))
+        data += _OPENING.pack(opcode, len(content)) + content
+    return data
+
+
+def _change(records: list[_Record], random: Random) -> None:
+    at = random.randrange(len(records))
+    record = records[at]
+    match random.randrange(10):
+        case 0:
+            records[at] = record._replace(opcode=random.choice((0, 1, 3, 4, 5, 6, 9, 12, 15, 0x7F, 0x80, 255)))
+        case 1:
+            records.insert(at, records[random.randrange(len(records))])
+        case 2 if len(records) > 1:
+            del records[at]
+        case 3:
+            other = random.randrange(len(records))
+            records[at], records[other] = records[other], record
+        case 4:
+            end = min(at + random.choice((1, 3, 50)), len(records))
+            records[at:end] = [_chunk(records[at:end], random)]
+        case 5:
+            records[at:at] = [record] * random.choice((2, 500))
+        case _:
+            records[at] = record._replace(content=_content(record, random))
+
+
+def _content(record: _Record, random: Random) -> bytes:
+    if record.opcode == _MESSAGE_OP and len(record.content) >= _MESSAGE.size:
+        return _message(record.content, random)
+    if record.opcode == _METADATA_OP:
+        return _metadata(record.content, random)
+    if record.opcode == _FOOTER_OP:
+        return record.content[: random.randrange(len(record.content) + 1)]
+    return altered(record.content, random)
+
+
+def _message(content: bytes, random: Random) -> bytes:
+    channel, sequence, logged, published = _MESSAGE.unpack_from(content)
+    data = content[_MESSAGE.size :]
+    match random.randrange(6):
+        case 0:
+            channel = random.choice((0, 1, 2, 3, 4, 5, 6, 65535))
+        case 1:
+            logged = random.choice(INTEGERS) % 2**64
+        case 2:
+            published = random.choice(INTEGERS) % 2**64
+        case _:
+            try:
+                data = encode_text(json_file(decode_text(data), random))
+            except McapError:
+                data = altered(data, random)
+    return _MESSAGE.pack(channel, sequence, logged, published) + data
+
+
+def _metadata(content: bytes, random: Random) -> bytes:
+    """Change one key or value of a metadata record's map; values are texts or JSON."""
+    try:
+        name, at = _text(content, 0)
+        pairs, at = [], at + _LENGTH.size
+        while at < len(content):
+            key, at = _text(content, at)
+            value, at = _text(content, at)
+            pairs.append([key, value])
+    except error:
+        return altered(content, random)
+    pair = random.choice(pairs or [[b"version", b"1"]])
+    match random.randrange(8):
+        case 0:
+            pair[0] = random.choice(TEXTS).encode("utf-8", "surrogatepass")
+        case 1:
+            pair[1] = random.choice(TEXTS).encode("utf-8", "surrogatepass")
+        case 2:
+            pairs.remove(pair) if pair in pairs else pairs.append(pair)
+        case 3:
+            name = altered(name, random)
+        case _:
+            pair[1] = json_file(pair[1], random)
+    joined = b"".join(_packed(text) for pair in pairs for text in pair)
+    return _packed(name) + _packed(joined)
+
+
+def _text(content: bytes, at: int) -> tuple[bytes, int]:
+    (length,) = _LENGTH.unpack_from(content, at)
+    end = at + _LENGTH.size + length
+    return content[at + _LENGTH.size : end], end
+
+
+def _packed(text: bytes) -> bytes:
+    return _LENGTH.pack(len(text)) + text
+
+
+def _chunk(records: list[_Record], random: Random) -> _Record:
+    """Return a chunk of these records, whose sizes, checksum and compression now and then are not what they say."""
+    inside = b"".join(_OPENING.pack(opcode, len(content)) + content for opcode, content in records)
+    size = random.choice((len(inside), len(inside), len(inside), *INTEGERS)) % 2**64
+    crc = random.choice((crc32(inside), crc32(inside), 0, 1))
+    compression = random.choice(_COMPRESSIONS).encode()
+    length = random.choice((len(inside), len(inside), len(inside), *INTEGERS)) % 2**64
+    head = _CHUNK.pack(0, random.choice((0, 2**64 - 1)), size, crc)
+    return _Record(_CHUNK_OP, head + _packed(compression) + length.to_bytes(8, "little") + inside)

@@ -1,0 +1,316 @@
+"""Build folders, their members one by one, and what the commands read of a frontier and of a placement.
+
+A member that was changed comes with a `build.json` that holds its checksum and its own, so that it is read to its end.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from random import Random
+
+import msgspec
+import numpy as np
+from material import GRASPS, SWITCHES, Format, build_files, grasp_set, harness, make_folder
+from mutating import Mutate, altered, json_file, npz_file, sealed
+
+from thenar.cli.from_frontier import picked
+from thenar.cli.kept_files import kept_names
+from thenar.compiler.build.verify import verify_build
+from thenar.compiler.firmware.folder import sums, write_folder
+from thenar.compiler.firmware.generate import Request, firmware_files, fit_of
+from thenar.compiler.frontier import points
+from thenar.compiler.frontier.drawing.table import csv_bytes
+from thenar.compiler.frontier.storing.store import HEADER, Store
+from thenar.compiler.placement.placement import place
+from thenar.compiler.report.frontier_charts import frontier_charts
+from thenar.compiler.report.frontier_view import frontier_view
+from thenar.compiler.spec.files import spec_files
+from thenar.drivers.errors import ThenarError
+from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME, Build
+from thenar.runtime.live.frames import GloveFrame, SwitchFrame
+from thenar.runtime.live.system import System
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.recognizer import Frame, Recognizer
+from thenar.runtime.scanning.scanmap import ScanMap
+from thenar.runtime.scanning.timing import scan_us
+
+_DIGESTS = {TABLES_NAME: "tables_sha256", ENSEMBLE_NAME: "ensemble_sha256", SCAN_NAME: "scan_sha256"}
+
+
+def _canonical(data: bytes, kind: type[msgspec.Struct]) -> bytes:
+    """Return a JSON document as thenar itself would write it, where it can be one; else as it is."""
+    try:
+        return msgspec.json.format(msgspec.json.encode(msgspec.json.decode(data, type=kind)), indent=2) + b"\n"
+    except (msgspec.MsgspecError, UnicodeError, RecursionError):
+        return data
+
+
+def _resealed(data: bytes) -> bytes:
+    """Return a `build.json` with its own checksum, where it has a place for one."""
+    canonical = _canonical(data, Manifest)
+    try:
+        document = json.loads(canonical)
+        said = json.dumps(document["checksum"], ensure_ascii=False).encode("utf-8", "replace")
+    except (ValueError, RecursionError, KeyError, TypeError):
+        return data
+    empty = canonical.replace(b'"checksum": ' + said, b'"checksum": ""', 1)
+    return empty.replace(b'"checksum": ""', b'"checksum": "%s"' % hashlib.sha256(empty).hexdigest().encode(), 1)
+
+
+def _described(files: dict[str, bytes]) -> dict[str, bytes]:
+    """Return the files of a build with a `build.json` that holds their checksums."""
+    try:
+        document = json.loads(files[MANIFEST_NAME])
+        document |= {key: hashlib.sha256(files[name]).hexdigest() for name, key in _DIGESTS.items() if name in files}
+        return {**files, MANIFEST_NAME: _resealed(json.dumps(document).encode())}
+    except (ValueError, RecursionError, KeyError, TypeError):
+        return files
+
+
+def _use_build(folder: Path) -> None:
+    """Do what the commands do with a build: classify, verify, scan, lay out firmware, tell its spec."""
+    build = Build.load(folder)
+    switches, joints = build.tables.n_switches, build.tables.n_joints
+    closed, codes = np.ones(switches, np.bool_), np.full(joints, 65535, np.uint16)
+    build.classify(closed, codes)
+    Recognizer(build).recognise(Frame(0, closed, codes, closed, np.zeros(joints, np.bool_)))
+    for step in (_live, _verified, _spec, _firmware):
+        _allowed(step, build, folder)
+
+
+def _allowed(step: Callable[[Build, Path], object], build: Build, folder: Path) -> None:
+    """Take a step that may refuse the build, though others do not."""
+    try:
+        step(build, folder)
+    except (ThenarError, OSError) as refusal:
+        if isinstance(refusal.__cause__, MemoryError) or isinstance(refusal.__context__, MemoryError):
+            raise
+
+
+def _live(build: Build, _folder: Path) -> None:
+    system = System.of(build, harness())
+    glove = GloveFrame(0, bytes(range(100, 118)), None)
+    frame = SwitchFrame(0, closed=5, lost=2)
+    system.recognizer().step(0, 0, frame, glove)
+    if build.scan is not None:
+        scan_us(build.scan, harness())
+    system.sources()
+
+
+def _verified(_build: Build, folder: Path) -> None:
+    verify_build(folder, grasp_set())
+
+
+def _spec(build: Build, _folder: Path) -> None:
+    spec_files(build.manifest, build.scan, harness())
+
+
+def _firmware(build: Build, _folder: Path) -> None:
+    request = Request(build, "host")
+    firmware_files(request, fit_of(request))
+
+
+def _member(name: str, mutate: Mutate, sealed_again: Callable[[bytes], bytes]) -> Format:
+    """Return the format of one member of a build, read in the middle of the others."""
+
+    def changed(data: bytes, random: Random) -> bytes:
+        return sealed_again(mutate(data, random))
+
+    def read(data: bytes, folder: Path) -> None:
+        files = {**build_files(), name: data}
+        _use_build(make_folder(files if name == MANIFEST_NAME else _described(files), folder / "build"))
+
+    return Format(name, lambda: [build_files()[name]], changed, read)
+
+
+def _mixed(data: bytes, random: Random) -> bytes:
+    """Change a build folder, packed as msgpack: take members away, exchange or damage them."""
+    try:
+        files = msgspec.msgpack.decode(data, type=dict[str, bytes])
+    except (msgspec.MsgspecError, UnicodeError):
+        return _packed_build()
+    name = random.choice([*files, MANIFEST_NAME])
+    match random.randrange(5):
+        case 0:
+            files.pop(name, None)
+        case 1:
+            files[name] = files.get(random.choice([*files, name]), b"")
+        case 2:
+            files[random.choice(("report.html", "x.part", "notes.txt", ".build.old"))] = files.get(name, b"")
+        case 3:
+            files = {**files, name: altered(files.get(name, b""), random)}
+        case _:
+            files = _described({**files, name: altered(files.get(name, b""), random)})
+    return msgspec.msgpack.encode(files)
+
+
+@cache
+def _packed_build() -> bytes:
+    return msgspec.msgpack.encode(build_files())
+
+
+def _folder(data: bytes, folder: Path) -> None:
+    try:
+        files = msgspec.msgpack.decode(data, type=dict[str, bytes])
+    except (msgspec.MsgspecError, UnicodeError):
+        return
+    known = {*build_files(), "report.html", "x.part", "notes.txt", ".build.old"}
+    _use_build(make_folder({name: data for name, data in files.items() if name in known}, folder / "build"))
+
+
+def _frontier() -> list[bytes]:
+    rate = points.Rate(0.9, 0.85, 0.95)
+    us = points.Time(12.5, "wire")
+    ways = (points.Way("elimination", 4.0), points.Way("id3", 2.0), points.Way("elimination", 3.0))
+    wirings = (("mcp23017", 400_000), ("as wired", 400_000), ("board", 1_000_000))
+    settings = [
+        points.Setting(way, "both", 4, 8, "", "full", "single", wiring, clock_hz, 16, None)
+        for way, (wiring, clock_hz) in zip(ways, wirings, strict=True)
+    ]
+    found = points.Frontier(
+        schema=points.SCHEMA,
+        thenar="0.1.0",
+        source="set.grasps",
+        fingerprint=grasp_set().fingerprint(),
+        rows=36,
+        subjects=2,
+        n_switches=len(SWITCHES),
+        n_joints=3,
+        grasps=GRASPS,
+        target="host",
+        folds=2,
+        repeats=1,
+        combinations=40,
+        points=tuple(
+            points.Point(
+                number=number,
+                setting=setting,
+                switches=SWITCHES[: number + 1],
+                rate=rate,
+                left_out=rate,
+                scan=us,
+                transfer=us,
+                classify=us,
+                frame=us,
+                latency=points.Latency(50.0, 90.0, 0.1, 0.02),
+                flash=900,
+                ram=20,
+                ports=2,
+                chips=1,
+                compile_s=0.5,
+                fronts=("frame", "switches"),
+            )
+            for number, setting in enumerate(settings, 1)
+        ),
+        tried=(points.Tried(ways[0], "both", 4, 4, rate, 25.0),),
+        curves=(points.Curve("elimination", "by tables", True, (1.0, 2.0), (rate, rate)),),
+        marks=(points.Mark("all switches", 6, rate, 40.0, 80.0),),
+        checks=(points.Check("scans", "wire", 4, 0.01, 0.02),),
+        skipped=("no AVR was simulated",),
+        picked=1,
+        wanted="a frame within 20 us",
+    )
+    return [points.frontier_to_bytes(found)]
+
+
+def _compile_from(data: bytes, folder: Path) -> None:
+    """Read a frontier as `compile --from` does until it trains, and as the report shows it."""
+    path = folder / "frontier.json"
+    path.write_bytes(data)
+    for number in (None, 1, 2):
+        chosen = picked(path, number, grasp_set())
+        _ = chosen.options
+        wired = chosen.wired(harness())
+        if callable(wired):
+            wired(SWITCHES[:4])
+    csv_bytes(chosen.frontier)
+    frontier_view(chosen.frontier, grasp_set().fingerprint(), None, chosen.point.number)
+    frontier_charts(chosen.frontier)
+
+
+class _Question(msgspec.Struct, frozen=True):
+    number: int
+
+
+class _Answer(msgspec.Struct, frozen=True):
+    rate: float
+    names: tuple[str, ...]
+
+
+@cache
+def _store() -> bytes:
+    from tempfile import TemporaryDirectory
+
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "store.jsonl"
+        with Store(path, "scope") as store:
+            for number in range(4):
+                store.put(_Question(number), _Answer(number / 4, GRASPS))
+        return path.read_bytes()
+
+
+def _changed_store(data: bytes, random: Random) -> bytes:
+    """Change an answer and work out its checksum; or lines, or bytes."""
+    lines = data.removeprefix(HEADER).splitlines(keepends=True)
+    if not lines or random.random() < 0.3:
+        return altered(data, random)
+    at = random.randrange(len(lines))
+    try:
+        line = json.loads(lines[at])
+        answer = json_file(json.dumps(line["answer"]).encode(), random)
+        from zlib import crc32
+
+        key = str(line["key"])
+        crc = crc32(answer, crc32(key.encode()))
+        lines[at] = b'{"key":"%s","crc":%d,"answer":%s}\n' % (key.encode(), crc, answer.replace(b"\n", b" "))
+    except (ValueError, RecursionError, KeyError, TypeError):
+        lines[at] = json_file(lines[at], random) + b"\n"
+    return HEADER + b"".join(lines)
+
+
+def _resume(data: bytes, folder: Path) -> None:
+    path = folder / "store.jsonl"
+    path.write_bytes(data)
+    with Store(path, "scope") as store:
+        for number in range(4):
+            store.get(_Question(number), _Answer)
+
+
+def _placements() -> list[bytes]:
+    placement, _ = place(grasp_set(), 0)
+    return [msgspec.json.encode(placement), msgspec.json.encode(SWITCHES), "\n".join(SWITCHES).encode()]
+
+
+def _kept(data: bytes, folder: Path) -> None:
+    path = folder / "kept"
+    path.write_bytes(data)
+    kept_names(path)
+
+
+_FIRMWARE = {"thenar.c": "int x;\n", "src/thenar.h": "/* */\n"}
+
+
+def _sums(data: bytes, folder: Path) -> None:
+    """Write firmware over a folder whose record is `data`."""
+    target = folder / "firmware"
+    write_folder(_FIRMWARE, target, overwrite=True) if not target.exists() else None
+    (target / "SHA256SUMS").write_bytes(data)
+    try:
+        write_folder(_FIRMWARE, target, overwrite=True)
+    finally:
+        (target / "SHA256SUMS").write_text(sums(_FIRMWARE))
+
+
+FORMATS = (
+    _member(MANIFEST_NAME, json_file, _resealed),
+    _member(TABLES_NAME, sealed(altered), bytes),
+    _member(ENSEMBLE_NAME, sealed(npz_file), bytes),
+    _member(SCAN_NAME, json_file, lambda data: _canonical(data, ScanMap)),
+    Format("build", lambda: [_packed_build()], _mixed, _folder),
+    Format("frontier.json", _frontier, json_file, _compile_from),
+    Format("store.jsonl", lambda: [_store()], _changed_store, _resume),
+    Format("placement.json", _placements, json_file, _kept),
+    Format("SHA256SUMS", lambda: [sums(_FIRMWARE).encode()], altered, _sums),
+)

@@ -1,0 +1,205 @@
+"""What users write by hand, or let thenar write for them: gloves, boards, calibrations, preshapes, scenes, postures."""
+
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import msgspec
+from material import GLOVE_TOML, GRASPS, SENSORS, Format, build_files, harness, make_folder
+from mutating import json_file, toml_file
+
+from thenar.compiler.firmware.board_loading import load_board
+from thenar.compiler.firmware.generate import Request, firmware_files, fit_of
+from thenar.compiler.firmware.library import Fit
+from thenar.compiler.frontier.timing.whole_glove import ports_of_whole_glove
+from thenar.compiler.recordings.objects import collected
+from thenar.compiler.spec.files import spec_files
+from thenar.drivers.calibration import GloveCalibration, SensorCalibration
+from thenar.drivers.cyberglove_sensors import SENSORS_18
+from thenar.runtime.build import Build
+from thenar.runtime.calibration import load_calibration
+from thenar.runtime.harness.loading import load_harness, parse_harness
+from thenar.runtime.harness.writing import harness_to_toml
+from thenar.runtime.live.codes import codes_of_bytes
+from thenar.runtime.live.sources import Sources
+from thenar.runtime.manifest import Calibration
+from thenar.runtime.preshape.loading import SHIPPED, load_preshapes
+from thenar.runtime.recording.session import Collection
+from thenar.runtime.recording.trials import planned
+from thenar.runtime.scanning.plan import plan_scan
+from thenar.runtime.scanning.timing import scan_us
+from thenar.runtime.scanning.whole import whole_scan
+from thenar.runtime.sinks.angles import AngleReader
+from thenar.simulator.body.anthropometry import Size
+from thenar.simulator.body.condition import Thing
+from thenar.simulator.body.hand import Hand
+from thenar.simulator.pipeline.pipeline import compile_pipeline
+from thenar.simulator.planning.postures import Postures
+from thenar.simulator.running.session import conditions_of
+from thenar.simulator.scenes import shipped
+from thenar.simulator.scenes.catalogue import load_catalogue
+from thenar.simulator.scenes.decode import load_scene
+
+
+@cache
+def _build() -> Build:
+    with TemporaryDirectory() as folder:
+        return Build.load(make_folder(build_files(), Path(folder)))
+
+
+def _kept() -> list[str]:
+    return [switch.name for switch in _build().manifest.switches]
+
+
+def _glove(data: bytes, folder: Path) -> None:
+    """Plan, time and write a wiring, and make the devices of it, none of which is opened."""
+    path = folder / "glove.toml"
+    path.write_bytes(data)
+    found = load_harness(path)
+    parse_harness(harness_to_toml(found), "written.toml")
+    ports_of_whole_glove(found, found.switches)
+    Sources(found, found.switches, whole_scan(found, found.switches))
+    scan = plan_scan(_kept(), _build().tables, found)
+    scan_us(scan, found)
+    spec_files(_build().manifest, None, found)
+
+
+_PINS = "\n".join(f'finger_{number} = "PB{number}"' for number in range(4))
+_BOARDS = (
+    f'part = "atmega328p"\nclock_hz = 16000000\nbaud = 1000000\nboard = 1\nscan_us = 1000\nstate_us = 0\n'
+    f'[debounce]\npress_us = 5000\nrelease_us = 10000\n[pins]\n{_PINS}\nfinger_4 = "PD2"\nfinger_5 = "PD3"\n',
+    'part = "atmega2560"\n[matrix]\nrows = ["PA0", "PA1"]\ncolumns = ["PC0", "PC1", "PC2"]\ndiodes = true\n'
+    'settle_us = 20\nswitches = [["finger_0", "finger_1", "finger_2"], ["finger_3", "finger_4", "finger_5"]]\n'
+    "[cyberglove]\nuart = 1\nbaud = 115200\nsensors = 18\nrate_hz = 90\n",
+    'part = "atmega328p"\nearly_exit = true\nscan_us = 3000\n[bus]\nclock_hz = 400000\n[[chip]]\nkind = "mcp23017"\n'
+    'address = 0x20\npins = { GPA0 = "finger_0", GPB0 = "finger_1", GPA2 = "finger_2" }\n[[chip]]\n'
+    'kind = "tca6424a"\naddress = 0x22\nclosed = "high"\n'
+    'pins = { P00 = "finger_3", P21 = "finger_4", P22 = "finger_5" }\n'
+    f'[analog]\n{SENSORS[0]} = "ADC0"\n{SENSORS[1]} = "ADC1"\n{SENSORS[2]} = "ADC2"\n',
+)
+_PLATFORMS = {"atmega328p": "avr328p", "atmega2560": "avr2560"}
+
+
+@cache
+def _fit(platform: str) -> Fit:
+    return fit_of(Request(_build(), platform))
+
+
+def _board(data: bytes, folder: Path) -> None:
+    """Write the firmware of a board, which recognises where it reads joints."""
+    path = folder / "board.toml"
+    path.write_bytes(data)
+    board = load_board(path)
+    platform = _PLATFORMS[board.part]
+    for mode in ("scan", "glove"):
+        request = Request(_build(), platform, mode, board=board)
+        firmware_files(request, _fit(platform))
+
+
+def _calibrations() -> list[bytes]:
+    lines = tuple(SensorCalibration(name, 40 + number, 0.0, 200, 90.0) for number, name in enumerate(SENSORS_18))
+    text = GloveCalibration(subject="anna", sensors=lines).to_toml()
+    inline = "".join(
+        f'    {{ name = "{name}", raw_a = 40, value_a = 0.0, raw_b = 200, value_b = 90.0 }},\n' for name in SENSORS
+    )
+    return [text.encode(), f'subject = "bert"\nunit = "deg"\nsensor = [\n{inline}]\n'.encode()]
+
+
+def _calibration(data: bytes, folder: Path) -> None:
+    path = folder / "anna.toml"
+    path.write_bytes(data)
+    calibration = load_calibration(path)
+    (folder / "again.toml").write_text(calibration.to_toml())
+    load_calibration(folder / "again.toml")
+    AngleReader(SENSORS_18, calibration).angles(bytes(18))
+    codes_of_bytes(Calibration(0, SENSORS[0], "deg", 0, -250.0, 1000, 250.0), calibration)
+
+
+def _preshape_tables() -> list[bytes]:
+    from importlib.resources import files
+
+    return [files("thenar.runtime.preshape").joinpath("tables", f"{name}.toml").read_bytes() for name in SHIPPED]
+
+
+def _preshapes(data: bytes, folder: Path) -> None:
+    path = folder / "hand.toml"
+    path.write_bytes(data)
+    table = load_preshapes(path)
+    table.find("PoS")
+    table.check(("PoS", *GRASPS))
+
+
+def _scenes() -> list[bytes]:
+    objects = "".join(
+        f'[[objects]]\nname = "thing {number}"\ngrasp = "{grasp}"\nshape = "cylinder"\ndiameter_mm = 32.0\n'
+        f"length_mm = 260.0\nmass_g = 200.0\n"
+        for number, grasp in enumerate(_kamakura(), 1)
+    )
+    subjects = '[[subjects]]\nname = "A"\nhand_length_mm = 188\nhand_breadth_mm = 84\n'
+    own = f'seed = 1\ntaxonomy = "kamakura14"\nrepetitions = 2\npostures = "own.json"\n{subjects}{objects}'
+    return [own.encode(), *(file.read_bytes() for file in shipped().values())]
+
+
+def _kamakura() -> tuple[str, ...]:
+    from thenar.compiler.recordings.taxonomy import KAMAKURA_14
+
+    return KAMAKURA_14.types
+
+
+def _scene(data: bytes, folder: Path) -> None:
+    """Read a scene as far as the first grasp."""
+    path = folder / "scene.toml"
+    path.write_bytes(data)
+    (folder / "own.json").write_bytes(_postures()[0])
+    scene = load_scene(path)
+    compile_pipeline(scene)
+    conditions_of(scene, scene.subjects[0], Postures.of(scene))
+
+
+@cache
+def _postures() -> list[bytes]:
+    known = Postures.shipped("kamakura14").entries[:3]
+    return [msgspec.json.encode({"format": 1, "taxonomy": "kamakura14", "entries": known})]
+
+
+def _held(data: bytes, folder: Path) -> None:
+    path = folder / "postures.json"
+    path.write_bytes(data)
+    postures = Postures.load(path)
+    for entry in postures.entries:
+        postures.held(Hand(Size(180.0, 80.0)), entry.grasp, Thing(entry.object, entry.shape, 0.2))
+
+
+def _catalogues() -> list[bytes]:
+    scene = _scenes()[0].decode()
+    return [f'taxonomy = "kamakura14"\n{scene[scene.index("[[objects]]") :]}'.encode()]
+
+
+def _catalogue(data: bytes, folder: Path) -> None:
+    path = folder / "catalogue.toml"
+    path.write_bytes(data)
+    load_catalogue(path)
+
+
+_OBJECTS = '"PoS" = ["bottle", "broom"]\n"Tip" = ["pin", "bead"]\nLat = ["key"]\n'
+
+
+def _objects(data: bytes, folder: Path) -> None:
+    """Read what is to be collected, and plan it."""
+    path = folder / "objects.toml"
+    path.write_bytes(data)
+    for taxonomy in ("kamakura14", "own"):
+        types, tasks = collected(taxonomy, path)
+        planned(Collection("anna", types.name, types.types, tasks, 2, 1))
+
+
+FORMATS = (
+    Format("glove.toml", lambda: [GLOVE_TOML.encode(), harness_to_toml(harness()).encode()], toml_file, _glove),
+    Format("board.toml", lambda: [text.encode() for text in _BOARDS], toml_file, _board),
+    Format("calibration.toml", _calibrations, toml_file, _calibration),
+    Format("preshapes.toml", _preshape_tables, toml_file, _preshapes),
+    Format("scene.toml", _scenes, toml_file, _scene),
+    Format("objects.toml", lambda: [_OBJECTS.encode()], toml_file, _objects),
+    Format("catalogue.toml", _catalogues, toml_file, _catalogue),
+    Format("postures.json", _postures, json_file, _held),
+)
