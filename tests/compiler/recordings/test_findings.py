@@ -13,6 +13,7 @@ from thenar.compiler.recordings.findings import (
     frame_numbers,
 )
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.recordings.taxonomy import own
 
 
 def by_kind(grasp_set: GraspSet) -> dict[str, Finding]:
@@ -88,3 +89,24 @@ def test_constant_and_duplicate_columns_are_all_found(rows: list[list[int]]) -> 
         if columns.index(column) != number and name not in constant
     ]
     assert list(duplicate_columns(np.array(rows), "abcd")) == repeats
+
+
+def test_what_ten_thousand_subjects_lack_is_counted_without_listing_it() -> None:
+    """Of a grasp type a subject, 10^8 pairs but 10^4 are absent: listed, they took gigabytes."""
+    names = np.array([f"{number:05}" for number in range(10_000)])
+    grasp_set = GraspSet(
+        switches=np.zeros((10_000, 1), np.bool_),
+        switch_names=("s",),
+        codes=np.zeros((10_000, 0), np.uint16),
+        joints=(),
+        grasps=names,
+        taxonomy=own(names.tolist()),
+        subjects=names,
+        objects=np.full(10_000, "o"),
+        trials=np.arange(10_000),
+    )
+    found = {finding.kind: finding for finding in find_oddities(grasp_set, np.arange(10_000))}
+    lacking = found["grasp types that a subject lacks"]
+    assert lacking.count == 10_000 * 9_999
+    assert lacking.message.startswith("subject 00000 has no 00001, subject 00000 has no 00002")
+    assert lacking.message.endswith(" and 99989995 more")

@@ -82,3 +82,10 @@ def test_types_that_cannot_be_told_apart_or_read_are_refused() -> None:
         Taxonomy("feix33", ("x",))
     with pytest.raises(RecordingError, match="no taxonomy is called 'feix'"):
         published("feix")
+
+
+def test_a_label_of_any_number_of_digits_is_compared_and_shown_in_short() -> None:
+    assert FEIX_33.find("0" * 5000 + "7") == FEIX_33.types[6]
+    with pytest.raises(RecordingError, match=r"'9{79}\.\.\. is not a grasp type of feix33") as refused:
+        FEIX_33.require("9" * 5000)
+    assert len(str(refused.value)) < 300
