@@ -57,7 +57,7 @@ def small_build() -> Build:
         grasps=("open", "closed"),
         switches=tuple(Switch(number, name, 0.5) for number, name in enumerate(SWITCHES)),
         joints=(),
-        proof=Proof(16, 1.0, 1, 4.5, 9.0, 60, 0),
+        proof=Proof(16, tables.scale, tables.bound, 4.5, 9.0, 60, 0),
         rates=(),
     )
     return Build(manifest, tables)
