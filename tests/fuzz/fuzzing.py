@@ -147,13 +147,21 @@ class Fuzzer:
 
     def mutate(self, form: Format, first: int, count: int) -> None:
         """Read the mutants of these numbers; the same numbers make the same mutants of the same corpus."""
-        self._in_child(form, partial(self._plain, form, first, count))
-        self.mutants[form.name] += self._count()
+        with self._counted(form):
+            self._in_child(form, partial(self._plain, form, first, count))
 
     def guide(self, form: Format, seconds: int, round_: int) -> None:
         """Read mutants for so long, and mutate again what reaches new code (atheris)."""
-        self._in_child(form, partial(self._guided, form, seconds, round_))
-        self.mutants[form.name] += self._count()
+        with self._counted(form):
+            self._in_child(form, partial(self._guided, form, seconds, round_))
+
+    @contextmanager
+    def _counted(self, form: Format) -> Iterator[None]:
+        """Count what a child has begun, also where Ctrl-C ends it."""
+        try:
+            yield
+        finally:
+            self.mutants[form.name] += self._count()
 
     def _saved(self, form: Format) -> list[Path]:
         return sorted(path for path in (self._corpus / form.name).glob("*") if path.is_file())

@@ -119,7 +119,7 @@ def _likely(value: Any, alike: Sequence[Any], random: Random) -> Any:
     if isinstance(value, bool):
         return not value
     if isinstance(value, int | float):
-        near = (value + 1, value - 1, 2 * value, value / 2, -value, 0, 1)
+        near = (value + 1, value - 1, 2 * value, value // 2, -value, 0, 1)
         return type(value)(random.choice((*near, *(other for other in alike if abs(other) < 1e18))))
     if isinstance(value, list):
         changed = list(value)
