@@ -7,15 +7,15 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiler.evaluation.compositions import COMPOSITIONS, inputs
-from ..compiler.evaluation.fits import Fit, Training, run_fits
-from ..compiler.evaluation.populations import populations
-from ..compiler.evaluation.rates import Rate
-from ..compiler.recordings.graspset import GraspSet
-from ..simulator.pipeline.pipeline import DEFAULT_CONTACT
-from ..simulator.running.sampling import best_us
-from ..simulator.running.simulation import Simulated, simulate
-from ..simulator.scenes.scene import Scene
+from thenar.compiler.evaluation.compositions import COMPOSITIONS, inputs
+from thenar.compiler.evaluation.fits import Fit, Training, run_fits
+from thenar.compiler.evaluation.populations import populations
+from thenar.compiler.evaluation.rates import Rate
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.simulator.pipeline.pipeline import DEFAULT_CONTACT
+from thenar.simulator.running.sampling import best_us
+from thenar.simulator.running.simulation import Simulated, simulate
+from thenar.simulator.scenes.scene import Scene
 
 Progress = Callable[[int, int], None]
 Bits = NDArray[np.bool_]

@@ -9,8 +9,9 @@ from .common import output_file, serial_port
 from .lines import echo
 
 if TYPE_CHECKING:
-    from ..drivers.calibration import GloveCalibration
-    from ..drivers.calibration_poses import Held
+    from thenar.drivers.calibration import GloveCalibration
+    from thenar.drivers.calibration_poses import Held
+
     from .calibrate_dialogue import Guide
 
 
@@ -40,9 +41,10 @@ def command(port: str, output: Path, subject: str | None, baud: int | None, sens
     Example:
         thenar calibrate /dev/ttyUSB0 -o anna.toml
     """
-    from ..drivers.cyberglove import CyberGlove
-    from ..runtime.files import write_atomically
-    from ..runtime.names import fault, shortened
+    from thenar.drivers.cyberglove import CyberGlove
+    from thenar.runtime.files import write_atomically
+    from thenar.runtime.names import fault, shortened
+
     from .calibrate_dialogue import Guide
 
     wearer = subject or output.stem
@@ -61,7 +63,7 @@ def command(port: str, output: Path, subject: str | None, baud: int | None, sens
 
 
 def _calibrated(guide: "Guide", subject: str) -> "GloveCalibration":
-    from ..drivers.calibration_poses import FLAT, POSES, calibration
+    from thenar.drivers.calibration_poses import FLAT, POSES, calibration
 
     poses = (FLAT, *(pose for pose in POSES if set(pose.degrees) & set(guide.info.names)))
     taken: list[Held] = []

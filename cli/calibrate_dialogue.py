@@ -7,11 +7,12 @@ import click
 from rich.live import Live
 from rich.table import Table
 
-from ..drivers.calibration import GloveCalibration
-from ..drivers.calibration_poses import Held, Pose, held, problems
-from ..drivers.cyberglove import CyberGlove
-from ..drivers.cyberglove_setup import GloveInfo
-from ..drivers.errors import DeviceError
+from thenar.drivers.calibration import GloveCalibration
+from thenar.drivers.calibration_poses import Held, Pose, held, problems
+from thenar.drivers.cyberglove import CyberGlove
+from thenar.drivers.cyberglove_setup import GloveInfo
+from thenar.drivers.errors import DeviceError
+
 from .common import err
 from .typed_lines import TypedLines
 

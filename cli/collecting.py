@@ -9,24 +9,25 @@ from typing import Protocol
 
 import click
 
-from ..compiler.recordings.names import check_names
-from ..compiler.recordings.taxonomy import Taxonomy
-from ..drivers.calibration import GloveCalibration
-from ..drivers.errors import SettingError
-from ..runtime.calibration import load_calibration
-from ..runtime.errors import HarnessError
-from ..runtime.harness.wiring import GloveWiring, Harness
-from ..runtime.live.arrivals import Taken
-from ..runtime.live.frames import now_us
-from ..runtime.live.keeper import DeviceState
-from ..runtime.live.sources import Sources
-from ..runtime.live.system import sensor_names_of
-from ..runtime.recording.guide import Guide, Stage
-from ..runtime.recording.session import Collection, Session
-from ..runtime.recording.trials import Journal, Trial
-from ..runtime.recording.writer import Recorder
-from ..runtime.scanning.whole import whole_scan
-from ..runtime.toml_source import read_source
+from thenar.compiler.recordings.names import check_names
+from thenar.compiler.recordings.taxonomy import Taxonomy
+from thenar.drivers.calibration import GloveCalibration
+from thenar.drivers.errors import SettingError
+from thenar.runtime.calibration import load_calibration
+from thenar.runtime.errors import HarnessError
+from thenar.runtime.harness.wiring import GloveWiring, Harness
+from thenar.runtime.live.arrivals import Taken
+from thenar.runtime.live.frames import now_us
+from thenar.runtime.live.keeper import DeviceState
+from thenar.runtime.live.sources import Sources
+from thenar.runtime.live.system import sensor_names_of
+from thenar.runtime.recording.guide import Guide, Stage
+from thenar.runtime.recording.session import Collection, Session
+from thenar.runtime.recording.trials import Journal, Trial
+from thenar.runtime.recording.writer import Recorder
+from thenar.runtime.scanning.whole import whole_scan
+from thenar.runtime.toml_source import read_source
+
 from .common import err
 from .ending import ended_by_signals
 from .guide_keys import GuideKeys

@@ -13,18 +13,19 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.segment import Segment
 from rich.text import Text
 
-from ..drivers.names import shortened
+from thenar.drivers.names import shortened
+
 from .lines import echo, echo_json, shown
 
 if TYPE_CHECKING:
-    from ..runtime.harness.wiring import Harness
+    from thenar.runtime.harness.wiring import Harness
 
 
 class _OutputFile(click.Path):
     """A file to write: no folder, in a folder that is there, so that no long work ends in an error."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
-        from ..runtime.files import is_special
+        from thenar.runtime.files import is_special
 
         path = Path(os.fsdecode(super().convert(value, param, ctx)))
         if not path.name:
@@ -59,7 +60,7 @@ json_flag = click.option("--json", "as_json", is_flag=True, help="Print one JSON
 
 def serial_port(context: click.Context, parameter: click.Parameter, text: str) -> str:
     """Return `text` if it is a port, by the rule that holds for those in files."""
-    from ..drivers.ports import port_fault
+    from thenar.drivers.ports import port_fault
 
     if fault := port_fault(text):
         raise click.BadParameter(f"{shortened(repr(text))} {fault}")

@@ -11,7 +11,7 @@ from .common import keep_apart
 from .hand import hand_of
 
 if TYPE_CHECKING:
-    from ..runtime.manifest import Inputs, TableBits
+    from thenar.runtime.manifest import Inputs, TableBits
 
 TABLE_BITS: "dict[str, TableBits]" = {"16": 16, "8": 8}
 # What a point of a frontier says.

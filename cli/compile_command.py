@@ -5,14 +5,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.registry import CHIPS
+
 from .common import any_path, err, existing_file, json_flag, out, output_file, print_json, progress
 from .compile_asked import TABLE_BITS, Asked
 from .scan_tables import print_scan
 
 if TYPE_CHECKING:
-    from ..compiler.build.compile import BuildReport
-    from ..runtime.manifest import Manifest
+    from thenar.compiler.build.compile import BuildReport
+    from thenar.runtime.manifest import Manifest
 
 _CHIP = "mcp23017"
 _BOARD = "board"
@@ -100,11 +101,12 @@ def command(context: click.Context, /, **options: Any) -> None:
 
 
 def _made(asked: Asked) -> "BuildReport":
-    from ..compiler.build.compile import compile_build
-    from ..compiler.build.made import no_documents
-    from ..compiler.frontier.timing.whole_glove import ports_of_whole_glove
-    from ..compiler.recordings.graspset import GraspSet
-    from ..runtime.harness.loading import load_harness
+    from thenar.compiler.build.compile import compile_build
+    from thenar.compiler.build.made import no_documents
+    from thenar.compiler.frontier.timing.whole_glove import ports_of_whole_glove
+    from thenar.compiler.recordings.graspset import GraspSet
+    from thenar.runtime.harness.loading import load_harness
+
     from .compile_documents import BuildDocuments
     from .from_frontier import picked
 
@@ -125,11 +127,11 @@ def _made(asked: Asked) -> "BuildReport":
 
 
 def _propose(manifest: "Manifest", path: Path, chip: str) -> None:
-    from ..runtime.files import write_atomically
-    from ..runtime.harness.wiring import GloveWiring
-    from ..runtime.harness.writing import harness_to_toml
-    from ..runtime.names import sound_name
-    from ..runtime.scanning.propose import propose_board, propose_harness
+    from thenar.runtime.files import write_atomically
+    from thenar.runtime.harness.wiring import GloveWiring
+    from thenar.runtime.harness.writing import harness_to_toml
+    from thenar.runtime.names import sound_name
+    from thenar.runtime.scanning.propose import propose_board, propose_harness
 
     names = [switch.name for switch in manifest.switches]
     called = sound_name(path.stem, "proposed")

@@ -4,12 +4,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ..compiler.build.made import REPORT_NAME, SPEC_FOLDER
+from thenar.compiler.build.made import REPORT_NAME, SPEC_FOLDER
+
 from .hand import hand_of
 
 if TYPE_CHECKING:
-    from ..compiler.build.made import Made
-    from ..compiler.evaluation.study import Study
+    from thenar.compiler.build.made import Made
+    from thenar.compiler.evaluation.study import Study
+
     from .from_frontier import Picked
 
     Progress = Callable[[int, int], None]
@@ -32,7 +34,7 @@ class BuildDocuments:
 
     def __call__(self, made: "Made") -> Mapping[str, bytes]:
         """Return path in the build's folder -> content."""
-        from ..compiler.spec.files import spec_files
+        from thenar.compiler.spec.files import spec_files
 
         files = {REPORT_NAME: self._report(made)}
         if made.manifest.switches:
@@ -42,9 +44,9 @@ class BuildDocuments:
         return files
 
     def _report(self, made: "Made") -> bytes:
-        from ..compiler.report.content import ReportContent
-        from ..compiler.report.guarantee import guarantee_of
-        from ..compiler.report.page import report_html
+        from thenar.compiler.report.content import ReportContent
+        from thenar.compiler.report.guarantee import guarantee_of
+        from thenar.compiler.report.page import report_html
 
         study, no_study = self._study(made)
         return report_html(
@@ -73,8 +75,8 @@ class BuildDocuments:
 
         Last of all: by then, nothing is wrong with the build.
         """
-        from ..compiler.evaluation.errors import EvaluationError
-        from ..compiler.evaluation.study import Options, evaluate
+        from thenar.compiler.evaluation.errors import EvaluationError
+        from thenar.compiler.evaluation.study import Options, evaluate
 
         asked = made.manifest.options
         if not asked.folds:

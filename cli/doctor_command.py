@@ -10,9 +10,9 @@ from .common import check_devices, existing_file, existing_folder, json_flag, of
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from ..runtime.build import Build
-    from ..runtime.harness.wiring import Harness
-    from ..runtime.live.checkup import Finding
+    from thenar.runtime.build import Build
+    from thenar.runtime.harness.wiring import Harness
+    from thenar.runtime.live.checkup import Finding
 
 
 @click.command("doctor")
@@ -28,11 +28,11 @@ def command(glove: Path, build: Path | None, as_json: bool) -> None:
     Example:
         thenar doctor glove.toml --build build/
     """
-    from ..runtime.build import Build
-    from ..runtime.harness.loading import load_harness
-    from ..runtime.live.checkup import check_up
-    from ..runtime.live.system import System
-    from ..runtime.scanning.whole import whole_scan
+    from thenar.runtime.build import Build
+    from thenar.runtime.harness.loading import load_harness
+    from thenar.runtime.live.checkup import check_up
+    from thenar.runtime.live.system import System
+    from thenar.runtime.scanning.whole import whole_scan
 
     harness = load_harness(glove)
     check_devices(harness, glove)
@@ -53,10 +53,10 @@ def command(glove: Path, build: Path | None, as_json: bool) -> None:
 
 def _calibration(harness: "Harness", build: "Build | None") -> "Iterator[Finding]":
     """Yield what is wrong with the CyberGlove's calibration: `thenar run` and `record` would end with it."""
-    from ..drivers.errors import ThenarError
-    from ..runtime.calibration import load_calibration
-    from ..runtime.live.checkup import Finding
-    from ..runtime.live.system import System
+    from thenar.drivers.errors import ThenarError
+    from thenar.runtime.calibration import load_calibration
+    from thenar.runtime.live.checkup import Finding
+    from thenar.runtime.live.system import System
 
     named = None if harness.cyberglove is None else harness.cyberglove.calibration
     try:

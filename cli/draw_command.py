@@ -9,8 +9,8 @@ from .common import existing_file, keep_apart, picture_file, progress
 from .lines import echo
 
 if TYPE_CHECKING:
-    from ..compiler.recordings.graspset import GraspSet
-    from ..simulator.handmaps.handpanels import Picture
+    from thenar.compiler.recordings.graspset import GraspSet
+    from thenar.simulator.handmaps.handpanels import Picture
 
 
 def _titled_paths(_context: click.Context, _option: click.Parameter, given: tuple[str, ...]) -> list[tuple[str, Path]]:
@@ -73,8 +73,8 @@ def command(
     if grasps is None:
         _write(_without_grasps(numbers, kept), output)
         return
-    from ..compiler.recordings.graspset import GraspSet
-    from ..simulator.handmaps.handpanels import contacts
+    from thenar.compiler.recordings.graspset import GraspSet
+    from thenar.simulator.handmaps.handpanels import contacts
 
     grasp_set = GraspSet.load(grasps)
     _write(_placements(grasp_set, prune) if choose else contacts(grasp_set, per_grasp), output)
@@ -96,7 +96,8 @@ def _check_options(
 
 
 def _without_grasps(numbers: bool, kept: list[tuple[str, Path]]) -> "Picture":
-    from ..simulator.handmaps import handpanels
+    from thenar.simulator.handmaps import handpanels
+
     from .kept_files import kept_names
 
     if not kept:
@@ -108,9 +109,9 @@ def _placements(grasp_set: "GraspSet", prune: int) -> "Picture":
     """Return a hand for each subject and one for all rows pooled, or one hand if there is but one subject."""
     import numpy as np
 
-    from ..compiler.placement.placement import place
-    from ..simulator.handmaps.handmap import hand_map
-    from ..simulator.handmaps.handpanels import kept
+    from thenar.compiler.placement.placement import place
+    from thenar.simulator.handmaps.handmap import hand_map
+    from thenar.simulator.handmaps.handpanels import kept
 
     hand_map().numbers_of(grasp_set.switch_names)  # a foreign set is refused before a tree is grown
     subjects = np.unique(grasp_set.subjects).tolist()
@@ -126,8 +127,8 @@ def _placements(grasp_set: "GraspSet", prune: int) -> "Picture":
 
 
 def _write(picture: "Picture", path: Path) -> None:
-    from ..runtime.files import write_atomically
-    from ..simulator.handmaps.draw import draw
+    from thenar.runtime.files import write_atomically
+    from thenar.simulator.handmaps.draw import draw
 
     with progress(f"drawing {path.name}"):
         data = draw(picture, path.suffix.lower()[1:])

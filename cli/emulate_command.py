@@ -19,10 +19,10 @@ from .lines import echo
 if TYPE_CHECKING:
     import subprocess
 
-    from ..simulator.playing.bench import Bench
-    from ..simulator.playing.cable import Cable
-    from ..simulator.playing.performance import Performance
-    from ..simulator.playing.player import Log
+    from thenar.simulator.playing.bench import Bench
+    from thenar.simulator.playing.cable import Cable
+    from thenar.simulator.playing.performance import Performance
+    from thenar.simulator.playing.player import Log
 
     CableOf = Callable[[int], Cable | None]
 
@@ -89,9 +89,9 @@ def command(
         thenar emulate quick --glove glove.toml --repeat
         thenar emulate continuous --glove glove.toml -- thenar run build/ --glove {glove} --sink jsonl:-
     """
-    from ..runtime.harness.loading import load_harness
-    from ..runtime.names import list_names
-    from ..simulator.playing.bench import Bench
+    from thenar.runtime.harness.loading import load_harness
+    from thenar.runtime.names import list_names
+    from thenar.simulator.playing.bench import Bench
 
     harness = load_harness(glove)
     check_devices(harness, glove)
@@ -119,7 +119,7 @@ def command(
 
 def _performance(source: str, subject: str | None, period_ms: float | None) -> tuple["Performance", "CableOf"]:
     """Return what to play, and what happens on serial line n."""
-    from ..simulator.playing import performance
+    from thenar.simulator.playing import performance
 
     given_us = None if period_ms is None else round(period_ms * 1000)
     path = Path(source)
@@ -129,14 +129,14 @@ def _performance(source: str, subject: str | None, period_ms: float | None) -> t
         if subject is not None:
             raise click.UsageError("--subject picks one of a scene's subjects: a recording has its own")
         if path.suffix == ".mcap":
-            from ..simulator.playing.recorded import of_recording
+            from thenar.simulator.playing.recorded import of_recording
 
             return of_recording(path, given_us or _FRAME_US, warning), _no_cable
-        from ..compiler.recordings.graspset import GraspSet
+        from thenar.compiler.recordings.graspset import GraspSet
 
         return performance.of_set(GraspSet.load(path), given_us or _FRAME_US), _no_cable
-    from ..simulator.playing.cable import cable_of
-    from ..simulator.scenes.decode import load_scene
+    from thenar.simulator.playing.cable import cable_of
+    from thenar.simulator.scenes.decode import load_scene
 
     scene = load_scene(source)
     with progress("simulating") as report:
@@ -151,8 +151,8 @@ def _no_cable(_line: int) -> "Cable | None":
 
 def _write_harness(bench: "Bench", performance: "Performance", folder: Path) -> Path:
     """Write the harness that names the emulated ports, and the subject's calibration; return the harness's path."""
-    from ..runtime.files import write_atomically
-    from ..runtime.harness.writing import harness_to_toml
+    from thenar.runtime.files import write_atomically
+    from thenar.runtime.harness.writing import harness_to_toml
 
     harness = bench.harness
     if harness.cyberglove is not None:
@@ -208,7 +208,7 @@ def _beside(
 
 
 def _play(bench: "Bench", performance: "Performance", note: "Log", stop: Event, *, repeat: bool) -> None:
-    from ..simulator.playing.player import Player
+    from thenar.simulator.playing.player import Player
 
     player = Player(performance, bench.show, note)
     while player.play(stop) and repeat:

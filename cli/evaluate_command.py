@@ -8,7 +8,7 @@ import click
 from .common import err, existing_file, json_flag, keep_apart, output_file, print_json, progress
 
 if TYPE_CHECKING:
-    from ..compiler.evaluation.study import Study
+    from thenar.compiler.evaluation.study import Study
 
 TABLES = ("compositions", "generality", "pruning", "baselines")
 
@@ -104,8 +104,8 @@ def command(
     """
     import msgspec
 
-    from ..compiler.evaluation.study import Options, evaluate
-    from ..compiler.recordings.graspset import GraspSet
+    from thenar.compiler.evaluation.study import Options, evaluate
+    from thenar.compiler.recordings.graspset import GraspSet
 
     options = msgspec.convert(asked, Options)
     if (confusion or folder is not None) and "compositions" not in options.tables:
@@ -121,11 +121,11 @@ def _write(study: "Study", folder: Path | None, output: Path | None) -> None:
     import msgspec
 
     if folder is not None:
-        from ..compiler.evaluation.pictures import draw_confusions
+        from thenar.compiler.evaluation.pictures import draw_confusions
 
         draw_confusions(study, folder)
     if output is not None:
-        from ..runtime.files import write_atomically
+        from thenar.runtime.files import write_atomically
 
         write_atomically(output, msgspec.json.format(msgspec.json.encode(study), indent=2) + b"\n")
 

@@ -4,10 +4,11 @@ from rich.console import Console
 from rich.table import Table as Grid
 from rich.text import Text
 
-from ..compiler.evaluation.protocols import PROTOCOLS
-from ..compiler.evaluation.rates import Average, Rate
-from ..compiler.evaluation.study import Study
-from ..compiler.evaluation.tables import Cell, Spread, Table
+from thenar.compiler.evaluation.protocols import PROTOCOLS
+from thenar.compiler.evaluation.rates import Average, Rate
+from thenar.compiler.evaluation.study import Study
+from thenar.compiler.evaluation.tables import Cell, Spread, Table
+
 from .common import out
 
 _TITLES = {

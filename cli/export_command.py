@@ -32,10 +32,10 @@ def command(grasps: Path, output: Path, codes: bool, meta: bool, columns: Path |
         thenar export set.grasps -o table.csv --columns columns.toml
         thenar export set.grasps -o table.arff
     """
-    from ..compiler.recordings.columns_of import columns_of
-    from ..compiler.recordings.export import export
-    from ..compiler.recordings.graspset import GraspSet
-    from ..runtime.files import write_atomically
+    from thenar.compiler.recordings.columns_of import columns_of
+    from thenar.compiler.recordings.export import export
+    from thenar.compiler.recordings.graspset import GraspSet
+    from thenar.runtime.files import write_atomically
 
     keep_apart(grasps, output, columns)
     grasp_set = GraspSet.load(grasps)

@@ -9,9 +9,9 @@ import click
 from .common import any_path, existing_file, existing_folder, json_flag, out, print_json, progress
 
 if TYPE_CHECKING:
-    from ..compiler.firmware.generate import Mode, Request
-    from ..compiler.firmware.library import Fit
-    from ..compiler.firmware.measuring import Measured
+    from thenar.compiler.firmware.generate import Mode, Request
+    from thenar.compiler.firmware.library import Fit
+    from thenar.compiler.firmware.measuring import Measured
 
 # Spelled out so that --help imports nothing; tests hold them against the compiler's own.
 PLATFORMS = ("avr328p", "avr2560", "cortex-m0plus", "cortex-m4", "host", "arduino")
@@ -82,12 +82,12 @@ def command(
         thenar firmware build/ --target avr2560 --mode glove --board board.toml -o firmware/
         thenar firmware build/ --target avr328p --frontier
     """
-    from ..compiler.firmware.board_loading import load_board
-    from ..compiler.firmware.folder import write_folder
-    from ..compiler.firmware.generate import Request, firmware_files, fit_of
-    from ..compiler.firmware.one_hand import for_one_hand
-    from ..runtime.build import Build
-    from ..runtime.calibration import load_calibration
+    from thenar.compiler.firmware.board_loading import load_board
+    from thenar.compiler.firmware.folder import write_folder
+    from thenar.compiler.firmware.generate import Request, firmware_files, fit_of
+    from thenar.compiler.firmware.one_hand import for_one_hand
+    from thenar.runtime.build import Build
+    from thenar.runtime.calibration import load_calibration
 
     _check(target, mode, writes=output is not None, counts=measure or frontier, calibrated=calibration is not None)
     loaded = Build.load(build)
@@ -124,8 +124,8 @@ def _check(target: str, mode: "Mode", *, writes: bool, counts: bool, calibrated:
 
 
 def _measured(request: "Request", fit: "Fit") -> "Measured":
-    from ..compiler.firmware.generate import library
-    from ..compiler.firmware.measuring import measure
+    from thenar.compiler.firmware.generate import library
+    from thenar.compiler.firmware.measuring import measure
 
     with progress(f"measuring on {fit.target.part}"):
         return measure(library(request, fit), request.name, fit, request.build.grasps)

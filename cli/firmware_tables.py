@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from ..compiler.firmware.library import Fit
-    from ..compiler.firmware.measuring import Measured
+    from thenar.compiler.firmware.library import Fit
+    from thenar.compiler.firmware.measuring import Measured
 
 
 @dataclass(frozen=True, slots=True)

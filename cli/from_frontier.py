@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from ..compiler.build.compile import Wired
-    from ..compiler.frontier.points import Frontier, Point
-    from ..compiler.recordings.graspset import GraspSet
-    from ..runtime.harness.wiring import Harness
+    from thenar.compiler.build.compile import Wired
+    from thenar.compiler.frontier.points import Frontier, Point
+    from thenar.compiler.recordings.graspset import GraspSet
+    from thenar.runtime.harness.wiring import Harness
 
 
 _LEAST_HZ = 1000  # of the clock of a bus in glove.toml
@@ -26,7 +26,7 @@ class Picked:
     @property
     def options(self) -> dict[str, object]:
         """The options of `compile_build` that the point settles."""
-        from ..compiler.selection.ways import METHODS
+        from thenar.compiler.selection.ways import METHODS
 
         setting = self.point.setting
         settled: dict[str, object] = {
@@ -44,7 +44,7 @@ class Picked:
 
     def wired(self, given: "Harness | None") -> "Wired | None":
         """Return the wiring to build for: the given one where the point is wired so, else a new one of its kind."""
-        from ..compiler.frontier.timing.wirings import AS_WIRED, Wiring
+        from thenar.compiler.frontier.timing.wirings import AS_WIRED, Wiring
 
         setting = self.point.setting
         if not setting.wiring:
@@ -60,8 +60,8 @@ class Picked:
 
 def picked(path: Path, number: int | None, grasp_set: "GraspSet") -> Picked:
     """Return point `number` of the frontier in `path`, or the one that it picked. Raises FrontierError, UsageError."""
-    from ..compiler.frontier.points import MAX_BYTES, FrontierError, frontier_from_bytes
-    from ..runtime.files import read_file
+    from thenar.compiler.frontier.points import MAX_BYTES, FrontierError, frontier_from_bytes
+    from thenar.runtime.files import read_file
 
     found = frontier_from_bytes(read_file(path, MAX_BYTES, FrontierError), str(path))
     wanted = found.picked if number is None else number
@@ -78,11 +78,11 @@ def picked(path: Path, number: int | None, grasp_set: "GraspSet") -> Picked:
 
 def _check_point(point: "Point", grasp_set: "GraspSet", path: Path) -> None:
     """Raise FrontierError where a point cannot be built here: before the training, not after it."""
-    from ..compiler.frontier.points import FrontierError
-    from ..compiler.frontier.timing.wirings import AS_WIRED, BOARD, Wiring
-    from ..compiler.selection.ways import METHODS
-    from ..drivers.i2c.registry import CHIPS
-    from ..runtime.names import shortened
+    from thenar.compiler.frontier.points import FrontierError
+    from thenar.compiler.frontier.timing.wirings import AS_WIRED, BOARD, Wiring
+    from thenar.compiler.selection.ways import METHODS
+    from thenar.drivers.i2c.registry import CHIPS
+    from thenar.runtime.names import shortened
 
     setting, there = point.setting, set(grasp_set.switch_names)
     what = f"{path}: point {point.number}"

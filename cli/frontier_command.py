@@ -5,11 +5,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..compiler.frontier.targets import TARGETS
+from thenar.compiler.frontier.targets import TARGETS
+
 from .common import any_path, err, existing_file, existing_folder, json_flag, out, print_json, progress
 
 if TYPE_CHECKING:
-    from ..compiler.frontier.points import Frontier
+    from thenar.compiler.frontier.points import Frontier
 
 
 def _names(_context: click.Context, _parameter: click.Parameter, text: str | None) -> tuple[str, ...] | None:
@@ -59,8 +60,8 @@ def command(budget_us: float | None, rate: float | None, as_json: bool, **asked:
         thenar frontier set.grasps -o frontier/ --budget-us 1500
         thenar compile set.grasps -o build/ --from frontier/frontier.json --point 7
     """
-    from ..compiler.frontier.preparing import Request, run_frontier
-    from ..compiler.frontier.study import Wanted
+    from thenar.compiler.frontier.preparing import Request, run_frontier
+    from thenar.compiler.frontier.study import Wanted
 
     if budget_us is not None and rate is not None:
         raise click.UsageError("--budget-us and --rate each pick a point: give one of them.")
@@ -78,7 +79,8 @@ def command(budget_us: float | None, rate: float | None, as_json: bool, **asked:
 
 
 def _print(found: "Frontier", output: Path) -> None:
-    from ..compiler.frontier.drawing.words import featured
+    from thenar.compiler.frontier.drawing.words import featured
+
     from .frontier_tables import print_frontier
 
     print_frontier(found)

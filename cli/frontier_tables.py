@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
-    from ..compiler.frontier.points import Check, Frontier, Point
+    from thenar.compiler.frontier.points import Check, Frontier, Point
 
 _WORDS = ("inputs", "placement", "rounds, bits", "wiring", "scan", "decision")
 _NUMBERS = ("rate %", "left out %", "frame", "latency, 99 %", "flash", "RAM")
@@ -18,7 +18,7 @@ def print_frontier(frontier: "Frontier") -> None:
     """Print the points, the picked one bold; then checks, what was left out, and what the picture says."""
     from rich.text import Text
 
-    from ..compiler.frontier.drawing.sentence import sentence
+    from thenar.compiler.frontier.drawing.sentence import sentence
 
     console = out()
     console.print(_grid(frontier))
@@ -57,7 +57,7 @@ def _title(frontier: "Frontier") -> str:
 def _cells(point: "Point") -> "tuple[Text, ...]":
     from rich.text import Text
 
-    from ..compiler.frontier.drawing.words import duration, interval, way_of, wiring_of
+    from thenar.compiler.frontier.drawing.words import duration, interval, way_of, wiring_of
 
     setting = point.setting
     texts = (

@@ -13,7 +13,8 @@ from importlib import import_module
 
 import click
 
-from ..drivers.errors import ThenarError
+from thenar.drivers.errors import ThenarError
+
 from .lines import echo
 
 COMMANDS = (

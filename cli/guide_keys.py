@@ -8,7 +8,7 @@ import tty
 from types import TracebackType
 from typing import Self
 
-from ..runtime.recording.guide import Key
+from thenar.runtime.recording.guide import Key
 
 _MEANT = {"": Key.ACCEPT, " ": Key.ACCEPT, "a": Key.ACCEPT, "r": Key.REDO, "q": Key.QUIT}
 # What a terminal sends for arrows, function keys and the like.

@@ -10,12 +10,12 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from ..compiler.recordings.taxonomy import Taxonomy
-from ..runtime.live.keeper import DeviceState
-from ..runtime.recording.guide import Guide, Stage
+from thenar.compiler.recordings.taxonomy import Taxonomy
+from thenar.runtime.live.keeper import DeviceState
+from thenar.runtime.recording.guide import Guide, Stage
 
 if TYPE_CHECKING:
-    from ..runtime.recording.trials import Trial
+    from thenar.runtime.recording.trials import Trial
 
 _REDRAW_US = 100_000
 _KEYS = {

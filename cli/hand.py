@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ..compiler.hand import HandShape
+    from thenar.compiler.hand import HandShape
 
 
 def hand_of(switch_names: Sequence[str], length_mm: float | None = None) -> "HandShape | None":
@@ -12,9 +12,9 @@ def hand_of(switch_names: Sequence[str], length_mm: float | None = None) -> "Han
 
     None: of a glove of the user's own nobody knows where its switches lie.
     """
-    from ..compiler.hand import HandShape
-    from ..simulator.handmaps.flathand import HAND
-    from ..simulator.handmaps.handmap import PARTS, RADIUS_MM, hand_map
+    from thenar.compiler.hand import HandShape
+    from thenar.simulator.handmaps.flathand import HAND
+    from thenar.simulator.handmaps.handmap import PARTS, RADIUS_MM, hand_map
 
     glove = hand_map()
     shape = HandShape(

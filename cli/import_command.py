@@ -9,8 +9,8 @@ from .common import existing_file, json_flag, keep_apart, out, output_file, prin
 from .lines import echo
 
 if TYPE_CHECKING:
-    from ..compiler.recordings.graspset import GraspSet
-    from ..compiler.recordings.importer import ImportReport
+    from thenar.compiler.recordings.graspset import GraspSet
+    from thenar.compiler.recordings.importer import ImportReport
 
 
 @click.command("import")
@@ -44,8 +44,8 @@ def command(tables: tuple[Path, ...], output: Path, columns: Path | None, as_jso
 
 
 def _imported(tables: tuple[Path, ...], columns: Path | None) -> "tuple[GraspSet, ImportReport]":
-    from ..compiler.recordings.importer import import_file
-    from ..compiler.recordings.mcap_recording import import_recordings
+    from thenar.compiler.recordings.importer import import_file
+    from thenar.compiler.recordings.mcap_recording import import_recordings
 
     if all(table.suffix.lower() == ".mcap" for table in tables):
         if columns is not None:

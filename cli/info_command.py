@@ -9,8 +9,8 @@ from .common import existing_file, json_flag, keep_apart, out, picture_file, pri
 from .lines import echo
 
 if TYPE_CHECKING:
-    from ..compiler.recordings.graspset import GraspSet
-    from ..compiler.recordings.summary import Summary
+    from thenar.compiler.recordings.graspset import GraspSet
+    from thenar.compiler.recordings.summary import Summary
 
 
 @click.command("info")
@@ -28,8 +28,8 @@ def command(grasps: Path, plot: Path | None, as_json: bool) -> None:
         thenar info set.grasps
         thenar info set.grasps --plot set.png
     """
-    from ..compiler.recordings.graspset import GraspSet
-    from ..compiler.recordings.summary import summarise
+    from thenar.compiler.recordings.graspset import GraspSet
+    from thenar.compiler.recordings.summary import summarise
 
     keep_apart(grasps, plot)
     grasp_set = GraspSet.load(grasps)
@@ -45,8 +45,8 @@ def command(grasps: Path, plot: Path | None, as_json: bool) -> None:
 
 
 def _draw(grasp_set: "GraspSet", path: Path) -> None:
-    from ..compiler.recordings.picture import draw
-    from ..runtime.files import write_atomically
+    from thenar.compiler.recordings.picture import draw
+    from thenar.runtime.files import write_atomically
 
     write_atomically(path, draw(grasp_set, path.suffix.lower()[1:]))
 

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import msgspec
 
-from ..drivers.errors import ThenarError
-from ..runtime.build import load_manifest
-from ..runtime.files import read_file
-from ..runtime.names import fault, shortened
-from ..runtime.nesting import check_json
+from thenar.drivers.errors import ThenarError
+from thenar.runtime.build import load_manifest
+from thenar.runtime.files import read_file
+from thenar.runtime.names import fault, shortened
+from thenar.runtime.nesting import check_json
 
 _LARGEST = 4_000_000  # bytes; a placement of the largest set has fewer
 _WANTED = "take a build's folder, the file of `thenar place -o`, or a text of one name a line"

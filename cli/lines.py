@@ -7,7 +7,7 @@ from io import TextIOWrapper
 
 import click
 
-from ..drivers.names import printable
+from thenar.drivers.names import printable
 
 # What stays as it is: lines may be several, and tabs part their columns.
 _LAYOUT = re.compile(r"([\n\t])")

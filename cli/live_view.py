@@ -11,8 +11,8 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from ..runtime.live.health import DeviceHealth, HealthReport
-from ..runtime.live.published import LiveGrasp
+from thenar.runtime.live.health import DeviceHealth, HealthReport
+from thenar.runtime.live.published import LiveGrasp
 
 Devices = Callable[[], Sequence[DeviceHealth]]
 _Shown = tuple[LiveGrasp, Devices, Sequence[str]]

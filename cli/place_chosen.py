@@ -8,9 +8,9 @@ from .common import out, progress
 from .lines import echo
 
 if TYPE_CHECKING:
-    from ..compiler.placement.costaware import PortCosts
-    from ..compiler.recordings.graspset import GraspSet
-    from ..compiler.selection.learning import Columns, Learning
+    from thenar.compiler.placement.costaware import PortCosts
+    from thenar.compiler.recordings.graspset import GraspSet
+    from thenar.compiler.selection.learning import Columns, Learning
 
 
 class Kept(msgspec.Struct, frozen=True):
@@ -51,7 +51,7 @@ def learning_of(grasp_set: "GraspSet", *, joints: bool) -> "Learning":
     """Return the rows of a set as methods learn from them. Raises PlacementError if it has none."""
     import numpy as np
 
-    from ..compiler.selection.learning import Learning
+    from thenar.compiler.selection.learning import Learning
 
     types, labels = np.unique(grasp_set.labels, return_inverse=True)
     codes = grasp_set.codes if joints else grasp_set.codes[:, :0]
@@ -70,7 +70,7 @@ def chosen(
 
     Raises PlacementError, for a name that is no method's too.
     """
-    from ..compiler.selection.ways import METHODS, chooser
+    from thenar.compiler.selection.ways import METHODS, chooser
 
     learning = learning_of(grasp_set, joints=joints)
     with progress(f"choosing switches by {method}"):
@@ -89,8 +89,8 @@ def chosen(
 
 
 def _exactly(grasp_set: "GraspSet", learning: "Learning", columns: "Columns") -> Exactly:
-    from ..compiler.selection.pairs import Pairs
-    from ..compiler.selection.subset import best_subset
+    from thenar.compiler.selection.pairs import Pairs
+    from thenar.compiler.selection.subset import best_subset
 
     with progress(f"looking for the best {len(columns)} switches") as report:
         best = best_subset(learning, len(columns), starts=(columns,), on_round=report)

@@ -10,7 +10,7 @@ from .common import existing_file, json_flag, keep_apart, output_file, picture_f
 from .lines import echo
 
 if TYPE_CHECKING:
-    from ..compiler.recordings.graspset import GraspSet
+    from thenar.compiler.recordings.graspset import GraspSet
 
 _PAPERS = "id3"
 _FOR_CROWDS = "elimination"
@@ -57,7 +57,7 @@ class _Options:
         keep_apart(self.grasps, self.glove, self.draw, self.output)
 
     def _check_priced(self) -> None:
-        from ..compiler.frontier.settings import PRICED_METHODS
+        from thenar.compiler.frontier.settings import PRICED_METHODS
 
         if self.crowd or self.method not in PRICED_METHODS:
             raise click.UsageError(
@@ -107,7 +107,7 @@ def command(**options: Any) -> None:
         thenar place set.grasps --method id3-cost --keep 16 --glove glove.toml
         thenar place crowd.grasps --crowd --keep 16 --draw subjects.svg
     """
-    from ..compiler.recordings.graspset import GraspSet
+    from thenar.compiler.recordings.graspset import GraspSet
 
     asked = _Options(**options)
     asked.check()
@@ -126,13 +126,13 @@ def _answer(asked: _Options, grasp_set: "GraspSet") -> Any:
 
 
 def _of_tree(asked: _Options, grasp_set: "GraspSet") -> Any:
-    from ..compiler.placement.placement import place
+    from thenar.compiler.placement.placement import place
 
     with progress(f"growing the tree of {asked.grasps.name}"):
         placement, tree = place(grasp_set, asked.prune or 0)
     types = [grasp_set.taxonomy.types[number] for number in map(int, tree.classes)]
     if asked.draw is not None:
-        from ..compiler.placement.draw import draw_tree
+        from thenar.compiler.placement.draw import draw_tree
 
         draw_tree(tree, asked.draw, grasp_set.switch_names, types)
     if asked.show_tree:
@@ -145,8 +145,9 @@ def _of_tree(asked: _Options, grasp_set: "GraspSet") -> Any:
 
 
 def _of_method(asked: _Options, grasp_set: "GraspSet") -> Any:
-    from ..compiler.frontier.timing.whole_glove import ports_of_whole_glove
-    from ..runtime.harness.loading import load_harness
+    from thenar.compiler.frontier.timing.whole_glove import ports_of_whole_glove
+    from thenar.runtime.harness.loading import load_harness
+
     from .place_chosen import chosen, print_chosen
 
     method, parameter = asked.method or _PAPERS, asked.keep if asked.by_size else asked.prune
@@ -178,6 +179,6 @@ def _of_crowd(asked: _Options, grasp_set: "GraspSet") -> Any:
 def _store(found: Any, path: Path) -> None:
     import msgspec
 
-    from ..runtime.files import write_atomically
+    from thenar.runtime.files import write_atomically
 
     write_atomically(path, msgspec.json.format(msgspec.json.encode(found), indent=2) + b"\n")

@@ -7,7 +7,7 @@ from .common import out
 from .lines import echo
 
 if TYPE_CHECKING:
-    from ..compiler.placement.placement import Placement
+    from thenar.compiler.placement.placement import Placement
 
 
 def print_placement(placement: "Placement") -> None:

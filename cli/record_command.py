@@ -10,8 +10,8 @@ from .common import check_devices, existing_file, keep_apart, output_file, progr
 from .lines import echo
 
 if TYPE_CHECKING:
-    from ..runtime.recording.session import Collection
-    from ..runtime.recording.trials import Journal
+    from thenar.runtime.recording.session import Collection
+    from thenar.runtime.recording.trials import Journal
 
 
 @click.command("record")
@@ -48,11 +48,12 @@ def command(
     Example:
         thenar record --glove glove.toml --subject A --objects objects.toml -o anna.grasps
     """
-    from ..compiler.recordings.names import check_names
-    from ..compiler.recordings.objects import collected
-    from ..runtime.harness.loading import load_harness
-    from ..runtime.recording.session import Collection
-    from ..runtime.recording.trials import planned, read_journal
+    from thenar.compiler.recordings.names import check_names
+    from thenar.compiler.recordings.objects import collected
+    from thenar.runtime.harness.loading import load_harness
+    from thenar.runtime.recording.session import Collection
+    from thenar.runtime.recording.trials import planned, read_journal
+
     from .collecting import collect
 
     if output.suffix != ".grasps":
@@ -87,7 +88,7 @@ def _resumed(journal: "Journal", wanted: "Collection", seed: int | None) -> "Col
     """Return the collection to go on with, which must be the one that was begun."""
     from msgspec.structs import asdict, replace
 
-    from ..drivers.errors import SettingError
+    from thenar.drivers.errors import SettingError
 
     begun = journal.session.collection
     assert begun is not None
@@ -104,13 +105,13 @@ def _resumed(journal: "Journal", wanted: "Collection", seed: int | None) -> "Col
 
 def _both(begun: object, wanted: object) -> str:
     """Return the two values, where they are short enough to be told."""
-    from ..runtime.names import shortened
+    from thenar.runtime.names import shortened
 
     return f" ({shortened(str(begun))}, not {shortened(str(wanted))})" if isinstance(begun, str | int) else ""
 
 
 def _write(recording: Path, output: Path, accepted: int, planned: int) -> None:
-    from ..compiler.recordings.mcap_recording import import_recordings
+    from thenar.compiler.recordings.mcap_recording import import_recordings
 
     if not accepted:
         echo(f"no trial was accepted: {output} is not written; the same command goes on")

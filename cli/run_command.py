@@ -10,7 +10,7 @@ from click.core import ParameterSource
 from .common import existing_file, existing_folder, output_file
 
 if TYPE_CHECKING:
-    from ..runtime.live.policy import Policy
+    from thenar.runtime.live.policy import Policy
 
 
 @click.command("run")
@@ -84,7 +84,7 @@ def command(
         raise click.UsageError("name a glove to run on (--glove) or frames to run through (--replay), one of them")
     if record is not None and record.suffix != ".mcap":
         raise click.BadParameter(f"{record.name}: a recording ends in .mcap", param_hint="--record")
-    from ..runtime.build import Build
+    from thenar.runtime.build import Build
 
     _refuse_idle(glove, replay)
     loaded = Build.load(build)
@@ -107,8 +107,9 @@ def command(
 
         replay_recording(loaded, replay, policy)
         return
-    from ..runtime.harness.loading import load_harness
-    from ..runtime.live.system import System
+    from thenar.runtime.harness.loading import load_harness
+    from thenar.runtime.live.system import System
+
     from .run_live import LiveOptions, run_live
 
     system = System.of(loaded, load_harness(str(glove)), policy)
@@ -146,7 +147,7 @@ def _us(ms: float | None) -> int | None:
 
 def _policy(asked: dict[str, Any]) -> "Policy | None":
     """Return the usual policy with what was `asked` for in its place; None if nothing was."""
-    from ..runtime.live.policy import Policy
+    from thenar.runtime.live.policy import Policy
 
     given = {name: value for name, value in asked.items() if value is not None}
     if not given:

@@ -10,17 +10,18 @@ from pathlib import Path
 
 import click
 
-from ..runtime.harness.writing import harness_to_toml
-from ..runtime.live.loop import LiveLoop
-from ..runtime.live.system import System
-from ..runtime.preshape.loading import load_preshapes
-from ..runtime.preshape.selector import PreshapeSelector
-from ..runtime.recording.session import Session
-from ..runtime.recording.writer import Recorder
-from ..runtime.sinks.angles import AngleReader
-from ..runtime.sinks.fanout import Fanout
-from ..runtime.sinks.opening import open_sink
-from ..runtime.sinks.sink import Sink
+from thenar.runtime.harness.writing import harness_to_toml
+from thenar.runtime.live.loop import LiveLoop
+from thenar.runtime.live.system import System
+from thenar.runtime.preshape.loading import load_preshapes
+from thenar.runtime.preshape.selector import PreshapeSelector
+from thenar.runtime.recording.session import Session
+from thenar.runtime.recording.writer import Recorder
+from thenar.runtime.sinks.angles import AngleReader
+from thenar.runtime.sinks.fanout import Fanout
+from thenar.runtime.sinks.opening import open_sink
+from thenar.runtime.sinks.sink import Sink
+
 from .common import err, out
 from .ending import ended_by_signals
 from .live_view import LiveView

@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from ..runtime.build import Build
-from ..runtime.live.policy import Policy
-from ..runtime.live.replay import replayed
-from ..runtime.sinks.line import encode
+from thenar.runtime.build import Build
+from thenar.runtime.live.policy import Policy
+from thenar.runtime.live.replay import replayed
+from thenar.runtime.sinks.line import encode
+
 from .common import warning
 from .lines import echo
 
 if TYPE_CHECKING:
-    from ..compiler.recordings.graspset import GraspSet
+    from thenar.compiler.recordings.graspset import GraspSet
 
 
 class Line(msgspec.Struct, frozen=True):
@@ -31,7 +32,7 @@ class Line(msgspec.Struct, frozen=True):
 
 def replay_set(build: Build, replay: Path, period_us: int) -> None:
     """Recognise every row of a set of grasps: one JSON line each on stdout, the rate on stderr."""
-    from ..compiler.recordings.graspset import GraspSet
+    from thenar.compiler.recordings.graspset import GraspSet
 
     grasp_set = GraspSet.load(replay)
     stdout, correct = sys.stdout.buffer, 0
@@ -58,8 +59,8 @@ def replay_recording(build: Build, replay: Path, policy: Policy | None) -> None:
 
 
 def _rows(build: Build, grasp_set: "GraspSet", period_us: int) -> Iterator[Line]:
-    from ..compiler.build.select import select_inputs
-    from ..runtime.recognizer import Frame, Recognizer
+    from thenar.compiler.build.select import select_inputs
+    from thenar.runtime.recognizer import Frame, Recognizer
 
     recognizer = Recognizer(build)
     bits, codes = select_inputs(grasp_set, build.manifest)

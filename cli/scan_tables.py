@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING
 from .common import out
 
 if TYPE_CHECKING:
-    from ..runtime.harness.wiring import Harness
-    from ..runtime.scanning.scanmap import ScanMap
-    from ..runtime.scanning.timing import ScanTime
+    from thenar.runtime.harness.wiring import Harness
+    from thenar.runtime.scanning.scanmap import ScanMap
+    from thenar.runtime.scanning.timing import ScanTime
 
 
 def print_scan(scan: "ScanMap", harness: "Harness") -> None:
     """Print the map chip by chip in the order in which chips are read first, with what the wire is bound to take."""
-    from ..runtime.scanning.timing import scan_us, scanner_us
+    from thenar.runtime.scanning.timing import scan_us, scanner_us
 
     time = scan_us(scan, harness)
     if time.chips:

@@ -12,7 +12,7 @@ from .common import json_flag, keep_apart, output_file, print_json, progress
 from .lines import echo
 
 if TYPE_CHECKING:
-    from ..simulator.scenes.scene import Scene
+    from thenar.simulator.scenes.scene import Scene
 
 _MODES = ("--output", "--explain", "--ablate", "--list")
 
@@ -58,7 +58,7 @@ def command(
     if scene is None:
         _list(as_json=as_json)
         return
-    from ..simulator.scenes.decode import own_file
+    from thenar.simulator.scenes.decode import own_file
 
     loaded = _load(scene, repetitions, seed, subjects)
     with _located(scene):
@@ -88,9 +88,9 @@ def _check_modes(scene: str | None, given: tuple[object, ...], *, keep_unsettled
 
 def _load(name: str, repetitions: int | None, seed: int | None, subjects: tuple[str, ...]) -> "Scene":
     """Return the scene, changed as asked for. Raises SceneError if it is none, or has no such subject."""
-    from ..compiler.recordings.names import nearest
-    from ..simulator.errors import SceneError
-    from ..simulator.scenes.decode import load_scene
+    from thenar.compiler.recordings.names import nearest
+    from thenar.simulator.errors import SceneError
+    from thenar.simulator.scenes.decode import load_scene
 
     scene = load_scene(name)
     known = {subject.name: subject for subject in scene.subjects}
@@ -108,8 +108,8 @@ def _load(name: str, repetitions: int | None, seed: int | None, subjects: tuple[
 @contextmanager
 def _located(name: str) -> Iterator[None]:
     """Say of what is wrong with a scene in which file and line it stands."""
-    from ..simulator.errors import SceneError
-    from ..simulator.scenes.decode import located
+    from thenar.simulator.errors import SceneError
+    from thenar.simulator.scenes.decode import located
 
     try:
         yield
@@ -118,7 +118,7 @@ def _located(name: str) -> Iterator[None]:
 
 
 def _simulate(scene: "Scene", output: Path, jobs: int, *, keep_unsettled: bool, as_json: bool) -> None:
-    from ..simulator.running.simulation import simulate
+    from thenar.simulator.running.simulation import simulate
 
     with progress(f"simulating {scene.name}") as report:
         simulated = simulate(scene, jobs, report, keep_unsettled=keep_unsettled)
@@ -132,7 +132,7 @@ def _simulate(scene: "Scene", output: Path, jobs: int, *, keep_unsettled: bool, 
 
 
 def _explain(scene: "Scene", jobs: int, *, as_json: bool) -> None:
-    from ..simulator.running.explain import explain
+    from thenar.simulator.running.explain import explain
 
     explanation = explain(scene, jobs)
     if as_json:
@@ -164,7 +164,7 @@ class _Shipped(msgspec.Struct, frozen=True):
 
 
 def _list(*, as_json: bool) -> None:
-    from ..simulator.scenes import shipped
+    from thenar.simulator.scenes import shipped
 
     found = [_Shipped(name, file.read_text().partition("\n")[0].removeprefix("# ")) for name, file in shipped().items()]
     if as_json:

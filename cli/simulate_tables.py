@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 from rich.text import Text
 
-from ..simulator.pipeline.pipeline import DEFAULT_CONTACT
-from ..simulator.pipeline.registry import CONTACTS
-from ..simulator.running.explain import Explanation
-from ..simulator.running.report import GraspReport, Report, StepReport
+from thenar.simulator.pipeline.pipeline import DEFAULT_CONTACT
+from thenar.simulator.pipeline.registry import CONTACTS
+from thenar.simulator.running.explain import Explanation
+from thenar.simulator.running.report import GraspReport, Report, StepReport
+
 from .common import err, out
 
 if TYPE_CHECKING:  # simulating needs no compiler; ablation does

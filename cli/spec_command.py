@@ -8,11 +8,11 @@ import click
 from .common import any_path, existing_file, existing_folder, json_flag, out, print_json
 
 if TYPE_CHECKING:
-    from ..compiler.hand import HandShape
-    from ..compiler.spec.ends import BoardPins
-    from ..runtime.build import Build
-    from ..runtime.harness.wiring import Harness
-    from ..runtime.manifest import Manifest
+    from thenar.compiler.hand import HandShape
+    from thenar.compiler.spec.ends import BoardPins
+    from thenar.runtime.build import Build
+    from thenar.runtime.harness.wiring import Harness
+    from thenar.runtime.manifest import Manifest
 
 _FOLDER = "spec"
 _WIRING = "glove.toml"
@@ -38,10 +38,11 @@ def command(
         thenar spec build/
         thenar spec build/ --hand-length 182 --glove glove.toml -o spec/
     """
-    from ..compiler.spec.files import files_of
-    from ..compiler.spec.folder import check_output, write_spec
-    from ..compiler.spec.glove_spec import glove_spec
-    from ..runtime.build import Build
+    from thenar.compiler.spec.files import files_of
+    from thenar.compiler.spec.folder import check_output, write_spec
+    from thenar.compiler.spec.glove_spec import glove_spec
+    from thenar.runtime.build import Build
+
     from .spec_tables import print_spec
 
     loaded = Build.load(build)
@@ -75,14 +76,14 @@ def _hand(manifest: "Manifest", length_mm: float | None) -> "HandShape | None":
 
 def _harness(folder: Path, loaded: "Build", glove: Path | None, board: Path | None) -> "Harness | None":
     """Return the wiring that was named, the one of the board, or the one that the build holds; None for a new one."""
-    from ..runtime.harness.loading import load_harness, parse_harness
+    from thenar.runtime.harness.loading import load_harness, parse_harness
 
     if glove is not None:
         return load_harness(glove)
     if board is not None:
-        from ..compiler.firmware.board_keys import glove_toml
-        from ..compiler.firmware.board_loading import load_board
-        from ..runtime.names import sound_name
+        from thenar.compiler.firmware.board_keys import glove_toml
+        from thenar.compiler.firmware.board_loading import load_board
+        from thenar.runtime.names import sound_name
 
         name = sound_name(board.stem, "board")
         return parse_harness(glove_toml(name, load_board(board), loaded.manifest), name)
@@ -92,10 +93,10 @@ def _harness(folder: Path, loaded: "Build", glove: Path | None, board: Path | No
 
 def _board_pins(path: Path, manifest: "Manifest") -> "BoardPins":
     """Return how the board in a `board.toml` reaches its keys."""
-    from ..compiler.firmware.board_keys import check_switches, key_names
-    from ..compiler.firmware.board_loading import load_board
-    from ..compiler.spec.ends import BoardPins
-    from ..runtime.harness.wiring import BusWiring
+    from thenar.compiler.firmware.board_keys import check_switches, key_names
+    from thenar.compiler.firmware.board_loading import load_board
+    from thenar.compiler.spec.ends import BoardPins
+    from thenar.runtime.harness.wiring import BusWiring
 
     board = load_board(path)
     names = [switch.name for switch in manifest.switches]

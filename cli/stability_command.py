@@ -9,7 +9,7 @@ import click
 from .common import json_flag, output_file, print_json, progress
 
 if TYPE_CHECKING:
-    from ..stability.report import Report
+    from thenar.stability.report import Report
 
 # What a run, and a page, import sooner or later: better to say at once that it is not there than once in each case.
 _NEEDED = ("mpmath", "joblib", "scipy", "sklearn")
@@ -18,8 +18,8 @@ _NEEDED_FOR_A_PAGE = ("jinja2", "matplotlib")
 
 def _known(_: click.Context, __: click.Parameter, cases: tuple[str, ...]) -> tuple[str, ...]:
     """Return the cases asked for in the order of the catalogue, each once; all of them where none is named."""
-    from ..compiler.recordings.names import nearest
-    from ..stability.catalogue import NAMES
+    from thenar.compiler.recordings.names import nearest
+    from thenar.stability.catalogue import NAMES
 
     for case in cases:
         if case not in NAMES:
@@ -64,9 +64,9 @@ def command(
 
 
 def _run(cases: tuple[str, ...], *, full: bool, jobs: int, output: Path | None, as_json: bool) -> int:
-    from ..stability.catalogue import NAMES
-    from ..stability.report import Report, run
-    from ..stability.weka.beside import beside_weka
+    from thenar.stability.catalogue import NAMES
+    from thenar.stability.report import Report, run
+    from thenar.stability.weka.beside import beside_weka
 
     with progress("hard cases") as report:
         found = run(cases, full=full, jobs=jobs, progress=report)
@@ -85,9 +85,9 @@ def _run(cases: tuple[str, ...], *, full: bool, jobs: int, output: Path | None, 
 
 
 def _write(result: "Report", jobs: int, path: Path) -> None:
-    from ..runtime.files import write_atomically
-    from ..stability.shown.figures import figures, measure
-    from ..stability.shown.page import page
+    from thenar.runtime.files import write_atomically
+    from thenar.stability.shown.figures import figures, measure
+    from thenar.stability.shown.page import page
 
     with progress("pictures") as report:
         measured = measure(full=result.full, jobs=jobs, progress=report)
@@ -96,7 +96,8 @@ def _write(result: "Report", jobs: int, path: Path) -> None:
 
 
 def _list(cases: tuple[str, ...], *, as_json: bool) -> None:
-    from ..stability.catalogue import load
+    from thenar.stability.catalogue import load
+
     from .stability_tables import Listed, print_list
 
     found = [Listed(name, load(name).CASE.title, load(name).CASE.danger) for name in cases]

@@ -7,9 +7,10 @@ from rich.console import Console, JustifyMethod
 from rich.table import Table
 from rich.text import Text
 
-from ..stability.report import CaseReport, Check, Report
-from ..stability.weka.beside import Beside, NotRun
-from ..stability.wording import besides, bound_of, failures, figure, legend, summary, verdict
+from thenar.stability.report import CaseReport, Check, Report
+from thenar.stability.weka.beside import Beside, NotRun
+from thenar.stability.wording import besides, bound_of, failures, figure, legend, summary, verdict
+
 from .common import out
 
 _HEADS = ("check", "held against", "tried", "worst error", "bound", "verdict")

@@ -3,17 +3,18 @@
 from contextlib import suppress
 from threading import Event
 
-from ..runtime.live.frames import GloveFrame, now_us
-from ..runtime.live.health import Health, HealthReport
-from ..runtime.live.keeper import NOT_YET
-from ..runtime.live.loop import Moment
-from ..runtime.live.newest import Newest
-from ..runtime.live.sources import Sources
-from ..runtime.live.system import System
-from ..runtime.preshape.selector import PreshapeSelector
-from ..runtime.recording.writer import Recorder
-from ..runtime.sinks.angles import AngleReader
-from ..runtime.sinks.fanout import Fanout
+from thenar.runtime.live.frames import GloveFrame, now_us
+from thenar.runtime.live.health import Health, HealthReport
+from thenar.runtime.live.keeper import NOT_YET
+from thenar.runtime.live.loop import Moment
+from thenar.runtime.live.newest import Newest
+from thenar.runtime.live.sources import Sources
+from thenar.runtime.live.system import System
+from thenar.runtime.preshape.selector import PreshapeSelector
+from thenar.runtime.recording.writer import Recorder
+from thenar.runtime.sinks.angles import AngleReader
+from thenar.runtime.sinks.fanout import Fanout
+
 from .common import of_device
 from .lines import echo
 from .live_view import LiveView, health_lines

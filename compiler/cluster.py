@@ -8,7 +8,8 @@ from itertools import islice
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ..drivers.errors import ThenarError
+from thenar.drivers.errors import ThenarError
+
 from .payloads import SharedArrays, UnreadableError, answered, installed
 
 if TYPE_CHECKING:

@@ -2,8 +2,8 @@
 
 import os
 
-from ..drivers.errors import ThenarError
-from ..runtime.tables import MAX_BYTES, MAX_CLASSES, MAX_JOINTS, MAX_SWITCHES, payload_bytes
+from thenar.drivers.errors import ThenarError
+from thenar.runtime.tables import MAX_BYTES, MAX_CLASSES, MAX_JOINTS, MAX_SWITCHES, payload_bytes
 
 # Of the arrays (types, rows) that a round of boosting holds, and of a training's columns with two values and with more.
 _BYTES_A_TYPE_AND_ROW, _BYTES_A_SWITCH_AND_ROW, _BYTES_A_JOINT_AND_ROW = 120, 10, 60

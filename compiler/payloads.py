@@ -12,7 +12,7 @@ from weakref import ref
 import numpy as np
 from numpy.typing import NDArray
 
-from ..drivers.errors import ThenarError
+from thenar.drivers.errors import ThenarError
 
 if TYPE_CHECKING:
     from distributed import Client, Future

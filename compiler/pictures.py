@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from ..runtime.errors import ThenarError
+from thenar.runtime.errors import ThenarError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

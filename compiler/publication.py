@@ -23,8 +23,8 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ..drivers.errors import ThenarError
-from ..runtime.files import sync_folder
+from thenar.drivers.errors import ThenarError
+from thenar.runtime.files import sync_folder
 
 # Returns the entries of a folder that are the user's, as `entries` has them: they are kept. Raises where the folder may
 # not be replaced. It also judges a folder that was replaced, elsewhere and under another name.

@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
-from ..drivers.calibration import GloveCalibration
-from ..drivers.errors import SettingError
+from thenar.drivers.calibration import GloveCalibration
+from thenar.drivers.errors import SettingError
+
 from .toml_source import Source, read_source
 from .toml_struct import convert
 

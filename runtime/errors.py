@@ -1,6 +1,6 @@
 """What can go wrong between a build folder, a glove and a recognised grasp."""
 
-from ..drivers.errors import ThenarError
+from thenar.drivers.errors import ThenarError
 
 __all__ = ["BuildError", "FrameError", "HarnessError", "SealError", "ThenarError"]
 

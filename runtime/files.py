@@ -5,7 +5,7 @@ import os
 import tempfile
 from pathlib import Path
 
-from ..drivers.files import open_file, read_file
+from thenar.drivers.files import open_file, read_file
 
 __all__ = ["is_special", "open_file", "read_file", "sync_folder", "write_atomically"]
 

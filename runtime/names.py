@@ -3,7 +3,7 @@
 import difflib
 from collections.abc import Sequence
 
-from ..drivers.names import LONGEST_NAME, LONGEST_SHOWN, fault, printable, shortened, sound_name
+from thenar.drivers.names import LONGEST_NAME, LONGEST_SHOWN, fault, printable, shortened, sound_name
 
 __all__ = [
     "LONGEST_NAME",

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiler.elementary import log
+from thenar.compiler.elementary import log
 
 Floats = NDArray[np.float64]
 Words = NDArray[np.uint64]

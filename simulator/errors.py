@@ -1,6 +1,6 @@
 """What can go wrong between a scene and its grasps."""
 
-from ..drivers.errors import ThenarError
+from thenar.drivers.errors import ThenarError
 
 __all__ = ["PlanError", "SceneError", "SimMissingError", "ThenarError"]
 

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import msgspec
 
-from ..compiler.workers import in_workers
+from thenar.compiler.workers import in_workers
+
 from .catalogue import load
 from .finding import Case, Finding
 from .weka.beside import Beside, NotRun

@@ -150,9 +150,9 @@ def tree_of(name: str) -> ast.Module:
 
 
 def resolve(name: str, is_package: bool, node: ast.ImportFrom) -> str:
-    """Return what a `from ... import` of module `name` names, relative to the repository."""
+    """Return what a `from ... import` of module `name` names; modules of ours by their path in the repository."""
     if not node.level:
-        return node.module or ""
+        return (node.module or "").removeprefix("thenar.")
     parts = name.split(".") if is_package else name.split(".")[:-1]
     base = parts[: len(parts) - node.level + 1]
     return ".".join([*base, *(node.module or "").split(".")]).strip(".")
@@ -162,7 +162,7 @@ def imports(name: str, tree: ast.Module) -> Iterator[str]:
     is_package = SOURCES[name].name == "__init__.py"
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            yield from (alias.name.removeprefix("thenar.") for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             yield resolve(name, is_package, node)
 
@@ -176,6 +176,15 @@ def test_a_module_imports_only_what_its_room_may(name: str) -> None:
     room = max((key for key in ALLOWED if fits(name, (key,))), key=len)
     ours = {imported for imported in imports(name, tree_of(name)) if imported.split(".")[0] in (*PACKAGES, "thenar")}
     assert not {imported for imported in ours if not fits(imported, (*ALLOWED[room], name))}
+
+
+@EACH
+def test_imports_are_relative_inside_a_room_and_absolute_between_rooms(name: str) -> None:
+    depth = len(name.split(".")) - (SOURCES[name].name != "__init__.py")
+    for node in ast.walk(tree_of(name)):
+        if isinstance(node, ast.ImportFrom):
+            assert node.level <= depth, f"line {node.lineno} leaves the room: write from thenar."
+            assert not fits(node.module or "", (f"thenar.{name.split('.')[0]}",)), f"line {node.lineno}: write from ."
 
 
 @EACH

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...drivers.errors import ThenarError
+from thenar.drivers.errors import ThenarError
+
 from ..elementary import add_exactly, softmax_and_loss
 from ..limits import check_memory
 from .binning import TwoValued, bin_columns

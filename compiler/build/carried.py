@@ -4,9 +4,10 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from ...runtime.build import Build
-from ...runtime.manifest import Manifest
-from ...runtime.tables import IntegerTables
+from thenar.runtime.build import Build
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.tables import IntegerTables
+
 from ..firmware.errors import FirmwareError
 from ..firmware.library import library_files, smallest_fit
 from ..firmware.library_names import FIRMWARE_NAME, LIBRARY_FILES

@@ -7,12 +7,13 @@ from typing import get_args
 
 import numpy as np
 
-from ...runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME
-from ...runtime.harness.wiring import Harness
-from ...runtime.manifest import Inputs, Manifest, Options, TableBits, manifest_from_bytes, manifest_to_bytes
-from ...runtime.scanning.plan import plan_scan
-from ...runtime.scanning.scanmap import ScanMap, scanmap_to_bytes
-from ...runtime.tables import IntegerTables, tables_to_bytes
+from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME
+from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.manifest import Inputs, Manifest, Options, TableBits, manifest_from_bytes, manifest_to_bytes
+from thenar.runtime.scanning.plan import plan_scan
+from thenar.runtime.scanning.scanmap import ScanMap, scanmap_to_bytes
+from thenar.runtime.tables import IntegerTables, tables_to_bytes
+
 from ..evaluation.folds import check_cut
 from ..frontier.timing.whole_glove import ports_of_whole_glove
 from ..placement.costaware import PortCosts

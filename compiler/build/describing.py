@@ -6,9 +6,10 @@ from importlib.metadata import version
 
 import numpy as np
 
-from ...runtime.build import ENSEMBLE_NAME, SCAN_NAME, TABLES_NAME
-from ...runtime.manifest import SCHEMA, Calibration, Manifest, Options, Proof, Recognised, Source, Switch
-from ...runtime.tables import IntegerTables
+from thenar.runtime.build import ENSEMBLE_NAME, SCAN_NAME, TABLES_NAME
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Proof, Recognised, Source, Switch
+from thenar.runtime.tables import IntegerTables
+
 from ..recordings.graspset import GraspSet
 from ..tables.compare import Comparison
 from .recognition import Tested

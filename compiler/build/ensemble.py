@@ -10,9 +10,10 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from ...runtime.errors import BuildError
-from ...runtime.sealed import seal, unseal
-from ...runtime.tables import MAX_CLASSES, MAX_JOINTS, MAX_SWITCHES
+from thenar.runtime.errors import BuildError
+from thenar.runtime.sealed import seal, unseal
+from thenar.runtime.tables import MAX_CLASSES, MAX_JOINTS, MAX_SWITCHES
+
 from ..boosting.stumps import Stumps
 from ..recordings.arrays import AnyArray, pack, unpack
 

@@ -1,6 +1,6 @@
 """What can be wrong with what a build is to be made of, or held against."""
 
-from ...runtime.errors import ThenarError
+from thenar.runtime.errors import ThenarError
 
 
 class CompileError(ThenarError, ValueError):

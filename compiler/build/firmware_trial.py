@@ -5,8 +5,9 @@ from typing import Literal
 import numpy as np
 from msgspec import Struct
 
-from ...runtime.build import Build
-from ...runtime.scorer import LANE_OFFSET
+from thenar.runtime.build import Build
+from thenar.runtime.scorer import LANE_OFFSET
+
 from ..firmware.answers import Answers
 from ..firmware.classifier import classifier_files
 from ..firmware.host_runner import run as run_on_host

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.harness.wiring import Harness
-from ...runtime.manifest import Manifest
-from ...runtime.scanning.scanmap import ScanMap
-from ...runtime.tables import IntegerTables
+from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.scanning.scanmap import ScanMap
+from thenar.runtime.tables import IntegerTables
+
 from ..recordings.graspset import GraspSet
 from ..tables.compare import Comparison
 from .training import Trained

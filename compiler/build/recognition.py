@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.manifest import Options, Recognised
+from thenar.runtime.manifest import Options, Recognised
+
 from ..boosting.stumps import winners
 from ..evaluation.folds import weka_folds
 from ..placement.costaware import PortCosts

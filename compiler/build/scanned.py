@@ -4,9 +4,9 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from ...runtime.scanning.decided import Decided
-from ...runtime.scanning.scanmap import ScanMap
-from ...runtime.tables import IntegerTables
+from thenar.runtime.scanning.decided import Decided
+from thenar.runtime.scanning.scanmap import ScanMap
+from thenar.runtime.tables import IntegerTables
 
 
 class ScanCheck(Struct, frozen=True):

@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.manifest import Calibration, Manifest
+from thenar.runtime.manifest import Calibration, Manifest
+
 from ..recordings.graspset import GraspSet, Joint
 from .errors import CompileError
 

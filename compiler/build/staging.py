@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from ...runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME
+from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME
+
 from ..firmware.library_names import FIRMWARE_NAME, LIBRARY_FILES
 from ..publication import check_folder, publish_folder, sweep
 from ..spec.files import NAMES

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.manifest import Options
+from thenar.runtime.manifest import Options
+
 from ..boosting.boost import boost
 from ..boosting.stumps import Stumps
 from ..limits import check_inputs, check_memory, check_types

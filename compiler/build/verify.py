@@ -8,9 +8,10 @@ from msgspec import Struct
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from ...runtime.build import ENSEMBLE_NAME, Build, read_member
-from ...runtime.errors import BuildError
-from ...runtime.tables import LIMIT
+from thenar.runtime.build import ENSEMBLE_NAME, Build, read_member
+from thenar.runtime.errors import BuildError
+from thenar.runtime.tables import LIMIT
+
 from ..boosting.stumps import TIE, Stumps
 from ..recordings.graspset import GraspSet
 from ..tables.collapse import collapse

@@ -6,8 +6,9 @@ from typing import Literal
 
 from msgspec import Struct
 
-from ...runtime.build import Build
-from ...runtime.tables import IntegerTables
+from thenar.runtime.build import Build
+from thenar.runtime.tables import IntegerTables
+
 from ..firmware.choose import choose
 from ..firmware.errors import FirmwareError
 from ..firmware.library import Fit, smallest_fit

@@ -1,6 +1,6 @@
 """What can stand in the way of an evaluation."""
 
-from ...drivers.errors import ThenarError
+from thenar.drivers.errors import ThenarError
 
 
 class EvaluationError(ThenarError, ValueError):

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...runtime.files import write_atomically
+from thenar.runtime.files import write_atomically
+
 from ..pictures import painting, rendered
 from .study import Study
 from .tables import Row, Table

@@ -3,8 +3,9 @@
 Layout and fields are those of the Arduino library specification, revision 1.5.
 """
 
-from ...firmware_templates.rendering import render
-from ...runtime.manifest import Manifest
+from thenar.firmware_templates.rendering import render
+from thenar.runtime.manifest import Manifest
+
 from .layout import Layout
 from .words import comment, inputs_in_words, markdown
 

@@ -3,7 +3,8 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from ...runtime.manifest import Manifest
+from thenar.runtime.manifest import Manifest
+
 from .errors import FirmwareError
 from .layout import Layout
 from .lookups import Lookup, lookups

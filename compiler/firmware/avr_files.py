@@ -1,6 +1,7 @@
 """The folder of a classifier for an AVR, but for the classifier itself."""
 
-from ...firmware_templates.rendering import render
+from thenar.firmware_templates.rendering import render
+
 from .layout import Layout
 from .microcontrollers import PARTS
 from .targets import Target

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...firmware_templates.rendering import render
+from thenar.firmware_templates.rendering import render
+
 from .answers import Answers, Frames, check_frames
 from .avr_harness import AVR_COMPILER, harness
 from .errors import FirmwareError

@@ -8,7 +8,8 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct, field
 
-from ...runtime.harness.wiring import Baud, ChipWiring
+from thenar.runtime.harness.wiring import Baud, ChipWiring
+
 from .microcontrollers import PARTS, Part
 
 Microseconds = Annotated[int, Meta(ge=0, le=60_000_000)]

@@ -2,11 +2,12 @@
 
 from collections.abc import Iterator
 
-from ...drivers.i2c.registry import CHIPS
-from ...runtime.harness import checks
-from ...runtime.harness.wiring import BusWiring, Harness
-from ...runtime.names import fault, nearest, shortened
-from ...runtime.toml_source import Place, spelled
+from thenar.drivers.i2c.registry import CHIPS
+from thenar.runtime.harness import checks
+from thenar.runtime.harness.wiring import BusWiring, Harness
+from thenar.runtime.names import fault, nearest, shortened
+from thenar.runtime.toml_source import Place, spelled
+
 from .baud import best_setting, near_rates
 from .board import Board, GloveUart, Matrix
 from .microcontrollers import Part

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from typing import Literal
 
-from ...runtime.manifest import Manifest
+from thenar.runtime.manifest import Manifest
+
 from .board import Board
 from .board_inputs import expanders_file, matrix_file, pins_file
 from .board_joints import joints_file

@@ -3,9 +3,10 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from ...drivers.i2c.chip import Write
-from ...runtime.harness.wiring import ChipWiring
-from ...runtime.scanning.scanmap import Port
+from thenar.drivers.i2c.chip import Write
+from thenar.runtime.harness.wiring import ChipWiring
+from thenar.runtime.scanning.scanmap import Port
+
 from .board import Board, Matrix
 from .board_text import text, wrapped
 from .errors import FirmwareError

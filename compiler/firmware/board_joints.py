@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
 
-from ...drivers.cyberglove_sensors import SENSORS_18, SENSORS_22
-from ...drivers.cyberglove_timing import period_words, shortest_us, told_us
-from ...runtime.manifest import Calibration
-from ...runtime.names import list_names, nearest
+from thenar.drivers.cyberglove_sensors import SENSORS_18, SENSORS_22
+from thenar.drivers.cyberglove_timing import period_words, shortest_us, told_us
+from thenar.runtime.manifest import Calibration
+from thenar.runtime.names import list_names, nearest
+
 from .board import Board, GloveUart
 from .board_inputs import needs_jtag_off
 from .board_text import text

@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 
-from ...runtime.harness.wiring import Debounce, Harness, ScannerWiring
-from ...runtime.harness.writing import harness_to_toml
-from ...runtime.manifest import Manifest
-from ...runtime.names import list_names
+from thenar.runtime.harness.wiring import Debounce, Harness, ScannerWiring
+from thenar.runtime.harness.writing import harness_to_toml
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.names import list_names
+
 from .board import Board
 from .errors import FirmwareError
 

@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
-from ...runtime.toml_source import Source, read_source
-from ...runtime.toml_struct import check_finite, convert
+from thenar.runtime.toml_source import Source, read_source
+from thenar.runtime.toml_struct import check_finite, convert
+
 from .board import Board
 from .board_checks import faults
 from .errors import FirmwareError

@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 from math import ceil
 
-from ...runtime.harness.wiring import BusWiring, Harness
-from ...runtime.scanning.plan import plan_scan
-from ...runtime.scanning.scanmap import Port
-from ...runtime.tables import IntegerTables
+from thenar.runtime.harness.wiring import BusWiring, Harness
+from thenar.runtime.scanning.plan import plan_scan
+from thenar.runtime.scanning.scanmap import Port
+from thenar.runtime.tables import IntegerTables
+
 from .board import Board
 from .board_keys import check_switches, rows_and_columns
 from .protocol import BoardConfig

@@ -3,7 +3,7 @@
 from importlib.metadata import version
 from textwrap import fill
 
-from ...firmware_templates.rendering import render
+from thenar.firmware_templates.rendering import render
 
 
 def text(file: str, /, **values: object) -> str:

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from itertools import product
 from typing import get_args
 
-from ...runtime.tables import IntegerTables
+from thenar.runtime.tables import IntegerTables
+
 from .costs import Cost, cost_of
 from .errors import FirmwareError
 from .layout import LARGEST_GROUP, SMALLEST_GROUP, Adding, Bins, Layout, arrange

@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 from importlib.metadata import version
 
-from ...firmware_templates.rendering import render
-from ...runtime.manifest import Calibration, Manifest
+from thenar.firmware_templates.rendering import render
+from thenar.runtime.manifest import Calibration, Manifest
+
 from .assembly import assembly_values, check_size
 from .layout import Layout
 from .lookups import Lookup, lookups

@@ -1,6 +1,6 @@
 """What the firmware room raises."""
 
-from ...drivers.errors import ThenarError
+from thenar.drivers.errors import ThenarError
 
 
 class FirmwareError(ThenarError, ValueError):

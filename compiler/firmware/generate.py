@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
-from ...runtime.build import Build
+from thenar.runtime.build import Build
+
 from .arduino import arduino_files
 from .avr_files import avr_files
 from .board import Board

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from ...firmware_templates.rendering import render
+from thenar.firmware_templates.rendering import render
+
 from .layout import Layout
 from .self_test import CHECKS, check_header
 

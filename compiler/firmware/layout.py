@@ -15,7 +15,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.tables import IntegerTables
+from thenar.runtime.tables import IntegerTables
+
 from .errors import FirmwareError
 from .joint_layout import Bins, JointLayout, check_joints, code_bits, joint_layout
 

@@ -4,8 +4,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from textwrap import wrap
 
-from ...runtime.manifest import Manifest
-from ...runtime.tables import IntegerTables
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.tables import IntegerTables
+
 from .choose import Choice, choose, features
 from .classifier import classifier_files
 from .errors import FirmwareError

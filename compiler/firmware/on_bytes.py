@@ -11,7 +11,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.tables import IntegerTables
+from thenar.runtime.tables import IntegerTables
+
 from .errors import FirmwareError
 
 BYTES = 256

@@ -2,10 +2,11 @@
 
 from msgspec.structs import replace
 
-from ...drivers.calibration import GloveCalibration
-from ...runtime.build import Build
-from ...runtime.live.codes import codes_of_bytes
-from ...runtime.manifest import Calibration
+from thenar.drivers.calibration import GloveCalibration
+from thenar.runtime.build import Build
+from thenar.runtime.live.codes import codes_of_bytes
+from thenar.runtime.manifest import Calibration
+
 from .on_bytes import on_bytes
 
 _FIRST, _LAST = 1, 255  # what a CyberGlove can send

@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.tables import IntegerTables
+from thenar.runtime.tables import IntegerTables
 
 _BYTE, _WORD = 0xFF, 0xFFFF
 _CHANGING = 40

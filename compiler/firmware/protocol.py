@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from textwrap import wrap
 
-from ...firmware_templates.rendering import render
-from ...runtime.scanning.earlyexit import EarlyExit
-from ...runtime.scanning.reach import Reach
-from ...runtime.tables import IntegerTables
+from thenar.firmware_templates.rendering import render
+from thenar.runtime.scanning.earlyexit import EarlyExit
+from thenar.runtime.scanning.reach import Reach
+from thenar.runtime.tables import IntegerTables
+
 from .errors import FirmwareError
 from .words import comment
 

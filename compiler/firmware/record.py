@@ -2,7 +2,8 @@
 
 from typing import Literal
 
-from ...firmware_templates.rendering import render
+from thenar.firmware_templates.rendering import render
+
 from .answers import frame_size
 from .layout import Layout
 

@@ -5,7 +5,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from ...runtime.manifest import Manifest
+from thenar.runtime.manifest import Manifest
+
 from .layout import Layout
 from .lookups import Lookup, lookups
 from .parts import Parts

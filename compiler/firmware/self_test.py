@@ -8,7 +8,8 @@ from textwrap import wrap
 import numpy as np
 from numpy.typing import NDArray
 
-from ...firmware_templates.rendering import render
+from thenar.firmware_templates.rendering import render
+
 from .layout import Layout
 from .probes import Probes, turns
 from .words import string

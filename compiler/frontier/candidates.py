@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from itertools import zip_longest
 from math import log
 
-from ...runtime.manifest import Inputs
+from thenar.runtime.manifest import Inputs
+
 from ..evaluation.rates import Rate as Counted
 from ..selection.learning import Columns
 from .pareto import front

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import msgspec
 
-from ...runtime.harness.wiring import Harness
+from thenar.runtime.harness.wiring import Harness
+
 from .timing.beside_wire import Beside
 from .timing.classify_times import ClassifyModel
 from .timing.wirings import Wiring

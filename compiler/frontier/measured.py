@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 from msgspec import Struct
 
-from ...runtime.tables import IntegerTables, tables_from_bytes
+from thenar.runtime.tables import IntegerTables, tables_from_bytes
+
 from ..firmware.choose import Option, features
 from ..firmware.targets import Target
 from .designs import Design

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from ...runtime.build import Build
+from thenar.runtime.build import Build
+
 from ..recordings.graspset import GraspSet
 from .candidates import rate_of
 from .equipment import Equipment

@@ -6,9 +6,9 @@ from typing import Annotated, Literal, TypeVar
 import msgspec
 from msgspec import Meta, Struct
 
-from ...drivers.errors import ThenarError
-from ...runtime.manifest import Inputs, TableBits
-from ...runtime.names import fault, shortened
+from thenar.drivers.errors import ThenarError
+from thenar.runtime.manifest import Inputs, TableBits
+from thenar.runtime.names import fault, shortened
 
 SCHEMA = 1
 MAX_BYTES = 64 << 20

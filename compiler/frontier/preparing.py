@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...runtime.harness.loading import load_harness
-from ...runtime.harness.wiring import Harness
+from thenar.runtime.harness.loading import load_harness
+from thenar.runtime.harness.wiring import Harness
+
 from ..publication import check_folder, entries, publish_folder
 from ..recordings.graspset import GraspSet
 from ..selection.rivals import RIVALS, available

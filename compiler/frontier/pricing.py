@@ -8,7 +8,8 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from ...runtime.tables import IntegerTables, tables_to_bytes
+from thenar.runtime.tables import IntegerTables, tables_to_bytes
+
 from ..evaluation.folds import Fold
 from ..selection.learning import Columns
 from ..tables.collapse import collapse

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ...runtime.manifest import Inputs, TableBits
+from thenar.runtime.manifest import Inputs, TableBits
+
 from ..selection.ways import METHODS
 from .points import FrontierError, Way
 

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...runtime.files import write_atomically
+from thenar.runtime.files import write_atomically
+
 from ..pictures import painting, rendered
 from .printing import names_for
 from .tree import Tree

@@ -1,6 +1,6 @@
 """What can be wrong with what a placement is asked for."""
 
-from ...runtime.errors import ThenarError
+from thenar.runtime.errors import ThenarError
 
 
 class PlacementError(ThenarError, ValueError):

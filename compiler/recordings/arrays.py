@@ -13,7 +13,8 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from ...runtime.errors import SealError
+from thenar.runtime.errors import SealError
+
 from .npy import read_head
 
 AnyArray = NDArray[np.generic]

@@ -11,8 +11,9 @@ from typing import Literal
 
 import msgspec
 
-from ...runtime.toml_source import read_source
-from ...runtime.toml_struct import convert
+from thenar.runtime.toml_source import read_source
+from thenar.runtime.toml_struct import convert
+
 from .errors import ColumnsError
 from .names import nearest, shortened
 

@@ -1,6 +1,6 @@
 """What can be wrong with recordings on their way in or out."""
 
-from ...runtime.errors import ThenarError
+from thenar.runtime.errors import ThenarError
 
 __all__ = ["ColumnsError", "RecordingError", "TableError"]
 

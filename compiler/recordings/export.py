@@ -7,7 +7,8 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from ...runtime.files import write_atomically
+from thenar.runtime.files import write_atomically
+
 from .columns_of import Heads, heads_of
 from .errors import TableError
 from .graspset import GraspSet, Joint

@@ -14,10 +14,11 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.errors import SealError
-from ...runtime.files import read_file, write_atomically
-from ...runtime.nesting import check_json
-from ...runtime.sealed import seal, unseal
+from thenar.runtime.errors import SealError
+from thenar.runtime.files import read_file, write_atomically
+from thenar.runtime.nesting import check_json
+from thenar.runtime.sealed import seal, unseal
+
 from .arrays import AnyArray, pack, unpack
 from .errors import RecordingError
 from .graspset import GraspSet, Joint

@@ -9,7 +9,8 @@ import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...runtime.names import shortened
+from thenar.runtime.names import shortened
+
 from .errors import RecordingError
 from .names import check_names, check_simulated
 from .taxonomy import Taxonomy

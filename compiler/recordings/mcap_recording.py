@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.live.frames import GloveFrame, SwitchFrame
-from ...runtime.names import shortened
-from ...runtime.recording.frame_bytes import switch_matrix
-from ...runtime.recording.reader import Reader, check_made
-from ...runtime.recording.session import Collection, Label, Session
+from thenar.runtime.live.frames import GloveFrame, SwitchFrame
+from thenar.runtime.names import shortened
+from thenar.runtime.recording.frame_bytes import switch_matrix
+from thenar.runtime.recording.reader import Reader, check_made
+from thenar.runtime.recording.session import Collection, Label, Session
+
 from .coding import CodingCost, code_joint
 from .columns import Calibration, JointColumns
 from .errors import TableError

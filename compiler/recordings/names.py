@@ -5,7 +5,8 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.names import LONGEST_NAME, SHOWN, fault, list_names, nearest, shortened
+from thenar.runtime.names import LONGEST_NAME, SHOWN, fault, list_names, nearest, shortened
+
 from .errors import RecordingError
 from .limits import NAMES, NAMES_EACH
 

@@ -7,7 +7,8 @@ from typing import BinaryIO
 
 import numpy as np
 
-from ...runtime.files import open_file
+from thenar.runtime.files import open_file
+
 from .arrays import UNREADABLE, AnyArray
 from .errors import TableError
 from .limits import COLUMNS, LARGEST, ROWS, unpacked

@@ -8,8 +8,9 @@ The paper gave each type two objects of different volume.
 
 from pathlib import Path
 
-from ...runtime.recording.session import Task
-from ...runtime.toml_source import Source, read_source
+from thenar.runtime.recording.session import Task
+from thenar.runtime.toml_source import Source, read_source
+
 from .errors import ColumnsError, RecordingError
 from .names import check_names
 from .taxonomy import Taxonomy, own, published

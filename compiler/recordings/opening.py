@@ -9,7 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from ...runtime.files import open_file
+from thenar.runtime.files import open_file
+
 from .errors import TableError
 from .limits import LARGEST, LONGEST_LINE, unpacked
 

@@ -10,7 +10,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from unicodedata import decimal
 
-from ...runtime.names import LONGEST_SHOWN, MOST_COMPARED, shortened
+from thenar.runtime.names import LONGEST_SHOWN, MOST_COMPARED, shortened
+
 from .errors import RecordingError
 from .names import check_names
 

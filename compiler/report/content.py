@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.harness.wiring import Harness
-from ...runtime.manifest import Manifest
-from ...runtime.scanning.scanmap import ScanMap
-from ...runtime.tables import IntegerTables
+from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.scanning.scanmap import ScanMap
+from thenar.runtime.tables import IntegerTables
+
 from ..evaluation.study import Study
 from ..frontier.points import Frontier
 from ..hand import HandShape

@@ -1,6 +1,6 @@
 """What can be wrong with what a report is to be made of."""
 
-from ...runtime.errors import ThenarError
+from thenar.runtime.errors import ThenarError
 
 
 class ReportError(ThenarError, ValueError):

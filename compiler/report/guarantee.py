@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...runtime.tables import IntegerTables
+from thenar.runtime.tables import IntegerTables
+
 from ..boosting.stumps import TIE, Stumps
 from ..tables.collapse import collapse
 from ..tables.compare import Comparison

@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from ...runtime.manifest import Recognised
+from thenar.runtime.manifest import Recognised
+
 from .content import ReportContent
 from .numbers import counted, percent, sentence
 

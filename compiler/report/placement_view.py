@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 
-from ...runtime.manifest import Manifest, Switch
+from thenar.runtime.manifest import Manifest, Switch
+
 from ..hand import HandShape
 from ..placement.gain import entropy_bits
 from ..placement.tree import Tree

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import msgspec
 
-from ...runtime.manifest import Manifest, Options
+from thenar.runtime.manifest import Manifest, Options
+
 from .numbers import counted
 
 Pairs = tuple[tuple[str, str], ...]

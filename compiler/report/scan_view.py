@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...runtime.harness.wiring import Harness
-from ...runtime.scanning.scanmap import ScanMap
-from ...runtime.scanning.timing import glove_us, port_us, reading_of, scan_us, scanner_us
+from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.scanning.scanmap import ScanMap
+from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, scan_us, scanner_us
+
 from .numbers import counted, microseconds, percent
 
 

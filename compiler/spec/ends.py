@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 from msgspec.structs import replace
 
-from ...runtime.harness.wiring import BusWiring, ChipWiring, Harness
+from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
+
 from .packages import PACKAGES
 
 GROUND, SUPPLY = "GND", "VCC"

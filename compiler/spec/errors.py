@@ -1,6 +1,6 @@
 """What can go wrong between a build and the spec of its glove."""
 
-from ...drivers.errors import ThenarError
+from thenar.drivers.errors import ThenarError
 
 
 class SpecError(ThenarError, ValueError):

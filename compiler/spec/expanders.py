@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from ...runtime.harness.wiring import Harness, MuxChannel
+from thenar.runtime.harness.wiring import Harness, MuxChannel
+
 from .circuit import Circuit, Kind, capacitor, header, resistor
 from .ends import GROUND, SUPPLY, End, Unit
 from .packages import GROUND as GROUND_PINS

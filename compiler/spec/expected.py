@@ -2,10 +2,10 @@
 
 from msgspec import Struct
 
-from ...runtime.harness.wiring import Harness
-from ...runtime.manifest import Manifest, Recognised
-from ...runtime.scanning.scanmap import ScanMap
-from ...runtime.scanning.timing import glove_us, scan_us, scanner_us
+from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.manifest import Manifest, Recognised
+from thenar.runtime.scanning.scanmap import ScanMap
+from thenar.runtime.scanning.timing import glove_us, scan_us, scanner_us
 
 _SENSORS = 18
 

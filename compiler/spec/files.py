@@ -4,10 +4,11 @@ from collections.abc import Mapping, Sequence
 
 import msgspec
 
-from ...runtime.harness.wiring import Harness
-from ...runtime.harness.writing import harness_to_toml
-from ...runtime.manifest import Manifest
-from ...runtime.scanning.scanmap import ScanMap
+from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.harness.writing import harness_to_toml
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.scanning.scanmap import ScanMap
+
 from ..hand import HandShape
 from .dxf import dxf_of
 from .ends import BoardPins

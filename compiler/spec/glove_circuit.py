@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from ...runtime.harness.wiring import Harness
+from thenar.runtime.harness.wiring import Harness
+
 from .circuit import Circuit, Kind, Node, header, resistor, two_pins
 from .ends import GROUND, SUPPLY, End, Unit
 from .expanders import add_expanders

@@ -6,14 +6,15 @@ from dataclasses import dataclass
 from msgspec import Struct
 from msgspec.structs import replace
 
-from ...runtime.errors import HarnessError
-from ...runtime.harness.wiring import GloveWiring, Harness
-from ...runtime.manifest import Manifest
-from ...runtime.names import list_names
-from ...runtime.scanning.plan import check_harness
-from ...runtime.scanning.propose import propose_harness
-from ...runtime.scanning.scanmap import ScanMap
-from ...runtime.scanning.whole import whole_scan
+from thenar.runtime.errors import HarnessError
+from thenar.runtime.harness.wiring import GloveWiring, Harness
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.names import list_names
+from thenar.runtime.scanning.plan import check_harness
+from thenar.runtime.scanning.propose import propose_harness
+from thenar.runtime.scanning.scanmap import ScanMap
+from thenar.runtime.scanning.whole import whole_scan
+
 from ..hand import HandShape
 from .circuit import Circuit
 from .ends import BoardPins, End, as_soldered, ends_of

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from ...drivers.i2c import tca9548a
-from ...drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c import tca9548a
+from thenar.drivers.i2c.registry import CHIPS
 
 SUPPLY = ("VDD", "VCC", "VCCI", "VCCP")
 GROUND = ("VSS", "GND", "EP")

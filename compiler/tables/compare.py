@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.scorer import LANE_OFFSET, Scorer
-from ...runtime.tables import IntegerTables
+from thenar.runtime.scorer import LANE_OFFSET, Scorer
+from thenar.runtime.tables import IntegerTables
+
 from ..boosting.stumps import Stumps, winners
 from .collapse import Floats, ScoreTables, collapse
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.tables import IntegerTables
+from thenar.runtime.tables import IntegerTables
+
 from .collapse import HIGHEST_CODE
 
 OPEN, CLOSED, LOST = 0, 1, -1

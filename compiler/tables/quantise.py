@@ -10,7 +10,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.tables import IntegerTables
+from thenar.runtime.tables import IntegerTables
+
 from .balance import balance
 from .collapse import Floats, ScoreTables
 from .scales import finest_scale, kindest_scale

@@ -8,7 +8,8 @@ scale for that is some 4 steps per unit of score, where one for 16 bits is some 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.tables import FINEST_SCALE
+from thenar.runtime.tables import FINEST_SCALE
+
 from ..boosting.stumps import winners
 from .collapse import Floats, ScoreTables
 

@@ -15,7 +15,8 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.tables import IntegerTables
+from thenar.runtime.tables import IntegerTables
+
 from .collapse import HIGHEST_CODE, Floats, ScoreTables
 
 Exact = NDArray[np.object_]  # of Python's integers

@@ -2,10 +2,11 @@
 
 from collections.abc import Iterable, Iterator
 
-from ...drivers.errors import SettingError
-from ...drivers.i2c import tca9548a
-from ...drivers.i2c.registry import CHIPS
-from ...drivers.ports import device_fault, port_fault
+from thenar.drivers.errors import SettingError
+from thenar.drivers.i2c import tca9548a
+from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.ports import device_fault, port_fault
+
 from ..names import fault, nearest, shortened
 from ..toml_source import Place, spelled
 from .wiring import BusWiring, ChipWiring, GloveWiring, Harness

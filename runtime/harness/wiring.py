@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta, Struct, field
 
-from ...drivers.i2c.chip import Chip
-from ...drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chip import Chip
+from thenar.drivers.i2c.registry import CHIPS
 
 # A board's bitmap has no room for more.
 MOST_KEYS = 2000

@@ -7,9 +7,10 @@ from time import monotonic, perf_counter
 
 import msgspec
 
-from ...drivers.errors import ThenarError
-from ...drivers.i2c.scan import Scan
-from ...drivers.scanner_reading import BoardGrasp
+from thenar.drivers.errors import ThenarError
+from thenar.drivers.i2c.scan import Scan
+from thenar.drivers.scanner_reading import BoardGrasp
+
 from ..harness.wiring import GloveWiring, Harness, ScannerWiring
 from ..scanning.scanmap import ScanMap
 from ..scanning.timing import ChipTime, glove_us, scan_us

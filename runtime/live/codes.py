@@ -12,8 +12,9 @@ import math
 from collections.abc import Sequence
 from operator import getitem, itemgetter
 
-from ...drivers.calibration import GloveCalibration
-from ...drivers.errors import SettingError
+from thenar.drivers.calibration import GloveCalibration
+from thenar.drivers.errors import SettingError
+
 from ..errors import FrameError
 from ..manifest import Calibration
 from ..names import nearest

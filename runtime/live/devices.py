@@ -5,10 +5,11 @@ from dataclasses import fields
 from math import ceil
 from typing import Any
 
-from ...drivers.cyberglove import CyberGlove
-from ...drivers.cyberglove_timing import BITS_A_BYTE, shortest_us
-from ...drivers.debounce import Debouncer
-from ...drivers.scanner import Scanner
+from thenar.drivers.cyberglove import CyberGlove
+from thenar.drivers.cyberglove_timing import BITS_A_BYTE, shortest_us
+from thenar.drivers.debounce import Debouncer
+from thenar.drivers.scanner import Scanner
+
 from ..harness.wiring import Debounce, GloveWiring, ScannerWiring
 from .frames import GloveFrame, SwitchFrame
 from .health import Count

@@ -3,8 +3,9 @@
 import time
 from collections.abc import Callable
 
-from ...drivers.i2c.bus import ChipAt, I2cBus, PortRead
-from ...drivers.i2c.scan import Scan
+from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead
+from thenar.drivers.i2c.scan import Scan
+
 from ..harness.wiring import Debounce, Harness
 from ..scanning.earlyexit import EarlyExit
 from ..scanning.scanmap import Port, ScanMap

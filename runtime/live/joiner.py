@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from typing import Protocol
 
-from ...drivers.calibration import GloveCalibration
+from thenar.drivers.calibration import GloveCalibration
+
 from ..build import Build
 from ..scanning.earlyexit import EarlyExit
 from ..scanning.reach import Reach

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from threading import Event, Thread
 from typing import Generic, Protocol, TypeVar
 
-from ...drivers.errors import DeviceError, SettingError
+from thenar.drivers.errors import DeviceError, SettingError
+
 from .frames import now_us
 
 T_co = TypeVar("T_co", covariant=True)

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from ...drivers.errors import SettingError
+from thenar.drivers.errors import SettingError
 
 # Beyond them no frames that a hand can hold ever decide.
 _LARGEST_LEAD = 1e6

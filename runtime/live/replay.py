@@ -3,7 +3,8 @@
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from ...drivers.errors import SettingError
+from thenar.drivers.errors import SettingError
+
 from ..build import Build
 from ..harness.loading import parse_harness
 from ..recording.reader import Reader

@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...drivers.calibration import GloveCalibration
-from ...drivers.cyberglove_sensors import SENSORS_18, SENSORS_22
+from thenar.drivers.calibration import GloveCalibration
+from thenar.drivers.cyberglove_sensors import SENSORS_18, SENSORS_22
+
 from ..build import Build
 from ..calibration import load_calibration
 from ..harness.wiring import GloveWiring, Harness

@@ -1,6 +1,6 @@
 """What can be wrong with a recording."""
 
-from ...drivers.errors import ThenarError
+from thenar.drivers.errors import ThenarError
 
 
 class McapError(ThenarError, ValueError):

@@ -13,7 +13,8 @@ from zlib import crc32
 from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, DataEnd, Footer, Header, McapRecord, Metadata, MetadataIndex, Schema, Statistics
 
-from ...drivers.errors import SettingError
+from thenar.drivers.errors import SettingError
+
 from .cdr import BYTES, DEFINITIONS, STRING
 from .errors import McapError
 from .session import METADATA, Session, from_metadata, to_metadata

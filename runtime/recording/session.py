@@ -10,7 +10,8 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec.structs import fields
 
-from ...drivers.calibration import GloveCalibration
+from thenar.drivers.calibration import GloveCalibration
+
 from ..live.policy import Policy
 from ..names import fault, shortened
 from .errors import McapError

@@ -4,7 +4,8 @@ import random
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...drivers.errors import SettingError
+from thenar.drivers.errors import SettingError
+
 from .layout import Tail
 from .reader import Reader
 from .session import MOST_TRIALS, Collection, Label, Session

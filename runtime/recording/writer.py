@@ -8,7 +8,8 @@ from typing import Self
 import msgspec
 from msgspec.structs import replace
 
-from ...drivers.errors import SettingError
+from thenar.drivers.errors import SettingError
+
 from ..files import write_atomically
 from ..live.frames import GloveFrame, SwitchFrame
 from ..live.published import LiveGrasp

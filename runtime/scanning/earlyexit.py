@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from functools import lru_cache
 from operator import add
 
-from ...drivers.errors import SettingError
+from thenar.drivers.errors import SettingError
+
 from ..live.frames import Mask
 from ..live.scores import LiveScores
 from ..tables import IntegerTables

@@ -3,9 +3,10 @@
 from collections.abc import Iterator, Sequence
 from itertools import islice
 
-from ...drivers.i2c import tca9548a
-from ...drivers.i2c.chip import Chip
-from ...drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c import tca9548a
+from thenar.drivers.i2c.chip import Chip
+from thenar.drivers.i2c.registry import CHIPS
+
 from ..errors import HarnessError
 from ..harness.wiring import MOST_KEYS, BusWiring, ChipWiring, GloveWiring, Harness, MuxChannel, ScannerWiring
 from ..names import nearest

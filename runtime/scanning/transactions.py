@@ -3,7 +3,8 @@
 from collections.abc import Collection, Mapping
 from itertools import combinations
 
-from ...drivers.i2c.chip import Chip, Reading
+from thenar.drivers.i2c.chip import Chip, Reading
+
 from ..harness.wiring import ChipWiring, Harness
 from .scanmap import Pair, Port
 

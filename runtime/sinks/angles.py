@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from ...drivers.errors import SettingError
+from thenar.drivers.errors import SettingError
 
 if TYPE_CHECKING:
-    from ...drivers.calibration import GloveCalibration
+    from thenar.drivers.calibration import GloveCalibration
 
 _BYTES = range(256)
 

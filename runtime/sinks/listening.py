@@ -10,7 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from time import monotonic
 
-from ...drivers.errors import SettingError
+from thenar.drivers.errors import SettingError
+
 from .sink import SinkError
 from .sockets import SocketLines
 

@@ -1,6 +1,7 @@
 """Sinks by name."""
 
-from ...drivers.errors import SettingError
+from thenar.drivers.errors import SettingError
+
 from ..names import shortened
 from .jsonlines import open_jsonlines
 from .listening import open_tcp, open_unix

@@ -3,7 +3,7 @@
 import os
 import re
 
-from ...drivers.errors import SettingError
+from thenar.drivers.errors import SettingError
 
 _MAX_DOMAIN = 232  # above it the ports of DDS would pass 65535
 _MAX_LENGTH = 200

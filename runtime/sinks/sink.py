@@ -4,7 +4,8 @@ from typing import Protocol
 
 import msgspec
 
-from ...drivers.errors import ThenarError
+from thenar.drivers.errors import ThenarError
+
 from ..live.health import HealthReport
 from ..live.published import LiveGrasp
 from ..preshape.preshape import Preshape

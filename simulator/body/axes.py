@@ -8,7 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.elementary import add_up, sincos
+from thenar.compiler.elementary import add_up, sincos
+
 from .anthropometry import FAN_DEG
 
 Floats = NDArray[np.float64]

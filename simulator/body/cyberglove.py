@@ -10,8 +10,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.recordings.graspset import Joint
-from ...drivers.cyberglove_sensors import SENSORS_18
+from thenar.compiler.recordings.graspset import Joint
+from thenar.drivers.cyberglove_sensors import SENSORS_18
+
 from ..streams import Draw, Draws, Site
 from .anthropometry import FAN_DEG
 from .hand import DOF

@@ -16,7 +16,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.elementary import add_up, sincos
+from thenar.compiler.elementary import add_up, sincos
+
 from .anthropometry import DIGITS, Size
 from .axes import ABDUCTORS, BETWEEN, REST, about_y, about_z, frame, thumb_times
 

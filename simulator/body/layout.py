@@ -11,7 +11,8 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.elementary import sincos
+from thenar.compiler.elementary import sincos
+
 from .hand import CAPSULES, TIP_SPHERE, Hand, Skeleton
 
 Floats = NDArray[np.float64]

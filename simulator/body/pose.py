@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.elementary import sincos
+from thenar.compiler.elementary import sincos
+
 from .shapes import Shape
 
 Floats = NDArray[np.float64]

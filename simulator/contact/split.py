@@ -8,7 +8,8 @@ is returned as such.
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.elementary import add_up
+from thenar.compiler.elementary import add_up
+
 from ..body.hand import CAPSULES
 from ..body.layout import Switches
 

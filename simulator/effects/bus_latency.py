@@ -6,7 +6,8 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from ...compiler.elementary import log
+from thenar.compiler.elementary import log
+
 from ..body.layout import murakami160
 from ..errors import SceneError
 from ..pipeline import ports

@@ -4,7 +4,8 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from ...compiler.elementary import exp
+from thenar.compiler.elementary import exp
+
 from ..pipeline.batch import Batch
 from ..pipeline.effect import Effect, EffectParameters, Setting, Step
 from ..streams import Draw

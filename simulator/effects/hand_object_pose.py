@@ -6,7 +6,8 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from ...compiler.elementary import sincos
+from thenar.compiler.elementary import sincos
+
 from ..pipeline.batch import Batch
 from ..pipeline.effect import Effect, EffectParameters, Setting, Step
 from ..streams import Draw

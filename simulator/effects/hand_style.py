@@ -5,7 +5,8 @@ from typing import Annotated
 import numpy as np
 from msgspec import Meta
 
-from ...compiler.elementary import exp
+from thenar.compiler.elementary import exp
+
 from ..body.hand import DOF, LIMITS_DEG
 from ..pipeline.batch import Batch
 from ..pipeline.effect import Effect, EffectParameters, Setting, Step

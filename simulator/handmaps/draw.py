@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...compiler.pictures import painting, rendered
+from thenar.compiler.pictures import painting, rendered
+
 from .handpaint import LINE, SIDE, bounds, colour, paint, paint_dot
 from .handpanels import Dot, Picture
 

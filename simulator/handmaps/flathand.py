@@ -12,7 +12,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.elementary import sincos
+from thenar.compiler.elementary import sincos
+
 from ..body.anthropometry import Size
 from ..body.hand import Hand
 

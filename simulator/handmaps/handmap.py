@@ -11,8 +11,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.recordings.names import nearest
-from ...drivers.errors import ThenarError
+from thenar.compiler.recordings.names import nearest
+from thenar.drivers.errors import ThenarError
+
 from ..body.anthropometry import DIGITS
 from ..body.layout import Switches, murakami160
 from .flathand import HAND, Floats, Ray, palm_at, rays

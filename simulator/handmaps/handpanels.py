@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.recordings.graspset import GraspSet
+from thenar.compiler.recordings.graspset import GraspSet
+
 from .handmap import PARTS, HandMap, MapError, hand_map
 
 

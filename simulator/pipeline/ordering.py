@@ -9,7 +9,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 
-from ...compiler.recordings.names import nearest
+from thenar.compiler.recordings.names import nearest
+
 from ..errors import SceneError
 from .effect import STAGES, Effect
 from .registry import NAMES

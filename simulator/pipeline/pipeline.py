@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from time import perf_counter_ns
 
-from ...compiler.recordings.names import nearest
+from thenar.compiler.recordings.names import nearest
+
 from ..contact.model import ContactModel, load_of, take
 from ..errors import SceneError
 from ..scenes.scene import Scene

@@ -3,7 +3,8 @@
 from importlib import import_module
 from types import ModuleType
 
-from ...compiler.recordings.names import nearest
+from thenar.compiler.recordings.names import nearest
+
 from ..errors import SceneError
 
 # In the order in which they act where nothing else decides.

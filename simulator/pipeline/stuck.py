@@ -7,7 +7,8 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from ...compiler.recordings.names import nearest
+from thenar.compiler.recordings.names import nearest
+
 from ..body.layout import murakami160
 from ..errors import SceneError
 from ..streams import Draw

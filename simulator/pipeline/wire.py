@@ -10,8 +10,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ...drivers import cyberglove_frame as glove
-from ...drivers import scanner_frame as scanner
+from thenar.drivers import cyberglove_frame as glove
+from thenar.drivers import scanner_frame as scanner
+
 from ..body.layout import murakami160
 from ..errors import SceneError
 from ..streams import Draw

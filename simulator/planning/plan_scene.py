@@ -4,7 +4,8 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from importlib.resources import files
 
-from ...compiler.workers import in_workers
+from thenar.compiler.workers import in_workers
+
 from ..errors import PlanError, SceneError
 from ..scenes.scene import Scene, SceneObject
 from .object_plan import EVERY_MM, Planned, Work, plan_object

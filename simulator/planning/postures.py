@@ -16,9 +16,10 @@ from typing import Annotated, Self
 import msgspec
 import numpy as np
 
-from ...runtime.files import read_file, write_atomically
-from ...runtime.names import shortened
-from ...runtime.nesting import check_json
+from thenar.runtime.files import read_file, write_atomically
+from thenar.runtime.names import shortened
+from thenar.runtime.nesting import check_json
+
 from ..body.anthropometry import Size
 from ..body.condition import Held, Pad, Thing
 from ..body.hand import Hand

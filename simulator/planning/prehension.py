@@ -13,9 +13,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.recordings.names import nearest
-from ...runtime.toml_source import Place, Source, read_source
-from ...runtime.toml_struct import as_table, check_finite, convert
+from thenar.compiler.recordings.names import nearest
+from thenar.runtime.toml_source import Place, Source, read_source
+from thenar.runtime.toml_struct import as_table, check_finite, convert
+
 from ..body.anthropometry import DIGITS, Size
 from ..body.hand import CAPSULES, LIMITS_DEG, Hand
 from ..errors import SceneError

@@ -8,12 +8,13 @@ from typing import Self
 
 import msgspec
 
-from ...drivers.emulated.cyberglove import EmulatedCyberGlove
-from ...drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, EmulatedI2c
-from ...drivers.emulated.pty_line import PtyLine
-from ...drivers.emulated.scanner import EmulatedScanner
-from ...runtime.harness.wiring import BusWiring, Harness
-from ...runtime.live.devices import sensors_of
+from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
+from thenar.drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, EmulatedI2c
+from thenar.drivers.emulated.pty_line import PtyLine
+from thenar.drivers.emulated.scanner import EmulatedScanner
+from thenar.runtime.harness.wiring import BusWiring, Harness
+from thenar.runtime.live.devices import sensors_of
+
 from .cable import Cable
 from .levels import levels_of
 

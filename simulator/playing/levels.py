@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from ...runtime.harness.wiring import ChipWiring
+from thenar.runtime.harness.wiring import ChipWiring
 
 _ALL_HIGH = (1 << 24) - 1
 

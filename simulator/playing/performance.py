@@ -6,8 +6,9 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.recordings.graspset import GraspSet
-from ...drivers.calibration import GloveCalibration, SensorCalibration
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.drivers.calibration import GloveCalibration, SensorCalibration
+
 from ..body.cyberglove import SENSORS, USED, Calibration
 from ..errors import SceneError
 from ..running.simulation import Progress, simulate

@@ -5,11 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ...runtime.live.frames import GloveFrame, SwitchFrame
-from ...runtime.live.published import UNKNOWN, LiveGrasp
-from ...runtime.recording.frame_bytes import switch_matrix
-from ...runtime.recording.reader import Reader, check_made
-from ...runtime.recording.session import Label
+from thenar.runtime.live.frames import GloveFrame, SwitchFrame
+from thenar.runtime.live.published import UNKNOWN, LiveGrasp
+from thenar.runtime.recording.frame_bytes import switch_matrix
+from thenar.runtime.recording.reader import Reader, check_made
+from thenar.runtime.recording.session import Label
+
 from ..errors import SceneError
 from .performance import Performance, resting, typical
 

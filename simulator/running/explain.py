@@ -2,7 +2,8 @@
 
 import msgspec
 
-from ...compiler.workers import workers_of
+from thenar.compiler.workers import workers_of
+
 from ..pipeline.frames import at_a_time
 from ..pipeline.ledger import Entry, Ledger
 from ..pipeline.pipeline import Pipeline, Stop, compile_pipeline

@@ -6,8 +6,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.recordings.graspset import GraspSet, Joint
-from ...compiler.recordings.taxonomy import Taxonomy
+from thenar.compiler.recordings.graspset import GraspSet, Joint
+from thenar.compiler.recordings.taxonomy import Taxonomy
+
 from ..body.condition import Condition
 from ..pipeline.batch import Batch, Bits
 

@@ -7,9 +7,10 @@ from time import perf_counter
 
 import numpy as np
 
-from ...compiler.recordings.graspset import GraspSet
-from ...compiler.recordings.taxonomy import published
-from ...compiler.workers import in_workers
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.recordings.taxonomy import published
+from thenar.compiler.workers import in_workers
+
 from ..body.cyberglove import USED, Calibration, common_joints, raw_joints
 from ..body.layout import murakami160
 from ..errors import SceneError

@@ -9,11 +9,12 @@ from typing import get_args
 
 import msgspec
 
-from ...compiler.recordings.errors import RecordingError
-from ...compiler.recordings.names import fault, list_names, nearest
-from ...compiler.recordings.taxonomy import Taxonomy, published
-from ...runtime.toml_source import Place, Source, read_source
-from ...runtime.toml_struct import as_list, as_table, check_finite, check_keys, convert
+from thenar.compiler.recordings.errors import RecordingError
+from thenar.compiler.recordings.names import fault, list_names, nearest
+from thenar.compiler.recordings.taxonomy import Taxonomy, published
+from thenar.runtime.toml_source import Place, Source, read_source
+from thenar.runtime.toml_struct import as_list, as_table, check_finite, check_keys, convert
+
 from ..body.shapes import Shape
 from ..errors import SceneError
 from .scene import SceneObject

@@ -9,10 +9,11 @@ from typing import Annotated
 
 import msgspec
 
-from ...compiler.recordings.names import fault, nearest
-from ...compiler.recordings.taxonomy import Taxonomy
-from ...runtime.toml_source import Source, read_source
-from ...runtime.toml_struct import as_list, as_table, check_finite, convert
+from thenar.compiler.recordings.names import fault, nearest
+from thenar.compiler.recordings.taxonomy import Taxonomy
+from thenar.runtime.toml_source import Source, read_source
+from thenar.runtime.toml_struct import as_list, as_table, check_finite, convert
+
 from ..errors import SceneError, ThenarError
 from ..pipeline import registry
 from ..pipeline.effect import EffectParameters

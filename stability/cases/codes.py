@@ -11,14 +11,15 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.boosting.binning import midpoints
-from ...compiler.boosting.boost import boost
-from ...compiler.recordings.columns import Columns, JointColumns
-from ...compiler.recordings.errors import TableError
-from ...compiler.recordings.graspset import GraspSet
-from ...compiler.recordings.importer import ImportReport, import_table
-from ...compiler.recordings.table import read_table
-from ...compiler.tables.collapse import HIGHEST_CODE, collapse
+from thenar.compiler.boosting.binning import midpoints
+from thenar.compiler.boosting.boost import boost
+from thenar.compiler.recordings.columns import Columns, JointColumns
+from thenar.compiler.recordings.errors import TableError
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.recordings.importer import ImportReport, import_table
+from thenar.compiler.recordings.table import read_table
+from thenar.compiler.tables.collapse import HIGHEST_CODE, collapse
+
 from ..finding import Case, Finding, Worst
 from ..inputs.hard_cells import HARD_DEGREES, HARD_DOUBLES, NO_BITS, NO_CODES, NO_FLOATS, NO_NUMBERS, NO_TRIALS
 

@@ -7,10 +7,11 @@ from itertools import combinations, product
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.boosting.boost import boost
-from ...compiler.placement.gain import Counts, best_position, compare_scores
-from ...compiler.placement.id3 import grow_id3
-from ...compiler.placement.tree import Tree
+from thenar.compiler.boosting.boost import boost
+from thenar.compiler.placement.gain import Counts, best_position, compare_scores
+from thenar.compiler.placement.id3 import grow_id3
+from thenar.compiler.placement.tree import Tree
+
 from ..finding import Case, Finding, Worst
 from ..inputs.hard_counts import node_of
 from ..inputs.small_sets import parity

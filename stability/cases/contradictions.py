@@ -10,8 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...compiler.boosting.boost import boost
-from ...compiler.boosting.stumps import winners
+from thenar.compiler.boosting.boost import boost
+from thenar.compiler.boosting.stumps import winners
+
 from ..checks.class_rounds import see_round
 from ..checks.counted import entropy_left, idle_loss, resting_error
 from ..checks.rounds import loss_rounding, moments, rise_rounding

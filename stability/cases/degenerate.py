@@ -8,15 +8,16 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from ...compiler.boosting.boost import boost
-from ...compiler.boosting.stumps import Stumps, winners
-from ...compiler.build.compile import compile_build
-from ...compiler.elementary import softmax
-from ...compiler.evaluation.study import Options, evaluate
-from ...compiler.placement.placement import place
-from ...compiler.recordings.graspset import GraspSet
-from ...drivers.errors import ThenarError
-from ...runtime.build import Build
+from thenar.compiler.boosting.boost import boost
+from thenar.compiler.boosting.stumps import Stumps, winners
+from thenar.compiler.build.compile import compile_build
+from thenar.compiler.elementary import softmax
+from thenar.compiler.evaluation.study import Options, evaluate
+from thenar.compiler.placement.placement import place
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.drivers.errors import ThenarError
+from thenar.runtime.build import Build
+
 from ..finding import Case, Finding, Worst
 from ..inputs.small_sets import make_set, one_hot
 from ..reference.numbers import precisely, ulps

@@ -7,7 +7,8 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from ...compiler.elementary import add_exactly, add_up, exp, log, sincos, softmax, softmax_and_loss
+from thenar.compiler.elementary import add_exactly, add_up, exp, log, sincos, softmax, softmax_and_loss
+
 from ..checks.roundings import ROUNDING, loss_error, part_of, share_error
 from ..finding import Case, Finding, Worst
 from ..inputs.hard_scores import hard_scores

@@ -7,8 +7,9 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from ...compiler.placement.cooccurrence import Cooccurrence
-from ...compiler.placement.gain import best_position, compare_scores, entropy_bits, gain_bits
+from thenar.compiler.placement.cooccurrence import Cooccurrence
+from thenar.compiler.placement.gain import best_position, compare_scores, entropy_bits, gain_bits
+
 from ..checks.roundings import ROUNDING, part_of
 from ..finding import Case, Finding, Worst
 from ..inputs.hard_counts import BitSet, Counts, bit_set, close_pairs, equal_pairs, hand_made, node_of, random_table

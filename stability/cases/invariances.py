@@ -10,7 +10,8 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ...compiler.placement.id3 import grow_id3
+from thenar.compiler.placement.id3 import grow_id3
+
 from ..checks.counted import counted
 from ..checks.learnt import Learnt, learn, numbers
 from ..checks.partings import SAME, Partings

@@ -6,9 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.tables.collapse import HIGHEST_CODE
-from ...runtime.recognizer import Frame, Recognizer
-from ...runtime.scorer import LANE_OFFSET
+from thenar.compiler.tables.collapse import HIGHEST_CODE
+from thenar.runtime.recognizer import Frame, Recognizer
+from thenar.runtime.scorer import LANE_OFFSET
+
 from ..checks.exact_means import ExactMeans
 from ..checks.lost_inputs import Loss, changes, every_loss, worst_frames
 from ..checks.ties import first_best

@@ -3,9 +3,10 @@
 from collections.abc import Iterator
 from itertools import permutations
 
-from ...compiler.tables.compare import float_slack
-from ...compiler.tables.worstcase import Rounding
-from ...runtime.tables import MAX_SWITCHES
+from thenar.compiler.tables.compare import float_slack
+from thenar.compiler.tables.worstcase import Rounding
+from thenar.runtime.tables import MAX_SWITCHES
+
 from ..checks.exact_frames import BothWays, lost
 from ..checks.integer_sums import furthest_sums, largest
 from ..checks.scales import finest_scales

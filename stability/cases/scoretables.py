@@ -8,10 +8,11 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from ...compiler.boosting.stumps import Stumps
-from ...compiler.tables.balance import balance
-from ...compiler.tables.collapse import ScoreTables, collapse
-from ...compiler.tables.quantise import quantise
+from thenar.compiler.boosting.stumps import Stumps
+from thenar.compiler.tables.balance import balance
+from thenar.compiler.tables.collapse import ScoreTables, collapse
+from thenar.compiler.tables.quantise import quantise
+
 from ..checks.roundings import ROUNDING, SMALLEST, part_of
 from ..finding import Case, Finding, Worst
 from ..inputs.hard_ensembles import SWITCHES, ensembles, frames

@@ -14,11 +14,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...compiler.boosting.boost import History, boost
-from ...compiler.boosting.stumps import Stumps, winners
-from ...compiler.tables.collapse import collapse
-from ...compiler.tables.quantise import quantise
-from ...runtime.tables import LIMIT, IntegerTables
+from thenar.compiler.boosting.boost import History, boost
+from thenar.compiler.boosting.stumps import Stumps, winners
+from thenar.compiler.tables.collapse import collapse
+from thenar.compiler.tables.quantise import quantise
+from thenar.runtime.tables import LIMIT, IntegerTables
+
 from ..checks.integer_sums import largest_sum
 from ..checks.roundings import ROUNDING, loss_error, part_of
 from ..checks.rounds import Moment, loss_rounding, moments, rise_rounding

@@ -6,9 +6,10 @@ from itertools import product
 import numpy as np
 from mpmath import mpf
 
-from ...compiler.evaluation.folds import Fold, weka_folds
-from ...compiler.evaluation.rates import Average, Rate
-from ...compiler.evaluation.study import Options, evaluate
+from thenar.compiler.evaluation.folds import Fold, weka_folds
+from thenar.compiler.evaluation.rates import Average, Rate
+from thenar.compiler.evaluation.study import Options, evaluate
+
 from ..checks.roundings import ROUNDING
 from ..finding import Case, Finding, Worst
 from ..inputs.lopsided import differs, guessed_untrained, lopsided, parts_of, tested_labels

@@ -7,8 +7,9 @@ from fractions import Fraction
 import numpy as np
 from mpmath import mpf
 
-from ...compiler.boosting.binning import bin_columns, midpoints
-from ...compiler.boosting.stumpfit import FittedStumps, Targets, fit_stumps
+from thenar.compiler.boosting.binning import bin_columns, midpoints
+from thenar.compiler.boosting.stumpfit import FittedStumps, Targets, fit_stumps
+
 from ..checks.class_rounds import ClassRound, branches
 from ..checks.trainings import trainings
 from ..finding import Case, Finding, Worst

@@ -7,9 +7,10 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from ...compiler.boosting.boost import weights_and_responses
-from ...compiler.boosting.exactsums import on_grids
-from ...compiler.elementary import softmax
+from thenar.compiler.boosting.boost import weights_and_responses
+from thenar.compiler.boosting.exactsums import on_grids
+from thenar.compiler.elementary import softmax
+
 from ..checks.roundings import ROUNDING, SMALLEST, share_error
 from ..finding import Case, Finding, Worst
 from ..inputs.hard_scores import hard_scores

@@ -10,7 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...compiler.boosting.boost import boost
+from thenar.compiler.boosting.boost import boost
+
 from ..checks.class_rounds import see_round
 from ..checks.drift import drift
 from ..checks.roundings import ROUNDING

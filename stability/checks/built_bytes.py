@@ -15,10 +15,10 @@ import msgspec
 import numpy as np
 from threadpoolctl import threadpool_info
 
-from ...compiler.build.compile import compile_build
-from ...runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, TABLES_NAME
-from ...simulator.running.simulation import simulate
-from ...simulator.scenes.decode import load_scene
+from thenar.compiler.build.compile import compile_build
+from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, TABLES_NAME
+from thenar.simulator.running.simulation import simulate
+from thenar.simulator.scenes.decode import load_scene
 
 SCENE = "quick"  # 160 switches, 16 joints, 14 grasp types, two hands
 SMALL = 3, 20, 2  # repetitions, rounds, folds: about half a second

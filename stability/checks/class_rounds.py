@@ -11,7 +11,8 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from ...compiler.boosting.stumps import Stumps
+from thenar.compiler.boosting.stumps import Stumps
+
 from ..finding import Worst
 from ..inputs.hard_data import Floats, HardSet
 from ..reference import stumps as truth

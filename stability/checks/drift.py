@@ -7,9 +7,10 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from ...compiler.boosting.boost import boost
-from ...compiler.boosting.stumps import Stumps, centred
-from ...compiler.elementary import add_up
+from thenar.compiler.boosting.boost import boost
+from thenar.compiler.boosting.stumps import Stumps, centred
+from thenar.compiler.elementary import add_up
+
 from ..finding import Finding, Worst
 from ..inputs.hard_data import Floats, noisy
 from ..reference import ensembles

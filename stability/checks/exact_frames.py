@@ -4,9 +4,10 @@ from collections.abc import Sequence
 
 from mpmath import mpf
 
-from ...compiler.tables.collapse import ScoreTables
-from ...runtime.scorer import LANE_OFFSET, Scorer
-from ...runtime.tables import IntegerTables
+from thenar.compiler.tables.collapse import ScoreTables
+from thenar.runtime.scorer import LANE_OFFSET, Scorer
+from thenar.runtime.tables import IntegerTables
+
 from ..reference.numbers import precisely
 from ..reference.tables import table_scores
 

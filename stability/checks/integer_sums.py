@@ -7,9 +7,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.tables.furthest import furthest
-from ...runtime.scorer import LANE_OFFSET, Scorer
-from ...runtime.tables import (
+from thenar.compiler.tables.furthest import furthest
+from thenar.runtime.scorer import LANE_OFFSET, Scorer
+from thenar.runtime.tables import (
     LIMIT,
     MAX_CLASSES,
     MAX_JOINTS,
@@ -18,6 +18,7 @@ from ...runtime.tables import (
     tables_from_bytes,
     tables_to_bytes,
 )
+
 from ..finding import Finding, Worst
 from ..inputs.hard_tables import whole_numbers
 

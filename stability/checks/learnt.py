@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.boosting.boost import boost
-from ...compiler.boosting.stumps import Stumps
-from ...compiler.placement.id3 import grow_id3
-from ...compiler.placement.tree import Tree
-from ...compiler.tables.collapse import ScoreTables, collapse
-from ...compiler.tables.quantise import quantise
-from ...runtime.tables import IntegerTables
+from thenar.compiler.boosting.boost import boost
+from thenar.compiler.boosting.stumps import Stumps
+from thenar.compiler.placement.id3 import grow_id3
+from thenar.compiler.placement.tree import Tree
+from thenar.compiler.tables.collapse import ScoreTables, collapse
+from thenar.compiler.tables.quantise import quantise
+from thenar.runtime.tables import IntegerTables
+
 from ..inputs.hard_data import HardSet
 
 ROUNDS = 30

@@ -7,10 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.tables.collapse import HIGHEST_CODE
-from ...compiler.tables.furthest import furthest
-from ...runtime.build import Build
-from ...runtime.tables import IntegerTables
+from thenar.compiler.tables.collapse import HIGHEST_CODE
+from thenar.compiler.tables.furthest import furthest
+from thenar.runtime.build import Build
+from thenar.runtime.tables import IntegerTables
+
 from ..inputs.hard_tables import Bits, Codes
 
 

@@ -4,8 +4,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ...compiler.boosting.boost import boost
-from ...compiler.boosting.stumps import TIE, Stumps
+from thenar.compiler.boosting.boost import boost
+from thenar.compiler.boosting.stumps import TIE, Stumps
+
 from ..finding import Finding, Worst
 from ..inputs.changes import Change
 from ..inputs.hard_data import Floats, HardSet

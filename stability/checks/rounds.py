@@ -7,9 +7,10 @@ from itertools import chain
 
 import numpy as np
 
-from ...compiler.boosting.boost import weights_and_responses
-from ...compiler.boosting.stumps import Stumps
-from ...compiler.elementary import softmax_and_loss
+from thenar.compiler.boosting.boost import weights_and_responses
+from thenar.compiler.boosting.stumps import Stumps
+from thenar.compiler.elementary import softmax_and_loss
+
 from ..inputs.hard_data import Floats, HardSet
 from .roundings import ROUNDING
 

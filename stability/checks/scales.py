@@ -2,8 +2,9 @@
 
 import math
 
-from ...compiler.tables.balance import balance
-from ...compiler.tables.collapse import ScoreTables
+from thenar.compiler.tables.balance import balance
+from thenar.compiler.tables.collapse import ScoreTables
+
 from ..finding import Finding, Worst
 from ..inputs.hard_tables import dominated, drawn, quantised, rows_of
 from ..reference.tables import steps

@@ -6,10 +6,11 @@ from itertools import product
 
 import numpy as np
 
-from ...compiler.tables.furthest import furthest
-from ...runtime.errors import BuildError
-from ...runtime.scorer import LANE_OFFSET, Scorer
-from ...runtime.tables import LIMIT, MAX_CLASSES, IntegerTables, tables_from_bytes, tables_to_bytes
+from thenar.compiler.tables.furthest import furthest
+from thenar.runtime.errors import BuildError
+from thenar.runtime.scorer import LANE_OFFSET, Scorer
+from thenar.runtime.tables import LIMIT, MAX_CLASSES, IntegerTables, tables_from_bytes, tables_to_bytes
+
 from ..finding import Finding, Worst
 
 # What can add the last step to a sum, and in which array it stands.

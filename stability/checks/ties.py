@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...runtime.recognizer import Frame, Recognizer
+from thenar.runtime.recognizer import Frame, Recognizer
+
 from ..finding import Finding, Worst
 from ..inputs.bare_build import bare_build
 from ..inputs.hard_tables import every_frame, whole_numbers

@@ -7,8 +7,9 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from ...compiler.boosting.boost import boost
-from ...compiler.boosting.stumps import Stumps
+from thenar.compiler.boosting.boost import boost
+from thenar.compiler.boosting.stumps import Stumps
+
 from ..finding import Finding, Worst
 from ..reference.ensembles import Round, boost_rounds
 from ..reference.numbers import precisely

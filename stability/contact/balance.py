@@ -6,11 +6,12 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
-from ...simulator.body.hand import LIMITS_DEG
-from ...simulator.body.pose import rotation
-from ...simulator.contact.grip import GRAVITY, STIFFNESS
-from ...simulator.contact.quasistatic import Case, Rest, Skin
-from ...simulator.contact.quasistatic.balance import HOLD_N_PER_MM, HOLD_NMM_PER_RAD, LIMIT_NMM_PER_RAD
+from thenar.simulator.body.hand import LIMITS_DEG
+from thenar.simulator.body.pose import rotation
+from thenar.simulator.contact.grip import GRAVITY, STIFFNESS
+from thenar.simulator.contact.quasistatic import Case, Rest, Skin
+from thenar.simulator.contact.quasistatic.balance import HOLD_N_PER_MM, HOLD_NMM_PER_RAD, LIMIT_NMM_PER_RAD
+
 from ..checks.roundings import ROUNDING
 from ..reference.numbers import precisely
 from .posed import Digit, centres, digits

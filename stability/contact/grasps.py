@@ -10,15 +10,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...simulator.body.anthropometry import Size
-from ...simulator.body.condition import Condition, Held, Pad, Thing
-from ...simulator.body.hand import Hand
-from ...simulator.body.shapes import Box, Cylinder, Shape, Sphere
-from ...simulator.contact.model import Load
-from ...simulator.contact.quasistatic import Case
-from ...simulator.planning.postures import Postures
-from ...simulator.scenes.decode import load_scene
-from ...simulator.scenes.population import SURVEYS
+from thenar.simulator.body.anthropometry import Size
+from thenar.simulator.body.condition import Condition, Held, Pad, Thing
+from thenar.simulator.body.hand import Hand
+from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
+from thenar.simulator.contact.model import Load
+from thenar.simulator.contact.quasistatic import Case
+from thenar.simulator.planning.postures import Postures
+from thenar.simulator.scenes.decode import load_scene
+from thenar.simulator.scenes.population import SURVEYS
 
 Floats = NDArray[np.float64]
 

@@ -12,15 +12,16 @@ from importlib.util import find_spec
 import numpy as np
 from numpy.typing import NDArray
 
-from ...simulator.body.layout import murakami160
-from ...simulator.contact.model import SLID_OUT_MM, Contact, Load
-from ...simulator.contact.quasistatic import USUAL, Pace
-from ...simulator.effects import contact_mujoco, switch_threshold
-from ...simulator.effects.contact_quasistatic import Parameters, Quasistatic
-from ...simulator.effects.contact_ramp import crossings
-from ...simulator.planning.postures import Postures
-from ...simulator.running.session import conditions_of
-from ...simulator.scenes.decode import load_scene
+from thenar.simulator.body.layout import murakami160
+from thenar.simulator.contact.model import SLID_OUT_MM, Contact, Load
+from thenar.simulator.contact.quasistatic import USUAL, Pace
+from thenar.simulator.effects import contact_mujoco, switch_threshold
+from thenar.simulator.effects.contact_quasistatic import Parameters, Quasistatic
+from thenar.simulator.effects.contact_ramp import crossings
+from thenar.simulator.planning.postures import Postures
+from thenar.simulator.running.session import conditions_of
+from thenar.simulator.scenes.decode import load_scene
+
 from ..finding import Finding, Worst
 from .rest import models
 

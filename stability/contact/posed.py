@@ -10,9 +10,10 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
-from ...simulator.body.axes import ABDUCTORS, BETWEEN, REST
-from ...simulator.body.hand import Hand
-from ...simulator.body.shapes import Box, Cylinder, Shape, Sphere
+from thenar.simulator.body.axes import ABDUCTORS, BETWEEN, REST
+from thenar.simulator.body.hand import Hand
+from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
+
 from ..reference.linear import turn
 from ..reference.numbers import precisely
 from .vectors import Vector, column, length, matrix, plus, product

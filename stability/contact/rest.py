@@ -7,12 +7,13 @@ from math import fsum
 import numpy as np
 from numpy.typing import NDArray
 
-from ...simulator.body.layout import Switches, murakami160
-from ...simulator.body.pose import Pose
-from ...simulator.contact.model import Contact, ContactModel, Load
-from ...simulator.contact.quasistatic import USUAL, Skin, close
-from ...simulator.effects import contact_mujoco, contact_quasistatic
-from ...simulator.pipeline.effect import Setting
+from thenar.simulator.body.layout import Switches, murakami160
+from thenar.simulator.body.pose import Pose
+from thenar.simulator.contact.model import Contact, ContactModel, Load
+from thenar.simulator.contact.quasistatic import USUAL, Skin, close
+from thenar.simulator.effects import contact_mujoco, contact_quasistatic
+from thenar.simulator.pipeline.effect import Setting
+
 from ..finding import Finding, Worst
 from . import timed
 from .balance import left_of

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from mpmath import mpf
 
-from ...simulator.contact.quasistatic import Case, Skin
+from thenar.simulator.contact.quasistatic import Case, Skin
+
 from ..checks.roundings import ROUNDING
 from ..reference.numbers import precisely
 from .posed import surface

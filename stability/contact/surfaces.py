@@ -9,11 +9,12 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from ...simulator.body.hand import CAPSULES
-from ...simulator.body.layout import Switches, murakami160
-from ...simulator.body.pose import rotation, rotation_vector
-from ...simulator.body.shapes import Box, Cylinder, Shape, Sphere
-from ...simulator.contact.split import split
+from thenar.simulator.body.hand import CAPSULES
+from thenar.simulator.body.layout import Switches, murakami160
+from thenar.simulator.body.pose import rotation, rotation_vector
+from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
+from thenar.simulator.contact.split import split
+
 from ..checks.roundings import ROUNDING
 from ..finding import Finding, Worst
 from ..reference.linear import turn

@@ -9,11 +9,12 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from ...simulator.contact.quasistatic import Skin
-from ...simulator.contact.quasistatic.balance import Balance
-from ...simulator.contact.quasistatic.case import command
-from ...simulator.contact.quasistatic.linear import solve_arrow
-from ...simulator.contact.quasistatic.newton import stiffness
+from thenar.simulator.contact.quasistatic import Skin
+from thenar.simulator.contact.quasistatic.balance import Balance
+from thenar.simulator.contact.quasistatic.case import command
+from thenar.simulator.contact.quasistatic.linear import solve_arrow
+from thenar.simulator.contact.quasistatic.newton import stiffness
+
 from ..checks.roundings import ROUNDING
 from ..finding import Finding, Worst
 from ..reference.linear import solve

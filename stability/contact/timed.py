@@ -6,11 +6,12 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
-from ...simulator.body.hand import CAPSULES, Hand
-from ...simulator.body.shapes import Sphere
-from ...simulator.contact.grip import GRAVITY
-from ...simulator.contact.model import Contact, ContactModel, Load
-from ...simulator.effects.contact_mujoco import Parameters
+from thenar.simulator.body.hand import CAPSULES, Hand
+from thenar.simulator.body.shapes import Sphere
+from thenar.simulator.contact.grip import GRAVITY
+from thenar.simulator.contact.model import Contact, ContactModel, Load
+from thenar.simulator.effects.contact_mujoco import Parameters
+
 from ..finding import Finding, Worst
 from ..reference.numbers import precisely
 from .grasps import held

@@ -1,8 +1,8 @@
 """A build around integer tables that nobody trained, for the runtime to recognise with."""
 
-from ...runtime.build import Build
-from ...runtime.manifest import SCHEMA, Calibration, Manifest, Options, Proof, Source, Switch
-from ...runtime.tables import IntegerTables
+from thenar.runtime.build import Build
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Proof, Source, Switch
+from thenar.runtime.tables import IntegerTables
 
 _NO_DIGEST = "0" * 64
 

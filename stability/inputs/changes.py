@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.tables.collapse import HIGHEST_CODE
+from thenar.compiler.tables.collapse import HIGHEST_CODE
+
 from .hard_data import HardSet
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.placement.gain import Node
+from thenar.compiler.placement.gain import Node
 
 Counts = NDArray[np.int64]
 BitSet = tuple[NDArray[np.bool_], NDArray[np.intp], int]  # X (n, d), labels (n,), number of classes

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.tables.collapse import HIGHEST_CODE
+from thenar.compiler.tables.collapse import HIGHEST_CODE
 
 Floats = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.boosting.stumps import Stumps
+from thenar.compiler.boosting.stumps import Stumps
 
 SWITCHES, JOINTS = 3, 2
 _BESIDE = np.nextafter([7.0, 7.0, 0.0, 0.0, 65535.0], [0.0, 8.0, 1.0, -1.0, 0.0])  # one double from a code

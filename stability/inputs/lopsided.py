@@ -3,11 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.evaluation.compositions import inputs
-from ...compiler.evaluation.fits import Fit, Training, predictions
-from ...compiler.evaluation.populations import Population, Scheme, populations
-from ...compiler.evaluation.tables import Cell
-from ...compiler.recordings.graspset import GraspSet
+from thenar.compiler.evaluation.compositions import inputs
+from thenar.compiler.evaluation.fits import Fit, Training, predictions
+from thenar.compiler.evaluation.populations import Population, Scheme, populations
+from thenar.compiler.evaluation.tables import Cell
+from thenar.compiler.recordings.graspset import GraspSet
+
 from .small_sets import make_set
 
 

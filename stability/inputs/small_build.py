@@ -7,12 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.build.compile import compile_build
-from ...compiler.build.ensemble import ensemble_from_bytes
-from ...compiler.build.select import select_inputs
-from ...compiler.recordings.graspset import GraspSet
-from ...compiler.tables.collapse import ScoreTables, collapse
-from ...runtime.build import ENSEMBLE_NAME, Build
+from thenar.compiler.build.compile import compile_build
+from thenar.compiler.build.ensemble import ensemble_from_bytes
+from thenar.compiler.build.select import select_inputs
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.tables.collapse import ScoreTables, collapse
+from thenar.runtime.build import ENSEMBLE_NAME, Build
+
 from .small_sets import make_set
 
 

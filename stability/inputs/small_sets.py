@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...compiler.recordings.graspset import GraspSet, Joint
-from ...compiler.recordings.taxonomy import own
+from thenar.compiler.recordings.graspset import GraspSet, Joint
+from thenar.compiler.recordings.taxonomy import own
 
 
 def make_set(

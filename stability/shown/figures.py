@@ -5,7 +5,8 @@ from functools import partial
 
 import msgspec
 
-from ...compiler.workers import in_workers
+from thenar.compiler.workers import in_workers
+
 from ..inputs.hard_data import noisy, separable
 from ..weka.beside import Beside, NotRun
 from ..wording import besides

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ...compiler.pictures import painting, rendered
+from thenar.compiler.pictures import painting, rendered
+
 from ..weka.beside import PARTED, Beside
 from .axes import BLUE, FONT, GREEN, GREY, ORANGE, RED, band, curve, exponents, head, powers, rule, sheet
 

@@ -4,7 +4,8 @@ import math
 
 import msgspec
 
-from ...compiler.boosting.boost import boost
+from thenar.compiler.boosting.boost import boost
+
 from ..checks.rounds import Moment, mean_score, moments
 from ..inputs.hard_data import Floats, HardSet
 

@@ -4,14 +4,15 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.boosting.boost import boost
-from ...compiler.boosting.stumps import winners
-from ...compiler.recordings.graspset import GraspSet
-from ...compiler.tables.collapse import collapse
-from ...compiler.tables.quantise import quantise
-from ...compiler.tables.worstcase import Rounding
-from ...runtime.scorer import Scorer
-from ...runtime.tables import IntegerTables
+from thenar.compiler.boosting.boost import boost
+from thenar.compiler.boosting.stumps import winners
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.tables.collapse import collapse
+from thenar.compiler.tables.quantise import quantise
+from thenar.compiler.tables.worstcase import Rounding
+from thenar.runtime.scorer import Scorer
+from thenar.runtime.tables import IntegerTables
+
 from ..checks.ties import first_best
 from ..inputs.small_build import small_set
 

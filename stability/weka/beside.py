@@ -4,9 +4,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.boosting.boost import boost
-from ...compiler.boosting.stumps import Stumps, winners
-from ...compiler.elementary import softmax
+from thenar.compiler.boosting.boost import boost
+from thenar.compiler.boosting.stumps import Stumps, winners
+from thenar.compiler.elementary import softmax
+
 from .program import EXP_IN_JAVA, EXP_OF_THE_PROCESSOR, Weka, WekaError
 
 Floats = NDArray[np.float64]

@@ -13,8 +13,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiler.boosting.stumps import Stumps
-from ...drivers.errors import ThenarError
+from thenar.compiler.boosting.stumps import Stumps
+from thenar.drivers.errors import ThenarError
 
 JAR = Path("/usr/share/java/weka.jar")  # where Debian's package puts it
 

@@ -4,7 +4,8 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from ....runtime.manifest import Inputs
+from thenar.runtime.manifest import Inputs
+
 from ..points import Frontier, Rate
 from .words import duration, shorten
 

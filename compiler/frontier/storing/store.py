@@ -11,9 +11,9 @@ from zlib import crc32
 
 import msgspec
 
-from ....drivers.errors import ThenarError
-from ....runtime.files import is_special, sync_folder
-from ....runtime.recording.appending import AppendedFile
+from thenar.drivers.errors import ThenarError
+from thenar.runtime.files import is_special, sync_folder
+from thenar.runtime.recording.appending import AppendedFile
 
 HEADER = b'{"thenar":"store of answers","schema":1}\n'
 

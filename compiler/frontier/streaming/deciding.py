@@ -14,13 +14,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ....runtime.live.decision import Decision
-from ....runtime.live.policy import Policy
-from ....runtime.live.sequential import SequentialTest
-from ....runtime.live.standing import Standing
-from ....runtime.packed import LANE_OFFSET
-from ....runtime.scanning.reach import Reach
-from ....runtime.tables import IntegerTables
+from thenar.runtime.live.decision import Decision
+from thenar.runtime.live.policy import Policy
+from thenar.runtime.live.sequential import SequentialTest
+from thenar.runtime.live.standing import Standing
+from thenar.runtime.packed import LANE_OFFSET
+from thenar.runtime.scanning.reach import Reach
+from thenar.runtime.tables import IntegerTables
 
 NOTHING = -1
 # So many frames must be left for it to be worth while to work out how many of them decide nothing.

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ....runtime.live.policy import Policy
-from ....runtime.tables import IntegerTables
+from thenar.runtime.live.policy import Policy
+from thenar.runtime.tables import IntegerTables
+
 from ...tables.batch import integer_scores
 from ..points import DecisionKind, FrontierError, Latency
 from .deciding import NOTHING, Decisions, decisions, stretches

@@ -8,9 +8,10 @@ from typing import Literal
 
 import numpy as np
 
-from ....runtime.build import Build
-from ....runtime.harness.wiring import BusWiring
-from ....runtime.scanning.transactions import ports_of
+from thenar.runtime.build import Build
+from thenar.runtime.harness.wiring import BusWiring
+from thenar.runtime.scanning.transactions import ports_of
+
 from ...firmware.avr_harness import harness
 from ...firmware.board import Board, BoardBus
 from ...firmware.errors import FirmwareError

@@ -9,7 +9,8 @@ from fcntl import ioctl
 from pathlib import Path
 from statistics import median
 
-from ....drivers.i2c.chip import Reading
+from thenar.drivers.i2c.chip import Reading
+
 from ...firmware.generate import PLATFORMS
 from ...firmware.targets import target_of
 

@@ -9,7 +9,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from ....runtime.tables import IntegerTables
+from thenar.runtime.tables import IntegerTables
+
 from ...firmware.running import toolchain_missing
 from ...firmware.targets import Target
 from ...workers import in_workers

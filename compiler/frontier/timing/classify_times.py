@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from ....runtime.tables import IntegerTables, tables_to_bytes
+from thenar.runtime.tables import IntegerTables, tables_to_bytes
+
 from ...firmware.choose import Option, choose, features, flash_shares
 from ...firmware.errors import FirmwareError
 from ...firmware.generate import PLATFORMS

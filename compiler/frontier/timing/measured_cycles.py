@@ -4,8 +4,9 @@ import hashlib
 from dataclasses import dataclass
 from importlib.metadata import version
 
-from ....runtime.manifest import SCHEMA, Calibration, Manifest, Options, Proof, Source, Switch
-from ....runtime.tables import IntegerTables, tables_to_bytes
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Proof, Source, Switch
+from thenar.runtime.tables import IntegerTables, tables_to_bytes
+
 from ...firmware.choose import Option
 from ...firmware.classifier import classifier_files
 from ...firmware.errors import FirmwareError

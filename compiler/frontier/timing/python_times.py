@@ -8,8 +8,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ....runtime.scorer import Scorer
-from ....runtime.tables import IntegerTables
+from thenar.runtime.scorer import Scorer
+from thenar.runtime.tables import IntegerTables
+
 from ...firmware.probes import random_frames
 
 # Shapes that are timed: switches, joints, grasp types.

@@ -7,15 +7,16 @@ from math import fsum
 import numpy as np
 from numpy.typing import NDArray
 
-from ....drivers.cyberglove_frame import OVERHEAD
-from ....drivers.cyberglove_timing import sending_us, shortest_us
-from ....runtime.harness.wiring import Harness, ScannerWiring
-from ....runtime.scanning.costs import Costs
-from ....runtime.scanning.decided import Decided
-from ....runtime.scanning.plan import plan_scan
-from ....runtime.scanning.scanmap import ScanMap
-from ....runtime.scanning.timing import reading_of, scanner_us
-from ....runtime.tables import IntegerTables
+from thenar.drivers.cyberglove_frame import OVERHEAD
+from thenar.drivers.cyberglove_timing import sending_us, shortest_us
+from thenar.runtime.harness.wiring import Harness, ScannerWiring
+from thenar.runtime.scanning.costs import Costs
+from thenar.runtime.scanning.decided import Decided
+from thenar.runtime.scanning.plan import plan_scan
+from thenar.runtime.scanning.scanmap import ScanMap
+from thenar.runtime.scanning.timing import reading_of, scanner_us
+from thenar.runtime.tables import IntegerTables
+
 from ..points import How
 from .beside_wire import WIRE_ONLY, Beside, board_beside
 from .wirings import Wiring

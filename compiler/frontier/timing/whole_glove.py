@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 
-from ....runtime.errors import HarnessError
-from ....runtime.harness.wiring import Harness
-from ....runtime.scanning.propose import propose_harness
+from thenar.runtime.errors import HarnessError
+from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.scanning.propose import propose_harness
+
 from ...placement.costaware import PortCosts
 from .wirings import port_costs
 

@@ -9,11 +9,12 @@ from statistics import fmean
 import msgspec
 from msgspec.structs import replace
 
-from ....drivers.emulated.i2c import EmulatedBus, EmulatedChip, EmulatedI2c, WireCounters
-from ....drivers.errors import DeviceError
-from ....runtime.harness.wiring import BusWiring, Harness
-from ....runtime.scanning.timing import free_us, scan_us
-from ....runtime.scanning.whole import whole_scan
+from thenar.drivers.emulated.i2c import EmulatedBus, EmulatedChip, EmulatedI2c, WireCounters
+from thenar.drivers.errors import DeviceError
+from thenar.runtime.harness.wiring import BusWiring, Harness
+from thenar.runtime.scanning.timing import free_us, scan_us
+from thenar.runtime.scanning.whole import whole_scan
+
 from ..points import Check
 from .wire_client import Order, behind
 from .wirings import BOARD, names_of, wirings

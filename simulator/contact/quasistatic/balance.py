@@ -5,7 +5,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ....compiler.elementary import add_up
+from thenar.compiler.elementary import add_up
+
 from ...body.hand import LIMITS_DEG
 from ...body.pose import Pose
 from ..grip import STIFFNESS

@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ....compiler.elementary import add_up
+from thenar.compiler.elementary import add_up
+
 from ..grip import STIFFNESS
 from .balance import DIGIT_SPHERES, HOLD_N_PER_MM, HOLD_NMM_PER_RAD, LIMIT_NMM_PER_RAD, Balance
 from .linear import solve_arrow

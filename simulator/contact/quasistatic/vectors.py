@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ....compiler.elementary import add_up
+from thenar.compiler.elementary import add_up
 
 Floats = NDArray[np.float64]
 
