@@ -12,7 +12,7 @@ from .compile_asked import TABLE_BITS, Asked
 from .scan_tables import print_scan
 
 if TYPE_CHECKING:
-    from thenar.compiler.build.compile import BuildReport
+    from thenar.compiler.artifact.compile import BuildReport
     from thenar.runtime.manifest import Manifest
 
 _CHIP = "mcp23017"
@@ -101,8 +101,8 @@ def command(context: click.Context, /, **options: Any) -> None:
 
 
 def _made(asked: Asked) -> "BuildReport":
-    from thenar.compiler.build.compile import compile_build
-    from thenar.compiler.build.made import no_documents
+    from thenar.compiler.artifact.compile import compile_build
+    from thenar.compiler.artifact.made import no_documents
     from thenar.compiler.frontier.timing.whole_glove import ports_of_whole_glove
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.harness.loading import load_harness

@@ -4,12 +4,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from thenar.compiler.build.made import REPORT_NAME, SPEC_FOLDER
+from thenar.compiler.artifact.made import REPORT_NAME, SPEC_FOLDER
 
 from .hand import hand_of
 
 if TYPE_CHECKING:
-    from thenar.compiler.build.made import Made
+    from thenar.compiler.artifact.made import Made
     from thenar.compiler.evaluation.study import Study
 
     from .from_frontier import Picked
@@ -34,7 +34,7 @@ class BuildDocuments:
 
     def __call__(self, made: "Made") -> Mapping[str, bytes]:
         """Return path in the build's folder -> content."""
-        from thenar.compiler.spec.files import spec_files
+        from thenar.compiler.glove.files import spec_files
 
         files = {REPORT_NAME: self._report(made)}
         if made.manifest.switches:

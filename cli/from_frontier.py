@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from thenar.compiler.build.compile import Wired
+    from thenar.compiler.artifact.compile import Wired
     from thenar.compiler.frontier.points import Frontier, Point
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.harness.wiring import Harness

@@ -59,7 +59,7 @@ def replay_recording(build: Build, replay: Path, policy: Policy | None) -> None:
 
 
 def _rows(build: Build, grasp_set: "GraspSet", period_us: int) -> Iterator[Line]:
-    from thenar.compiler.build.select import select_inputs
+    from thenar.compiler.artifact.select import select_inputs
     from thenar.runtime.recognizer import Frame, Recognizer
 
     recognizer = Recognizer(build)

@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING
 from .common import out
 
 if TYPE_CHECKING:
-    from thenar.compiler.spec.glove_spec import Summary
+    from thenar.compiler.glove.glove_spec import Summary
 
 
 def print_spec(spec: "Summary") -> None:
     """Print what `spec.json` holds, for people."""
-    from thenar.compiler.spec.reading import expectations
+    from thenar.compiler.glove.reading import expectations
 
     console = out()
     hand = "" if spec.hand_length_mm is None else f", for a right hand of {spec.hand_length_mm:g} mm"

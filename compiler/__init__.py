@@ -7,8 +7,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .artifact.compile import compile_build
     from .boosting.classifier import LogitBoostClassifier
-    from .build.compile import compile_build
     from .placement.id3 import grow_id3
     from .recordings.graspset import GraspSet
 
@@ -17,7 +17,7 @@ __all__ = ["GraspSet", "LogitBoostClassifier", "compile_build", "grow_id3"]
 _HOMES = {
     "GraspSet": ".recordings.graspset",
     "LogitBoostClassifier": ".boosting.classifier",
-    "compile_build": ".build.compile",
+    "compile_build": ".artifact.compile",
     "grow_id3": ".placement.id3",
 }
 

@@ -62,14 +62,14 @@ ALLOWED = {
         "compiler.tables",
         "compiler.workers",
     ),
-    "compiler.spec": (
+    "compiler.glove": (
         "runtime",
         "drivers",
         "compiler.hand",
         "compiler.publication",
         "compiler.recordings.graspset",
         "compiler.recordings.spreadsheet",
-        "compiler.spec",
+        "compiler.glove",
     ),
     "compiler.evaluation": (
         "runtime",

@@ -8,9 +8,9 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
+from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import Stumps, winners
-from thenar.compiler.build.compile import compile_build
 from thenar.compiler.elementary import softmax
 from thenar.compiler.evaluation.study import Options, evaluate
 from thenar.compiler.placement.placement import place

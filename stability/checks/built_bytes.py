@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 from threadpoolctl import threadpool_info
 
-from thenar.compiler.build.compile import compile_build
+from thenar.compiler.artifact.compile import compile_build
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, TABLES_NAME
 from thenar.simulator.running.simulation import simulate
 from thenar.simulator.scenes.decode import load_scene

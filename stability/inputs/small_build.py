@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.build.compile import compile_build
-from thenar.compiler.build.ensemble import ensemble_from_bytes
-from thenar.compiler.build.select import select_inputs
+from thenar.compiler.artifact.compile import compile_build
+from thenar.compiler.artifact.ensemble import ensemble_from_bytes
+from thenar.compiler.artifact.select import select_inputs
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.tables.collapse import ScoreTables, collapse
 from thenar.runtime.build import ENSEMBLE_NAME, Build

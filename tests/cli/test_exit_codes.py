@@ -110,7 +110,7 @@ def test_ctrl_c_exits_with_130_and_leaves_the_old_build_alone(set_file: Path, bu
     ready = build_folder.parent.parent / f"{build_folder.parent.name}.ready"
     program = (
         "import sys, pathlib\n"
-        "from thenar.compiler.build import compile as module\n"
+        "from thenar.compiler.artifact import compile as module\n"
         "from thenar.cli import run\n"
         "train = module.train\n"
         f"def slow(*a): pathlib.Path({str(ready)!r}).touch(); return [train(*a) for _ in range(10**6)][0]\n"

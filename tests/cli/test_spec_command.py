@@ -10,8 +10,8 @@ import pytest
 
 from thenar.cli.hand import hand_of
 from thenar.compiler import GraspSet, compile_build
+from thenar.compiler.glove.files import spec_files
 from thenar.compiler.recordings.taxonomy import own
-from thenar.compiler.spec.files import spec_files
 from thenar.runtime import Build
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.harness.writing import harness_to_toml

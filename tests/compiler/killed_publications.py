@@ -18,12 +18,12 @@ from types import FrameType
 from typing import Any, NamedTuple
 
 from thenar.compiler import publication
-from thenar.compiler.build import staging
+from thenar.compiler.artifact import staging
 from thenar.compiler.firmware import folder as firmware
 from thenar.compiler.frontier import preparing
 from thenar.compiler.frontier.points import FrontierError
 from thenar.compiler.frontier.storing.store import HEADER, Store
-from thenar.compiler.spec import folder as spec
+from thenar.compiler.glove import folder as spec
 
 Content = Mapping[str, str]
 TRACED = {function.__code__ for function in (publication.publish_folder, publication._put, publication.exchanged)}

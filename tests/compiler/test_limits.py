@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from thenar.compiler import GraspSet, compile_build
+from thenar.compiler.artifact.errors import CompileError
 from thenar.compiler.boosting.boost import BoostingError, boost
-from thenar.compiler.build.errors import CompileError
 from thenar.compiler.evaluation.errors import EvaluationError
 from thenar.compiler.evaluation.study import evaluate
 from thenar.compiler.frontier.material import Material

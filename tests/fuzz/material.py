@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from thenar.compiler.build.compile import compile_build
+from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import own
 from thenar.drivers.cyberglove_sensors import SENSORS_18

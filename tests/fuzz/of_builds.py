@@ -17,16 +17,16 @@ from mutating import Mutate, altered, json_file, npz_file, sealed
 
 from thenar.cli.from_frontier import picked
 from thenar.cli.kept_files import kept_names
-from thenar.compiler.build.verify import verify_build
+from thenar.compiler.artifact.verify import verify_build
 from thenar.compiler.firmware.folder import sums, write_folder
 from thenar.compiler.firmware.generate import Request, firmware_files, fit_of
 from thenar.compiler.frontier import points
 from thenar.compiler.frontier.drawing.table import csv_bytes
 from thenar.compiler.frontier.storing.store import HEADER, Store
+from thenar.compiler.glove.files import spec_files
 from thenar.compiler.placement.placement import place
 from thenar.compiler.report.frontier_charts import frontier_charts
 from thenar.compiler.report.frontier_view import frontier_view
-from thenar.compiler.spec.files import spec_files
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME, Build
 from thenar.runtime.live.frames import GloveFrame, SwitchFrame

@@ -12,8 +12,8 @@ from thenar.compiler.firmware.board_loading import load_board
 from thenar.compiler.firmware.generate import Request, firmware_files, fit_of
 from thenar.compiler.firmware.library import Fit
 from thenar.compiler.frontier.timing.whole_glove import ports_of_whole_glove
+from thenar.compiler.glove.files import spec_files
 from thenar.compiler.recordings.objects import collected
-from thenar.compiler.spec.files import spec_files
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.cyberglove_sensors import SENSORS_18
 from thenar.runtime.build import Build

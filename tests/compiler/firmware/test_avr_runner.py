@@ -7,7 +7,7 @@ import pytest
 
 import thenar.simulator.scenes
 from thenar.compiler import compile_build
-from thenar.compiler.build.select import select_inputs
+from thenar.compiler.artifact.select import select_inputs
 from thenar.compiler.firmware import avr_harness
 from thenar.compiler.firmware.answers import Answers
 from thenar.compiler.firmware.avr_runner import run

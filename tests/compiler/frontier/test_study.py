@@ -11,8 +11,8 @@ import pytest
 from distributed import LocalCluster
 from numpy.typing import NDArray
 
+from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.boosting.boost import boost
-from thenar.compiler.build.compile import compile_build
 from thenar.compiler.evaluation.folds import weka_folds
 from thenar.compiler.frontier.points import Frontier, FrontierError, Point, frontier_from_bytes
 from thenar.compiler.frontier.preparing import Request, run_frontier

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from thenar.cli.hand import hand_of
-from thenar.compiler.build.compile import compile_build
-from thenar.compiler.build.ensemble import ensemble_from_bytes
+from thenar.compiler.artifact.compile import compile_build
+from thenar.compiler.artifact.ensemble import ensemble_from_bytes
 from thenar.compiler.evaluation.study import Options as Asked
 from thenar.compiler.evaluation.study import evaluate
 from thenar.compiler.frontier.points import Frontier

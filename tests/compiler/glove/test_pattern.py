@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from thenar.compiler.glove.files import spec_files
+from thenar.compiler.glove.pattern import LAYERS
 from thenar.compiler.hand import HandShape
-from thenar.compiler.spec.files import spec_files
-from thenar.compiler.spec.pattern import LAYERS
 from thenar.runtime.manifest import Manifest
 
 Manifests = Callable[..., Manifest]

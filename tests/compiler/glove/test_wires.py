@@ -6,9 +6,9 @@ from math import dist
 
 import pytest
 
+from thenar.compiler.glove.glove_spec import Summary, glove_spec
+from thenar.compiler.glove.wires import COLOURS, marked, wrist_of
 from thenar.compiler.hand import HandShape
-from thenar.compiler.spec.glove_spec import Summary, glove_spec
-from thenar.compiler.spec.wires import COLOURS, marked, wrist_of
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.scanning.propose import propose_board, propose_harness
 

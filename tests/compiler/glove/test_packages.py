@@ -2,7 +2,7 @@
 
 import pytest
 
-from thenar.compiler.spec.packages import GROUND, MUX, PACKAGES, SUPPLY, Package
+from thenar.compiler.glove.packages import GROUND, MUX, PACKAGES, SUPPLY, Package
 from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.registry import CHIPS
 

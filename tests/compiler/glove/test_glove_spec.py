@@ -5,10 +5,10 @@ from collections.abc import Callable
 import pytest
 from msgspec.structs import replace
 
+from thenar.compiler.glove.errors import SpecError
+from thenar.compiler.glove.glove_spec import glove_spec
+from thenar.compiler.glove.placing import BODY_MM
 from thenar.compiler.hand import HandShape
-from thenar.compiler.spec.errors import SpecError
-from thenar.compiler.spec.glove_spec import glove_spec
-from thenar.compiler.spec.placing import BODY_MM
 from thenar.drivers.i2c.registry import CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import GloveWiring, Harness, ScannerWiring

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from thenar.compiler.artifact.ensemble import KIND, ensemble_from_bytes, ensemble_to_bytes
 from thenar.compiler.boosting.stumps import Stumps
-from thenar.compiler.build.ensemble import KIND, ensemble_from_bytes, ensemble_to_bytes
 from thenar.compiler.recordings.arrays import pack
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.sealed import seal

@@ -9,10 +9,10 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.compiler import GraspSet, compile_build
-from thenar.compiler.build.made import REPORT_NAME
-from thenar.compiler.build.scanned import ScanCheck, check_scan
-from thenar.compiler.build.staging import MEMBERS
-from thenar.compiler.build.verify import verify_build
+from thenar.compiler.artifact.made import REPORT_NAME
+from thenar.compiler.artifact.scanned import ScanCheck, check_scan
+from thenar.compiler.artifact.staging import MEMBERS
+from thenar.compiler.artifact.verify import verify_build
 from thenar.runtime import Build
 from thenar.runtime.build import SCAN_NAME
 from thenar.runtime.errors import HarnessError
@@ -129,7 +129,7 @@ def test_verification_does_not_hold_where_a_row_changes(
     grasp_set: GraspSet, harness: Harness, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     compile_build(grasp_set, tmp_path / "build", rounds=2, folds=0, harness=harness)
-    monkeypatch.setattr("thenar.compiler.build.verify.check_scan", lambda *_: ScanCheck(2, 1.0, 1))
+    monkeypatch.setattr("thenar.compiler.artifact.verify.check_scan", lambda *_: ScanCheck(2, 1.0, 1))
     assert not verify_build(tmp_path / "build", grasp_set).holds
 
 

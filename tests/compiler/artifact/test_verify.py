@@ -9,9 +9,9 @@ import pytest
 from msgspec.structs import replace as replace_fields
 
 from thenar.compiler import GraspSet, compile_build
-from thenar.compiler.build.ensemble import ensemble_from_bytes
-from thenar.compiler.build.errors import CompileError
-from thenar.compiler.build.verify import verify_build
+from thenar.compiler.artifact.ensemble import ensemble_from_bytes
+from thenar.compiler.artifact.errors import CompileError
+from thenar.compiler.artifact.verify import verify_build
 from thenar.compiler.tables.collapse import collapse
 from thenar.runtime import Build, BuildError
 from thenar.runtime.manifest import manifest_from_bytes, manifest_to_bytes

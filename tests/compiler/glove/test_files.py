@@ -9,9 +9,9 @@ from collections.abc import Callable
 import msgspec
 import pytest
 
+from thenar.compiler.glove.files import NAMES, spec_files
+from thenar.compiler.glove.glove_spec import Summary
 from thenar.compiler.hand import HandShape
-from thenar.compiler.spec.files import NAMES, spec_files
-from thenar.compiler.spec.glove_spec import Summary
 from thenar.runtime.manifest import Manifest
 
 Manifests = Callable[..., Manifest]
@@ -21,7 +21,7 @@ DIGEST = """
 import hashlib, sys
 import msgspec
 from thenar.cli.hand import hand_of
-from thenar.compiler.spec.files import spec_files
+from thenar.compiler.glove.files import spec_files
 from thenar.runtime.manifest import Manifest
 manifest = msgspec.json.decode(sys.stdin.buffer.read(), type=Manifest)
 files = spec_files(manifest, hand=hand_of([switch.name for switch in manifest.switches]))

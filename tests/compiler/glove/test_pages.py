@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.spec.pages import MARGIN_MM, page_for
+from thenar.compiler.glove.pages import MARGIN_MM, page_for
 
 # ISO 216.
 SHEETS = {"A4": (210, 297), "A3": (297, 420), "A2": (420, 594), "A1": (594, 841), "A0": (841, 1189)}

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from thenar.compiler.glove.files import spec_files
 from thenar.compiler.recordings.spreadsheet import text_of
-from thenar.compiler.spec.files import spec_files
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import GloveWiring
 from thenar.runtime.manifest import Manifest

@@ -7,9 +7,9 @@ import pytest
 from msgspec import structs
 
 from thenar.compiler import GraspSet, compile_build
-from thenar.compiler.build import firmware_trial
-from thenar.compiler.build.verify import verify_build
-from thenar.compiler.build.verify_firmware import Kind, verify_firmware
+from thenar.compiler.artifact import firmware_trial
+from thenar.compiler.artifact.verify import verify_build
+from thenar.compiler.artifact.verify_firmware import Kind, verify_firmware
 from thenar.compiler.firmware import classifier
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.errors import FirmwareError

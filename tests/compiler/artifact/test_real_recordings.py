@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from thenar.compiler import compile_build
+from thenar.compiler.artifact.select import select_inputs
+from thenar.compiler.artifact.training import material_of, train
+from thenar.compiler.artifact.verify import verify_build
 from thenar.compiler.boosting.stumps import winners
-from thenar.compiler.build.select import select_inputs
-from thenar.compiler.build.training import material_of, train
-from thenar.compiler.build.verify import verify_build
 from thenar.compiler.evaluation.folds import weka_folds
 from thenar.compiler.recordings.importer import import_file
 from thenar.compiler.tables.collapse import collapse

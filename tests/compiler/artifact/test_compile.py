@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from thenar.compiler import GraspSet, compile_build, grow_id3
-from thenar.compiler.build.errors import CompileError
-from thenar.compiler.build.verify import verify_build
+from thenar.compiler.artifact.errors import CompileError
+from thenar.compiler.artifact.verify import verify_build
 from thenar.compiler.evaluation.errors import EvaluationError
 from thenar.drivers.errors import ThenarError
 from thenar.runtime import Build

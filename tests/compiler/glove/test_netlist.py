@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from thenar.compiler.glove.files import spec_files
+from thenar.compiler.glove.glove_spec import glove_spec
+from thenar.compiler.glove.packages import PACKAGES
 from thenar.compiler.hand import HandShape
-from thenar.compiler.spec.files import spec_files
-from thenar.compiler.spec.glove_spec import glove_spec
-from thenar.compiler.spec.packages import PACKAGES
 from thenar.drivers.i2c.registry import CHIPS
 from thenar.runtime.harness.loading import load_harness, parse_harness
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel, ScannerWiring
