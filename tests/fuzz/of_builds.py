@@ -219,7 +219,7 @@ def _compile_from(data: bytes, folder: Path) -> None:
     """Read a frontier as `compile --from` does until it trains, and as the report shows it."""
     path = folder / "frontier.json"
     path.write_bytes(data)
-    for number in (None, 1, 2):
+    for number in (1, 2):
         chosen = picked(path, number, grasp_set())
         _ = chosen.options
         wired = chosen.wired(harness())
