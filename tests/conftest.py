@@ -94,18 +94,9 @@ def aml_table() -> Path:
 
 # What our children import before anything of ours, or soon after.
 SHADOWED = (
-    "argparse",
-    "collections",
-    "ctypes",
-    "ensurepip",
-    "json",
-    "msgspec",
-    "pickle",
-    "platform",
-    "runpy",
-    "signal",
+    *("argparse", "collections", "ctypes", "ensurepip", "json", "msgspec", "pickle", "platform", "runpy", "signal"),
+    *("struct", "subprocess", "threading", "typing", "joblib", "numpy", "gi", "drivers", "thenar"),
 )
-SHADOWED += ("struct", "subprocess", "threading", "typing", "joblib", "numpy", "gi", "drivers", "thenar")
 HOSTILE = """
 from pathlib import Path
 with open(Path(__file__).with_name("mark"), "a") as mark:

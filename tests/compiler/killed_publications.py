@@ -121,7 +121,7 @@ def _limit(system: str) -> None:
         raise OSError("there are no hard links")
 
     if system != "exchange":
-        publication.exchanged = lambda _one, _other: False
+        publication.exchanged = lambda one, other: False
     if system == "renames, no links":
         os.link = no_links
 

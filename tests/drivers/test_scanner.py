@@ -6,6 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 from queue import Queue
 from time import monotonic, monotonic_ns
+from typing import Any
 
 import numpy as np
 import pytest
@@ -202,7 +203,7 @@ def test_a_board_that_restarts_is_followed(line: PtyLine, start: Callable[..., E
 
 @pytest.mark.parametrize("settings", [{"heartbeat_us": 10_000}, {"state_us": 2000}, {"heartbeat_us": 0}])
 def test_a_board_that_restarts_is_not_believed_before_it_has_scanned(
-    line: PtyLine, start: Callable[..., EmulatedScanner], settings: dict[str, int]
+    line: PtyLine, start: Callable[..., EmulatedScanner], settings: dict[str, Any]
 ) -> None:
     board = start(**settings)
     board.set(0b101)
@@ -220,7 +221,7 @@ def test_a_board_that_restarts_is_not_believed_before_it_has_scanned(
 
 @pytest.mark.parametrize("settings", [{"heartbeat_us": 10_000}, {"state_us": 2000}, {"heartbeat_us": 0}])
 def test_keys_that_the_board_cannot_read_are_not_known_until_it_can(
-    line: PtyLine, start: Callable[..., EmulatedScanner], settings: dict[str, int]
+    line: PtyLine, start: Callable[..., EmulatedScanner], settings: dict[str, Any]
 ) -> None:
     board = start(**settings)
     with driver(line) as scanner:
@@ -240,7 +241,7 @@ def test_keys_that_the_board_cannot_read_are_not_known_until_it_can(
 
 @pytest.mark.parametrize("settings", [{"heartbeat_us": 3000}, {"state_us": 2000, "heartbeat_us": 20_000}])
 def test_through_a_bad_cable_keys_that_cannot_be_read_are_never_known(
-    line: PtyLine, start: Callable[..., EmulatedScanner], settings: dict[str, int]
+    line: PtyLine, start: Callable[..., EmulatedScanner], settings: dict[str, Any]
 ) -> None:
     """One message in three is swallowed. A change is over once it was told; before that the keys are in between."""
     board, random = start(**settings), np.random.default_rng(7)
@@ -457,7 +458,7 @@ def age_us(scanner: Scanner, reading: ScannerReading) -> int:
 
 @pytest.mark.parametrize("settings", [{"heartbeat_us": 10_000}, {"heartbeat_us": 10_000, "state_us": 5000}])
 def test_a_delay_that_all_frames_share_shows_in_their_age(
-    line: PtyLine, start: Callable[..., EmulatedScanner], settings: dict[str, int]
+    line: PtyLine, start: Callable[..., EmulatedScanner], settings: dict[str, Any]
 ) -> None:
     """From the opening on, after the board has started again, and no longer than it lasts."""
     line.delay_s = 0.4

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from io import BytesIO
 from pathlib import Path
 from struct import pack, unpack_from
-from typing import Any
+from typing import Any, Literal
 from zlib import crc32
 
 import numpy as np
@@ -229,7 +229,7 @@ def records(build: Build, tmp_path_factory: pytest.TempPathFactory) -> list[Reco
                 recorder.glove(glove)
                 recorder.switches(switches)
                 recorder.grasp(recognizer.step(time_us + 10, 10**15 + time_us, switches, glove))
-                event = "captured" if number % 2 == 0 else "accepted"
+                event: Literal["captured", "accepted"] = "captured" if number % 2 == 0 else "accepted"
                 trial = 1 + begun * FRAMES // 2 + number // 2
                 recorder.label(Label(time_us + 20, event, trial, TYPES[trial % 3], "A", "mug"))
     return records_of(path.read_bytes())

@@ -103,7 +103,7 @@ def test_an_oversized_document_is_refused() -> None:
 )
 def test_a_sealed_build_whose_names_would_deceive_is_refused(manifest: Manifest, where: str, name: str) -> None:
     source, options, (joint, *joints) = manifest.source, manifest.options, manifest.joints
-    changes: dict[str, object] = {
+    changes: dict[str, dict[str, object]] = {
         "grasps": {"grasps": (name, *manifest.grasps[1:])},
         "switches": {"switches": (replace(manifest.switches[0], name=name), *manifest.switches[1:])},
         "joints": {"joints": (replace(joint, name=name), *joints)},

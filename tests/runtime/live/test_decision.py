@@ -1,4 +1,4 @@
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import pytest
@@ -107,7 +107,7 @@ def test_after_unknown_the_first_candidate_is_taken_at_once(reach: Reach) -> Non
 A, B, C = (110, 100, 100), (100, 110, 100), (100, 100, 110)
 
 
-def follow(frames: list[tuple[int, tuple[int, ...], bool]], reach: Reach) -> list[int]:
+def follow(frames: Sequence[tuple[int, tuple[int, ...], bool]], reach: Reach) -> list[int]:
     """What is decided after each frame of a time, scores, and whether it is whole."""
     decision = Decision(LEAD, DWELL, HOLD)
     return [decision.update(time_us, Standing(scores, reach), whole=whole) for time_us, scores, whole in frames]

@@ -35,7 +35,8 @@ class Row:
 
 def recording(build: Build, seed: int) -> list[Row]:
     """Grasps that are held for some frames each, with a switch or a joint that moves now and then."""
-    random, scorer, rows = Random(seed), Scorer(build.tables), []
+    random, scorer = Random(seed), Scorer(build.tables)
+    rows: list[Row] = []
     closed, sensors = 0, bytes(JOINTS)
     while len(rows) < ROWS:
         if random.random() < 0.1:

@@ -265,9 +265,10 @@ def test_where_readers_hang_on_every_place_honest_ones_have_the_next(
 def test_one_other_machine_never_takes_every_place(make_grasp: MakeGrasp) -> None:
     sink = open_tcp("127.0.0.1:0")
     assert isinstance(sink.address, tuple)
+    address = sink.address
 
     def crowd(host: str) -> list[socket.socket]:
-        return [socket.create_connection(sink.address, source_address=(host, 0)) for _ in range(MAX_OF_ONE + 1)]
+        return [socket.create_connection(address, source_address=(host, 0)) for _ in range(MAX_OF_ONE + 1)]
 
     # Any address in 127.0.0.0/8 but that of this machine is another machine's, for want of one.
     there = crowd("127.0.0.2")
