@@ -5,10 +5,12 @@ from pathlib import Path
 from msgspec import Struct
 
 from thenar.runtime.build import Build
+from thenar.runtime.files import read_file
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
 
 from ..firmware.errors import FirmwareError
+from ..firmware.folder import LARGEST
 from ..firmware.library import library_files, smallest_fit
 from ..firmware.library_names import FIRMWARE_NAME, LIBRARY_FILES
 
@@ -42,6 +44,6 @@ def carried_firmware(folder: Path, build: Build) -> Carried:
 
 def _content(path: Path) -> bytes | None:
     try:
-        return path.read_bytes()
-    except OSError:
+        return read_file(path, LARGEST, FirmwareError)
+    except (OSError, FirmwareError):
         return None

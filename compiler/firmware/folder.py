@@ -8,10 +8,14 @@ import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
+from thenar.runtime.files import read_file
+
 from ..publication import check_folder, entries, publish_folder
 from .errors import FirmwareError
 
 SUMS = "SHA256SUMS"
+# Bytes of one text; the tables of the largest build have fewer.
+LARGEST = 64 << 20
 
 
 def write_folder(files: Mapping[str, str], folder: Path, *, overwrite: bool = False) -> Path:
@@ -46,11 +50,11 @@ def _users_files(folder: Path) -> list[str]:
         raise FirmwareError(f"{folder} is not empty and holds no firmware of thenar: name another folder")
     ours = _read_sums(folder / SUMS)
     for path in sorted(ours.keys() & set(there)):
-        if _digest((folder / path).read_bytes()) != ours[path]:
+        if _digest(read_file(folder / path, LARGEST, FirmwareError)) != ours[path]:
             raise FirmwareError(f"{folder}/{path} was changed since thenar wrote it: move it, or name another folder")
     return [path for path in there if path not in ours and path != SUMS]
 
 
 def _read_sums(path: Path) -> dict[str, str]:
-    lines = path.read_text(errors="replace").splitlines()
+    lines = read_file(path, LARGEST, FirmwareError).decode(errors="replace").splitlines()
     return {name: digest for digest, _, name in (line.partition("  ") for line in lines) if name}

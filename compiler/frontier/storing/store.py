@@ -12,9 +12,11 @@ from zlib import crc32
 import msgspec
 
 from thenar.drivers.errors import ThenarError
-from thenar.runtime.files import is_special, sync_folder
+from thenar.runtime.files import is_special, read_file, sync_folder
 from thenar.runtime.recording.appending import AppendedFile
 
+# Bytes; a frontier of the largest set answers a few million questions.
+LARGEST = 1 << 30
 HEADER = b'{"thenar":"store of answers","schema":1}\n'
 
 _Answer = TypeVar("_Answer")
@@ -54,7 +56,7 @@ class Store:
         try:
             with _told(path):
                 fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                self._file = AppendedFile(path, self._read(path.read_bytes()))
+                self._file = AppendedFile(path, self._read(read_file(path, LARGEST, StoreError)))
             if self._file.size == 0:
                 self._append(HEADER)
                 sync_folder(path.parent)

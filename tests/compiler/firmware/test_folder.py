@@ -56,6 +56,14 @@ def test_what_was_changed_since_is_not_replaced(folder: Path) -> None:
     assert (folder / "thenar_glove.c").read_text() == "better\n"
 
 
+@pytest.mark.parametrize("name", [SUMS, "thenar_glove.c"])
+def test_a_link_to_what_never_ends_is_refused_unread(folder: Path, name: str) -> None:
+    (folder / name).unlink()
+    (folder / name).symlink_to("/dev/zero")
+    with pytest.raises(FirmwareError, match="is a device or a pipe"):
+        write_folder(NEW, folder, overwrite=True)
+
+
 def test_a_folder_of_somebody_elses_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "firmware").mkdir()
     (tmp_path / "firmware" / "main.c").write_text("mine")
