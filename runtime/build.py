@@ -39,12 +39,6 @@ class Build:
                 f"{MANIFEST_NAME} names {named[0]} grasp types, {named[1]} switches and {named[2]} joints, "
                 f"{TABLES_NAME} holds {held[0]}, {held[1]} and {held[2]}: compile the build again"
             )
-        proved = manifest.proof.scale, manifest.proof.bound
-        if proved != (tables.scale, tables.bound):
-            raise BuildError(
-                f"{MANIFEST_NAME} proves a scale of {proved[0]!r} and a bound of {proved[1]}, {TABLES_NAME} has "
-                f"{tables.scale!r} and {tables.bound}: compile the build again"
-            )
         if scan is not None:
             check_switches(scan, tables.n_switches)
         self.manifest = manifest
@@ -64,7 +58,14 @@ class Build:
         manifest = load_manifest(where)
         path = where / TABLES_NAME
         data = read_member(path, tables_file.MAX_BYTES, manifest.tables_sha256)
-        return cls(manifest, tables_from_bytes(data, str(path)), _load_scan(where, manifest))
+        tables = tables_from_bytes(data, str(path))
+        proved = manifest.proof.scale, manifest.proof.bound
+        if proved != (tables.scale, tables.bound):
+            raise BuildError(
+                f"{where / MANIFEST_NAME} proves a scale of {proved[0]!r} and a bound of {proved[1]}, {TABLES_NAME} "
+                f"has {tables.scale!r} and {tables.bound}: compile the build again"
+            )
+        return cls(manifest, tables, _load_scan(where, manifest))
 
     def lanes(self, bits: ArrayLike, codes: ArrayLike) -> tuple[int, ...]:
         """Return the scores of one frame as K plain integers, all 2^15 too high: enough to compare them."""

@@ -64,8 +64,8 @@ class IntegerTables:
     def __post_init__(self) -> None:
         _check_counts(self.n_classes, self.n_switches, self.n_joints)
         _check_shapes(self)
-        if not COARSEST_SCALE <= self.scale <= FINEST_SCALE:
-            raise BuildError(f"the scale is {self.scale!r}, it must be from 2^-64 to 2^30 steps per unit")
+        if not 0 < self.scale <= FINEST_SCALE:
+            raise BuildError(f"the scale is {self.scale!r}, it must be above 0 and at most 2^30 steps per unit")
         for number, thresholds in enumerate(self.thresholds):
             if np.any(thresholds[1:] <= thresholds[:-1]):
                 raise BuildError(f"the thresholds of joint {number} are not strictly increasing")
@@ -130,6 +130,12 @@ def _check_shapes(tables: IntegerTables) -> None:
             raise BuildError(f"{name} is {rows.dtype} {rows.shape}, it must be int16 {shape}")
 
 
+def _check_stored_scale(scale: float) -> None:
+    # Coarser tables are sound, but no ensemble that a build may hold is as large as that.
+    if not scale >= COARSEST_SCALE:
+        raise BuildError(f"the scale is {scale!r}, in a file it must be at least 2^-64 steps per unit")
+
+
 def payload_bytes(n_classes: int, n_switches: int, thresholds: Sequence[int]) -> int:
     """Return the length of the payload of tables of so many classes and switches; `thresholds` of each joint."""
     rows = 1 + 2 * n_switches + sum(2 + count for count in thresholds)
@@ -137,7 +143,8 @@ def payload_bytes(n_classes: int, n_switches: int, thresholds: Sequence[int]) ->
 
 
 def tables_to_bytes(tables: IntegerTables) -> bytes:
-    """Return the content of `tables.bin`. Raises BuildError if it would be larger than 16 MiB."""
+    """Return the content of `tables.bin`. Raises BuildError if it is larger than 16 MiB or its scale too coarse."""
+    _check_stored_scale(tables.scale)
     header = _COUNTS.pack(tables.n_classes, tables.n_switches, tables.n_joints, 0, tables.scale)
     counts = np.array([len(t) for t in tables.thresholds], dtype="<u2").tobytes()
     rows = (tables.bias, tables.switch_rows, tables.switch_means, tables.joint_means)
@@ -170,6 +177,7 @@ def _parse(payload: bytes) -> IntegerTables:
         raise BuildError(f"{len(payload)} bytes of content, the counts alone have {_COUNTS.size}")
     K, s, j, zero, scale = _COUNTS.unpack_from(payload)
     _check_counts(K, s, j)
+    _check_stored_scale(scale)
     if zero:
         raise BuildError("the two bytes at offset 6 are not zero")
     if len(payload) < _COUNTS.size + 2 * j:

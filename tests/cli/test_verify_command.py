@@ -21,10 +21,12 @@ Thenar = Callable[..., subprocess.CompletedProcess[str]]
 def _silence_joints(folder: Path) -> None:
     tables = tables_from_bytes((folder / "tables.bin").read_bytes())
     rows = tuple(0 * rows for rows in tables.joint_rows)
-    data = tables_to_bytes(replace(tables, joint_rows=rows, joint_means=0 * tables.joint_means))
+    silent = replace(tables, joint_rows=rows, joint_means=0 * tables.joint_means)
+    data = tables_to_bytes(silent)
     manifest = manifest_from_bytes((folder / "build.json").read_bytes())
     (folder / "tables.bin").write_bytes(data)
-    described = replace_fields(manifest, tables_sha256=hashlib.sha256(data).hexdigest())
+    proof = replace_fields(manifest.proof, bound=silent.bound)
+    described = replace_fields(manifest, tables_sha256=hashlib.sha256(data).hexdigest(), proof=proof)
     (folder / "build.json").write_bytes(manifest_to_bytes(described))
 
 

@@ -1,4 +1,5 @@
 import contextlib
+import struct
 import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,8 +12,16 @@ from hypothesis import strategies as st
 
 from thenar.runtime import tables as module
 from thenar.runtime.errors import BuildError, SealError, ThenarError
-from thenar.runtime.sealed import seal
-from thenar.runtime.tables import KIND, MAX_BYTES, IntegerTables, tables_from_bytes, tables_to_bytes
+from thenar.runtime.sealed import HEADER, seal
+from thenar.runtime.tables import (
+    COARSEST_SCALE,
+    KIND,
+    MAX_BYTES,
+    VERSION,
+    IntegerTables,
+    tables_from_bytes,
+    tables_to_bytes,
+)
 
 MakeTables = Callable[..., IntegerTables]
 Size = dict[str, int]
@@ -92,10 +101,20 @@ def test_thresholds_that_do_not_increase_are_refused(make_tables: MakeTables) ->
         replace(tables, thresholds=(tables.thresholds[0], tables.thresholds[1][::-1], tables.thresholds[2]))
 
 
-@pytest.mark.parametrize("scale", [0.0, -1.0, float("nan"), float("inf"), 1e308, 2.0**31, 2.0**-65])
+@pytest.mark.parametrize("scale", [0.0, -1.0, float("nan"), float("inf"), 1e308, 2.0**31])
 def test_a_scale_that_is_no_scale_is_refused(make_tables: MakeTables, scale: float) -> None:
     with pytest.raises(BuildError, match="scale"):
         replace(make_tables(), scale=scale)
+
+
+def test_a_file_holds_no_coarser_scale_than_an_ensemble_can_need(make_tables: MakeTables) -> None:
+    data = tables_to_bytes(replace(make_tables(), scale=COARSEST_SCALE))
+    assert tables_from_bytes(data).scale == COARSEST_SCALE
+    with pytest.raises(BuildError, match="at least 2"):
+        tables_to_bytes(replace(make_tables(), scale=COARSEST_SCALE / 2))
+    payload = data[HEADER.size :].replace(struct.pack("<d", COARSEST_SCALE), struct.pack("<d", COARSEST_SCALE / 2))
+    with pytest.raises(BuildError, match="at least 2"):
+        tables_from_bytes(seal(KIND, VERSION, payload))
 
 
 @pytest.mark.parametrize("change", [{"bias": np.zeros(4, np.int16)}, {"bias": np.zeros(5)}, {"joint_rows": ()}])
