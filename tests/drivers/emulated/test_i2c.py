@@ -3,6 +3,7 @@ import select
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -61,10 +62,8 @@ def test_several_buses_are_served_at_a_time_each_with_its_own_chips() -> None:
 
 
 @pytest.mark.usefixtures("umockdev")
-def test_programs_that_know_nothing_of_thenar_meet_the_chips_too() -> None:
-    program = shutil.which("i2cget")
-    if program is None:
-        pytest.skip("program i2cget is missing")
+def test_programs_that_know_nothing_of_thenar_meet_the_chips_too(tool: Callable[[str], str]) -> None:
+    program = tool("i2cget")
     with EmulatedI2c([EmulatedBus("/dev/i2c-3", 400_000, "any", (MCP,), paced=False)]) as emulated:
         assert client(emulated, program, "-y", "3", "0x20", "0x00").strip() == "0xff"
 
