@@ -195,7 +195,7 @@ def test_sets_at_the_edges_have_a_report(
     thenar: Thenar, tmp_path: Path, types: int, switches: int, joints: int, small_set: GraspSet
 ) -> None:
     labels, random = np.arange(types * 6) % types, np.random.default_rng(3)
-    names = tuple(f"</td><b>type {number} & 握り \u202e" for number in range(types))
+    names = tuple(f"</td><b>type {number} & 握り \u200d" for number in range(types))
     edge = replace(
         small_set,
         switches=(labels[:, None] >> np.arange(switches) & 1).astype(bool),
