@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 from thenar.runtime.files import write_atomically
 
 from ..pictures import painting, rendered
-from .printing import names_for
-from .tree import Tree
+from .tree import Tree, names_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

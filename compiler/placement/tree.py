@@ -6,6 +6,7 @@ of values of each node are all that is needed to know the children.
 
 from collections.abc import Sequence
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import msgspec
@@ -14,8 +15,6 @@ import numpy.typing as npt
 
 from .errors import PlacementError
 from .inputs import check_matrix
-from .printing import tree_text
-from .soundness import check_tree
 
 Label = bool | int | float | str
 
@@ -63,7 +62,7 @@ class Tree(msgspec.Struct, frozen=True, dict=True):
     min_samples: int = 0
 
     def __post_init__(self) -> None:
-        check_tree(self)
+        _check_tree(self)
 
     @cached_property
     def children(self) -> tuple[tuple[int, ...], ...]:
@@ -148,7 +147,7 @@ class Tree(msgspec.Struct, frozen=True, dict=True):
 
     def text(self, names: Sequence[str] = (), class_names: Sequence[str] = ()) -> str:
         """Return the tree for people, a line a node; names default to x0, x1 ... and `classes`."""
-        return tree_text(self, names, class_names)
+        return _tree_text(self, names, class_names)
 
     def to_json(self) -> bytes:
         """Return the tree as one JSON document."""
@@ -168,3 +167,89 @@ def _share_out(
 ) -> dict[int, npt.NDArray[np.intp]]:
     parts = {child: rows[column == value] for value, child in zip(values, children, strict=True)}
     return {child: part for child, part in parts.items() if len(part)}
+
+
+def _check_tree(tree: Tree) -> None:
+    """Raise PlacementError, with the number of the node, if `tree` is not sound."""
+    if not tree.nodes or not tree.classes:
+        raise PlacementError("a tree has at least one node and one class")
+    waiting = 1
+    for number, node in enumerate(tree.nodes):
+        waiting += len(node.values) - 1
+        if waiting < 0 or (waiting == 0) != (number == len(tree.nodes) - 1):
+            raise PlacementError(f"the {len(tree.nodes)} nodes are not one tree in preorder (node {number})")
+        _check_node(tree, number, node)
+    for number, children in enumerate(tree.children):
+        counts = zip(*(tree.nodes[child].counts for child in children), strict=True)
+        if children and tuple(map(sum, counts)) != tree.nodes[number].counts:
+            raise PlacementError(f"the children of node {number} do not hold its rows")
+
+
+def _check_node(tree: Tree, number: int, node: Node) -> None:
+    if len(node.counts) != len(tree.classes) or min(node.counts) < 0 or not node.size:
+        raise PlacementError(f"node {number} needs {len(tree.classes)} class counts >= 0, not all zero")
+    if (node.input is None) != (len(node.values) < 2) or (node.input is None and (node.values or node.gain)):
+        raise PlacementError(f"node {number} is neither a leaf nor a decision between two values or more")
+    if node.input is not None and not 0 <= node.input < tree.n_inputs:
+        raise PlacementError(f"node {number} asks for input {node.input}, there are {tree.n_inputs}")
+    if not node.gain >= 0 or any(a >= b for a, b in pairwise((-1, *node.values))):
+        raise PlacementError(f"node {number} has a negative gain, or values that do not ascend from 0")
+
+
+def _tree_text(tree: Tree, names: Sequence[str], class_names: Sequence[str]) -> str:
+    """Return the text of Tree.text; raise PlacementError if there are names, but not one for each."""
+    names, class_names = names_for(tree, names, class_names)
+    lines = []
+    # Number of the node, what stands before its own line, and before its children's.
+    waiting = [(0, "", "")]
+    while waiting:
+        number, lead, below = waiting.pop()
+        node, children = tree.nodes[number], tree.children[number]
+        lines.append(lead + node_text(node, names, class_names))
+        for value, child in zip(reversed(node.values), reversed(children), strict=True):
+            last = child == children[-1]
+            waiting.append((child, f"{below}{'└─' if last else '├─'} {value}: ", below + ("   " if last else "│  ")))
+    return "\n".join([*lines, _summary(tree)])
+
+
+def names_for(tree: Tree, names: Sequence[str], class_names: Sequence[str]) -> tuple[Sequence[str], Sequence[str]]:
+    """Return a name for each input and each class, those given or their numbers and labels."""
+    names = names or [f"x{number}" for number in range(tree.n_inputs)]
+    class_names = class_names or [str(label) for label in tree.classes]
+    if len(names) != tree.n_inputs or len(class_names) != len(tree.classes):
+        raise PlacementError(
+            f"{len(names)} input and {len(class_names)} class names were given, "
+            f"the tree has {tree.n_inputs} inputs and {len(tree.classes)} classes"
+        )
+    return names, class_names
+
+
+def node_text(node: Node, names: Sequence[str], class_names: Sequence[str]) -> str:
+    """Return one node in words."""
+    if node.input is not None:
+        gain = "no input gains anything alone" if node.gains_nothing else f"gain {node.gain:.4g} bits"
+        return f"{names[node.input]}?  {node.size} rows, {gain}"
+    most = max(node.counts)
+    return f"{class_names[node.majority]}  {most if most == node.size else f'{most} of {node.size}'} rows"
+
+
+def _summary(tree: Tree) -> str:
+    pruned = f", pruned at S = {tree.min_samples}" if tree.min_samples else ""
+    said = (
+        f"{len(tree.inputs)} of {tree.n_inputs} inputs, {len(tree.nodes)} nodes, {tree.n_leaves} leaves, "
+        f"depth {tree.depth}{pruned}"
+    )
+    if tree.n_zero_gain:
+        said += (
+            f"; at {count_of(tree.n_zero_gain, 'node')} no input gains anything alone, the lowest-numbered varying one "
+            "was taken"
+        )
+    if tree.n_undecided:
+        leaves = count_of(tree.n_undecided, "leaf", "leaves")
+        said += f"; at {leaves} rows of several classes agree in every input"
+    return said
+
+
+def count_of(number: int, one: str, many: str = "") -> str:
+    """Return "1 node" or "2 nodes"; `many` where it is not `one` with an s."""
+    return f"{number} {one if number == 1 else many or one + 's'}"

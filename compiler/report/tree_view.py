@@ -4,8 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..placement.printing import node_text
-from ..placement.tree import Tree
+from ..placement.tree import Tree, node_text
 
 MOST_NODES = 300
 _ANSWERS = {0: "open", 1: "closed"}

@@ -9,7 +9,7 @@ from . import words
 from .member import Member
 from .node import NOBODY, Node, Query
 from .recognising import ImpostorError, read_back, set_up, whats_there
-from .routes import Routes
+from .routes import Routes, place
 
 T = TypeVar("T")
 
@@ -110,7 +110,7 @@ class Keeper:
     def _in_order(self, member: Member) -> bool:
         """Return whether the chip holds its registers. A mux that connects something else is set again."""
         if member.route and not self.routes.holds():
-            named = words.place(self._node.device, "tca9548a", member.route.mux, None)
+            named = place(self._node.device, "tca9548a", member.route.mux, None)
             member.blame(f"{named} had lost its channel (a reset, or another program): it was selected again")
             self.routes.forget()
             self.routes.select(member.route)
@@ -157,7 +157,7 @@ class Keeper:
         """Blame the mux where it failed, else the chip."""
         named = member.named
         if member.route and self.routes.selected != member.route and self.routes.mux is not None:
-            named = words.place(self._node.device, "tca9548a", self.routes.mux, None)
+            named = place(self._node.device, "tca9548a", self.routes.mux, None)
         member.blame(words.failure(named, error.errno))
 
     def _lose(self, member: Member, error: OSError) -> None:

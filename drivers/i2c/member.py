@@ -2,10 +2,9 @@
 
 from dataclasses import dataclass
 
-from . import words
 from .chip import Chip, Write
 from .recognising import watched
-from .routes import Route
+from .routes import Route, place
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +42,7 @@ class Member:
     @property
     def named(self) -> str:
         """The chip and where it is, for messages."""
-        return words.place(self.device, self.chip.kind, self.chip.address, self.route)
+        return place(self.device, self.chip.kind, self.chip.address, self.route)
 
     @property
     def state(self) -> ChipState:

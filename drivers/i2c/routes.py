@@ -19,6 +19,12 @@ class Route:
     channel: int
 
 
+def place(device: str, what: str, address: int, route: Route | None) -> str:
+    """Name a chip by where it is."""
+    behind = f" (channel {route.channel} of the tca9548a at 0x{route.mux:02X})" if route else ""
+    return f"{device}: the {what} at 0x{address:02X}{behind}"
+
+
 class Routes:
     """The muxes of a bus. Only one channel of them all is connected at a time; chips off the muxes are always reached.
 

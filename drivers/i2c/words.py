@@ -1,10 +1,6 @@
 """What an errno of an I2C transfer means, in words that say what to check."""
 
 import errno
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from .routes import Route
 
 # No acknowledge: bcm2835 and designware, i2c-gpio, i2c-stub.
 NOBODY_THERE = frozenset({errno.EREMOTEIO, errno.ENXIO, errno.ENODEV})
@@ -28,12 +24,6 @@ def meaning(code: int | None) -> str:
         return "does not answer: check its supply, its wires and its address pins"
     words = _MEANINGS.get(code or errno.EIO, "the transfer failed: check cable and adapter")
     return f"does not work: {words}"
-
-
-def place(device: str, what: str, address: int, route: "Route | None") -> str:
-    """Name a chip by where it is."""
-    behind = f" (channel {route.channel} of the tca9548a at 0x{route.mux:02X})" if route else ""
-    return f"{device}: the {what} at 0x{address:02X}{behind}"
 
 
 def failure(named: str, code: int | None) -> str:
