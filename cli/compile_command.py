@@ -7,7 +7,7 @@ import click
 
 from thenar.drivers.i2c.registry import CHIPS
 
-from .common import any_path, err, existing_file, json_flag, out, output_file, print_json, progress
+from .common import any_path, existing_file, json_flag, out, output_file, print_json, progress, warning
 from .compile_asked import TABLE_BITS, Asked
 from .scan_tables import print_scan
 
@@ -81,8 +81,8 @@ def command(context: click.Context, /, **options: Any) -> None:
     asked.check(context)
     made = _made(asked)
     if made.only_answer is not None:
-        err().print(
-            f"warning: the build recognises every row as {made.only_answer}: no input tells grasp types apart by "
+        warning(
+            f"the build recognises every row as {made.only_answer}: no input tells grasp types apart by "
             "itself, and stumps look at one at a time"
         )
     if asked.propose is not None:

@@ -100,7 +100,7 @@ def command(
     keep_apart(glove, Path(source), calibration, folder / _HARNESS, folder / _CALIBRATION, log)
     performance, cable = _performance(source, subject, period_ms)
     if missing := [name for name in harness.switches if name not in performance.switch_names]:
-        echo(f"warning: {source} has no switch {list_names(missing)}: open all the time", err=True)
+        warning(f"{source} has no switch {list_names(missing)}: open all the time")
     with ExitStack() as stack:
         stop = stack.enter_context(ended_by_signals())
         folder.mkdir(parents=True, exist_ok=True)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .common import err, existing_file, json_flag, keep_apart, output_file, print_json, progress
+from .common import existing_file, json_flag, keep_apart, output_file, print_json, progress, warning
 
 if TYPE_CHECKING:
     from thenar.compiler.evaluation.study import Study
@@ -131,8 +131,8 @@ def _write(study: "Study", folder: Path | None, output: Path | None) -> None:
 
 
 def _show(study: "Study", *, as_json: bool, confusion: bool) -> None:
-    for warning in study.warnings:
-        err().print(f"warning: {warning}")
+    for sentence in study.warnings:
+        warning(sentence)
     if as_json:
         print_json(study)
         return

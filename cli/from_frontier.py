@@ -89,9 +89,9 @@ def _check_point(point: "Point", grasp_set: "GraspSet", path: Path) -> None:
     if not there.issuperset(point.switches):
         raise FrontierError(f"{what} keeps switches that the recordings do not have: run thenar frontier on these")
     if setting.inputs != "joints" and setting.way.method not in METHODS:
-        raise FrontierError(f"{what} takes a method that is not there: {shortened(setting.way.method)!r}")
+        raise FrontierError(f"{what} takes a method that is not there: {shortened(repr(setting.way.method))}")
     if setting.wiring not in ("", AS_WIRED, BOARD, *CHIPS):
-        raise FrontierError(f"{what} takes a wiring that is not there: {shortened(setting.wiring)!r}")
+        raise FrontierError(f"{what} takes a wiring that is not there: {shortened(repr(setting.wiring))}")
     if setting.wiring in CHIPS and not _LEAST_HZ <= setting.clock_hz <= CHIPS[setting.wiring].clock_hz:
         raise FrontierError(f"{what} runs its {setting.wiring} at {setting.clock_hz} Hz, which it cannot")
     if setting.wiring not in ("", AS_WIRED) and not Wiring(setting.wiring, setting.clock_hz).fits(point.switches):

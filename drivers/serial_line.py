@@ -12,6 +12,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from .errors import DeviceError, SettingError
+from .names import shortened
 from .ports import check_node, port_fault
 
 if TYPE_CHECKING:
@@ -22,8 +23,6 @@ _CHUNK = 4096
 _WRITE_TIMEOUT_S = 1.0
 # A port without a file descriptor is asked again this often: its reading may be that much late in giving up.
 _SLICE_S = 0.005
-# So much of what is no port a message repeats.
-_SHOWN = 80
 # So often an open line looks whether its name still leads to the port that it has open.
 _LOOK_S = 0.2
 
@@ -47,7 +46,7 @@ class SerialLine:
         Raises DeviceError if that fails, SettingError for a baud rate below 1 and for what is no port.
         """
         if fault := port_fault(url):
-            raise SettingError(f"{url[:_SHOWN]!r} {fault}")
+            raise SettingError(f"{shortened(repr(url))} {fault}")
         if baud < 1:
             raise SettingError(f"{url}: a baud rate is at least 1, not {baud}")
         self.url, self.baud = url, baud

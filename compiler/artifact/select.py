@@ -4,11 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Calibration, Manifest
+from thenar.runtime.names import list_names
 
 from ..recordings.graspset import GraspSet, Joint
 from .errors import CompileError
-
-_SHOWN = 5
 
 
 def select_inputs(grasp_set: GraspSet, manifest: Manifest) -> tuple[NDArray[np.bool_], NDArray[np.uint16]]:
@@ -27,8 +26,7 @@ def _columns(kind: str, wanted: list[str], there: tuple[str, ...]) -> list[int]:
     number = {name: column for column, name in enumerate(there)}
     missing = [name for name in wanted if name not in number]
     if missing:
-        more = f" and {len(missing) - _SHOWN} more" if len(missing) > _SHOWN else ""
-        raise CompileError(f"the recordings lack {kind} that the build needs: {', '.join(missing[:_SHOWN])}{more}")
+        raise CompileError(f"the recordings lack {kind} that the build needs: {list_names(missing)}")
     return [number[name] for name in wanted]
 
 

@@ -158,7 +158,7 @@ class Tree(msgspec.Struct, frozen=True, dict=True):
         """Return the tree of `to_json`; raise PlacementError if the document is not one, or the tree is not sound."""
         try:
             return msgspec.json.decode(document, type=cls)
-        except msgspec.DecodeError as wrong:
+        except (ValueError, RecursionError) as wrong:
             raise PlacementError(f"this is no stored tree: {wrong}") from None
 
 

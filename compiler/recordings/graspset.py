@@ -127,7 +127,7 @@ class GraspSet:
             if grasp not in number:
                 row = int(np.flatnonzero(self.grasps == grasp)[0])
                 name = shortened(self.taxonomy.name)
-                raise RecordingError(f"row {row}: {shortened(grasp)!r} is not a type of taxonomy {name}")
+                raise RecordingError(f"row {row}: {shortened(repr(grasp))} is not a type of taxonomy {name}")
         return np.array([number[grasp] for grasp in found.tolist()], dtype=np.intp)[where]
 
     def __len__(self) -> int:

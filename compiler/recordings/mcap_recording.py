@@ -188,6 +188,6 @@ def _value(name: str, part: _Part, grasp: _Grasp) -> float:
     line = next((line for line in calibration.sensors if line.name == name), None)
     if line is None:
         raise TableError(
-            f"{part.what}: its calibration has no sensor {shortened(name)!r}: `thenar calibrate` makes a whole one"
+            f"{part.what}: its calibration has no sensor {shortened(repr(name))}: `thenar calibrate` makes a whole one"
         )
     return line.value(raw)

@@ -8,6 +8,7 @@ from fcntl import ioctl
 from typing import TYPE_CHECKING
 
 from ..errors import DeviceError, SettingError
+from ..names import shortened
 from ..ports import check_node, device_fault
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ class Node:
     def __init__(self, device: str) -> None:
         """Raise SettingError for what is no path of a device."""
         if fault := device_fault(device):
-            raise SettingError(f"{device!r} {fault}")
+            raise SettingError(f"{shortened(repr(device))} {fault}")
         self.device = device
         self.transfers = 0
         self.plain_i2c = True

@@ -135,7 +135,7 @@ class Decoder:
     def _sessions(self, record: RawRecord, metadata: Metadata) -> Iterator[Session]:
         if metadata.name != METADATA:
             self.foreign = True
-            self.passed.add(f"metadata {shortened(metadata.name)!r}", record.offset)
+            self.passed.add(f"metadata {shortened(repr(metadata.name))}", record.offset)
             return
         before, session = self.session, from_metadata(metadata.metadata)
         if before is not None and (before.switches, before.sensors) != (session.switches, session.sensors):

@@ -9,6 +9,7 @@ from zlib import crc32
 from mcap.opcode import Opcode
 from mcap.records import DataEnd, Footer
 
+from ..names import list_names
 from .decoding import Decoder, Entry, parsed
 from .errors import McapError
 from .layout import Tail
@@ -88,8 +89,7 @@ class Reader:
         if wrong:
             yield Fault("altered recordings", 1, f"{name} is altered: {'; '.join(wrong)}")
         if passed.count:
-            more = f" and {passed.count - len(passed.first)} more" if passed.count > len(passed.first) else ""
-            message = f"{name} holds what thenar does not read, passed over: {', '.join(passed.first)}{more}"
+            message = f"{name} holds what thenar does not read, passed over: {list_names(passed.first, passed.count)}"
             yield Fault("records passed over", passed.count, message)
 
     def _read(self) -> Iterator[Entry]:

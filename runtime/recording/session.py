@@ -100,7 +100,7 @@ def from_metadata(texts: dict[str, str]) -> Session:
     version = texts.get("version", "")
     # No more digits than any version will have, and than int() takes.
     if not re.fullmatch("[0-9]{1,9}", version):
-        raise McapError(f"its version is {shortened(version, 20)!r}, not a number: it was not recorded by thenar")
+        raise McapError(f"its version is {shortened(repr(version), 20)}, not a number: it was not recorded by thenar")
     if int(version) > VERSION:
         raise McapError(f"it is of version {version}, this thenar reads up to {VERSION}: update thenar")
     session = Session(**{field.name: _value(field, texts) for field in fields(Session) if field.name in _need(texts)})

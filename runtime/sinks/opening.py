@@ -40,7 +40,7 @@ def open_sink(where: str, *, wait: bool = False) -> Sink:
 def _open_ros(place: str) -> Sink:
     name, mark, readers = place.partition("?")
     if mark and readers != "public":
-        raise SettingError(f"{shortened('ros:' + place)!r}: behind the question mark can only be `public`")
+        raise SettingError(f"{shortened(repr('ros:' + place))}: behind the question mark can only be `public`")
     try:
         from .dds import RosTopics
     except ImportError as reason:

@@ -57,7 +57,7 @@ def test_what_has_a_default_may_be_missing(session: Session) -> None:
         ({"collection": PLAN.replace('"repetitions":3', '"repetitions":1000000000000')}, "<= 1000000"),
         ({"collection": PLAN.replace('"repetitions":3', '"repetitions":0')}, ">= 1"),
         ({"collection": PLAN.replace('"seed":7', '"seed":-1')}, ">= 0"),
-        ({"version": "\x1b[2J"}, r"its version is '\\\\x1b\[2J'"),
+        ({"version": "\x1b[2J"}, r"its version is '\\x1b\[2J'"),
     ],
 )
 def test_a_session_that_cannot_be_read_is_refused_by_its_key(
