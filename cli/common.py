@@ -108,7 +108,7 @@ def err() -> Console:
 
 
 def warning(sentence: str) -> None:
-    """Say on stderr what is odd about what was read."""
+    """Print a warning on stderr."""
     echo(f"warning: {sentence}", err=True)
 
 

@@ -90,7 +90,7 @@ def run_group(arguments: Sequence[str]) -> int:
 
 
 def _brought_by(lack: ModuleNotFoundError, arguments: Sequence[str]) -> str:
-    """Return what to install: thenar with the extra that brings the package, the command's own first; or thenar."""
+    """Return the requirement to install: thenar with an extra that has the package, the command's first; or thenar."""
     package = (lack.name or "").partition(".")[0]
     bringing = [extra for extra, packages in EXTRAS.items() if package in packages]
     bringing.sort(key=lambda extra: extra not in arguments[:1])

@@ -16,7 +16,7 @@ _DOUBTFUL = re.compile(r"[^\n -~]")
 
 
 def shown(text: str) -> str:
-    """Return `text` for a terminal: what is no glyph is written as Python would, but for line breaks and tabs."""
+    """Return `text` for a terminal: characters without a glyph escaped as in Python, except line breaks and tabs."""
     if text.isprintable():
         return text
     return "".join(part if part in ("\n", "\t") else printable(part) for part in _LAYOUT.split(text))
@@ -34,7 +34,7 @@ def echo_json(text: str) -> None:
 
 
 def json_shown(text: str, encoding: str) -> str:
-    """Return the JSON document `text`, with JSON's own escapes for what is no glyph or not in `encoding`."""
+    """Return the JSON document `text`, with JSON's escapes for characters without a glyph or outside `encoding`."""
     return _DOUBTFUL.sub(lambda found: _in_json(found[0], encoding), text)
 
 

@@ -1,4 +1,4 @@
-"""What is checked before the work: how much a build can hold, and whether a training fits into memory."""
+"""Limits that are checked before the work: the size of a build, and the memory of a training."""
 
 import os
 
@@ -18,7 +18,7 @@ def check_types(types: int, raises: type[ThenarError]) -> None:
 
 
 def check_inputs(types: int, switches: int, joints: int, raises: type[ThenarError]) -> None:
-    """Raise `raises` where a build has no room for so many switches and joints, whatever their rows are."""
+    """Raise `raises` where no build has room for these numbers of switches and joints."""
     if switches > MAX_SWITCHES:
         raise raises(f"{switches} switches, a build has at most {MAX_SWITCHES}: keep fewer")
     if joints > MAX_JOINTS:
@@ -32,7 +32,7 @@ def check_inputs(types: int, switches: int, joints: int, raises: type[ThenarErro
 
 
 def check_memory(rows: int, types: int, raises: type[ThenarError], switches: int = 0, joints: int = 0) -> None:
-    """Raise `raises` where training on so many rows needs more memory than this machine has."""
+    """Raise `raises` where training on `rows` rows needs more memory than this machine has."""
     a_row = _BYTES_A_TYPE_AND_ROW * types + _BYTES_A_SWITCH_AND_ROW * switches + _BYTES_A_JOINT_AND_ROW * joints
     needed, there = rows * a_row, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     if needed > there:

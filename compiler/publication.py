@@ -1,11 +1,11 @@
-"""Folders are published whole: written beside their place, made durable, then exchanged with what is there.
+"""Folders are published whole: written next to their place, made durable, then exchanged with what is there.
 
-Writing takes place in a box, the folder `.NAME.XXXXXXXX.part` beside the published folder. It holds at most
+Writing takes place in a box, the folder `.NAME.XXXXXXXX.part` next to the published folder. It holds at most
 
-    part  what is being written
-    new   what is complete; after the exchange, the folder that was replaced
+    part  the folder that is being written
+    new   the complete folder; after the exchange, the folder that was replaced
     old   the folder that was replaced, where the file system cannot exchange two names
-    gone  what is being deleted
+    gone  a folder that is being deleted
 
 Its writer holds a lock on it. What a killed writer leaves can be locked, and the next publication clears it.
 """
@@ -46,7 +46,7 @@ def entries(folder: Path) -> list[str]:
 
 
 def check_folder(folder: Path, theirs: Theirs, raises: type[ThenarError]) -> tuple[Path, Collection[str]]:
-    """Return `folder`, resolved, and what is the user's in it; what killed publications left beside it is cleared.
+    """Return `folder`, resolved, and the user's entries in it; delete what killed publications left there.
 
     Raises `raises` where no folder can be exchanged, and what `theirs` raises.
     """
@@ -74,7 +74,7 @@ def _is_current(target: Path) -> bool:
 def publish_folder(files: Mapping[str, bytes], folder: Path, theirs: Theirs, raises: type[ThenarError]) -> Path:
     """Write `files`, path below the folder -> content, as `folder`; return it, resolved.
 
-    What is the user's is in the new folder too, as the same files (a copy where there are no hard links). At every
+    The user's entries are in the new folder too, as the same files (a copy where there are no hard links). At every
     instant there is the old folder or the new one, whole. Where the file system cannot exchange two names there is a
     moment between two renames with neither: the next publication brings back the old one.
     Raises as `check_folder`; `raises` where a user's file is in the way, or the folder was changed meanwhile; OSError.
@@ -104,7 +104,7 @@ def publish_folder(files: Mapping[str, bytes], folder: Path, theirs: Theirs, rai
 
 
 def sweep(target: Path, theirs: Theirs) -> None:
-    """Clear what killed publications of `target` have left beside it; boxes of living ones stay."""
+    """Delete the boxes that killed publications of `target` left next to it; those of living ones stay."""
     name = re.compile(rf"\.{re.escape(target.name)}\.[0-9a-f]{{8}}\.part")
     for box in sorted(path for path in target.parent.iterdir() if name.fullmatch(path.name)):
         with suppress(OSError):
@@ -172,7 +172,7 @@ def _settle(box: Path, target: Path, theirs: Theirs) -> None:
 
 
 def _disposable(folder: Path, target: Path, theirs: Theirs) -> bool:
-    """Return whether nothing in the folder is the user's but what is in `target` too."""
+    """Return whether nothing in the folder is the user's except entries that `target` has too."""
     try:
         kept = theirs(folder)
     except (ThenarError, OSError):

@@ -5,9 +5,9 @@ from time import monotonic_ns
 from .board_clock import BoardClock
 from .scanner_messages import FromBoard, Hello, Lost, Ping, State
 
-# So often a PING bounds the delay that all messages share; between two of them clocks drift apart by 2 ms at most.
+# How often a PING bounds the delay that all messages share; between two of them clocks drift apart by 2 ms at most.
 _PING_US = 250_000
-# So many PINGs may be under way: an answer that takes longer than they do says nothing.
+# At most this many PINGs are under way: an answer that takes longer than they do says nothing.
 _UNDER_WAY = 64
 _TOKENS = 0xFFFF
 
@@ -15,9 +15,9 @@ _TOKENS = 0xFFFF
 class BoardTimes:
     """Gives every message its time, in the host's monotonic microseconds: never one before the last one's.
 
-    late_us  how late the last message with a time of its own came in, which those without one are taken to share
-    pings    how often the board's time was asked for
-    answered whether it was ever told
+    late_us   how late the last message with a time came in, which those without one are taken to share
+    pings     how often the board's time was asked for
+    answered  whether an answer ever came
     """
 
     def __init__(self) -> None:

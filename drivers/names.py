@@ -42,7 +42,7 @@ def sound_name(name: str, otherwise: str) -> str:
 
 
 def printable(text: str) -> str:
-    """Return `text` with every character that is no glyph written as Python would, so that no terminal obeys it."""
+    """Return `text` with every character without a glyph escaped as in Python, so that no terminal obeys it."""
     if text.isprintable():
         return text
     return "".join(
@@ -52,7 +52,7 @@ def printable(text: str) -> str:
 
 
 def shortened(text: str, longest: int = LONGEST_SHOWN) -> str:
-    """Return what a message repeats of a foreign `text`: printable, and cut behind `longest` characters."""
+    """Return a foreign `text` for a message: printable, and cut after `longest` characters."""
     return printable(text) if len(text) <= longest else f"{printable(text[:longest])}..."
 
 

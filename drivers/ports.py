@@ -1,4 +1,4 @@
-"""Ports: which texts name one, and what must be there when it is opened. Files of others name ports, too.
+"""Ports: which texts name one, and which file may be opened as one. A port may come from somebody else's file.
 
 pySerial takes more for a port than a line: `spy://` writes to any file, `alt://` loads any of its classes.
 """
@@ -43,7 +43,7 @@ def device_fault(path: str) -> str:
 def check_node(path: str) -> None:
     """Raise DeviceError unless a device is at `path`: a file would be locked, or taken for a device, by its opening.
 
-    What is not there, or may not be looked at, is left for its opening to tell.
+    A path that is missing or unreadable is no error here: opening it reports that.
     """
     try:
         mode = Path(path).stat().st_mode

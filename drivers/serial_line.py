@@ -23,7 +23,7 @@ _CHUNK = 4096
 _WRITE_TIMEOUT_S = 1.0
 # A port without a file descriptor is asked again this often: its reading may be that much late in giving up.
 _SLICE_S = 0.005
-# So often an open line looks whether its name still leads to the port that it has open.
+# How often an open line looks whether its name still leads to the port that it has open.
 _LOOK_S = 0.2
 
 _ADVICE = {
@@ -43,7 +43,7 @@ class SerialLine:
     def __init__(self, url: str, baud: int) -> None:
         """Open `url`, for this program alone where the system can see to that.
 
-        Raises DeviceError if that fails, SettingError for a baud rate below 1 and for what is no port.
+        Raises DeviceError if that fails, SettingError for a baud rate below 1 and a text that names no port.
         """
         if fault := port_fault(url):
             raise SettingError(f"{shortened(repr(url))} {fault}")
@@ -134,7 +134,7 @@ def _opened(url: str, baud: int) -> "Serial":
 
 
 def _node(port: str | int) -> int | None:
-    """Return which device a path or a descriptor leads to, None for what is none."""
+    """Return the device number behind a path or a descriptor, None if it is no device."""
     try:
         return os.stat(port).st_rdev or None  # noqa: PTH116 - of a descriptor, too
     except (OSError, ValueError):

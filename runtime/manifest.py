@@ -22,7 +22,7 @@ Inputs = Literal["both", "switches", "joints"]
 TableBits = Literal[8, 16]
 Count = Annotated[int, Meta(ge=0, le=2**53)]
 Code = Annotated[int, Meta(ge=0, le=65535)]
-# No more than this of what is told in steps or bits, and of what a joint's values are.
+# Bounds of errors and margins in steps, and of gains in bits and the values of joints.
 Amount = Annotated[float, Meta(ge=0.0, le=1e9)]
 Value = Annotated[float, Meta(ge=-1e300, le=1e300)]
 Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]

@@ -18,7 +18,7 @@ __all__ = [
 ]
 
 SHOWN = 5
-# So many names are compared with one that is not among them.
+# At most this many names are compared with one that is not among them.
 MOST_COMPARED = 1000
 
 

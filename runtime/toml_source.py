@@ -38,7 +38,7 @@ class Source:
     raises: type[ThenarError]
 
     def tables(self) -> dict[str, object]:
-        """Return what the file holds; raises its error, with the line, where it is no TOML or too much of it."""
+        """Return the content of the file; raises its error, with the line, where it is no TOML or exceeds a limit."""
         if len(self.text) > LARGEST:
             raise self.raises(f"{self.name} is longer than {LARGEST} characters, the most that is read of TOML")
         try:

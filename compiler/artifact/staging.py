@@ -21,7 +21,7 @@ _FOLDERS = {FIRMWARE_NAME: frozenset(LIBRARY_FILES), SPEC_FOLDER: NAMES}
 def check_target(folder: Path) -> Path:
     """Return `folder` resolved, if a build may be put there: a new or empty folder, or one that holds only a build.
 
-    What killed publications have left beside it, and beside the spec in it, is cleared. Raises CompileError where no
+    Deletes the leftovers of killed publications next to it, and next to the spec in it. Raises CompileError where no
     build may be put: files that thenar has not made are never deleted.
     """
     spec = folder.resolve() / SPEC_FOLDER
@@ -54,5 +54,5 @@ def _refuse_foreign(folder: Path) -> tuple[str, ...]:
 
 
 def _foreign(folder: Path, members: frozenset[str]) -> list[Path]:
-    """Return what is in `folder` that is not a file by the name of a member."""
+    """Return the entries of `folder` that are not files with a member's name."""
     return [path for path in sorted(folder.iterdir()) if path.name not in members or not path.is_file()]

@@ -42,7 +42,7 @@ def _digest(data: bytes) -> str:
 
 
 def _users_files(folder: Path) -> list[str]:
-    """Return what is in the folder and not ours, in order. Raises FirmwareError if ours may not be replaced."""
+    """Return the user's entries of the folder, in order. Raises FirmwareError if ours may not be replaced."""
     there = entries(folder)
     if not there:
         return []

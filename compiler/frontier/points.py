@@ -237,7 +237,7 @@ def _contradictions(frontier: Frontier) -> Iterator[str]:
 
 
 def _fault(point: Point, frontier: Frontier) -> str:
-    """Return what is wrong with a point's setting, or nothing."""
+    """Return the first contradiction in a point's setting, or nothing."""
     setting = point.setting
     if len(set(point.switches)) < len(point.switches) or len(point.switches) > frontier.n_switches:
         return "keeps a switch twice, or more than there are"

@@ -146,7 +146,7 @@ def _documents(found: Frontier) -> dict[str, bytes]:
 
 
 def _kept(folder: Path) -> list[str]:
-    """Return what is in the folder of a frontier besides its documents: the store, and what is the user's."""
+    """Return the entries of a frontier's folder that are kept: the store and the user's files."""
     there = entries(folder)
     if there and not {FRONTIER_NAME, STORE_NAME} & set(there):
         raise FrontierError(f"{folder} is not empty and holds no frontier: name another folder")

@@ -22,7 +22,7 @@ def write_spec(files: Mapping[str, bytes], folder: Path) -> None:
 
 
 def users_files(folder: Path) -> list[str]:
-    """Return what is in the folder of a spec and is not the spec's. Raises SpecError if it holds no spec."""
+    """Return the user's entries of the folder of a spec. Raises SpecError if it holds no spec."""
     if any(folder.iterdir()) and not (folder / _MARK).is_file():
         raise SpecError(f"{folder} is there already and is no spec: name another folder")
     return [path for path in entries(folder) if path not in NAMES]

@@ -60,7 +60,7 @@ def codes(column: Column) -> Parsed[np.float64]:
 
 
 def names(column: Column, cells: bool = False, size: int = 0) -> Parsed[np.str_]:
-    """Read `column` as names without outer blanks; missing: empty and ?, wrong: what is no good name. With `cells` they
+    """Read `column` as names without outer blanks; missing: empty and ?, wrong: by the rule of names. With `cells` they
     are written as cells of a spreadsheet.
 
     Numbers are names too, but for NaN, which is missing, and infinity, which is wrong. Whole ones read as such: 3, not
@@ -120,7 +120,7 @@ def _parsed(column: Column, words: dict[str, float]) -> Parsed[np.float64]:
 
 
 def _floats(column: AnyArray) -> NDArray[np.float64]:
-    # What is too large for a double becomes infinite, and is refused with its row.
+    # A number too large for a double becomes infinite, and is refused with its row.
     with np.errstate(over="ignore"):
         return column.astype(np.float64)
 

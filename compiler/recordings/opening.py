@@ -17,7 +17,7 @@ from .limits import LARGEST, LONGEST_LINE, unpacked
 
 @contextmanager
 def open_lines(path: Path) -> Iterator[Iterator[str]]:
-    """Open a text file, gzipped or not, behind its byte order mark; what is wrong inside becomes a TableError."""
+    """Open a text file, gzipped or not, behind its byte order mark; a fault of its content becomes a TableError."""
     zipped = path.suffix.lower() == ".gz"
     try:
         with open_file(path, TableError) as raw:

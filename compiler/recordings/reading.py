@@ -42,7 +42,7 @@ def read_cells(table: Table, columns: Columns, selection: Selection) -> tuple[Re
     trials = np.ones(len(table.rows))
     if columns.trial is not None:
         trials = reader.read(columns.trial, integers, "whole numbers")
-    # Read into place, and in columns: what is wide and long is there once.
+    # Read into place, and in columns, so that a large table is in memory only once.
     rows = len(table.rows)
     switches = np.empty((rows, len(selection.switches)), np.bool_, order="F")
     for number, name in enumerate(selection.switches):

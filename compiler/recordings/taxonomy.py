@@ -81,7 +81,7 @@ class Taxonomy:
         return tuple(_KAMAKURA.values()) if self.name == "kamakura14" else self.types
 
     def finder(self) -> Callable[[str], str | None]:
-        """Return what finds the type that a label means, or None: made once for many labels."""
+        """Return a function from a label to the type that it means, or None; made once for many labels."""
         types, aliases = frozenset(self.types), self._aliases()
         return lambda label: label if label in types else aliases.get(_plain(label))
 
@@ -97,7 +97,7 @@ class Taxonomy:
         return found
 
     def unknown(self, label: str) -> str:
-        """Return what to say of a `label` that means no type, with those that look most like it."""
+        """Return the message about a `label` that means no type, with the types most like it."""
         return f"{shortened(repr(label))} is not a grasp type of {self.name}{self.suggestion(label)}"
 
     def suggestion(self, label: str) -> str:

@@ -108,7 +108,7 @@ class _Answers:
 
 
 def _answers(stumps: Stumps, branch: int) -> _Answers:
-    """Return what each of the M K stumps adds in a branch: centring spreads it from its own class."""
+    """Return the answers of the M K stumps in a branch: centring spreads it from its own class."""
     own, others = spread(stumps.values[:, :, branch].ravel(), stumps.n_classes, stumps.shrinkage)
     return _Answers(own, others, np.tile(np.arange(stumps.n_classes), stumps.n_rounds), stumps.n_classes)
 

@@ -100,7 +100,7 @@ class _Pairs:
         self._first = np.stack([self._losses(k, slice(None), 1)[0] for k in range(self._n_classes)])
 
     def taken(self, leader: int, rival: int) -> list[list[int]]:
-        """Return what each choice of each input takes from the lead of `leader` over `rival`."""
+        """Return by how much each choice of each input lowers the lead of `leader` over `rival`."""
         return [self._whole(parts[:, :, leader] - parts[:, :, rival]) for parts in self._parts]
 
     def greatest(self, tie: int) -> tuple[int, int, int]:

@@ -46,7 +46,7 @@ class Node:
     """
 
     def __init__(self, device: str) -> None:
-        """Raise SettingError for what is no path of a device."""
+        """Raise SettingError if `device` is no path of a device."""
         if fault := device_fault(device):
             raise SettingError(f"{shortened(repr(device))} {fault}")
         self.device = device

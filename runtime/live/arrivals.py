@@ -28,7 +28,7 @@ class Arrivals:
     without it: each is one value that is replaced whole.
 
     switches, glove  the newest frames, None before the first
-    overflowed       frames that nobody took in time, and that are therefore missing from what is recorded
+    overflowed       frames that nobody took in time: a recording lacks them
     """
 
     def __init__(self, parts: Parts) -> None:

@@ -23,7 +23,7 @@ SHORTEST_US = 10_000
 # A board that speaks less often is asked for a heartbeat, beside an event for every change: silence is missed sooner.
 STATE_US = SHORTEST_US
 
-# What a good line makes of a PING: the 16 ms of an adapter, what a board takes to answer; and so many bytes both ways.
+# The round trip of a PING on a good line: an adapter's 16 ms and the board's answer; and its bytes, both ways.
 _ANSWERED_US = 20_000
 _PING_BYTES = 8 + 41
 

@@ -24,7 +24,7 @@ _LARGEST_MADE = 20_000_000
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """What is wrong with a file that could be read all the same: its kind, how often, a sentence for people."""
+    """A fault of a file that could be read nevertheless: its kind, how often it occurs, a sentence for people."""
 
     kind: str
     count: int
@@ -78,7 +78,7 @@ class Reader:
             yield entry
 
     def faults(self) -> Iterator[Fault]:
-        """Yield what is wrong with the file, once its end is reached."""
+        """Yield the faults of the file, once its end is reached."""
         name, end, passed = self.path.name, self.end, self._decoder.passed
         if end is not None and (end.whole < end.size or not (end.closed or self._in_data)):
             message = f"{name} is whole up to byte {end.whole} of {end.size}, the rest was left out: {end.reason}"
@@ -136,7 +136,7 @@ class Reader:
 def check_made(what: str, made: int, size: int) -> None:
     """Raise McapError if something of `made` bytes would be made of recordings of `size` bytes.
 
-    Every row of it was captured of frames of its own length: no glove records less than it is asked to make.
+    Every row was captured from frames of its length, so a sound recording is at least as long as its rows.
     """
     if made > size + _LARGEST_MADE:
         raise McapError(f"{what} would fill {made >> 20} MiB, more than {size} bytes can have recorded: it is damaged")

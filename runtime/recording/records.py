@@ -138,7 +138,7 @@ class RecordStream:
 
 
 def kind_of(opcode: int) -> str:
-    """Return what a record of this kind is called."""
+    """Return the name of a kind of record."""
     try:
         return Opcode(opcode).name.lower().replace("_", " ")
     except ValueError:

@@ -208,7 +208,7 @@ class _Reader:
 
 
 def _host(reader: socket.socket, peer: Any) -> str:
-    """Return what is one machine, as far as its address says: all of a network's 64 bits in IPv6; "" for this one."""
+    """Return the key of a reader's machine: its address, in IPv6 its network of 64 bits; "" for this machine."""
     if reader.family == socket.AF_UNIX:
         return ""
     address = ipaddress.ip_address(peer[0].partition("%")[0])
