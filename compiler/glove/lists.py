@@ -4,7 +4,7 @@ import csv
 import io
 from collections.abc import Iterable, Sequence
 
-from ..recordings.spreadsheet import cell
+from ..recordings.spreadsheet import cells
 from .glove_spec import Summary
 from .materials import Material
 
@@ -60,5 +60,5 @@ def _csv(header: Sequence[str], rows: Iterable[Row]) -> bytes:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(header)
-    writer.writerows([cell(value) if isinstance(value, str) else value for value in row] for row in rows)
+    writer.writerows(map(cells, rows))
     return text.getvalue().encode()

@@ -4,7 +4,7 @@ import csv
 import io
 from collections.abc import Iterable, Iterator
 
-from ...recordings.spreadsheet import cell
+from ...recordings.spreadsheet import cells
 from ..points import Frontier, Point, Rate, Time
 
 COLUMNS = (
@@ -25,12 +25,11 @@ def csv_bytes(frontier: Frontier) -> bytes:
     file = io.StringIO(newline="")
     rows = csv.writer(file, lineterminator="\n")
     rows.writerow(COLUMNS)
-    for point in frontier.points:
-        rows.writerow(cell(value) if isinstance(value, str) else value for value in _cells(point))
+    rows.writerows(cells(_values(point)) for point in frontier.points)
     return file.getvalue().encode()
 
 
-def _cells(point: Point) -> Iterator[object]:
+def _values(point: Point) -> Iterator[object]:
     setting, latency = point.setting, point.latency
     yield from (point.number, _list(point.fronts), len(point.switches), setting.inputs)
     yield from (setting.way.method, setting.way.parameter, setting.rounds, setting.width, setting.layout)
