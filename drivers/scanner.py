@@ -34,7 +34,7 @@ _ASK_AGAIN_S = 0.1
 
 
 class Scanner:
-    """A scanner board at `url`, anything that pySerial opens; boards with USB of their own ignore `baud`.
+    """A scanner board at `url`: a device, socket://HOST:PORT or rfc2217://HOST:PORT; boards with USB ignore `baud`.
 
     `open`, then `read` again and again; both raise DeviceError when the board is gone or is not what it was, after
     which opening it again is the way back. For one thread.
