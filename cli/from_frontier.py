@@ -13,9 +13,6 @@ if TYPE_CHECKING:
     from thenar.runtime.harness.wiring import Harness
 
 
-_LEAST_HZ = 1000  # of the clock of a bus in glove.toml
-
-
 @dataclass(frozen=True, slots=True)
 class Picked:
     """A frontier, and the point of it that is to be built."""
@@ -82,6 +79,7 @@ def _check_point(point: "Point", grasp_set: "GraspSet", path: Path) -> None:
     from thenar.compiler.frontier.timing.wirings import AS_WIRED, BOARD, Wiring
     from thenar.compiler.selection.ways import METHODS
     from thenar.drivers.i2c.registry import CHIPS
+    from thenar.runtime.harness.wiring import SLOWEST_HZ
     from thenar.runtime.names import shortened
 
     setting, there = point.setting, set(grasp_set.switch_names)
@@ -92,7 +90,7 @@ def _check_point(point: "Point", grasp_set: "GraspSet", path: Path) -> None:
         raise FrontierError(f"{what} takes a method that is not there: {shortened(repr(setting.way.method))}")
     if setting.wiring not in ("", AS_WIRED, BOARD, *CHIPS):
         raise FrontierError(f"{what} takes a wiring that is not there: {shortened(repr(setting.wiring))}")
-    if setting.wiring in CHIPS and not _LEAST_HZ <= setting.clock_hz <= CHIPS[setting.wiring].clock_hz:
+    if setting.wiring in CHIPS and not SLOWEST_HZ <= setting.clock_hz <= CHIPS[setting.wiring].clock_hz:
         raise FrontierError(f"{what} runs its {setting.wiring} at {setting.clock_hz} Hz, which it cannot")
     if setting.wiring not in ("", AS_WIRED) and not Wiring(setting.wiring, setting.clock_hz).fits(point.switches):
         raise FrontierError(f"{what} has no room for its {len(point.switches)} switches on {setting.wiring}")

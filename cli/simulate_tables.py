@@ -11,7 +11,7 @@ from thenar.simulator.pipeline.registry import CONTACTS
 from thenar.simulator.running.explain import Explanation
 from thenar.simulator.running.report import GraspReport, Report, StepReport
 
-from .common import err, out
+from .common import err, out, warning
 
 if TYPE_CHECKING:  # simulating needs no compiler; ablation does
     from .ablation import Ablation, Change, Recognised, Variant
@@ -105,7 +105,7 @@ def _warn_of_unsettled(report: Report) -> None:
     what = "kept as asked" if report.kept_unsettled else "left out of the set (--keep-unsettled keeps them)"
     console = err()
     count = f"{len(report.unsettled)} of {report.repetitions} grasps"
-    console.print(f"warning: {count} cannot be trusted, and are {what}:", soft_wrap=True)
+    warning(f"{count} cannot be trusted, and are {what}:")
     for one in report.unsettled[:_SHOWN]:
         console.print(
             f"  subject {one.subject}, {one.grasp} with {one.object}, repetition {one.repetition}: {one.why}",

@@ -15,6 +15,8 @@ from thenar.drivers.i2c.registry import CHIPS
 
 # A board's bitmap has no room for more.
 MOST_KEYS = 2000
+# Of the clock of a bus.
+SLOWEST_HZ = 1000
 Text = Annotated[str, Meta(min_length=1)]
 Baud = Annotated[int, Meta(ge=1, le=12_000_000)]
 Milliseconds = Annotated[float, Meta(ge=0.0, le=1000.0)]
@@ -92,7 +94,7 @@ class BusWiring(_Table, frozen=True):
     """An I2C bus and the chips on it."""
 
     device: Text
-    clock_hz: Annotated[int, Meta(ge=1000, le=1_700_000)] = 100_000
+    clock_hz: Annotated[int, Meta(ge=SLOWEST_HZ, le=1_700_000)] = 100_000
     chips: tuple[ChipWiring, ...] = field(default=(), name="chip")
 
 
