@@ -1,5 +1,6 @@
 """What several tests need: where the real recordings and Weka's answers are, and what a missing one means."""
 
+import importlib.util
 import os
 import shutil
 import signal
@@ -7,7 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import pytest
 from hypothesis import settings
@@ -114,3 +115,16 @@ def hostile_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[
     monkeypatch.chdir(folder)
     yield folder
     assert not (folder / "mark").exists(), (folder / "mark").read_text()
+
+
+@pytest.fixture(scope="session")
+def examples() -> Any:
+    """Return the module with example_frontier, the made-up frontier for all tests that show one."""
+    path = Path(__file__).parent / "compiler" / "frontier" / "example_frontier.py"
+    spec = importlib.util.spec_from_file_location("example_frontier", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module

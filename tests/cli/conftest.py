@@ -1,11 +1,9 @@
 """A small set of grasps as a file, and a build of it, for the sub-commands to work on."""
 
-import importlib.util
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,8 +11,6 @@ import pytest
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.recordings.taxonomy import own
-
-_EXAMPLE = Path(__file__).parents[1] / "compiler" / "frontier" / "example_frontier.py"
 
 Thenar = Callable[..., "subprocess.CompletedProcess[str]"]
 
@@ -59,14 +55,3 @@ def set_file(small_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> P
 @pytest.fixture
 def build_folder(small_set: GraspSet, tmp_path: Path) -> Path:
     return compile_build(small_set, tmp_path / "build", rounds=10, folds=0).folder
-
-
-@pytest.fixture(scope="session")
-def examples() -> Any:
-    spec = importlib.util.spec_from_file_location("example_frontier", _EXAMPLE)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module

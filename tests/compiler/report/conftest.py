@@ -1,7 +1,5 @@
 """Small builds with everything that a report can tell of, and the made-up frontier."""
 
-import importlib.util
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -37,19 +35,6 @@ NASTY = (
     "\"quotes\" & 'more' ${x} {{ 7 * 7 }} %{y}",
     "Griff ✊ 握り \u200d <!-- <script> \\u003c",
 )
-
-
-@pytest.fixture(scope="session")
-def examples() -> Any:
-    """Return the module with example_frontier."""
-    path = Path(__file__).parents[1] / "frontier" / "example_frontier.py"
-    spec = importlib.util.spec_from_file_location("example_frontier", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.fixture(scope="session")
