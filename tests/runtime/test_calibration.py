@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.errors import SettingError
 from thenar.drivers.names import fault
-from thenar.runtime.calibration import load_calibration, parse_calibration
+from thenar.runtime.calibration import load_calibration
 
 VALUES = st.floats(-1e6, 1e6)
 LINES = st.builds(
@@ -27,8 +27,10 @@ SENSOR = '{ name = "index_mpj", raw_a = 96, value_a = 0.0, raw_b = 161, value_b 
 
 
 @given(CALIBRATIONS)
-def test_a_file_gives_back_every_digit(calibration: GloveCalibration) -> None:
-    assert parse_calibration(calibration.to_toml(), "anna") == calibration
+def test_a_file_gives_back_every_digit(tmp_path_factory: pytest.TempPathFactory, calibration: GloveCalibration) -> None:
+    path = tmp_path_factory.getbasetemp() / "digits.toml"
+    path.write_text(calibration.to_toml(), "utf-8")
+    assert load_calibration(path) == calibration
 
 
 def test_a_file_is_as_its_docstring_shows_it(tmp_path: Path) -> None:
@@ -85,9 +87,10 @@ def test_a_file_that_is_not_there_or_no_text_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["", "\x1b[2J", "a\u202eb", "two\nlines", "s" * 201])
-def test_a_name_that_would_deceive_or_get_lost_is_refused(name: str) -> None:
+def test_a_name_that_would_deceive_or_get_lost_is_refused(tmp_path: Path, name: str) -> None:
     line = SensorCalibration("index_mpj", 96, 0.0, 161, 90.0)
     text = GloveCalibration(subject="anna", sensors=(line,)).to_toml()
     for good in ("anna", "index_mpj")[not name :]:  # no subject is given in many files
+        (tmp_path / "anna.toml").write_text(text.replace(f'"{good}"', json.dumps(name)))
         with pytest.raises(SettingError, match=r"must be text of length|holds a control character|at most 200"):
-            parse_calibration(text.replace(f'"{good}"', json.dumps(name)), "anna.toml")
+            load_calibration(tmp_path / "anna.toml")
