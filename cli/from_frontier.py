@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from thenar.compiler.artifact.compile import Wired
     from thenar.compiler.frontier.points import Frontier, Point
     from thenar.compiler.recordings.graspset import GraspSet
@@ -46,13 +48,28 @@ class Picked:
         setting = self.point.setting
         if not setting.wiring:
             return given
-        if setting.wiring == AS_WIRED:
-            if given is None:
-                raise click.UsageError(
-                    f"Point {self.point.number} is read as the glove was wired: name its glove.toml with --glove."
-                )
-            return given
-        return lambda names: Wiring(setting.wiring, setting.clock_hz).harness_of(names, setting.inputs != "switches")
+        if setting.wiring == AS_WIRED and given is None:
+            raise click.UsageError(
+                f"Point {self.point.number} is read as the glove was wired: name its glove.toml with --glove."
+            )
+
+        def harness_of(kept: "Sequence[str]") -> "Harness":
+            self._check_kept(kept)
+            if given is not None and setting.wiring == AS_WIRED:
+                return given
+            return Wiring(setting.wiring, setting.clock_hz).harness_of(kept, setting.inputs != "switches")
+
+        return harness_of
+
+    def _check_kept(self, kept: "Sequence[str]") -> None:
+        """Raise FrontierError unless the placement kept the switches that the point lists."""
+        from thenar.compiler.frontier.points import FrontierError
+
+        if set(kept) != set(self.point.switches):
+            raise FrontierError(
+                f"point {self.point.number} lists {len(self.point.switches)} switches, but its placement keeps "
+                f"{len(kept)}, not the same ones: run thenar frontier again"
+            )
 
 
 def picked(path: Path, number: int | None, grasp_set: "GraspSet") -> Picked:
@@ -88,6 +105,9 @@ def _check_point(point: "Point", grasp_set: "GraspSet", path: Path) -> None:
         raise FrontierError(f"{what} keeps switches that the recordings do not have: run thenar frontier on these")
     if setting.inputs != "joints" and setting.way.method not in METHODS:
         raise FrontierError(f"{what} takes a method that is not there: {shortened(repr(setting.way.method))}")
+    least = 1 if setting.inputs != "joints" and METHODS[setting.way.method].parameter == "switches" else 0
+    if not (setting.way.parameter.is_integer() and setting.way.parameter >= least):
+        raise FrontierError(f"{what} takes {setting.way.parameter} for its method: it is a whole number from {least} on")
     if setting.wiring not in ("", AS_WIRED, BOARD, *CHIPS):
         raise FrontierError(f"{what} takes a wiring that is not there: {shortened(repr(setting.wiring))}")
     if setting.wiring in CHIPS and not SLOWEST_HZ <= setting.clock_hz <= CHIPS[setting.wiring].clock_hz:

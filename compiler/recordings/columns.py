@@ -2,15 +2,18 @@
 
 import glob
 import math
+import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
+from fnmatch import translate
+from itertools import islice
 from pathlib import Path
 from typing import Literal
 
 import msgspec
 
+from thenar.runtime.names import LONGEST_NAME
 from thenar.runtime.toml_source import read_source
 from thenar.runtime.toml_struct import convert
 
@@ -18,6 +21,10 @@ from .errors import ColumnsError
 from .names import nearest, shortened
 
 DEFAULT_GRID = 0.5
+# A name whose every letter is escaped is three times as long.
+LONGEST_GLOB = 3 * LONGEST_NAME
+# Globs times columns: some seconds.
+COMPARISONS = 20_000_000
 
 
 class Calibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -106,8 +113,11 @@ def select(columns: Columns, names: Sequence[str]) -> Selection:
     for key, column in meta.items():
         if column is not None and column not in there:
             raise ColumnsError(f"{key}: the table has no column {shortened(repr(column))}{nearest(column, names)}")
-    switches = tuple(_matches("switches", columns.switches, names))
-    joints = tuple((name, entry) for entry in columns.joints for name in _matches("joints", entry.columns, names))
+    _check_globs([*columns.switches, *(pattern for entry in columns.joints for pattern in entry.columns)], names)
+    # One match more than there are columns, and some column is matched twice.
+    found = list(islice(_matched(columns, names), len(names) + 1))
+    switches = tuple(name for name, entry in found if entry is None)
+    joints = tuple((name, entry) for name, entry in found if entry is not None)
     used = Counter([*filter(None, meta.values()), *switches, *(name for name, _ in joints)])
     if twice := [name for name, times in used.items() if times > 1]:
         raise ColumnsError(f"column {twice[0]!r} is used {used[twice[0]]} times: name it once, or narrow the globs")
@@ -116,11 +126,38 @@ def select(columns: Columns, names: Sequence[str]) -> Selection:
     return Selection(switches, joints)
 
 
-def _matches(what: str, globs: Sequence[str], names: Sequence[str]) -> Iterator[str]:
-    for pattern in globs:
-        found = [name for name in names if fnmatchcase(name, pattern)]
-        if not found:
-            advice = f"; for the column of that name write {glob.escape(pattern)!r}"
-            advice = advice if pattern in names else nearest(pattern, names)
-            raise ColumnsError(f"{what}: {pattern!r} matches no column of the table{advice}")
-        yield from found
+def _check_globs(globs: Sequence[str], names: Sequence[str]) -> None:
+    """Raise ColumnsError where finding the columns of so many globs, or of such long ones, would take too long."""
+    longest = max(globs, key=len, default="")
+    if len(longest) > LONGEST_GLOB:
+        raise ColumnsError(f"the glob {shortened(repr(longest))} has more than {LONGEST_GLOB} characters: shorten it")
+    if sum(map(_is_wild, globs)) * len(names) > COMPARISONS:
+        raise ColumnsError(
+            f"{len(globs)} globs are too many for {len(names)} columns: name columns, or use fewer globs"
+        )
+
+
+def _matched(columns: Columns, names: Sequence[str]) -> Iterator[tuple[str, JointColumns | None]]:
+    """Yield each column that a glob finds, with the entry of the joint that it is, None for a switch."""
+    there = frozenset(names)
+    for pattern in columns.switches:
+        yield from ((name, None) for name in _matches("switches", pattern, names, there))
+    for entry in columns.joints:
+        for pattern in entry.columns:
+            yield from ((name, entry) for name in _matches("joints", pattern, names, there))
+
+
+def _matches(what: str, pattern: str, names: Sequence[str], there: frozenset[str]) -> list[str]:
+    if _is_wild(pattern):
+        found = list(filter(re.compile(translate(pattern)).match, names))
+    else:
+        found = [pattern] if pattern in there else []
+    if not found:
+        advice = f"; for the column of that name write {shortened(repr(glob.escape(pattern)), LONGEST_GLOB)}"
+        advice = advice if pattern in there else nearest(pattern, names)
+        raise ColumnsError(f"{what}: {shortened(repr(pattern))} matches no column of the table{advice}")
+    return found
+
+
+def _is_wild(pattern: str) -> bool:
+    return any(letter in pattern for letter in "*?[")

@@ -101,7 +101,8 @@ def _labels(table: Table, columns: Columns, readings: Readings) -> tuple[NDArray
     if unknown.any():
         label = aliased[where[np.flatnonzero(unknown)[0]]]
         raise TableError(
-            f"{table.what}: {unknown.sum()} unknown labels in {columns.label!r}, {list_rows(readings.rows[unknown])}; "
+            f"{table.what}: {unknown.sum()} unknown labels in {shortened(repr(columns.label))}, "
+            f"{list_rows(readings.rows[unknown])}; "
             f"{shortened(repr(label))} is no grasp type of {taxonomy.name}{taxonomy.suggestion(label)}; "
             "[labels] can translate it"
         )

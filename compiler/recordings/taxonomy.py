@@ -138,7 +138,9 @@ def own(types: Iterable[str]) -> Taxonomy:
 def published(name: str) -> Taxonomy:
     """Return the published taxonomy called `name`; raises RecordingError naming those there are."""
     if name not in _PUBLISHED:
-        raise RecordingError(f"no taxonomy is called {name!r}: take one of {', '.join(_PUBLISHED)}, own, or a list")
+        raise RecordingError(
+            f"no taxonomy is called {shortened(repr(name))}: take one of {', '.join(_PUBLISHED)}, own, or a list"
+        )
     return Taxonomy(name, _PUBLISHED[name])
 
 

@@ -44,6 +44,9 @@ def test_a_point_that_can_be_built_is(compiled: Callable[[Change], tuple[int, st
     ("change", "said"),
     [
         (_setting(way=Way("nonsense", 6.0)), "takes a method that is not there: 'nonsense'"),
+        (_setting(way=Way("elimination", 0.0)), "takes 0.0 for its method: it is a whole number from 1 on"),
+        (_setting(way=Way("id3", 0.5)), "takes 0.5 for its method: it is a whole number from 0 on"),
+        (_setting(way=Way("id3", -1.0)), "takes -1.0 for its method: it is a whole number from 0 on"),
         (_setting(clock_hz=0), "has switches without a wiring or its clock"),
         (_setting(clock_hz=1), "runs its mcp23017 at 1 Hz, which it cannot"),
         (_setting(clock_hz=12_000_000), "runs its mcp23017 at 12000000 Hz, which it cannot"),

@@ -123,6 +123,30 @@ def test_columns_that_do_not_fit_the_table_are_refused(columns: Columns, reason:
         select(columns, NAMES)
 
 
+@pytest.mark.parametrize(
+    ("globs", "count", "reason"),
+    [
+        (("[s" * 400_000,), 2, "more than 600 characters"),
+        (("*a" * 400_000,), 2, "more than 600 characters"),
+        (tuple(f"s{number:05}*" for number in range(10_000)), 20_000, "10000 globs are too many for 20000 columns"),
+        (("*",) * 1000, 20_000, "column 'g' is used"),
+        (("s" * 400_000,), 2, "more than 600 characters"),
+    ],
+)
+def test_globs_that_would_take_long_are_refused_at_once_and_in_few_words(
+    globs: tuple[str, ...], count: int, reason: str
+) -> None:
+    names = ["g", *(f"s{number:05}" for number in range(count - 1))]
+    with pytest.raises(ColumnsError, match=reason) as refused:
+        select(Columns("g", switches=globs), names)
+    assert len(str(refused.value)) < 300
+
+
+def test_columns_by_their_names_may_be_as_many_as_there_are() -> None:
+    names = [f"s{number}" for number in range(50_000)]
+    assert select(Columns("g", switches=tuple(names)), ["g", *names]).switches == tuple(names)
+
+
 @given(text=st.text('label=[]{}"#\n.*0'))
 @settings(deadline=None)
 def test_any_text_is_a_columns_file_or_refused(text: str, tmp_path_factory: pytest.TempPathFactory) -> None:
