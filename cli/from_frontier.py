@@ -107,7 +107,9 @@ def _check_point(point: "Point", grasp_set: "GraspSet", path: Path) -> None:
         raise FrontierError(f"{what} takes a method that is not there: {shortened(repr(setting.way.method))}")
     least = 1 if setting.inputs != "joints" and METHODS[setting.way.method].parameter == "switches" else 0
     if not (setting.way.parameter.is_integer() and setting.way.parameter >= least):
-        raise FrontierError(f"{what} takes {setting.way.parameter} for its method: it is a whole number from {least} on")
+        raise FrontierError(
+            f"{what} takes {setting.way.parameter} for its method: it is a whole number from {least} on"
+        )
     if setting.wiring not in ("", AS_WIRED, BOARD, *CHIPS):
         raise FrontierError(f"{what} takes a wiring that is not there: {shortened(repr(setting.wiring))}")
     if setting.wiring in CHIPS and not SLOWEST_HZ <= setting.clock_hz <= CHIPS[setting.wiring].clock_hz:

@@ -3,7 +3,11 @@
 import io
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import chdir, contextmanager
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 from thenar.runtime.errors import ThenarError
@@ -21,12 +25,10 @@ class PictureError(ThenarError, ValueError):
 @contextmanager
 def painting(font_size: float) -> Iterator[None]:
     """Set matplotlib up for what is made and rendered inside. Raises PictureError if it is not installed."""
-    try:
-        import matplotlib as mpl
-    except ImportError as reason:
-        raise PictureError("drawing needs matplotlib: pip install 'thenar[compiler]'") from reason
-    with (
-        mpl.rc_context(
+    mpl = _matplotlib()
+    with mpl.rc_context(), warnings.catch_warnings():
+        mpl.rcdefaults()
+        mpl.rcParams.update(
             {
                 "svg.hashsalt": "thenar",
                 "font.size": font_size,
@@ -34,12 +36,23 @@ def painting(font_size: float) -> Iterator[None]:
                 "axes.spines.right": False,
                 "text.parse_math": False,  # a dollar in a name is a dollar
             }
-        ),
-        warnings.catch_warnings(),
-    ):
+        )
         # A letter that the font lacks is drawn as a box; the rest of the picture is still worth having.
         warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from font")
         yield
+
+
+def _matplotlib() -> ModuleType:
+    """Import matplotlib without a matplotlibrc of the current folder or the user's: it could run LaTeX.
+
+    Whoever has imported it before, such as a notebook, has read theirs already; pictures are drawn by its defaults.
+    """
+    found = find_spec("matplotlib")
+    if found is None or found.origin is None:
+        raise PictureError("drawing needs matplotlib: pip install 'thenar[compiler]'")
+    # It reads the file of that name in the current folder first, while it is imported: here that is its own.
+    with chdir(Path(found.origin).with_name("mpl-data")):
+        return import_module("matplotlib")
 
 
 def rendered(figure: "Figure", kind: str) -> bytes:
