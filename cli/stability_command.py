@@ -1,6 +1,6 @@
 """`thenar stability`: every hard case, the truth it is held against, and the error."""
 
-from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -59,7 +59,9 @@ def command(
         _list(cases, as_json=as_json)
         return 0
     for name in (*_NEEDED, *(_NEEDED_FOR_A_PAGE if output is not None else ())):
-        import_module(name)
+        # Not imported: how matplotlib is, compiler/pictures.py says.
+        if find_spec(name) is None:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
     return _run(cases, full=full, jobs=jobs or -1, output=output, as_json=as_json)
 
 
