@@ -47,6 +47,11 @@ class Cooccurrence:
             ]
         )
 
+    def kinds(self) -> tuple[list[int], npt.NDArray[np.intp]]:
+        """Return a bit of each kind, those of a kind having equal counts in every class, and each bit's kind (d,)."""
+        _, first, kind = np.unique(self._ones, axis=1, return_index=True, return_inverse=True)
+        return first.tolist(), kind.ravel()
+
     def sign(self, one: tuple[int, int | None], other: tuple[int, int | None]) -> int:
         """Return the sign of I(class; a | b) of pair `one` minus that of pair `other`, exactly."""
         difference: Counter[int] = Counter()
