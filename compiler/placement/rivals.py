@@ -31,15 +31,15 @@ def top_mutual_information(X: npt.ArrayLike, y: npt.ArrayLike, m: int) -> tuple[
     # Bits of equal counts tell the same: one of them stands for all.
     alike, kind = counts.kinds()
 
-    def compare(a: int, b: int) -> int:
+    def compare(one: int, other: int) -> int:
+        a, b = alike[one], alike[other]
         apart = scores[b] - scores[a]
         exactly = abs(apart) <= 2 * counts.error_bound
         return counts.sign((b, None), (a, None)) if exactly else int(np.sign(apart))
 
     ranks = np.zeros(len(alike), dtype=np.intp)
-    order = sorted(range(len(alike)), key=cmp_to_key(lambda one, other: compare(alike[one], alike[other])))
-    for before, one in pairwise(order):
-        ranks[one] = ranks[before] + (compare(alike[before], alike[one]) != 0)
+    for before, one in pairwise(sorted(range(len(alike)), key=cmp_to_key(compare))):
+        ranks[one] = ranks[before] + (compare(before, one) != 0)
     best = counts.varying[np.argsort(ranks[kind[counts.varying]], kind="stable")]
     return tuple(best[:m].tolist())
 
