@@ -8,6 +8,7 @@ sum its splits.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,8 @@ Floats = NDArray[np.float64]
 
 # Elements of the histograms of one batch of many-valued columns: 32 MiB of doubles, whatever the number of rows.
 _BATCH_ELEMENTS = 1 << 22
+# Of the columns that are looked at together: 8 MiB of doubles.
+_BLOCK_ELEMENTS = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,27 +141,47 @@ def bin_columns(X: NDArray[np.generic], max_bins: int | None = None) -> Binned:
 
     Columns have at most `max_bins` bins (2 or more; None: one for each value), that hold rows as evenly as can be.
     """
-    binned = [(column, *_bin(np.asarray(X[:, column], dtype=np.float64), max_bins)) for column in range(X.shape[1])]
+    two, rest = _two_valued(X)
+    binned = [(column, *_bin(np.asarray(X[:, column], dtype=np.float64), max_bins)) for column in rest]
     varying = [(column, bins, edges) for column, bins, edges in binned if edges.size]
-    two = [(column, bins == 0, edges[0]) for column, bins, edges in varying if bins.max() == 1]
+    # With few bins a column of many values may have two.
+    two += [([column], [bins == 0], edges) for column, bins, edges in varying if bins.max() == 1]
     many = [(column, bins, edges) for column, bins, edges in varying if bins.max() > 1]
     groups: list[TwoValued | ManyValued] = []
     if two:
-        columns, low, thresholds = zip(*two, strict=True)
-        groups.append(TwoValued(np.array(columns), np.array(low), np.array(thresholds)))
+        columns, low, thresholds = map(np.concatenate, zip(*two, strict=True))
+        order = np.argsort(columns)
+        groups.append(TwoValued(columns[order], low[order], thresholds[order]))
     if many:
         groups.append(ManyValued(*map(list, zip(*many, strict=True))))
-    home = {int(column): (group, position) for group in groups for position, column in enumerate(group.columns)}
+    home = {column: (group, position) for group in groups for position, column in enumerate(group.columns.tolist())}
     return Binned(X.shape[1], tuple(groups), home)
+
+
+def _two_valued(X: NDArray[np.generic]) -> tuple[list[tuple[Any, Any, Floats]], list[int]]:
+    """Return the columns of two values and no missing one, and the numbers of those of more; constant ones are in none.
+
+    Most columns are switches: many at a time, and no need to sort them. Each part of the first is what `TwoValued` is
+    made of: columns (c,), low (c, n), thresholds (c,).
+    """
+    two: list[tuple[Any, Any, Floats]] = []
+    rest: list[int] = []
+    step = max(1, _BLOCK_ELEMENTS // max(1, len(X)))
+    for start in range(0, X.shape[1], step):
+        numbers = np.asarray(X[:, start : start + step], dtype=np.float64)
+        least, most = numbers.min(axis=0), numbers.max(axis=0)
+        is_low = numbers == least
+        few = (is_low | (numbers == most)).all(axis=0)
+        parted = few & (least < most)
+        if parted.any():
+            columns = start + np.flatnonzero(parted)
+            two.append((columns, is_low.T[parted], _between(least[parted], most[parted])))
+        rest += (start + np.flatnonzero(~few)).tolist()
+    return two, rest
 
 
 def _bin(numbers: Floats, max_bins: int | None) -> tuple[NDArray[np.int32], Floats]:
     """Return the bin (n,) of every number and the edges between bins; a missing one gets bin len(edges) + 1."""
-    low, high = numbers.min(), numbers.max()
-    is_high = numbers == high
-    if (is_high | (numbers == low)).all():
-        # Most columns are switches: no need to sort them.
-        return is_high.astype(np.int32), midpoints(np.unique([low, high]))
     values, bins, counts = np.unique(numbers, return_inverse=True, return_counts=True)
     present = ~np.isnan(values)
     edges = midpoints(values[present])
@@ -186,7 +209,10 @@ def midpoints(values: Floats) -> Floats:
     right stays there. Weka 3.6 keeps the midpoint and sends v[i + 1] left. Halving first keeps the largest doubles
     finite.
     """
-    lower, upper = values[:-1], values[1:]
+    return _between(values[:-1], values[1:])
+
+
+def _between(lower: Floats, upper: Floats) -> Floats:
     with np.errstate(over="ignore"):
         total = lower + upper
     middle = np.where(np.isfinite(total), 0.5 * total, 0.5 * lower + 0.5 * upper)

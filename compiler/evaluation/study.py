@@ -18,6 +18,9 @@ from .tables import Reader, Table
 
 TABLES: tuple[TableName, ...] = ("compositions", "generality", "pruning", "baselines")
 
+# Those with a row that is trained on all switches at once.
+_OF_ALL_SWITCHES: tuple[TableName, ...] = ("compositions", "pruning")
+
 
 @dataclass(frozen=True, slots=True)
 class Options:
@@ -79,6 +82,8 @@ def evaluate(
     chosen = _of_subjects(grasp_set, options.subjects)
     parts = populations(chosen, options.scheme, options.folds, options.repeats, options.seed)
     reasons = {name: _why_not(name, chosen, parts, options.scheme) for name in options.tables}
+    if any(reasons.get(name, "") is None for name in _OF_ALL_SWITCHES):
+        _check_all_switches(chosen, parts)
     placements = Placements(chosen.switches, chosen.labels)
     planner = Planner(parts, placements, len(chosen.joints), options.prune, options.prune_list, options.seed)
     protocols = [protocol for protocol in PROTOCOLS if protocol.name in options.protocols]
@@ -112,6 +117,15 @@ def _of_subjects(grasp_set: GraspSet, subjects: tuple[str, ...]) -> GraspSet:
     check_types(types, EvaluationError)
     check_memory(len(chosen), types, EvaluationError)
     return chosen
+
+
+def _check_all_switches(grasp_set: GraspSet, parts: tuple[Population, ...]) -> None:
+    """Raise EvaluationError where a training on all switches has no room in memory: before placements are chosen."""
+    switches = grasp_set.switches
+    varying = int(np.count_nonzero(switches.any(axis=0) & ~switches.all(axis=0)))
+    for part in parts:
+        rows = max((len(fold.train) for fold in part.folds), default=0)
+        check_memory(rows, len(part.grasps), EvaluationError, varying)
 
 
 def _why_not(name: TableName, grasp_set: GraspSet, parts: tuple[Population, ...], scheme: Scheme) -> str | None:

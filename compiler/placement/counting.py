@@ -76,15 +76,19 @@ def _lanes(digits: Digits) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.intp
 
     Lanes are numbered through all digits; every digit has as many as the one with most cells.
     """
-    cells = [(p.digit, p.weight, p.radix, code) for p in digits.places for code in range(1, p.radix)]
-    used = np.bincount([cell[0] for cell in cells], minlength=len(digits.packed)).astype(np.intp)
+    places = np.array([(p.digit, p.weight, p.radix) for p in digits.places], dtype=np.intp).reshape(-1, 3)
+    sizes = places[:, 2] - 1
+    digit, weight, radix = np.repeat(places, sizes, axis=0).T
+    code = 1 + np.arange(len(digit)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    used = np.bincount(digit, minlength=len(digits.packed))
     width = int(used.max(initial=0))
+    lane = np.arange(len(digit)) - (np.cumsum(used) - used)[digit]
     tables = np.zeros((len(digits.packed), _DIGIT, width), dtype=np.float32)
-    firsts = np.cumsum(used) - used
-    lane_of_cell = np.zeros(len(cells), dtype=np.intp)
+    # Cells that lie alike in their digits are written together: of bits, every eighth.
+    cells = np.lexsort((code, radix, weight))
+    kinds, counts = np.unique(np.stack([weight, radix, code])[:, cells], axis=1, return_counts=True)
     every = np.arange(_DIGIT)
-    for number, (digit, weight, radix, code) in enumerate(cells):
-        lane = number - int(firsts[digit])
-        tables[digit, :, lane] = every // weight % radix == code
-        lane_of_cell[number] = digit * width + lane
-    return tables, lane_of_cell
+    for (w, r, c), end, count in zip(kinds.T.tolist(), np.cumsum(counts).tolist(), counts.tolist(), strict=True):
+        alike = cells[end - count : end]
+        tables[digit[alike], :, lane[alike]] = every // w % r == c
+    return tables, digit * width + lane

@@ -4,7 +4,9 @@ Inputs are bits. An input that is constant is never chosen; if fewer than m vary
 information, exactly compared, are decided by the lowest number.
 """
 
+from collections.abc import Iterator
 from functools import cmp_to_key
+from itertools import islice, pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -26,12 +28,20 @@ def top_mutual_information(X: npt.ArrayLike, y: npt.ArrayLike, m: int) -> tuple[
     counts = _count(X, y)
     scores = counts.information()
 
-    def compare(a: int, b: int) -> int:
+    # Bits of equal counts tell the same: one of them stands for all.
+    alike, kind = counts.kinds()
+
+    def compare(one: int, other: int) -> int:
+        a, b = alike[one], alike[other]
         apart = scores[b] - scores[a]
         exactly = abs(apart) <= 2 * counts.error_bound
-        return (counts.sign((b, None), (a, None)) if exactly else int(np.sign(apart))) or a - b
+        return counts.sign((b, None), (a, None)) if exactly else int(np.sign(apart))
 
-    return tuple(sorted(counts.varying.tolist(), key=cmp_to_key(compare))[:m])
+    ranks = np.zeros(len(alike), dtype=np.intp)
+    for before, one in pairwise(sorted(range(len(alike)), key=cmp_to_key(compare))):
+        ranks[one] = ranks[before] + (compare(before, one) != 0)
+    best = counts.varying[np.argsort(ranks[kind[counts.varying]], kind="stable")]
+    return tuple(best[:m].tolist())
 
 
 def forward_cmim(X: npt.ArrayLike, y: npt.ArrayLike, m: int) -> tuple[int, ...]:
@@ -41,17 +51,20 @@ def forward_cmim(X: npt.ArrayLike, y: npt.ArrayLike, m: int) -> tuple[int, ...]:
     the input a of maximum  min over the chosen b of I(y; a | b),  first that of maximum I(y; a).
     """
     _check_size(m)
+    return tuple(islice(cmim_order(X, y), m))
+
+
+def cmim_order(X: npt.ArrayLike, y: npt.ArrayLike) -> Iterator[int]:
+    """Yield what `forward_cmim` chooses, one input after the other."""
     counts = _count(X, y)
     open_inputs: list[int] = counts.varying.tolist()
-    chosen: list[int] = []
     scores = counts.information()
     given: dict[int, int | None] = dict.fromkeys(open_inputs)
-    while open_inputs and len(chosen) < m:
+    while open_inputs:
         best = _best(counts, scores, given, open_inputs)
         open_inputs.remove(best)
-        chosen.append(best)
+        yield best
         _lower(counts, scores, given, open_inputs, best)
-    return tuple(chosen)
 
 
 def _best(

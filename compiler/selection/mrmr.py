@@ -5,28 +5,29 @@ each time the input a of maximum  I(y; a) - mean over the chosen b of I(a; b).  
 are elementary's, so that every machine chooses alike; equal scores go to the lowest number.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..elementary import add_up, log
-from .learning import Columns
 
 Floats = NDArray[np.float64]
 
 
-def mrmr(bits: NDArray[np.bool_], labels: NDArray[np.intp]) -> Columns:
-    """Return all inputs of bits (n, d) in the order in which they are chosen to tell labels (n,) apart."""
+def mrmr(bits: NDArray[np.bool_], labels: NDArray[np.intp]) -> Iterator[int]:
+    """Yield all inputs of bits (n, d) in the order in which they are chosen to tell labels (n,) apart."""
     relevance = _information(bits, labels[:, None] == np.unique(labels))
     open_inputs = list(range(bits.shape[1]))
-    chosen: list[int] = []
+    chosen = 0
     redundancy = np.zeros(bits.shape[1])
     while open_inputs:
-        scores = relevance - redundancy / max(len(chosen), 1)
+        scores = relevance - redundancy / max(chosen, 1)
         best = open_inputs[int(scores[open_inputs].argmax())]
         open_inputs.remove(best)
-        chosen.append(best)
+        chosen += 1
+        yield best
         redundancy += _information(bits, np.stack([bits[:, best], ~bits[:, best]], axis=1))
-    return tuple(chosen)
 
 
 def _information(bits: NDArray[np.bool_], member: NDArray[np.bool_]) -> Floats:

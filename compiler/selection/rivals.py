@@ -6,14 +6,15 @@ for, fewer are returned. What scikit-learn, SciPy and PySensors answer rests on 
 another machine near ties may fall otherwise.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib.util import find_spec
+from itertools import islice
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..placement.rivals import forward_cmim, random_placement, top_mutual_information
+from ..placement.rivals import cmim_order, random_placement, top_mutual_information
 from .learning import Columns, Learning
 from .mrmr import mrmr
 from .sparse_sensing import qr_order, sspoc_order
@@ -29,20 +30,32 @@ _TREES = 300
 _ITERATIONS, _TOLERANCE = 2000, 1e-3
 
 
-def _ranked(rank: Callable[[Bits, Labels], Columns]) -> Callable[[Learning], Choose]:
-    """Return the chooser of a method that ranks switches (n, s), all of which vary, best one first."""
+def _ranked(rank: Callable[[Bits, Labels], Iterable[int]]) -> Callable[[Learning], Choose]:
+    """Return the chooser of a method that ranks switches (n, s), all of which vary, best one first.
+
+    What is ranked one at a time is ranked as far as is asked for.
+    """
 
     def chooser(learning: Learning) -> Choose:
         from threadpoolctl import threadpool_limits
 
         bits, labels = learning.switches, learning.labels
         varying = np.flatnonzero(bits.any(axis=0) & ~bits.all(axis=0))
-        order: Columns = ()
+        order: list[int] = []
+        ranked: Iterator[int] = iter(())
         if varying.size and np.ptp(labels):
             # The matrices are small: threads would wait for each other longer than they work.
             with threadpool_limits(1):
-                order = tuple(varying[list(rank(bits[:, varying], labels))].tolist())
-        return lambda m: order[: max(int(m), 0)]
+                ranked = iter(rank(bits[:, varying], labels))
+
+        def choose(m: float) -> Columns:
+            most = min(max(int(m), 0), len(varying))
+            if most > len(order):
+                with threadpool_limits(1):
+                    order.extend(int(varying[column]) for column in islice(ranked, most - len(order)))
+            return tuple(order[:most])
+
+        return choose
 
     return chooser
 
@@ -71,10 +84,6 @@ def _mutual_information(bits: Bits, labels: Labels) -> Columns:
     return top_mutual_information(bits, labels, bits.shape[1])
 
 
-def _cmim(bits: Bits, labels: Labels) -> Columns:
-    return forward_cmim(bits, labels, bits.shape[1])
-
-
 def _random(bits: Bits, labels: Labels) -> Columns:
     return random_placement(bits.shape[1], bits.shape[1], _SEED)
 
@@ -87,7 +96,7 @@ RIVALS: Mapping[str, tuple[str, Callable[[Learning], Choose]]] = MappingProxyTyp
         ),
         "forest": (f"Importance in a random forest of {_TREES} trees (scikit-learn)", _ranked(_forest_importance)),
         "mrmr": ("Greedy: most relevant to the grasp type, least redundant (mRMR)", _ranked(mrmr)),
-        "cmim": ("Greedy by conditional mutual information (CMIM)", _ranked(_cmim)),
+        "cmim": ("Greedy by conditional mutual information (CMIM)", _ranked(cmim_order)),
         "mutual-information": ("Those that each tell most about the grasp type, alone", _ranked(_mutual_information)),
         "random": ("Drawn at random (seeded) among those that vary", _ranked(_random)),
         "sspoc": ("Sparse sensors for classification (PySensors' SSPOC)", _ranked(sspoc_order)),

@@ -1,6 +1,7 @@
 """What is too large is refused in one sentence, and at once."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from time import process_time
 
@@ -11,13 +12,14 @@ from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.artifact.errors import CompileError
 from thenar.compiler.boosting.boost import BoostingError, boost
 from thenar.compiler.evaluation.errors import EvaluationError
-from thenar.compiler.evaluation.study import evaluate
+from thenar.compiler.evaluation.study import Options, evaluate
 from thenar.compiler.frontier.material import Material
 from thenar.compiler.frontier.points import FrontierError
 from thenar.compiler.limits import check_inputs, check_memory
 from thenar.compiler.placement.errors import PlacementError
 from thenar.compiler.placement.placement import place
 from thenar.compiler.selection.learning import Learning
+from thenar.compiler.selection.ways import chooser
 from thenar.drivers.errors import ThenarError
 
 Make = Callable[..., GraspSet]
@@ -99,3 +101,35 @@ def test_rows_that_do_not_fit_into_memory_are_refused_before_the_training() -> N
 
 def test_a_training_that_fits_into_memory_is_not_refused() -> None:
     check_memory(1000, 33, CompileError, switches=160, joints=22)
+
+
+@pytest.fixture(scope="module")
+def wide(make_set: Make) -> GraspSet:
+    """All pairs of its switches, counted for each type, would be 160 GB."""
+    few = make_set(rows=40, types=2, switches=1, joints=0)
+    switches = np.random.default_rng(0).random((40, 99_999)) < 0.5
+    return replace(few, switches=switches, switch_names=tuple(f"s{number}" for number in range(99_999)))
+
+
+@pytest.mark.parametrize("method", ["cmim", "mrmr", "mutual-information"])
+def test_of_many_switches_few_are_chosen_without_counting_all_pairs(wide: GraspSet, method: str) -> None:
+    began = process_time()
+    placement = chooser(method, Learning(wide.switches, wide.codes, wide.labels, 2))(5)
+    assert len(set(placement)) == 5
+    assert process_time() - began < 10 * SECONDS
+
+
+def test_the_rivals_of_an_evaluation_take_a_set_of_many_switches(wide: GraspSet) -> None:
+    study = evaluate(wide, Options(folds=2, repeats=1, rounds=1, protocols=("honest",), tables=("baselines",)), jobs=1)
+    assert [row.name for row in study.tables[0].rows] == ["ID3", "CMIM", "top-k", "random"]
+
+
+def test_all_switches_that_do_not_fit_into_memory_are_refused_before_placements_are_chosen(
+    wide: GraspSet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("os.sysconf", {"SC_PHYS_PAGES": 2000, "SC_PAGE_SIZE": 4096}.__getitem__)
+    monkeypatch.setattr("thenar.compiler.evaluation.study.Placements", None)
+    with pytest.raises(
+        EvaluationError, match=r"30 rows of 2 grasp types needs some 0\.0 GB of memory.*fewer rows or columns"
+    ):
+        evaluate(wide, Options(repeats=1), jobs=1)
