@@ -224,7 +224,7 @@ def _compile_from(data: bytes, folder: Path) -> None:
         _ = chosen.options
         wired = chosen.wired(harness())
         if callable(wired):
-            wired(SWITCHES[:4])
+            wired(chosen.point.switches)
     csv_bytes(chosen.frontier)
     frontier_view(chosen.frontier, grasp_set().fingerprint(), None, chosen.point.number)
     frontier_charts(chosen.frontier)
