@@ -22,7 +22,7 @@ from placementtables import bounds, compared, saved
 
 from thenar.compiler.evaluation.folds import weka_folds
 from thenar.compiler.recordings.graspset import GraspSet
-from thenar.compiler.selection.learning import Learning
+from thenar.compiler.samples import Samples
 from thenar.compiler.workers import in_workers
 from thenar.simulator.running.simulation import simulate
 from thenar.simulator.scenes.decode import load_scene
@@ -47,12 +47,9 @@ def papers_prune(grasp_set: GraspSet) -> int:
 
 def datas(grasp_set: GraspSet, folds: int) -> tuple[Data, Data]:
     """Return the set with switches alone, and with joints."""
-    types, labels = np.unique(grasp_set.labels, return_inverse=True)
-    cut, prune = tuple(weka_folds(labels, folds, SEED)), papers_prune(grasp_set)
-    alone, both = (
-        Data(Learning(grasp_set.switches, codes, labels, len(types)), grasp_set.switch_names, cut, prune)
-        for codes in (grasp_set.codes[:, :0], grasp_set.codes)
-    )
+    samples = Samples.of(grasp_set, "switches"), Samples.of(grasp_set)
+    cut, prune = tuple(weka_folds(samples[0].labels, folds, SEED)), papers_prune(grasp_set)
+    alone, both = (Data(part, grasp_set.switch_names, cut, prune) for part in samples)
     return alone, both
 
 

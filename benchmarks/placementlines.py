@@ -12,11 +12,11 @@ from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.evaluation.folds import Fold
 from thenar.compiler.frontier.timing.wirings import port_costs
-from thenar.compiler.selection.learning import Columns, Learning
-from thenar.compiler.selection.pairs import Pairs
-from thenar.compiler.selection.rivals import available
-from thenar.compiler.selection.subset import Subset, best_subset
-from thenar.compiler.selection.ways import METHODS, Chooser, chooser
+from thenar.compiler.placement.baselines import available
+from thenar.compiler.placement.pairs import Pairs
+from thenar.compiler.placement.subset import Subset, best_subset
+from thenar.compiler.placement.ways import METHODS, Chooser, chooser
+from thenar.compiler.samples import Columns, Samples
 from thenar.compiler.workers import in_workers
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import scan_us
@@ -33,7 +33,7 @@ PAPERS, BOUNDED = "id3", "elimination"
 class Data:
     """A set, switches alone or with joints, its folds, and the S that the paper would take."""
 
-    learning: Learning
+    learning: Samples
     names: tuple[str, ...]
     folds: tuple[Fold, ...]
     prune: int
@@ -141,7 +141,7 @@ class Ways:
         return self._rates[key]
 
 
-def rate(learning: Learning, fold: Fold, columns: Columns) -> float:
+def rate(learning: Samples, fold: Fold, columns: Columns) -> float:
     """Return the share of the test rows that LogitBoost recognises."""
     X = np.hstack([learning.switches[:, sorted(columns)].astype(np.uint16), learning.codes])
     stumps, _ = boost(X[fold.train], learning.labels[fold.train], learning.n_classes, rounds=ROUNDS)

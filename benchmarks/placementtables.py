@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from placementlines import BOUNDED, MOST, SHOWN, WITHIN, Line, Point
 from rich.table import Table
 
-from thenar.compiler.selection.subset import Subset
-from thenar.compiler.selection.ways import METHODS
+from thenar.compiler.placement.subset import Subset
+from thenar.compiler.placement.ways import METHODS
 
 
 def saved(lines: Sequence[Line], joints: bool, paper: Point) -> Table:

@@ -25,7 +25,7 @@ class Picked:
     @property
     def options(self) -> dict[str, object]:
         """The options of `compile_build` that the point settles."""
-        from thenar.compiler.selection.ways import METHODS
+        from thenar.compiler.placement.ways import METHODS
 
         setting = self.point.setting
         settled: dict[str, object] = {
@@ -94,7 +94,7 @@ def _check_point(point: "Point", grasp_set: "GraspSet", path: Path) -> None:
     """Raise FrontierError where a point cannot be built here: before the training, not after it."""
     from thenar.compiler.frontier.points import FrontierError
     from thenar.compiler.frontier.timing.wirings import AS_WIRED, BOARD, Wiring
-    from thenar.compiler.selection.ways import METHODS
+    from thenar.compiler.placement.ways import METHODS
     from thenar.drivers.i2c.registry import CHIPS
     from thenar.runtime.harness.wiring import SLOWEST_HZ
     from thenar.runtime.names import shortened

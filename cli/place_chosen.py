@@ -10,7 +10,7 @@ from .lines import echo
 if TYPE_CHECKING:
     from thenar.compiler.placement.costaware import PortCosts
     from thenar.compiler.recordings.graspset import GraspSet
-    from thenar.compiler.selection.learning import Columns, Learning
+    from thenar.compiler.samples import Columns, Samples
 
 
 class Kept(msgspec.Struct, frozen=True):
@@ -47,15 +47,11 @@ class Choice(msgspec.Struct, frozen=True):
     exact: Exactly | None
 
 
-def learning_of(grasp_set: "GraspSet", *, joints: bool) -> "Learning":
+def learning_of(grasp_set: "GraspSet", *, joints: bool) -> "Samples":
     """Return the rows of a set as methods learn from them. Raises PlacementError if it has none."""
-    import numpy as np
+    from thenar.compiler.samples import Samples
 
-    from thenar.compiler.selection.learning import Learning
-
-    types, labels = np.unique(grasp_set.labels, return_inverse=True)
-    codes = grasp_set.codes if joints else grasp_set.codes[:, :0]
-    return Learning(grasp_set.switches, codes, labels, len(types))
+    return Samples.of(grasp_set, "both" if joints else "switches")
 
 
 def named(grasp_set: "GraspSet", columns: "Columns") -> tuple[Kept, ...]:
@@ -70,7 +66,7 @@ def chosen(
 
     Raises PlacementError, for a name that is no method's too.
     """
-    from thenar.compiler.selection.ways import METHODS, chooser
+    from thenar.compiler.placement.ways import METHODS, chooser
 
     learning = learning_of(grasp_set, joints=joints)
     with progress(f"choosing switches by {method}"):
@@ -88,9 +84,9 @@ def chosen(
     )
 
 
-def _exactly(grasp_set: "GraspSet", learning: "Learning", columns: "Columns") -> Exactly:
-    from thenar.compiler.selection.pairs import Pairs
-    from thenar.compiler.selection.subset import best_subset
+def _exactly(grasp_set: "GraspSet", learning: "Samples", columns: "Columns") -> Exactly:
+    from thenar.compiler.placement.pairs import Pairs
+    from thenar.compiler.placement.subset import best_subset
 
     with progress(f"looking for the best {len(columns)} switches") as report:
         best = best_subset(learning, len(columns), starts=(columns,), on_round=report)

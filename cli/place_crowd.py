@@ -12,8 +12,8 @@ from .place_chosen import Kept, learning_of, named
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from thenar.compiler.placement.crowd import Standard
     from thenar.compiler.recordings.graspset import GraspSet
-    from thenar.compiler.selection.crowd import Standard
 
 _BETTERED = {"plain": "as chosen", "mean": "bettered for the mean", "worst tenth": "bettered for the worst tenth"}
 
@@ -33,8 +33,8 @@ def crowded(grasp_set: "GraspSet", method: str, keep: int, *, joints: bool, jobs
     """Return the standard placement of a set. Raises PlacementError if it has too few subjects."""
     import numpy as np
 
-    from thenar.compiler.selection.crowd import Asked, standard_placement
-    from thenar.compiler.selection.serving import Crowd
+    from thenar.compiler.placement.crowd import Asked, standard_placement
+    from thenar.compiler.placement.serving import Crowd
 
     subjects = np.unique(grasp_set.subjects, return_inverse=True)[1]
     crowd = Crowd(learning_of(grasp_set, joints=joints), subjects)

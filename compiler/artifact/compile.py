@@ -18,6 +18,7 @@ from ..evaluation.folds import check_cut
 from ..frontier.timing.whole_glove import ports_of_whole_glove
 from ..placement.costaware import PortCosts
 from ..recordings.graspset import GraspSet
+from ..samples import Samples
 from ..tables.collapse import collapse
 from ..tables.compare import Comparison, compare
 from ..tables.quantise import quantise
@@ -28,7 +29,7 @@ from .errors import CompileError
 from .made import Documents, Made, no_documents
 from .recognition import cross_validated
 from .staging import check_target, publish
-from .training import Material, Trained, check_placement, material_of, train
+from .training import Trained, check_placement, material_of, train
 
 # A wiring, or what makes one for the names of the kept switches.
 Wired = Harness | Callable[[Sequence[str]], Harness]
@@ -78,7 +79,7 @@ def compile_build(
     tolerance is the last; folds and seed cut the cross-validation whose rate goes into the build (0 folds: none).
     With table_bits 8, steps are coarse enough for firmware with 8-bit entries (quantise); with max_bins, no joint has
     more bins than that, so that tables stay small; no sum needs more than `width` bits, 4 to 16. `placement` is a
-    method of selection.ways, `keep` how many switches it keeps, where it is not pruned by S.
+    method of placement.ways, `keep` how many switches it keeps, where it is not pruned by S.
     `ports` say what reading each switch costs, for methods that ask (None: on a glove of as few MCP23017 as will do).
     With a harness, the build says how to read its switches there; `documents` go into the folder with it.
     progress(done, total) is called as work is done. The same recordings, options and harness give the same bytes.
@@ -91,21 +92,21 @@ def compile_build(
         prune, rounds, inputs, float(shrinkage), folds, seed, least, table_bits, max_bins, placement, keep, width
     )
     _check(options)
-    material = material_of(grasp_set, options)
+    samples = material_of(grasp_set, options)
     if folds:
         check_cut(len(grasp_set), folds, "rows")
     steps = _Steps(progress, rounds, folds)
     ports = ports or ports_of_whole_glove(None, grasp_set.switch_names)
-    trained = train(material, options, steps.round_done, ports)
-    bits = trained.kept(material)
-    integers = quantise(collapse(trained.stumps, len(trained.columns)), bits, material.codes, width, table_bits)
+    trained = train(samples, options, steps.round_done, ports)
+    bits = trained.kept(samples)
+    integers = quantise(collapse(trained.stumps, len(trained.columns)), bits, samples.codes, width, table_bits)
     names = [grasp_set.switch_names[column] for column in trained.columns]
     wired = harness(names) if callable(harness) else harness
-    scan = None if wired is None else plan_scan(names, integers, wired, bits, material.codes)
+    scan = None if wired is None else plan_scan(names, integers, wired, bits, samples.codes)
     files = _files(integers, trained, scan)
-    comparison = compare(trained.stumps, integers, bits, material.codes)
-    tested = cross_validated(material, options, steps.fold_done, ports) if folds else None
-    described = manifest_to_bytes(describe(grasp_set, options, material, trained, integers, comparison, tested, files))
+    comparison = compare(trained.stumps, integers, bits, samples.codes)
+    tested = cross_validated(samples, options, steps.fold_done, ports) if folds else None
+    described = manifest_to_bytes(describe(grasp_set, options, samples, trained, integers, comparison, tested, files))
     manifest = manifest_from_bytes(described)
     firmware, note = made_firmware(manifest, integers)
     made = Made(
@@ -119,7 +120,7 @@ def compile_build(
         harness=wired,
         scan=scan,
         firmware=note,
-        only_answer=_only_answer(comparison, material),
+        only_answer=_only_answer(comparison, samples),
     )
     written = {path: text.encode() for path, text in firmware.items()}
     publish({**files, **written, **documents(made), MANIFEST_NAME: described}, target)
@@ -140,9 +141,9 @@ def _files(integers: IntegerTables, trained: Trained, scan: ScanMap | None) -> d
     return files if scan is None else {**files, SCAN_NAME: scanmap_to_bytes(scan)}
 
 
-def _only_answer(comparison: Comparison, material: Material) -> str | None:
+def _only_answer(comparison: Comparison, samples: Samples) -> str | None:
     answers = np.unique(comparison.deployed)
-    return material.grasps[answers[0]] if len(answers) == 1 else None
+    return samples.grasps[answers[0]] if len(answers) == 1 else None
 
 
 class _Steps:

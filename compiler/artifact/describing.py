@@ -11,26 +11,27 @@ from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Proo
 from thenar.runtime.tables import IntegerTables
 
 from ..recordings.graspset import GraspSet
+from ..samples import Samples
 from ..tables.compare import Comparison
 from .recognition import Tested
-from .training import Material, Trained
+from .training import Trained
 
 
 def describe(
     grasp_set: GraspSet,
     options: Options,
-    material: Material,
+    samples: Samples,
     trained: Trained,
     integers: IntegerTables,
     comparison: Comparison,
     tested: Tested | None,
     files: Mapping[str, bytes],
 ) -> Manifest:
-    """Return the manifest, not sealed yet: `trained` on `material`, made `integers`, held against the floats on every
+    """Return the manifest, not sealed yet: `trained` on `samples`, made `integers`, held against the floats on every
     row by `comparison`, and `tested` in folds (None: was not); `files` are name -> content of what lies beside it.
     """
     digests = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
-    rates = [_training_rate(comparison, material, options), *([tested.rate] if tested else [])]
+    rates = [_training_rate(comparison, samples, options), *([tested.rate] if tested else [])]
     return Manifest(
         schema=SCHEMA,
         checksum="",
@@ -39,7 +40,7 @@ def describe(
         ensemble_sha256=digests[ENSEMBLE_NAME],
         source=_source(grasp_set),
         options=options,
-        grasps=material.grasps,
+        grasps=samples.grasps,
         switches=_switches(grasp_set, trained),
         joints=_joints(grasp_set) if options.inputs != "switches" else (),
         proof=_proof(integers, comparison, options.width),
@@ -84,6 +85,6 @@ def _proof(integers: IntegerTables, comparison: Comparison, width: int) -> Proof
     )
 
 
-def _training_rate(comparison: Comparison, material: Material, options: Options) -> Recognised:
-    correct = int(np.count_nonzero(comparison.deployed == material.labels))
-    return Recognised("training", 0, options.seed, correct, len(material.labels))
+def _training_rate(comparison: Comparison, samples: Samples, options: Options) -> Recognised:
+    correct = int(np.count_nonzero(comparison.deployed == samples.labels))
+    return Recognised("training", 0, options.seed, correct, len(samples.labels))

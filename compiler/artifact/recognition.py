@@ -10,8 +10,9 @@ from thenar.runtime.manifest import Options, Recognised
 from ..boosting.stumps import winners
 from ..evaluation.folds import weka_folds
 from ..placement.costaware import PortCosts
+from ..samples import Samples
 from .errors import CompileError
-from .training import Material, Report, Trained, train
+from .training import Report, Trained, train
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,21 +23,21 @@ class Tested:
     confusion: NDArray[np.intp]
 
 
-def cross_validated(material: Material, options: Options, report: Report, ports: PortCosts | None = None) -> Tested:
+def cross_validated(samples: Samples, options: Options, report: Report, ports: PortCosts | None = None) -> Tested:
     """Return what comes of stratified folds, each trained anew and without a look at its test rows."""
-    confusion = np.zeros((len(material.grasps),) * 2, dtype=np.intp)
-    for number, fold in enumerate(weka_folds(material.labels, options.folds, options.seed)):
-        trained = _train(material.rows(fold.train), options, number, ports)
-        test = material.rows(fold.test)
+    confusion = np.zeros((len(samples.grasps),) * 2, dtype=np.intp)
+    for number, fold in enumerate(weka_folds(samples.labels, options.folds, options.seed)):
+        trained = _train(samples.rows(fold.train), options, number, ports)
+        test = samples.rows(fold.test)
         scores = trained.stumps.scores(np.hstack([trained.kept(test), test.codes]))
         np.add.at(confusion, (test.labels, winners(scores)), 1)
         report(number + 1, options.folds)
     correct = int(np.trace(confusion))
-    return Tested(Recognised("honest", options.folds, options.seed, correct, len(material.labels)), confusion)
+    return Tested(Recognised("honest", options.folds, options.seed, correct, len(samples.labels)), confusion)
 
 
-def _train(material: Material, options: Options, fold: int, ports: PortCosts | None) -> Trained:
+def _train(samples: Samples, options: Options, fold: int, ports: PortCosts | None) -> Trained:
     try:
-        return train(material, options, ports=ports)
+        return train(samples, options, ports=ports)
     except CompileError as wrong:
         raise CompileError(f"in fold {fold + 1}: {wrong}, or do without folds (0)") from None

@@ -15,9 +15,9 @@ from ..placement.cooccurrence import Cooccurrence
 from ..placement.costaware import PortCosts
 from ..placement.id3 import grow_id3
 from ..placement.tree import Tree
+from ..placement.ways import METHODS, chooser
 from ..recordings.graspset import GraspSet
-from ..selection.learning import Columns, Learning
-from ..selection.ways import METHODS, chooser
+from ..samples import Columns, Samples
 from .ensemble import MAX_STUMPS
 from .errors import CompileError
 
@@ -25,20 +25,6 @@ PAPERS = "id3"  # the method of the paper
 LN2 = 0.6931471805599453
 
 Report = Callable[[int, int], None]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Material:
-    """Rows to train on: switches (n, s), codes (n, j), labels (n,) that index `grasps`, the types that occur."""
-
-    switches: NDArray[np.bool_]
-    codes: NDArray[np.uint16]
-    labels: NDArray[np.intp]
-    grasps: tuple[str, ...]
-
-    def rows(self, index: NDArray[np.intp]) -> "Material":
-        """Return the material of some rows; the grasp types stay all."""
-        return Material(self.switches[index], self.codes[index], self.labels[index], self.grasps)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,29 +44,22 @@ class Trained:
         """At how many decisions of the tree no switch gained anything alone."""
         return 0 if self.tree is None else self.tree.n_zero_gain
 
-    def kept(self, material: Material) -> NDArray[np.bool_]:
-        """Return the kept switches (n, kept) of `material`."""
-        return material.switches[:, list(self.columns)]
+    def kept(self, samples: Samples) -> NDArray[np.bool_]:
+        """Return the kept switches (n, kept) of `samples`."""
+        return samples.switches[:, list(self.columns)]
 
 
-def material_of(grasp_set: GraspSet, options: Options) -> Material:
+def material_of(grasp_set: GraspSet, options: Options) -> Samples:
     """Return what of `grasp_set` the option `inputs` allows. Raises CompileError if that is nothing to learn from."""
     wanted = options.inputs
     for kind, names in (("switches", grasp_set.switch_names), ("joints", grasp_set.joint_names)):
         if wanted == kind and not names:
             raise CompileError(f"the recordings have no {kind}: choose other inputs than {kind!r}")
-    found, labels = np.unique(grasp_set.labels, return_inverse=True)
-    if len(found) < 2:
-        raise CompileError(f"the recordings hold {len(found)} grasp type(s): there is nothing to tell apart")
-    switches = grasp_set.switches[:, : None if wanted != "joints" else 0]
-    codes = grasp_set.codes[:, : None if wanted != "switches" else 0]
-    _check_size(len(found), min(options.keep or 0, switches.shape[1]), codes, options.rounds)
-    return Material(
-        switches=switches,
-        codes=codes,
-        labels=labels,
-        grasps=tuple(grasp_set.taxonomy.types[label] for label in found),
-    )
+    if (found := len(np.unique(grasp_set.labels))) < 2:
+        raise CompileError(f"the recordings hold {found} grasp type(s): there is nothing to tell apart")
+    samples = Samples.of(grasp_set, wanted)
+    _check_size(found, min(options.keep or 0, samples.n_switches), samples.codes, options.rounds)
+    return samples
 
 
 def _check_size(types: int, kept: int, codes: NDArray[np.uint16], rounds: int) -> None:
@@ -94,22 +73,20 @@ def _check_size(types: int, kept: int, codes: NDArray[np.uint16], rounds: int) -
         )
 
 
-def train(
-    material: Material, options: Options, report: Report | None = None, ports: PortCosts | None = None
-) -> Trained:
+def train(samples: Samples, options: Options, report: Report | None = None, ports: PortCosts | None = None) -> Trained:
     """Choose the switches and boost on them and the joints. Raises CompileError if no input tells grasps apart.
 
     ports  what reading switches costs, for methods that ask
     """
-    columns, gains, tree = _placed(material, options, ports)
-    if not columns and not material.codes.shape[1]:
+    columns, gains, tree = _placed(samples, options, ports)
+    if not columns and not samples.codes.shape[1]:
         raise CompileError("no switch is worth keeping: lower --prune, or record switches that differ between grasps")
-    check_inputs(len(material.grasps), len(columns), material.codes.shape[1], CompileError)
-    X = np.hstack([material.switches[:, list(columns)], material.codes])
+    check_inputs(len(samples.grasps), len(columns), samples.codes.shape[1], CompileError)
+    X = np.hstack([samples.switches[:, list(columns)], samples.codes])
     stumps, history = boost(
         X,
-        material.labels,
-        len(material.grasps),
+        samples.labels,
+        len(samples.grasps),
         rounds=options.rounds,
         shrinkage=options.shrinkage,
         tolerance=options.tolerance,
@@ -135,14 +112,13 @@ def check_placement(options: Options) -> None:
 
 
 def _placed(
-    material: Material, options: Options, ports: PortCosts | None
+    samples: Samples, options: Options, ports: PortCosts | None
 ) -> tuple[Columns, tuple[float, ...], Tree | None]:
-    if options.placement == PAPERS or not material.switches.shape[1]:
-        tree = grow_id3(material.switches, material.labels, min_samples=options.prune)
+    if options.placement == PAPERS or not samples.switches.shape[1]:
+        tree = grow_id3(samples.switches, samples.labels, min_samples=options.prune)
         return tree.inputs, tree.gains, tree
-    learning = Learning(material.switches, material.codes, material.labels, len(material.grasps))
     parameter = options.prune if options.keep is None else options.keep
-    columns = chooser(options.placement, learning, ports)(float(parameter))
-    counts = Cooccurrence(material.switches, material.labels, len(material.grasps))
-    alone = counts.information() / (len(material.labels) * LN2)
+    columns = chooser(options.placement, samples, ports)(float(parameter))
+    counts = Cooccurrence(samples.switches, samples.labels, len(samples.grasps))
+    alone = counts.information() / (len(samples.labels) * LN2)
     return columns, tuple(float(alone[column]) for column in columns), None

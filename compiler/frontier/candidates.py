@@ -8,7 +8,7 @@ from math import log
 from thenar.runtime.manifest import Inputs
 
 from ..evaluation.rates import Rate as Counted
-from ..selection.learning import Columns
+from ..samples import Columns
 from .pareto import front
 from .points import Rate, Way
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from ..boosting.boost import boost
 from ..boosting.stumps import Stumps, winners
 from ..evaluation.folds import Fold
-from ..selection.learning import Columns
-from ..selection.ways import chooser
+from ..placement.ways import chooser
+from ..samples import Columns
 from ..tables.batch import integer_scores
 from ..tables.collapse import collapse
 from ..tables.quantise import quantise

@@ -13,7 +13,7 @@ from ..evaluation.groups import leave_one_out
 from ..limits import check_inputs, check_memory, check_types
 from ..placement.costaware import PortCosts
 from ..recordings.graspset import GraspSet
-from ..selection.learning import Learning
+from ..samples import Samples
 from .points import FrontierError
 from .settings import Search
 
@@ -63,10 +63,10 @@ class Material:
         """How many people recorded."""
         return len(np.unique(self.subjects))
 
-    def learning(self, rows: Rows, joints: bool) -> Learning:
+    def learning(self, rows: Rows, joints: bool) -> Samples:
         """Return rows to choose a placement from, with the joints or without."""
         codes = self.codes[rows] if joints else self.codes[rows, :0]
-        return Learning(self.switches[rows], codes, self.labels[rows], len(self.grasps))
+        return Samples(self.switches[rows], codes, self.labels[rows], self.grasps)
 
     def inputs(self, columns: tuple[int, ...], joints: bool) -> NDArray[np.uint16]:
         """Return what is trained on, (n, kept + j): the kept switches in their order, then the joints' codes."""

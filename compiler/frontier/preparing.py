@@ -10,9 +10,9 @@ import numpy as np
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.harness.wiring import Harness
 
+from ..placement.baselines import RIVALS, available
 from ..publication import check_folder, entries, publish_folder
 from ..recordings.graspset import GraspSet
-from ..selection.rivals import RIVALS, available
 from .calibrating import equipment_for
 from .drawing.pictures import PICTURES, pictures
 from .drawing.table import csv_bytes

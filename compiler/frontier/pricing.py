@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from ..evaluation.folds import Fold
-from ..selection.learning import Columns
+from ..samples import Columns
 from ..tables.collapse import collapse
 from ..tables.quantise import quantise
 from .equipment import Equipment

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..selection.ways import METHODS
+from ..placement.ways import METHODS
 from .candidates import NO_SWITCHES, Choice, Screened, rate_of
 from .equipment import Equipment
 from .learnt import Fit

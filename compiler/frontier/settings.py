@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from thenar.runtime.manifest import Inputs, TableBits
 
-from ..selection.ways import METHODS
+from ..placement.ways import METHODS
 from .points import FrontierError, Way
 
 # Numbers of switches, as far as the glove has them; the paper's own sizes are near 26 to 66.
@@ -42,7 +42,7 @@ TABLED = (10, 30, 100)
 class Search:
     """How much is tried.
 
-    methods     names of `selection.ways`: ours, that may be built; rivals: curves to see beside them
+    methods     names of `placement.ways`: ours, that may be built; rivals: curves to see beside them
     folds       of the stratified folds, cut `repeats` times with seeds seed, seed + 1, ...
     screening   rounds with which every placement is screened, on the folds of the first repeat
     rounds      the most rounds that those on the front are trained for

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from ..evaluation.folds import Fold
-from ..selection.learning import Columns
+from ..samples import Columns
 from .candidates import NO_SWITCHES, Choice
 from .learnt import Fit, FitKey, FitTask, Path, PathKey, PathTask, choose_path, fit_stages
 from .material import Cuts, Material

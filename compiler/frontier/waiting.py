@@ -8,7 +8,7 @@ import numpy as np
 from msgspec import Struct
 
 from ..evaluation.folds import Fold
-from ..selection.learning import Columns
+from ..samples import Columns
 from .material import Material
 from .points import DecisionKind, Latency
 from .pricing import PriceKey, Tabled, tables_of

@@ -9,7 +9,7 @@ from thenar.runtime.manifest import Manifest, Switch
 from ..hand import HandShape
 from ..placement.gain import entropy_bits
 from ..placement.tree import Tree
-from ..selection.ways import METHODS
+from ..placement.ways import METHODS
 from .numbers import percent
 
 

@@ -18,8 +18,8 @@ from thenar.compiler.frontier.points import FrontierError
 from thenar.compiler.limits import check_inputs, check_memory
 from thenar.compiler.placement.errors import PlacementError
 from thenar.compiler.placement.placement import place
-from thenar.compiler.selection.learning import Learning
-from thenar.compiler.selection.ways import chooser
+from thenar.compiler.placement.ways import chooser
+from thenar.compiler.samples import Samples, SamplesError
 from thenar.drivers.errors import ThenarError
 
 Make = Callable[..., GraspSet]
@@ -34,11 +34,11 @@ def many_types(make_set: Make) -> GraspSet:
 @pytest.mark.parametrize(
     ("work", "error"),
     [
-        (lambda grasps, folder: compile_build(grasps, folder / "build"), CompileError),
+        (lambda grasps, folder: compile_build(grasps, folder / "build"), SamplesError),
         (lambda grasps, _: Material.of(grasps, None), FrontierError),
         (lambda grasps, _: evaluate(grasps), EvaluationError),
         (lambda grasps, _: place(grasps), PlacementError),
-        (lambda grasps, _: Learning(grasps.switches, grasps.codes, grasps.labels, 10_000), PlacementError),
+        (lambda grasps, _: Samples.of(grasps), SamplesError),
     ],
     ids=["compile", "frontier", "evaluate", "place", "place --method"],
 )
@@ -114,7 +114,7 @@ def wide(make_set: Make) -> GraspSet:
 @pytest.mark.parametrize("method", ["cmim", "mrmr", "mutual-information"])
 def test_of_many_switches_few_are_chosen_without_counting_all_pairs(wide: GraspSet, method: str) -> None:
     began = process_time()
-    placement = chooser(method, Learning(wide.switches, wide.codes, wide.labels, 2))(5)
+    placement = chooser(method, Samples(wide.switches, wide.codes, wide.labels, tuple("01")))(5)
     assert len(set(placement)) == 5
     assert process_time() - began < 10 * SECONDS
 

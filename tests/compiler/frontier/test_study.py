@@ -17,9 +17,9 @@ from thenar.compiler.evaluation.folds import weka_folds
 from thenar.compiler.frontier.points import Frontier, FrontierError, Point, frontier_from_bytes
 from thenar.compiler.frontier.preparing import Request, run_frontier
 from thenar.compiler.frontier.study import Wanted
+from thenar.compiler.placement.ways import chooser
 from thenar.compiler.recordings.graspset import GraspSet
-from thenar.compiler.selection.learning import Learning
-from thenar.compiler.selection.ways import chooser
+from thenar.compiler.samples import Samples
 from thenar.compiler.tables.collapse import collapse
 from thenar.compiler.tables.quantise import quantise
 from thenar.runtime.harness.writing import harness_to_toml
@@ -116,7 +116,7 @@ def rows_recognised(grasp_set: GraspSet, point: Point, train: Rows, test: Rows) 
     columns: tuple[int, ...] = ()
     if setting.inputs != "joints":
         beside = codes if setting.way.method == "elimination" else codes[:, :0]
-        learning = Learning(grasp_set.switches[train], beside[train], labels[train], 4)
+        learning = Samples(grasp_set.switches[train], beside[train], labels[train], tuple("0123"))
         columns = chooser(setting.way.method, learning)(setting.way.parameter)
     bits = grasp_set.switches[:, list(columns)]
     X = np.hstack([bits.astype(np.uint16), codes])

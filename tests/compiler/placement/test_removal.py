@@ -3,7 +3,7 @@ import numpy.typing as npt
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.selection.removal import removal_rises
+from thenar.compiler.placement.removal import removal_rises
 
 Floats = npt.NDArray[np.float64]
 

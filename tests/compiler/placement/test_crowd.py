@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from thenar.compiler.placement.crowd import Asked, standard_placement
 from thenar.compiler.placement.errors import PlacementError
-from thenar.compiler.selection.crowd import Asked, standard_placement
-from thenar.compiler.selection.learning import Learning
-from thenar.compiler.selection.serving import Crowd, rates, served
+from thenar.compiler.placement.serving import Crowd, rates, served
+from thenar.compiler.samples import Samples
 
 TYPES, EACH = 4, 24
 ODD = tuple(range(1, 40, 4))  # subjects whose hands press switches 2 and 3 instead of 0 and 1
@@ -23,7 +23,7 @@ def crowd(people: int = 40, odd: tuple[int, ...] = ODD) -> Crowd:
     others = np.isin(subjects, odd)
     bits[~others, 0:2] = told[~others]
     bits[others, 2:4] = told[others]
-    return Crowd(Learning(bits, np.zeros((len(labels), 0), np.uint16), labels, TYPES), subjects)
+    return Crowd(Samples(bits, np.zeros((len(labels), 0), np.uint16), labels, tuple(map(str, range(TYPES)))), subjects)
 
 
 TAKE = Asked(keep=2, method="cmim", rows=600, rounds=10, repeats=2)

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from ..placement.errors import PlacementError
+from ..samples import Columns
 from ..workers import in_workers
-from .learning import Columns
+from .errors import PlacementError
 from .refining import REACH, Refining
 from .serving import Aim, Crowd, Numbers, Served, rates, served
 from .ways import chooser

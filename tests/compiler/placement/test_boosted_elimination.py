@@ -5,9 +5,9 @@ import numpy.typing as npt
 import pytest
 
 from thenar.compiler.boosting.boost import boost
-from thenar.compiler.selection import boosted_elimination
-from thenar.compiler.selection.boosted_elimination import boosted_elimination_order
-from thenar.compiler.selection.learning import Columns, Learning
+from thenar.compiler.placement import boosted_elimination
+from thenar.compiler.placement.boosted_elimination import boosted_elimination_order
+from thenar.compiler.samples import Columns, Samples
 from thenar.compiler.tables.collapse import collapse
 
 Bits = npt.NDArray[np.bool_]
@@ -15,12 +15,12 @@ Codes = npt.NDArray[np.uint16]
 Floats = npt.NDArray[np.float64]
 
 
-def learning_of(switches: Bits, labels: npt.NDArray[np.intp], codes: Codes | None = None) -> Learning:
+def learning_of(switches: Bits, labels: npt.NDArray[np.intp], codes: Codes | None = None) -> Samples:
     none = np.zeros((len(labels), 0), np.uint16)
-    return Learning(switches, none if codes is None else codes, labels, int(labels.max()) + 1)
+    return Samples(switches, none if codes is None else codes, labels, tuple(map(str, range(int(labels.max()) + 1))))
 
 
-def noisy(seed: int, joints: int, switches: int = 11) -> Learning:
+def noisy(seed: int, joints: int, switches: int = 11) -> Samples:
     random = np.random.default_rng(seed)
     labels = np.arange(160) % 5
     bits = (random.random((5, switches)) < 0.4)[labels] ^ (random.random((160, switches)) < 0.15)
@@ -33,7 +33,7 @@ def plain_loss(scores: Floats, labels: npt.NDArray[np.intp]) -> float:
     return float(-np.log(shares[np.arange(len(labels)), labels]).sum())
 
 
-def plainly(learning: Learning) -> Columns:
+def plainly(learning: Samples) -> Columns:
     """Return the order found by scoring every row anew without each switch, one after the other."""
     left = list(range(learning.n_switches))
     gone: list[int] = []
@@ -101,7 +101,7 @@ def test_more_go_at_once_only_while_many_are_left(monkeypatch: pytest.MonkeyPatc
     sizes: list[int] = []
     costs = boosted_elimination._costs
 
-    def counted(learning: Learning, left: npt.NDArray[np.intp]) -> Floats:
+    def counted(learning: Samples, left: npt.NDArray[np.intp]) -> Floats:
         sizes.append(len(left))
         return costs(learning, left)
 

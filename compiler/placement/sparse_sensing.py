@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..placement.errors import PlacementError
-from .learning import Columns
+from ..samples import Columns
+from .errors import PlacementError
 
 _SEED = 0
 # With PySensors' defaults (no modes, penalty 0.1) SSPOC recognised 4 to 34 points worse on simulated grasps.

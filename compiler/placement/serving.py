@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..boosting.boost import boost
 from ..boosting.stumps import winners
-from .learning import Columns, Learning
+from ..samples import Columns, Samples
 
 Numbers = NDArray[np.intp]
 # What a standard placement is bettered for: nothing, the mean over subjects, or those that are served worst.
@@ -37,7 +37,7 @@ class Served(msgspec.Struct, frozen=True):
 class Crowd:
     """Rows of many subjects: `learning` of n rows, and whose each row is, subjects (n,) intp."""
 
-    learning: Learning
+    learning: Samples
     subjects: Numbers
 
     def of(self, subjects: Numbers) -> "Crowd":

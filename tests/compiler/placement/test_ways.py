@@ -3,22 +3,22 @@
 import numpy as np
 import pytest
 
+from thenar.compiler.placement.baselines import RIVALS
 from thenar.compiler.placement.costaware import PortCosts
 from thenar.compiler.placement.errors import PlacementError
-from thenar.compiler.selection.learning import Learning
-from thenar.compiler.selection.rivals import RIVALS
-from thenar.compiler.selection.ways import METHODS, chooser
+from thenar.compiler.placement.ways import METHODS, chooser
+from thenar.compiler.samples import Samples
 
 OURS = [name for name, method in METHODS.items() if method.ours]
 BY_NUMBER = [name for name in OURS if METHODS[name].parameter == "switches"]
 
 
-def learning(switches: int = 14) -> Learning:
+def learning(switches: int = 14) -> Samples:
     random = np.random.default_rng(11)
     labels = np.arange(150) % 5
     bits = (random.random((5, switches)) < 0.4)[labels] ^ (random.random((150, switches)) < 0.15)
     bits[:, :1] = True
-    return Learning(bits, np.zeros((150, 0), np.uint16), labels, 5)
+    return Samples(bits, np.zeros((150, 0), np.uint16), labels, tuple("01234"))
 
 
 def test_the_papers_ours_and_the_rivals_are_there() -> None:

@@ -12,9 +12,9 @@ left: the last one of a port pays for all of it.
 import numpy as np
 from numpy.typing import NDArray
 
-from ..placement.costaware import PortCosts
+from ..samples import Columns, Samples
+from .costaware import PortCosts
 from .indicators import sampled, thermometer
-from .learning import Columns, Learning
 from .logistic import Logistic
 from .removal import removal_rises
 
@@ -30,7 +30,7 @@ FIRST_STEPS, TRIAL_STEPS, STEPS = 60, 3, 5
 PORT_WEIGHT = 16.0
 
 
-def elimination_order(learning: Learning, ports: PortCosts | None = None) -> Columns:
+def elimination_order(learning: Samples, ports: PortCosts | None = None) -> Columns:
     """Return the switches that vary in `learning`, the last one to go first: any m are the m first.
 
     The joints' codes, where there are any, are always kept. `ports` tells of all switches of `learning`. Takes the time
@@ -40,7 +40,7 @@ def elimination_order(learning: Learning, ports: PortCosts | None = None) -> Col
 
 
 class _Elimination:
-    def __init__(self, learning: Learning, ports: PortCosts | None) -> None:
+    def __init__(self, learning: Samples, ports: PortCosts | None) -> None:
         bits = learning.switches.T
         self._left: list[int] = np.flatnonzero(bits.any(axis=1) & ~bits.all(axis=1)).tolist()
         self._bits = np.ascontiguousarray(bits[self._left])

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import numpy as np
 from numpy.typing import NDArray
 
-from .learning import Columns
+from ..samples import Columns
 
 # The program is scaled so that a thousandth of all pairs is 1; HiGHS holds constraints to 1e-6 of that.
 _UNIT, _SLACK = 1000.0, 1e-5

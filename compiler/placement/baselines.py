@@ -14,9 +14,9 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from ..placement.rivals import cmim_order, random_placement, top_mutual_information
-from .learning import Columns, Learning
+from ..samples import Columns, Samples
 from .mrmr import mrmr
+from .rivals import cmim_order, random_placement, top_mutual_information
 from .sparse_sensing import qr_order, sspoc_order
 
 Choose = Callable[[float], Columns]
@@ -30,13 +30,13 @@ _TREES = 300
 _ITERATIONS, _TOLERANCE = 2000, 1e-3
 
 
-def _ranked(rank: Callable[[Bits, Labels], Iterable[int]]) -> Callable[[Learning], Choose]:
+def _ranked(rank: Callable[[Bits, Labels], Iterable[int]]) -> Callable[[Samples], Choose]:
     """Return the chooser of a method that ranks switches (n, s), all of which vary, best one first.
 
     What is ranked one at a time is ranked as far as is asked for.
     """
 
-    def chooser(learning: Learning) -> Choose:
+    def chooser(learning: Samples) -> Choose:
         from threadpoolctl import threadpool_limits
 
         bits, labels = learning.switches, learning.labels
@@ -88,7 +88,7 @@ def _random(bits: Bits, labels: Labels) -> Columns:
     return random_placement(bits.shape[1], bits.shape[1], _SEED)
 
 
-RIVALS: Mapping[str, tuple[str, Callable[[Learning], Choose]]] = MappingProxyType(
+RIVALS: Mapping[str, tuple[str, Callable[[Samples], Choose]]] = MappingProxyType(
     {
         "rfe": (
             "Recursive elimination by logistic regression (scikit-learn), one switch at a time",

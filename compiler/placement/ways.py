@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
-from ..placement.costaware import PortCosts
-from ..placement.errors import PlacementError
+from ..samples import Columns, Samples
+from .baselines import RIVALS
 from .boosted_elimination import boosted_elimination_order
+from .costaware import PortCosts
 from .elimination import elimination_order
+from .errors import PlacementError
 from .id3_family import cost_aware_chooser, cost_complexity_chooser, id3_chooser, reduced_error_chooser
-from .learning import Columns, Learning
-from .rivals import RIVALS
 
 Chooser = Callable[[float], Columns]
 
@@ -36,7 +36,7 @@ def _first_of(order: Columns) -> Chooser:
     return lambda most: order[: max(int(most), 0)]
 
 
-_OURS: Mapping[str, tuple[str, Callable[[Learning, PortCosts | None], Chooser]]] = {
+_OURS: Mapping[str, tuple[str, Callable[[Samples, PortCosts | None], Chooser]]] = {
     "id3": (
         "The paper's ID3: the switches that decide nodes of at least S rows",
         lambda learning, _: id3_chooser(learning),
@@ -77,7 +77,7 @@ def _methods() -> Mapping[str, Method]:
 METHODS: Mapping[str, Method] = _methods()
 
 
-def chooser(method: str, learning: Learning, ports: PortCosts | None = None) -> Chooser:
+def chooser(method: str, learning: Samples, ports: PortCosts | None = None) -> Chooser:
     """Return the placement of `learning` for every parameter of a method; the expensive work is done here, once.
 
     Numbers of switches are rounded down. `ports` tells the methods that heed scan time what reading takes; without it

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.selection import indicators
-from thenar.compiler.selection.indicators import BINS, sampled, thermometer
-from thenar.compiler.selection.learning import Learning
+from thenar.compiler.placement import indicators
+from thenar.compiler.placement.indicators import BINS, sampled, thermometer
+from thenar.compiler.samples import Samples
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.integers(1, 9))
@@ -33,12 +33,12 @@ def test_a_sample_keeps_the_shares_of_the_classes_and_the_order(monkeypatch: pyt
     monkeypatch.setattr(indicators, "MOST_ROWS", 30)
     labels = np.array([0] * 100 + [1] * 200)[np.random.default_rng(0).permutation(300)]
     codes = np.arange(300, dtype=np.uint16)[:, np.newaxis]
-    few = sampled(Learning(np.zeros((300, 1), np.bool_), codes, labels, 2))
+    few = sampled(Samples(np.zeros((300, 1), np.bool_), codes, labels, tuple("01")))
     assert np.bincount(few.labels).tolist() == [10, 20]
     assert (np.diff(few.codes[:, 0].astype(int)) > 0).all()
     assert (labels[few.codes[:, 0]] == few.labels).all()
 
 
 def test_a_small_set_is_taken_whole() -> None:
-    learning = Learning(np.zeros((3, 1), np.bool_), np.zeros((3, 0), np.uint16), np.zeros(3, np.intp), 1)
+    learning = Samples(np.zeros((3, 1), np.bool_), np.zeros((3, 0), np.uint16), np.zeros(3, np.intp), tuple("0"))
     assert sampled(learning) is learning

@@ -4,17 +4,17 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from thenar.compiler.placement import elimination
 from thenar.compiler.placement.costaware import PortCosts
-from thenar.compiler.selection import elimination
-from thenar.compiler.selection.elimination import elimination_order
-from thenar.compiler.selection.learning import Learning
+from thenar.compiler.placement.elimination import elimination_order
+from thenar.compiler.samples import Samples
 
 Bits = npt.NDArray[np.bool_]
 
 
-def learning_of(switches: Bits, labels: npt.NDArray[np.intp], codes: npt.NDArray[np.uint16] | None = None) -> Learning:
+def learning_of(switches: Bits, labels: npt.NDArray[np.intp], codes: npt.NDArray[np.uint16] | None = None) -> Samples:
     none = np.zeros((len(labels), 0), np.uint16)
-    return Learning(switches, none if codes is None else codes, labels, int(labels.max()) + 1)
+    return Samples(switches, none if codes is None else codes, labels, tuple(map(str, range(int(labels.max()) + 1))))
 
 
 @pytest.fixture(autouse=True)
@@ -22,7 +22,7 @@ def _few_are_tried(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(elimination, "FINE", 8)
 
 
-def planted(seed: int, noise: int = 22) -> Learning:
+def planted(seed: int, noise: int = 22) -> Samples:
     """Return eight classes that switches 7, 13 and 20 tell apart, among others that tell nothing."""
     random = np.random.default_rng(seed)
     labels = np.arange(240) % 8

@@ -14,10 +14,10 @@ is a subset that is evaluated, and gives the next lines. Where bound and best su
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from ..placement.errors import PlacementError
+from ..samples import Columns, Samples
 from .bounding import Bounding
+from .errors import PlacementError
 from .exchange import filled, swapped
-from .learning import Columns, Learning
 from .pairs import Pairs
 
 
@@ -64,7 +64,7 @@ class Subset:
 
 
 def best_subset(
-    learning: Learning,
+    learning: Samples,
     m: int,
     *,
     rounds: int = 10,

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from .learning import Columns
+from ..samples import Columns
 from .serving import Aim, Crowd, rates, served
 
 # So many of the switches chosen last, and of those chosen next, may change places, in so many exchanges at most.

@@ -5,7 +5,7 @@ import numpy.typing as npt
 import pytest
 from sklearn.linear_model import LogisticRegression
 
-from thenar.compiler.selection.logistic import RIDGE, Logistic
+from thenar.compiler.placement.logistic import RIDGE, Logistic
 
 Bits = npt.NDArray[np.bool_]
 Labels = npt.NDArray[np.intp]

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from .learning import Columns, Learning
+from ..samples import Columns, Samples
 
 Counts = NDArray[np.int64]
 Numbers = NDArray[np.intp]
@@ -19,7 +19,7 @@ class Pairs:
     varying    (v,) numbers of the switches that ever change
     """
 
-    def __init__(self, learning: Learning) -> None:
+    def __init__(self, learning: Samples) -> None:
         bits = learning.switches
         self.varying: Numbers = np.flatnonzero(bits.any(axis=0) & ~bits.all(axis=0))
         packed = np.packbits(bits[:, self.varying], axis=1)

@@ -3,13 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from .learning import Learning
+from ..samples import Samples
 
 MOST_ROWS = 8192
 BINS = 8
 
 
-def sampled(learning: Learning) -> Learning:
+def sampled(learning: Samples) -> Samples:
     """Return MOST_ROWS rows at most, spread evenly over each class's rows, in order: classes keep their shares."""
     if len(learning.labels) <= MOST_ROWS:
         return learning

@@ -6,15 +6,15 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from thenar.compiler.placement.baselines import RIVALS, available
 from thenar.compiler.placement.errors import PlacementError
 from thenar.compiler.placement.rivals import forward_cmim, top_mutual_information
-from thenar.compiler.selection.learning import Learning
-from thenar.compiler.selection.rivals import RIVALS, available
+from thenar.compiler.samples import Samples
 
 TELLING = (7, 2, 5)
 
 
-def told_by_three(rows: int = 240, switches: int = 12, types: int = 8) -> Learning:
+def told_by_three(rows: int = 240, switches: int = 12, types: int = 8) -> Samples:
     """Three switches spell the type out; two never change; the others are noise."""
     random = np.random.default_rng(3)
     labels = np.arange(rows) % types
@@ -22,21 +22,21 @@ def told_by_three(rows: int = 240, switches: int = 12, types: int = 8) -> Learni
     for place, column in enumerate(TELLING):
         bits[:, column] = (labels >> place) & 1
     bits[:, 0], bits[:, 11] = False, True
-    return Learning(bits, np.zeros((rows, 0), np.uint16), labels, types)
+    return Samples(bits, np.zeros((rows, 0), np.uint16), labels, tuple(map(str, range(types))))
 
 
 @pytest.fixture(scope="module")
-def learning() -> Learning:
+def learning() -> Samples:
     return told_by_three()
 
 
 @pytest.mark.parametrize("name", sorted(set(RIVALS) - {"random", "sspoc", "qr"}))
-def test_who_looks_at_labels_finds_the_switches_that_tell_the_types(name: str, learning: Learning) -> None:
+def test_who_looks_at_labels_finds_the_switches_that_tell_the_types(name: str, learning: Samples) -> None:
     assert set(RIVALS[name][1](learning)(3)) == set(TELLING)
 
 
 @pytest.mark.parametrize("name", sorted(RIVALS))
-def test_placements_are_nested_repeatable_and_of_switches_that_vary(name: str, learning: Learning) -> None:
+def test_placements_are_nested_repeatable_and_of_switches_that_vary(name: str, learning: Samples) -> None:
     if name not in available():
         pytest.skip(f"{name} needs PySensors")
     choose, again = RIVALS[name][1](learning), RIVALS[name][1](learning)
@@ -47,19 +47,19 @@ def test_placements_are_nested_repeatable_and_of_switches_that_vary(name: str, l
 
 
 @pytest.mark.parametrize("name", sorted(RIVALS))
-def test_where_nothing_varies_or_one_type_is_left_nothing_is_chosen(name: str, learning: Learning) -> None:
-    still = Learning(np.ones((6, 3), bool), np.zeros((6, 0), np.uint16), np.arange(6) % 2, 2)
-    alike = Learning(learning.switches, learning.codes, np.zeros(len(learning.labels), np.intp), 2)
+def test_where_nothing_varies_or_one_type_is_left_nothing_is_chosen(name: str, learning: Samples) -> None:
+    still = Samples(np.ones((6, 3), bool), np.zeros((6, 0), np.uint16), np.arange(6) % 2, tuple("01"))
+    alike = Samples(learning.switches, learning.codes, np.zeros(len(learning.labels), np.intp), tuple("01"))
     assert RIVALS[name][1](still)(2) == RIVALS[name][1](alike)(2) == ()
 
 
-def test_joints_are_not_looked_at(learning: Learning) -> None:
+def test_joints_are_not_looked_at(learning: Samples) -> None:
     telling = learning.labels[:, None].astype(np.uint16)
-    beside = Learning(learning.switches, telling, learning.labels, learning.n_classes)
+    beside = Samples(learning.switches, telling, learning.labels, tuple(map(str, range(learning.n_classes))))
     assert RIVALS["forest"][1](beside)(10) == RIVALS["forest"][1](learning)(10)
 
 
-def test_the_greedy_ones_are_those_of_the_placement_room(learning: Learning) -> None:
+def test_the_greedy_ones_are_those_of_the_placement_room(learning: Samples) -> None:
     bits, labels = learning.switches, learning.labels
     assert RIVALS["cmim"][1](learning)(6) == forward_cmim(bits, labels, 6)
     assert RIVALS["mutual-information"][1](learning)(6) == top_mutual_information(bits, labels, 6)
@@ -86,7 +86,7 @@ def test_mrmr_is_pengs_definition() -> None:
             if a not in chosen
         }
         chosen.append(max(scores, key=lambda a: scores[a]))
-    learning = Learning(bits, np.zeros((150, 0), np.uint16), labels, 4)
+    learning = Samples(bits, np.zeros((150, 0), np.uint16), labels, tuple("0123"))
     assert RIVALS["mrmr"][1](learning)(9) == tuple(chosen)
 
 
@@ -95,14 +95,14 @@ def test_recursive_elimination_drops_the_copy_that_importance_alone_keeps() -> N
     labels = np.arange(400) % 4
     strong, weak = (labels & 1).astype(bool), (labels >> 1).astype(bool) ^ (random.random(400) < 0.15)
     copy = strong ^ (random.random(400) < 0.1)
-    learning = Learning(np.column_stack([strong, copy, weak]), np.zeros((400, 0), np.uint16), labels, 4)
+    learning = Samples(np.column_stack([strong, copy, weak]), np.zeros((400, 0), np.uint16), labels, tuple("0123"))
     assert set(RIVALS["rfe"][1](learning)(2)) == {0, 2}
     assert set(RIVALS["mutual-information"][1](learning)(2)) == {0, 1}
 
 
 @pytest.mark.parametrize("name", ["sspoc", "qr"])
 def test_without_pysensors_its_methods_say_what_to_install(
-    name: str, learning: Learning, monkeypatch: pytest.MonkeyPatch
+    name: str, learning: Samples, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pysensors", None)
     with pytest.raises(PlacementError, match="pip install python-sensors"):

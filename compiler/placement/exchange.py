@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .learning import Columns
+from ..samples import Columns
 from .pairs import Pairs
 
 

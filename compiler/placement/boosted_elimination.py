@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 
 from ..boosting.boost import boost
 from ..elementary import softmax
+from ..samples import Columns, Samples
 from ..tables.collapse import collapse
 from .indicators import BINS, sampled
-from .learning import Columns, Learning
 from .removal import Floats, removal_rises
 
 ROUNDS = 40
 SHARE = 0.12
 
 
-def boosted_elimination_order(learning: Learning) -> Columns:
+def boosted_elimination_order(learning: Samples) -> Columns:
     """Return the switches that vary in `learning`, the last one to go first: any m are the m first.
 
     The joints' codes, where there are any, are always kept. Trains some 35 ensembles for 160 switches; of many rows, a
@@ -37,7 +37,7 @@ def boosted_elimination_order(learning: Learning) -> Columns:
     return tuple(left.tolist() + gone[::-1])
 
 
-def _costs(learning: Learning, left: NDArray[np.intp]) -> Floats:
+def _costs(learning: Samples, left: NDArray[np.intp]) -> Floats:
     """Return (len(left),) by how much the loss rises without each of the switches `left`."""
     bits = learning.switches[:, left]
     X = np.hstack([bits.astype(np.uint16), learning.codes])

@@ -5,15 +5,15 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..placement.costaware import PortCosts, cost_aware_order
-from ..placement.id3 import grow_id3
-from ..placement.pruning import entropy_brought, errors_spared, weakest_links
-from .learning import Columns, Learning
+from ..samples import Columns, Samples
+from .costaware import PortCosts, cost_aware_order
+from .id3 import grow_id3
+from .pruning import entropy_brought, errors_spared, weakest_links
 
 _HELD_OUT = 3
 
 
-def id3_chooser(learning: Learning) -> Callable[[float], Columns]:
+def id3_chooser(learning: Samples) -> Callable[[float], Columns]:
     """Return S -> the inputs of grow_id3(min_samples=S) on the switches, from one unpruned tree.
 
     S only decides which nodes are terminal: a node has no more rows than any node above it, so the tree under S is the
@@ -28,13 +28,13 @@ def id3_chooser(learning: Learning) -> Callable[[float], Columns]:
     return choose
 
 
-def cost_complexity_chooser(learning: Learning) -> Callable[[float], Columns]:
+def cost_complexity_chooser(learning: Samples) -> Callable[[float], Columns]:
     """Return m -> the inputs, at most m, of the unpruned tree less its weakest links, by entropy of the rows."""
     tree = grow_id3(learning.switches, learning.labels)
     return weakest_links(tree, entropy_brought(tree)).placement
 
 
-def reduced_error_chooser(learning: Learning) -> Callable[[float], Columns]:
+def reduced_error_chooser(learning: Samples) -> Callable[[float], Columns]:
     """Return m -> the inputs, at most m, of a tree grown on two thirds of the rows and pruned by errors on the others.
 
     What spares no error on the rows held out goes in any case (Quinlan 1987); then the weakest links, until at most m
@@ -57,7 +57,7 @@ def every_third(labels: NDArray[np.intp]) -> NDArray[np.bool_]:
     return chosen
 
 
-def cost_aware_chooser(learning: Learning, ports: PortCosts | None) -> Callable[[float], Columns]:
+def cost_aware_chooser(learning: Samples, ports: PortCosts | None) -> Callable[[float], Columns]:
     """Return m -> the first m switches of cost-aware ID3; without `ports` all switches cost the same."""
     alike = PortCosts((0,) * learning.n_switches, (0.0,))
     order = cost_aware_order(learning.switches, learning.labels, ports or alike)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from thenar.compiler.selection.sums import Floats, dot, exact_sum, sums_of_logs
+from thenar.compiler.placement.sums import Floats, dot, exact_sum, sums_of_logs
 
 NUMBERS = arrays(np.float64, st.integers(0, 60), elements=st.floats(-1e9, 1e9))
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from thenar.compiler.selection import refining as module
-from thenar.compiler.selection.learning import Columns, Learning
-from thenar.compiler.selection.refining import EXCHANGES, Refining
-from thenar.compiler.selection.serving import Aim, Crowd
+from thenar.compiler.placement import refining as module
+from thenar.compiler.placement.refining import EXCHANGES, Refining
+from thenar.compiler.placement.serving import Aim, Crowd
+from thenar.compiler.samples import Columns, Samples
 
 TYPES, EACH, PEOPLE = 4, 40, 20
 FEW = (3, 11)
@@ -30,7 +30,7 @@ def crowd(people: int = PEOPLE) -> Crowd:
     bits[:, 0] = np.where(few, bits[:, 0], low)
     bits[:, 1] = high
     bits[:, 2] = low ^ (random.random(len(labels)) < 0.12)
-    return Crowd(Learning(bits, np.zeros((len(labels), 0), np.uint16), labels, TYPES), subjects)
+    return Crowd(Samples(bits, np.zeros((len(labels), 0), np.uint16), labels, tuple(map(str, range(TYPES)))), subjects)
 
 
 def refining(kept: Columns, spare: Columns, people: int = PEOPLE) -> Refining:

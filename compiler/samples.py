@@ -1,0 +1,87 @@
+"""What is learnt from: the rows of a training set, as plain arrays."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.drivers.errors import ThenarError
+from thenar.runtime.manifest import Inputs
+
+from .limits import check_types
+from .recordings.graspset import GraspSet
+
+Columns = tuple[int, ...]
+
+
+class SamplesError(ThenarError, ValueError):
+    """Rows that nothing can be learnt from."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Samples:
+    """Rows of a training set, of one fold or of everything.
+
+    Parameters
+    ----------
+    switches : ndarray of bool, shape (n, s)
+        True where a switch is closed.
+    codes : ndarray of uint16, shape (n, j)
+        The joints' codes. With j = 0 the switches alone are to recognise the grasp.
+    labels : ndarray of intp, shape (n,)
+        Class numbers, that index `grasps`.
+    grasps : tuple of str
+        The grasp types. A fold keeps all of them, whether they occur in it or not.
+
+    Raises
+    ------
+    SamplesError
+        If the arrays do not fit together, or there are no rows.
+    """
+
+    switches: NDArray[np.bool_]
+    codes: NDArray[np.uint16]
+    labels: NDArray[np.intp]
+    grasps: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        rows = {len(part) for part in (self.switches, self.codes, self.labels)}
+        if len(rows) != 1 or self.switches.ndim != 2 or self.codes.ndim != 2 or self.labels.ndim != 1:
+            raise SamplesError(
+                f"switches {self.switches.shape}, codes {self.codes.shape} and labels {self.labels.shape} must be "
+                f"(n, s), (n, j) and (n,) of the same n rows"
+            )
+        if not rows.pop():
+            raise SamplesError("nothing can be learnt from a set without rows")
+        if self.labels.min() < 0 or self.labels.max() >= self.n_classes:
+            raise SamplesError(f"labels must be class numbers 0 to {self.n_classes - 1}")
+        check_types(self.n_classes, SamplesError)
+
+    @classmethod
+    def of(cls, grasp_set: GraspSet, inputs: Inputs = "both") -> "Samples":
+        """Return all rows of a set, with those of its inputs that `inputs` allows, and the grasp types that occur."""
+        found, labels = np.unique(grasp_set.labels, return_inverse=True)
+        return cls(
+            switches=grasp_set.switches[:, : None if inputs != "joints" else 0],
+            codes=grasp_set.codes[:, : None if inputs != "switches" else 0],
+            labels=labels,
+            grasps=tuple(grasp_set.taxonomy.types[label] for label in found),
+        )
+
+    @property
+    def n_switches(self) -> int:
+        """The number of switches there are to choose from."""
+        return int(self.switches.shape[1])
+
+    @property
+    def n_classes(self) -> int:
+        """The number of grasp types."""
+        return len(self.grasps)
+
+    def rows(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> "Samples":
+        """Return some of the rows, by number or by mask (n,)."""
+        return Samples(self.switches[chosen], self.codes[chosen], self.labels[chosen], self.grasps)
+
+    def kept(self, columns: Columns) -> NDArray[np.uint16]:
+        """Return what is trained on, (n, kept + j): the switches `columns` in their order, then the joints' codes."""
+        return np.hstack([self.switches[:, list(columns)].astype(np.uint16), self.codes])

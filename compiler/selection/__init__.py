@@ -1,1 +1,0 @@
-"""Placements better than the paper's, and the strong rivals they are held beside."""
