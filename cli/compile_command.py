@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS
 
 from .common import any_path, existing_file, json_flag, out, output_file, print_json, progress, warning
 from .compile_asked import TABLE_BITS, Asked

@@ -165,7 +165,7 @@ def test_what_only_some_effects_need_is_imported_for_these_alone(audits: dict[tu
         "thenar.simulator.contact.mujoco_grasp": (OTHER,),
         "thenar.simulator.contact.quasistatic": (ONE, ()),
         "thenar.simulator.pipeline.wire": (ONE, OTHER),
-        "thenar.drivers.scanner_frame": (ONE, OTHER),
+        "thenar.drivers.scanner_protocol": (ONE, OTHER),
         "thenar.simulator.pipeline.stuck": (ONE, OTHER),
         "thenar.simulator.pipeline.ports": (ONE, OTHER),
     }

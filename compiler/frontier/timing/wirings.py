@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from msgspec.structs import replace
 
 from thenar.drivers.i2c import tca9548a
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import GloveWiring, Harness
 from thenar.runtime.scanning.costs import Costs

@@ -8,7 +8,7 @@ from thenar.compiler.firmware import board_checks
 from thenar.compiler.firmware.board import Board, BoardBus
 from thenar.compiler.frontier.timing.beside_wire import Beside
 from thenar.compiler.frontier.timing.wirings import AS_WIRED, BOARD, CLOCKS_HZ, KINDS, Wiring, port_costs, wirings
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.checks import faults
 from thenar.runtime.harness.wiring import Harness
