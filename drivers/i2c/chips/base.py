@@ -148,6 +148,7 @@ class Chip(ABC):
                 high, so that switches must pull down; the generated firmware reads none of these
     pulls_up    whether its inputs are pulled up inside, by the chip itself or once it is set up; where they are not,
                 the netlist has a resistor for each
+    tried       whether a frontier tries a new glove with it: not where another chip's port is read as fast
     package     as a part to solder
     model       the class that emulates it, in a module that imports nothing but the standard library and thenar.drivers
     """
@@ -161,6 +162,7 @@ class Chip(ABC):
     readings: ClassVar[tuple[Reading, ...]]
     registers: ClassVar[bool] = True
     pulls_up: ClassVar[bool] = True
+    tried: ClassVar[bool] = True
     package: ClassVar[Package]
     model: ClassVar[type[Device]]
 

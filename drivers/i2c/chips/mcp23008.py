@@ -17,6 +17,7 @@ class Mcp23008(Chip):
 
     name = "mcp23008"
     rank = 2
+    tried = False  # it reads as half an mcp23017 does
     addresses = range(0x20, 0x28)
     clock_hz = 1_700_000
     pins = tuple(f"GP{bit}" for bit in range(8))

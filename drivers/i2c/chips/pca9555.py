@@ -104,6 +104,7 @@ class Tca9555(Pca9555):
 
     name = "tca9555"
     rank = 7
+    tried = False
     package = Package("TCA9555PWR", "Texas Instruments", "TCA9555PWR", TSSOP24, pins_of_24("GND", "VCC"))
 
 

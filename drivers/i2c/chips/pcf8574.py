@@ -39,6 +39,7 @@ class Pcf8574(Chip):
 
     name = "pcf8574"
     rank = 4
+    tried = False  # eight pins, at 100 kHz, take longer than the sixteen of a pcf8575
     addresses = range(0x20, 0x28)
     clock_hz = 100_000
     pins = tuple(f"P{bit}" for bit in range(8))
