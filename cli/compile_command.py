@@ -101,26 +101,34 @@ def command(context: click.Context, /, **options: Any) -> None:
 
 def _made(asked: Asked) -> "BuildReport":
     from thenar.compiler.artifact.compile import compile_build
+    from thenar.compiler.artifact.documents import BuildDocuments
     from thenar.compiler.artifact.made import no_documents
     from thenar.compiler.frontier.timing.whole_glove import ports_of_whole_glove
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.harness.loading import load_harness
 
-    from .compile_documents import BuildDocuments
     from .from_frontier import picked
+    from .hand import hand_shape
 
     given = None if asked.glove is None else load_harness(asked.glove)
     grasp_set = GraspSet.load(asked.recordings)
     asked.check_hand(grasp_set.switch_names)
     chosen = None if asked.from_frontier is None else picked(asked.from_frontier, asked.point, grasp_set)
     with progress("compiling, then the paper's tables" if asked.report and asked.folds else "compiling") as told:
+        documents = BuildDocuments(
+            hand_shape(),
+            asked.hand_length,
+            None if chosen is None else chosen.frontier,
+            None if chosen is None else chosen.point.number,
+            told,
+        )
         return compile_build(
             grasp_set,
             asked.output,
             **(asked.training if chosen is None else asked.training | chosen.options),
             harness=given if chosen is None else chosen.wired(given),
             ports=ports_of_whole_glove(given, grasp_set.switch_names),
-            documents=BuildDocuments(told, chosen, asked.hand_length) if asked.report else no_documents,
+            documents=documents if asked.report else no_documents,
             progress=told,
         )
 
