@@ -4,9 +4,9 @@ import logging
 from collections import deque
 from dataclasses import asdict, dataclass
 from time import monotonic, monotonic_ns
-from types import TracebackType
 from typing import NamedTuple, Self
 
+from .closing import Closing
 from .errors import DeviceError
 from .scanner_protocol import (
     DEGRADED,
@@ -90,7 +90,7 @@ _GREETING_S = 0.3
 _ASK_AGAIN_S = 0.1
 
 
-class Scanner:
+class Scanner(Closing):
     """A scanner board at `url`: a device, socket://HOST:PORT or rfc2217://HOST:PORT; boards with USB ignore `baud`.
 
     `open`, then `read` again and again; both raise DeviceError when the board is gone or is not what it was, after
@@ -122,9 +122,6 @@ class Scanner:
     def __enter__(self) -> Self:
         self.open()
         return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self.close()
 
     def open(self) -> Hello:
         """Find the board. Raises DeviceError if none answers within three seconds, or one that speaks otherwise."""
@@ -276,6 +273,7 @@ class Scanner:
                 self._misfits += 1
                 self._keys.misread()
         else:
+            _LOG.info("%s: bytes that are no frame were skipped", self.url)
             self._keys.damaged()
         return None
 

@@ -8,9 +8,9 @@ import errno
 import os
 import select
 from time import monotonic
-from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
+from .closing import Closing
 from .errors import DeviceError, SettingError
 from .names import shortened
 from .ports import check_node, port_fault
@@ -54,7 +54,7 @@ class Pieces:
         return [piece[: self._keep] for piece in pieces]
 
 
-class SerialLine:
+class SerialLine(Closing):
     """An open serial line. Closing it twice does no harm; a context manager closes it at its end.
 
     One thread may read while another writes.
@@ -77,12 +77,6 @@ class SerialLine:
         self._node = None if self._sliced else _node(self._port.fileno())
         self._look_at = 0.0
         _lower_latency(self._port)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self.close()
 
     def read(self, timeout_s: float) -> bytes:
         """Return what has come in, after waiting for something until the timeout: b"" if nothing came.
