@@ -291,8 +291,8 @@ class RecordDecoder:
 
     def feed(self, chunk: bytes) -> list[Record]:
         """Return the records that `chunk` completes, oldest first."""
-        found = (self._record(piece) for piece in self._pieces.feed(chunk) if piece)
-        return [record for record in found if record is not None]
+        pieces = self._pieces.feed(chunk)
+        return [record for piece in pieces if piece and (record := self._record(piece)) is not None]
 
     def _record(self, piece: bytes) -> Record | None:
         start, ending = piece[:1], piece[self._body :]
@@ -305,11 +305,9 @@ class RecordDecoder:
             self.counts.wrong_length += 1
             _LOG.debug("a record of %d bytes was skipped: %d are right", len(piece), self._body)
             return None
-        self._count(fault)
+        self.counts.records += 1
+        if fault is not None:
+            self.counts.too_fast += fault == "too fast"
+            self.counts.unplugged += fault == "unplugged"
         status = piece[self._body - 1] if self.status else None
         return Record(piece[1 : self.sensors + 1], start == STREAM, fault, status)
-
-    def _count(self, fault: RecordFault | None) -> None:
-        self.counts.records += 1
-        self.counts.too_fast += fault == "too fast"
-        self.counts.unplugged += fault == "unplugged"

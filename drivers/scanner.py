@@ -161,7 +161,8 @@ class Scanner(Closing):
         reading = self._next()
         while reading is None:
             left = end - monotonic()
-            self._ask_for_state()
+            if not self._keys.trusted:
+                self._ask_for_state()
             self._receive(max(0.0, min(left, _ASK_AGAIN_S)))
             reading = self._next()
             if left <= 0:
@@ -199,7 +200,8 @@ class Scanner(Closing):
         data = self._opened().read(timeout_s)
         came_us = monotonic_ns() // 1000
         self._received_bytes += len(data)
-        self._waiting.extend((came_us, received) for received in self._decoder.received(data))
+        for received in self._decoder.received(data):
+            self._waiting.append((came_us, received))
 
     def _tell(self, setting: SetRate | SetDebounce) -> None:
         self._send(setting)
@@ -283,9 +285,9 @@ class Scanner(Closing):
         self.hello = hello
 
     def _ask_for_state(self) -> None:
-        """Ask for a full bitmap if there is none to be trusted, and again if none came."""
+        """Ask for a full bitmap, and again if none came."""
         now = monotonic()
-        if not self._keys.trusted and now >= self._ask_at:
+        if now >= self._ask_at:
             _LOG.info("%s: what the board said of its keys cannot be trusted: all of them are asked for", self.url)
             self._ask_at = now + _ASK_AGAIN_S
             self._asked += 1

@@ -74,8 +74,9 @@ class SerialLine(Closing):
         self._sliced = not _has_descriptor(self._port)
         if self._sliced:
             self._port.timeout = _SLICE_S
-        self._node = None if self._sliced else _node(self._port.fileno())
-        self._look_at = 0.0
+        self._descriptor = -1 if self._sliced else self._port.fileno()
+        self._node = None if self._sliced else _node(self._descriptor)
+        self._look_at = 0.0 if self._node else float("inf")
         _lower_latency(self._port)
 
     def read(self, timeout_s: float) -> bytes:
@@ -84,7 +85,8 @@ class SerialLine(Closing):
         Raises DeviceError when the line is gone, as soon as that shows, or when its name has come to lead to another
         port: the one that is open is then no longer the one that was meant.
         """
-        self._look()
+        if monotonic() >= self._look_at:
+            self._look()
         try:
             return self._in_slices(timeout_s) if self._sliced else self._when_ready(timeout_s)
         except (OSError, TypeError, ValueError) as reason:  # the latter two: closed meanwhile by another thread
@@ -106,22 +108,20 @@ class SerialLine(Closing):
 
     def close(self) -> None:
         """Close the line; what was written is given to the system already."""
+        self._descriptor = -1  # nobody reads what another file of the same number holds
         self._port.close()
 
     def _look(self) -> None:
-        now = monotonic()
-        if self._node is None or now < self._look_at:
-            return
-        self._look_at = now + _LOOK_S
+        self._look_at = monotonic() + _LOOK_S
         if _node(self.url) not in (None, self._node):
             raise DeviceError(f"{self.url}: it has come to be another port than the one that was opened")
 
     def _when_ready(self, timeout_s: float) -> bytes:
-        ready, _, _ = select.select([self._port.fileno()], [], [], max(0.0, timeout_s))
+        ready, _, _ = select.select([self._descriptor], [], [], max(0.0, timeout_s))
         if not ready:
             return b""
         try:
-            data = os.read(self._port.fileno(), _CHUNK)  # pySerial would wait once more, in ten calls
+            data = os.read(self._descriptor, _CHUNK)  # pySerial would wait once more, in ten calls
         except BlockingIOError:
             return b""
         if not data:
