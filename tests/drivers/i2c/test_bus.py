@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.drivers.errors import DeviceError, SettingError
-from thenar.drivers.i2c.bus import ChipAt, I2cBus, Port, PortRead, Way, cut
+from thenar.drivers.i2c.bus import ChipAt, I2cBus, Port, PortRead, cut
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.drivers.i2c.keeper import PlacedChip, Route
-from thenar.drivers.i2c.node import MOST_MESSAGES, Query
+from thenar.drivers.i2c.node import MOST_MESSAGES, Query, Way
 
 MakeRig = Callable[..., Any]
 NEVER_CHECKED = 3600.0
