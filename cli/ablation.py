@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.compiler.evaluation.compositions import COMPOSITIONS, inputs
-from thenar.compiler.evaluation.fits import Fit, Training, run_fits
+from thenar.compiler.evaluation.fits import Fit, run_fits
 from thenar.compiler.evaluation.populations import populations
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.trainers.base import Training
 from thenar.simulator.pipeline.pipeline import DEFAULT_CONTACT
 from thenar.simulator.running.sampling import best_us
 from thenar.simulator.running.simulation import Simulated, simulate
@@ -112,7 +113,9 @@ def _correct(grasp_set: GraspSet, jobs: int, progress: Progress | None) -> dict[
         for name, kind in _KINDS.items()
     }
     everything = [fit for some in fits.values() for fit in some]
-    found = run_fits(inputs(grasp_set), grasp_set.labels, everything, Training(ROUNDS), jobs, progress)
+    found = run_fits(
+        inputs(grasp_set), grasp_set.labels, everything, Training("logitboost", {"rounds": ROUNDS}), jobs, progress
+    )
     correct = {name: np.zeros(len(grasp_set), dtype=np.bool_) for name in fits}
     for name, some in fits.items():
         for fit in some:

@@ -49,6 +49,12 @@ class HandShape:
             labels=self.labels * factor,
         )
 
+    def of(self, names: Sequence[str], length_mm: float | None = None) -> "HandShape | None":
+        """Return the same hand, of `length_mm` if that is given; None unless it has all of `names`, one at least."""
+        if not names or not self.knows(names):
+            return None
+        return self if length_mm is None else self.scaled(length_mm)
+
     def knows(self, names: Sequence[str]) -> bool:
         """Return whether every one of `names` is a switch of this hand."""
         return set(names) <= set(self.names)

@@ -14,11 +14,11 @@ from thenar.runtime.tables import LIMIT
 
 from ..boosting.stumps import TIE, Stumps
 from ..recordings.graspset import GraspSet
-from ..tables.collapse import collapse
+from ..tables.collapse import Model, collapse
 from ..tables.compare import Comparison, compare
 from ..tables.furthest import furthest
 from ..tables.worstcase import Rounding
-from .ensemble import MAX_BYTES, ensemble_from_bytes
+from .ensemble import MAX_BYTES, ensemble_from_bytes, model_fault
 from .errors import CompileError
 from .scanned import ScanCheck, check_scan
 from .select import select_inputs
@@ -103,10 +103,10 @@ def verify_build(
     if not len(grasp_set):
         raise CompileError("the recordings have no rows: there is nothing to verify")
     build = Build.load(folder)
-    stumps = _load_ensemble(Path(folder), build)
+    model = _load_ensemble(Path(folder), build)
     bits, codes = select_inputs(grasp_set, build.manifest)
-    comparison = compare(stumps, build.tables, bits, codes, progress)
-    worst = _worst(stumps, build, comparison)
+    comparison = compare(model, build.tables, bits, codes, progress)
+    worst = _worst(model, build, comparison)
     scan = None if build.scan is None else check_scan(build.scan, build.tables, bits, codes, comparison.deployed)
     grasps = np.array(build.grasps)
     return Verification(
@@ -128,24 +128,21 @@ def verify_build(
     )
 
 
-def _load_ensemble(folder: Path, build: Build) -> Stumps:
+def _load_ensemble(folder: Path, build: Build) -> Model:
     path = folder / ENSEMBLE_NAME
-    stumps = ensemble_from_bytes(read_member(path, MAX_BYTES, build.manifest.ensemble_sha256), str(path))
-    inputs = build.tables.n_switches + build.tables.n_joints
-    options = build.manifest.options
-    belongs = (stumps.n_inputs, stumps.n_classes, stumps.shrinkage) == (
-        inputs,
-        build.tables.n_classes,
-        options.shrinkage,
-    )
-    if not belongs or stumps.n_rounds > options.rounds:
+    model = ensemble_from_bytes(read_member(path, MAX_BYTES, build.manifest.ensemble_sha256), str(path))
+    tables, options = build.tables, build.manifest.options
+    foreign = bool(model_fault(model, tables.n_switches, tables.n_joints, tables.n_classes))
+    if isinstance(model, Stumps):
+        foreign |= model.shrinkage != options.shrinkage or model.n_rounds > options.rounds
+    if foreign:
         raise BuildError(f"{path} is the ensemble of another build: compile the build again")
-    return stumps
+    return model
 
 
-def _worst(stumps: Stumps, build: Build, comparison: Comparison) -> WorstCase:
+def _worst(model: Model, build: Build, comparison: Comparison) -> WorstCase:
     integers = build.tables
-    rounding = Rounding(collapse(stumps, integers.n_switches), integers)
+    rounding = Rounding(collapse(model, integers.n_switches), integers)
     frame, furthest_sum = rounding.worst_of_all(), furthest(integers)
     safe = float(rounding.safe_margin())
     # Scores that the ensemble takes for tied are decided by the number of the class.

@@ -129,7 +129,8 @@ class Planner:
 
         def fit(fold: Fold) -> Fit:
             placement = select(part, fold) if kind.needs_placement else ()
-            return Fit(fold, kind.columns(placement, self._n_switches, self.n_joints), part.grasps)
+            columns = kind.columns(placement, self._n_switches, self.n_joints)
+            return Fit(fold, columns, part.grasps, sum(column < self._n_switches for column in columns))
 
         return CellPlan(part, tuple(tuple(map(fit, folds)) for folds in part.repeats))
 

@@ -1,15 +1,19 @@
 """An evaluation: the paper's tables for the user's own recordings."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from thenar.runtime.manifest import Options as Manifested
+
 from ..limits import check_memory, check_types
 from ..recordings.graspset import GraspSet
+from ..trainers.base import Training, changed
 from .compositions import inputs
 from .concerns import concerns
 from .errors import EvaluationError
-from .fits import Progress, Training, is_blind, run_fits
+from .fits import Progress, is_blind, run_fits
 from .placements import Placements
 from .plan import Planner, TableName
 from .populations import Population, Scheme, populations
@@ -32,6 +36,7 @@ class Options:
     repeats     of `stratified`, with seeds seed, seed + 1, ...
     prune       S of the placements of the compositions, the generality and the baselines
     prune_list  each S of the table of pooled and pruned placements
+    trainer     what makes every classifier, with its `settings`; rounds are LogitBoost's
     """
 
     subjects: tuple[str, ...] = ()
@@ -44,6 +49,8 @@ class Options:
     protocols: tuple[ProtocolName, ...] = ("paper", "honest")
     tables: tuple[TableName, ...] = TABLES
     seed: int = 1
+    trainer: str = "logitboost"
+    settings: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +86,7 @@ def evaluate(
     Raises EvaluationError if the set cannot be cut as asked.
     """
     options = options or Options()
+    training = Training.of(changed(Manifested(rounds=options.rounds, trainer=options.trainer), options.settings))
     chosen = _of_subjects(grasp_set, options.subjects)
     parts = populations(chosen, options.scheme, options.folds, options.repeats, options.seed)
     reasons = {name: _why_not(name, chosen, parts, options.scheme) for name in options.tables}
@@ -90,7 +98,7 @@ def evaluate(
     plans = [planner.table(name, each) for name, reason in reasons.items() if reason is None for each in protocols]
     fits = [fit for plan in plans for row in plan.rows for cell in row.cells for fit in cell.fits]
     X = inputs(chosen)
-    predictions = run_fits(X, chosen.labels, fits, Training(options.rounds), jobs, progress)
+    predictions = run_fits(X, chosen.labels, fits, training, jobs, progress)
     grasps = tuple(np.unique(chosen.labels).tolist())
     blind = frozenset(fit for fit in predictions if is_blind(X, fit))
     reader = Reader(chosen.labels, grasps, len(chosen.switch_names), predictions, blind)

@@ -7,8 +7,8 @@ import numpy as np
 
 from thenar.runtime.tables import IntegerTables
 
-from ..boosting.stumps import TIE, Stumps
-from ..tables.collapse import collapse
+from ..boosting.stumps import TIE
+from ..tables.collapse import Model, collapse
 from ..tables.compare import Comparison
 from ..tables.furthest import furthest
 from ..tables.worstcase import Rounding
@@ -40,9 +40,9 @@ class Guarantee:
     reach: int
 
 
-def guarantee_of(stumps: Stumps, integers: IntegerTables, comparison: Comparison, grasps: Sequence[str]) -> Guarantee:
-    """Return what holds of `integers`, which were made of `stumps` and compared with them on the rows trained on."""
-    rounding = Rounding(collapse(stumps, integers.n_switches), integers)
+def guarantee_of(model: Model, integers: IntegerTables, comparison: Comparison, grasps: Sequence[str]) -> Guarantee:
+    """Return what holds of `integers`, which were made of `model` and compared with them on the rows trained on."""
+    rounding = Rounding(collapse(model, integers.n_switches), integers)
     worst, safe = rounding.worst_of_all(), float(rounding.safe_margin())
     # Scores that the ensemble takes for tied are decided by the number of the class.
     covered = comparison.margins > max(safe, TIE * integers.scale) + 2 * comparison.slack

@@ -10,7 +10,7 @@ from thenar.runtime.scorer import LANE_OFFSET, Scorer
 from thenar.runtime.tables import IntegerTables
 
 from ..boosting.stumps import Stumps, winners
-from .collapse import Floats, ScoreTables, collapse
+from .collapse import Floats, Model, ScoreTables, collapse, model_scores
 
 COLLAPSE_TOLERANCE = 1e-12  # of the sum of the magnitudes that are added up
 
@@ -69,34 +69,40 @@ def float_slack(tables: ScoreTables, scale: float) -> float:
 
 
 def compare(
-    stumps: Stumps,
+    model: Model,
     integers: IntegerTables,
     bits: Flags,
     codes: NDArray[np.uint16],
     report: Callable[[int, int], None] | None = None,
 ) -> Comparison:
     """Send the kept switches (n, s) and codes (n, j) through all three; the integers frame by frame, as they run."""
-    tables = collapse(stumps, bits.shape[1])
-    by_stumps = stumps.scores(np.hstack([bits, codes]))
+    tables = collapse(model, bits.shape[1])
+    by_model = model_scores(model, bits, codes)
     by_tables = tables.scores(bits, codes)
     by_integers = _deployed_scores(integers, bits, codes, report)
     steps = by_tables * integers.scale
     best_two = np.sort(steps, axis=1)[:, -2:]
     margins = best_two[:, 1] - best_two[:, 0]
     error, slack = rounding_error(tables.n_inputs), float_slack(tables, integers.scale)
-    magnitudes = 2 * stumps.shrinkage * np.abs(stumps.values[:, :, :2]).max(axis=(1, 2)).sum()
     return Comparison(
-        collapse_difference=float(np.abs(by_stumps - by_tables).max()),
-        collapse_bound=COLLAPSE_TOLERANCE * float(magnitudes),
+        collapse_difference=float(np.abs(by_model - by_tables).max()),
+        collapse_bound=COLLAPSE_TOLERANCE * _magnitudes(model),
         integer_difference=float(np.abs(steps - by_integers).max()),
         integer_bound=error,
         slack=slack,
         safe_margin=2 * error,
-        trained=winners(by_stumps),
+        trained=winners(by_model),
         deployed=by_integers.argmax(axis=1),
         margins=margins,
         covered=margins > 2 * (error + slack),
     )
+
+
+def _magnitudes(model: Model) -> float:
+    """Return the sum of the magnitudes that an ensemble adds up; from tables to themselves nothing is lost."""
+    if not isinstance(model, Stumps):
+        return 0.0
+    return float(2 * model.shrinkage * np.abs(model.values[:, :, :2]).max(axis=(1, 2)).sum())
 
 
 def _deployed_scores(

@@ -9,7 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.compiler import GraspSet, compile_build
-from thenar.compiler.artifact.made import REPORT_NAME
+from thenar.compiler.artifact.documents import REPORT_NAME
 from thenar.compiler.artifact.scanned import ScanCheck, check_scan
 from thenar.compiler.artifact.staging import MEMBERS
 from thenar.compiler.artifact.verify import verify_build
