@@ -1,4 +1,4 @@
-"""`compile_build`: recordings in, a build folder out; and `compile`: a fitted estimator in."""
+"""`compile_build`: recordings in, a build folder out."""
 
 import hashlib
 import sys
@@ -32,8 +32,8 @@ from thenar.runtime.tables import IntegerTables, tables_to_bytes
 from ..evaluation.folds import check_cut
 from ..frontier.timing.whole_glove import ports_of_whole_glove
 from ..placement.costaware import PortCosts
-from ..recordings.graspset import GraspSet
-from ..samples import Samples
+from ..recordings.graspset import GraspSet, Joint
+from ..samples import Columns, Samples
 from ..tables.collapse import collapse
 from ..tables.compare import Comparison, compare
 from ..tables.quantise import quantise
@@ -114,7 +114,8 @@ def compile_build(
     steps = _Steps(progress, asked.folds)
     ports = ports or ports_of_whole_glove(None, grasp_set.switch_names)
     trained = train(samples, asked, steps.trained, ports)
-    made = _Made(grasp_set, samples, asked, trained, harness)
+    joints = tuple(range(samples.codes.shape[1]))
+    made = Making(grasp_set, samples, joints, asked, trained, harness)
     tested = cross_validated(samples, asked, steps.tested, ports) if asked.folds else None
     return made.publish(target, tested, documents, progress)
 
@@ -157,13 +158,23 @@ class _Steps:
         self.trained(self._steps * (1 + done), self._steps)
 
 
-class _Made:
-    """A build in the making: integers of what was trained, held against it, and how to read its switches."""
+class Making:
+    """A build in the making: integers of what was trained, held against it, and how to read its switches.
+
+    `samples` have all switches, and the codes of `joints`, columns of the recordings.
+    """
 
     def __init__(
-        self, grasp_set: GraspSet, samples: Samples, options: Options, trained: Trained, harness: Wired | None
+        self,
+        grasp_set: GraspSet,
+        samples: Samples,
+        joints: Columns,
+        options: Options,
+        trained: Trained,
+        harness: Wired | None,
     ) -> None:
-        self.grasp_set, self.samples, self.options, self.trained = grasp_set, samples, options, trained
+        self.grasp_set, self.samples, self.joints = grasp_set, samples, joints
+        self.options, self.trained = options, trained
         kept = samples.keeping(trained.columns)
         tables = collapse(trained.model, kept.n_switches)
         self.integers = quantise(tables, kept.switches, kept.codes, options.width, options.table_bits)
@@ -231,7 +242,7 @@ class _Made:
             options=options,
             grasps=self.samples.grasps,
             switches=tuple(Switch(column, grasp_set.switch_names[column], gain) for column, gain in switches),
-            joints=_joints(grasp_set) if options.inputs != "switches" else (),
+            joints=tuple(_calibration(column, grasp_set.joints[column]) for column in self.joints),
             proof=_proof(self.integers, self.comparison, options.width),
             rates=tuple(rates if tested is None else [*rates, tested.rate]),
             stopped_after=self.trained.stopped_after,
@@ -240,11 +251,8 @@ class _Made:
         )
 
 
-def _joints(grasp_set: GraspSet) -> tuple[Calibration, ...]:
-    return tuple(
-        Calibration(column, joint.name, joint.unit, joint.code_a, joint.value_a, joint.code_b, joint.value_b)
-        for column, joint in enumerate(grasp_set.joints)
-    )
+def _calibration(column: int, joint: Joint) -> Calibration:
+    return Calibration(column, joint.name, joint.unit, joint.code_a, joint.value_a, joint.code_b, joint.value_b)
 
 
 def _proof(integers: IntegerTables, comparison: Comparison, width: int) -> Proof:

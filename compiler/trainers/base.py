@@ -98,7 +98,7 @@ class Trainer(ABC):
             value = getattr(options, setting.name, given)
             if value is not None and setting.least is not None and not value >= setting.least:
                 raise TrainerError(f"{setting.name}={value} must be at least {setting.least}")
-            values[setting.name] = value
+            values[setting.name] = None if value is None else setting.kind(value)
         return values
 
 
