@@ -98,7 +98,7 @@ def command(
     from thenar.runtime.harness.loading import load_harness
 
     from .from_frontier import picked
-    from .hand import glove as drawn
+    from .hand import hand_shape
 
     _check_proposal(propose, chip, glove, overwrite=overwrite)
     _check_point(context, from_frontier, point)
@@ -108,8 +108,8 @@ def command(
     options = asked_settings(context, asked) | asked
     given = None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
-    hand = drawn() if report else None
-    if hand is not None and hand_length is not None and hand.of(grasp_set.switch_names) is None:
+    hand = hand_shape() if report else None
+    if hand is not None and hand_length is not None and hand.fitted(grasp_set.switch_names) is None:
         raise click.UsageError(
             "--hand-length: the switches of these recordings are not those of murakami160, and where they lie is not "
             "known."

@@ -1,4 +1,4 @@
-"""The hand that reports and specs draw: the simulator's glove, where its switches are the recordings' own."""
+"""The hand that reports and specs draw: the simulator's glove."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -7,7 +7,7 @@ if TYPE_CHECKING:
     from thenar.compiler.hand import HandShape
 
 
-def glove() -> "HandShape":
+def hand_shape() -> "HandShape":
     """Return the glove `murakami160` laid flat."""
     from thenar.compiler.hand import HandShape
     from thenar.simulator.handmaps.flathand import HAND
@@ -30,8 +30,8 @@ def glove() -> "HandShape":
 
 
 def hand_of(switch_names: Sequence[str], length_mm: float | None = None) -> "HandShape | None":
-    """Return the glove for a hand of `length_mm`, if it has all of these switches.
+    """Return that glove for a hand of `length_mm`, if it has all of these switches.
 
     None: of a glove of the user's own nobody knows where its switches lie.
     """
-    return glove().of(switch_names, length_mm)
+    return hand_shape().fitted(switch_names, length_mm)

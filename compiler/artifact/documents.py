@@ -93,7 +93,7 @@ class Documents:
 
         files = {REPORT_NAME: self._report(made, progress)}
         if names := [switch.name for switch in made.manifest.switches]:
-            hand = None if self.hand is None else self.hand.of(names, self.hand_length)
+            hand = None if self.hand is None else self.hand.fitted(names, self.hand_length)
             spec = spec_files(made.manifest, made.scan, made.harness, hand)
             files |= {f"{SPEC_FOLDER}/{name}": content for name, content in spec.items()}
         return files
@@ -118,7 +118,7 @@ class Documents:
                 no_study=no_study,
                 frontier=self.frontier,
                 point=self.point,
-                hand=None if self.hand is None else self.hand.of(made.grasp_set.switch_names),
+                hand=None if self.hand is None else self.hand.fitted(made.grasp_set.switch_names),
                 scan=made.scan,
                 harness=made.harness,
                 guarantee=guarantee_of(made.trained.model, made.tables, made.comparison, made.manifest.grasps),

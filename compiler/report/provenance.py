@@ -7,8 +7,8 @@ import msgspec
 
 from thenar.runtime.manifest import Manifest, Options
 
+from ..text import counted
 from ..trainers.base import TRAINERS
-from .numbers import counted
 
 Pairs = tuple[tuple[str, str], ...]
 

@@ -33,8 +33,8 @@ from thenar.runtime.sinks.angles import AngleReader
 from thenar.simulator.body.anthropometry import Size
 from thenar.simulator.body.condition import Thing
 from thenar.simulator.body.hand import Hand
-from thenar.simulator.pipeline.pipeline import compile_pipeline
 from thenar.simulator.planning.postures import Postures
+from thenar.simulator.running.pipeline import compile_pipeline
 from thenar.simulator.running.session import conditions_of
 from thenar.simulator.scenes import shipped
 from thenar.simulator.scenes.catalogue import load_catalogue

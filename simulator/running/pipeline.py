@@ -1,29 +1,28 @@
 """The pipeline: what a scene calls for, compiled once into one list of steps, and nothing else.
 
-The modules of effects that the scene does not list are not imported; no step asks whether it is enabled.
+Of effects that the scene does not list nothing is prepared; no step asks whether it is enabled.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from time import perf_counter_ns
 
+import msgspec
+
 from thenar.compiler.recordings.names import nearest
 
-from ..contact.model import ContactModel, load_of, take
+from ..contact.model import ContactModel
 from ..errors import SceneError
+from ..pipeline.batch import Batch
+from ..pipeline.effect import EFFECTS, Effect, Setting, Step, Together
+from ..pipeline.glove import STEPS
+from ..pipeline.ledger import Ledger
+from ..pipeline.ordering import Place, in_order
 from ..scenes.scene import Scene
 from ..streams import Draw, Draws, Site
-from . import glove
-from .batch import Batch
-from .effect import Effect, EffectParameters, Setting, Step, Together
-from .ledger import Ledger
-from .ordering import Place, in_order
-from .registry import CONTACTS, load
 
 # What closes the hand on its object where the scene names no other: every scene needs one.
 DEFAULT_CONTACT = "contact.quasistatic"
-# The effect that asks the contact model again.
-_RAMP = "contact.ramp"
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,22 +70,12 @@ def _each(step: Step) -> Together:
 
 def _closing(model: ContactModel) -> Together:
     def act(batches: Sequence[Batch], draws: Sequence[Draw]) -> None:
-        contacts = model.solve([load_of(batch) for batch in batches])
+        contacts = model.solve([batch.load() for batch in batches])
         for batch, contact, draw in zip(batches, contacts, draws, strict=True):
-            take(batch, contact)
+            batch.take(contact)
             draw.count("solver steps", contact.steps)
 
     return act
-
-
-@dataclass(frozen=True, slots=True)
-class _Part:
-    """An effect that takes part, listed by the scene or (`own`) because there must be a contact model."""
-
-    name: str
-    parameters: EffectParameters
-    effect: Effect
-    own: bool
 
 
 def compile_pipeline(scene: Scene, without: str | None = None) -> Pipeline:
@@ -95,25 +84,37 @@ def compile_pipeline(scene: Scene, without: str | None = None) -> Pipeline:
     Raises SceneError where effects conflict, wait for one another in a circle, or cannot do with their parameters;
     SimMissingError where one needs a package that is not installed.
     """
-    parts = list(_parts(scene, without))
-    setting = scene.setting(tuple(part.effect for part in parts))
-    own_steps = _own_steps(setting)
-    places = [Place(effect, own=True) for effect, _ in own_steps]
-    places += [Place(part.effect, part.own, _after(part, without)) for part in parts]
-    ordered = in_order(places)
-    steps = {effect.name: _each(make(setting)) for effect, make in own_steps} | _effect_steps(parts, setting)
-    return Pipeline(setting, tuple(Stop(p.effect, steps[p.effect.name], p.own) for p in ordered))
+    listed = list(_listed(scene, without))
+    setting = scene.setting(place.effect for place in listed)
+    own = [Place(effect, own=True) for effect in _own_steps(setting)]
+    ordered = in_order([*own, *listed])
+    acts = {place.effect.name: _prepared(place, setting) for place in own}
+    closing = next(place for place in listed if place.effect.model is not None)
+    assert closing.effect.model is not None
+    model = closing.effect.model(closing.parameters, setting)
+    acts[closing.effect.name] = _closing(model)
+    for place in listed:
+        if place.effect.together is not None:
+            acts[place.effect.name] = place.effect.together(place.parameters, setting, model)
+        elif place is not closing:
+            acts[place.effect.name] = _prepared(place, setting)
+    return Pipeline(setting, tuple(Stop(place.effect, acts[place.effect.name], place.own) for place in ordered))
 
 
-def _parts(scene: Scene, without: str | None) -> Iterator[_Part]:
+def _listed(scene: Scene, without: str | None) -> Iterator[Place]:
+    """Yield the effects that the scene lists, and a contact model where it names none: there must be one."""
     names = [listed.name for listed in scene.effects]
     _check_without(names, without)
-    for listed in scene.effects:
-        if listed.name != without:
-            yield _Part(listed.name, listed.parameters, load(listed.name).EFFECT, own=False)
-    if not {*names} - {without} & {*CONTACTS}:
-        module = load(DEFAULT_CONTACT)
-        yield _Part(DEFAULT_CONTACT, module.Parameters(), module.EFFECT, own=True)
+    closes = False
+    for name, parameters in scene.effects:
+        if name != without:
+            after = tuple(other for other in parameters.after if other != without)
+            place = Place(EFFECTS[name], own=False, parameters=msgspec.structs.replace(parameters, after=after))
+            closes = closes or place.effect.model is not None
+            yield place
+    if not closes:
+        effect = EFFECTS[DEFAULT_CONTACT]
+        yield Place(effect, own=True, parameters=effect.parameters())
 
 
 def _check_without(names: list[str], without: str | None) -> None:
@@ -125,25 +126,16 @@ def _check_without(names: list[str], without: str | None) -> None:
         raise SceneError(f"effect {without!r} cannot be left out: without it nothing closes the hand on its object")
 
 
-def _after(part: _Part, without: str | None) -> tuple[str, ...]:
-    return tuple(name for name in part.parameters.after if name != without)
-
-
-def _own_steps(setting: Setting) -> tuple[glove.OwnStep, ...]:
+def _own_steps(setting: Setting) -> tuple[Effect, ...]:
     if not setting.on_wire:
-        return glove.STEPS
-    from .wire import RECEIVE, SEND
+        return STEPS
+    from ..pipeline.wire import RECEIVE, SEND
 
-    return (*glove.STEPS, SEND, RECEIVE)
+    return (*STEPS, SEND, RECEIVE)
 
 
-def _effect_steps(parts: list[_Part], setting: Setting) -> dict[str, Together]:
-    closing = next(part for part in parts if part.name in CONTACTS)
-    model: ContactModel = load(closing.name).model(closing.parameters, setting)
-    steps = {closing.name: _closing(model)}
-    for part in parts:
-        if part.name == _RAMP:
-            steps[part.name] = load(part.name).prepare(part.parameters, setting, model)
-        elif part is not closing:
-            steps[part.name] = _each(load(part.name).prepare(part.parameters, setting))
-    return steps
+def _prepared(place: Place, setting: Setting) -> Together:
+    effect = place.effect
+    if effect.prepare is None:
+        raise SceneError(f"effect {effect.name!r} has nothing that acts: give its record a `prepare`")
+    return _each(effect.prepare(place.parameters, setting))

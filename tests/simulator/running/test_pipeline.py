@@ -10,11 +10,13 @@ from hypothesis import strategies as st
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import STAGES
+from thenar.simulator.pipeline.effect import EFFECTS, STAGES
 from thenar.simulator.pipeline.ledger import Ledger
-from thenar.simulator.pipeline.pipeline import compile_pipeline
-from thenar.simulator.pipeline.registry import CONTACTS, NAMES, load
+from thenar.simulator.running.pipeline import compile_pipeline
 from thenar.simulator.scenes.scene import Scene
+
+NAMES = tuple(EFFECTS)
+CONTACTS = tuple(name for name, effect in EFFECTS.items() if effect.model)
 
 SceneMaker = Callable[..., Scene]
 BatchMaker = Callable[..., Batch]
@@ -37,7 +39,7 @@ SUBSETS = st.sets(st.sampled_from(OTHERS)).flatmap(
 
 
 def listed_with(name: str, **parameters: object) -> tuple:
-    return name, load(name).Parameters(**parameters)
+    return name, EFFECTS[name].parameters(**parameters)
 
 
 def light() -> list[tuple]:
@@ -124,7 +126,7 @@ def test_every_step_reads_and_writes_what_it_says(make_scene: SceneMaker, make_b
     batch.__init__(plain.condition, plain.repetitions, plain.trials, plain.previous_deg)  # type: ignore[misc]
     batch.taken()
     for name in OTHERS:
-        assert {*load(name).EFFECT.reads, *load(name).EFFECT.writes} <= FIELDS
+        assert {*EFFECTS[name].reads, *EFFECTS[name].writes} <= FIELDS
     pipeline = compile_pipeline(make_scene([contact, *light()]))
     written = {"trials", "previous_deg", "delay_us", "lost"}
     for stop in pipeline.stops:
