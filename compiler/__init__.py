@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from .artifact.compile import compile_build
     from .artifact.documents import BuildReport, Documents
     from .artifact.errors import CompileError
-    from .artifact.estimator import Build, compile
+    from .artifact.estimator import Build, compile  # noqa: A004
     from .artifact.verify import Verification, verify
     from .boosting.boost import BoostingError
     from .boosting.classifier import LogitBoostClassifier

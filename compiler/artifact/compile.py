@@ -38,12 +38,12 @@ from ..tables.collapse import collapse
 from ..tables.compare import Comparison, compare
 from ..tables.quantise import quantise
 from ..trainers.base import Training, changed
-from .carried import made_firmware
 from .documents import BuildReport, Documents, Progress
 from .ensemble import ensemble_to_bytes
 from .errors import CompileError
 from .staging import check_target, publish
 from .training import Tested, Trained, check_placement, cross_validated, samples_of, train
+from .verify_firmware import made_firmware
 
 # A wiring, or what makes one for the names of the kept switches.
 Wired = Harness | Callable[[Sequence[str]], Harness]

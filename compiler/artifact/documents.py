@@ -16,7 +16,7 @@ from thenar.runtime.tables import IntegerTables
 from ..evaluation.errors import EvaluationError
 from ..hand import HandShape
 from ..recordings.graspset import GraspSet
-from ..tables.compare import Comparison
+from ..tables.compare import Comparison, worst_case
 from .training import Trained
 
 if TYPE_CHECKING:
@@ -100,10 +100,10 @@ class Documents:
 
     def _report(self, made: BuildReport, progress: Progress | None) -> bytes:
         from ..report.content import ReportContent
-        from ..report.guarantee import guarantee_of
         from ..report.page import report_html
 
         study, no_study = _study(made, progress)
+        names = [switch.name for switch in made.manifest.switches]
         return report_html(
             ReportContent(
                 manifest=made.manifest,
@@ -121,7 +121,8 @@ class Documents:
                 hand=None if self.hand is None else self.hand.fitted(made.grasp_set.switch_names),
                 scan=made.scan,
                 harness=made.harness,
-                guarantee=guarantee_of(made.trained.model, made.tables, made.comparison, made.manifest.grasps),
+                comparison=made.comparison,
+                worst=worst_case(made.trained.model, made.tables, made.comparison, made.manifest.grasps, names),
             )
         )
 

@@ -1,12 +1,13 @@
 """From scikit-learn and back to C: a fitted estimator becomes a build, a build becomes firmware."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
+from sklearn.base import clone
 
 from thenar import runtime
 from thenar.runtime.manifest import Inputs, Options, Recognised, TableBits
@@ -20,15 +21,13 @@ from ..firmware.generate import Mode, Request, firmware_files, fit_of
 from ..firmware.library_names import LIBRARY_NAME
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
-from ..tables.collapse import Model
+from ..tables.collapse import Model, ScoreTables
 from .compile import Making, Wired
 from .documents import BuildReport, Documents, Progress
 from .ensemble import model_fault
 from .errors import CompileError
 from .staging import check_target
 from .training import Tested, Trained, information_alone
-
-Labels = NDArray[np.intp]
 
 
 class Build(runtime.Build):
@@ -86,7 +85,7 @@ class Build(runtime.Build):
         return tuple(Path(folder) / path for path in files)
 
 
-def compile(
+def compile(  # noqa: A001
     estimator: Any,
     grasp_set: GraspSet,
     folder: str | Path,
@@ -197,11 +196,10 @@ def _labelled(samples: Samples, grasp_set: GraspSet, classes: NDArray[Any]) -> S
 def _model(classifier: Any, columns: Columns, n_switches: int) -> Model:
     """Return the classifier's model over [switches | joints]."""
     order = sorted(range(len(columns)), key=lambda place: columns[place] >= n_switches)
-    tables: Model | None = getattr(classifier, "tables_", None)
-    stumps: Stumps | None = getattr(classifier, "stumps_", None)
-    if stumps is not None:
+    tables, stumps = getattr(classifier, "tables_", None), getattr(classifier, "stumps_", None)
+    if isinstance(stumps, Stumps):
         return replace(stumps, columns=np.argsort(order)[stumps.columns].astype(np.int32))
-    if tables is None or order != sorted(order):
+    if not isinstance(tables, ScoreTables) or order != sorted(order):
         raise CompileError(
             f"{type(classifier).__name__} has no model that is a sum over switches, then joints: use a classifier with "
             "stumps_ or tables_, such as LogitBoostClassifier"
@@ -210,11 +208,9 @@ def _model(classifier: Any, columns: Columns, n_switches: int) -> Model:
 
 
 def _trained_by(classifier: Any, options: Options) -> Options:
-    from msgspec.structs import replace as changed
-
     if not isinstance(classifier, LogitBoostClassifier):
-        return changed(options, trainer=type(classifier).__name__)
-    return changed(
+        return structs.replace(options, trainer=type(classifier).__name__)
+    return structs.replace(
         options,
         rounds=classifier.rounds,
         shrinkage=float(classifier.shrinkage),
@@ -227,14 +223,12 @@ def _tested(
     estimator: Any, grasp_set: GraspSet, samples: Samples, options: Options, progress: Progress | None
 ) -> Tested:
     """Return what comes of stratified folds, on each of which a clone of the estimator is fitted anew."""
-    from sklearn.base import clone
-
-    X = Samples.of(grasp_set).inputs
-    grasps: Sequence[str] = samples.grasps
-    y, confusion = np.array(grasps)[samples.labels], np.zeros((len(grasps),) * 2, dtype=np.intp)
+    X, classes = Samples.of(grasp_set).inputs, estimator.classes_
+    y, confusion = classes[samples.labels], np.zeros((len(classes),) * 2, dtype=np.intp)
     for number, fold in enumerate(weka_folds(samples.labels, options.folds, options.seed), 1):
         found = clone(estimator).fit(X[fold.train], y[fold.train]).predict(X[fold.test])
-        np.add.at(confusion, (samples.labels[fold.test], [grasps.index(name) for name in found]), 1)
+        answers = (found[:, np.newaxis] == classes).argmax(axis=1)
+        np.add.at(confusion, (samples.labels[fold.test], answers), 1)
         if progress is not None:
             progress(number, options.folds)
     correct = int(np.trace(confusion))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from thenar.compiler import Samples, ScoreTables, Setting, Trainer
+from thenar.compiler import ScoreTables, Setting, Trainer
 
 
 class NaiveBayes(Trainer):

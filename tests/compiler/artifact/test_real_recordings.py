@@ -8,7 +8,7 @@ import pytest
 from thenar.compiler import compile_build
 from thenar.compiler.artifact.select import select_inputs
 from thenar.compiler.artifact.training import samples_of, train
-from thenar.compiler.artifact.verify import verify_build
+from thenar.compiler.artifact.verify import verify
 from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.evaluation.folds import weka_folds
 from thenar.compiler.recordings.importer import import_file
@@ -31,7 +31,7 @@ def test_a_build_of_real_recordings_holds_and_recognises(
     varying = np.flatnonzero(grasp_set.switches.any(axis=0) & ~grasp_set.switches.all(axis=0))
     assert {switch.column for switch in manifest.switches} <= set(varying.tolist())
 
-    found = verify_build(tmp_path / "build", grasp_set)
+    found = verify(tmp_path / "build", grasp_set)
     assert found.holds
     assert found.covered == len(grasp_set)
 

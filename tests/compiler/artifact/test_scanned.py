@@ -10,9 +10,8 @@ from msgspec.structs import replace
 
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.artifact.documents import REPORT_NAME
-from thenar.compiler.artifact.scanned import ScanCheck, check_scan
 from thenar.compiler.artifact.staging import MEMBERS
-from thenar.compiler.artifact.verify import verify_build
+from thenar.compiler.artifact.verify import ScanCheck, check_scan, verify
 from thenar.runtime import Build
 from thenar.runtime.build import SCAN_NAME
 from thenar.runtime.errors import HarnessError
@@ -90,14 +89,14 @@ def test_a_build_of_joints_alone_reads_no_port(grasp_set: GraspSet, harness: Har
     report = compile_build(grasp_set, tmp_path / "build", rounds=2, inputs="joints", folds=0, harness=harness)
     assert report.scan is not None
     assert report.scan.ports == ()
-    found = verify_build(tmp_path / "build", grasp_set)
+    found = verify(tmp_path / "build", grasp_set)
     assert found.scan == ScanCheck(0, 0.0, 0)
     assert found.holds
 
 
 def test_verification_scans_every_row_and_no_row_changes(grasp_set: GraspSet, harness: Harness, tmp_path: Path) -> None:
     compile_build(grasp_set, tmp_path / "build", rounds=8, folds=0, harness=harness)
-    found = verify_build(tmp_path / "build", grasp_set)
+    found = verify(tmp_path / "build", grasp_set)
     assert found.scan is not None
     assert found.scan.changed == 0
     assert 1.0 <= found.scan.mean_read <= found.scan.ports == 2
@@ -106,7 +105,7 @@ def test_verification_scans_every_row_and_no_row_changes(grasp_set: GraspSet, ha
 
 def test_verification_of_a_build_for_no_harness_says_nothing_of_scans(grasp_set: GraspSet, tmp_path: Path) -> None:
     compile_build(grasp_set, tmp_path / "build", rounds=2, folds=0)
-    assert verify_build(tmp_path / "build", grasp_set).scan is None
+    assert verify(tmp_path / "build", grasp_set).scan is None
 
 
 def test_a_row_that_a_scan_would_call_otherwise_is_counted(
@@ -130,7 +129,7 @@ def test_verification_does_not_hold_where_a_row_changes(
 ) -> None:
     compile_build(grasp_set, tmp_path / "build", rounds=2, folds=0, harness=harness)
     monkeypatch.setattr("thenar.compiler.artifact.verify.check_scan", lambda *_: ScanCheck(2, 1.0, 1))
-    assert not verify_build(tmp_path / "build", grasp_set).holds
+    assert not verify(tmp_path / "build", grasp_set).holds
 
 
 def test_buses_without_chips_are_no_hindrance(grasp_set: GraspSet, harness: Harness, tmp_path: Path) -> None:

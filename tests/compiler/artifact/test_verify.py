@@ -11,7 +11,7 @@ from msgspec.structs import replace as replace_fields
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.artifact.ensemble import ensemble_from_bytes
 from thenar.compiler.artifact.errors import CompileError
-from thenar.compiler.artifact.verify import verify_build
+from thenar.compiler.artifact.verify import verify
 from thenar.compiler.tables.collapse import collapse
 from thenar.runtime import Build, BuildError
 from thenar.runtime.manifest import manifest_from_bytes, manifest_to_bytes
@@ -44,7 +44,7 @@ def _seal(folder: Path, tables: IntegerTables) -> None:
 
 
 def test_a_build_holds_on_the_recordings_it_was_made_from(folder: Path, grasp_set: GraspSet) -> None:
-    found = verify_build(folder, grasp_set)
+    found = verify(folder, grasp_set)
     proof = manifest_from_bytes((folder / "build.json").read_bytes()).proof
     assert found.holds
     assert found.same_recordings
@@ -55,7 +55,7 @@ def test_a_build_holds_on_the_recordings_it_was_made_from(folder: Path, grasp_se
 
 
 def test_the_worst_frame_is_told_whether_recorded_or_not(folder: Path, grasp_set: GraspSet) -> None:
-    worst = verify_build(folder, grasp_set).worst
+    worst = verify(folder, grasp_set).worst
     build = Build.load(folder)
     bits = [switch.name in worst.closed for switch in build.manifest.switches]
     stumps = ensemble_from_bytes((folder / "ensemble.bin").read_bytes())
@@ -79,7 +79,7 @@ def test_a_fault_that_no_recorded_row_shows_does_not_hold(folder: Path, grasp_se
     rows = np.vstack([tables.joint_rows[0], tables.joint_rows[0][-1:] + np.array([-30, 0, 0, 0], np.int16)])
     thresholds = (np.append(tables.thresholds[0], np.uint16(300)), *tables.thresholds[1:])
     _seal(folder, replace(tables, thresholds=thresholds, joint_rows=(rows, *tables.joint_rows[1:])))
-    found = verify_build(folder, grasp_set)
+    found = verify(folder, grasp_set)
     assert found.integer_difference <= found.integer_bound
     assert found.worst.loss > found.worst.bound
     assert found.worst.codes[0] == 301
@@ -92,7 +92,7 @@ def test_other_recordings_with_their_columns_in_another_order_will_do(folder: Pa
         other.switches[:, ::-1], other.switch_names[::-1], other.codes[:, ::-1], other.joints[::-1],
         other.grasps, other.taxonomy, other.subjects, other.objects, other.trials,
     )  # fmt: skip
-    found, straight = verify_build(folder, shuffled), verify_build(folder, other)
+    found, straight = verify(folder, shuffled), verify(folder, other)
     assert not found.same_recordings
     assert found.holds
     assert found == straight
@@ -101,14 +101,14 @@ def test_other_recordings_with_their_columns_in_another_order_will_do(folder: Pa
 
 def test_tables_that_are_not_the_ensembles_do_not_hold(folder: Path, grasp_set: GraspSet) -> None:
     _silence(folder, 1)
-    found = verify_build(folder, grasp_set)
+    found = verify(folder, grasp_set)
     assert not found.holds
     assert found.integer_difference > found.integer_bound
 
 
 def test_every_changed_row_is_told(folder: Path, grasp_set: GraspSet) -> None:
     _silence(folder, 3)
-    found = verify_build(folder, grasp_set)
+    found = verify(folder, grasp_set)
     assert found.changed
     assert found.covered_changed > 0
     for row in found.changed:
@@ -122,7 +122,7 @@ def test_every_changed_row_is_told(folder: Path, grasp_set: GraspSet) -> None:
 
 def test_missing_inputs_are_named(folder: Path, make_set: Make) -> None:
     with pytest.raises(CompileError, match="lack joints that the build needs: j2"):
-        verify_build(folder, make_set(joints=2))
+        verify(folder, make_set(joints=2))
 
 
 def test_codes_that_mean_something_else_are_refused(folder: Path, grasp_set: GraspSet) -> None:
@@ -133,26 +133,26 @@ def test_codes_that_mean_something_else_are_refused(folder: Path, grasp_set: Gra
         grasp_set.grasps, grasp_set.taxonomy, grasp_set.subjects, grasp_set.objects, grasp_set.trials,
     )  # fmt: skip
     with pytest.raises(CompileError, match="joint j1 is coded differently here: code 0 is 10 deg, in the build 0 deg"):
-        verify_build(folder, other)
+        verify(folder, other)
 
 
 def test_the_point_at_which_codes_mean_something_else_is_named(folder: Path, grasp_set: GraspSet) -> None:
     steeper = replace(grasp_set.joints[1], value_b=200.0)
     other = replace(grasp_set, joints=(grasp_set.joints[0], steeper, grasp_set.joints[2]))
     with pytest.raises(CompileError, match=r"code 255 is 200 deg, in the build 127\.5 deg"):
-        verify_build(folder, other)
+        verify(folder, other)
 
 
 def test_the_ensemble_of_another_build_is_refused(folder: Path, make_set: Make, tmp_path: Path) -> None:
     compile_build(make_set(seed=3), tmp_path / "other", rounds=15, folds=0)
     (folder / "ensemble.bin").write_bytes((tmp_path / "other" / "ensemble.bin").read_bytes())
     with pytest.raises(BuildError, match=r"ensemble\.bin is not the one"):
-        verify_build(folder, make_set())
+        verify(folder, make_set())
 
 
 def test_recordings_without_rows_are_refused(folder: Path, grasp_set: GraspSet) -> None:
     with pytest.raises(CompileError, match="no rows"):
-        verify_build(folder, grasp_set.rows(np.array([], int)))
+        verify(folder, grasp_set.rows(np.array([], int)))
 
 
 @pytest.mark.slow
@@ -161,5 +161,5 @@ def test_verifying_hundreds_of_classes_is_no_slower_than_compiling_them(make_set
     began = perf_counter()
     compile_build(many, tmp_path / "build", rounds=10, folds=0)
     compiled = perf_counter()
-    assert verify_build(tmp_path / "build", many).holds
+    assert verify(tmp_path / "build", many).holds
     assert perf_counter() - compiled <= compiled - began
