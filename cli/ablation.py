@@ -7,8 +7,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.evaluation.compositions import COMPOSITIONS, inputs
 from thenar.compiler.evaluation.fits import Fit, run_fits
+from thenar.compiler.evaluation.plan import COMPOSITIONS, inputs
 from thenar.compiler.evaluation.populations import populations
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.recordings.graspset import GraspSet

@@ -13,7 +13,7 @@ from thenar.runtime.manifest import Manifest
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.tables import IntegerTables
 
-from ..evaluation.errors import EvaluationError
+from ..evaluation.folds import EvaluationError
 from ..hand import HandShape
 from ..recordings.graspset import GraspSet
 from ..tables.compare import Comparison, worst_case

@@ -9,7 +9,7 @@ from msgspec import structs
 from numpy.typing import NDArray
 from sklearn.base import clone
 
-from thenar import runtime
+from thenar.runtime.build import Build as LoadedBuild
 from thenar.runtime.manifest import Inputs, Options, Recognised, TableBits
 
 from ..boosting.classifier import LogitBoostClassifier
@@ -30,7 +30,7 @@ from .staging import check_target
 from .training import Tested, Trained, information_alone
 
 
-class Build(runtime.Build):
+class Build(LoadedBuild):
     """A build as `thenar.runtime.Build` loads it, that can be written as C besides.
 
     Examples

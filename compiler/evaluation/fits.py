@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..boosting.stumps import winners
-from ..samples import Samples
+from ..samples import Columns, Samples
 from ..tables.collapse import model_scores
 from ..trainers.base import Training
 from ..workers import in_workers
-from .compositions import Columns
 from .folds import Fold
 
 Inputs = NDArray[np.uint16]

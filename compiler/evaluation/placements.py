@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..placement.id3 import grow_id3
 from ..placement.rivals import forward_cmim, random_placement, top_mutual_information
-from .compositions import Columns
+from ..samples import Columns
 from .folds import Rows
 
 _Key = tuple[str, int, bytes]

@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.evaluation.compositions import inputs
 from thenar.compiler.evaluation.fits import Fit, predictions
+from thenar.compiler.evaluation.plan import inputs
 from thenar.compiler.evaluation.populations import Population, Scheme, populations
-from thenar.compiler.evaluation.tables import Cell
+from thenar.compiler.evaluation.study import Cell
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.trainers.base import Training
 

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.cli.ablation import Ablation, ablate, change_of
-from thenar.compiler.evaluation.errors import EvaluationError
+from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.evaluation.study import Options, evaluate
 from thenar.simulator import load_scene, simulate
 from thenar.simulator.effects.contact_quasistatic import Parameters

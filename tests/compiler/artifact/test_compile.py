@@ -14,7 +14,7 @@ import pytest
 from thenar.compiler import GraspSet, compile_build, grow_id3
 from thenar.compiler.artifact.errors import CompileError
 from thenar.compiler.artifact.verify import verify
-from thenar.compiler.evaluation.errors import EvaluationError
+from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.drivers.errors import ThenarError
 from thenar.runtime import Build
 from thenar.runtime.manifest import Inputs

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from thenar.compiler import LogitBoostClassifier
-from thenar.compiler.evaluation.compositions import inputs
 from thenar.compiler.evaluation.fits import Fit, is_blind, predictions, run_fits
 from thenar.compiler.evaluation.folds import Fold, weka_folds
+from thenar.compiler.evaluation.plan import inputs
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.trainers.base import Training
 
