@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.simulator.body.layout import murakami160
-from thenar.simulator.contact.model import SLID_OUT_MM, Contact, Load
+from thenar.simulator.contact.model import Contact, Load
+from thenar.simulator.pipeline.batch import SLID_OUT_MM
 from thenar.simulator.contact.quasistatic import USUAL, Pace
 from thenar.simulator.effects import contact_mujoco, switch_threshold
 from thenar.simulator.effects.contact_quasistatic import Parameters, Quasistatic
