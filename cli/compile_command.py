@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS
 
 from .common import any_path, existing_file, json_flag, out, output_file, print_json, progress, warning
 from .compile_asked import TABLE_BITS, Asked
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from thenar.compiler.artifact.compile import BuildReport
     from thenar.runtime.manifest import Manifest
 
-_CHIP = "mcp23017"
 _BOARD = "board"
 
 
@@ -59,7 +58,7 @@ _BOARD = "board"
 @click.option(
     "--chip",
     type=click.Choice([*CHIPS, _BOARD]),
-    help="The port expander to propose, or a switch-scanner board.  [default: mcp23017]",
+    help="The port expander to propose, or a switch-scanner board.  [default: the first]",
 )
 @click.option("--overwrite", is_flag=True, help="Let --propose replace a file that is there.")
 @json_flag
@@ -86,7 +85,7 @@ def command(context: click.Context, /, **options: Any) -> None:
             "itself, and stumps look at one at a time"
         )
     if asked.propose is not None:
-        _propose(made.manifest, asked.propose, asked.chip or _CHIP)
+        _propose(made.manifest, asked.propose, asked.chip or next(iter(CHIPS)))
     if asked.as_json:
         print_json(made.manifest)
         return

@@ -80,7 +80,7 @@ ALLOWED = {
         "compiler.evaluation",
     ),
     "simulator.body": (
-        "drivers.cyberglove_sensors",
+        "drivers.cyberglove_protocol",
         "compiler.elementary",
         "compiler.recordings",
         "simulator.streams",

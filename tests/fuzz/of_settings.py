@@ -15,7 +15,7 @@ from thenar.compiler.frontier.timing.whole_glove import ports_of_whole_glove
 from thenar.compiler.glove.files import spec_files
 from thenar.compiler.recordings.objects import collected
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
-from thenar.drivers.cyberglove_sensors import SENSORS_18
+from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.build import Build
 from thenar.runtime.calibration import load_calibration
 from thenar.runtime.harness.loading import load_harness, parse_harness
