@@ -9,6 +9,7 @@ from thenar.drivers.i2c.chips import CHIPS
 
 from .common import any_path, existing_file, json_flag, out, output_file, print_json, progress, warning
 from .compile_asked import TABLE_BITS, Asked
+from .methods import WithMethods
 from .scan_tables import print_scan
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 _BOARD = "board"
 
 
-@click.command("compile")
+@click.command("compile", cls=WithMethods)
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option("-o", "--output", type=any_path, required=True, help="Folder of the build; a build there is replaced.")
 @click.option(
@@ -46,7 +47,7 @@ _BOARD = "board"
 @click.option(
     "--max-bins", type=click.IntRange(2), help="At most so many bins a joint: smaller tables.  [default: no limit]"
 )
-@click.option("--placement", default="id3", show_default=True, help="How switches are chosen: see thenar place.")
+@click.option("--placement", default="id3", show_default=True, help="How switches are chosen: see below.")
 @click.option("--keep", type=click.IntRange(1), help="How many switches, for placements that take a number.")
 @click.option("--width", type=click.IntRange(4, 16), default=16, show_default=True, help="Bits that every sum fits.")
 @click.option("--from", "from_frontier", type=existing_file, help="A frontier.json: build one of its points.")
@@ -103,7 +104,7 @@ def _made(asked: Asked) -> "BuildReport":
     from thenar.compiler.artifact.compile import compile_build
     from thenar.compiler.artifact.documents import BuildDocuments
     from thenar.compiler.artifact.made import no_documents
-    from thenar.compiler.frontier.timing.whole_glove import ports_of_whole_glove
+    from thenar.compiler.placement.ports import ports_of_whole_glove
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.harness.loading import load_harness
 

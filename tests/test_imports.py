@@ -35,6 +35,7 @@ ALLOWED = {
     "compiler.placement": (
         "runtime",
         "drivers.errors",
+        "drivers.members",
         "compiler.boosting",
         "compiler.elementary",
         "compiler.limits",
