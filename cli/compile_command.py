@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS
 
 from .common import any_path, existing_file, json_flag, keep_apart, out, output_file, print_json, progress, warning
+from .methods import WithMethods
 from .scan_tables import print_scan
 from .trainer_options import asked_settings, trainer_options
 
@@ -16,13 +17,12 @@ if TYPE_CHECKING:
     from thenar.compiler.artifact.documents import BuildReport
     from thenar.runtime.manifest import Manifest
 
-_CHIP = "mcp23017"
 _BOARD = "board"
 # What a point of a frontier says.
 _SETTLED = ("prune", "rounds", "inputs", "table_bits", "max_bins", "placement", "keep", "width")
 
 
-@click.command("compile")
+@click.command("compile", cls=WithMethods)
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option("-o", "--output", type=any_path, required=True, help="Folder of the build; a build there is replaced.")
 @click.option(
@@ -46,7 +46,7 @@ _SETTLED = ("prune", "rounds", "inputs", "table_bits", "max_bins", "placement", 
     show_default=True,
     help="8: coarser steps, so that firmware can store a byte an entry.",
 )
-@click.option("--placement", default="id3", show_default=True, help="How switches are chosen: see thenar place.")
+@click.option("--placement", default="id3", show_default=True, help="How switches are chosen: see below.")
 @click.option("--keep", type=click.IntRange(1), help="How many switches, for placements that take a number.")
 @click.option("--width", type=click.IntRange(4, 16), default=16, show_default=True, help="Bits that every sum fits.")
 @click.option("--from", "from_frontier", type=existing_file, help="A frontier.json: build one of its points.")
@@ -58,7 +58,7 @@ _SETTLED = ("prune", "rounds", "inputs", "table_bits", "max_bins", "placement", 
 @click.option(
     "--chip",
     type=click.Choice([*CHIPS, _BOARD]),
-    help="The port expander to propose, or a switch-scanner board.  [default: mcp23017]",
+    help="The port expander to propose, or a switch-scanner board.  [default: the first]",
 )
 @click.option("--overwrite", is_flag=True, help="Let --propose replace a file that is there.")
 @json_flag
@@ -93,7 +93,7 @@ def command(
     """
     from thenar.compiler.artifact.compile import compile_build
     from thenar.compiler.artifact.documents import Documents
-    from thenar.compiler.frontier.timing.whole_glove import ports_of_whole_glove
+    from thenar.compiler.placement.ports import ports_of_whole_glove
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.harness.loading import load_harness
 
@@ -135,7 +135,7 @@ def command(
             "itself, and stumps look at one at a time"
         )
     if propose is not None:
-        _propose(made.manifest, propose, chip or _CHIP)
+        _propose(made.manifest, propose, chip or next(iter(CHIPS)))
     if as_json:
         print_json(made.manifest)
         return

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .boosting.classifier import LogitBoostClassifier
     from .evaluation.study import Study, evaluate
     from .placement.id3 import grow_id3
-    from .placement.ways import METHODS
+    from .placement.methods.base import METHODS
     from .recordings.graspset import GraspSet, Joint
     from .samples import Samples
     from .tables.collapse import ScoreTables
@@ -32,7 +32,7 @@ _HOMES = {
     ".boosting.classifier": ("LogitBoostClassifier",),
     ".evaluation.study": ("Study", "evaluate"),
     ".placement.id3": ("grow_id3",),
-    ".placement.ways": ("METHODS",),
+    ".placement.methods.base": ("METHODS",),
     ".recordings.graspset": ("GraspSet", "Joint"),
     ".samples": ("Samples",),
     ".tables.collapse": ("ScoreTables",),

@@ -35,6 +35,7 @@ ALLOWED = {
     "compiler.placement": (
         "runtime",
         "drivers.errors",
+        "drivers.members",
         "compiler.boosting",
         "compiler.elementary",
         "compiler.limits",
@@ -91,7 +92,7 @@ ALLOWED = {
         "compiler.evaluation",
     ),
     "simulator.body": (
-        "drivers.cyberglove_sensors",
+        "drivers.cyberglove_protocol",
         "compiler.elementary",
         "compiler.recordings",
         "simulator.streams",

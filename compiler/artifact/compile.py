@@ -30,8 +30,7 @@ from thenar.runtime.scanning.scanmap import scanmap_to_bytes
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from ..evaluation.folds import check_cut
-from ..frontier.timing.whole_glove import ports_of_whole_glove
-from ..placement.costaware import PortCosts
+from ..placement.ports import PortCosts, ports_of_whole_glove
 from ..recordings.graspset import GraspSet, Joint
 from ..samples import Columns, Samples
 from ..tables.collapse import collapse

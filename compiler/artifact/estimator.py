@@ -19,6 +19,7 @@ from ..firmware.board import Board
 from ..firmware.folder import write_folder
 from ..firmware.generate import Mode, Request, firmware_files, fit_of
 from ..firmware.library_names import LIBRARY_NAME
+from ..placement.placement import information_alone
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
 from ..tables.collapse import Model, ScoreTables
@@ -27,7 +28,7 @@ from .documents import BuildReport, Documents, Progress
 from .ensemble import model_fault
 from .errors import CompileError
 from .staging import check_target
-from .training import Tested, Trained, information_alone
+from .training import Tested, Trained
 
 
 class Build(LoadedBuild):

@@ -10,20 +10,16 @@ from thenar.runtime.manifest import Options, Recognised
 from ..boosting.stumps import Stumps, winners
 from ..evaluation.folds import weka_folds
 from ..limits import check_inputs, check_memory, check_types
-from ..placement.cooccurrence import Cooccurrence
-from ..placement.costaware import PortCosts
-from ..placement.id3 import grow_id3
+from ..placement.methods.base import METHODS, PAPERS
+from ..placement.placement import choose
+from ..placement.ports import PortCosts
 from ..placement.tree import Tree
-from ..placement.ways import METHODS, chooser
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
 from ..tables.collapse import Model, model_scores
 from ..trainers.base import Report, Training
 from .ensemble import MAX_STUMPS, model_fault
 from .errors import CompileError
-
-PAPERS = "id3"  # the method of the paper
-LN2 = 0.6931471805599453
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +75,11 @@ def train(samples: Samples, options: Options, report: Report | None = None, port
 
     ports  what reading switches costs, for methods that ask
     """
-    columns, gains, tree = _placed(samples, options, ports)
+    # Without switches the tree is a leaf.
+    method = options.placement if samples.n_switches else PAPERS
+    parameter = options.keep or 0 if METHODS.named(method).by_number else options.prune
+    chosen = choose(samples, method, float(parameter), ports)
+    columns = chosen.columns
     if not columns and not samples.codes.shape[1]:
         raise CompileError("no switch is worth keeping: lower --prune, or record switches that differ between grasps")
     check_inputs(len(samples.grasps), len(columns), samples.codes.shape[1], CompileError)
@@ -90,38 +90,18 @@ def train(samples: Samples, options: Options, report: Report | None = None, port
     model = Training.of(options).train(kept, report)
     if fault := model_fault(model, kept.n_switches, kept.codes.shape[1], kept.n_classes):
         raise CompileError(f"trainer {options.trainer!r} made a model that {fault}: it is at fault")
-    return Trained(columns, gains, tree, model)
+    return Trained(columns, chosen.gains, chosen.tree, model)
 
 
 def check_placement(options: Options) -> None:
-    """Raise CompileError unless `options` name a method that there is, with the parameter that it takes."""
-    if options.placement not in METHODS:
-        raise CompileError(f"there is no placement {options.placement!r}: choose one of {', '.join(METHODS)}")
-    by_number = METHODS[options.placement].parameter == "switches"
+    """Raise MemberError unless `options` name a method that there is, CompileError unless with its own parameter."""
+    by_number = METHODS.named(options.placement).by_number
     if by_number and options.keep is None:
         raise CompileError(f"placement {options.placement!r} needs --keep: how many switches")
     if by_number and options.prune:
         raise CompileError(f"placement {options.placement!r} knows no --prune: say with --keep how many switches")
     if not by_number and options.keep is not None:
         raise CompileError(f"placement {options.placement!r} is pruned by --prune: it cannot --keep a given number")
-
-
-def _placed(
-    samples: Samples, options: Options, ports: PortCosts | None
-) -> tuple[Columns, tuple[float, ...], Tree | None]:
-    if options.placement == PAPERS or not samples.switches.shape[1]:
-        tree = grow_id3(samples.switches, samples.labels, min_samples=options.prune)
-        return tree.inputs, tree.gains, tree
-    parameter = options.prune if options.keep is None else options.keep
-    columns = chooser(options.placement, samples, ports)(float(parameter))
-    return columns, information_alone(samples, columns), None
-
-
-def information_alone(samples: Samples, columns: Columns) -> tuple[float, ...]:
-    """Return the information (bits) on the grasp type that each of the switches `columns` holds alone."""
-    counts = Cooccurrence(samples.switches, samples.labels, len(samples.grasps))
-    alone = counts.information() / (len(samples.labels) * LN2)
-    return tuple(float(alone[column]) for column in columns)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
