@@ -95,7 +95,7 @@ def _check_point(point: "Point", grasp_set: "GraspSet", path: Path) -> None:
     from thenar.compiler.frontier.points import FrontierError
     from thenar.compiler.frontier.timing.wirings import AS_WIRED, BOARD, Wiring
     from thenar.compiler.placement.methods.base import METHODS
-    from thenar.drivers.i2c.registry import CHIPS
+    from thenar.drivers.i2c.chips import CHIPS
     from thenar.runtime.harness.wiring import SLOWEST_HZ
     from thenar.runtime.names import shortened
 

@@ -10,7 +10,7 @@ from ..hand import HandShape
 from ..placement.gain import entropy_bits
 from ..placement.methods.base import METHODS
 from ..placement.tree import Tree
-from .numbers import percent
+from ..text import NBSP, percent
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ def _kept(switches: Sequence[Switch], tree: Tree | None, hand: HandShape | None)
             part="" if hand is None else hand.part_names[parts[switch.name]],
             column=switch.column,
             gain=f"{switch.gain:.3f}",
-            share=percent(gain / entropy) if entropy else "",
+            share=percent(gain / entropy, NBSP) if entropy else "",
         )
         for order, (switch, gain) in enumerate(zip(switches, together, strict=True), 1)
     )

@@ -6,16 +6,13 @@ from dataclasses import dataclass
 from msgspec.structs import replace
 
 from thenar.drivers.i2c import tca9548a
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import GloveWiring, Harness
 from thenar.runtime.scanning.propose import propose_board, propose_harness
 
 AS_WIRED, BOARD = "as wired", "board"
 
-# One of each sort: a tca9555 reads as a pca9555 does, and an mcp23008 as half an mcp23017; eight pins of a pcf8574, at
-# 100 kHz, take longer than the sixteen of a pcf8575.
-KINDS = ("mcp23017", "pcf8575", "pca9555", "tca6424a")
 # Standard mode, Fast mode, Fast-mode Plus.
 CLOCKS_HZ = (100_000, 400_000, 1_000_000)
 BAUDS = (115_200, 1_000_000)
@@ -80,11 +77,10 @@ def wirings(given: Harness | None, target: str = "host") -> tuple[Wiring, ...]:
     """
     avr = target.startswith("avr")
     found = [] if given is None or not given.switches or (avr and not _of_an_avr(given)) else [_as_wired(given)]
-    for kind in KINDS:
-        if avr and not CHIPS[kind].registers:
-            continue
-        clocks = (hz for hz in CLOCKS_HZ if hz <= CHIPS[kind].clock_hz and (not avr or hz in _AVR_HZ))
-        found += [Wiring(kind, hz, muxes=not avr) for hz in clocks]
+    for chip in CHIPS.values():
+        if chip.tried and (chip.registers or not avr):
+            clocks = (hz for hz in CLOCKS_HZ if hz <= chip.clock_hz and (not avr or hz in _AVR_HZ))
+            found += [Wiring(chip.name, hz, muxes=not avr) for hz in clocks]
     return tuple(found if avr else [*found, *(Wiring(BOARD, baud) for baud in BAUDS)])
 
 
