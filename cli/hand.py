@@ -12,24 +12,9 @@ def hand_of(switch_names: Sequence[str], length_mm: float | None = None) -> "Han
 
     None: of a glove of the user's own nobody knows where its switches lie.
     """
-    from thenar.compiler.hand import HandShape
-    from thenar.simulator.handmaps.flathand import HAND
-    from thenar.simulator.handmaps.handmap import PARTS, RADIUS_MM, hand_map
+    from thenar.simulator.handmaps.handmap import hand_map
 
-    glove = hand_map()
-    shape = HandShape(
-        length_mm=HAND.size.length_mm,
-        names=glove.names,
-        places=glove.places,
-        radius_mm=RADIUS_MM,
-        part_names=PARTS,
-        parts=glove.parts,
-        sides=glove.sides,
-        outline=glove.outline,
-        strips=glove.strips,
-        creases=glove.creases,
-        labels=glove.labels,
-    )
+    shape = hand_map()
     if not switch_names or not shape.knows(switch_names):
         return None
     return shape if length_mm is None else shape.scaled(length_mm)

@@ -13,7 +13,7 @@ from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.placement.tree import Tree
 
 from ..finding import Case, Finding, Worst
-from ..inputs.hard_counts import node_of
+from ..inputs.hard_data import node_of
 from ..inputs.small_sets import parity
 from ..reference.information import compare_gains
 

@@ -11,7 +11,7 @@ from thenar.compiler.boosting import stumps
 from thenar.compiler.tables import balance, collapse, quantise
 from thenar.runtime.tables import IntegerTables
 from thenar.stability.cases import scoretables
-from thenar.stability.inputs import hard_ensembles
+from thenar.stability.cases import scoretables as hard_ensembles
 
 SEEDS = st.integers(0, 2**32)
 
