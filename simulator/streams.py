@@ -104,10 +104,7 @@ def _quantile(p: Floats) -> Floats:
     inner = 0.180625 - centred * centred
     central = centred * _ratio(inner, _A, _B)
     tail = np.sqrt(-log(np.minimum(p, 1.0 - p)))
-    near, far = (
-        polynomial(tail - 1.6, _C) / polynomial(tail - 1.6, _D),
-        polynomial(tail - 5.0, _E) / polynomial(tail - 5.0, _F),
-    )
+    near, far = _ratio(tail - 1.6, _C, _D), _ratio(tail - 5.0, _E, _F)
     outer = np.copysign(np.where(tail <= 5.0, near, far), centred)
     return np.where(inner >= 0.0, central, outer)
 
