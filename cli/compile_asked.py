@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .common import keep_apart
-from .hand import hand_of
 
 if TYPE_CHECKING:
     from thenar.runtime.manifest import Inputs, TableBits
@@ -65,7 +64,9 @@ class Asked:
 
     def check_hand(self, switches: Sequence[str]) -> None:
         """Raise UsageError if a hand is to be drawn whose `switches` nobody knows the places of."""
-        if self.hand_length is not None and hand_of(switches) is None:
+        from thenar.simulator.handmaps.handmap import hand_map
+
+        if self.hand_length is not None and hand_map().fitted(switches) is None:
             raise click.UsageError(
                 "--hand-length: the switches of these recordings are not those of murakami160, and where they lie is "
                 "not known."

@@ -23,6 +23,7 @@ ALLOWED = {
     "compiler.frontier": ("runtime", "drivers", "compiler"),
     "compiler.pictures": ("runtime.errors",),
     "compiler.elementary": (),
+    "compiler.text": (),
     "compiler.payloads": ("drivers.errors",),
     "compiler.cluster": ("drivers.errors", "compiler.payloads"),
     "compiler.workers": ("compiler.cluster",),
@@ -34,6 +35,7 @@ ALLOWED = {
     "compiler.placement": (
         "runtime",
         "drivers.errors",
+        "drivers.members",
         "compiler.boosting",
         "compiler.elementary",
         "compiler.limits",
@@ -42,6 +44,7 @@ ALLOWED = {
         "compiler.recordings",
         "compiler.samples",
         "compiler.tables",
+        "compiler.text",
         "compiler.workers",
     ),
     "compiler.boosting": ("runtime", "drivers.errors", "compiler.boosting", "compiler.elementary", "compiler.limits"),
@@ -78,7 +81,7 @@ ALLOWED = {
         "compiler.evaluation",
     ),
     "simulator.body": (
-        "drivers.cyberglove_sensors",
+        "drivers.cyberglove_protocol",
         "compiler.elementary",
         "compiler.recordings",
         "simulator.streams",

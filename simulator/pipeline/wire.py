@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.drivers import cyberglove_frame as glove
-from thenar.drivers import scanner_frame as scanner
+from thenar.drivers import cyberglove_protocol as glove
+from thenar.drivers import scanner_protocol as scanner
 
 from ..body.layout import murakami160
 from ..errors import SceneError
@@ -131,12 +131,12 @@ def _decoded(data: Bytes, at_us: Integers, feed: Feed) -> Iterator[tuple[int, by
 
 
 def _payloads() -> Feed:
-    decoder = scanner.Decoder()
+    decoder = scanner.FrameDecoder()
     return lambda chunk: [frame.payload for frame in decoder.feed(chunk) if frame.kind == scanner.STATE]
 
 
 def _sensors() -> Feed:
-    decoder = glove.Decoder()
+    decoder = glove.RecordDecoder()
     return lambda chunk: [record.sensors for record in decoder.feed(chunk) if record.fault is None]
 
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, EmulatedI2c
-from thenar.drivers.emulated.pty_line import PtyLine
 from thenar.drivers.emulated.scanner import EmulatedScanner
+from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
 from thenar.runtime.live.devices import sensors_of
 

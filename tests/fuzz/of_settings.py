@@ -11,11 +11,11 @@ from mutating import json_file, toml_file
 from thenar.compiler.firmware.board_loading import load_board
 from thenar.compiler.firmware.generate import Request, firmware_files, fit_of
 from thenar.compiler.firmware.library import Fit
-from thenar.compiler.frontier.timing.whole_glove import ports_of_whole_glove
 from thenar.compiler.glove.files import spec_files
+from thenar.compiler.placement.ports import ports_of_whole_glove
 from thenar.compiler.recordings.objects import collected
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
-from thenar.drivers.cyberglove_sensors import SENSORS_18
+from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.build import Build
 from thenar.runtime.calibration import load_calibration
 from thenar.runtime.harness.loading import load_harness, parse_harness

@@ -152,7 +152,7 @@ def test_what_only_some_effects_need_is_imported_for_these_alone(audits: dict[tu
         "mujoco": (OTHER,),
         "thenar.simulator.contact.mujoco": (OTHER,),
         "thenar.simulator.pipeline.wire": (ONE, OTHER),
-        "thenar.drivers.scanner_frame": (ONE, OTHER),
+        "thenar.drivers.scanner_protocol": (ONE, OTHER),
     }
     for module, scenes in needed.items():
         for listed, audit in {**audits, (): bare}.items():

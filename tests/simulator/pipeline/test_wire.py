@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers import scanner_frame as scanner
+from thenar.drivers import scanner_protocol as scanner
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import Effect, Setting, Step
