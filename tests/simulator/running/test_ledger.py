@@ -5,7 +5,7 @@ from collections import Counter
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.pipeline.ledger import Ledger
+from thenar.simulator.running.pipeline import Ledger
 from thenar.simulator.streams import Draws
 
 CALLS = st.lists(

@@ -1,4 +1,4 @@
-"""What of a glove is faulty: the switches that a scene names as stuck, or so many of its parts, drawn for the glove."""
+"""Parts of a glove: how switches are wired, and which of them are faulty."""
 
 from collections.abc import Callable
 from typing import Annotated
@@ -7,12 +7,25 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from thenar.compiler.recordings.names import nearest
+from thenar.runtime.names import nearest
 
 from ..body.layout import murakami160
 from ..errors import SceneError
 from ..streams import Draw
 from .effect import EffectParameters
+
+PORT = 16
+
+
+def port_count(switches: int) -> int:
+    """Return how many ports so many switches need."""
+    return -(-switches // PORT)
+
+
+def port_of(switches: int) -> NDArray[np.int64]:
+    """Return the port (switches,) of each switch."""
+    return np.arange(switches) // PORT
+
 
 Bits = NDArray[np.bool_]
 
