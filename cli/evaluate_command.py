@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .common import existing_file, json_flag, keep_apart, output_file, print_json, progress, warning
+from .methods import WithMethods, method_names
+from .trainer_options import asked_settings, trainer_options
 
 if TYPE_CHECKING:
     from thenar.compiler.evaluation.study import Study
@@ -42,7 +44,7 @@ _COUNT = click.IntRange(min=1)
 _FOLDER = click.Path(file_okay=False, path_type=Path)
 
 
-@click.command()
+@click.command(cls=WithMethods)
 @click.argument("grasps", type=existing_file)
 @click.option("--subject", "subjects", multiple=True, metavar="NAME", help="Only this subject; may be given again.")
 @click.option("--folds", type=click.IntRange(min=2), default=4, show_default=True, help="Folds of cross-validation.")
@@ -54,7 +56,7 @@ _FOLDER = click.Path(file_okay=False, path_type=Path)
     help="Leave out a subject, an object, or a range of trials (as many as folds) at a time, instead of random rows.",
 )
 @click.option("--repeats", type=_COUNT, default=3, show_default=True, help="Repeats of random folds, other seeds each.")
-@click.option("--rounds", type=_COUNT, default=100, show_default=True, help="Rounds of boosting.")
+@trainer_options
 @click.option("--prune", type=click.IntRange(min=0), default=0, show_default=True, help="S: smallest node ID3 splits.")
 @click.option(
     "--prune-list",
@@ -76,13 +78,23 @@ _FOLDER = click.Path(file_okay=False, path_type=Path)
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of the first repeat.")
 @click.option("--jobs", type=_COUNT, help="Worker processes. The result does not depend on it.  [default: all cores]")
 @click.option(
+    "--rivals",
+    callback=method_names,
+    default="cmim,mutual-information",
+    show_default=True,
+    help="Methods to compare ID3 with, by commas.",
+)
+@click.option(
     "--tables", callback=_tables, metavar="NAME,...", default=",".join(TABLES), show_default=True, help="Which tables."
 )
 @click.option("--confusion", is_flag=True, help="Print the confusion matrix of every composition and subject.")
 @click.option("--plot", "folder", type=_FOLDER, metavar="FOLDER", help="Draw the confusion matrices there.")
 @click.option("-o", "--output", type=output_file, metavar="FILE", help="Write the whole result there, as JSON.")
 @json_flag
+@click.pass_context
 def command(
+    context: click.Context,
+    /,
     grasps: Path,
     jobs: int | None,
     confusion: bool,
@@ -107,7 +119,9 @@ def command(
     from thenar.compiler.evaluation.study import Options, evaluate
     from thenar.compiler.recordings.graspset import GraspSet
 
-    options = msgspec.convert(asked, Options)
+    training = asked_settings(context, asked)
+    named = {name: training.pop(name) for name in ("trainer", "rounds") if name in training}
+    options = msgspec.convert(asked | named | {"settings": training}, Options)
     if (confusion or folder is not None) and "compositions" not in options.tables:
         raise click.UsageError("--confusion and --plot show the compositions: name them among --tables")
     keep_apart(grasps, output)

@@ -63,9 +63,9 @@ def command(
 
 
 def _hand(manifest: "Manifest", length_mm: float | None) -> "HandShape | None":
-    from .hand import hand_of
+    from thenar.simulator.handmaps.handmap import hand_map
 
-    hand = hand_of([switch.name for switch in manifest.switches], length_mm)
+    hand = hand_map().fitted([switch.name for switch in manifest.switches], length_mm)
     if hand is None and length_mm is not None:
         raise click.UsageError(
             "--hand-length: the switches of this build are not those of murakami160, and where they lie is not known"

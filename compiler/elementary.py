@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+LN_2 = 0.6931471805599453
 _INVERSE_LN2 = 1.4426950408889634
 # ln 2 in two parts (Cody and Waite): the high one ends in 21 zero bits, so k * _LN2_HIGH is exact for |k| < 2^21.
 _LN2_HIGH = 0.6931471803691238
@@ -136,15 +137,16 @@ def sincos(x: Floats) -> tuple[Floats, Floats]:
     quarter = np.rint(x * _TWO_OVER_PI)
     rest = ((x - quarter * _HALF_PI_HIGH) - quarter * _HALF_PI_MIDDLE) - quarter * _HALF_PI_LOW
     square = rest * rest
-    sine = rest + rest * square * _series(square, _SIN_TERMS)
-    cosine = (1.0 - 0.5 * square) + square * square * _series(square, _COS_TERMS)
+    sine = rest + rest * square * polynomial(square, _SIN_TERMS)
+    cosine = (1.0 - 0.5 * square) + square * square * polynomial(square, _COS_TERMS)
     turn = quarter.astype(np.int64)
     swapped = (turn & 1).astype(bool)
     first, second = np.where(swapped, cosine, sine), np.where(swapped, sine, cosine)
     return np.where(turn & 2, -first, first), np.where((turn + 1) & 2, -second, second)
 
 
-def _series(x: Floats, terms: tuple[float, ...]) -> Floats:
+def polynomial(x: Floats, terms: tuple[float, ...]) -> Floats:
+    """Return the sum of terms[k] x^k, any shape, from the last term on."""
     total = np.full_like(x, terms[-1])
     for term in terms[-2::-1]:
         total *= x

@@ -1,22 +1,75 @@
-"""What to fit for each of the tables, before anything is fitted."""
+"""What to fit for each of the tables: which inputs, which placement, which folds."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .compositions import ALL_SWITCHES, SELECTED, Columns, Composition, available
+from ..placement.methods.base import METHODS, PAPERS, Chooser
+from ..placement.methods.filters import random_placement
+from ..recordings.graspset import GraspSet
+from ..samples import Columns, Samples
 from .fits import Fit
-from .folds import Fold
-from .placements import Placements
-from .populations import Population
-from .protocols import Protocol, ProtocolName
+from .folds import Fold, Rows
+from .populations import Population, Protocol, ProtocolName
+
+
+@dataclass(frozen=True, slots=True)
+class Composition:
+    """Which inputs a classifier gets: the joints (Angle), the placement's switches (Sel-Co), the others (NoSel-Co)."""
+
+    name: str
+    what: str
+    angle: bool
+    selected: bool
+    others: bool
+
+    @property
+    def needs_placement(self) -> bool:
+        """Whether its columns depend on which switches were selected."""
+        return self.selected != self.others
+
+    @property
+    def has_switches(self) -> bool:
+        """Whether it takes any switches."""
+        return self.selected or self.others
+
+    def columns(self, placement: Columns, n_switches: int, n_joints: int) -> Columns:
+        """Return the ascending columns of `inputs` that it takes, given the selected switches."""
+        kept = set(placement)
+        switches = (s for s in range(n_switches) if (self.selected if s in kept else self.others))
+        return (*switches, *range(n_switches, n_switches + n_joints * self.angle))
+
+
+COMPOSITIONS = (
+    Composition("I", "Angle + All-Co", angle=True, selected=True, others=True),
+    Composition("II", "Angle + Sel-Co", angle=True, selected=True, others=False),
+    Composition("III", "Angle + NoSel-Co", angle=True, selected=False, others=True),
+    Composition("IV", "Angle", angle=True, selected=False, others=False),
+    Composition("V", "All-Co", angle=False, selected=True, others=True),
+    Composition("VI", "Sel-Co", angle=False, selected=True, others=False),
+    Composition("VII", "NoSel-Co", angle=False, selected=False, others=True),
+)
+ANGLE_SELECTED, ANGLE, ALL_SWITCHES, SELECTED = COMPOSITIONS[1], COMPOSITIONS[3], COMPOSITIONS[4], COMPOSITIONS[5]
+
+
+def available(n_switches: int, n_joints: int) -> tuple[Composition, ...]:
+    """Return the compositions that a set has the inputs for: without switches only IV, without joints V, VI and VII."""
+    return tuple(c for c in COMPOSITIONS if (n_joints or not c.angle) and (n_switches or not c.has_switches))
+
+
+def inputs(grasp_set: GraspSet) -> NDArray[np.uint16]:
+    """Return what compositions take columns of: (n, s + j), the switches' bits, then the joints' codes."""
+    return np.hstack([grasp_set.switches.astype(np.uint16), grasp_set.codes])
+
 
 TableName = Literal["compositions", "generality", "pruning", "baselines"]
 Select = Callable[[Population, Fold], Columns]
 
+RIVALS = ("cmim", "mutual-information")
 DRAWS = 5  # random placements that a placement is compared with
 
 
@@ -53,14 +106,20 @@ class TablePlan:
 
 @dataclass(frozen=True, slots=True)
 class Planner:
-    """Plans the tables for populations of one set, with n_joints joints, ID3 pruned by S = `prune`."""
+    """Plans the tables for populations of one set.
+
+    samples  of all rows, with n_joints joints besides; prune: S of the paper's placements; rivals: methods of the
+             baselines. A method learns once from the same rows.
+    """
 
     parts: tuple[Population, ...]
-    placements: Placements
+    samples: Samples
     n_joints: int
     prune: int
     prune_list: tuple[int, ...]
     seed: int
+    rivals: tuple[str, ...] = RIVALS
+    _choosers: dict[tuple[str, bytes], Chooser] = field(default_factory=dict, init=False, repr=False)
 
     def table(self, name: TableName, protocol: Protocol) -> TablePlan:
         """Return the plan of a table under a protocol."""
@@ -81,7 +140,7 @@ class Planner:
         def chosen_by(giver: Population, part: Population, fold: Fold) -> Columns:
             # Another subject's placement has never seen this subject's rows: both protocols agree on it.
             own = part is giver
-            return self.own(protocol, part, fold) if own else self.placements.id3(giver.rows, self.prune)
+            return self.own(protocol, part, fold) if own else self.chosen(PAPERS, giver.rows, self.prune)
 
         return [
             self._row(giver.name, f"placement of subject {giver.name}", SELECTED, partial(chosen_by, giver))
@@ -92,34 +151,44 @@ class Planner:
         everyone = np.unique(np.concatenate([part.rows for part in self.parts]))
 
         def pooled(least: int, part: Population, fold: Fold) -> Columns:
-            return self.placements.id3(protocol.may_choose_pooled(everyone, fold), least)
+            return self.chosen(PAPERS, protocol.may_choose_pooled(everyone, fold), least)
 
         everything = self._row("all", "all switches", ALL_SWITCHES, lambda part, fold: ())
         pruned = [self._row(str(s), f"S = {s}", SELECTED, partial(pooled, s)) for s in self.prune_list]
         return [everything, *pruned]
 
     def _baselines(self, protocol: Protocol) -> list[RowPlan]:
-        def rival(choose: Callable[..., Columns], part: Population, fold: Fold) -> Columns:
-            return choose(protocol.may_choose(part, fold), len(self.own(protocol, part, fold)))
+        def rival(name: str, part: Population, fold: Fold) -> Columns:
+            return self.chosen(name, protocol.may_choose(part, fold), len(self.own(protocol, part, fold)))
 
         def drawn(draw: int, part: Population, fold: Fold) -> Columns:
-            return self.placements.random(len(self.own(protocol, part, fold)), self.seed + draw)
+            return random_placement(self._n_switches, len(self.own(protocol, part, fold)), self.seed + draw)
 
+        rivals = [METHODS.named(name) for name in self.rivals]
         draws = [self._row("random", f"mean of {DRAWS} draws", SELECTED, partial(drawn, draw)) for draw in range(DRAWS)]
         return [
-            self._row("ID3", "the paper's placement", SELECTED, partial(self.own, protocol)),
-            self._row("CMIM", "forward conditional mutual information", SELECTED, partial(rival, self.placements.cmim)),
-            self._row("top-k", "largest mutual information each", SELECTED, partial(rival, self.placements.top)),
+            self._row(METHODS[PAPERS].title, "the paper's placement", SELECTED, partial(self.own, protocol)),
+            *(self._row(each.title, each.help, SELECTED, partial(rival, each.name)) for each in rivals),
             _joined(draws),
         ]
 
     @property
     def _n_switches(self) -> int:
-        return int(self.placements.switches.shape[1])
+        return self.samples.n_switches
 
     def own(self, protocol: Protocol, part: Population, fold: Fold) -> Columns:
         """Return the placement that ID3 chooses for a fold from the population's own rows, as the protocol allows."""
-        return self.placements.id3(protocol.may_choose(part, fold), self.prune)
+        return self.chosen(PAPERS, protocol.may_choose(part, fold), self.prune)
+
+    def chosen(self, method: str, rows: Rows, parameter: int) -> Columns:
+        """Return the switches that a method keeps from these rows, in whatever order they are given."""
+        if not self._n_switches:
+            return ()
+        rows = np.sort(rows)
+        key = (method, rows.tobytes())
+        if key not in self._choosers:
+            self._choosers[key] = METHODS.named(method).chooser(self.samples.rows(rows))
+        return self._choosers[key](parameter)
 
     def _row(self, name: str, what: str, kind: Composition, select: Select) -> RowPlan:
         return RowPlan(name, what, tuple(self.cell(part, kind, select) for part in self.parts))
@@ -129,7 +198,8 @@ class Planner:
 
         def fit(fold: Fold) -> Fit:
             placement = select(part, fold) if kind.needs_placement else ()
-            return Fit(fold, kind.columns(placement, self._n_switches, self.n_joints), part.grasps)
+            columns = kind.columns(placement, self._n_switches, self.n_joints)
+            return Fit(fold, columns, part.grasps, sum(column < self._n_switches for column in columns))
 
         return CellPlan(part, tuple(tuple(map(fit, folds)) for folds in part.repeats))
 

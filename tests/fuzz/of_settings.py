@@ -11,8 +11,8 @@ from mutating import json_file, toml_file
 from thenar.compiler.firmware.board_loading import load_board
 from thenar.compiler.firmware.generate import Request, firmware_files, fit_of
 from thenar.compiler.firmware.library import Fit
-from thenar.compiler.frontier.timing.whole_glove import ports_of_whole_glove
 from thenar.compiler.glove.files import spec_files
+from thenar.compiler.placement.ports import ports_of_whole_glove
 from thenar.compiler.recordings.objects import collected
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.cyberglove_protocol import SENSORS_18
@@ -30,15 +30,13 @@ from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.timing import scan_us
 from thenar.runtime.scanning.whole import whole_scan
 from thenar.runtime.sinks.angles import AngleReader
-from thenar.simulator.body.anthropometry import Size
 from thenar.simulator.body.condition import Thing
-from thenar.simulator.body.hand import Hand
+from thenar.simulator.body.hand import Hand, Size
 from thenar.simulator.planning.postures import Postures
 from thenar.simulator.running.pipeline import compile_pipeline
-from thenar.simulator.running.session import conditions_of
+from thenar.simulator.running.simulation import conditions_of
 from thenar.simulator.scenes import shipped
-from thenar.simulator.scenes.catalogue import load_catalogue
-from thenar.simulator.scenes.decode import load_scene
+from thenar.simulator.scenes.decode import load_catalogue, load_scene
 
 
 @cache

@@ -3,12 +3,66 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from thenar.compiler.evaluation.placements import Placements
-from thenar.compiler.evaluation.plan import DRAWS, Planner, RowPlan, TableName, TablePlan
-from thenar.compiler.evaluation.populations import populations
-from thenar.compiler.evaluation.protocols import HONEST, PAPER, Protocol
+from thenar.compiler import grow_id3
+from thenar.compiler.evaluation.plan import (
+    COMPOSITIONS,
+    DRAWS,
+    Composition,
+    Planner,
+    RowPlan,
+    TableName,
+    TablePlan,
+    available,
+)
+from thenar.compiler.evaluation.populations import HONEST, PAPER, Protocol, populations
+from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.samples import Samples
+
+OF_THE_PAPER = {
+    "I": ("Angle + All-Co", (0, 1, 2, 3, 4, 5)),
+    "II": ("Angle + Sel-Co", (1, 3, 4, 5)),
+    "III": ("Angle + NoSel-Co", (0, 2, 4, 5)),
+    "IV": ("Angle", (4, 5)),
+    "V": ("All-Co", (0, 1, 2, 3)),
+    "VI": ("Sel-Co", (1, 3)),
+    "VII": ("NoSel-Co", (0, 2)),
+}
+
+
+@pytest.mark.parametrize("composition", COMPOSITIONS, ids=lambda c: c.name)
+def test_compositions_are_the_papers(composition: Composition) -> None:
+    # Four switches, of which 3 and 1 are selected, and two joints in columns 4 and 5.
+    assert (composition.what, composition.columns((3, 1), 4, 2)) == OF_THE_PAPER[composition.name]
+
+
+def test_they_stand_in_the_papers_order() -> None:
+    assert [composition.name for composition in COMPOSITIONS] == list(OF_THE_PAPER)
+
+
+@given(st.sets(st.integers(0, 19)), st.integers(1, 5))
+def test_selected_and_others_together_are_all(placement: set[int], n_joints: int) -> None:
+    by_name = {c.name: set(c.columns(tuple(placement), 20, n_joints)) for c in COMPOSITIONS}
+    assert by_name["VI"] | by_name["VII"] == by_name["V"]
+    assert not by_name["VI"] & by_name["VII"]
+    assert by_name["II"] | by_name["III"] == by_name["I"]
+    assert by_name["II"] & by_name["III"] == by_name["IV"]
+
+
+@pytest.mark.parametrize(
+    ("n_switches", "n_joints", "names"),
+    [(0, 6, ["IV"]), (60, 0, ["V", "VI", "VII"]), (60, 9, list(OF_THE_PAPER))],
+)
+def test_a_set_gets_the_compositions_it_has_inputs_for(n_switches: int, n_joints: int, names: list[str]) -> None:
+    assert [composition.name for composition in available(n_switches, n_joints)] == names
+
+
+def test_only_compositions_that_part_the_switches_need_a_placement() -> None:
+    assert [c.name for c in COMPOSITIONS if c.needs_placement] == ["II", "III", "VI", "VII"]
+
 
 Make = Callable[..., GraspSet]
 both_protocols = pytest.mark.parametrize("protocol", [PAPER, HONEST], ids=lambda protocol: protocol.name)
@@ -16,7 +70,7 @@ both_protocols = pytest.mark.parametrize("protocol", [PAPER, HONEST], ids=lambda
 
 def planner_of(grasps: GraspSet, prune: int = 0, repeats: int = 2) -> Planner:
     parts = populations(grasps, "stratified", 4, repeats, 1)
-    return Planner(parts, Placements(grasps.switches, grasps.labels), len(grasps.joints), prune, (0, 30), 1)
+    return Planner(parts, Samples.of(grasps, "switches"), len(grasps.joints), prune, (0, 30), 1)
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +116,7 @@ def test_off_the_diagonal_both_protocols_take_the_others_placement(planner: Plan
     paper, honest = (planner.table("generality", protocol) for protocol in (PAPER, HONEST))
     for i, line in enumerate(paper.rows):
         giver = planner.parts[i]
-        given = tuple(sorted(planner.placements.id3(giver.rows, 0)))
+        given = tuple(sorted(planner.chosen("id3", giver.rows, 0)))
         for j, cell in enumerate(line.cells):
             if i != j:
                 assert cell == honest.rows[i].cells[j]
@@ -81,7 +135,7 @@ def test_pruning_starts_from_all_switches_and_takes_one_placement_for_all_subjec
         for cell in line.cells:
             for fit in cell.fits:
                 seen = everyone if protocol is PAPER else np.setdiff1d(everyone, fit.fold.test)
-                assert fit.columns == tuple(sorted(planner.placements.id3(seen, least)))
+                assert fit.columns == tuple(sorted(planner.chosen("id3", seen, least)))
 
 
 @both_protocols
@@ -100,11 +154,11 @@ def test_baselines_have_as_many_switches_as_id3_in_every_fold(planner: Planner, 
 @both_protocols
 def test_baselines_choose_from_the_rows_that_id3_may_choose_from(planner: Planner, protocol: Protocol) -> None:
     table = planner.table("baselines", protocol)
-    for name, choose in (("CMIM", planner.placements.cmim), ("top-k", planner.placements.top)):
+    for name, method in (("CMIM", "cmim"), ("top-k", "mutual-information")):
         for cell in row(table, name).cells:
             for fit in cell.fits:
                 seen = cell.part.rows if protocol is PAPER else fit.fold.train
-                assert fit.columns == tuple(sorted(choose(seen, len(fit.columns))))
+                assert fit.columns == tuple(sorted(planner.chosen(method, seen, len(fit.columns))))
 
 
 def test_pruning_by_s_makes_the_placements_of_all_tables_smaller(make_grasps: Make) -> None:
@@ -124,3 +178,23 @@ def test_random_draws_differ_and_follow_the_seed(planner: Planner) -> None:
 
     assert len(set(drawn(1))) > 1
     assert drawn(1) == drawn(1) != drawn(100)
+
+
+def test_every_method_sees_exactly_the_rows_given_in_whatever_order(make_grasps: Make) -> None:
+    grasps, rows = make_grasps(noise=0.3), np.arange(5, 40)
+    used, fresh = planner_of(grasps), planner_of(grasps)
+    seen = Samples.of(grasps, "switches").rows(rows)
+    assert used.chosen("id3", rows, 4) == grow_id3(seen.switches, seen.labels, min_samples=4).inputs
+    assert used.chosen("id3", rows, 20) == fresh.chosen("id3", rows[::-1], 20) != used.chosen("id3", rows, 0)
+    assert used.chosen("id3", rows[:20], 0) == fresh.chosen("id3", rows[:20], 0)
+    for name in ("cmim", "mutual-information"):
+        assert used.chosen(name, rows, 3) == METHODS[name].chooser(seen)(3) == fresh.chosen(name, rows, 3)
+
+
+def test_any_method_can_be_a_rival(make_grasps: Make) -> None:
+    table = replace(planner_of(make_grasps()), rivals=("mrmr",)).table("baselines", HONEST)
+    assert [line.name for line in table.rows] == ["ID3", "mrmr", "random"]
+
+
+def test_a_set_without_switches_has_an_empty_placement(make_grasps: Make) -> None:
+    assert planner_of(make_grasps(n_switches=0)).chosen("id3", np.arange(5, 40), 0) == ()

@@ -20,11 +20,11 @@ ALWAYS = {"README.txt", "bom.csv", "glove.net", "glove.toml", "spec.json", "swit
 DIGEST = """
 import hashlib, sys
 import msgspec
-from thenar.cli.hand import hand_of
+from thenar.simulator.handmaps.handmap import hand_map
 from thenar.compiler.glove.files import spec_files
 from thenar.runtime.manifest import Manifest
 manifest = msgspec.json.decode(sys.stdin.buffer.read(), type=Manifest)
-files = spec_files(manifest, hand=hand_of([switch.name for switch in manifest.switches]))
+files = spec_files(manifest, hand=hand_map().fitted([switch.name for switch in manifest.switches]))
 print(sorted((name, hashlib.sha256(data).hexdigest()) for name, data in files.items()))
 """
 
