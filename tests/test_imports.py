@@ -106,6 +106,7 @@ ALLOWED = {
         "compiler.workers",
         "simulator",
     ),
+    "simulator.running.ablation": ("compiler.evaluation", "compiler.recordings", "simulator"),
     "stability": ("compiler", "drivers", "runtime", "simulator", "stability"),
     "stability.reference": ("stability.reference",),
     "cli": PACKAGES,

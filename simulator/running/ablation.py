@@ -12,10 +12,11 @@ from thenar.compiler.evaluation.fits import Fit, Training, run_fits
 from thenar.compiler.evaluation.populations import populations
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.recordings.graspset import GraspSet
-from thenar.simulator.running.explain import best_us
-from thenar.simulator.running.pipeline import DEFAULT_CONTACT
-from thenar.simulator.running.simulation import Simulated, simulate
-from thenar.simulator.scenes.scene import Scene
+
+from ..scenes.scene import Scene
+from .explain import best_us
+from .pipeline import DEFAULT_CONTACT
+from .simulation import Simulated, simulate
 
 Progress = Callable[[int, int], None]
 Bits = NDArray[np.bool_]

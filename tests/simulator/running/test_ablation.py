@@ -4,12 +4,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.cli.ablation import Ablation, ablate, change_of
 from thenar.compiler.evaluation.errors import EvaluationError
 from thenar.compiler.evaluation.study import Options, evaluate
 from thenar.simulator import load_scene, simulate
 from thenar.simulator.effects.contact_quasistatic import Parameters
 from thenar.simulator.pipeline.effect import EFFECTS
+from thenar.simulator.running.ablation import Ablation, ablate, change_of
 from thenar.simulator.scenes.scene import Listed, Scene
 
 KEPT = ("hand.posture", "joint.noise")
