@@ -8,10 +8,10 @@ from itertools import permutations, product
 import numpy as np
 from mpmath import mpf
 
-from thenar.compiler.tables.balance import balance
 from thenar.compiler.tables.collapse import ScoreTables
 from thenar.compiler.tables.compare import float_slack
 from thenar.compiler.tables.furthest import furthest
+from thenar.compiler.tables.quantise import balance
 from thenar.compiler.tables.worstcase import Rounding
 from thenar.runtime.errors import BuildError
 from thenar.runtime.scorer import LANE_OFFSET, Scorer

@@ -7,14 +7,14 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from thenar.compiler.evaluation.compositions import inputs
-from thenar.compiler.evaluation.fits import Fit, Training, predictions
+from thenar.compiler.evaluation.fits import Fit, predictions
 from thenar.compiler.evaluation.folds import Fold, weka_folds
+from thenar.compiler.evaluation.plan import inputs
 from thenar.compiler.evaluation.populations import Population, Scheme, populations
 from thenar.compiler.evaluation.rates import Average, Rate
-from thenar.compiler.evaluation.study import Options, evaluate
-from thenar.compiler.evaluation.tables import Cell
+from thenar.compiler.evaluation.study import Cell, Options, evaluate
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.trainers.base import Training
 
 from ..checks.roundings import ROUNDING
 from ..finding import Case, Finding, Worst
@@ -59,7 +59,8 @@ def guessed_untrained(grasp_set: GraspSet, scheme: Scheme) -> int:
     wrong = 0
     for part in parts_of(grasp_set, scheme):
         for fold in part.folds:
-            found = predictions(X, labels, Fit(fold, tuple(range(X.shape[1])), part.grasps), Training(rounds=10))
+            fit = Fit(fold, tuple(range(X.shape[1])), part.grasps, len(grasp_set.switch_names))
+            found = predictions(X, labels, fit, Training("logitboost", {"rounds": 10}))
             wrong += int((~np.isin(found, labels[fold.train])).sum())
     return wrong
 

@@ -10,7 +10,7 @@ import msgspec
 import pytest
 
 from thenar.compiler.glove.files import NAMES, spec_files
-from thenar.compiler.glove.glove_spec import Summary
+from thenar.compiler.glove.spec import SpecSummary
 from thenar.compiler.hand import HandShape
 from thenar.runtime.manifest import Manifest
 
@@ -55,7 +55,7 @@ def test_the_same_build_gives_the_same_bytes_in_any_process(manifest_of: Manifes
 
 def test_lists_summary_and_netlist_agree(manifest_of: Manifests, hand: HandShape) -> None:
     files = spec_files(manifest_of(hand.names[:40]), hand=hand)
-    summary = msgspec.json.decode(files["spec.json"], type=Summary)
+    summary = msgspec.json.decode(files["spec.json"], type=SpecSummary)
     switches, wires = rows(files["switches.csv"]), rows(files["wiring.csv"])
     assert [row["name"] for row in switches] == list(hand.names[:40])
     assert len(wires) == len(summary.wires)

@@ -5,9 +5,8 @@ from collections.abc import Callable
 import pytest
 from msgspec.structs import replace
 
-from thenar.compiler.glove.errors import SpecError
-from thenar.compiler.glove.glove_spec import glove_spec
-from thenar.compiler.glove.placing import BODY_MM
+from thenar.compiler.glove.layout import BODY_MM
+from thenar.compiler.glove.spec import SpecError, glove_spec
 from thenar.compiler.hand import HandShape
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.errors import HarnessError

@@ -6,8 +6,8 @@ from math import dist
 
 import pytest
 
-from thenar.compiler.glove.glove_spec import Summary, glove_spec
-from thenar.compiler.glove.wires import COLOURS, marked, wrist_of
+from thenar.compiler.glove.layout import COLOURS, marked, wrist_of
+from thenar.compiler.glove.spec import SpecSummary, glove_spec
 from thenar.compiler.hand import HandShape
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.scanning.propose import propose_board, propose_harness
@@ -16,11 +16,11 @@ Manifests = Callable[..., Manifest]
 
 
 @pytest.fixture(scope="module", params=[1, 33, 160])
-def summary(request: pytest.FixtureRequest, manifest_of: Manifests, hand: HandShape) -> Summary:
+def summary(request: pytest.FixtureRequest, manifest_of: Manifests, hand: HandShape) -> SpecSummary:
     return glove_spec(manifest_of(hand.names[: request.param]), hand=hand).summary
 
 
-def test_every_switch_has_one_signal_and_one_return(summary: Summary) -> None:
+def test_every_switch_has_one_signal_and_one_return(summary: SpecSummary) -> None:
     signals = Counter(n for wire in summary.wires if wire.unit for n in wire.switches)
     returns = Counter(n for wire in summary.wires if not wire.unit for n in wire.switches)
     assert signals == returns == Counter(range(1, len(summary.switches) + 1))
@@ -36,27 +36,27 @@ def test_the_signals_of_a_bundle_come_in_the_switches_order(manifest_of: Manifes
         assert numbers == sorted(numbers)
 
 
-def test_a_return_is_shared_within_one_digit_and_one_chip(summary: Summary) -> None:
+def test_a_return_is_shared_within_one_digit_and_one_chip(summary: SpecSummary) -> None:
     read_by = {n: reader.ref for reader in summary.readers for n in reader.switches}
     for wire in summary.wires:
         assert {summary.switches[n - 1].part for n in wire.switches} == {wire.bundle}
         assert len({read_by[n] for n in wire.switches}) == 1
 
 
-def test_no_two_wires_of_a_bundle_look_alike(summary: Summary) -> None:
+def test_no_two_wires_of_a_bundle_look_alike(summary: SpecSummary) -> None:
     looks = [(wire.bundle, wire.colour) for wire in summary.wires]
     assert len(set(looks)) == len(looks)
     assert all(wire.colour.startswith("black") != bool(wire.unit) for wire in summary.wires)
 
 
-def test_connectors_have_pins_from_one_on_and_no_more_than_headers_have(summary: Summary) -> None:
+def test_connectors_have_pins_from_one_on_and_no_more_than_headers_have(summary: SpecSummary) -> None:
     for connector in {wire.connector for wire in summary.wires}:
         pins = [wire.pin for wire in summary.wires if wire.connector == connector]
         assert pins == list(range(1, len(pins) + 1))
         assert len(pins) <= 40
 
 
-def test_a_wire_is_longer_than_the_way_to_its_farthest_switch(summary: Summary, hand: HandShape) -> None:
+def test_a_wire_is_longer_than_the_way_to_its_farthest_switch(summary: SpecSummary, hand: HandShape) -> None:
     home = wrist_of(hand)
     for wire in summary.wires:
         places = [(summary.switches[n - 1].x_mm, summary.switches[n - 1].y_mm) for n in wire.switches]

@@ -6,30 +6,79 @@ from dataclasses import dataclass
 from msgspec import Struct
 from msgspec.structs import replace
 
+from thenar.drivers.errors import ThenarError
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import GloveWiring, Harness
-from thenar.runtime.manifest import Manifest
+from thenar.runtime.manifest import Manifest, Recognised
 from thenar.runtime.names import list_names
 from thenar.runtime.scanning.plan import check_harness
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.scanmap import ScanMap
+from thenar.runtime.scanning.timing import glove_us, scan_us, scanner_us
 from thenar.runtime.scanning.whole import whole_scan
 
 from ..hand import HandShape
-from .circuit import Circuit
-from .ends import BoardPins, End, as_soldered, ends_of
-from .errors import SpecError
-from .expected import Expected, expected_of
-from .glove_circuit import glove_circuit
-from .materials import Material, bill_of
+from .circuit import BillLine, Circuit, bill_of, glove_circuit
+from .layout import (
+    BODY_MM,
+    BoardPins,
+    End,
+    PlacedSwitch,
+    Wire,
+    as_soldered,
+    crowded,
+    ends_of,
+    place_switches,
+    wires_of,
+)
 from .pattern import Pattern, pattern_of
-from .placing import BODY_MM, PlacedSwitch, crowded, place_switches
-from .wires import Wire, wires_of
+
+
+class SpecError(ThenarError, ValueError):
+    """There is no glove to describe, or not with this wiring."""
+
+
+_SENSORS = 18
+
+
+class Expected(Struct, frozen=True):
+    """Times by the wire's arithmetic, microseconds: what the computer adds to every transaction is not in them.
+
+    scan_us      of all kept switches on expanders, in `transactions` transactions, selections of muxes included
+    full_us      of all switches that are wired to expanders, kept or not
+    boards_us    of a full bitmap of each scanner board
+    glove_us     between records of the CyberGlove; None where the build looks at no joint
+    rates        the recognition that was measured when the build was compiled
+    """
+
+    transactions: int
+    scan_us: float
+    full_us: float
+    boards_us: tuple[float, ...]
+    glove_us: float | None
+    rates: tuple[Recognised, ...]
+
+
+def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> Expected:
+    """Return what to expect of a build's switches in a harness, read whole by `scan`."""
+    time = scan_us(scan, harness)
+    glove = harness.cyberglove if manifest.joints else None
+    return Expected(
+        transactions=len(scan.ports) + time.selects,
+        scan_us=time.us,
+        full_us=time.full_us,
+        boards_us=tuple(
+            scanner_us(board) for board, pairs in zip(harness.scanners, scan.scanners, strict=True) if pairs
+        ),
+        glove_us=None if glove is None else glove_us(glove, glove.sensors or _SENSORS),
+        rates=manifest.rates,
+    )
+
 
 _GLOVE_PORT = "/dev/ttyUSB0"
 
 
-class Reader(Struct, frozen=True):
+class SwitchReader(Struct, frozen=True):
     """What reads switches, by its designator: an expander or a board, and the numbers of the switches on its pins."""
 
     ref: str
@@ -38,7 +87,7 @@ class Reader(Struct, frozen=True):
     switches: tuple[int, ...]
 
 
-class Summary(Struct, frozen=True):
+class SpecSummary(Struct, frozen=True):
     """A spec as values: what `spec.json` holds. `remarks` are sentences for whoever builds the glove."""
 
     glove: str
@@ -46,9 +95,9 @@ class Summary(Struct, frozen=True):
     hand_length_mm: float | None
     print_on: str
     switches: tuple[PlacedSwitch, ...]
-    readers: tuple[Reader, ...]
+    readers: tuple[SwitchReader, ...]
     wires: tuple[Wire, ...]
-    materials: tuple[Material, ...]
+    materials: tuple[BillLine, ...]
     expected: Expected
     remarks: tuple[str, ...]
 
@@ -57,7 +106,7 @@ class Summary(Struct, frozen=True):
 class GloveSpec:
     """A reduced glove: its summary, and what is drawn, connected and loaded. No pattern: nobody knows the places."""
 
-    summary: Summary
+    summary: SpecSummary
     harness: Harness
     scan: ScanMap
     circuit: Circuit
@@ -90,7 +139,7 @@ def glove_spec(
     circuit = glove_circuit(switches, ends, wires, soldered)
     title = f"{wired.name}: {len(names)} switches, right hand of {known.length_mm:g} mm" if known else ""
     pattern = None if known is None else pattern_of(switches, known, title)
-    summary = Summary(
+    summary = SpecSummary(
         glove=wired.name,
         proposed=harness is None,
         hand_length_mm=None if known is None else known.length_mm,
@@ -131,12 +180,12 @@ def _portable(harness: Harness) -> Harness:
     return replace(harness, cyberglove=replace(glove, calibration=name or None))
 
 
-def _readers(ends: Sequence[End]) -> tuple[Reader, ...]:
+def _readers(ends: Sequence[End]) -> tuple[SwitchReader, ...]:
     groups: dict[str, list[End]] = {}
     for end in ends:
         groups.setdefault(end.unit.ref, []).append(end)
     return tuple(
-        Reader(ref, group[0].unit.place, tuple(end.pin for end in group), tuple(end.switch + 1 for end in group))
+        SwitchReader(ref, group[0].unit.place, tuple(end.pin for end in group), tuple(end.switch + 1 for end in group))
         for ref, group in sorted(groups.items(), key=lambda item: (item[0][0], int(item[0][1:])))
     )
 
