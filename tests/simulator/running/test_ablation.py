@@ -1,18 +1,18 @@
 import msgspec
 import pytest
 
-from thenar.cli.ablation import ablate
 from thenar.compiler.evaluation.ablation import Ablation
-from thenar.compiler.evaluation.errors import EvaluationError
+from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.evaluation.study import Options, evaluate
 from thenar.simulator import load_scene, simulate
+from thenar.simulator.effects import joint_noise
 from thenar.simulator.effects.contact_quasistatic import Parameters
-from thenar.simulator.pipeline.effect import EFFECTS
+from thenar.simulator.running.ablation import ablate
 from thenar.simulator.scenes.scene import Listed, Scene
 
 KEPT = ("hand.posture", "joint.noise")
 # So much noise that it matters to joints, and to nothing else.
-NOISE = Listed("joint.noise", EFFECTS["joint.noise"].parameters(sd_deg=40.0))
+NOISE = Listed("joint.noise", joint_noise.Parameters(sd_deg=40.0))
 
 
 def scene_of(repetitions: int, subjects: int = 1) -> Scene:

@@ -5,10 +5,11 @@ from collections.abc import Callable
 import msgspec
 
 from thenar.compiler.evaluation.ablation import FOLDS, ROUNDS, Ablation, Made, ablated
-from thenar.simulator.running.explain import best_us
-from thenar.simulator.running.pipeline import DEFAULT_CONTACT
-from thenar.simulator.running.simulation import simulate
-from thenar.simulator.scenes.scene import Scene
+
+from ..scenes.scene import Scene
+from .explain import best_us
+from .pipeline import DEFAULT_CONTACT
+from .simulation import simulate
 
 
 def ablate(scene: Scene, jobs: int = -1, progress: Callable[[int, int], None] | None = None) -> Ablation:
