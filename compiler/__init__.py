@@ -7,6 +7,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from thenar.drivers.errors import ThenarError
+    from thenar.runtime.manifest import Options
+
     from .artifact.compile import compile_build
     from .artifact.documents import BuildReport, Documents
     from .artifact.errors import CompileError
@@ -14,6 +17,7 @@ if TYPE_CHECKING:
     from .artifact.verify import Verification, verify
     from .boosting.boost import BoostingError
     from .boosting.classifier import LogitBoostClassifier
+    from .evaluation.folds import EvaluationError
     from .evaluation.study import Study, evaluate
     from .placement.id3 import grow_id3
     from .placement.methods.base import METHODS
@@ -23,6 +27,8 @@ if TYPE_CHECKING:
     from .trainers.base import TRAINERS, Setting, Trainer
 
 _HOMES = {
+    "thenar.drivers.errors": ("ThenarError",),
+    "thenar.runtime.manifest": ("Options",),
     ".artifact.compile": ("compile_build",),
     ".artifact.documents": ("BuildReport", "Documents"),
     ".artifact.errors": ("CompileError",),
@@ -30,6 +36,7 @@ _HOMES = {
     ".artifact.verify": ("Verification", "verify"),
     ".boosting.boost": ("BoostingError",),
     ".boosting.classifier": ("LogitBoostClassifier",),
+    ".evaluation.folds": ("EvaluationError",),
     ".evaluation.study": ("Study", "evaluate"),
     ".placement.id3": ("grow_id3",),
     ".placement.methods.base": ("METHODS",),
@@ -48,13 +55,16 @@ __all__ = [
     "BuildReport",
     "CompileError",
     "Documents",
+    "EvaluationError",
     "GraspSet",
     "Joint",
     "LogitBoostClassifier",
+    "Options",
     "Samples",
     "ScoreTables",
     "Setting",
     "Study",
+    "ThenarError",
     "Trainer",
     "Verification",
     "compile",

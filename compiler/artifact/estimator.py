@@ -39,7 +39,7 @@ class Build(LoadedBuild):
     >>> from thenar.compiler import Build, GraspSet, compile_build
     >>> report = compile_build(GraspSet.load("set.grasps"), "build", rounds=3, folds=0)
     >>> sorted(path.name for path in Build.load("build").export_c("firmware", "host"))[:2]
-    ['Makefile', 'host.c']
+    ['Makefile', 'check.c']
     """
 
     __slots__ = ()

@@ -37,11 +37,30 @@ LARGEST_VALUE = 1e300
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """One joint of the glove: its name, and what its integer codes mean in `unit`, by two points of a straight line.
+    """One joint of the glove: its name, and what its integer codes mean, by two points of a straight line.
 
-    Codes are what is trained on and recognised; values are for people. Raises RecordingError if the two points are no
-    line, or if neighbouring codes would be closer than a billionth of the largest value; values lie within +-1e300, and
-    steps are above 1e-300.
+    Codes are what is trained on and recognised; values are for people.
+
+    Parameters
+    ----------
+    name, unit : str
+        Of the joint, and of its values, such as "deg".
+    code_a, code_b : int
+        Two different codes of 0 to 65535.
+    value_a, value_b : float
+        Their values, within +-1e300.
+
+    Raises
+    ------
+    RecordingError
+        If the two points are no line, or if neighbouring codes would be closer than a billionth of the largest value.
+
+    Examples
+    --------
+    >>> from thenar.compiler import Joint
+    >>> thumb = Joint("thumb", "deg", 0, -20.0, 200, 80.0)
+    >>> float(thumb.value(40)), float(thumb.code(0.1))
+    (0.0, 40.0)
     """
 
     name: str
@@ -84,14 +103,35 @@ class Joint:
 class GraspSet:
     """n recorded grasps; arrays are checked, and cannot be written to.
 
-    switches  (n, s) bool      switch_names  s names
-    codes     (n, j) uint16    joints        j Joints, the codes' names and calibration
-    grasps    (n,) str         taxonomy      holds every one of them
-    subjects, objects (n,) str, trials (n,) int64: who, what with, and the number of the repetition
-    labels    (n,) intp        index of each grasp in taxonomy.types
-    simulated                  what simulated them; empty: they were recorded
+    Parameters
+    ----------
+    switches : ndarray of bool, shape (n, s)
+        True where a switch is closed; `switch_names` are their s names.
+    codes : ndarray of uint16, shape (n, j)
+        The joints' codes; `joints` are their j names and calibrations.
+    grasps : ndarray of str, shape (n,)
+        The grasp types; `taxonomy` holds every one of them.
+    subjects, objects, trials : ndarray of str, str and int64, shape (n,)
+        Who, what with, and the number of the repetition.
+    simulated : str
+        What simulated them; empty: they were recorded.
 
-    Raises RecordingError naming the array and the row that does not fit.
+    Attributes
+    ----------
+    labels : ndarray of intp, shape (n,)
+        Index of each grasp in `taxonomy.types`.
+
+    Raises
+    ------
+    RecordingError
+        Naming the array and the row that does not fit.
+
+    Examples
+    --------
+    >>> from thenar.compiler import GraspSet
+    >>> grasp_set = GraspSet.load("set.grasps")
+    >>> grasp_set.switches.shape == (len(grasp_set), len(grasp_set.switch_names))
+    True
     """
 
     switches: NDArray[np.bool_]
