@@ -114,7 +114,7 @@ def test_an_exclusive_or_is_placed_told_and_built_without_a_word_too_few(
     tree, table = command(capsys, "place", path, "--tree")[1].split("Placement", 1)
     assert "s0?  4 rows, no input gains anything alone" in tree
     assert "2 of 2 switches" in table
-    assert "at 1 of the decisions no switch gains anything alone" in table
+    assert "at 1 node no switch gains anything alone" in table
     command(capsys, "compile", path, "-o", tmp_path / "build", "--folds", 0)
     assert json.loads((tmp_path / "build" / "build.json").read_bytes())["zero_gain_nodes"] == 1
 
