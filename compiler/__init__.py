@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .evaluation.study import Study, evaluate
     from .placement.id3 import grow_id3
     from .placement.methods.base import METHODS
+    from .placement.selectors import ID3Selector, SwitchSelector
     from .recordings.graspset import GraspSet, Joint
     from .samples import Samples
     from .tables.collapse import ScoreTables
@@ -40,6 +41,7 @@ _HOMES = {
     ".evaluation.study": ("Study", "evaluate"),
     ".placement.id3": ("grow_id3",),
     ".placement.methods.base": ("METHODS",),
+    ".placement.selectors": ("ID3Selector", "SwitchSelector"),
     ".recordings.graspset": ("GraspSet", "Joint"),
     ".samples": ("Samples",),
     ".tables.collapse": ("ScoreTables",),
@@ -57,6 +59,7 @@ __all__ = [
     "Documents",
     "EvaluationError",
     "GraspSet",
+    "ID3Selector",
     "Joint",
     "LogitBoostClassifier",
     "Options",
@@ -64,6 +67,7 @@ __all__ = [
     "ScoreTables",
     "Setting",
     "Study",
+    "SwitchSelector",
     "ThenarError",
     "Trainer",
     "Verification",

@@ -17,6 +17,7 @@ from thenar.compiler import (
     Build,
     CompileError,
     GraspSet,
+    ID3Selector,
     LogitBoostClassifier,
     Samples,
     compile,  # noqa: A004
@@ -108,6 +109,21 @@ def test_a_pipeline_that_selects_columns_becomes_a_build_of_those(
     found = verify(tmp_path / "build", grasp_set)
     assert found.holds
     assert found.correct_ensemble == np.count_nonzero(pipeline.predict(X) == grasp_set.labels)
+
+
+def test_the_papers_recipe_is_the_same_from_a_pipeline_and_from_compile_build(
+    grasp_set: GraspSet, X: np.ndarray, tmp_path: Path
+) -> None:
+    switches = slice(0, len(grasp_set.switch_names))
+    chosen = ColumnTransformer([("switches", ID3Selector(min_samples=5), switches)], remainder="passthrough")
+    pipeline = make_pipeline(chosen, LogitBoostClassifier(rounds=4)).fit(X, grasp_set.labels)
+    made = compile(pipeline, grasp_set, tmp_path / "made", folds=3).manifest
+    same = compile_build(grasp_set, tmp_path / "same", prune=5, rounds=4, folds=3).manifest
+    assert made.options == same.options
+    assert made.rates == same.rates
+    assert sorted(made.switches, key=lambda switch: switch.column) == sorted(
+        same.switches, key=lambda switch: switch.column
+    )
 
 
 def test_what_is_no_sum_over_these_columns_is_refused(grasp_set: GraspSet, X: np.ndarray, tmp_path: Path) -> None:
