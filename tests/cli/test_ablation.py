@@ -3,7 +3,7 @@ import pytest
 
 from thenar.cli.ablation import ablate
 from thenar.compiler.evaluation.ablation import Ablation
-from thenar.compiler.evaluation.errors import EvaluationError
+from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.evaluation.study import Options, evaluate
 from thenar.simulator import load_scene, simulate
 from thenar.simulator.effects.contact_quasistatic import Parameters
