@@ -1,9 +1,9 @@
 """An evaluation: the paper's tables for the user's own recordings, from fits that are each done once."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from statistics import fmean
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -190,14 +190,48 @@ class Study:
 
 
 def evaluate(
-    grasp_set: GraspSet, options: Options | None = None, jobs: int = -1, progress: Progress | None = None
+    grasp_set: GraspSet,
+    options: Options | None = None,
+    jobs: int = -1,
+    progress: Progress | None = None,
+    **changes: Any,
 ) -> Study:
-    """Return the tables that `options` ask for and the set has the inputs for.
+    """Cross-validate: return the paper's tables that `options` ask for and the set has the inputs for.
 
-    The result is the same for any number of `jobs` (worker processes; -1: all cores).
-    Raises EvaluationError if the set cannot be cut as asked, MemberError for a rival that is no method.
+    Parameters
+    ----------
+    grasp_set : GraspSet
+        The recordings.
+    options : Options, optional
+        What to evaluate, and how.
+    jobs : int
+        Worker processes; -1: all cores. The result is the same for any number of them.
+    progress : callable, optional
+        Called with (done, total) after each classifier.
+    **changes
+        Single options, such as `folds=5`, instead of those in `options`.
+
+    Returns
+    -------
+    Study
+        The tables, of rates in 0..1 with 95 % intervals, and what to beware of.
+
+    Raises
+    ------
+    EvaluationError
+        If the set cannot be cut as asked.
+    MemberError, TrainerError
+        For a rival that is no method, or a trainer that is not there or takes no such setting.
+
+    Examples
+    --------
+    >>> from thenar.compiler import GraspSet, evaluate
+    >>> tables = {"tables": ("compositions",), "protocols": ("honest",)}
+    >>> study = evaluate(GraspSet.load("set.grasps"), jobs=1, folds=2, repeats=1, rounds=2, **tables)
+    >>> 0 <= study.tables[0].rows[0].average.mean <= 1
+    True
     """
-    options = options or Options()
+    options = replace(options or Options(), **changes)
     for name in options.rivals:
         if not METHODS.named(name).by_number:
             raise EvaluationError(f"{name} takes S: a rival is a method that takes a number of switches")

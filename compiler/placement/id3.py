@@ -28,13 +28,35 @@ class _Subset:
 def grow_id3(X: npt.ArrayLike | Digits, y: npt.ArrayLike, min_samples: int = 0) -> Tree:
     """Grow the paper's tree.
 
-    X (n, d) is bool or whole numbers >= 0, of any number of values an input, or `Digits` packed before; y (n,) are
-    labels that can be sorted. A node is terminal if its rows have one label, are fewer than `min_samples` (the paper's
-    S; 0 does not prune), or agree in every input; it then answers with the majority, of equal ones with the lowest
-    class. An input that is constant at a node is never chosen; of equal gains, exactly compared, the lowest number is.
-    If no input gains anything the rule stands: the lowest-numbered one that varies is chosen, and the node's gain is 0.
+    A node is terminal if its rows have one label, are fewer than `min_samples`, or agree in every input; it then
+    answers with the majority, of equal ones with the lowest class. An input that is constant at a node is never chosen;
+    of equal gains, exactly compared, the lowest number is. If no input gains anything the rule holds: the
+    lowest-numbered one that varies is chosen, and the node's gain is 0.
 
-    Raises PlacementError, with row and column, if X or y are not such data.
+    Parameters
+    ----------
+    X : array-like, shape (n, d)
+        Bool or whole numbers >= 0, of any number of values an input; or `Digits` packed before.
+    y : array-like, shape (n,)
+        Labels that can be sorted.
+    min_samples : int
+        The paper's S: nodes of fewer rows decide nothing; 0 does not prune.
+
+    Returns
+    -------
+    Tree
+        Its `inputs` are the columns that it looks at, in the order in which they come; `gains` are in bits.
+
+    Raises
+    ------
+    PlacementError
+        With row and column, if X or y are not such data.
+
+    Examples
+    --------
+    >>> from thenar.compiler import grow_id3
+    >>> grow_id3([[0, 0], [0, 1], [1, 0], [1, 1]], ["pen", "pen", "cup", "cup"]).inputs
+    (0,)
     """
     if min_samples < 0:
         raise PlacementError(f"min_samples is {min_samples}, a number of rows >= 0 is needed")

@@ -59,7 +59,7 @@ def test_builds_without_joints_or_without_switches_are_pythons_too(
 ) -> None:
     for name in TOOLS[kind]:
         tool(name)
-    folder = compile_build(grasp_set, tmp_path / "build", rounds=5, folds=0, inputs=inputs).folder  # type: ignore[arg-type]
+    folder = compile_build(grasp_set, tmp_path / "build", rounds=5, folds=0, inputs=inputs).folder
     assert verify_firmware(folder, grasp_set, (kind,)).holds
 
 
