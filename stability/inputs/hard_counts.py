@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.placement.gain import Node
+from thenar.compiler.placement.gain import NodeCounts
 
 Counts = NDArray[np.int64]
 BitSet = tuple[NDArray[np.bool_], NDArray[np.intp], int]  # X (n, d), labels (n,), number of classes
@@ -19,11 +19,11 @@ def random_table(rng: np.random.Generator) -> Counts:
     return counts
 
 
-def node_of(*tables: Counts) -> Node:
+def node_of(*tables: Counts) -> NodeCounts:
     """Return the node at which inputs have these tables (K, values), each of the same classes."""
     cells = np.concatenate([table[:, 1:] for table in tables], axis=1)
     starts = np.cumsum([0] + [table.shape[1] - 1 for table in tables])[:-1]
-    return Node(tables[0].sum(axis=1), cells, starts)
+    return NodeCounts(tables[0].sum(axis=1), cells, starts)
 
 
 def hand_made() -> Iterator[Counts]:
