@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..recordings.graspset import GraspSet
-from .compositions import COMPOSITIONS, inputs
-from .fits import Fit, Progress, Training, run_fits
+from ..trainers.base import Training
+from .fits import Fit, Progress, run_fits
+from .plan import COMPOSITIONS, inputs
 from .populations import populations
 from .rates import Rate
 
@@ -102,7 +103,9 @@ def _correct(grasp_set: GraspSet, jobs: int, progress: Progress | None) -> dict[
         for name, kind in _KINDS.items()
     }
     everything = [fit for some in fits.values() for fit in some]
-    found = run_fits(inputs(grasp_set), grasp_set.labels, everything, Training(ROUNDS), jobs, progress)
+    found = run_fits(
+        inputs(grasp_set), grasp_set.labels, everything, Training("logitboost", {"rounds": ROUNDS}), jobs, progress
+    )
     correct = {name: np.zeros(len(grasp_set), dtype=np.bool_) for name in fits}
     for name, some in fits.items():
         for fit in some:
