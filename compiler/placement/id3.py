@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from . import gain
 from .counts import Counter, Digits
 from .errors import PlacementError
 from .exact import Counts
+from .gain import NodeCounts, best_position, gain_bits
 from .inputs import check_labels, check_matrix
 from .tree import Node, Tree
 
@@ -91,22 +91,22 @@ class _Growth:
         table = counted.table(position)
         present = np.flatnonzero(table.any(axis=0))
         values = tuple(self.digits.values[position][present].tolist())
-        node = Node(counts, int(self.digits.columns[position]), gain.gain_bits(table), values)
+        node = Node(counts, int(self.digits.columns[position]), gain_bits(table), values)
         return node, self._children(subset.rows, counted, position, table[:, present], present)
 
     def _goes_on(self, totals: Counts) -> bool:
         return int(np.count_nonzero(totals)) > 1 and int(totals.sum()) >= self.min_samples
 
-    def _split(self, subset: _Subset) -> tuple[gain.Node, int] | None:
+    def _split(self, subset: _Subset) -> tuple[NodeCounts, int] | None:
         if not len(self.digits.columns):
             return None
         cells = self.counter.count(subset.rows) if subset.cells is None else subset.cells
-        counted = gain.Node(subset.totals, cells, self.counter.starts)
-        position = gain.best_position(counted, self.digits.columns)
+        counted = NodeCounts(subset.totals, cells, self.counter.starts)
+        position = best_position(counted, self.digits.columns)
         return None if position is None else (counted, position)
 
     def _children(
-        self, rows: Rows, counted: gain.Node, position: int, tables: Counts, present: npt.NDArray[Any]
+        self, rows: Rows, counted: NodeCounts, position: int, tables: Counts, present: npt.NDArray[Any]
     ) -> list[_Subset]:
         codes = self.digits.codes(position, rows)
         parts = [rows[codes == code] for code in present]

@@ -128,7 +128,7 @@ def test_all_switches_that_do_not_fit_into_memory_are_refused_before_placements_
     wide: GraspSet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("os.sysconf", {"SC_PHYS_PAGES": 2000, "SC_PAGE_SIZE": 4096}.__getitem__)
-    monkeypatch.setattr("thenar.compiler.evaluation.study.Placements", None)
+    monkeypatch.setattr("thenar.compiler.evaluation.study.Planner", None)
     with pytest.raises(
         EvaluationError, match=r"30 rows of 2 grasp types needs some 0\.0 GB of memory.*fewer rows or columns"
     ):
