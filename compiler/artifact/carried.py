@@ -9,10 +9,13 @@ from thenar.runtime.files import read_file
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
 
+from ..firmware.choose import smallest_fit
+from ..firmware.classifier import LIBRARY_NAME, Library
 from ..firmware.errors import FirmwareError
 from ..firmware.folder import LARGEST
-from ..firmware.library import library_files, smallest_fit
-from ..firmware.library_names import FIRMWARE_NAME, LIBRARY_FILES
+
+FIRMWARE_NAME = "firmware"
+LIBRARY_FILES = tuple(f"thenar_{LIBRARY_NAME}{ending}" for ending in (".h", ".c", "_avr.S"))
 
 
 class Carried(Struct, frozen=True):
@@ -26,7 +29,7 @@ def made_firmware(manifest: Manifest, tables: IntegerTables) -> tuple[dict[str, 
     """Return path in the build -> text of its firmware, and a sentence that says what for, or why there is none."""
     try:
         fit = smallest_fit(tables)
-        made = library_files(manifest, fit)
+        made = Library(LIBRARY_NAME, manifest, fit.choice.layout, fit.target.avr, fit.notes()).files
     except FirmwareError as reason:
         return {}, f"no firmware: {reason}"
     return {f"{FIRMWARE_NAME}/{name}": text for name, text in made.items()}, f"firmware {fit.words}"

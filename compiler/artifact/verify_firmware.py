@@ -4,27 +4,125 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 from msgspec import Struct
 
 from thenar.runtime.build import Build
+from thenar.runtime.scorer import LANE_OFFSET
 from thenar.runtime.tables import IntegerTables
 
-from ..firmware.choose import choose
+from ..firmware.answers import Answers
+from ..firmware.choose import Fit, fit_for, smallest_fit
+from ..firmware.classifier import LIBRARY_NAME, classifier_files
 from ..firmware.errors import FirmwareError
-from ..firmware.library import Fit, smallest_fit
-from ..firmware.probes import Probes, extreme_frames, random_frames
-from ..firmware.running import toolchain_missing
+from ..firmware.probes import Probes, extreme_frames, joined, random_frames
 from ..firmware.targets import TARGETS
+from ..firmware.targets import kinds as every_kind
 from ..recordings.graspset import GraspSet
 from .carried import Carried, carried_firmware
-from .firmware_trial import ANSWERS, FirmwareTrial, TargetCheck
 from .select import select_inputs
 
-Kind = Literal["host", "avr", "cortex-m"]
-KINDS: tuple[Kind, ...] = ("host", "avr", "cortex-m")
 RANDOM_FRAMES = 10_000
 _SEED = 1
-_CORES = ("cortex-m0plus", "cortex-m4")
+
+
+Answer = Literal["classify", "update"]
+ANSWERS: tuple[Answer, ...] = ("classify", "update")
+
+
+class Difference(Struct, frozen=True):
+    """A frame that is answered otherwise: which it is, what is closed and coded in it, and both answers."""
+
+    frame: str
+    closed: tuple[str, ...]
+    codes: tuple[int, ...]
+    grasp: str
+    scores: tuple[int, ...]
+    compiled_grasp: str
+    compiled_scores: tuple[int, ...]
+
+
+class TargetCheck(Struct, frozen=True, kw_only=True):
+    """What came of one part.
+
+    layout     which layout was compiled, and why
+    answer     "classify": every frame from nothing; "update": from what changed since the frame before
+    frames     how many were answered, `differing` of them with another score or grasp type than in Python
+    first      the first of those
+    misnamed   how many grasp types thenar_NAME_grasp calls otherwise than the manifest; None: not asked, on an AVR
+    worst      what the slowest answer took, in `unit`, and `stack` the bytes that answers need; None: not counted
+    """
+
+    part: str
+    layout: str
+    answer: Answer
+    frames: int
+    differing: int
+    first: Difference | None
+    misnamed: int | None
+    worst: int | None
+    unit: str
+    stack: int | None
+
+
+class FirmwareTrial:
+    """Frames, in three lots, and Python's scores of them: those of the very `Build` that the runtime runs."""
+
+    def __init__(self, build: Build, rows: Probes, extreme: Probes, random: Probes) -> None:
+        self._build, self._lots = build, (("row", rows), ("extreme frame", extreme), ("random frame", random))
+        self._frames = joined(rows, extreme, random)
+        pairs = zip(self._frames.bits, self._frames.codes, strict=True)
+        self._scores = np.array([build.lanes(bits, codes) for bits, codes in pairs]) - LANE_OFFSET
+
+    def check(self, fit: Fit, answer: Answer) -> TargetCheck:
+        """Compile the classifier as `fit` says and hold its answers against Python's. Raises FirmwareError."""
+        answers = self._run(fit, incremental=answer == "update")
+        wrong = (answers.scores != self._scores).any(axis=1) | (answers.classes != self._scores.argmax(axis=1))
+        return TargetCheck(
+            part=fit.target.part,
+            layout=fit.choice.why,
+            answer=answer,
+            frames=len(wrong),
+            differing=int(np.count_nonzero(wrong)),
+            first=self._difference(int(wrong.argmax()), answers) if wrong.any() else None,
+            misnamed=self._misnamed(answers),
+            worst=None if answers.cost is None else int(answers.cost.max()),
+            unit=answers.unit,
+            stack=answers.stack,
+        )
+
+    def _misnamed(self, answers: Answers) -> int | None:
+        if answers.names is None:
+            return None
+        return sum(name != grasp for name, grasp in zip(answers.names, self._build.grasps, strict=True))
+
+    def _run(self, fit: Fit, *, incremental: bool) -> Answers:
+        layout, target = fit.choice.layout, fit.target
+        files = classifier_files(LIBRARY_NAME, self._build.manifest, layout, avr=target.avr)
+        frames = layout.frame_bytes(self._frames.bits, self._frames.codes)
+        return target.run(files, LIBRARY_NAME, layout, frames, incremental=incremental)
+
+    def _difference(self, frame: int, answers: Answers) -> Difference:
+        build, bits, codes = self._build, self._frames.bits[frame], self._frames.codes[frame]
+        return Difference(
+            frame=self._name(frame),
+            closed=tuple(switch.name for switch, bit in zip(build.manifest.switches, bits, strict=True) if bit),
+            codes=tuple(codes.tolist()),
+            grasp=build.grasps[int(self._scores[frame].argmax())],
+            scores=tuple(self._scores[frame].tolist()),
+            compiled_grasp=self._grasp(int(answers.classes[frame])),
+            compiled_scores=tuple(answers.scores[frame].tolist()),
+        )
+
+    def _name(self, frame: int) -> str:
+        for name, lot in self._lots:
+            if frame < len(lot):
+                return f"{name} {frame}"
+            frame -= len(lot)
+        raise IndexError(frame)
+
+    def _grasp(self, number: int) -> str:
+        return self._build.grasps[number] if number < len(self._build.grasps) else f"type {number}, which there is not"
 
 
 class FirmwareVerification(Struct, frozen=True, kw_only=True):
@@ -47,7 +145,7 @@ class FirmwareVerification(Struct, frozen=True, kw_only=True):
 def verify_firmware(
     folder: str | Path,
     grasp_set: GraspSet,
-    kinds: Sequence[Kind],
+    kinds: Sequence[str],
     progress: Callable[[int, int], None] | None = None,
 ) -> FirmwareVerification:
     """Hold the classifiers that gcc makes for `kinds` against Python: every row, extreme frames, 10,000 random ones.
@@ -59,9 +157,9 @@ def verify_firmware(
     part cannot hold the build, else as `verify_build` does.
     """
     build = Build.load(folder)
-    fits = [fit for kind in KINDS if kind in kinds for fit in _fits(build.tables, kind)]
+    fits = [fit for kind in every_kind() if kind in kinds for fit in _fits(build.tables, kind)]
     for fit in fits:
-        if lack := toolchain_missing(fit.target):
+        if lack := fit.target.missing():
             raise FirmwareError(f"firmware for {fit.target.part} cannot be tried here: {lack}")
     bits, codes = select_inputs(grasp_set, build.manifest)
     extreme, random = extreme_frames(build.tables), random_frames(build.tables, RANDOM_FRAMES, _SEED)
@@ -81,12 +179,9 @@ def verify_firmware(
     )
 
 
-def _fits(tables: IntegerTables, kind: Kind) -> list[Fit]:
-    """Return the parts to try, each with its layout. Of a build that no AVR holds, host takes a larger part's."""
-    match kind:
-        case "host":
-            return [Fit(TARGETS["host"], smallest_fit(tables).choice)]
-        case "avr":
-            return [smallest_fit(tables, avr=True)]
-        case "cortex-m":
-            return [Fit(TARGETS[core], choose(tables, TARGETS[core])) for core in _CORES]
+def _fits(tables: IntegerTables, kind: str) -> list[Fit]:
+    """Return the parts of a kind to try, each with its layout: of parts that are alike, the smallest that will do."""
+    targets = [target for target in TARGETS.values() if target.kind == kind]
+    if all(target.alike for target in targets):
+        return [smallest_fit(tables, kind=kind)]
+    return [fit_for(target, tables) for target in targets]

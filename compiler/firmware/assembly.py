@@ -3,13 +3,9 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from thenar.runtime.manifest import Manifest
-
 from .errors import FirmwareError
-from .layout import Layout
-from .lookups import Lookup, lookups
-from .parts import Parts, parts_of
-from .words import comment
+from .layout import Layout, Lookup, lookups
+from .words import Names, comment
 
 # Free to use for a C function, and to be kept for its caller.
 _FREE, _KEPT = (18, 20, 22, 24, 26), (28, 16, 14, 12, 10, 8, 6, 4, 2)
@@ -78,7 +74,7 @@ class Part:
 
 def check_size(layout: Layout) -> None:
     """Raise FirmwareError if the tables alone are more than an AVR's lpm can reach."""
-    parts = parts_of(layout.tables.n_classes)
+    parts = layout.parts
     entries = layout.n_rows * parts.width * len(parts.firsts)
     needed = entries * layout.entry_bits // 8 + sum(len(joint.bins) for joint in layout.joints)
     if needed > _LPM_REACH:
@@ -87,15 +83,15 @@ def check_size(layout: Layout) -> None:
 
 def calls_are_near(layout: Layout) -> bool:
     """Return whether all calls are `rcall`; else they are `call`, a word and a cycle more."""
-    passes = len(parts_of(layout.tables.n_classes).firsts)
+    passes = len(layout.parts.firsts)
     return _LOOKUP_BYTES * layout.n_lookups * passes < _NEAR_BYTES
 
 
-def assembly_values(name: str, manifest: Manifest, layout: Layout, parts: Parts) -> dict[str, object]:
+def assembly_values(name: str, names: Names, layout: Layout) -> dict[str, object]:
     """Return what the template of the assembly asks for."""
-    near = calls_are_near(layout)
+    near, parts = calls_are_near(layout), layout.parts
     registers = sorted((_FREE + _KEPT)[: parts.width])
-    passes = [_part(name, manifest, layout, parts, number, registers) for number in range(len(parts.firsts))]
+    passes = [_part(name, names, layout, number, registers) for number in range(len(parts.firsts))]
     stride = parts.width * layout.entry_bits // 8
     searched = layout.bins == "search" and any(not joint.constant for joint in layout.joints)
     bins = sum(len(joint.bins) for joint in layout.joints if not joint.constant)
@@ -117,18 +113,19 @@ def assembly_values(name: str, manifest: Manifest, layout: Layout, parts: Parts)
     }
 
 
-def _part(name: str, manifest: Manifest, layout: Layout, parts: Parts, number: int, registers: Iterable[int]) -> Part:
+def _part(name: str, names: Names, layout: Layout, number: int, registers: Iterable[int]) -> Part:
+    parts = layout.parts
     first = parts.firsts[number]
     starts = layout.start[first : first + parts.width].tolist()
-    grasps = map(comment, manifest.grasps[first : first + parts.width])
+    grasps = map(comment, names.grasps[first : first + parts.width])
     sums = tuple(Sum(*each) for each in zip(registers, starts, grasps, strict=True))
-    steps = tuple(_steps(name, manifest, layout, parts, number))
+    steps = tuple(_steps(name, names, layout, number))
     again = parts.firsts[number - 1] + parts.width - first if number else 0
     return Part(number, sums, 2 * first, again, steps, number == len(parts.firsts) - 1)
 
 
-def _steps(name: str, manifest: Manifest, layout: Layout, parts: Parts, part: int) -> Iterator[Step]:
-    stride = parts.width * layout.entry_bits // 8
+def _steps(name: str, names: Names, layout: Layout, part: int) -> Iterator[Step]:
+    stride = layout.parts.width * layout.entry_bits // 8
     codes = len(layout.groups) + layout.padding
     for lookup in lookups(layout):
         rows = (part * layout.n_rows + lookup.first_row) * stride
@@ -137,7 +134,7 @@ def _steps(name: str, manifest: Manifest, layout: Layout, parts: Parts, part: in
             what, source = f"switches {numbers[0]} to {numbers[-1]}", f"thenar_{name}_input + {lookup.number}"
             yield Step(lookup.index, what, True, "byte", source, rows)
             continue
-        what = comment(manifest.joints[lookup.number].name)
+        what = comment(names.joints[lookup.number].name)
         if layout.bins == "search":
             source = f"thenar_{name}_found + {lookup.index - len(layout.groups)}"
             yield Step(lookup.index, what, False, "byte", source, rows)

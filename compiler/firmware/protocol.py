@@ -7,7 +7,6 @@ byte for byte, given the same scans, times and received bytes.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from textwrap import wrap
 
 from thenar.firmware_templates.rendering import render
@@ -91,7 +90,10 @@ class HurdleRow:
 
 def protocol_files(config: BoardConfig) -> dict[str, str]:
     """Return name -> text of the C of a board: configuration, frames, debouncing and protocol."""
-    return {"thenar_config.h": _text("thenar_config.h", config=config), **{name: _text(name) for name in _PORTABLE}}
+    return {
+        "thenar_config.h": render("board/thenar_config.h.j2", config=config),
+        **{name: render(f"board/{name}.j2") for name in _PORTABLE},
+    }
 
 
 def decided_files(
@@ -124,7 +126,7 @@ def decided_files(
         ],
         "tables": [_hurdles(reach, early.unread(port), names) for port in range(len(ports) - 1)],
     }
-    return {f"thenar_{name}_decided.{end}": _text(f"thenar_NAME_decided.{end}", **values) for end in "hc"}
+    return {f"thenar_{name}_decided.{end}": render(f"board/thenar_NAME_decided.{end}.j2", **values) for end in "hc"}
 
 
 def _hurdles(reach: Reach, unread: int, grasps: Sequence[str]) -> list[HurdleRow]:
@@ -140,8 +142,3 @@ def _hurdles(reach: Reach, unread: int, grasps: Sequence[str]) -> list[HurdleRow
 
 def _listed(port: Sequence[int]) -> str:
     return ("switches " if len(port) > 1 else "switch ") + ", ".join(map(str, port)) if port else "no switch"
-
-
-def _text(file: str, /, **values: object) -> str:
-    template = f"board/{file}.j2"
-    return render(template, origin=f"thenar {version('thenar')}, template {template}.", **values)

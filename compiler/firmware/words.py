@@ -1,10 +1,74 @@
 """Words of a build as words of C: names, comments and string literals, whatever characters they are made of."""
 
+import hashlib
 import re
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Protocol
+
+from thenar.runtime.manifest import Calibration, Switch
+from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from .errors import FirmwareError
 
 _LONGEST_NAME = 32
+
+
+class Names(Protocol):
+    """What firmware says of a build besides its tables. A Manifest is one; so is `Numbered`."""
+
+    @property
+    def grasps(self) -> tuple[str, ...]:
+        """The K grasp types."""
+        ...
+
+    @property
+    def switches(self) -> tuple[Switch, ...]:
+        """The switches in the order of the tables."""
+        ...
+
+    @property
+    def joints(self) -> tuple[Calibration, ...]:
+        """The joints in the order of the tables, and what their codes mean."""
+        ...
+
+    @property
+    def tables_sha256(self) -> str:
+        """The digest of the tables that all was made from."""
+        ...
+
+    @property
+    def thenar(self) -> str:
+        """The version of thenar that made them."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Numbered:
+    """Names for tables that belong to no build: grasp types, switches and joints are numbered."""
+
+    tables: IntegerTables
+    thenar: str = version("thenar")
+
+    @property
+    def grasps(self) -> tuple[str, ...]:
+        """The types 0, 1..."""
+        return tuple(f"type {number}" for number in range(self.tables.n_classes))
+
+    @property
+    def switches(self) -> tuple[Switch, ...]:
+        """The switches s0, s1..."""
+        return tuple(Switch(number, f"s{number}", 0.0) for number in range(self.tables.n_switches))
+
+    @property
+    def joints(self) -> tuple[Calibration, ...]:
+        """The joints j0, j1..., in codes of their own."""
+        return tuple(Calibration(number, f"j{number}", "raw", 0, 0.0, 1, 1.0) for number in range(self.tables.n_joints))
+
+    @property
+    def tables_sha256(self) -> str:
+        """That of tables.bin."""
+        return hashlib.sha256(tables_to_bytes(self.tables)).hexdigest()
 
 
 def check_name(name: str) -> None:

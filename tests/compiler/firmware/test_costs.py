@@ -9,14 +9,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from thenar.compiler.firmware import avr_runner, cortex_runner
-from thenar.compiler.firmware.avr_costs import AvrCosts
+from thenar.compiler.firmware.avr_costs import AvrCosts, worst_frame
 from thenar.compiler.firmware.classifier import classifier_files
-from thenar.compiler.firmware.costs import Cost, cost_of
+from thenar.compiler.firmware.costs import Cost
 from thenar.compiler.firmware.layout import Adding, Bins, Layout, arrange
 from thenar.compiler.firmware.probes import changing_frames
 from thenar.compiler.firmware.targets import TARGETS
-from thenar.compiler.firmware.worst import worst_frame
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
 
@@ -24,7 +22,7 @@ MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
 Tool = Callable[[str], str]
 
-AVRS = ("atmega328p", "atmega2560")
+AVRS = ("avr328p", "avr2560")
 # Classes, switches, joints and highest threshold: one pass and several, no joint, no switch, codes of 16 bits, more
 # look-ups than rcall reaches across, members of the input beyond the reach of ldd.
 SHAPES = [
@@ -112,28 +110,28 @@ def test_the_model_says_to_the_cycle_what_every_frame_takes_and_the_bound_is_nea
 ) -> None:
     tool("avr-gcc")
     layout, target = _laid_out(make_tables, shape, bins, adding, entry_bits), TARGETS[part]
-    costs = AvrCosts(layout, target)
+    costs = AvrCosts(layout, target.flash)
     bits, codes = _frames(layout, 60)
-    worst = worst_frame(layout, target)
+    worst = worst_frame(layout)
     bits, codes = np.vstack([bits, worst[0]]), np.vstack([codes, worst[1]])
     files = classifier_files("hand", describe(layout.tables), layout, avr=True)
-    answers = avr_runner.run(files, "hand", layout, target, layout.frame_bytes(bits, codes))
+    answers = target.run(files, "hand", layout, layout.frame_bytes(bits, codes))
     assert answers.cost is not None
     assert answers.stack is not None
     expected = costs.fixed_cycles + costs.varying_cycles(bits, codes)
     # For two joints the compiler makes less of the search, as it does beyond the reach of `ldd`: the model is a bound.
     exact = bins != "search" or shape[2] == 3
     assert np.array_equal(answers.cost, expected) if exact else (answers.cost <= expected).all()
-    cost = cost_of(layout, target)
+    cost = target.cost(layout)
     assert answers.cost.max() == answers.cost[-1]
     assert answers.cost.max() <= cost.cycles <= 1.02 * answers.cost.max() + shape[0] + (0 if exact else 50)
     changing = layout.frame_bytes(*_all_changing(layout, bits, codes))
-    changed = avr_runner.run(files, "hand", layout, target, changing, incremental=True)
+    changed = target.run(files, "hand", layout, changing, incremental=True)
     assert changed.stack is not None
     assert changed.cost is not None
     # Few frames have every class better than the one before.
     assert changed.cost.max() <= cost.update_cycles <= 1.02 * changed.cost.max() + shape[0] + (0 if exact else 150)
-    _, _, variables = size(files, ["avr-gcc", f"-mmcu={part}", "-Os"])
+    _, _, variables = size(files, ["avr-gcc", *TARGETS[part].flags])
     assert 0 <= cost.ram - variables - max(answers.stack, changed.stack) <= 4
 
 
@@ -151,8 +149,8 @@ def test_an_avr_s_flash_is_what_the_model_allows_for_or_a_little_less(
     layout = _laid_out(make_tables, shape, bins, adding, entry_bits)
     files = classifier_files("hand", describe(layout.tables), layout, avr=True)
     for part in AVRS:
-        flash, updating, _ = size(files, ["avr-gcc", f"-mmcu={part}", "-Os"])
-        cost = cost_of(layout, TARGETS[part])
+        flash, updating, _ = size(files, ["avr-gcc", *TARGETS[part].flags])
+        cost = TARGETS[part].cost(layout)
         # Names have 15 bytes in the model, 7 or 8 here; code in C is rounded up, and so are pages of bins.
         allowed = 8 * (shape[0] + 1) + (700 if bins == "direct" else 500)
         assert flash <= cost.flash <= flash + allowed
@@ -182,12 +180,12 @@ def test_a_cortex_takes_no_more_than_the_model_and_not_much_less(
     tables = replace(tables, thresholds=tuple(steps + np.uint16(lowest) for steps in tables.thresholds))
     target = TARGETS[part]
     layout = arrange(tables, bins=bins, entry_bits=entry_bits)
-    files, cost = classifier_files("hand", describe(tables), layout, avr=False), cost_of(layout, target)
-    answers = cortex_runner.run(files, "hand", layout, target, layout.frame_bytes(*_frames(layout, 50)))
+    files, cost = classifier_files("hand", describe(tables), layout, avr=False), target.cost(layout)
+    answers = target.run(files, "hand", layout, layout.frame_bytes(*_frames(layout, 50)))
     assert answers.cost is not None
     assert answers.cost.max() <= cost.cycles <= 1.2 * answers.cost.max()
     changing = layout.frame_bytes(*_all_changing(layout, *_frames(layout, 50)))
-    changed = cortex_runner.run(files, "hand", layout, target, changing, incremental=True)
+    changed = target.run(files, "hand", layout, changing, incremental=True)
     assert changed.cost is not None
     assert changed.cost.max() <= cost.update_cycles <= 1.3 * changed.cost.max()
     flash, updating, variables = size(files, ["arm-none-eabi-gcc", f"-mcpu={part}", "-mthumb", "-O2", "-ffreestanding"])
@@ -209,18 +207,18 @@ def test_no_frame_takes_longer_than_the_bound_and_more_look_ups_never_cost_less(
 ) -> None:
     layout = _laid_out(make_tables, shape, bins, "called", entry_bits)
     for part in AVRS:
-        costs = AvrCosts(layout, TARGETS[part])
+        costs = AvrCosts(layout, TARGETS[part].flash)
         varying = costs.varying_cycles(*_frames(layout, 100))
         assert varying.min() >= 0
         assert costs.fixed_cycles + varying.max() <= costs.most_cycles
     smaller = arrange(layout.tables, group_size=2, bins=bins, entry_bits=entry_bits)
     for target in TARGETS.values():
-        assert cost_of(smaller, target).cycles >= cost_of(layout, target).cycles
+        assert target.cost(smaller).cycles >= target.cost(layout).cycles
 
 
 def test_eight_bits_take_five_cycles_an_entry_and_sixteen_eight(make_tables: MakeTables) -> None:
     tables = make_tables(1, classes=14, switches=20, joints=4, reach=5)
-    wide, narrow = (cost_of(arrange(tables, entry_bits=bits), TARGETS["atmega328p"]) for bits in (16, 8))
+    wide, narrow = (TARGETS["avr328p"].cost(arrange(tables, entry_bits=bits)) for bits in (16, 8))
     look_ups, clearing = 8, 8
     assert wide.cycles - narrow.cycles == look_ups * 14 * 3 - clearing
     assert wide.flash > narrow.flash

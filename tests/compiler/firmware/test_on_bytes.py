@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.firmware.errors import FirmwareError
-from thenar.compiler.firmware.on_bytes import BYTES, on_bytes
+from thenar.compiler.firmware.one_hand import BYTES, on_bytes
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.live.codes import codes_of_bytes
 from thenar.runtime.manifest import Calibration

@@ -6,18 +6,17 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from thenar.compiler.firmware.avr_costs import AvrCosts
+from thenar.compiler.firmware.avr_costs import AvrCosts, worst_frame
 from thenar.compiler.firmware.layout import Bins, Layout, arrange
 from thenar.compiler.firmware.targets import TARGETS
-from thenar.compiler.firmware.worst import worst_frame
 from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
-SMALL = TARGETS["atmega328p"]
+SMALL = TARGETS["avr328p"]
 
 
 def _cycles(layout: Layout, bits: np.ndarray, codes: np.ndarray) -> int:
-    return int(AvrCosts(layout, SMALL).varying_cycles(bits[np.newaxis], codes[np.newaxis])[0])
+    return int(AvrCosts(layout, SMALL.flash).varying_cycles(bits[np.newaxis], codes[np.newaxis])[0])
 
 
 def _longest(layout: Layout) -> int:
@@ -27,7 +26,7 @@ def _longest(layout: Layout) -> int:
     frames = list(product(*[[0, 1]] * tables.n_switches, *steps))
     bits = np.array([frame[: tables.n_switches] for frame in frames], bool).reshape(len(frames), -1)
     codes = np.array([frame[tables.n_switches :] for frame in frames], np.uint16).reshape(len(frames), -1)
-    return int(AvrCosts(layout, SMALL).varying_cycles(bits, codes).max())
+    return int(AvrCosts(layout, SMALL.flash).varying_cycles(bits, codes).max())
 
 
 @given(
@@ -50,7 +49,7 @@ def test_in_large_tables_it_takes_longer_than_any_of_many_frames_and_nearly_as_l
     make_tables: MakeTables, bins: Bins
 ) -> None:
     layout = arrange(make_tables(1, classes=14, switches=33, joints=16, bins=25), bins=bins)
-    costs, random = AvrCosts(layout, SMALL), np.random.default_rng(7)
+    costs, random = AvrCosts(layout, SMALL.flash), np.random.default_rng(7)
     worst = costs.fixed_cycles + _cycles(layout, *worst_frame(layout))
     bits = random.random((20000, 33)) < 0.5
     codes = random.integers(0, 256, (20000, 16)).astype(np.uint16)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.frontier.targets import TARGETS
+from thenar.compiler.firmware.targets import timed
 from thenar.compiler.frontier.timing.beside_wire import (
     Beside,
     beside_wire,
@@ -118,7 +118,7 @@ def test_without_joints_no_record_is_waited_for() -> None:
     assert transfer_us(0) == record_period_us(0) == 0.0
 
 
-@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("target", timed())
 def test_every_target_says_what_its_scans_hold_beside_the_wire(target: str) -> None:
     beside = beside_wire(target)
     assert len(beside.what) > 20

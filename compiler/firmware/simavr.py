@@ -1,29 +1,88 @@
 """The compiled classifier on an AVR in libsimavr: every frame, its cycles, and the stack it takes."""
 
-from collections.abc import Mapping
+import atexit
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
 
 import numpy as np
 
 from thenar.firmware_templates.rendering import render
 
 from .answers import Answers, Frames, check_frames
-from .avr_harness import AVR_COMPILER, harness
 from .errors import FirmwareError
 from .layout import Layout
-from .targets import Target
-from .tools import STRICT, call, find, workshop
+from .tools import AVR_COMPILER, HOST_COMPILER, STRICT, Tool, call, find, lacking, workshop
 
-_CLOCK_HZ = 16_000_000
+_MAKE: Tool = (("make",), "make")
+
+
+def missing() -> str | None:
+    """Return what keeps AVR code from being run here, and what to install; None if nothing does."""
+    if gone := lacking(AVR_COMPILER, HOST_COMPILER, _MAKE):
+        return gone
+    try:
+        harness("simavr_classify")
+    except FirmwareError as error:
+        return str(error)
+    return None
+
+
+def harness(program: str) -> Path:
+    """Return the path of the harness's `program`, compiled at most once a process.
+
+    Its sources stand in the folder $THENAR_SIMAVR, else in tests/simavr of the checkout that this file belongs to.
+    Raises FirmwareError if they are not there or do not compile.
+    """
+    return _built(_sources(), program)
+
+
+def _sources() -> Path:
+    named = os.environ.get("THENAR_SIMAVR")
+    folder = Path(named) if named else Path(__file__).resolve().parents[2] / "tests" / "simavr"
+    if not (folder / "simavr_classify.c").is_file():
+        raise FirmwareError(
+            f"{folder} has no harness for simavr: set THENAR_SIMAVR to the folder tests/simavr of thenar's sources"
+        )
+    return folder
+
+
+@lru_cache
+def _shelf(_sources: Path) -> Path:
+    """Return a new folder for programs of these sources, which is removed when the process ends."""
+    folder = mkdtemp(prefix="thenar-simavr-")
+    atexit.register(rmtree, folder, ignore_errors=True)
+    return Path(folder)
+
+
+@lru_cache
+def _built(sources: Path, program: str) -> Path:
+    built = _shelf(sources) / program
+    if gone := lacking(HOST_COMPILER, _MAKE):
+        raise FirmwareError(gone)
+    try:
+        call(["make", "-C", str(sources), f"BUILD={built.parent}", str(built)], sources)
+    except FirmwareError as error:
+        if "sim_avr.h" in str(error) or "lsimavr" in str(error):
+            raise FirmwareError("libsimavr not found; Debian: apt-get install libsimavr-dev") from None
+        raise
+    return built
+
+
+_CLOCK_HZ = 16_000_000  # of the simulated time, in which nothing is counted
 
 
 def run(
     files: Mapping[str, str],
     name: str,
     layout: Layout,
-    target: Target,
     frames: Frames,
+    part: str,
+    flags: Sequence[str],
     *,
     incremental: bool = False,
 ) -> Answers:
@@ -39,7 +98,7 @@ def run(
     """
     check_frames(frames, layout)
     answer = "update" if incremental else "classify"
-    command = [find(AVR_COMPILER), *STRICT, f"-mmcu={target.part}", "-Os"]
+    command = [find(AVR_COMPILER), *STRICT, *flags]
     program = harness("simavr_classify")
     main = {"main.c": render("checking/avr_main.c.j2", name=name, answer=answer)}
     with workshop({**files, **main}) as folder:
@@ -50,9 +109,10 @@ def run(
             _span(found, f"thenar_{name}_input", frames.shape[1]),
             _span(found, f"thenar_{name}_scores", 2 * len(layout.start)),
         )
-        clock = str(target.clock_hz or _CLOCK_HZ)
         places = hex(_symbol(found, f"thenar_{name}_{answer}").address), hex(_symbol(found, "_end").address)
-        printed = call([str(program), target.part, clock, "classifier.elf", *places, *spans], folder, frames.tobytes())
+        printed = call(
+            [str(program), part, str(_CLOCK_HZ), "classifier.elf", *places, *spans], folder, frames.tobytes()
+        )
     return _answers(printed, len(frames), layout)
 
 
