@@ -8,7 +8,7 @@ C: its cycles are those of avr-gcc 5.4 with -Os.
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Self
 
 import numpy as np
@@ -46,6 +46,7 @@ class Code:
         return self.cycles + self.calls * (counter_bytes - 2)
 
 
+@cache
 def code(text: str) -> Code:
     """Return the instructions whose mnemonics `text` holds; "taken" is a branch that is, "skip" one over a `jmp`, each
     of which takes no room, standing for what is in the text of the other path.

@@ -80,14 +80,6 @@ _RANGES = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class HurdleRow:
-    """By how many steps `leader` must be ahead of every class, in lines of C."""
-
-    leader: str
-    steps: list[str]
-
-
 def protocol_files(config: BoardConfig) -> dict[str, str]:
     """Return name -> text of the C of a board: configuration, frames, debouncing and protocol."""
     return {
@@ -129,14 +121,15 @@ def decided_files(
     return {f"thenar_{name}_decided.{end}": render(f"board/thenar_NAME_decided.{end}.j2", **values) for end in "hc"}
 
 
-def _hurdles(reach: Reach, unread: int, grasps: Sequence[str]) -> list[HurdleRow]:
-    rows = []
+def _hurdles(reach: Reach, unread: int, grasps: Sequence[str]) -> list[dict[str, object]]:
+    """Return by how many steps each leader must be ahead of every class, in lines of C."""
+    rows: list[dict[str, object]] = []
     for leader, grasp in enumerate(grasps):
         steps = [
             0 if rival == leader else min(most + (rival < leader), _NEVER)
             for rival, most in enumerate(reach.of(leader, unread))
         ]
-        rows.append(HurdleRow(grasp, wrap(", ".join(map(str, steps)), _WIDTH)))
+        rows.append({"leader": grasp, "steps": wrap(", ".join(map(str, steps)), _WIDTH)})
     return rows
 
 
