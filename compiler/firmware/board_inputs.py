@@ -5,9 +5,8 @@ from itertools import accumulate, pairwise
 from math import ceil
 from textwrap import fill
 
-from thenar.drivers.cyberglove_sensors import SENSORS_18, SENSORS_22
-from thenar.drivers.cyberglove_timing import period_words, shortest_us, told_us
-from thenar.drivers.i2c.chip import Reading, Write
+from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22, period_words, shortest_us, told_us
+from thenar.drivers.i2c.chips import Reading, Write
 from thenar.firmware_templates.rendering import render
 from thenar.runtime.harness.wiring import ChipWiring
 from thenar.runtime.manifest import Calibration

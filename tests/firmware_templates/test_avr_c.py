@@ -12,7 +12,7 @@ from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.layout import arrange
 from thenar.compiler.firmware.protocol import decided_files, protocol_files
 from thenar.compiler.firmware.targets.base import Mode
-from thenar.drivers.cyberglove_sensors import SENSORS_18
+from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.manifest import Calibration, Manifest, Options, Proof, Source, Switch
 from thenar.runtime.tables import IntegerTables
 
