@@ -14,7 +14,7 @@ from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.simavr import harness
 from thenar.compiler.firmware.targets import Target
 from thenar.compiler.firmware.tools import AVR_COMPILER, call, find, workshop
-from thenar.compiler.firmware.words import Numbered
+from thenar.compiler.firmware.words import numbered
 
 # As thenar's Makefiles compile: what is not called is not linked.
 _HOW = ("-Os", "-std=gnu99", "-w", "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections")
@@ -77,7 +77,7 @@ def of_ours(layout: Layout, target: Target, frames: Frames, expected: Scores, *,
     """Return what thenar's classifier takes for frames whose scores (n, K) are known; with `changes`, update()'s cost
     for every frame but the first, which has nothing to start from.
     """
-    files = classifier_files("glove", Numbered(layout.tables), layout, avr=True)
+    files = classifier_files("glove", numbered(layout.tables), layout, avr=True)
     called = ("classify", "update") if changes else ("classify",)
     body = " ".join(f"thenar_glove_{function}();" for function in called)
     program = {**files, "main.c": f'#include "thenar_glove.h"\nint main(void) {{ for (;;) {{ {body} }} }}\n'}
@@ -113,7 +113,7 @@ def of_peer(peer: Peer, target: Target) -> Cost:
 
 def instructions(layout: Layout, core: Target, frames: Frames, expected: Scores) -> int:
     """Return the most instructions that a frame takes on a Cortex-M. Raises FirmwareError if any score is wrong."""
-    files = classifier_files("glove", Numbered(layout.tables), layout, avr=False)
+    files = classifier_files("glove", numbered(layout.tables), layout, avr=False)
     answers = core.run(files, "glove", layout, frames)
     if answers.cost is None or (answers.scores != expected).any():
         raise FirmwareError(f"{core.part} gives other scores than Python")

@@ -2,9 +2,8 @@
 
 import shlex
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 from rich.table import Table
@@ -131,7 +130,7 @@ def command(
     if output is not None:
         write_folder(files, output, overwrite=overwrite)
     if as_json:
-        print_json(_told(fit, measured, sorted(files)))
+        print_json(_document(fit, measured, sorted(files)))
     else:
         if mode != "scan":
             _print(fit, measured, frontier=frontier, updates=mode == "glove")
@@ -156,7 +155,7 @@ def _check(target: "Target", mode: "Mode", *, writes: bool, counts: bool, calibr
 def _print(fit: "Fit", measured: "Measured | None", *, frontier: bool, updates: bool) -> None:
     console = out()
     if frontier:
-        console.print(frontier_table(fit))
+        console.print(_frontier_table(fit))
     console.print(f"layout {fit.words}", soft_wrap=True)
     if fit.target.own_layout:
         console.print(f"expected: {_expected(fit, updates)}", soft_wrap=True)
@@ -173,84 +172,53 @@ def _expected(fit: "Fit", updates: bool) -> str:
     return f"{fit.target.bound} {times}, {cost.flash} bytes of flash{less}, {cost.ram} of RAM"
 
 
-@dataclass(frozen=True, slots=True)
-class LayoutRow:
-    """A layout than which none is both faster and smaller: `time` of a frame and bytes, as in ToldCost; `lookup` is how
-    many switches share a look-up at most.
+def _layouts(fit: "Fit") -> list[dict[str, Any]]:
+    """Return the frontier that a layout was chosen from, fastest first: `time` of a frame, bytes, and how many switches
+    share a `lookup` at most.
     """
-
-    entry_bits: int
-    lookup: int
-    bins: str
-    adding: str
-    time: int
-    flash: int
-    ram: int
-    chosen: bool
-
-
-@dataclass(frozen=True, slots=True)
-class ToldCost:
-    """What a classifier costs by the model: the `time` of a frame in `unit`, and bytes; `bound` says whether these are
-    bounds, as on an AVR, or estimates.
-    """
-
-    time: int
-    unit: str
-    flash: int
-    flash_classify: int
-    ram: int
-    bound: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Told:
-    """All that is told of firmware; on this machine nothing is counted, and there is no cost."""
-
-    part: str
-    layout: str
-    cost: ToldCost | None
-    frontier: list[LayoutRow]
-    measured: "Measured | None"
-    files: list[str]
-
-
-def cost_told(fit: "Fit") -> ToldCost:
-    """Return what the chosen layout costs."""
-    cost = fit.choice.cost
-    return ToldCost(cost.cycles, fit.target.unit, cost.flash, cost.flash_classify, cost.ram, fit.target.avr)
-
-
-def layouts(fit: "Fit") -> list[LayoutRow]:
-    """Return the frontier that a layout was chosen from, fastest first."""
     return [
-        LayoutRow(
-            entry_bits=layout.entry_bits,
-            lookup=max(map(len, layout.groups), default=0),
-            bins=layout.bins if layout.joints else "",
-            adding=layout.adding if fit.target.avr else "",
-            time=cost.cycles,
-            flash=cost.flash,
-            ram=cost.ram,
-            chosen=layout is fit.choice.layout,
-        )
+        {
+            "entry_bits": layout.entry_bits,
+            "lookup": max(map(len, layout.groups), default=0),
+            "bins": layout.bins if layout.joints else "",
+            "adding": layout.adding if fit.target.avr else "",
+            "time": cost.cycles,
+            "flash": cost.flash,
+            "ram": cost.ram,
+            "chosen": layout is fit.choice.layout,
+        }
         for layout, cost in fit.choice.frontier
     ]
 
 
-def frontier_table(fit: "Fit") -> Table:
+def _frontier_table(fit: "Fit") -> Table:
     """Return the frontier as a table, the chosen layout marked."""
     table = Table(title=f"Layouts for {fit.target.part}, {fit.target.bound}")
     for heading in ("", "bits", "switches a look-up", "codes", "rows added", fit.target.unit, "flash", "RAM"):
         table.add_column(heading, justify="left" if heading in ("", "codes", "rows added") else "right")
-    for row in layouts(fit):
-        numbers = str(row.time), str(row.flash), str(row.ram)
-        mark, lookup = "*" if row.chosen else "", str(row.lookup or "")
-        table.add_row(mark, str(row.entry_bits), lookup, row.bins, row.adding, *numbers)
+    for row in _layouts(fit):
+        mark, lookup = "*" if row["chosen"] else "", str(row["lookup"] or "")
+        numbers = (str(row[key]) for key in ("time", "flash", "ram"))
+        table.add_row(mark, str(row["entry_bits"]), lookup, row["bins"], row["adding"], *numbers)
     return table
 
 
-def _told(fit: "Fit", measured: "Measured | None", files: list[str]) -> Told:
-    counted = fit.target.own_layout
-    cost, frontier = (cost_told(fit), layouts(fit)) if counted else (None, [])
-    return Told(fit.target.part, fit.words, cost, frontier, measured, files)
+def _document(fit: "Fit", measured: "Measured | None", files: list[str]) -> dict[str, object]:
+    """Return all that --json tells; on this machine nothing is counted, and there is no cost."""
+    counted, cost = fit.target.own_layout, fit.choice.cost
+    costs = {
+        "time": cost.cycles,
+        "unit": fit.target.unit,
+        "flash": cost.flash,
+        "flash_classify": cost.flash_classify,
+        "ram": cost.ram,
+        "bound": fit.target.avr,
+    }
+    return {
+        "part": fit.target.part,
+        "layout": fit.words,
+        "cost": costs if counted else None,
+        "frontier": _layouts(fit) if counted else [],
+        "measured": measured,
+        "files": files,
+    }

@@ -21,7 +21,7 @@ from .words import Names, check_name
 class Firmware:
     """Firmware of `tables` for `target`, one of TARGETS, in `mode`.
 
-    names        what grasp types, switches and joints are called: a build's manifest, or words.Numbered(tables)
+    names        what grasp types, switches and joints are called: a build's manifest, or words.numbered(tables)
     mode         "classify": a library; "scan": a board that scans switches; "glove": one that also recognises
     name         what its files and functions are called: lower-case letters, digits and _, at most 32
     board        how the microcontroller is wired: needed by the modes scan and glove, and only by them

@@ -15,7 +15,7 @@ _LONGEST_NAME = 32
 
 
 class Names(Protocol):
-    """What firmware says of a build besides its tables. A Manifest is one; so is `Numbered`."""
+    """What firmware says of a build besides its tables. A Manifest is one, and `numbered(tables)`."""
 
     @property
     def grasps(self) -> tuple[str, ...]:
@@ -45,30 +45,24 @@ class Names(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Numbered:
-    """Names for tables that belong to no build: grasp types, switches and joints are numbered."""
+    """Names of nothing but numbers, for tables that belong to no build: see `numbered`."""
 
-    tables: IntegerTables
-    thenar: str = version("thenar")
+    grasps: tuple[str, ...]
+    switches: tuple[Switch, ...]
+    joints: tuple[Calibration, ...]
+    tables_sha256: str
+    thenar: str
 
-    @property
-    def grasps(self) -> tuple[str, ...]:
-        """The types 0, 1..."""
-        return tuple(f"type {number}" for number in range(self.tables.n_classes))
 
-    @property
-    def switches(self) -> tuple[Switch, ...]:
-        """The switches s0, s1..."""
-        return tuple(Switch(number, f"s{number}", 0.0) for number in range(self.tables.n_switches))
-
-    @property
-    def joints(self) -> tuple[Calibration, ...]:
-        """The joints j0, j1..., in codes of their own."""
-        return tuple(Calibration(number, f"j{number}", "raw", 0, 0.0, 1, 1.0) for number in range(self.tables.n_joints))
-
-    @property
-    def tables_sha256(self) -> str:
-        """That of tables.bin."""
-        return hashlib.sha256(tables_to_bytes(self.tables)).hexdigest()
+def numbered(tables: IntegerTables) -> Numbered:
+    """Return names for tables alone: "type 0", "s0", "j0" and so on."""
+    return Numbered(
+        grasps=tuple(f"type {number}" for number in range(tables.n_classes)),
+        switches=tuple(Switch(number, f"s{number}", 0.0) for number in range(tables.n_switches)),
+        joints=tuple(Calibration(number, f"j{number}", "raw", 0, 0.0, 1, 1.0) for number in range(tables.n_joints)),
+        tables_sha256=hashlib.sha256(tables_to_bytes(tables)).hexdigest(),
+        thenar=version("thenar"),
+    )
 
 
 def check_name(name: str) -> None:

@@ -16,7 +16,7 @@ from ...firmware.generate import Firmware
 from ...firmware.simavr import harness
 from ...firmware.targets import TARGETS
 from ...firmware.tools import call, workshop
-from ...firmware.words import Numbered
+from ...firmware.words import numbered
 from .beside_wire import beside_wire
 from .measured_cycles import Outcome
 from .python_times import random_tables
@@ -76,7 +76,7 @@ def simulated_scan_us(trial: ScanTrial) -> float:
     numbers = {name: number for number, name in enumerate(glove.switches)}
     tables = random_tables(trial.switches, 0, 2)
     board = _board(trial, bus)
-    firmware = Firmware(tables, Numbered(tables), trial.target, "scan", board=board)
+    firmware = Firmware(tables, numbered(tables), trial.target, "scan", board=board)
     slowed, always = f"THENAR_SCAN_US UINT32_C({board.scan_us})", "THENAR_SCAN_US UINT32_C(1)"
     files = {name: text.replace(slowed, always) for name, text in firmware.files().items()}
     with workshop(files) as folder:

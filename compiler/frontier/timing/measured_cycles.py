@@ -6,7 +6,7 @@ from ...firmware.choose import Option
 from ...firmware.classifier import LIBRARY_NAME, Library
 from ...firmware.measuring import run_counted, slow_frames
 from ...firmware.targets import Target
-from ...firmware.words import Numbered
+from ...firmware.words import numbered
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,5 +33,5 @@ class Outcome:
 def run_trial(trial: Trial) -> Outcome:
     """Compile the layout and run the frame that should take longest, and extreme ones. Raises FirmwareError."""
     layout, cost = trial.option
-    library = Library(LIBRARY_NAME, Numbered(layout.tables), layout, trial.part.avr)
+    library = Library(LIBRARY_NAME, numbered(layout.tables), layout, trial.part.avr)
     return Outcome(cost.cycles, float(run_counted(library, trial.part, slow_frames(layout)).most))

@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,6 +21,11 @@ def test_every_target_says_what_it_is_and_what_to_do_with_its_folder(name: str) 
     if target.kind not in ("", "host"):
         assert target.compiler is not None
         assert target.size is not None
+
+
+def test_the_page_on_firmware_names_every_target() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "firmware.md").read_text()
+    assert [name for name in TARGETS if f"`{name}`" not in page] == []
 
 
 def test_an_atmega328p_has_32_kib_of_flash_and_2_of_ram() -> None:
