@@ -64,6 +64,8 @@ def together(pieces: Iterable[Code]) -> Code:
     return sum(pieces, Code())
 
 
+# The search for a code's row, as avr-gcc 5.4 makes it of find() and below(). Another compiler may make something else
+# of it: where cycles matter, there are layouts without a search.
 # classify() calls find() and jumps on; find() saves four registers, and calls below() for each joint.
 _CLASSIFY, _FIND = code("call jmp"), code("push push push push ldi ldi ldi ldi pop pop pop pop ret")
 _JOINT = {8: code("movw ld ldi ldi ldi call st"), 16: code("movw ld ld ldi ldi ldi call st")}

@@ -91,7 +91,7 @@ MOST_TABLE_ROWS = 65535  # their numbers are 16 bits wide
 Adding = Literal["called", "unrolled"]
 
 
-MOST_CLASSES = 14
+MOST_CLASSES = 14  # of a pass: an AVR has registers for fourteen sums of 16 bits
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,9 @@
-"""A build whose joints are coded in any way, as the same build for the bytes that one hand's CyberGlove sends."""
+"""A build whose joints are coded in any way, as the same build for the bytes that one hand's CyberGlove sends.
+
+Recordings of several hands share one scale of codes; the runtime turns a hand's bytes into codes by its calibration,
+and then codes into bins. Firmware does both at once: the bin of a byte is the bin of its code, so every answer stays
+what it was, and thresholds that no byte parts fall away.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,9 +1,12 @@
-"""The compiled classifier on an AVR in libsimavr: every frame, its cycles, and the stack it takes."""
+"""The compiled classifier on an AVR in libsimavr: every frame, its cycles, and the stack it takes.
+
+The programs that run AVR code are linked to libsimavr, which is under the GPL 3, and so are no part of the product:
+`verify` and the tests build them from the sources in a checkout of thenar, when they are first needed.
+"""
 
 import atexit
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from shutil import rmtree
@@ -18,6 +21,7 @@ from .errors import FirmwareError
 from .layout import Layout
 from .tools import AVR_COMPILER, HOST_COMPILER, STRICT, Tool, call, find, lacking, workshop
 
+_CLOCK_HZ = 16_000_000  # of the simulated time, in which nothing is counted
 _MAKE: Tool = (("make",), "make")
 
 
@@ -73,9 +77,6 @@ def _built(sources: Path, program: str) -> Path:
     return built
 
 
-_CLOCK_HZ = 16_000_000  # of the simulated time, in which nothing is counted
-
-
 def run(
     files: Mapping[str, str],
     name: str,
@@ -109,37 +110,31 @@ def run(
             _span(found, f"thenar_{name}_input", frames.shape[1]),
             _span(found, f"thenar_{name}_scores", 2 * len(layout.start)),
         )
-        places = hex(_symbol(found, f"thenar_{name}_{answer}").address), hex(_symbol(found, "_end").address)
+        places = (hex(_symbol(found, symbol)[0]) for symbol in (f"thenar_{name}_{answer}", "_end"))
         printed = call(
             [str(program), part, str(_CLOCK_HZ), "classifier.elf", *places, *spans], folder, frames.tobytes()
         )
     return _answers(printed, len(frames), layout)
 
 
-@dataclass(frozen=True, slots=True)
-class _Symbol:
-    address: int
-    size: int
-
-
-def _symbols(folder: Path) -> dict[str, _Symbol]:
-    """Return the symbols of the compiled program, data from 0x800000 on."""
+def _symbols(folder: Path) -> dict[str, tuple[int, int]]:
+    """Return address and size of the symbols of the compiled program, data from 0x800000 on."""
     lines = call(["avr-nm", "--format=posix", "classifier.elf"], folder).decode().splitlines()
     words = [line.split() for line in lines]
-    return {word[0]: _Symbol(int(word[2], 16), int(word[3], 16) if len(word) > 3 else 0) for word in words}
+    return {word[0]: (int(word[2], 16), int(word[3], 16) if len(word) > 3 else 0) for word in words}
 
 
-def _symbol(found: Mapping[str, _Symbol], name: str) -> _Symbol:
+def _symbol(found: Mapping[str, tuple[int, int]], name: str) -> tuple[int, int]:
     if name not in found:
         raise FirmwareError(f"the compiled program has no {name}")
     return found[name]
 
 
-def _span(found: Mapping[str, _Symbol], name: str, size: int) -> str:
-    symbol = _symbol(found, name)
-    if symbol.size != size:
-        raise FirmwareError(f"{name} has {symbol.size} bytes in the compiled program, its layout says {size}")
-    return f"{symbol.address:#x}:{size}"
+def _span(found: Mapping[str, tuple[int, int]], name: str, size: int) -> str:
+    address, held = _symbol(found, name)
+    if held != size:
+        raise FirmwareError(f"{name} has {held} bytes in the compiled program, its layout says {size}")
+    return f"{address:#x}:{size}"
 
 
 def _answers(printed: bytes, frames: int, layout: Layout) -> Answers:
