@@ -1,4 +1,7 @@
-"""`verify_firmware`: do compiled classifiers answer as Python does, in every score of every frame that is tried?"""
+"""Do compiled classifiers answer as Python does, in every score of every frame that is tried?
+
+And is the firmware that a build carries what would be made of it today?
+"""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -8,26 +11,60 @@ import numpy as np
 from msgspec import Struct
 
 from thenar.runtime.build import Build
+from thenar.runtime.files import read_file
+from thenar.runtime.manifest import Manifest
 from thenar.runtime.scorer import LANE_OFFSET
 from thenar.runtime.tables import IntegerTables
 
 from ..firmware.answers import Answers
 from ..firmware.choose import Fit, fit_for, smallest_fit
-from ..firmware.classifier import LIBRARY_NAME, classifier_files
+from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES, LIBRARY_NAME, Library, classifier_files
 from ..firmware.errors import FirmwareError
+from ..firmware.folder import LARGEST
 from ..firmware.probes import Probes, extreme_frames, joined, random_frames
 from ..firmware.targets import TARGETS
 from ..firmware.targets import kinds as every_kind
 from ..recordings.graspset import GraspSet
-from .carried import Carried, carried_firmware
 from .select import select_inputs
 
 RANDOM_FRAMES = 10_000
 _SEED = 1
-
-
 Answer = Literal["classify", "update"]
 ANSWERS: tuple[Answer, ...] = ("classify", "update")
+
+
+class Carried(Struct, frozen=True):
+    """Whether a build has the folder `firmware/`, and which of its files are not what thenar makes of the build now."""
+
+    present: bool
+    outdated: tuple[str, ...]
+
+
+def made_firmware(manifest: Manifest, tables: IntegerTables) -> tuple[dict[str, str], str]:
+    """Return path in the build -> text of its firmware, and a sentence that says what for, or why there is none."""
+    try:
+        fit = smallest_fit(tables)
+        made = Library(LIBRARY_NAME, manifest, fit.choice.layout, fit.target.avr, fit.notes()).files
+    except FirmwareError as reason:
+        return {}, f"no firmware: {reason}"
+    return {f"{FIRMWARE_NAME}/{name}": text for name, text in made.items()}, f"firmware {fit.words}"
+
+
+def carried_firmware(folder: Path, build: Build) -> Carried:
+    """Return how the firmware in the build `folder` stands."""
+    if not (folder / FIRMWARE_NAME).is_dir():
+        return Carried(False, ())
+    made, _ = made_firmware(build.manifest, build.tables)
+    now = {name: text.encode() for name, text in made.items()}
+    names = [f"{FIRMWARE_NAME}/{name}" for name in LIBRARY_FILES]
+    return Carried(True, tuple(name for name in names if now.get(name) != _content(folder / name)))
+
+
+def _content(path: Path) -> bytes | None:
+    try:
+        return read_file(path, LARGEST, FirmwareError)
+    except (OSError, FirmwareError):
+        return None
 
 
 class Difference(Struct, frozen=True):
@@ -152,10 +189,12 @@ def verify_firmware(
 
     "host" runs with the address and undefined behaviour sanitizers, "avr" is the smallest AVR that the classifier fits,
     "cortex-m" both cores. Each is run from nothing for every frame, and once more from the changes between frames, on
-    "host" and "cortex-m" with every switch set by set_switch() and every name asked for. Of a
-    build that no AVR holds, host runs the layout of the larger core. Raises FirmwareError where a tool is missing or a
-    part cannot hold the build, else as `verify_build` does.
+    "host" and "cortex-m" with every switch set by set_switch() and every name asked for. Of a build that no AVR holds,
+    host runs the layout of the larger core. Raises FirmwareError where a tool is missing, a kind is none of
+    `firmware.targets.kinds()`, or a part cannot hold the build, else as `verify` does.
     """
+    if unknown := [kind for kind in kinds if kind not in every_kind()]:
+        raise FirmwareError(f"nothing runs firmware for {unknown[0]!r}: choose among {', '.join(every_kind())}")
     build = Build.load(folder)
     fits = [fit for kind in every_kind() if kind in kinds for fit in _fits(build.tables, kind)]
     for fit in fits:

@@ -18,6 +18,9 @@ from .words import Names, comment, inputs_in_words, string
 
 LIBRARY_NAME = "glove"
 """What the library is called unless it is named: its files are thenar_glove.h and so on, its functions alike."""
+FIRMWARE_NAME = "firmware"
+LIBRARY_FILES = tuple(f"thenar_{LIBRARY_NAME}{ending}" for ending in (".h", ".c", "_avr.S"))
+"""The folder of a build that carries the library, and what it may hold."""
 
 COLUMNS = 120
 _FOLDER = "classifier/"
