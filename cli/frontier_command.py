@@ -5,20 +5,24 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from thenar.compiler.frontier.targets import TARGETS
-
-from .common import any_path, err, existing_file, existing_folder, json_flag, out, print_json, progress
+from .common import Listed, any_path, err, existing_file, existing_folder, json_flag, out, print_json, progress
 from .methods import WithMethods, method_names
 
 if TYPE_CHECKING:
     from thenar.compiler.frontier.points import Frontier
 
 
+def _timed() -> tuple[str, ...]:
+    from thenar.compiler.firmware.targets import timed
+
+    return timed()
+
+
 @click.command("frontier", cls=WithMethods)
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option("-o", "--output", type=any_path, required=True, help="Folder for tables, pictures and the store.")
 @click.option("--glove", type=existing_file, help="A glove.toml: try its wiring as well, and choose by its ports.")
-@click.option("--target", type=click.Choice(TARGETS), default="host", show_default=True, help="What classifies.")
+@click.option("--target", type=Listed(_timed), default="host", show_default=True, help="What classifies.")
 @click.option("--budget-us", type=click.FloatRange(min=0, min_open=True), help="Pick the best within so long a frame.")
 @click.option("--rate", type=click.FloatRange(0, 1, min_open=True), help="Pick the fastest that recognises this share.")
 @click.option("--build", type=existing_folder, help="A build of yours: mark it on the pictures.")

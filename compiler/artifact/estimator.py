@@ -16,9 +16,10 @@ from ..boosting.classifier import LogitBoostClassifier
 from ..boosting.stumps import Stumps
 from ..evaluation.folds import weka_folds
 from ..firmware.board import Board
+from ..firmware.classifier import LIBRARY_NAME
 from ..firmware.folder import write_folder
-from ..firmware.generate import Mode, Request, firmware_files, fit_of
-from ..firmware.library_names import LIBRARY_NAME
+from ..firmware.generate import Firmware
+from ..firmware.targets.base import Mode
 from ..placement.methods.base import METHODS, PAPERS
 from ..placement.placement import information_alone
 from ..placement.selectors import SwitchSelector
@@ -64,7 +65,7 @@ class Build(LoadedBuild):
         folder : path
             The folder to write.
         target : str
-            A platform of `thenar firmware --target`.
+            What `thenar firmware --target` calls it: one of `thenar.compiler.firmware.targets.TARGETS`.
         mode : {"classify", "scan", "glove"}
             The classifier alone, a board that scans, or a glove that recognises by itself.
         board : Board, optional
@@ -78,12 +79,12 @@ class Build(LoadedBuild):
 
         Raises
         ------
+        MemberError
+            If there is no such target.
         FirmwareError
             If the target cannot hold the build, or these do not go together.
         """
-        request = Request(self, target, mode, name, board, flash)
-        fit = fit_of(request)
-        files = firmware_files(request, fit, fit.notes())
+        files = Firmware(self.tables, self.manifest, target, mode, name, board, flash).files()
         write_folder(files, Path(folder), overwrite=overwrite)
         return tuple(Path(folder) / path for path in files)
 

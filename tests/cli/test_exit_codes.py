@@ -174,7 +174,7 @@ def test_the_extras_in_hints_are_those_of_the_project() -> None:
     [
         ("compile {set} -o {new}", "", "compiler"),
         ("compile {set} -o {new} --no-report", "", "compiler"),
-        ("verify {build} {set}", "", "compiler"),
+        ("verify {build} {set} --firmware host", "", "compiler"),
         ("firmware {build} --target host -o {new}", "", "compiler"),
         ("frontier {set} -o {new}", "", "compiler"),
         ("evaluate {set}", "", "compiler"),

@@ -19,7 +19,7 @@ from thenar.cli.from_frontier import picked
 from thenar.cli.kept_files import kept_names
 from thenar.compiler.artifact.verify import verify
 from thenar.compiler.firmware.folder import sums, write_folder
-from thenar.compiler.firmware.generate import Request, firmware_files, fit_of
+from thenar.compiler.firmware.generate import Firmware
 from thenar.compiler.frontier import points
 from thenar.compiler.frontier.drawing.table import csv_bytes
 from thenar.compiler.frontier.storing.store import HEADER, Store
@@ -108,8 +108,7 @@ def _spec(build: Build, _folder: Path) -> None:
 
 
 def _firmware(build: Build, _folder: Path) -> None:
-    request = Request(build, "host")
-    firmware_files(request, fit_of(request))
+    Firmware(build.tables, build.manifest, "host").files()
 
 
 def _member(name: str, mutate: Mutate, sealed_again: Callable[[bytes], bytes]) -> Format:

@@ -8,11 +8,9 @@ import pytest
 import thenar.simulator.scenes
 from thenar.compiler import compile_build
 from thenar.compiler.artifact.select import select_inputs
-from thenar.compiler.firmware import avr_harness
+from thenar.compiler.firmware import simavr
 from thenar.compiler.firmware.answers import Answers
-from thenar.compiler.firmware.avr_runner import run
 from thenar.compiler.firmware.classifier import classifier_files
-from thenar.compiler.firmware.costs import cost_of
 from thenar.compiler.firmware.errors import FirmwareError
 from thenar.compiler.firmware.layout import Adding, Layout, arrange
 from thenar.compiler.firmware.probes import Probes, random_frames
@@ -28,7 +26,7 @@ Describe = Callable[[IntegerTables], Manifest]
 Probed = Callable[[IntegerTables, int], Probes]
 Compare = Callable[[Answers, IntegerTables, Probes], None]
 
-SMALL, LARGE = TARGETS["atmega328p"], TARGETS["atmega2560"]
+SMALL, LARGE = TARGETS["avr328p"], TARGETS["avr2560"]
 HEADER = """
 #include <stdint.h>
 typedef struct { uint8_t switches[1]; } thenar_test_frame;
@@ -64,7 +62,7 @@ BOTH = pytest.mark.parametrize("target", [SMALL, LARGE], ids=["328P", "2560"])
 @pytest.fixture(autouse=True)
 def installed(tool: Callable[[str], str]) -> None:
     tool("avr-gcc")
-    if (gone := avr_harness.missing()) is not None:
+    if (gone := simavr.missing()) is not None:
         assert "libsimavr" in gone, gone
         tool("libsimavr-dev")
 
@@ -96,7 +94,7 @@ def answered(
 ) -> Answers:
     files = classifier_files("test", describe(tables), layout, avr=True)
     given = layout.frame_bytes(frames.bits, frames.codes)
-    return run(files, "test", layout, target, given, incremental=incremental)
+    return target.run(files, "test", layout, given, incremental=incremental)
 
 
 @BOTH
@@ -109,7 +107,7 @@ def test_every_score_of_recordings_is_that_of_the_build(
     layout = arrange(build.tables, bins="search")
     files = classifier_files("test", build.manifest, layout, avr=True)
     given = layout.frame_bytes(frames.bits, frames.codes)
-    same_as_python(run(files, "test", layout, target, given, incremental=incremental), build.tables, frames)
+    same_as_python(target.run(files, "test", layout, given, incremental=incremental), build.tables, frames)
 
 
 @BOTH
@@ -152,7 +150,7 @@ def test_no_frame_takes_longer_than_the_static_bound_nor_far_less(
     answers = answered(tables, describe, layout, target, probed(tables, 200))
     assert answers.cost is not None
     assert answers.unit == "cycles"
-    bound = cost_of(layout, target).cycles
+    bound = target.cost(layout).cycles
     print(f"{answers.cost.min()} to {answers.cost.max()} cycles, bound {bound}, {answers.stack} bytes of stack")
     assert bound - 16 <= answers.cost.max() <= bound
 
@@ -163,7 +161,7 @@ def test_stack_cycles_and_answers_are_those_of_the_function_alone(target: Target
     tables = one_switch()
     layout = arrange(tables)
     frames = layout.frame_bytes(np.array([[False], [True]]), np.empty((2, 0), np.uint16))
-    answers = run(BY_HAND, "test", layout, target, frames)
+    answers = target.run(BY_HAND, "test", layout, frames)
     assert answers.cost is not None
     assert answers.cost.tolist()[1] - answers.cost.tolist()[0] == 3 * 100
     assert answers.stack == 8 + (2 if target is SMALL else 3)
@@ -199,16 +197,16 @@ def children_s() -> float:
 def test_files_that_are_no_such_classifier_are_an_error(changed: dict[str, str], said: str) -> None:
     layout = arrange(one_switch())
     with pytest.raises(FirmwareError, match=said):
-        run({**BY_HAND, **changed}, "test", layout, SMALL, np.ones((1, 1), np.uint8))
+        SMALL.run({**BY_HAND, **changed}, "test", layout, np.ones((1, 1), np.uint8))
 
 
 def test_frames_of_another_size_are_refused() -> None:
     with pytest.raises(FirmwareError, match="this layout takes uint8"):
-        run(BY_HAND, "test", arrange(one_switch()), SMALL, np.zeros((1, 2), np.uint8))
+        SMALL.run(BY_HAND, "test", arrange(one_switch()), np.zeros((1, 2), np.uint8))
 
 
 def test_no_frames_have_no_answers() -> None:
-    answers = run(BY_HAND, "test", arrange(one_switch()), SMALL, np.zeros((0, 1), np.uint8))
+    answers = SMALL.run(BY_HAND, "test", arrange(one_switch()), np.zeros((0, 1), np.uint8))
     assert (answers.scores.shape, answers.stack) == ((0, 2), None)
 
 
@@ -217,12 +215,12 @@ def test_what_is_missing_is_named_with_the_packages_that_bring_it(
 ) -> None:
     with monkeypatch.context() as changed:
         changed.setenv("THENAR_SIMAVR", str(tmp_path))
-        assert "has no harness for simavr: set THENAR_SIMAVR" in str(avr_harness.missing())
+        assert "has no harness for simavr: set THENAR_SIMAVR" in str(simavr.missing())
         lacks_libsimavr = "all:\n%:\n\t@echo 'fatal error: simavr/sim_avr.h: No such file' >&2; exit 1\n"
         (tmp_path / "Makefile").write_text(lacks_libsimavr)
         (tmp_path / "simavr_classify.c").touch()
-        assert avr_harness.missing() == "libsimavr not found; Debian: apt-get install libsimavr-dev"
+        assert simavr.missing() == "libsimavr not found; Debian: apt-get install libsimavr-dev"
     monkeypatch.setenv("PATH", str(tmp_path))
-    gone = avr_harness.missing()
+    gone = simavr.missing()
     assert gone is not None
     assert gone.endswith("Debian: apt-get install gcc-avr avr-libc gcc make")

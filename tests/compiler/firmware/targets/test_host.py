@@ -9,14 +9,12 @@ from hypothesis import strategies as st
 from thenar.compiler.firmware.answers import Answers
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.errors import FirmwareError
-from thenar.compiler.firmware.host_runner import run
 from thenar.compiler.firmware.layout import Layout, arrange
 from thenar.compiler.firmware.probes import Probes
-from thenar.compiler.firmware.targets import TARGETS
+from thenar.compiler.firmware.targets.host import MEMBER as HOST
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
 
-HOST = TARGETS["host"]
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
 Probed = Callable[[IntegerTables, int], Probes]
@@ -47,11 +45,10 @@ def test_every_score_and_class_is_python_s_without_a_warning_or_a_finding(
 ) -> None:
     tables = make_tables(classes=14, switches=33, joints=16)
     layout, frames = arrange(tables, entry_bits=entry_bits), probed(tables, 10_000)
-    answers = run(
+    answers = HOST.run(
         files(layout),
         "hand",
         layout,
-        HOST,
         layout.frame_bytes(frames.bits, frames.codes),
         incremental=incremental,
         compiler=Path(tool(compiler)).name,
@@ -87,7 +84,7 @@ def test_so_it_is_for_builds_of_any_shape(
     layout = arrange(tables, bins="search" if SHAPES[shape].get("highest", 0) > 254 else "direct")
     frames = probed(tables, 300)
     sent = layout.frame_bytes(frames.bits, frames.codes)
-    same_as_python(run(files(layout), "hand", layout, HOST, sent, incremental=incremental), tables, frames)
+    same_as_python(HOST.run(files(layout), "hand", layout, sent, incremental=incremental), tables, frames)
 
 
 @given(
@@ -119,7 +116,7 @@ def test_so_it_is_for_every_arrangement(
     layout = arrange(tables, group_size=group_size, entry_bits=entry_bits, bins=bins)  # type: ignore[arg-type]
     frames = probed(tables, 100)
     sent = layout.frame_bytes(frames.bits, frames.codes)
-    same_as_python(run(files(layout), "hand", layout, HOST, sent, incremental=incremental), tables, frames)
+    same_as_python(HOST.run(files(layout), "hand", layout, sent, incremental=incremental), tables, frames)
 
 
 STAND_IN = {
@@ -153,18 +150,18 @@ const char *thenar_hand_grasp(thenar_hand_class grasp) { return grasp == 4 ? "la
 
 def test_update_is_called_for_every_frame_and_then_switches_are_set_one_by_one(make_tables: MakeTables) -> None:
     layout, frames = arrange(make_tables()), np.full((3, 5), 2, np.uint8)
-    full = run(STAND_IN, "hand", layout, HOST, frames)
+    full = HOST.run(STAND_IN, "hand", layout, frames)
     assert full.classes.tolist() == [3, 3, 3]
     assert full.scores[:, :3].tolist() == [[1, 0, 0], [2, 0, 0], [3, 0, 0]]
     assert full.names == ("", "", "", "", "last")
-    updated = run(STAND_IN, "hand", layout, HOST, frames, incremental=True)
+    updated = HOST.run(STAND_IN, "hand", layout, frames, incremental=True)
     assert updated.classes.tolist() == [4, 4, 4]
     assert updated.scores[:, :3].tolist() == [[0, -1, 1], [0, -2, 2], [0, -3, 3]]
 
 
 def test_no_frames_have_no_answers(make_tables: MakeTables, files: Files) -> None:
     layout = arrange(make_tables())
-    answers = run(files(layout), "hand", layout, HOST, np.zeros((0, 5), np.uint8))
+    answers = HOST.run(files(layout), "hand", layout, np.zeros((0, 5), np.uint8))
     assert answers.scores.shape == (0, 5)
     assert answers.classes.shape == (0,)
 
@@ -180,14 +177,14 @@ OTHERS: dict[str, np.ndarray] = {
 def test_frames_of_another_layout_are_refused(make_tables: MakeTables, other: str) -> None:
     layout = arrange(make_tables())
     with pytest.raises(FirmwareError, match=r"this layout takes uint8 \(n, 5\)"):
-        run({}, "hand", layout, HOST, OTHERS[other])
+        HOST.run({}, "hand", layout, OTHERS[other])
 
 
 def test_a_warning_is_an_error_that_shows_it(make_tables: MakeTables, files: Files) -> None:
     layout = arrange(make_tables())
     untidy = files(layout) | {"untidy.c": "int twice(int x); int twice(int x) { int idle; return 2 * x; }\n"}
     with pytest.raises(FirmwareError, match=r"(?s)ended with 1: .*untidy\.c.*unused variable .*idle"):
-        run(untidy, "hand", layout, HOST, np.zeros((1, 5), np.uint8))
+        HOST.run(untidy, "hand", layout, np.zeros((1, 5), np.uint8))
 
 
 def test_a_sanitizer_s_finding_is_an_error_that_shows_it(make_tables: MakeTables, files: Files) -> None:
@@ -196,9 +193,9 @@ def test_a_sanitizer_s_finding_is_an_error_that_shows_it(make_tables: MakeTables
     head = "_classify(void)\n{\n"
     broken = made | {"thenar_hand.c": made["thenar_hand.c"].replace(head, head + OVERFLOW)}
     assert broken != made
-    run(broken, "hand", layout, HOST, np.zeros((1, 5), np.uint8))
+    HOST.run(broken, "hand", layout, np.zeros((1, 5), np.uint8), sanitize=False)
     with pytest.raises(FirmwareError, match="signed integer overflow"):
-        run(broken, "hand", layout, HOST, np.zeros((1, 5), np.uint8), sanitize=True)
+        HOST.run(broken, "hand", layout, np.zeros((1, 5), np.uint8), sanitize=True)
 
 
 OVERFLOW = "    volatile int most = 2147483647;\n    most = most + 1;\n"
@@ -209,7 +206,7 @@ def test_a_program_that_answers_too_few_frames_is_an_error(make_tables: MakeTabl
     made = files(layout)
     early = {"early.c": "#include <stdlib.h>\n__attribute__((constructor)) static void leave(void) { exit(0); }\n"}
     with pytest.raises(FirmwareError, match="printed 0 names for 5 grasp types"):
-        run(made | early, "hand", layout, HOST, np.zeros((2, 5), np.uint8))
+        HOST.run(made | early, "hand", layout, np.zeros((2, 5), np.uint8))
 
 
 def test_a_missing_compiler_is_named_with_its_package(
@@ -218,6 +215,6 @@ def test_a_missing_compiler_is_named_with_its_package(
     monkeypatch.setenv("PATH", str(tmp_path))
     layout = arrange(make_tables())
     with pytest.raises(FirmwareError, match="gcc or clang not found; Debian: apt-get install gcc"):
-        run({}, "hand", layout, HOST, np.zeros((1, 5), np.uint8))
+        HOST.run({}, "hand", layout, np.zeros((1, 5), np.uint8))
     with pytest.raises(FirmwareError, match="clang not found; Debian: apt-get install clang"):
-        run({}, "hand", layout, HOST, np.zeros((1, 5), np.uint8), compiler="clang")
+        HOST.run({}, "hand", layout, np.zeros((1, 5), np.uint8), compiler="clang")

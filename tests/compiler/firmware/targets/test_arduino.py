@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from thenar.compiler.firmware.arduino import arduino_files
-from thenar.compiler.firmware.classifier import classifier_files
+from thenar.compiler.firmware.classifier import Library as Files
 from thenar.compiler.firmware.layout import Layout, arrange
+from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
@@ -79,10 +79,7 @@ def library(describe: Describe, tmp_path: Path) -> Callable[..., Path]:
     """Return what writes the library "hand" of a layout."""
 
     def library(layout: Layout, avr: bool = True) -> Path:
-        manifest = describe(layout.tables)
-        own = classifier_files("hand", manifest, layout, avr=avr)
-        files = {f"src/{name}": text for name, text in own.items()}
-        for name, text in (files | arduino_files("hand", manifest, layout, avr=avr)).items():
+        for name, text in TARGETS["arduino"].files(Files("hand", describe(layout.tables), layout, avr)).items():
             path = tmp_path / "thenar_hand" / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text)
@@ -224,6 +221,7 @@ def test_names_that_are_no_words_of_c_do_no_harm(
     switches = tuple(replace(switch, name=name) for switch, name in zip(manifest.switches, names, strict=True))
     joints = (replace(manifest.joints[0], name="roll ??/"),)
     made = library(layout)
-    odd = arduino_files("hand", replace(manifest, switches=switches, joints=joints), layout, avr=True)
+    named = replace(manifest, switches=switches, joints=joints)
+    odd = TARGETS["arduino"].files(Files("hand", named, layout, avr=True))
     (made / "examples/Recognise/Recognise.ino").write_text(odd["examples/Recognise/Recognise.ino"])
     sketch(made, "uno")

@@ -8,15 +8,14 @@ from thenar.compiler.firmware.answers import Answers
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.layout import arrange
 from thenar.compiler.firmware.probes import Probes
-from thenar.compiler.firmware.running import run, toolchain_missing
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
 
 UNITS = {
     "host": "",
-    "atmega328p": "cycles",
-    "atmega2560": "cycles",
+    "avr328p": "cycles",
+    "avr2560": "cycles",
     "cortex-m0plus": "instructions",
     "cortex-m4": "instructions",
 }
@@ -34,13 +33,13 @@ def test_every_target_answers_as_python_does(
     incremental: bool,
 ) -> None:
     target = TARGETS[part]
-    if (missing := toolchain_missing(target)) is not None:
+    if (missing := target.missing()) is not None:
         tool(missing.split()[0])
     tables = make_tables(classes=7, switches=12, joints=4)
     layout, frames = arrange(tables), probed(tables, 500)
-    files = classifier_files("hand", describe(tables), layout, avr=target.kind == "avr")
+    files = classifier_files("hand", describe(tables), layout, avr=target.avr)
     sent = layout.frame_bytes(frames.bits, frames.codes)
-    answers = run(files, "hand", layout, target, sent, incremental=incremental)
+    answers = target.run(files, "hand", layout, sent, incremental=incremental)
     same_as_python(answers, tables, frames)
     assert answers.unit == UNITS[part]
     assert (answers.cost is None) == (part == "host")
@@ -51,7 +50,7 @@ NEEDED = {
     "host": "gcc or clang not found; Debian: apt-get install gcc",
     "cortex-m4": "arm-none-eabi-gcc and qemu-system-arm not found; "
     "Debian: apt-get install gcc-arm-none-eabi qemu-system-arm",
-    "atmega328p": "avr-gcc and gcc or clang and make not found; Debian: apt-get install gcc-avr avr-libc gcc make",
+    "avr328p": "avr-gcc and gcc or clang and make not found; Debian: apt-get install gcc-avr avr-libc gcc make",
 }
 
 
@@ -60,4 +59,4 @@ def test_missing_tools_are_named_before_anything_is_run(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, part: str
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert toolchain_missing(TARGETS[part]) == NEEDED[part]
+    assert TARGETS[part].missing() == NEEDED[part]

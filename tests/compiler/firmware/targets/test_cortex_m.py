@@ -6,11 +6,10 @@ import pytest
 
 from thenar.compiler.firmware.answers import Answers
 from thenar.compiler.firmware.classifier import classifier_files
-from thenar.compiler.firmware.cortex_runner import run
 from thenar.compiler.firmware.errors import FirmwareError
 from thenar.compiler.firmware.layout import Layout, arrange
 from thenar.compiler.firmware.probes import Probes
-from thenar.compiler.firmware.targets import TARGETS, Target
+from thenar.compiler.firmware.targets.cortex_m import MEMBER
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
 
@@ -18,6 +17,7 @@ from thenar.runtime.tables import IntegerTables
 pytestmark = pytest.mark.slow
 
 PARTS = ("cortex-m0plus", "cortex-m4")
+CORES = {core.part: core for core in MEMBER}
 # Of classify() for 33 switches and 16 joints with 14 classes.
 MOST_INSTRUCTIONS = {
     ("cortex-m0plus", 16): 850,
@@ -54,7 +54,7 @@ def test_every_score_and_class_is_python_s_in_few_instructions(
     layout, frames = arrange(tables, entry_bits=entry_bits), probed(tables, 10_000)
     files = classifier_files("hand", describe(tables), layout, avr=False)
     sent = layout.frame_bytes(frames.bits, frames.codes)
-    answers = run(files, "hand", layout, TARGETS[part], sent, incremental=incremental)
+    answers = CORES[part].run(files, "hand", layout, sent, incremental=incremental)
     same_as_python(answers, tables, frames)
     assert answers.unit == "instructions"
     assert answers.cost is not None
@@ -84,7 +84,7 @@ def test_so_it_is_for_builds_of_any_shape(
     layout, frames = arrange(tables, bins="search"), probed(tables, 100)
     files = classifier_files("hand", describe(tables), layout, avr=False)
     sent = layout.frame_bytes(frames.bits, frames.codes)
-    same_as_python(run(files, "hand", layout, TARGETS[part], sent), tables, frames)
+    same_as_python(CORES[part].run(files, "hand", layout, sent), tables, frames)
 
 
 # A stand-in for a classifier, whose classify() is given: in assembly its instructions can be counted by hand.
@@ -153,7 +153,7 @@ def test_the_count_of_instructions_is_exact(layout: Layout, part: str) -> None:
     turns = np.arange(256).repeat(4)
     frames = np.zeros((len(turns), 5), np.uint8)
     frames[:, 0] = turns
-    answers = run(stand_in(COUNTED), "hand", layout, TARGETS[part], frames)
+    answers = CORES[part].run(stand_in(COUNTED), "hand", layout, frames)
     assert np.array_equal(answers.classes, turns)
     assert answers.cost is not None
     assert np.array_equal(answers.cost, 4 + 2 * (turns + 1) + 1)
@@ -166,11 +166,11 @@ UPDATED = "uint8_t thenar_hand_update(void) { thenar_hand_scores[1]--; return 4;
 def test_update_is_called_for_every_frame_and_then_switches_are_set_one_by_one(layout: Layout) -> None:
     files = {"thenar_hand.h": HEADER, "thenar_hand.c": STATE + CALLED + UPDATED}
     frames = np.full((3, 5), 2, np.uint8)
-    full = run(files, "hand", layout, TARGETS["cortex-m4"], frames)
+    full = CORES["cortex-m4"].run(files, "hand", layout, frames)
     assert full.classes.tolist() == [3, 3, 3]
     assert full.scores[:, :3].tolist() == [[1, 0, 0], [2, 0, 0], [3, 0, 0]]
     assert full.names == ("", "", "", "", "last")
-    updated = run(files, "hand", layout, TARGETS["cortex-m4"], frames, incremental=True)
+    updated = CORES["cortex-m4"].run(files, "hand", layout, frames, incremental=True)
     assert updated.classes.tolist() == [4, 4, 4]
     assert updated.scores[:, :3].tolist() == [[0, -1, 1], [0, -2, 2], [0, -3, 3]]
 
@@ -178,44 +178,38 @@ def test_update_is_called_for_every_frame_and_then_switches_are_set_one_by_one(l
 @pytest.mark.parametrize("part", PARTS)
 def test_a_classifier_that_hangs_is_stopped_and_is_an_error(layout: Layout, part: str) -> None:
     with pytest.raises(FirmwareError, match="qemu-system-arm had not ended after 2 s and was stopped"):
-        run(stand_in(HANGING), "hand", layout, TARGETS[part], np.zeros((1, 5), np.uint8), limit_s=2)
+        CORES[part].run(stand_in(HANGING), "hand", layout, np.zeros((1, 5), np.uint8), limit_s=2)
 
 
 @pytest.mark.parametrize("part", PARTS)
 def test_a_classifier_that_faults_is_an_error_that_says_so(layout: Layout, part: str) -> None:
     with pytest.raises(FirmwareError, match="qemu-system-arm ended with 1: the program faulted"):
-        run(stand_in(FAULTING), "hand", layout, TARGETS[part], np.zeros((1, 5), np.uint8), limit_s=60)
+        CORES[part].run(stand_in(FAULTING), "hand", layout, np.zeros((1, 5), np.uint8), limit_s=60)
 
 
 def test_instructions_of_a_larger_core_fault_on_a_small_one(layout: Layout) -> None:
     frames = np.zeros((1, 5), np.uint8)
-    assert len(run(stand_in(LARGER_CORE_S), "hand", layout, TARGETS["cortex-m4"], frames).classes) == 1
+    assert len(CORES["cortex-m4"].run(stand_in(LARGER_CORE_S), "hand", layout, frames).classes) == 1
     with pytest.raises(FirmwareError, match="the program faulted"):
-        run(stand_in(LARGER_CORE_S), "hand", layout, TARGETS["cortex-m0plus"], frames)
+        CORES["cortex-m0plus"].run(stand_in(LARGER_CORE_S), "hand", layout, frames)
 
 
 def test_a_classifier_that_does_not_fit_is_an_error_that_says_what_is_full(layout: Layout) -> None:
     files = stand_in(LARGE)
     with pytest.raises(FirmwareError, match="region `FLASH' overflowed"):
-        run(files, "hand", layout, TARGETS["cortex-m0plus"], np.zeros((1, 5), np.uint8))
-    assert len(run(files, "hand", layout, TARGETS["cortex-m4"], np.zeros((1, 5), np.uint8)).classes) == 1
+        CORES["cortex-m0plus"].run(files, "hand", layout, np.zeros((1, 5), np.uint8))
+    assert len(CORES["cortex-m4"].run(files, "hand", layout, np.zeros((1, 5), np.uint8)).classes) == 1
 
 
 def test_a_warning_is_an_error_that_shows_it(layout: Layout) -> None:
     files = stand_in(COUNTED) | {"untidy.c": "int twice(int x); int twice(int x) { int idle; return 2 * x; }\n"}
     with pytest.raises(FirmwareError, match=r"(?s)untidy\.c.*unused variable .*idle"):
-        run(files, "hand", layout, TARGETS["cortex-m4"], np.zeros((1, 5), np.uint8))
+        CORES["cortex-m4"].run(files, "hand", layout, np.zeros((1, 5), np.uint8))
 
 
 def test_frames_of_another_layout_are_refused(layout: Layout) -> None:
     with pytest.raises(FirmwareError, match=r"this layout takes uint8 \(n, 5\)"):
-        run(stand_in(COUNTED), "hand", layout, TARGETS["cortex-m4"], np.zeros((1, 6), np.uint8))
-
-
-def test_a_part_without_a_machine_is_refused(layout: Layout) -> None:
-    other = Target("cortex-m", "cortex-m33", 1 << 20, 1 << 18)
-    with pytest.raises(FirmwareError, match="no machine of qemu for 'cortex-m33': there are ones for cortex-m0plus"):
-        run(stand_in(COUNTED), "hand", layout, other, np.zeros((1, 5), np.uint8))
+        CORES["cortex-m4"].run(stand_in(COUNTED), "hand", layout, np.zeros((1, 6), np.uint8))
 
 
 def test_missing_tools_are_named_with_their_packages(
@@ -223,4 +217,4 @@ def test_missing_tools_are_named_with_their_packages(
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(FirmwareError, match="arm-none-eabi-gcc not found; Debian: apt-get install gcc-arm-none-eabi"):
-        run(stand_in(COUNTED), "hand", layout, TARGETS["cortex-m4"], np.zeros((1, 5), np.uint8))
+        CORES["cortex-m4"].run(stand_in(COUNTED), "hand", layout, np.zeros((1, 5), np.uint8))
