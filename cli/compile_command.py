@@ -103,12 +103,12 @@ def command(context: click.Context, /, **options: Any) -> None:
 def _made(asked: Asked) -> "BuildReport":
     from thenar.compiler.artifact.compile import compile_build
     from thenar.compiler.artifact.made import no_documents
+    from thenar.compiler.frontier.picked import picked
     from thenar.compiler.frontier.timing.whole_glove import ports_of_whole_glove
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.harness.loading import load_harness
 
     from .compile_documents import BuildDocuments
-    from .from_frontier import picked
 
     given = None if asked.glove is None else load_harness(asked.glove)
     grasp_set = GraspSet.load(asked.recordings)

@@ -11,8 +11,7 @@ from .hand import hand_of
 if TYPE_CHECKING:
     from thenar.compiler.artifact.made import Made
     from thenar.compiler.evaluation.study import Study
-
-    from .from_frontier import Picked
+    from thenar.compiler.frontier.picked import Picked
 
     Progress = Callable[[int, int], None]
 

@@ -57,7 +57,7 @@ class _Options:
         keep_apart(self.grasps, self.glove, self.draw, self.output)
 
     def _check_priced(self) -> None:
-        from thenar.compiler.frontier.settings import PRICED_METHODS
+        from thenar.compiler.frontier.search import PRICED_METHODS
 
         if self.crowd or self.method not in PRICED_METHODS:
             raise click.UsageError(

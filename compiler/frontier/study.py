@@ -1,146 +1,241 @@
-"""A frontier from recordings: everything is screened, what is near the front is looked at closely, and put together."""
+"""What a frontier is computed from: rows and their folds; in these switches are chosen and classifiers trained."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from importlib.metadata import version
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
-from .beside_points import choices_to_mark, marks_of, tried
-from .built import EARLY, Built, Waits, points_of, with_whole_scans
-from .candidates import Choice, finalists
-from .closeup import look_closely
-from .designs import best_designs, designs
+import numpy as np
+from msgspec import Struct
+from numpy.typing import NDArray
+
+from ..boosting.boost import boost
+from ..boosting.stumps import Stumps, winners
+from ..evaluation.folds import Fold, Rows, check_cut, weka_folds
+from ..evaluation.groups import leave_one_out
+from ..placement.costaware import PortCosts
+from ..placement.ways import chooser
+from ..recordings.graspset import GraspSet
+from ..samples import Columns, Samples
+from ..tables.batch import integer_scores
+from ..tables.collapse import collapse
+from ..tables.quantise import quantise
+from .cache import Cache, stored
 from .equipment import Equipment
-from .material import Cuts, Material
-from .measured import measure_designs
-from .points import SCHEMA, Frontier, FrontierError, Mark, Point
-from .screening import Screening, screen
-from .settings import Search
-from .stages import Learner
-from .storing.asking import Desk
-from .streaming.stream import Stream
-from .waiting import Pace, Waited, WaitKey, WaitTask, digest, find_latencies
+from .points import Way
+from .search import BEST, NO_SWITCHES, PRICED_METHODS, Choice, Search, Shape
 
-
-@dataclass(frozen=True, slots=True)
-class Wanted:
-    """What a point has to satisfy: the best within a time, or the fastest that recognises a share; None: not asked."""
-
-    budget_us: float | None = None
-    rate: float | None = None
-
-    @property
-    def words(self) -> str:
-        """What was asked for, "" for nothing."""
-        if self.budget_us is not None:
-            return f"the best within {self.budget_us:g} us a frame"
-        return "" if self.rate is None else f"the fastest that recognises {100 * self.rate:g} %"
-
-    def pick(self, points: Sequence[Point]) -> Point | None:
-        """Return the point that suits; None where none does or nothing was asked for."""
-        single = [point for point in points if point.setting.decision == "single"]
-        if self.budget_us is not None:
-            quick = [point for point in single if point.frame.us <= self.budget_us]
-            return max(quick, key=lambda point: (point.rate.mean, -point.frame.us), default=None)
-        good = [point for point in single if self.rate is not None and point.rate.mean >= self.rate]
-        return min(good, key=lambda point: (point.frame.us, -point.rate.mean), default=None)
+# Expected seconds of one core, for so many rows: they only say how the time that is left is told.
+_ROWS = 3000
+_PATH_S = {BEST: 5.0, "elimination-cost": 5.0, "elimination-boosted": 9.0, "rfe": 6.0, "sspoc": 4.0}
+_ROUND_S, _TABLE_S = 0.009, 0.06
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Cuts:
+    """All ways in which rows are parted: repeats of stratified folds, and each subject against the others."""
+
+    repeats: tuple[tuple[Fold, ...], ...]
+    subjects: tuple[Fold, ...]
+    everything: Fold
+
+    @classmethod
+    def of(cls, labels: Rows, subjects: NDArray[np.str_], search: Search) -> "Cuts":
+        """Return those of rows (n,). Raises EvaluationError if there are too few."""
+        check_cut(len(labels), search.folds, "rows")
+        seeds = range(search.seed, search.seed + search.repeats)
+        rows = np.arange(len(labels))
+        return cls(
+            repeats=tuple(tuple(weka_folds(labels, search.folds, seed)) for seed in seeds),
+            subjects=tuple(leave_one_out(subjects, "subject")) if len(np.unique(subjects)) > 1 else (),
+            everything=Fold(rows, rows[:0], "all"),
+        )
+
+    @property
+    def screening(self) -> tuple[Fold, ...]:
+        """The folds of the first repeat."""
+        return self.repeats[0]
+
+    @property
+    def others(self) -> tuple[Fold, ...]:
+        """Every other fold that is tested."""
+        return (*(fold for folds in self.repeats[1:] for fold in folds), *self.subjects)
+
+
+class Path(Struct, frozen=True):
+    """The placements of a method, one for each parameter, and how long they took together."""
+
+    columns: tuple[Columns, ...]
+    seconds: float
+
+
+class Fit(Struct, frozen=True):
+    """How many of `total` test rows were recognised: after every stage, and by the tables of each shape after each
+    tabled stage (stages x shapes).
+    """
+
+    total: int
+    correct: tuple[int, ...]
+    deployed: tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True, eq=False)
 class Study:
-    """What a frontier is computed from: rows and how they are cut, what is tried, what may be built, a stream to decide
-    on (of the test rows of the first fold, or of other recordings), and what the user asks for.
+    """Rows, what is tried on them, and of what a glove may be built; placements and fits that were asked for are known.
+
+    source  what the recordings are called
+    ports   what they cost to read on the whole glove, None where that is not known
     """
 
+    grasp_set: GraspSet
     source: str
-    material: Material
-    cuts: Cuts
+    samples: Samples
+    ports: PortCosts | None
     search: Search
+    cuts: Cuts
     equipment: Equipment
-    stream: Stream
-    wanted: Wanted
-    own: Mark | None = None
-    skipped: tuple[str, ...] = ()
+    cache: Cache
+    _columns: dict[tuple[Way, bool, Fold], Columns] = field(default_factory=dict, init=False)
+    _seconds: dict[tuple[str, bool], float] = field(default_factory=dict, init=False)
+
+    @property
+    def switch_names(self) -> tuple[str, ...]:
+        """The names of all switches."""
+        return self.grasp_set.switch_names
+
+    @property
+    def n_joints(self) -> int:
+        """How many joints a frame has."""
+        return int(self.samples.codes.shape[1])
+
+    @cached_property
+    def _alone(self) -> Samples:
+        return replace(self.samples, codes=self.samples.codes[:, :0])
+
+    def inputs(self, joints: bool) -> Samples:
+        """Return all rows, with the joints or without."""
+        return self.samples if joints else self._alone
+
+    def choose(self, stage: str, choices: Iterable[Choice], folds: Sequence[Fold]) -> None:
+        """Have the switches of all choices chosen from the training rows of these folds."""
+        asked: dict[tuple[str, bool], dict[float, None]] = {}
+        for choice in choices:
+            if choice.way != NO_SWITCHES:
+                asked.setdefault((choice.way.method, choice.learns_from_joints), {})[choice.way.parameter] = None
+        places = [(method, joints, fold) for method, joints in asked for fold in folds]
+        calls = [
+            choose_path.call(
+                path_s(method, len(fold.train)),
+                self.inputs(joints),
+                fold.train,
+                method,
+                tuple(asked[method, joints]),
+                self.ports if method in PRICED_METHODS else None,
+            )
+            for method, joints, fold in places
+        ]
+        for (method, joints, fold), path in zip(places, self.cache.ask(stage, calls), strict=True):
+            for parameter, columns in zip(asked[method, joints], path.columns, strict=True):
+                self._columns[Way(method, parameter), joints, fold] = columns
+            if fold is self.cuts.everything:
+                self._seconds[method, joints] = path.seconds
+
+    def columns(self, choice: Choice, fold: Fold) -> Columns:
+        """Return the switches of a choice, once chosen, from the training rows of `fold`."""
+        return () if choice.way == NO_SWITCHES else self._columns[choice.way, choice.learns_from_joints, fold]
+
+    def choosing_s(self, choice: Choice) -> float:
+        """Return how long it took to choose the switches of a choice from all rows."""
+        return self._seconds.get((choice.way.method, choice.learns_from_joints), 0.0)
+
+    def fit(
+        self,
+        stage: str,
+        choices: Sequence[Choice],
+        folds: Sequence[Fold],
+        stages: tuple[int, ...],
+        tabled: tuple[int, ...] = (),
+        shapes: tuple[Shape, ...] = (),
+    ) -> dict[tuple[Choice, Fold], Fit]:
+        """Return what came of every choice in every fold."""
+        places = [(choice, fold) for choice in choices for fold in folds]
+        calls = [
+            fit_stages.call(
+                fit_s(stages[-1], len(tabled) * len(shapes), len(fold.train)),
+                self.inputs(choice.joints),
+                fold,
+                self.columns(choice, fold),
+                stages,
+                tabled,
+                shapes,
+                self.search.max_bins,
+            )
+            for choice, fold in places
+        ]
+        return dict(zip(places, self.cache.ask(stage, calls), strict=True))
 
 
-def find_frontier(study: Study, desk: Desk) -> Frontier:
-    """Return the frontier. Answers that are in the desk's store are not looked for again.
+def path_s(method: str, rows: int) -> float:
+    """Return the expected seconds of all placements of a method."""
+    return _PATH_S.get(method, 0.5) * rows / _ROWS
 
-    A point's rate is one of those by which the points were chosen, so the best of many is a little lucky; its rate with
-    subjects left out had no say. Raises FrontierError if nothing can be built.
+
+def fit_s(rounds: int, tables: int, rows: int) -> float:
+    """Return the expected seconds of a training with tests, and with so many tables made and tested."""
+    return (rounds * _ROUND_S + tables * _TABLE_S) * rows / _ROWS
+
+
+@stored(1)
+def choose_path(
+    samples: Samples, rows: Rows, method: str, parameters: tuple[float, ...], ports: PortCosts | None
+) -> Path:
+    """Choose switches from some rows by one method, for all of its parameters."""
+    began = time.perf_counter()
+    choose = chooser(method, samples.rows(rows), ports)
+    columns = tuple(choose(parameter) for parameter in parameters)
+    return Path(columns, time.perf_counter() - began)
+
+
+@stored(1)
+def fit_stages(
+    samples: Samples,
+    fold: Fold,
+    columns: Columns,
+    stages: tuple[int, ...],
+    tabled: tuple[int, ...],
+    shapes: tuple[Shape, ...],
+    max_bins: int | None,
+) -> Fit:
+    """Train once on a fold's training rows, on the switches `columns` and the joints; test at every stage.
+
+    Rows of a placement without a switch that varies get the most frequent type.
     """
-    n_joints = study.material.codes.shape[1]
-    learner = Learner(desk, study.material, study.cuts, study.search.max_bins)
-    screening = screen(learner, study.search, study.equipment)
-    _check(screening, study)
-    named = choices_to_mark(len(study.material.switch_names), n_joints)
-    chosen = finalists(screening.screened, list(named), study.search.finalists)
-    closes = look_closely(learner, study.search, study.equipment, chosen)
-    every = [design for close in closes for design in designs(close, n_joints)]
-    by_time, by_switches = best_designs(every, lambda design: design.frame_us)
-    kept = with_whole_scans([*by_time, *by_switches])
-    measured = measure_designs(study.equipment, kept, desk)
-    builts = [Built(design, measured.classify(design)) for design in kept]
-    points = points_of(builts, _waits(study, learner, builts), study.material.switch_names, study.search.max_bins)
-    picked, seen = study.wanted.pick(points), tried(screening, closes, study.search)
-    early = [EARLY] if any(design.scan_kind == "early" for design in kept) else []
-    marks = marks_of(named, closes, study.search, n_joints)
-    return Frontier(
-        schema=SCHEMA,
-        thenar=version("thenar"),
-        source=study.source,
-        fingerprint=study.material.fingerprint,
-        rows=len(study.material.labels),
-        subjects=study.material.n_subjects,
-        n_switches=len(study.material.switch_names),
-        n_joints=n_joints,
-        grasps=study.material.grasps,
-        target=study.equipment.model.target,
-        folds=study.search.folds,
-        repeats=study.search.repeats,
-        combinations=sum(len(Built(design, design.classify).decisions) for design in every) + len(seen),
-        points=points,
-        tried=seen,
-        curves=screening.curves,
-        marks=(*marks, *([study.own] if study.own else [])),
-        checks=measured.checks,
-        skipped=(*study.skipped, *measured.skipped, *early, study.stream.what),
-        picked=None if picked is None else picked.number,
-        wanted=study.wanted.words,
+    stumps = trained(samples, fold.train, columns, stages[-1], max_bins)
+    train, test = samples.labels[fold.train], samples.labels[fold.test]
+    if not stumps.n_rounds:
+        same = int(np.count_nonzero(test == np.bincount(train).argmax()))
+        return Fit(len(test), (same,) * len(stages), ((same,) * len(shapes),) * len(tabled))
+    X = samples.kept(columns)
+    scores = enumerate(stumps.staged_scores(X[fold.test]), 1)
+    counts = {done: int(np.count_nonzero(winners(each) == test)) for done, each in scores if done in stages}
+    deployed = tuple(
+        tuple(_recognised(stumps.first(stage), shape, X, len(columns), fold, test) for shape in shapes)
+        for stage in tabled
     )
+    return Fit(len(test), tuple(counts[stage] for stage in stages), deployed)
 
 
-def _check(screening: Screening, study: Study) -> None:
-    if not screening.screened:
-        raise FrontierError(
-            f"no placement that was tried can be built for {study.equipment.model.target}: name other --methods or "
-            "another --target"
-        )
+def trained(samples: Samples, rows: Rows, columns: Columns, rounds: int, max_bins: int | None) -> Stumps:
+    """Return the ensemble of so many rounds on some rows of the switches `columns` and the joints."""
+    X, y = samples.kept(columns)[rows], samples.labels[rows]
+    return boost(X, y, samples.n_classes, rounds=rounds, max_bins=max_bins)[0]
 
 
-def _waits(study: Study, learner: Learner, builts: Sequence[Built]) -> Waits:
-    """Return the latency of every build with every decision that it serves, by tables of rows that the stream of the
-    set's own test rows does not hold.
-    """
-    fold, stream = study.cuts.screening[0], digest(study.stream)
-    grouped: dict[Choice, list[Built]] = {}
-    for built in builts:
-        grouped.setdefault(built.design.choice, []).append(built)
-    keys = {
-        choice: WaitKey(
-            learner.columns(choice, fold),
-            choice.joints,
-            study.cuts.names[fold],
-            stream,
-            tuple(Pace(built.design.tabled, built.frame.us, built.decisions) for built in mine),
-            learner.max_bins,
-        )
-        for choice, mine in grouped.items()
-    }
-    tasks = [WaitTask(key, study.material, fold, study.stream, 2.0 + len(key.paces)) for key in keys.values()]
-    found = learner.desk.ask("latencies", tasks, find_latencies, Waited)
-    return {
-        (built, kind): latency
-        for choice, mine in grouped.items()
-        for built, latencies in zip(mine, found[keys[choice]].latencies, strict=True)
-        for kind, latency in zip(built.decisions, latencies, strict=True)
-    }
+def _recognised(stumps: Stumps, shape: Shape, X: NDArray[np.uint16], kept: int, fold: Fold, right: Rows) -> int:
+    bits, codes = X[:, :kept].astype(bool), X[:, kept:]
+    # The rows trained on have a say in what stands in for lost inputs, which nothing here looks at; in scores only
+    # where entries are narrow.
+    seen = fold.train if shape.table_bits < 16 else fold.train[:1]
+    tables = quantise(collapse(stumps, kept), bits[seen], codes[seen], shape.width, shape.table_bits)
+    answers = integer_scores(tables, bits[fold.test], codes[fold.test]).argmax(axis=1)
+    return int(np.count_nonzero(answers == right))
