@@ -8,6 +8,7 @@ import click
 from thenar.compiler.frontier.targets import TARGETS
 
 from .common import any_path, err, existing_file, existing_folder, json_flag, out, print_json, progress
+from .methods import WithMethods, method_names
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -21,13 +22,7 @@ _WORDS = ("inputs", "placement", "rounds, bits", "wiring", "scan", "decision")
 _NUMBERS = ("rate %", "left out %", "frame", "latency, 99 %", "flash", "RAM")
 
 
-def _names(_context: click.Context, _parameter: click.Parameter, text: str | None) -> tuple[str, ...] | None:
-    if text is None:
-        return None
-    return tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip() and name.strip() != "none"))
-
-
-@click.command("frontier")
+@click.command("frontier", cls=WithMethods)
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option("-o", "--output", type=any_path, required=True, help="Folder for tables, pictures and the store.")
 @click.option("--glove", type=existing_file, help="A glove.toml: try its wiring as well, and choose by its ports.")
@@ -38,11 +33,11 @@ def _names(_context: click.Context, _parameter: click.Parameter, text: str | Non
 @click.option("--stream", type=existing_file, help="A set of whole movements: measure decision latency on it.")
 @click.option(
     "--methods",
-    callback=_names,
-    help="Placements to build from, by commas.  [default: elimination,id3,id3-cost,id3-ccp]",
+    callback=method_names,
+    help="Placement methods to build from, by commas.  [default: elimination and ID3, by cost with --glove]",
 )
 @click.option(
-    "--rivals", callback=_names, help="Placements to see beside them, by commas, or none.  [default: all installed]"
+    "--rivals", callback=method_names, help="Methods to compare them with, by commas, or none.  [default: most rivals]"
 )
 @click.option("--rounds", type=click.IntRange(1, 300), default=300, show_default=True, help="The most rounds to try.")
 @click.option("--repeats", type=click.IntRange(1), default=3, show_default=True, help="Repeats of the folds.")
@@ -80,7 +75,8 @@ def command(
         thenar compile set.grasps -o build/ --from frontier/frontier.json --point 7
     """
     from thenar.compiler.frontier.find import Wanted, find_frontier
-    from thenar.compiler.frontier.search import USUAL_RIVALS, Search, usual_methods
+    from thenar.compiler.frontier.search import Search
+    from thenar.compiler.placement.methods.base import usual
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.harness.loading import load_harness
 
@@ -88,8 +84,8 @@ def command(
         raise click.UsageError("--budget-us and --rate each pick a point: give one of them.")
     wanted, harness = Wanted(budget_us, rate), None if glove is None else load_harness(glove)
     search = Search(
-        methods=methods or usual_methods(harness is not None),
-        rivals=USUAL_RIVALS if rivals is None else rivals,
+        methods=methods or usual(ours=True, wired=harness is not None),
+        rivals=usual(ours=False) if rivals is None else rivals,
         **{name: asked.pop(name) for name in _SEARCHED},
     )
     with progress("frontier") as report:
@@ -167,7 +163,8 @@ def _title(frontier: "Frontier") -> str:
 def _cells(point: "Point") -> "tuple[Text, ...]":
     from rich.text import Text
 
-    from thenar.compiler.frontier.drawing.words import duration, interval, way_of, wiring_of
+    from thenar.compiler.frontier.drawing.words import way_of, wiring_of
+    from thenar.compiler.text import duration, interval
 
     setting = point.setting
     texts = (

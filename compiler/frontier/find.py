@@ -12,7 +12,8 @@ import numpy as np
 from thenar.runtime.harness.wiring import Harness
 
 from ..limits import check_inputs, check_memory, check_types
-from ..placement.baselines import RIVALS, available
+from ..placement.methods.base import METHODS, usual
+from ..placement.ports import ports_of_whole_glove
 from ..publication import check_folder, entries, publish_folder
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
@@ -28,10 +29,9 @@ from .measure import TRIAL_S, measured
 from .movements import holds_movements
 from .points import SCHEMA, Frontier, FrontierError, Mark, Point, Tried, frontier_to_bytes
 from .screen import QUICK_PRICE_S, Screened, screen
-from .search import SHAPES, Choice, Search, available_inputs, curve_ways, learns_from_joints, usual_methods, ways
+from .search import SHAPES, Choice, Search, available_inputs, curve_ways, ways
 from .stream import Stream, stream_of
 from .study import Cuts, Study, fit_s, path_s
-from .timing.whole_glove import ports_of_whole_glove
 from .timing.wirings import wirings
 
 FRONTIER_NAME, TABLE_NAME, STORE_NAME = "frontier.json", "frontier.csv", "store.jsonl"
@@ -138,7 +138,7 @@ def find_frontier(
     >>> found.points[0].frame.us  # doctest: +SKIP
     """
     samples = _samples(grasp_set, source)
-    search, lacking = _installed(search or Search(methods=usual_methods(harness is not None)))
+    search, lacking = _installed(search or Search(methods=usual(ours=True, wired=harness is not None)))
     cuts = Cuts.of(samples.labels, grasp_set.subjects, search)
     ports = ports_of_whole_glove(harness, grasp_set.switch_names)
     with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:
@@ -174,9 +174,9 @@ def _samples(grasp_set: GraspSet, source: str) -> Samples:
 
 def _installed(search: Search) -> tuple[Search, tuple[str, ...]]:
     """Return the search without rivals that are not installed, and a sentence on each of these."""
-    missing = [name for name in search.rivals if name in RIVALS and name not in available()]
+    missing = [name for name in search.rivals if not METHODS[name].installed]
     there = tuple(name for name in search.rivals if name not in missing)
-    said = (f"{name} was left out: PySensors is not installed (python-sensors)" for name in missing)
+    said = (f"{name} was left out: it needs {METHODS[name].install}, which is not installed" for name in missing)
     return replace(search, rivals=there), tuple(said)
 
 
@@ -235,7 +235,7 @@ def foreseen(study: Study) -> dict[str, float]:
     wired = len(kinds) - ("joints" in kinds)
     train, more = ([len(fold.train) for fold in folds] for folds in (cuts.screening, cuts.others))
     # Once, or for each of the inputs if a method learns from joints.
-    methods = [name for name in search.methods for _ in range(wired if learns_from_joints(name) else min(wired, 1))]
+    methods = [name for name in search.methods for _ in range(wired if METHODS[name].uses_joints else min(wired, 1))]
     choices = sum(len(ways(name, n_switches)) for name in search.methods) * wired + ("joints" in kinds)
     rivals = sum(len(curve_ways(name, n_switches)) for name in search.rivals)
     last = min(search.finalists + _MARKED, choices)

@@ -5,12 +5,13 @@ from pathlib import Path
 
 from thenar.runtime.build import Build
 
+from ..placement.methods.base import BEST, PAPERS
 from ..recordings.graspset import GraspSet
 from .equipment import Equipment
 from .finalists import Close, papers_tables
 from .points import FrontierError, Mark, Way
 from .screen import rate_of
-from .search import BEST, Choice
+from .search import Choice
 from .study import Study
 from .timing.scan_times import scan_times, transfer_us
 
@@ -22,7 +23,7 @@ def choices_to_mark(n_switches: int, n_joints: int) -> dict[Choice, str]:
     """Return what to mark, with its name: the paper's placement and all switches, alone and with the joints."""
     if not n_switches:
         return {}
-    marked = {Way("id3", prune): f"paper, S = {prune:g}" for prune in _PAPERS}
+    marked = {Way(PAPERS, prune): f"paper, S = {prune:g}" for prune in _PAPERS}
     # Whichever method says so, to keep all of them is the same.
     marked[Way(BEST, float(n_switches))] = f"all of {n_switches}"
     alone = {Choice(way, "switches"): name for way, name in marked.items()}

@@ -4,12 +4,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.files import read_file
 from thenar.runtime.harness.wiring import SLOWEST_HZ, Harness
 from thenar.runtime.names import shortened
 
-from ..placement.ways import METHODS
+from ..placement.methods.base import METHODS
 from ..recordings.graspset import GraspSet
 from .points import MAX_BYTES, Frontier, FrontierError, Point, frontier_from_bytes
 from .timing.wirings import AS_WIRED, BOARD, Wiring
@@ -35,7 +35,7 @@ class Picked:
         }
         if setting.inputs == "joints":
             return settled
-        parameter = "keep" if _counts_switches(self.point) else "prune"
+        parameter = "keep" if METHODS[setting.way.method].by_number else "prune"
         return {**settled, "placement": setting.way.method, parameter: int(setting.way.parameter)}
 
     def wired(self, given: Harness | None) -> Harness | Callable[[Sequence[str]], Harness] | None:
@@ -102,10 +102,6 @@ def picked(path: Path, number: int | None, grasp_set: GraspSet) -> Picked:
     return Picked(found, point)
 
 
-def _counts_switches(point: Point) -> bool:
-    return METHODS[point.setting.way.method].parameter == "switches"
-
-
 def _check(point: Point, grasp_set: GraspSet, what: str) -> None:
     """Raise FrontierError where a point cannot be built here: before the training, not after it."""
     setting = point.setting
@@ -113,7 +109,7 @@ def _check(point: Point, grasp_set: GraspSet, what: str) -> None:
         raise FrontierError(f"{what} keeps switches that the recordings do not have: run thenar frontier on these")
     if setting.inputs != "joints" and setting.way.method not in METHODS:
         raise FrontierError(f"{what} takes a method that is not there: {shortened(repr(setting.way.method))}")
-    least = 1 if setting.inputs != "joints" and _counts_switches(point) else 0
+    least = 1 if setting.inputs != "joints" and METHODS[setting.way.method].by_number else 0
     if not (setting.way.parameter.is_integer() and setting.way.parameter >= least):
         raise FrontierError(
             f"{what} takes {setting.way.parameter} for its method: it is a whole number from {least} on"

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..evaluation.rates import Rate as Counted
-from ..placement.ways import METHODS
+from ..placement.methods.base import METHODS
 from ..samples import Columns
 from .points import Curve, Rate
 from .price import Tabled, price
@@ -82,4 +82,4 @@ def _curve(study: Study, name: str, rates: dict[Choice, Rate]) -> Curve:
         if choice.way.method == name and choice.inputs == "switches":
             points[sum(len(study.columns(choice, fold)) for fold in folds) / len(folds)] = rate
     sizes = tuple(sorted(points))
-    return Curve(name, METHODS[name].what, METHODS[name].ours, sizes, tuple(points[size] for size in sizes))
+    return Curve(name, METHODS[name].help, METHODS[name].ours, sizes, tuple(points[size] for size in sizes))

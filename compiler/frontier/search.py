@@ -1,27 +1,15 @@
 """What the frontier tries: placements under which parameters, inputs, rounds, widths, folds."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from thenar.runtime.manifest import Inputs, TableBits
 
-from ..placement.ways import METHODS
+from ..placement.methods.base import METHODS, usual
 from .points import FrontierError, Way
 
-# Numbers of switches, as far as the glove has them; the paper's own sizes are near 26 to 66.
-SIZES = (1, 2, 3, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 28, 33, 40, 50, 66, 100, 130)
-# Of methods that are there to be seen beside: a coarser ladder.
-OTHER_SIZES = (4, 8, 12, 16, 20, 24, 28, 33, 40, 50, 66)
-# The paper's S, and beyond, until next to nothing is left of the tree.
-PRUNES = (0, 10, 13, 29, 62, 100, 150, 200, 300, 400, 600, 1000)
 # Rivals are only seen beside ours: a few sizes show their curves.
 CURVE_SIZES = (4, 8, 16, 33, 66)
-BEST = "elimination"  # tried at every size, all switches included
-USUAL_METHODS = (BEST, "id3", "id3-cost", "id3-ccp")
-# Where the glove's own wiring is known, and may be kept: by what its ports cost.
-WIRED_METHODS = (BEST, "elimination-cost", "id3", "id3-cost")
-# What the ports cost has a say in these alone.
-PRICED_METHODS = ("elimination-cost", "id3-cost")
 # The placement of inputs without switches.
 NO_SWITCHES = Way("none", 0.0)
 USUAL_RIVALS = ("rfe", "forest", "mrmr", "mutual-information", "random", "sspoc", "qr")
@@ -55,7 +43,7 @@ class Choice:
     @property
     def learns_from_joints(self) -> bool:
         """Whether its switches are chosen by the joints as well."""
-        return self.joints and learns_from_joints(self.way.method)
+        return self.joints and METHODS[self.way.method].uses_joints
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +53,7 @@ class Search:
     Parameters
     ----------
     methods : tuple of str
-        Placement methods that points are built from; `usual_methods` knows the usual ones.
+        Placement methods that points are built from.
     rivals : tuple of str
         Placement methods of which only curves are seen beside those.
     folds, repeats, seed : int
@@ -81,12 +69,14 @@ class Search:
 
     Raises
     ------
+    MemberError
+        For a method that is not there.
     FrontierError
         Where nothing could come of it.
     """
 
-    methods: tuple[str, ...] = USUAL_METHODS
-    rivals: tuple[str, ...] = USUAL_RIVALS
+    methods: tuple[str, ...] = field(default_factory=lambda: usual(ours=True))
+    rivals: tuple[str, ...] = field(default_factory=lambda: usual(ours=False))
     folds: int = 4
     repeats: int = 3
     seed: int = 1
@@ -97,8 +87,7 @@ class Search:
 
     def __post_init__(self) -> None:
         for name in (*self.methods, *self.rivals):
-            if name not in METHODS:
-                raise FrontierError(f"there is no method {name!r}: choose among {', '.join(METHODS)}")
+            METHODS.named(name)
         if min(self.repeats, self.screening, self.rounds, self.finalists) < 1 or not self.methods:
             raise FrontierError("a frontier needs a method, a repeat, a round and a finalist at least")
 
@@ -118,23 +107,9 @@ class Search:
         return (*(stage for stage in TABLED if stage < self.rounds), self.rounds)
 
 
-def usual_methods(wired: bool) -> tuple[str, ...]:
-    """Return the methods that are tried where nobody says which; `wired`: for a glove whose wiring is known."""
-    return WIRED_METHODS if wired else USUAL_METHODS
-
-
-def learns_from_joints(method: str) -> bool:
-    """Return whether a method looks at the joints: only elimination does; with others, all inputs share a placement."""
-    return method.startswith(BEST)
-
-
 def ways(method: str, n_switches: int) -> tuple[Way, ...]:
     """Return the placements of a method that are tried among so many switches."""
-    if METHODS[method].parameter == "S":
-        return tuple(Way(method, float(prune)) for prune in PRUNES)
-    if not method.startswith(BEST):
-        return tuple(Way(method, float(size)) for size in OTHER_SIZES if size < n_switches)
-    return tuple(Way(method, float(size)) for size in (*(size for size in SIZES if size < n_switches), n_switches))
+    return tuple(Way(method, float(parameter)) for parameter in METHODS[method].ladder(n_switches))
 
 
 def curve_ways(method: str, n_switches: int) -> tuple[Way, ...]:

@@ -13,8 +13,8 @@ from ..boosting.boost import boost
 from ..boosting.stumps import Stumps, winners
 from ..evaluation.folds import Fold, Rows, check_cut, weka_folds
 from ..evaluation.groups import leave_one_out
-from ..placement.costaware import PortCosts
-from ..placement.ways import chooser
+from ..placement.methods.base import METHODS
+from ..placement.ports import PortCosts
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
 from ..tables.batch import integer_scores
@@ -23,11 +23,10 @@ from ..tables.quantise import quantise
 from .cache import Cache, stored
 from .equipment import Equipment
 from .points import Way
-from .search import BEST, NO_SWITCHES, PRICED_METHODS, Choice, Search, Shape
+from .search import NO_SWITCHES, Choice, Search, Shape
 
 # Expected seconds of one core, for so many rows: they only say how the time that is left is told.
 _ROWS = 3000
-_PATH_S = {BEST: 5.0, "elimination-cost": 5.0, "elimination-boosted": 9.0, "rfe": 6.0, "sspoc": 4.0}
 _ROUND_S, _TABLE_S = 0.009, 0.06
 
 
@@ -130,7 +129,7 @@ class Study:
                 fold.train,
                 method,
                 tuple(asked[method, joints]),
-                self.ports if method in PRICED_METHODS else None,
+                self.ports if METHODS[method].uses_ports else None,
             )
             for method, joints, fold in places
         ]
@@ -177,7 +176,7 @@ class Study:
 
 def path_s(method: str, rows: int) -> float:
     """Return the expected seconds of all placements of a method."""
-    return _PATH_S.get(method, 0.5) * rows / _ROWS
+    return METHODS[method].seconds * rows / _ROWS
 
 
 def fit_s(rounds: int, tables: int, rows: int) -> float:
@@ -191,7 +190,7 @@ def choose_path(
 ) -> Path:
     """Choose switches from some rows by one method, for all of its parameters."""
     began = time.perf_counter()
-    choose = chooser(method, samples.rows(rows), ports)
+    choose = METHODS[method].chooser(samples.rows(rows), ports)
     columns = tuple(choose(parameter) for parameter in parameters)
     return Path(columns, time.perf_counter() - began)
 

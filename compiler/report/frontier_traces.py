@@ -5,8 +5,8 @@ from math import log10
 from typing import Any
 
 from ..frontier.points import Curve, Mark, Point, Rate, Tried, front
+from ..text import interval, microseconds
 from .charts import words
-from .numbers import interval, microseconds
 from .point_view import point_words
 
 Trace = dict[str, Any]

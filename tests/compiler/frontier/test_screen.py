@@ -1,11 +1,14 @@
+import numpy as np
 import pytest
 
+from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.marks import choices_to_mark
 from thenar.compiler.frontier.points import FrontierError, Way
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.search import Choice, Search, Shape, available_inputs, curve_ways, ways
 from thenar.compiler.frontier.timing.classify_times import Classified
 from thenar.compiler.frontier.timing.scan_times import ScanTimes, transfer_us
+from thenar.compiler.recordings.graspset import GraspSet
 
 QUICK = (Classified("quick", 40.0, "model", 900, 30), Classified("small", 60.0, "model", 500, 30))
 
@@ -49,6 +52,11 @@ def test_the_papers_placements_are_marked_with_all_inputs_that_there_are() -> No
     assert choices_to_mark(14, 0)[Choice(Way("elimination", 14.0), "switches")] == "all of 14"
     assert choices_to_mark(14, 3)[Choice(Way("elimination", 14.0), "both")] == "all of 14, joints"
     assert choices_to_mark(0, 3) == {}
+
+
+def test_one_type_leaves_nothing_to_tell_apart(grasp_set: GraspSet) -> None:
+    with pytest.raises(FrontierError, match="nothing to tell apart"):
+        find_frontier(grasp_set.rows(np.arange(0, 96, 4)))
 
 
 def test_a_search_for_nothing_is_refused() -> None:

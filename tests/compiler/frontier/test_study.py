@@ -10,8 +10,8 @@ from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.frontier.search import SHAPES, Search, Shape
 from thenar.compiler.frontier.study import Cuts, Fit, choose_path, fit_stages
-from thenar.compiler.placement.costaware import PortCosts
 from thenar.compiler.placement.id3 import grow_id3
+from thenar.compiler.placement.ports import PortCosts
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.compiler.tables.collapse import collapse
