@@ -30,7 +30,7 @@ _WORTHWHILE = 4
 Decided = tuple[int, int | None]
 
 
-class _Decider(Protocol):
+class Decider(Protocol):
     """Sees stretches of equal frames, one after the other."""
 
     def stay(self, times: range, standing: Standing) -> Iterator[Decided]:
@@ -93,7 +93,7 @@ def decisions(tables: IntegerTables, frames: Stretches, policy: Policy) -> Decis
     )
 
 
-def decider_of(tables: IntegerTables, policy: Policy) -> _Decider:
+def decider_of(tables: IntegerTables, policy: Policy) -> Decider:
     """Return the decider that the live recogniser has under `policy`."""
     if policy.error_rate is None:
         return _Hysteresis(Decision(policy.lead_steps(tables.scale), policy.dwell_us, policy.hold_us))

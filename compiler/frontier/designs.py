@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from .finalists import Close
-from .latency import DECISIONS
+from .latency import POLICIES
 from .points import DecisionKind, Latency, Point, Scan, Setting, Time, front
 from .price import PricedTables, Wired
 from .timing.classify_times import Classified
@@ -67,7 +67,7 @@ class Design:
     @property
     def decisions(self) -> tuple[DecisionKind, ...]:
         """The decisions that its scans serve."""
-        return DECISIONS if self.scan_kind == "full" else ("single",)
+        return tuple(POLICIES) if self.scan_kind == "full" else ("single",)
 
 
 Latencies = Mapping[tuple[Design, DecisionKind], Latency]
@@ -141,7 +141,7 @@ def _fronts(several: Sequence[Design], latencies: Latencies) -> dict[tuple[Desig
     for name, best in zip(("frame", "switches"), best_designs(several), strict=True):
         for design in best:
             found[design, "single"] += (name,)
-    for kind in DECISIONS:
+    for kind in POLICIES:
         waits = {design: latencies[design, kind].mean_us for design in several if kind in design.decisions}
         for design in front(list(waits), waits.__getitem__, lambda design: design.rate):
             found[design, kind] += ("latency",)

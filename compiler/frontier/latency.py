@@ -1,8 +1,9 @@
 """How long after a hand has arrived in a grasp `thenar run` has decided on it."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from msgspec import Struct
@@ -22,32 +23,10 @@ from .stream import Stream
 
 Times = NDArray[np.int64]
 
-DECISIONS: tuple[DecisionKind, ...] = ("single", "dwell", "sequential")
-_USUAL = Policy()
-
-
-@dataclass(frozen=True, slots=True)
-class Decider:
-    """How a grasp type is decided on; what that means stands in runtime.live.policy. Scans that end early decide alike.
-
-    kind  "single": the best type of every frame; "dwell": `lead` and `dwell_us` count, and `hold_us`; "sequential":
-          `error_rate` and `spacing_us` do, and `hold_us`
-    """
-
-    kind: DecisionKind
-    dwell_us: int = _USUAL.dwell_us
-    lead: float = _USUAL.lead
-    error_rate: float = 0.01
-    spacing_us: int = _USUAL.spacing_us
-    hold_us: int = _USUAL.hold_us
-
-    def policy(self) -> Policy:
-        """Return the runtime's policy that decides so. Raises SettingError if a value is out of range."""
-        if self.kind == "single":
-            return Policy(lead=0.0, dwell_us=0)
-        if self.kind == "dwell":
-            return Policy(lead=self.lead, dwell_us=self.dwell_us, hold_us=max(self.hold_us, self.dwell_us))
-        return Policy(dwell_us=0, hold_us=self.hold_us, error_rate=self.error_rate, spacing_us=self.spacing_us)
+# What `thenar run` does under each. Scans that end early decide alike.
+POLICIES: Mapping[DecisionKind, Policy] = MappingProxyType(
+    {"single": Policy(lead=0.0, dwell_us=0), "dwell": Policy(), "sequential": Policy(dwell_us=0, error_rate=0.01)}
+)
 
 
 class Pace(Struct, frozen=True):
@@ -67,12 +46,8 @@ def latencies(
     """
     wanted = tuple(dict.fromkeys(pace.tabled for pace in paces))
     tables = {tabled: made for tabled, made, _ in tables_of(samples, rows, columns, wanted, max_bins)}
-    joints = bool(samples.codes.shape[1])
     return tuple(
-        tuple(
-            latency(tables[pace.tabled], columns, joints, stream, pace.frame_us, Decider(kind))
-            for kind in pace.decisions
-        )
+        tuple(latency(tables[pace.tabled], columns, stream, pace.frame_us, POLICIES[kind]) for kind in pace.decisions)
         for pace in paces
     )
 
@@ -86,18 +61,10 @@ class _Held:
     types: NDArray[np.intp]
 
 
-def latency(
-    tables: IntegerTables,
-    columns: Sequence[int],
-    use_joints: bool,
-    stream: Stream,
-    frame_us: float,
-    decider: Decider,
-) -> Latency:
+def latency(tables: IntegerTables, columns: Sequence[int], stream: Stream, frame_us: float, policy: Policy) -> Latency:
     """Return the latency of tables on a stream whose frames follow one another every frame_us, in whole microseconds.
 
-    columns     the stream's switches that the tables take, in their order
-    use_joints  whether the tables take the joints, all of the stream's
+    columns  the stream's switches that the tables take, in their order; of its joints they take all, or none
 
     A frame shows the glove as it was when the frame began; its answer is there when it ends, frame_us later. A grasp's
     latency is the time from its arrival until the first answer that is its type, 0 where that was the answer already,
@@ -107,24 +74,19 @@ def latency(
 
     Raises FrontierError where the tables are not for these inputs, the stream has no grasps, or no frame takes a time.
     """
-    _check(tables, columns, use_joints, stream, frame_us)
+    _check(tables, columns, stream, frame_us)
     step_us = max(round(frame_us), 1)
-    decided = decided_on(tables, columns, use_joints, stream, step_us, decider.policy())
+    decided = decided_on(tables, columns, stream, step_us, policy)
     begun_us = stream.at_us - stream.at_us[0]
     held = _Held(begun_us[stream.arrivals], begun_us[stream.ends], stream.types[stream.arrivals])
     return _measured(held, *_waits_and_errors(decided, step_us, held))
 
 
 def decided_on(
-    tables: IntegerTables,
-    columns: Sequence[int],
-    use_joints: bool,
-    stream: Stream,
-    step_us: int,
-    policy: Policy,
+    tables: IntegerTables, columns: Sequence[int], stream: Stream, step_us: int, policy: Policy
 ) -> Decisions:
     """Return what is decided under `policy` on a stream whose frames begin every step_us, the first with the stream."""
-    codes = stream.codes if use_joints else stream.codes[:, :0]
+    codes = stream.codes[:, : None if tables.n_joints else 0]
     scores = integer_scores(tables, stream.bits[:, list(columns)], codes)
     return decisions(tables, stretches(scores, stream.at_us, step_us), policy)
 
@@ -163,9 +125,9 @@ def _measured(held: _Held, waits_us: Times, wrong_us: Times) -> Latency:
     )
 
 
-def _check(tables: IntegerTables, columns: Sequence[int], use_joints: bool, stream: Stream, frame_us: float) -> None:
-    switches, joints = stream.bits.shape[1], stream.codes.shape[1] if use_joints else 0
-    if (tables.n_switches, tables.n_joints) != (len(columns), joints):
+def _check(tables: IntegerTables, columns: Sequence[int], stream: Stream, frame_us: float) -> None:
+    switches, joints = stream.bits.shape[1], stream.codes.shape[1]
+    if tables.n_switches != len(columns) or tables.n_joints not in (0, joints):
         raise FrontierError(
             f"tables of {tables.n_switches} switches and {tables.n_joints} joints, for {len(columns)} and {joints}"
         )

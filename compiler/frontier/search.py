@@ -43,7 +43,7 @@ class Choice:
     @property
     def learns_from_joints(self) -> bool:
         """Whether its switches are chosen by the joints as well."""
-        return self.joints and METHODS[self.way.method].uses_joints
+        return self.inputs == "both" and METHODS[self.way.method].uses_joints
 
 
 @dataclass(frozen=True, slots=True)

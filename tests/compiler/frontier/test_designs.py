@@ -6,7 +6,7 @@ import pytest
 
 from thenar.compiler.frontier.designs import Design, best_designs, designs, points_of, with_whole_scans
 from thenar.compiler.frontier.finalists import Close
-from thenar.compiler.frontier.latency import DECISIONS
+from thenar.compiler.frontier.latency import POLICIES
 from thenar.compiler.frontier.points import Latency, Rate, Time, Way
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.screen import Screened
@@ -53,7 +53,7 @@ def test_joints_alone_have_one_design_a_layout_and_wait_for_a_record() -> None:
 
 def test_compiling_is_choosing_training_and_making_the_tables() -> None:
     design = next(designs(close_of(), 0))
-    (point, *_) = points_of([design], dict.fromkeys(((design, kind) for kind in DECISIONS), WAIT), NAMES, None)
+    (point, *_) = points_of([design], dict.fromkeys(((design, kind) for kind in POLICIES), WAIT), NAMES, None)
     assert point.compile_s == 3.25
 
 
@@ -73,7 +73,7 @@ def test_a_design_that_ends_early_is_joined_by_the_one_of_whole_scans_once() -> 
 
 def test_dwell_and_tests_are_for_whole_scans() -> None:
     whole, early = designs(close_of(), 0)
-    assert (whole.decisions, early.decisions) == (DECISIONS, ("single",))
+    assert (whole.decisions, early.decisions) == (tuple(POLICIES), ("single",))
 
 
 def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
