@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from msgspec import Struct
-
 from .cache import Cache, stored
 from .timing.beside_wire import Beside, beside_wire
 from .timing.classify_times import ClassifyModel
@@ -28,20 +26,13 @@ class Equipment:
         return tuple(wiring for wiring in self.wirings if wiring.fits(names)) if names else ()
 
 
-class Calibration(Struct, frozen=True):
-    """What classifying takes in Python here, where that is asked; what a transaction takes besides the wire."""
-
-    python: PythonCost | None
-    beside: Beside
-
-
 @stored(1, where="process")
-def calibrate(target: str) -> Calibration:
-    """Measure this machine."""
-    return Calibration(ClassifyModel(target).python, beside_wire(target))
+def calibrate(target: str) -> tuple[PythonCost | None, Beside]:
+    """Measure here what classifying takes in Python, where that is asked, and a transaction besides the wire."""
+    return ClassifyModel(target).python, beside_wire(target)
 
 
 def equipment_for(target: str, wirings: tuple[Wiring, ...], cache: Cache) -> Equipment:
     """Return what may be built for `target`, measured here once."""
-    (found,) = cache.ask("calibration", [calibrate.call(_CALIBRATION_S, target)])
-    return Equipment(ClassifyModel(target, python=found.python), wirings, found.beside)
+    ((python, beside),) = cache.ask("calibration", [calibrate.call(_CALIBRATION_S, target)])
+    return Equipment(ClassifyModel(target, python=python), wirings, beside)

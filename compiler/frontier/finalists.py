@@ -12,8 +12,8 @@ from thenar.runtime.manifest import Inputs
 from .points import STEP, Rate, front
 from .price import PricedTables, Tabled, price
 from .screen import Screened, rate_of
-from .search import SHAPES, Choice, Search, Shape
-from .study import Fit, Study
+from .search import SHAPES, Candidate, Search, Shape
+from .survey import Survey, Tally
 
 # Of what the best recognises; the least gain that counts on a front of rates that were screened; what is level.
 _USEFUL, _STEP, _LEVEL = 0.75, 0.003, 0.005
@@ -40,7 +40,7 @@ class Close:
     choosing_s: float
 
 
-def finalists(screened: Sequence[Screened], wanted: Sequence[Choice], most: int) -> tuple[Screened, ...]:
+def finalists(screened: Sequence[Screened], wanted: Sequence[Candidate], most: int) -> tuple[Screened, ...]:
     """Return at most `most` of `screened`, in their order; `wanted` ones come on top.
 
     They are on a front of rate against frame time or, among the same inputs, against the number of switches, and are
@@ -98,19 +98,19 @@ def _different(screened: Sequence[Screened]) -> list[Screened]:
     return list({(one.choice.inputs, frozenset(one.columns)): one for one in reversed(screened)}.values())[::-1]
 
 
-def look_closely(study: Study, chosen: Sequence[Screened]) -> tuple[Close, ...]:
+def look_closely(survey: Survey, chosen: Sequence[Screened]) -> tuple[Close, ...]:
     """Return the finalists with all that is to be known of them.
 
     All are trained to the last round in the folds of the first repeat; in the others, those that gain nothing by more
     rounds than the paper's hundred are trained for these alone.
     """
-    search, cuts, choices = study.search, study.cuts, [one.choice for one in chosen]
-    study.choose("finalists' placements", choices, cuts.others)
-    fits = study.fit("finalists", choices, cuts.screening, search.stages, search.tabled, SHAPES)
+    search, cuts, choices = survey.search, survey.cuts, [one.choice for one in chosen]
+    survey.choose("finalists' placements", choices, cuts.others)
+    fits = survey.fit("finalists", choices, cuts.screening, search.stages, search.tabled, SHAPES)
     depths = {choice: depth_of(search, [fits[choice, fold] for fold in cuts.screening]) for choice in choices}
     for depth in dict.fromkeys(depths.values()):
         alike = [choice for choice in choices if depths[choice] == depth]
-        fits |= study.fit(further(depth.rounds), alike, cuts.others, depth.stages, depth.tabled, SHAPES)
+        fits |= survey.fit(further(depth.rounds), alike, cuts.others, depth.stages, depth.tabled, SHAPES)
     rated = []
     for one in chosen:
         depth = depths[one.choice]
@@ -121,19 +121,19 @@ def look_closely(study: Study, chosen: Sequence[Screened]) -> tuple[Close, ...]:
     calls = [
         price.call(
             PRICE_S,
-            study.inputs(one.choice.joints),
-            tuple(study.switch_names[column] for column in one.columns),
+            survey.inputs(one.choice.joints),
+            tuple(survey.switch_names[column] for column in one.columns),
             one.columns,
             tuple(dict.fromkeys([*worthwhile(rates), papers_tables(search)])),
             search.max_bins,
-            study.equipment,
+            survey.equipment,
             cuts.screening[0],
         )
         for one, _, rates, _ in rated
     ]
-    prices = study.cache.ask("prices", calls)
+    prices = survey.cache.ask("prices", calls)
     return tuple(
-        Close(one, stages, rates, left_out, priced, study.choosing_s(one.choice))
+        Close(one, stages, rates, left_out, priced, survey.choosing_s(one.choice))
         for (one, stages, rates, left_out), priced in zip(rated, prices, strict=True)
     )
 
@@ -153,7 +153,7 @@ def further(rounds: int) -> str:
     return f"finalists, {rounds} rounds"
 
 
-def depth_of(search: Search, fits: Sequence[Fit]) -> Search:
+def depth_of(search: Search, fits: Sequence[Tally]) -> Search:
     """Return how far a placement is worth following, by what the folds of the first repeat say."""
     few = papers_depth(search)
     correct = np.sum([fit.correct for fit in fits], axis=0)
@@ -171,14 +171,14 @@ def worthwhile(rates: dict[Tabled, Rate]) -> tuple[Tabled, ...]:
     return tuple(found)
 
 
-def _staged(search: Search, repeats: Sequence[Sequence[Fit]]) -> dict[int, Rate]:
+def _staged(search: Search, repeats: Sequence[Sequence[Tally]]) -> dict[int, Rate]:
     return {
         stage: _rate(repeats, [[fit.correct[number] for fit in fits] for fits in repeats])
         for number, stage in enumerate(search.stages)
     }
 
 
-def _tabled(search: Search, repeats: Sequence[Sequence[Fit]]) -> dict[Tabled, Rate]:
+def _tabled(search: Search, repeats: Sequence[Sequence[Tally]]) -> dict[Tabled, Rate]:
     return {
         Tabled(rounds, Shape(*shape)): _rate(repeats, [[fit.deployed[row][column] for fit in fits] for fits in repeats])
         for row, rounds in enumerate(search.tabled)
@@ -186,5 +186,5 @@ def _tabled(search: Search, repeats: Sequence[Sequence[Fit]]) -> dict[Tabled, Ra
     }
 
 
-def _rate(repeats: Sequence[Sequence[Fit]], correct: Sequence[Sequence[int]]) -> Rate:
+def _rate(repeats: Sequence[Sequence[Tally]], correct: Sequence[Sequence[int]]) -> Rate:
     return rate_of(tuple(map(sum, correct)), sum(fit.total for fit in repeats[0]))

@@ -29,9 +29,9 @@ from .measure import TRIAL_S, measured
 from .movements import holds_movements
 from .points import SCHEMA, Frontier, FrontierError, Mark, Point, Tried, frontier_to_bytes
 from .screen import QUICK_PRICE_S, Screened, screen
-from .search import SHAPES, Choice, Search, available_inputs, curve_ways, ways
+from .search import SHAPES, Candidate, Search, available_inputs, curve_ways, ways
 from .stream import Stream, stream_of
-from .study import Cuts, Study, fit_s, path_s
+from .survey import Cuts, Survey, fit_s, path_s
 from .timing.wirings import wirings
 
 FRONTIER_NAME, TABLE_NAME, STORE_NAME = "frontier.json", "frontier.csv", "store.jsonl"
@@ -144,11 +144,11 @@ def find_frontier(
     with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:
         cache = Cache(store, report or _unheard, jobs=jobs, cluster=cluster)
         equipment = equipment_for(target, wirings(harness, target), cache)
-        study = Study(grasp_set, source, samples, ports, search, cuts, equipment, cache)
-        played = _stream(study, stream)
+        survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
+        played = _stream(survey, stream)
         own = () if build is None else (own_build(build, grasp_set, equipment),)
-        cache.foresee(foreseen(study))
-        found = _found(study, played, wanted or Wanted(), own, (*([_RENEWED] if store.renewed else []), *lacking))
+        cache.foresee(foreseen(survey))
+        found = _found(survey, played, wanted or Wanted(), own, (*([_RENEWED] if store.renewed else []), *lacking))
         if output is not None:
             # The store goes into the new folder as the same file, and nobody else may have it meanwhile.
             publish_folder(_documents(found), output, kept_entries, FrontierError)
@@ -205,33 +205,33 @@ def _documents(found: Frontier) -> dict[str, bytes]:
     return {FRONTIER_NAME: frontier_to_bytes(found), TABLE_NAME: csv_bytes(found), **drawn}
 
 
-def _stream(study: Study, given: GraspSet | None) -> Stream:
+def _stream(survey: Survey, given: GraspSet | None) -> Stream:
     """Return the test rows of the first fold as a stream, or the recordings that are given for it."""
-    grasp_set, seed = study.grasp_set, study.search.seed
+    grasp_set, seed = survey.grasp_set, survey.search.seed
     if given is None:
-        return stream_of(grasp_set, study.samples.labels, study.cuts.screening[0].test, seed=seed)
+        return stream_of(grasp_set, survey.samples.labels, survey.cuts.screening[0].test, seed=seed)
     if given.fingerprint() == grasp_set.fingerprint():
         raise FrontierError(
-            f"the stream is what is trained on, {study.source}: name other recordings with --stream, or leave it out, "
+            f"the stream is what is trained on, {survey.source}: name other recordings with --stream, or leave it out, "
             "and rows that are set aside are used"
         )
     if (given.switch_names, given.joints) != (grasp_set.switch_names, grasp_set.joints):
-        raise FrontierError(f"the stream has other switches or joints than {study.source}")
-    number = {grasp: label for label, grasp in enumerate(study.samples.grasps)}
+        raise FrontierError(f"the stream has other switches or joints than {survey.source}")
+    number = {grasp: label for label, grasp in enumerate(survey.samples.grasps)}
     strange = sorted({str(grasp) for grasp in given.grasps} - set(number))
     if strange:
-        raise FrontierError(f"the stream holds {strange[0]!r}, which {study.source} does not")
+        raise FrontierError(f"the stream holds {strange[0]!r}, which {survey.source} does not")
     labels = np.array([number[str(grasp)] for grasp in given.grasps], dtype=np.intp)
     return stream_of(given, labels, seed=seed)
 
 
-def foreseen(study: Study) -> dict[str, float]:
+def foreseen(survey: Survey) -> dict[str, float]:
     """Return the expected seconds of one core of each stage, before any has begun: the time that is left does not grow
     on the way.
     """
-    search, cuts, n_switches = study.search, study.cuts, len(study.switch_names)
-    rows, simulated = len(study.samples.labels), study.equipment.model.part is not None
-    kinds = available_inputs(n_switches, study.n_joints)
+    search, cuts, n_switches = survey.search, survey.cuts, len(survey.switch_names)
+    rows, simulated = len(survey.samples.labels), survey.equipment.model.part is not None
+    kinds = available_inputs(n_switches, survey.n_joints)
     wired = len(kinds) - ("joints" in kinds)
     train, more = ([len(fold.train) for fold in folds] for folds in (cuts.screening, cuts.others))
     # Once, or for each of the inputs if a method learns from joints.
@@ -255,40 +255,40 @@ def foreseen(study: Study) -> dict[str, float]:
     }
 
 
-def _found(study: Study, stream: Stream, wanted: Wanted, own: tuple[Mark, ...], lacking: tuple[str, ...]) -> Frontier:
-    search, n_switches = study.search, len(study.switch_names)
-    screened, curves = screen(study)
+def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...], lacking: tuple[str, ...]) -> Frontier:
+    search, n_switches = survey.search, len(survey.switch_names)
+    screened, curves = screen(survey)
     if not screened:
         raise FrontierError(
-            f"no placement that was tried can be built for {study.equipment.model.target}: name other --methods or "
+            f"no placement that was tried can be built for {survey.equipment.model.target}: name other --methods or "
             "another --target"
         )
-    named = choices_to_mark(n_switches, study.n_joints)
-    closes = look_closely(study, finalists(screened, list(named), search.finalists))
-    every = [design for close in closes for design in designs(close, study.n_joints)]
+    named = choices_to_mark(n_switches, survey.n_joints)
+    closes = look_closely(survey, finalists(screened, list(named), search.finalists))
+    every = [design for close in closes for design in designs(close, survey.n_joints)]
     by_time, by_switches = best_designs(every)
-    kept, checks, skipped = measured(with_whole_scans([*by_time, *by_switches]), study.equipment, study.cache)
-    points = points_of(kept, _latencies(study, stream, kept), study.switch_names, search.max_bins)
+    kept, checks, skipped = measured(with_whole_scans([*by_time, *by_switches]), survey.equipment, survey.cache)
+    points = points_of(kept, _latencies(survey, stream, kept), survey.switch_names, search.max_bins)
     picked, tried = wanted.pick(points), _tried(screened, closes, search)
     early = [_EARLY] if any(design.scan_kind == "early" for design in kept) else []
     return Frontier(
         schema=SCHEMA,
         thenar=version("thenar"),
-        source=study.source,
-        fingerprint=study.grasp_set.fingerprint(),
-        rows=len(study.samples.labels),
-        subjects=len(np.unique(study.grasp_set.subjects)),
+        source=survey.source,
+        fingerprint=survey.grasp_set.fingerprint(),
+        rows=len(survey.samples.labels),
+        subjects=len(np.unique(survey.grasp_set.subjects)),
         n_switches=n_switches,
-        n_joints=study.n_joints,
-        grasps=study.samples.grasps,
-        target=study.equipment.model.target,
+        n_joints=survey.n_joints,
+        grasps=survey.samples.grasps,
+        target=survey.equipment.model.target,
         folds=search.folds,
         repeats=search.repeats,
         combinations=sum(len(design.decisions) for design in every) + len(tried),
         points=points,
         tried=tried,
         curves=curves,
-        marks=(*marks_of(named, closes, study), *own),
+        marks=(*marks_of(named, closes, survey), *own),
         checks=checks,
         skipped=(*lacking, *skipped, *early, stream.what),
         picked=None if picked is None else picked.number,
@@ -296,28 +296,28 @@ def _found(study: Study, stream: Stream, wanted: Wanted, own: tuple[Mark, ...], 
     )
 
 
-def _latencies(study: Study, stream: Stream, kept: Sequence[Design]) -> Latencies:
+def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latencies:
     """Return the latency of every design with every decision that it serves, by tables of rows that the stream of the
     set's own test rows does not hold.
     """
-    fold, grouped = study.cuts.screening[0], dict[Choice, list[Design]]()
+    fold, grouped = survey.cuts.screening[0], dict[Candidate, list[Design]]()
     for design in kept:
         grouped.setdefault(design.close.screened.choice, []).append(design)
     calls = [
         latencies.call(
             2.0 + len(mine),
-            study.inputs(choice.joints),
+            survey.inputs(choice.joints),
             fold.train,
-            study.columns(choice, fold),
+            survey.columns(choice, fold),
             stream,
             tuple(Pace(design.tables.tabled, design.frame.us, design.decisions) for design in mine),
-            study.search.max_bins,
+            survey.search.max_bins,
         )
         for choice, mine in grouped.items()
     ]
     return {
         (design, kind): latency
-        for mine, found in zip(grouped.values(), study.cache.ask("latencies", calls), strict=True)
+        for mine, found in zip(grouped.values(), survey.cache.ask("latencies", calls), strict=True)
         for design, several in zip(mine, found, strict=True)
         for kind, latency in zip(design.decisions, several, strict=True)
     }

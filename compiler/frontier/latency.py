@@ -14,7 +14,7 @@ from thenar.runtime.tables import IntegerTables
 
 from ..evaluation.folds import Rows
 from ..samples import Columns, Samples
-from ..tables.batch import integer_scores
+from ..tables.quantise import integer_scores
 from .cache import stored
 from .deciders import NOTHING, Decisions, decisions, stretches
 from .points import DecisionKind, FrontierError, Latency

@@ -11,33 +11,33 @@ from .equipment import Equipment
 from .finalists import Close, papers_tables
 from .points import FrontierError, Mark, Way
 from .screen import rate_of
-from .search import Choice
-from .study import Study
+from .search import Candidate
+from .survey import Survey
 from .timing.scan_times import scan_times, transfer_us
 
 # The paper's S.
 _PAPERS = (62.0,)
 
 
-def choices_to_mark(n_switches: int, n_joints: int) -> dict[Choice, str]:
+def choices_to_mark(n_switches: int, n_joints: int) -> dict[Candidate, str]:
     """Return what to mark, with its name: the paper's placement and all switches, alone and with the joints."""
     if not n_switches:
         return {}
     marked = {Way(PAPERS, prune): f"paper, S = {prune:g}" for prune in _PAPERS}
     # Whichever method says so, to keep all of them is the same.
     marked[Way(BEST, float(n_switches))] = f"all of {n_switches}"
-    alone = {Choice(way, "switches"): name for way, name in marked.items()}
-    return alone | ({Choice(way, "both"): f"{name}, joints" for way, name in marked.items()} if n_joints else {})
+    alone = {Candidate(way, "switches"): name for way, name in marked.items()}
+    return alone | ({Candidate(way, "both"): f"{name}, joints" for way, name in marked.items()} if n_joints else {})
 
 
-def marks_of(named: dict[Choice, str], closes: Sequence[Close], study: Study) -> tuple[Mark, ...]:
+def marks_of(named: dict[Candidate, str], closes: Sequence[Close], survey: Survey) -> tuple[Mark, ...]:
     """Return the marks of these choices that were looked at closely, with the paper's rounds and whole scans."""
-    found, tabled = [], papers_tables(study.search)
+    found, tabled = [], papers_tables(survey.search)
     for close in closes:
         screened = close.screened
         if screened.choice in named:
             priced = next(tables for tables in close.priced if tables.tabled == tabled)
-            us = priced.fastest_us(study.n_joints if screened.choice.joints else 0)
+            us = priced.fastest_us(survey.n_joints if screened.choice.joints else 0)
             if us is not None:
                 found.append(Mark(named[screened.choice], len(screened.columns), close.rates[tabled], us))
     return tuple(found)

@@ -16,7 +16,7 @@ from ..tables.quantise import quantise
 from .cache import stored
 from .equipment import Equipment
 from .search import Shape
-from .study import trained
+from .survey import trained
 from .timing.classify_times import Classified
 from .timing.scan_times import ScanTimes, scan_times, transfer_us
 

@@ -29,7 +29,7 @@ TABLED = (10, 30, 100)
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class Candidate:
     """A way to choose switches, and whether the joints are read besides; inputs "joints" have NO_SWITCHES."""
 
     way: Way

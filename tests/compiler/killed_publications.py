@@ -23,7 +23,7 @@ from thenar.compiler.firmware import folder as firmware
 from thenar.compiler.frontier.cache import HEADER, Store
 from thenar.compiler.frontier.find import kept_entries
 from thenar.compiler.frontier.points import FrontierError
-from thenar.compiler.glove import folder as spec
+from thenar.compiler.glove import files as spec
 
 Content = Mapping[str, str]
 TRACED = {function.__code__ for function in (publication.publish_folder, publication._put, publication.exchanged)}

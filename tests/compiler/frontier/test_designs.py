@@ -10,7 +10,7 @@ from thenar.compiler.frontier.latency import POLICIES
 from thenar.compiler.frontier.points import Latency, Rate, Time, Way
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.screen import Screened
-from thenar.compiler.frontier.search import Choice, Shape
+from thenar.compiler.frontier.search import Candidate, Shape
 from thenar.compiler.frontier.timing.classify_times import Classified
 from thenar.compiler.frontier.timing.scan_times import ScanTimes
 
@@ -25,7 +25,7 @@ def close_of(switches: int = 20, rate: float = 0.9, early_us: float = 200.0, lay
     tables = PricedTables(TABLED, b"", (Classified("plain", layout_us, "model", 900, 30),), wired, 1.25)
     way = Way("id3", float(switches))
     screened = Screened(
-        Choice(way, "switches" if switches else "joints"), tuple(range(switches)), Rate(rate, rate, rate), 1.0
+        Candidate(way, "switches" if switches else "joints"), tuple(range(switches)), Rate(rate, rate, rate), 1.0
     )
     return Close(screened, {}, {TABLED: Rate(rate, rate, rate)}, None, (tables,), 2.0)
 

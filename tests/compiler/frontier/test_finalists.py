@@ -4,18 +4,18 @@ from thenar.compiler.frontier.finalists import depth_of, finalists, papers_depth
 from thenar.compiler.frontier.points import Rate, Way
 from thenar.compiler.frontier.price import Tabled
 from thenar.compiler.frontier.screen import Screened, rate_of
-from thenar.compiler.frontier.search import NO_SWITCHES, Choice, Search, Shape
-from thenar.compiler.frontier.study import Fit
+from thenar.compiler.frontier.search import NO_SWITCHES, Candidate, Search, Shape
+from thenar.compiler.frontier.survey import Tally
 from thenar.runtime.manifest import Inputs
 
 
 def _screened(size: int, rate: float, frame_us: float, inputs: Inputs = "switches", method: str = "id3") -> Screened:
-    choice = Choice(Way(method, float(size)), inputs)
+    choice = Candidate(Way(method, float(size)), inputs)
     return Screened(choice, tuple(range(size)), Rate(rate, rate, rate), frame_us)
 
 
 def test_joints_are_read_unless_switches_stand_alone() -> None:
-    assert [Choice(NO_SWITCHES, kind).joints for kind in ("both", "joints", "switches")] == [True, True, False]
+    assert [Candidate(NO_SWITCHES, kind).joints for kind in ("both", "joints", "switches")] == [True, True, False]
 
 
 def test_the_best_and_the_smallest_that_is_level_come_first() -> None:
@@ -90,13 +90,13 @@ def test_rounds_beyond_the_papers_are_followed_where_they_win_more_than_a_fifth_
 ) -> None:
     search = Search(methods=("id3",), rivals=())
     correct = [450 + (late if stage > 100 else 0) for stage in search.stages]
-    fits = [Fit(500, tuple(correct), ()), Fit(500, tuple(450 for _ in correct), ())]
+    fits = [Tally(500, tuple(correct), ()), Tally(500, tuple(450 for _ in correct), ())]
     assert depth_of(search, fits).rounds == rounds
 
 
 def test_a_search_of_few_rounds_is_followed_to_its_end() -> None:
     search = Search(methods=("id3",), rivals=(), rounds=50)
-    assert depth_of(search, [Fit(10, tuple(range(len(search.stages))), ())]) == search
+    assert depth_of(search, [Tally(10, tuple(range(len(search.stages))), ())]) == search
 
 
 def test_what_is_followed_less_far_is_the_beginning_of_what_is() -> None:

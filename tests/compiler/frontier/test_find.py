@@ -52,7 +52,7 @@ def keys_in(store: Path) -> list[str]:
 
 @pytest.fixture(scope="module")
 def first(tmp_path_factory: pytest.TempPathFactory, make_set: Make) -> tuple[Request, Frontier]:
-    request = asked(tmp_path_factory.mktemp("study"), make_set(subjects=2))
+    request = asked(tmp_path_factory.mktemp("survey"), make_set(subjects=2))
     return request, found_of(request)
 
 

@@ -13,7 +13,7 @@ from thenar.compiler.frontier.measure import measured
 from thenar.compiler.frontier.points import Rate, Way
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.screen import Screened
-from thenar.compiler.frontier.search import Choice, Shape
+from thenar.compiler.frontier.search import Candidate, Shape
 from thenar.compiler.frontier.timing.beside_wire import WIRE_ONLY
 from thenar.compiler.frontier.timing.checks import unchecked
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel
@@ -29,7 +29,7 @@ def design_of(model: ClassifyModel) -> Design:
     scan = ScanTimes(500.0, 200.0, 4, 2, "wire", 1.5)
     wired = Wired("mcp23017", 400_000, scan)
     priced = PricedTables(Tabled(1, Shape(16)), tables_to_bytes(tables), model.options(tables), (wired,), 1.0)
-    screened = Screened(Choice(Way("id3", 6.0), "switches"), tuple(range(6)), Rate(0.9, 0.9, 0.9), 1.0)
+    screened = Screened(Candidate(Way("id3", 6.0), "switches"), tuple(range(6)), Rate(0.9, 0.9, 0.9), 1.0)
     close = Close(screened, {}, {}, None, (priced,), 1.0)
     return Design(close, priced, priced.classified[0], wired, "early", 0)
 

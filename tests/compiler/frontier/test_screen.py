@@ -5,7 +5,7 @@ from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.marks import choices_to_mark
 from thenar.compiler.frontier.points import FrontierError, Way
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
-from thenar.compiler.frontier.search import Choice, Search, Shape, available_inputs, curve_ways, ways
+from thenar.compiler.frontier.search import Candidate, Search, Shape, available_inputs, curve_ways, ways
 from thenar.compiler.frontier.timing.classify_times import Classified
 from thenar.compiler.frontier.timing.scan_times import ScanTimes, transfer_us
 from thenar.compiler.recordings.graspset import GraspSet
@@ -47,10 +47,10 @@ def test_nothing_is_screened_with_more_rounds_than_are_trained() -> None:
 
 
 def test_the_papers_placements_are_marked_with_all_inputs_that_there_are() -> None:
-    assert Choice(Way("id3", 62.0), "both") in choices_to_mark(14, 3)
-    assert Choice(Way("id3", 62.0), "switches") in choices_to_mark(14, 0)
-    assert choices_to_mark(14, 0)[Choice(Way("elimination", 14.0), "switches")] == "all of 14"
-    assert choices_to_mark(14, 3)[Choice(Way("elimination", 14.0), "both")] == "all of 14, joints"
+    assert Candidate(Way("id3", 62.0), "both") in choices_to_mark(14, 3)
+    assert Candidate(Way("id3", 62.0), "switches") in choices_to_mark(14, 0)
+    assert choices_to_mark(14, 0)[Candidate(Way("elimination", 14.0), "switches")] == "all of 14"
+    assert choices_to_mark(14, 3)[Candidate(Way("elimination", 14.0), "both")] == "all of 14, joints"
     assert choices_to_mark(0, 3) == {}
 
 
