@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from .boosting.classifier import LogitBoostClassifier
     from .evaluation.folds import EvaluationError
     from .evaluation.study import Study, evaluate
+    from .frontier.find import find_frontier
+    from .frontier.points import Frontier
+    from .frontier.search import Search
     from .placement.id3 import grow_id3
     from .placement.methods.base import METHODS
     from .placement.selectors import ID3Selector, SwitchSelector
@@ -39,6 +42,9 @@ _HOMES = {
     ".boosting.classifier": ("LogitBoostClassifier",),
     ".evaluation.folds": ("EvaluationError",),
     ".evaluation.study": ("Study", "evaluate"),
+    ".frontier.find": ("find_frontier",),
+    ".frontier.points": ("Frontier",),
+    ".frontier.search": ("Search",),
     ".placement.id3": ("grow_id3",),
     ".placement.methods.base": ("METHODS",),
     ".placement.selectors": ("ID3Selector", "SwitchSelector"),
@@ -58,6 +64,7 @@ __all__ = [
     "CompileError",
     "Documents",
     "EvaluationError",
+    "Frontier",
     "GraspSet",
     "ID3Selector",
     "Joint",
@@ -65,6 +72,7 @@ __all__ = [
     "Options",
     "Samples",
     "ScoreTables",
+    "Search",
     "Setting",
     "Study",
     "SwitchSelector",
@@ -74,6 +82,7 @@ __all__ = [
     "compile",
     "compile_build",
     "evaluate",
+    "find_frontier",
     "grow_id3",
     "verify",
 ]

@@ -4,8 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from math import log10
 from typing import Any
 
-from ..frontier.pareto import front
-from ..frontier.points import Curve, Mark, Point, Rate, Tried
+from ..frontier.points import Curve, Mark, Point, Rate, Tried, front
 from ..text import interval, microseconds
 from .charts import words
 from .point_view import point_words

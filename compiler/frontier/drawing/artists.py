@@ -4,8 +4,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from ...text import counted, percent
-from ..pareto import front
-from ..points import Mark, Point, Rate, Tried
+from ..points import Mark, Point, Rate, Tried, front
 from .chart import COLOURS, GREY, INK, NAMES, SHAPES
 from .labels import Label
 from .room import FAINT, LINE

@@ -54,6 +54,11 @@ class ClassifyModel:
         self.python = (python or fit_here()) if self.part is None else None
         self.factor = factor if target == "pi" and not on_a_pi() else 1.0
 
+    @property
+    def identity(self) -> tuple[object, ...]:
+        """What its predictions depend on besides the tables."""
+        return self.target, self.clock_hz, self.python, self.factor
+
     def options(self, tables: IntegerTables) -> tuple[Classified, ...]:
         """Return the layouts that fit the part than which none is both faster and smaller, the fastest first.
 

@@ -14,7 +14,7 @@ from thenar.compiler.frontier.timing.beside_wire import (
     measured_call_us,
 )
 from thenar.compiler.frontier.timing.python_times import random_tables
-from thenar.compiler.frontier.timing.scan_times import ScanTimes, record_period_us, scan_times, transfer_us
+from thenar.compiler.frontier.timing.scan_times import ScanTimes, scan_times, transfer_us
 from thenar.compiler.frontier.timing.wirings import BOARD, Wiring
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.scanning.costs import Costs
@@ -111,11 +111,10 @@ def test_a_switch_without_a_place_is_an_error() -> None:
 @pytest.mark.parametrize(("joints", "sensors"), [(1, 18), (16, 18), (18, 18), (19, 22), (22, 22)])
 def test_a_record_has_18_or_22_sensors_a_letter_a_status_and_an_end(joints: int, sensors: int) -> None:
     assert transfer_us(joints) == pytest.approx((sensors + 3) * 10 / 115_200 * 1e6)
-    assert record_period_us(joints) == pytest.approx(transfer_us(joints) + 250 * sensors)
 
 
 def test_without_joints_no_record_is_waited_for() -> None:
-    assert transfer_us(0) == record_period_us(0) == 0.0
+    assert transfer_us(0) == 0.0
 
 
 @pytest.mark.parametrize("target", timed())
