@@ -79,7 +79,7 @@ def command(budget_us: float | None, rate: float | None, as_json: bool, **asked:
 
 
 def _print(found: "Frontier", output: Path) -> None:
-    from thenar.compiler.frontier.drawing.words import featured
+    from thenar.compiler.frontier.words import featured
 
     from .frontier_tables import print_frontier
 

@@ -18,7 +18,7 @@ def print_frontier(frontier: "Frontier") -> None:
     """Print the points, the picked one bold; then checks, what was left out, and what the picture says."""
     from rich.text import Text
 
-    from thenar.compiler.frontier.drawing.sentence import sentence
+    from thenar.compiler.frontier.words import summary
 
     console = out()
     console.print(_grid(frontier))
@@ -30,7 +30,7 @@ def print_frontier(frontier: "Frontier") -> None:
     for missing in frontier.skipped:
         console.print(Text(missing, "yellow"))
     console.print()
-    console.print(Text(sentence(frontier), "bold"))
+    console.print(Text(summary(frontier), "bold"))
 
 
 def _grid(frontier: "Frontier") -> "Table":
@@ -57,7 +57,7 @@ def _title(frontier: "Frontier") -> str:
 def _cells(point: "Point") -> "tuple[Text, ...]":
     from rich.text import Text
 
-    from thenar.compiler.frontier.drawing.words import way_of, wiring_of
+    from thenar.compiler.frontier.words import way_of, wiring_of
     from thenar.compiler.text import duration, interval
 
     setting = point.setting

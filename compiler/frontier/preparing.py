@@ -14,11 +14,10 @@ from ..placement.baselines import RIVALS, available
 from ..publication import check_folder, entries, publish_folder
 from ..recordings.graspset import GraspSet
 from .calibrating import equipment_for
-from .drawing.pictures import PICTURES, pictures
-from .drawing.table import csv_bytes
 from .foreseeing import foreseen
 from .material import Cuts, Material
 from .own_build import own_build
+from .plots import PICTURES, pictures
 from .points import Frontier, FrontierError, frontier_to_bytes
 from .settings import USUAL_METHODS, USUAL_RIVALS, WIRED_METHODS, Search
 from .storing.asking import Desk
@@ -30,6 +29,7 @@ from .streaming.streams import stream_of
 from .study import Study, Wanted, find_frontier
 from .timing.whole_glove import ports_of_whole_glove
 from .timing.wirings import wirings
+from .words import csv_bytes
 
 FRONTIER_NAME, TABLE_NAME, STORE_NAME = "frontier.json", "frontier.csv", "store.jsonl"
 _DOCUMENTS = frozenset({FRONTIER_NAME, TABLE_NAME, *(f"{name}.svg" for name in PICTURES)})

@@ -3,9 +3,8 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from ..frontier.drawing.sentence import sentence
-from ..frontier.drawing.words import featured
 from ..frontier.points import Frontier, Point
+from ..frontier.words import featured, summary
 from ..hand import HandShape
 from ..text import NBSP, counted, interval, microseconds
 from ..text import sentence as as_sentence
@@ -84,7 +83,7 @@ def _hand(frontier: Frontier, hand: HandShape | None, picked: Detail | None) -> 
 
 
 def _notes(frontier: Frontier) -> Iterable[str]:
-    yield sentence(frontier)
+    yield summary(frontier)
     yield (
         f"{frontier.combinations:,} combinations of {frontier.source}: {counted(frontier.rows, 'row')}, "
         f"{counted(frontier.subjects, 'subject')}, {counted(frontier.n_switches, 'switch', 'switches')}, "

@@ -21,8 +21,8 @@ from thenar.compiler.artifact.verify import verify_build
 from thenar.compiler.firmware.folder import sums, write_folder
 from thenar.compiler.firmware.generate import Request, firmware_files, fit_of
 from thenar.compiler.frontier import points
-from thenar.compiler.frontier.drawing.table import csv_bytes
 from thenar.compiler.frontier.storing.store import HEADER, Store
+from thenar.compiler.frontier.words import csv_bytes
 from thenar.compiler.glove.files import spec_files
 from thenar.compiler.placement.placement import place
 from thenar.compiler.report.frontier_charts import frontier_charts
