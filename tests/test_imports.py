@@ -118,7 +118,6 @@ WORKSTATION_ONLY = {
     "threadpoolctl",
     "mpmath",
     "jinja2",
-    "plotly",
     "ezdxf",
     "dask",
     "distributed",

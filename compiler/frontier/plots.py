@@ -45,7 +45,7 @@ POINT_ID, RING_ID = "point-", "featured"
 _WIDTH, _HEIGHT = 9.0, 5.4  # inches
 _LEFT, _RIGHT, _BOTTOM, _TOP = 0.72, 0.18, 0.58, 1.02  # inches around the axes
 _SIZE, _MARK_SIZE, _TRIED_SIZE = 34.0, 52.0, 9.0  # square points
-_LOWEST_US = 1e-3  # a logarithmic axis has no 0
+_LOWEST = 1e-3  # a logarithmic axis has no 0
 _FEW = 16  # switches: curves may leave the picture below the rate of so many
 _DECISIONS = {"single": "one frame", "dwell": "dwell", "sequential": "sequential test"}
 
@@ -118,14 +118,16 @@ def pictures(frontier: Frontier, kind: Literal["svg", "png"], *, letters: bool =
 
 def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
     figure, axes = _sheet(frontier, cost.title)
-    marks = [(x, mark) for mark in frontier.marks if (x := cost.of_mark(mark)) is not None]
-    points = [(x, point) for point in frontier.points if (x := cost.of_point(point)) is not None]
+    marks = [(max(x, _LOWEST), mark) for mark in frontier.marks if (x := cost.of_mark(mark)) is not None]
+    points = [(max(x, _LOWEST), point) for point in frontier.points if (x := cost.of_point(point)) is not None]
     ends = [(x, end, point) for x, point in points if (end := cost.end(point)) is not None]
     curves = () if cost.is_time else frontier.curves
     _scale_rates(axes, [*(point.rate for _, point in points), *(mark.rate for _, mark in marks), *_shown(curves)])
     lowest = axes.get_ylim()[0]
     tried = [
-        (x, each) for each in frontier.tried if (x := cost.of_tried(each)) is not None and each.rate.mean >= lowest
+        (max(x, _LOWEST), each)
+        for each in frontier.tried
+        if (x := cost.of_tried(each)) is not None and each.rate.mean >= lowest
     ]
     if cost.is_time:
         _scale_times(axes, [*(x for x, _ in (*marks, *tried, *points)), *(end for _, end, _ in ends)])
@@ -173,7 +175,7 @@ def _sheet(frontier: Frontier, title: str) -> tuple["Figure", "Axes"]:
     left, right, bottom, top = _LEFT / _WIDTH, _RIGHT / _WIDTH, _BOTTOM / _HEIGHT, _TOP / _HEIGHT
     under = (
         f"{shorten(frontier.source)}: {frontier.rows:,} grasps of {counted(frontier.subjects, 'person', 'people')}, "
-        f"{len(frontier.grasps)} types; {frontier.target}; "
+        f"{len(frontier.grasps)} types; {shorten(frontier.target)}; "
         f"{frontier.folds} folds x {frontier.repeats}, placement inside the fold, 95 % intervals"
     )
     figure.text(left, 1 - 0.30 / _HEIGHT, title, fontsize=13, fontweight="bold", color=_INK)
@@ -188,7 +190,7 @@ def _sheet(frontier: Frontier, title: str) -> tuple["Figure", "Axes"]:
 
 def _scale_times(axes: "Axes", us: Iterable[float]) -> None:
     """Make the horizontal axis logarithmic, in times, with room for all of `us`."""
-    known = [max(each, _LOWEST_US) for each in us] or [100.0, 1000.0]
+    known = [max(each, _LOWEST) for each in us] or [100.0, 1000.0]
     low, high = min(known), max(known)
     room = max(1.15, (high / low) ** 0.07)
     axes.set_xscale("log")

@@ -4,6 +4,8 @@ import csv
 import io
 from collections.abc import Iterable, Iterator
 
+from thenar.runtime.names import printable
+
 from ..recordings.spreadsheet import cells
 from ..text import counted, duration, interval, listed, percent
 from .points import Frontier, Mark, Point, Rate, Setting, Time
@@ -28,8 +30,8 @@ def inputs_of(point: Point) -> str:
 
 
 def shorten(name: str) -> str:
-    """Return a name that has room on a picture: one line of at most 40 letters."""
-    line = " ".join(name.split())
+    """Return a name that has room on a picture: one line of at most 40 letters, all of which XML knows."""
+    line = printable(" ".join(name.split()))
     return line if len(line) <= _LONGEST else f"{line[: _LONGEST - 3]}..."
 
 

@@ -1,10 +1,11 @@
-"""All that a report tells of, gathered by whoever compiled the build."""
+"""What a report is made of, and the table that its sections share."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.errors import ThenarError
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.scanning.scanmap import ScanMap
@@ -14,8 +15,11 @@ from ..evaluation.study import Study
 from ..frontier.points import Frontier
 from ..hand import HandShape
 from ..placement.tree import Tree
-from .errors import ReportError
 from .guarantee import Guarantee
+
+
+class ReportError(ThenarError, ValueError):
+    """The parts of a report do not belong together."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,3 +75,20 @@ class ReportContent:
     def switch_names(self) -> tuple[str, ...]:
         """Names of the kept switches, in the order in which they were chosen."""
         return tuple(switch.name for switch in self.manifest.switches)
+
+
+@dataclass(frozen=True, slots=True)
+class PlainTable:
+    """A table of texts: every row is as long as `columns`.
+
+    words  columns of words; the others hold numbers, to the right
+    head   the column that heads the rows
+    note   a sentence below the table
+    """
+
+    caption: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    words: tuple[int, ...] = (0,)
+    head: int = 0
+    note: str = ""

@@ -25,8 +25,7 @@ from thenar.compiler.frontier.storing.store import HEADER, Store
 from thenar.compiler.frontier.words import csv_bytes
 from thenar.compiler.glove.files import spec_files
 from thenar.compiler.placement.placement import place
-from thenar.compiler.report.frontier_charts import frontier_charts
-from thenar.compiler.report.frontier_view import frontier_view
+from thenar.compiler.report.frontier import frontier_view
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME, Build
 from thenar.runtime.live.frames import GloveFrame, SwitchFrame
@@ -227,7 +226,6 @@ def _compile_from(data: bytes, folder: Path) -> None:
             wired(chosen.point.switches)
     csv_bytes(chosen.frontier)
     frontier_view(chosen.frontier, grasp_set().fingerprint(), None, chosen.point.number)
-    frontier_charts(chosen.frontier)
 
 
 class _Question(msgspec.Struct, frozen=True):

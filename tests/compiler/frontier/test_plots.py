@@ -165,6 +165,17 @@ def test_names_are_no_formulas_and_no_markup(examples: Any) -> None:
         assert any(text.startswith(NASTY) for text in _texts(_drawn(frontier, name)))
 
 
+def test_a_cost_of_nothing_has_a_place_and_no_name_breaks_the_file(examples: Any) -> None:
+    found, replace = examples.example_frontier(), msgspec.structs.replace
+    first = replace(found.points[0], frame=replace(found.points[0].frame, us=0.0))
+    mark = replace(found.marks[0], name="bell \x07 and no character \ufffe", frame_us=0.0)
+    frontier = replace(found, points=(first, *found.points[1:]), marks=(mark,), source="\x1b[31m")
+    read = {name: ElementTree.fromstring(svg) for name, svg in pictures(frontier, "svg", letters=True).items()}
+    marker = read["frontier"].find(f".//{{*}}g[@id='{POINT_ID}{first.number}']")
+    assert marker is not None
+    assert marker.find(".//{*}use") is not None
+
+
 @pytest.mark.parametrize(
     "changes",
     [

@@ -1,0 +1,138 @@
+"""The sections on what is recognised: the paper's tables, and what is mistaken for what."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..evaluation.plan import TableName
+from ..evaluation.protocols import PROTOCOLS
+from ..evaluation.study import Study
+from ..evaluation.tables import Cell, Spread, Table
+from ..text import NBSP, counted, interval, percent, sentence
+from .content import PlainTable, ReportContent
+from .sections import honest_rate
+
+# Wider tables cannot be read; the list of what is mistaken most often can.
+WIDEST = 40
+_MOST = 5
+_SHADES = 9
+_TITLES: dict[TableName, str] = {
+    "compositions": "Compositions of inputs (the paper's Tables II and V)",
+    "generality": "One subject's placement (row) on another's data (column), selected switches (Tables III and VI)",
+    "pruning": "Placement of all subjects pooled, pruned by S, selected switches (Tables IV and VII)",
+    "baselines": "ID3 beside other placements of as many switches, selected switches",
+}
+
+
+def protocols(study: Study) -> tuple[tuple[str, str], ...]:
+    """Return the study's protocols and their meanings."""
+    return tuple((f"{each.name} protocol", each.meaning) for each in PROTOCOLS if each.name in study.options.protocols)
+
+
+def study_tables(study: Study) -> tuple[PlainTable, ...]:
+    """Return the paper's tables."""
+    return tuple(map(_table, study.tables))
+
+
+def study_notes(study: Study) -> Iterator[str]:
+    """Yield how the rows were cut, what to beware of, and which tables are missing, and why."""
+    options, repeats = study.options, counted(study.options.repeats, "repeat")
+    cut = {
+        "stratified": f"{options.folds} stratified folds, {repeats} from seed {options.seed}",
+        "subject": "one subject left out at a time, all others trained on",
+        "object": "one object left out at a time",
+        "block": f"{options.folds} blocks of trials",
+    }[options.scheme]
+    grasps = counted(len(study.grasps), "grasp type")
+    yield f"{study.rows:,} rows, {grasps}; {cut}; {options.rounds} rounds; rates in % with 95{NBSP}% intervals."
+    yield from map(sentence, study.warnings)
+    for left in study.left_out:
+        yield f"No table of {left.name}: {left.reason}."
+
+
+def _table(table: Table) -> PlainTable:
+    several = len(table.columns) > 1
+    rows = tuple(
+        (row.name, row.what, _spread(row.switches), *map(_cell, row.cells), *([interval(row.average)] * several))
+        for row in table.rows
+    )
+    blind = any(cell.no_inputs for row in table.rows for cell in row.cells)
+    return PlainTable(
+        caption=f"{_TITLES[table.name]}: {table.protocol} protocol",
+        columns=("Row", "What", "Switches", *table.columns, *(["average"] * several)),
+        rows=rows,
+        words=(0, 1),
+        note="* In some folds no input varied: there, the most frequent grasp type is answered." if blind else "",
+    )
+
+
+def _cell(cell: Cell) -> str:
+    draws = "" if cell.draws is None else f"\nfrom {100 * cell.draws.least:.1f} to {100 * cell.draws.most:.1f}"
+    return interval(cell.rate) + ("*" if cell.no_inputs else "") + draws
+
+
+def _spread(spread: Spread) -> str:
+    return f"{spread.least:g}" if spread.least == spread.most else f"{spread.least:g} to {spread.most:g}"
+
+
+@dataclass(frozen=True, slots=True)
+class ConfusionView:
+    """Counts as a table: where they are from, the grasp types, a row for each of these, and what is mistaken most.
+
+    rows  grasp type; its counts, each with the class that shades it ("hit1" to "miss9", "" for none); how many rows it
+          has; the share of them that was recognised. There are none where the table would be too wide.
+    """
+
+    title: str
+    grasps: tuple[str, ...]
+    rows: tuple[tuple[str, tuple[tuple[str, str], ...], str, str], ...]
+    mistaken: tuple[str, ...]
+
+
+def confusion_view(title: str, grasps: Sequence[str], counts: NDArray[np.intp]) -> ConfusionView:
+    """Return the table of `counts` (K, K), row: true, column: recognised; a shade is a share of its row."""
+    rows = []
+    for number, (grasp, line) in enumerate(zip(grasps, counts.tolist(), strict=True)):
+        total = sum(line)
+        cells = tuple(_shaded(count, total, column == number) for column, count in enumerate(line))
+        rows.append((grasp, cells, f"{total:,}", percent(line[number] / total, NBSP) if total else ""))
+    shown = tuple(rows) if len(grasps) <= WIDEST else ()
+    return ConfusionView(title, tuple(grasps), shown, tuple(_mistaken(grasps, counts)))
+
+
+def confusions(content: ReportContent) -> Iterator[ConfusionView]:
+    """Yield the build's own matrix, then those of the compositions, honest folds, all subjects together."""
+    if content.confusion is not None:
+        rate = honest_rate(content.manifest)
+        folds = "honest folds" if rate is None else counted(rate.folds, "honest fold")
+        yield confusion_view(f"This build's own recipe, {folds}", content.manifest.grasps, content.confusion)
+    if content.study is None:
+        return
+    for table in content.study.tables:
+        if (table.name, table.protocol) == ("compositions", "honest"):
+            one = len(table.columns) == 1
+            whose = f"subject {table.columns[0]}" if one else f"{len(table.columns)} subjects together"
+            for row in table.rows:
+                counts = [cell.confusion for cell in row.cells if cell.confusion is not None]
+                if counts:
+                    title = f"{row.name}: {row.what}, honest folds of {whose}"
+                    yield confusion_view(title, content.study.grasps, np.sum(counts, axis=0))
+
+
+def _shaded(count: int, total: int, hit: bool) -> tuple[str, str]:
+    if not count:
+        return "·", ""
+    return f"{count:,}", f"{'hit' if hit else 'miss'}{1 + (_SHADES - 1) * count // total}"
+
+
+def _mistaken(grasps: Sequence[str], counts: NDArray[np.intp]) -> Iterator[str]:
+    """Yield sentences on the commonest mistakes; of equally common ones the first in the table."""
+    wrong = counts.copy()
+    np.fill_diagonal(wrong, 0)
+    for place in np.argsort(-wrong, axis=None, kind="stable")[:_MOST].tolist():
+        true, found = divmod(place, len(grasps))
+        if wrong[true, found]:
+            total = int(counts[true].sum())
+            yield f"{grasps[true]} taken for {grasps[found]}: {wrong[true, found]:,} of {total:,} rows"
