@@ -16,7 +16,7 @@ import numpy as np
 
 from thenar.cli.teller import Teller
 from thenar.compiler import compile_build
-from thenar.drivers.cyberglove_frame import ALWAYS, PLUGGED
+from thenar.drivers.cyberglove_protocol import ALWAYS, PLUGGED
 from thenar.runtime import Build
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import GloveWiring, Harness

@@ -10,7 +10,7 @@ from thenar.runtime.manifest import Manifest, Recognised
 from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, scan_us, scanner_us
 
 from ..placement.gain import entropy_bits
-from ..placement.ways import METHODS
+from ..placement.methods.base import METHODS
 from ..text import NBSP, counted, microseconds, percent
 from .content import PlainTable, ReportContent
 
@@ -89,7 +89,7 @@ def kept_table(content: ReportContent) -> PlainTable:
 def placement_sentences(content: ReportContent) -> tuple[str, str]:
     """Return by which method the switches were chosen, and how to read their table."""
     method = content.manifest.options.placement
-    how = METHODS[method].what if method in METHODS else "Chosen by another version of thenar"
+    how = METHODS[method].help if method in METHODS else "Chosen by another version of thenar"
     if content.tree is not None:
         bits = "brought the tree; together is what it and those before it brought, as a share of all there is to know"
     else:

@@ -6,9 +6,10 @@ from math import ceil
 from typing import Any
 
 from thenar.drivers.cyberglove import CyberGlove
-from thenar.drivers.cyberglove_timing import BITS_A_BYTE, shortest_us
+from thenar.drivers.cyberglove_protocol import shortest_us
 from thenar.drivers.debounce import Debouncer
 from thenar.drivers.scanner import Scanner
+from thenar.drivers.serial_line import BITS_A_BYTE
 
 from ..harness.wiring import Debounce, GloveWiring, ScannerWiring
 from .frames import GloveFrame, SwitchFrame
