@@ -77,6 +77,7 @@ ALLOWED = {
         "compiler.limits",
         "compiler.pictures",
         "compiler.samples",
+        "compiler.text",
         "compiler.workers",
         "compiler.evaluation",
     ),

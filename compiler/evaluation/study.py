@@ -8,6 +8,7 @@ from ..limits import check_memory, check_types
 from ..placement.methods.base import METHODS
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
+from ..text import counted
 from .compositions import inputs
 from .concerns import concerns
 from .errors import EvaluationError
@@ -71,6 +72,18 @@ class Study:
     warnings: tuple[str, ...]
     left_out: tuple[LeftOut, ...]
     tables: tuple[Table, ...]
+
+    def __str__(self) -> str:
+        """Return how many rows there are, and how they were cut."""
+        options, repeats = self.options, counted(self.options.repeats, "repeat")
+        cut = {
+            "stratified": f"{options.folds} stratified folds, {repeats} from seed {options.seed}",
+            "subject": "one subject left out at a time (the column), all others trained on",
+            "object": "one object left out at a time",
+            "block": f"{options.folds} blocks of trials",
+        }[options.scheme]
+        grasps = counted(len(self.grasps), "grasp type")
+        return f"{self.rows:,} rows, {grasps}; {cut}; {options.rounds} rounds; rates in % with 95 % intervals"
 
 
 def evaluate(

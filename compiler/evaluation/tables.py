@@ -7,6 +7,7 @@ from typing import Self
 
 import numpy as np
 
+from ..text import interval
 from .fits import Fit, Labels
 from .plan import CellPlan, RowPlan, TableName, TablePlan
 from .protocols import ProtocolName
@@ -14,6 +15,13 @@ from .rates import Average, Rate
 
 Predictions = Mapping[Fit, Labels]
 Confusion = tuple[tuple[int, ...], ...]
+
+_TITLES: dict[TableName, str] = {
+    "compositions": "Compositions of inputs (the paper's Tables II and V)",
+    "generality": "One subject's placement (row) on another's data (column), selected switches (Tables III and VI)",
+    "pruning": "Placement of all subjects pooled, pruned by S, selected switches (Tables IV and VII)",
+    "baselines": "ID3 beside other placements of as many switches, selected switches",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +37,10 @@ class Spread:
         """Return the spread of one or more values."""
         listed = list(values)
         return cls(min(listed), fmean(listed), max(listed))
+
+    def __str__(self) -> str:
+        """Return "33", or "31 to 35"."""
+        return f"{self.least:g}" if self.least == self.most else f"{self.least:g} to {self.most:g}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +58,11 @@ class Cell:
     no_inputs: int
     draws: Spread | None
     confusion: Confusion | None
+
+    def __str__(self) -> str:
+        """Return rate and interval in percent, starred where fits had no inputs; the draws' spread on a second line."""
+        draws = "" if self.draws is None else f"\nfrom {100 * self.draws.least:.1f} to {100 * self.draws.most:.1f}"
+        return f"{interval(self.rate)}{'*' if self.no_inputs else ''}{draws}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +84,17 @@ class Table:
     protocol: ProtocolName
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
+
+    @property
+    def title(self) -> str:
+        """What the table shows."""
+        return f"{_TITLES[self.name]}: {self.protocol} protocol"
+
+    @property
+    def note(self) -> str:
+        """What a star means, in a sentence; "" where there is none."""
+        starred = any(cell.no_inputs for row in self.rows for cell in row.cells)
+        return "* In some folds no input varied: there, the most frequent grasp type is answered." if starred else ""
 
 
 @dataclass(frozen=True, slots=True)

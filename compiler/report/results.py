@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..evaluation.plan import TableName
 from ..evaluation.protocols import PROTOCOLS
 from ..evaluation.study import Study
-from ..evaluation.tables import Cell, Spread, Table
+from ..evaluation.tables import Table
 from ..text import NBSP, counted, interval, percent, sentence
 from .content import PlainTable, ReportContent
 from .sections import honest_rate
@@ -18,12 +17,6 @@ from .sections import honest_rate
 WIDEST = 40
 _MOST = 5
 _SHADES = 9
-_TITLES: dict[TableName, str] = {
-    "compositions": "Compositions of inputs (the paper's Tables II and V)",
-    "generality": "One subject's placement (row) on another's data (column), selected switches (Tables III and VI)",
-    "pruning": "Placement of all subjects pooled, pruned by S, selected switches (Tables IV and VII)",
-    "baselines": "ID3 beside other placements of as many switches, selected switches",
-}
 
 
 def protocols(study: Study) -> tuple[tuple[str, str], ...]:
@@ -38,15 +31,7 @@ def study_tables(study: Study) -> tuple[PlainTable, ...]:
 
 def study_notes(study: Study) -> Iterator[str]:
     """Yield how the rows were cut, what to beware of, and which tables are missing, and why."""
-    options, repeats = study.options, counted(study.options.repeats, "repeat")
-    cut = {
-        "stratified": f"{options.folds} stratified folds, {repeats} from seed {options.seed}",
-        "subject": "one subject left out at a time, all others trained on",
-        "object": "one object left out at a time",
-        "block": f"{options.folds} blocks of trials",
-    }[options.scheme]
-    grasps = counted(len(study.grasps), "grasp type")
-    yield f"{study.rows:,} rows, {grasps}; {cut}; {options.rounds} rounds; rates in % with 95{NBSP}% intervals."
+    yield sentence(str(study))
     yield from map(sentence, study.warnings)
     for left in study.left_out:
         yield f"No table of {left.name}: {left.reason}."
@@ -54,27 +39,12 @@ def study_notes(study: Study) -> Iterator[str]:
 
 def _table(table: Table) -> PlainTable:
     several = len(table.columns) > 1
+    columns = ("Row", "What", "Switches", *table.columns, *(["average"] * several))
     rows = tuple(
-        (row.name, row.what, _spread(row.switches), *map(_cell, row.cells), *([interval(row.average)] * several))
+        (row.name, row.what, str(row.switches), *map(str, row.cells), *([interval(row.average)] * several))
         for row in table.rows
     )
-    blind = any(cell.no_inputs for row in table.rows for cell in row.cells)
-    return PlainTable(
-        caption=f"{_TITLES[table.name]}: {table.protocol} protocol",
-        columns=("Row", "What", "Switches", *table.columns, *(["average"] * several)),
-        rows=rows,
-        words=(0, 1),
-        note="* In some folds no input varied: there, the most frequent grasp type is answered." if blind else "",
-    )
-
-
-def _cell(cell: Cell) -> str:
-    draws = "" if cell.draws is None else f"\nfrom {100 * cell.draws.least:.1f} to {100 * cell.draws.most:.1f}"
-    return interval(cell.rate) + ("*" if cell.no_inputs else "") + draws
-
-
-def _spread(spread: Spread) -> str:
-    return f"{spread.least:g}" if spread.least == spread.most else f"{spread.least:g} to {spread.most:g}"
+    return PlainTable(table.title, columns, rows, words=(0, 1), note=table.note)
 
 
 @dataclass(frozen=True, slots=True)
