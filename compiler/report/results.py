@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..evaluation.protocols import PROTOCOLS
-from ..evaluation.study import Study
-from ..evaluation.tables import Table
+from ..evaluation.populations import PROTOCOLS
+from ..evaluation.study import Study, Table
 from ..text import NBSP, counted, interval, percent, sentence
 from .content import PlainTable, ReportContent
 from .sections import honest_rate

@@ -12,6 +12,7 @@ from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, scan_u
 from ..placement.gain import entropy_bits
 from ..placement.methods.base import METHODS
 from ..text import NBSP, counted, microseconds, percent
+from ..trainers.base import TRAINERS
 from .content import PlainTable, ReportContent
 
 Pairs = tuple[tuple[str, str], ...]
@@ -109,7 +110,7 @@ def no_tree(manifest: Manifest) -> str:
 
 def guarantee_sentences(content: ReportContent) -> Iterator[str]:
     """Yield what build.json proves of the integers, and what the worst case adds to it."""
-    proof, rows, found = content.manifest.proof, content.manifest.source.rows, content.guarantee
+    proof, rows, worst = content.manifest.proof, content.manifest.source.rows, content.worst
     yield (
         f"Scores are sums of integers, {proof.scale:.1f} steps to a unit of score. No sum of them, in any order and "
         f"with any inputs missing, goes beyond {proof.bound:,} steps, and so none leaves {proof.width} bits."
@@ -119,26 +120,26 @@ def guarantee_sentences(content: ReportContent) -> Iterator[str]:
         f"{proof.safe_margin:g} steps keeps its grasp type: {_share(proof.covered, rows)} rows trained on have it. "
         f"{counted(proof.changed, 'row')} changed grasp type."
     )
-    if found is not None:
+    if worst is not None:
         yield (
-            f"At worst, over every frame there is and not only those recorded, {found.leader} loses {found.loss:.3f} "
-            f"steps of its lead over {found.rival}. Worked out exactly, ties in whole steps included, a lead of more "
-            f"than {found.safe_margin:.3f} steps is safe: {_share(found.covered, found.rows)} rows trained on have it."
+            f"At worst, over every frame there is and not only those recorded, {worst.leader} loses {worst.loss:.3f} "
+            f"steps of its lead over {worst.rival}. Worked out exactly, ties in whole steps included, a lead of more "
+            f"than {worst.safe_margin:.3f} steps is safe: {_share(worst.covered, rows)} rows trained on have it."
         )
 
 
 def guarantee_table(content: ReportContent) -> PlainTable | None:
     """Return the differences and their bounds, where the worst case was worked out."""
-    found = content.guarantee
-    if found is None:
+    found, worst = content.comparison, content.worst
+    if found is None or worst is None:
         return None
-    most = 2 ** (content.manifest.proof.width - 1) - 1
+    most, integer_bound = 2 ** (content.manifest.proof.width - 1) - 1, found.integer_bound + found.slack
     float_difference, float_bound = f"{found.collapse_difference:.3g}", f"{found.collapse_bound:.3g}"
     rows = (
         ("Ensemble against float tables, units of score", float_difference, float_bound),
-        ("Float tables against integers, steps", f"{found.integer_difference:.3f}", f"{found.integer_bound:.3f}"),
-        ("Most that a lead can lose, steps, all frames", f"{found.loss:.3f}", f"{found.loss_bound:.3f}"),
-        ("Furthest that a sum can get from zero, steps", f"{abs(found.reach):,}", f"{most:,}"),
+        ("Float tables against integers, steps", f"{found.integer_difference:.3f}", f"{integer_bound:.3f}"),
+        ("Most that a lead can lose, steps, all frames", f"{worst.loss:.3f}", f"{worst.bound:.3f}"),
+        ("Furthest that a sum can get from zero, steps", f"{abs(worst.reach):,}", f"{most:,}"),
     )
     return PlainTable("Differences beside their bounds", ("What", "Found", "Bound"), rows)
 
@@ -206,9 +207,13 @@ def provenance(manifest: Manifest) -> Pairs:
 
 
 def options_set(manifest: Manifest) -> Pairs:
-    """Return every option that is set, by the name that `thenar compile` gives it."""
-    values = [(name, getattr(manifest.options, name)) for name in msgspec.structs.asdict(manifest.options)]
-    return tuple((f"--{name.replace('_', '-')}", _plain(value)) for name, value in values if value is not None)
+    """Return every option that is set, by the name that `thenar compile` gives it: of trainers, only of its own."""
+    options = manifest.options
+    names = {trainer.name: {setting.name for setting in trainer.settings} for trainer in TRAINERS.values()}
+    foreign = set().union(*names.values()) - names.get(options.trainer, set()) | {"settings"}
+    fields = [field.name for field in msgspec.structs.fields(options) if field.name not in foreign]
+    values = {name: getattr(options, name) for name in fields} | options.settings
+    return tuple((f"--{name.replace('_', '-')}", _plain(value)) for name, value in values.items() if value is not None)
 
 
 def commands(content: ReportContent) -> tuple[str, str]:

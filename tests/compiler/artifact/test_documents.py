@@ -9,19 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thenar.cli.hand import hand_shape
 from thenar.compiler import GraspSet, compile_build
-from thenar.compiler.artifact.documents import BuildDocuments
+from thenar.compiler.artifact.documents import Documents
 from thenar.compiler.recordings.taxonomy import own
+from thenar.simulator.handmaps.handmap import hand_map
 
 Make = Callable[..., GraspSet]
 TAGS = re.compile(r"<[^>]*>")
 
 
-def _compile(grasp_set: GraspSet, build: Path, documents: BuildDocuments | None = None, **options: object) -> str:
+def _compile(grasp_set: GraspSet, build: Path, documents: Documents | None = None, **options: object) -> str:
     """Compile a build with documents; return the words of its report, without styles and scripts."""
     given: dict[str, object] = {"rounds": 3, "folds": 0, **options}
-    compile_build(grasp_set, build, documents=documents or BuildDocuments(hand_shape()), **given)  # type: ignore[arg-type]
+    compile_build(grasp_set, build, documents=documents or Documents(hand_map()), **given)  # type: ignore[arg-type]
     page = re.sub(r"<(style|script)\b.*?</\1>", "", (build / "report.html").read_text(), flags=re.DOTALL)
     return " ".join(html.unescape(TAGS.sub(" ", page)).split())
 
@@ -29,12 +29,12 @@ def _compile(grasp_set: GraspSet, build: Path, documents: BuildDocuments | None 
 @pytest.fixture(scope="module")
 def gloved(grasp_set: GraspSet) -> GraspSet:
     """Return a set that switches of the shipped glove have recorded."""
-    return replace(grasp_set, switch_names=hand_shape().names[::11][: len(grasp_set.switch_names)])
+    return replace(grasp_set, switch_names=hand_map().names[::11][: len(grasp_set.switch_names)])
 
 
 def test_one_call_makes_a_build_with_its_report_and_spec(gloved: GraspSet, tmp_path: Path) -> None:
     build = tmp_path / "build"
-    for documents, drawn in ((BuildDocuments(), False), (BuildDocuments(hand_shape(), 180), True)):
+    for documents, drawn in ((Documents(), False), (Documents(hand_map(), 180), True)):
         _compile(gloved, build, documents)
         assert ('id="kept-hand"' in (build / "report.html").read_text()) == drawn
         assert (build / "spec" / "glove.toml").is_file()
