@@ -46,6 +46,20 @@ def distance(got: float, truth: mpf) -> float:
     return float(abs(mpf(float(got)) - truth))
 
 
+@precisely()
+def added(doubles: Sequence[float]) -> mpf:
+    """Return the sum of doubles: every bit of it, as far as 60 digits go.
+
+    fsum rounds once; what that leaves out is another sum of doubles, until nothing is left out.
+    """
+    parts: list[float] = []
+    while rest := math.fsum([*doubles, *parts]):
+        if not math.isfinite(rest):
+            return mpf(rest)
+        parts.append(-rest)
+    return -mpmath.fsum(parts)
+
+
 Vector = Sequence[float]
 
 
