@@ -115,7 +115,7 @@ def command(
 
 
 def _print(found: "Frontier", output: Path) -> None:
-    from thenar.compiler.frontier.drawing.words import featured
+    from thenar.compiler.frontier.words import featured
 
     print_frontier(found)
     best = featured(found)
@@ -128,7 +128,7 @@ def print_frontier(frontier: "Frontier") -> None:
     """Print the points, the picked one bold; then checks, what was left out, and what the picture says."""
     from rich.text import Text
 
-    from thenar.compiler.frontier.drawing.sentence import sentence
+    from thenar.compiler.frontier.words import summary
 
     console = out()
     console.print(_grid(frontier))
@@ -140,7 +140,7 @@ def print_frontier(frontier: "Frontier") -> None:
     for missing in frontier.skipped:
         console.print(Text(missing, "yellow"))
     console.print()
-    console.print(Text(sentence(frontier), "bold"))
+    console.print(Text(summary(frontier), "bold"))
 
 
 def _grid(frontier: "Frontier") -> "Table":
@@ -167,7 +167,7 @@ def _title(frontier: "Frontier") -> str:
 def _cells(point: "Point") -> "tuple[Text, ...]":
     from rich.text import Text
 
-    from thenar.compiler.frontier.drawing.words import way_of, wiring_of
+    from thenar.compiler.frontier.words import way_of, wiring_of
     from thenar.compiler.text import duration, interval
 
     setting = point.setting

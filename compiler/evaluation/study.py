@@ -13,6 +13,7 @@ from ..limits import check_memory, check_types
 from ..placement.methods.base import METHODS
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
+from ..text import counted, interval
 from ..trainers.base import Training, changed
 from .fits import Fit, Labels, Progress, is_blind, run_fits
 from .folds import EvaluationError
@@ -22,6 +23,13 @@ from .rates import Average, Rate
 
 Predictions = Mapping[Fit, Labels]
 Confusion = tuple[tuple[int, ...], ...]
+
+_TITLES: dict[TableName, str] = {
+    "compositions": "Compositions of inputs (the paper's Tables II and V)",
+    "generality": "One subject's placement (row) on another's data (column), selected switches (Tables III and VI)",
+    "pruning": "Placement of all subjects pooled, pruned by S, selected switches (Tables IV and VII)",
+    "baselines": "ID3 beside other placements of as many switches, selected switches",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +45,10 @@ class Spread:
         """Return the spread of one or more values."""
         listed = list(values)
         return cls(min(listed), fmean(listed), max(listed))
+
+    def __str__(self) -> str:
+        """Return "33", or "31 to 35"."""
+        return f"{self.least:g}" if self.least == self.most else f"{self.least:g} to {self.most:g}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +66,11 @@ class Cell:
     no_inputs: int
     draws: Spread | None
     confusion: Confusion | None
+
+    def __str__(self) -> str:
+        """Return rate and interval in percent, starred where fits had no inputs; the draws' spread on a second line."""
+        draws = "" if self.draws is None else f"\nfrom {100 * self.draws.least:.1f} to {100 * self.draws.most:.1f}"
+        return f"{interval(self.rate)}{'*' if self.no_inputs else ''}{draws}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +92,17 @@ class Table:
     protocol: ProtocolName
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
+
+    @property
+    def title(self) -> str:
+        """What the table shows."""
+        return f"{_TITLES[self.name]}: {self.protocol} protocol"
+
+    @property
+    def note(self) -> str:
+        """What a star means, in a sentence; "" where there is none."""
+        starred = any(cell.no_inputs for row in self.rows for cell in row.cells)
+        return "* In some folds no input varied: there, the most frequent grasp type is answered." if starred else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,6 +215,18 @@ class Study:
     warnings: tuple[str, ...]
     left_out: tuple[LeftOut, ...]
     tables: tuple[Table, ...]
+
+    def __str__(self) -> str:
+        """Return how many rows there are, and how they were cut."""
+        options, repeats = self.options, counted(self.options.repeats, "repeat")
+        cut = {
+            "stratified": f"{options.folds} stratified folds, {repeats} from seed {options.seed}",
+            "subject": "one subject left out at a time (the column), all others trained on",
+            "object": "one object left out at a time",
+            "block": f"{options.folds} blocks of trials",
+        }[options.scheme]
+        grasps = counted(len(self.grasps), "grasp type")
+        return f"{self.rows:,} rows, {grasps}; {cut}; {options.rounds} rounds; rates in % with 95 % intervals"
 
 
 def evaluate(

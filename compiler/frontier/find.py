@@ -19,20 +19,20 @@ from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from .cache import Cache, Report, Store
 from .designs import Design, Latencies, best_designs, designs, points_of, with_whole_scans
-from .drawing.pictures import PICTURES, pictures
-from .drawing.table import csv_bytes
 from .equipment import equipment_for
 from .finalists import PRICE_S, Close, finalists, further, look_closely, papers_depth
 from .latency import Pace, latencies
 from .marks import choices_to_mark, marks_of, own_build
 from .measure import TRIAL_S, measured
 from .movements import holds_movements
+from .plots import PICTURES, pictures
 from .points import SCHEMA, Frontier, FrontierError, Mark, Point, Tried, frontier_to_bytes
 from .screen import QUICK_PRICE_S, Screened, screen
 from .search import SHAPES, Candidate, Search, available_inputs, curve_ways, ways
 from .stream import Stream, stream_of
 from .survey import Cuts, Survey, fit_s, path_s
 from .timing.wirings import wirings
+from .words import csv_bytes
 
 FRONTIER_NAME, TABLE_NAME, STORE_NAME = "frontier.json", "frontier.csv", "store.jsonl"
 _DOCUMENTS = frozenset({FRONTIER_NAME, TABLE_NAME, *(f"{name}.svg" for name in PICTURES)})

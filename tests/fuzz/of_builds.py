@@ -21,12 +21,11 @@ from thenar.compiler.firmware.folder import sums, write_folder
 from thenar.compiler.firmware.generate import Firmware
 from thenar.compiler.frontier import points
 from thenar.compiler.frontier.cache import HEADER, Store
-from thenar.compiler.frontier.drawing.table import csv_bytes
 from thenar.compiler.frontier.picked import picked
+from thenar.compiler.frontier.words import csv_bytes
 from thenar.compiler.glove.files import spec_files
 from thenar.compiler.placement.placement import place
-from thenar.compiler.report.frontier_charts import frontier_charts
-from thenar.compiler.report.frontier_view import frontier_view
+from thenar.compiler.report.frontier import frontier_view
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME, Build
 from thenar.runtime.live.frames import GloveFrame, SwitchFrame
@@ -226,7 +225,6 @@ def _compile_from(data: bytes, folder: Path) -> None:
             wired(chosen.point.switches)
     csv_bytes(chosen.frontier)
     frontier_view(chosen.frontier, grasp_set().fingerprint(), None, chosen.point.number)
-    frontier_charts(chosen.frontier)
 
 
 class _Answer(msgspec.Struct, frozen=True):

@@ -19,7 +19,6 @@ from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import own
 from thenar.compiler.report.content import ReportContent
 from thenar.compiler.tables.compare import worst_case
-from thenar.runtime.build import Build
 from thenar.runtime.harness.wiring import GloveWiring
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.simulator.handmaps.handmap import hand_map
@@ -77,25 +76,21 @@ def _content(grasp_set: GraspSet, folder: Path, hand: HandShape | None) -> Repor
     glove = GloveWiring(port="/dev/ttyUSB0") if grasp_set.joints else None
     harness = propose_harness(names, cyberglove=glove)
     made = compile_build(grasp_set, folder, prune=8, rounds=4, folds=2, harness=harness)
-    build = Build.load(folder)
-    comparison = made.comparison
-    confusion = np.zeros((len(build.grasps), len(build.grasps)), np.intp)
-    np.add.at(confusion, (grasp_set.labels, comparison.deployed), 1)
     asked = Asked(rounds=2, folds=2, repeats=1, prune=8, prune_list=(0, 8))
     return ReportContent(
         manifest=made.manifest,
-        tables=build.tables,
+        tables=made.tables,
         tables_bytes=made.tables_bytes,
         rounds=made.trained.rounds,
         firmware=made.firmware,
         tree=tree,
-        confusion=confusion,
+        confusion=made.confusion,
         study=evaluate(grasp_set, asked, jobs=1),
         hand=hand,
         scan=made.scan,
         harness=harness,
-        comparison=comparison,
-        worst=worst_case(made.trained.model, build.tables, comparison, build.grasps, names),
+        comparison=made.comparison,
+        worst=worst_case(made.trained.model, made.tables, made.comparison, made.manifest.grasps, names),
     )
 
 

@@ -13,30 +13,11 @@ _LABELS_MM = 7.0
 
 
 @dataclass(frozen=True, slots=True)
-class Dot:
-    """A switch: its number on the hand, name, place, and which of the kept ones it is, from 1; "" if none."""
-
-    number: int
-    name: str
-    x: str
-    y: str
-    order: str
-
-
-@dataclass(frozen=True, slots=True)
-class Label:
-    """The name of a digit, and where it stands."""
-
-    text: str
-    x: str
-    y: str
-
-
-@dataclass(frozen=True, slots=True)
 class HandPicture:
     """A hand to draw; `ident` begins the ids of its elements, title and summary are what a screen reader says.
 
-    view_box is SVG's; outline, strips and creases are values of `d`.
+    view_box is SVG's; outline, strips and creases are values of `d`. Of a digit, labels hold the name and its place; of
+    a switch, dots hold the name, its place, and which of the kept ones it is, from 1; "" if none.
     """
 
     ident: str
@@ -46,14 +27,13 @@ class HandPicture:
     outline: str
     strips: tuple[str, ...]
     creases: tuple[str, ...]
-    labels: tuple[Label, ...]
-    dots: tuple[Dot, ...]
+    labels: tuple[tuple[str, str, str], ...]
+    dots: tuple[tuple[str, str, str, str], ...]
 
 
 def hand_picture(hand: HandShape, kept: Sequence[str], ident: str, title: str, summary: str) -> HandPicture:
     """Return the picture of `hand` with the switches called `kept`, all of which it knows, numbered in their order."""
     order = {name: str(place) for place, name in enumerate(kept, 1)}
-    places = hand.places * (1, -1)
     return HandPicture(
         ident=ident,
         title=title,
@@ -63,11 +43,11 @@ def hand_picture(hand: HandShape, kept: Sequence[str], ident: str, title: str, s
         strips=tuple(_path(strip, closed=True) for strip in hand.strips),
         creases=tuple(_path(crease, closed=False) for crease in hand.creases),
         labels=tuple(
-            Label(name, _mm(x), _mm(-y)) for name, (x, y) in zip(hand.part_names, hand.labels.tolist(), strict=False)
+            (name, _mm(x), _mm(-y)) for name, (x, y) in zip(hand.part_names, hand.labels.tolist(), strict=False)
         ),
         dots=tuple(
-            Dot(number, name, _mm(x), _mm(y), order.get(name, ""))
-            for number, (name, (x, y)) in enumerate(zip(hand.names, places.tolist(), strict=True))
+            (name, _mm(x), _mm(-y), order.get(name, ""))
+            for name, (x, y) in zip(hand.names, hand.places.tolist(), strict=True)
         ),
     )
 

@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from thenar.compiler.frontier.drawing.pictures import PICTURES, pictures
+from thenar.compiler.frontier.plots import PICTURES, POINT_ID, pictures
 from thenar.compiler.frontier.points import Frontier, Mark, Point
 from thenar.compiler.pictures import PictureError, painting
 
@@ -165,6 +165,17 @@ def test_names_are_no_formulas_and_no_markup(examples: Any) -> None:
         assert any(text.startswith(NASTY) for text in _texts(_drawn(frontier, name)))
 
 
+def test_a_cost_of_nothing_has_a_place_and_no_name_breaks_the_file(examples: Any) -> None:
+    found, replace = examples.example_frontier(), msgspec.structs.replace
+    first = replace(found.points[0], frame=replace(found.points[0].frame, us=0.0))
+    mark = replace(found.marks[0], name="bell \x07 and no character \ufffe", frame_us=0.0)
+    frontier = replace(found, points=(first, *found.points[1:]), marks=(mark,), source="\x1b[31m")
+    read = {name: ElementTree.fromstring(svg) for name, svg in pictures(frontier, "svg", letters=True).items()}
+    marker = read["frontier"].find(f".//{{*}}g[@id='{POINT_ID}{first.number}']")
+    assert marker is not None
+    assert marker.find(".//{*}use") is not None
+
+
 @pytest.mark.parametrize(
     "changes",
     [
@@ -185,6 +196,14 @@ def test_what_is_missing_is_left_out(examples: Any, changes: dict[str, object]) 
     assert (b"<!-- switches alone -->" in against_time) == bool(frontier.points)
     assert (b"<!-- paper, S = 62 " in against_time) == bool(frontier.marks)
     assert (b"<!-- point " in against_time) == bool(frontier.points)
+
+
+def test_every_point_that_is_shown_has_a_marker_with_its_number(examples: Any) -> None:
+    frontier = examples.example_frontier()
+    for name, svg in pictures(frontier, "svg", letters=True).items():
+        ids = {element.get("id", "") for element in ElementTree.fromstring(svg).iter()}
+        shown = {f"{POINT_ID}{point.number}" for point in frontier.points if _is_shown(point, name)}
+        assert {one for one in ids if one.startswith(POINT_ID)} == shown
 
 
 def test_other_kinds_of_files_are_refused(examples: Any) -> None:

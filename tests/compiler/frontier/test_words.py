@@ -1,4 +1,4 @@
-"""The CSV: what was found, to the last digit."""
+"""The sentence that sums a frontier up, names, and the CSV: what was found, to the last digit."""
 
 import csv
 import io
@@ -7,9 +7,56 @@ from typing import Any
 import msgspec
 import pytest
 
-from thenar.compiler.frontier.drawing.table import COLUMNS, csv_bytes
 from thenar.compiler.frontier.points import Frontier
+from thenar.compiler.frontier.words import COLUMNS, csv_bytes, featured, summary, wiring_of
 from thenar.compiler.recordings.spreadsheet import text_of
+
+
+def test_it_says_how_many_switches_how_much_time_how_much_recognition_and_against_what(examples: Any) -> None:
+    marks = examples.example_frontier().marks
+    assert summary(examples.example_frontier(marks=(marks[0], marks[2]))) == (
+        "Point 5: 33 of 160 switches, read and classified in 440 us on avr328p, recognise 92.9 [92.1, 93.7] % of the "
+        "grasps, against 93.6 % in 2.05 ms with all 160 switches and 91.5 % in 905 us with 35 switches (paper, S = 62)."
+    )
+
+
+def test_joints_are_told_too(examples: Any) -> None:
+    assert summary(examples.example_frontier(picked=8)).startswith("Point 8: 8 of 160 switches and 16 joints, read")
+    assert summary(examples.example_frontier(picked=7)).startswith("Point 7: 16 joints, read")
+
+
+def test_without_marks_and_without_points_it_is_still_a_summary(examples: Any) -> None:
+    assert summary(examples.example_frontier(marks=())).endswith("% of the grasps.")
+    none = examples.example_frontier(points=(), picked=None)
+    assert summary(none) == "Of 184,320 combinations none is a point of the frontier."
+
+
+def test_where_nothing_is_picked_the_fastest_point_level_with_all_switches_is_spoken_of(examples: Any) -> None:
+    frontier = examples.example_frontier(picked=None)
+    point = featured(frontier)
+    assert point is not None
+    assert point.number == 6
+    assert all(other.rate.mean < 0.931 for other in frontier.points if other.frame.us < point.frame.us)
+
+
+def test_where_no_point_is_level_the_best_is_spoken_of(examples: Any) -> None:
+    best = featured(examples.example_frontier(picked=None, marks=()))
+    assert best is not None
+    assert best.number == 10
+
+
+@pytest.mark.parametrize(
+    ("wiring", "clock", "said"),
+    [
+        ("mcp23017", 400_000, "mcp23017 400 kHz"),
+        ("board", 1_000_000, "board 1 Mbaud"),
+        ("board", 115_200, "board 115.2 kbaud"),
+        ("as wired", 0, ""),
+    ],
+)
+def test_a_wiring_is_told_with_its_clock(examples: Any, wiring: str, clock: int, said: str) -> None:
+    setting = examples.example_frontier().points[0].setting
+    assert wiring_of(msgspec.structs.replace(setting, wiring=wiring, clock_hz=clock)) == said
 
 
 def _rows(frontier: Frontier) -> list[dict[str, str]]:
@@ -66,5 +113,5 @@ def test_one_subject_has_no_rate_of_those_left_out(examples: Any) -> None:
     assert (row["left_out"], row["left_out_low"], row["left_out_high"]) == ("", "", "")
 
 
-def test_equal_frontiers_give_equal_bytes(examples: Any) -> None:
+def test_equal_frontiers_give_equal_tables(examples: Any) -> None:
     assert csv_bytes(examples.example_frontier()) == csv_bytes(examples.example_frontier())
