@@ -6,15 +6,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.firmware.targets import timed
-from thenar.compiler.frontier.timing.beside_wire import (
+from thenar.compiler.frontier.timing.python_times import random_tables
+from thenar.compiler.frontier.timing.scan_times import (
     Beside,
+    ScanTimes,
     beside_wire,
     board_beside,
     firmware_beside,
     measured_call_us,
+    scan_times,
+    transfer_us,
 )
-from thenar.compiler.frontier.timing.python_times import random_tables
-from thenar.compiler.frontier.timing.scan_times import ScanTimes, scan_times, transfer_us
 from thenar.compiler.frontier.timing.wirings import BOARD, Wiring
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.scanning.costs import Costs

@@ -3,7 +3,7 @@ from collections.abc import Callable
 import pytest
 
 from thenar.compiler.firmware.simavr import missing
-from thenar.compiler.frontier.timing.avr_scans import ScanTrial, run_scan, scan_trials
+from thenar.compiler.frontier.timing.simulated import ScanTrial, run_scan, scan_trials
 
 
 @pytest.fixture(autouse=True)

@@ -1,4 +1,6 @@
-"""What a scan really takes on an AVR: thenar's scanning firmware on a simulated board, its next scan always due."""
+"""What classifying and scanning really take, in a simulator: a layout compiled, and its slowest frames run; on an AVR,
+thenar's scanning firmware on a simulated board, its next scan always due.
+"""
 
 import json
 import subprocess
@@ -11,16 +13,17 @@ from thenar.runtime.harness.wiring import BusWiring
 from thenar.runtime.scanning.transactions import ports_of
 
 from ...firmware.board import Board, BoardBus
+from ...firmware.choose import Option
+from ...firmware.classifier import LIBRARY_NAME, Library
 from ...firmware.errors import FirmwareError
 from ...firmware.generate import Firmware
+from ...firmware.measuring import run_counted, slow_frames
 from ...firmware.simavr import harness
-from ...firmware.targets import TARGETS
+from ...firmware.targets import TARGETS, Target
 from ...firmware.tools import call, workshop
 from ...firmware.words import numbered
-from .beside_wire import beside_wire
-from .measured_cycles import Outcome
 from .python_times import random_tables
-from .scan_times import scan_times
+from .scan_times import beside_wire, scan_times
 from .wirings import Wiring, names_of
 
 _TRIALS = (
@@ -39,6 +42,29 @@ _TRIALS = (
 _WATCHED = 1_600_000
 # A START, and a repeated one before what is read: chips with registers, which alone an AVR's firmware reads.
 _STARTS = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """Cycles, or instructions, as predicted and as counted of the slowest frame; microseconds on host."""
+
+    predicted: float
+    counted: float
+
+    @property
+    def error(self) -> float:
+        """How far the prediction is off, as a share of what was counted."""
+        return abs(self.predicted - self.counted) / self.counted
+
+
+def run_layout(trial: tuple[Option, Target]) -> Outcome:
+    """Compile a layout for a target, and run the frame that should take longest, and extreme ones.
+
+    Raises FirmwareError.
+    """
+    (layout, cost), part = trial
+    library = Library(LIBRARY_NAME, numbered(layout.tables), layout, part.avr)
+    return Outcome(cost.cycles, float(run_counted(library, part, slow_frames(layout)).most))
 
 
 @dataclass(frozen=True, slots=True)
