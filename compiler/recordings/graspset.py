@@ -35,11 +35,30 @@ LARGEST_VALUE = 1e300
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """One joint of the glove: its name, and what its integer codes mean in `unit`, by two points of a straight line.
+    """One joint of the glove: its name, and what its integer codes mean, by two points of a straight line.
 
-    Codes are what is trained on and recognised; values are for people. Raises RecordingError if the two points are no
-    line, or if neighbouring codes would be closer than a billionth of the largest value; values lie within +-1e300, and
-    steps are above 1e-300.
+    Codes are what is trained on and recognised; values are for people.
+
+    Parameters
+    ----------
+    name, unit : str
+        Of the joint, and of its values, such as "deg".
+    code_a, code_b : int
+        Two different codes of 0 to 65535.
+    value_a, value_b : float
+        Their values, within +-1e300.
+
+    Raises
+    ------
+    RecordingError
+        If the two points are no line, or if neighbouring codes would be closer than a billionth of the largest value.
+
+    Examples
+    --------
+    >>> from thenar.compiler import Joint
+    >>> thumb = Joint("thumb", "deg", 0, -20.0, 200, 80.0)
+    >>> float(thumb.value(40)), float(thumb.code(0.1))
+    (0.0, 40.0)
     """
 
     name: str
