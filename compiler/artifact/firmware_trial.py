@@ -6,7 +6,7 @@ import numpy as np
 from msgspec import Struct
 
 from thenar.runtime.build import Build
-from thenar.runtime.scorer import LANE_OFFSET
+from thenar.runtime.scores import LANE_OFFSET
 
 from ..firmware.answers import Answers
 from ..firmware.classifier import classifier_files

@@ -21,7 +21,7 @@ BYTES = 256
 def on_bytes(tables: IntegerTables, codes: Sequence[Sequence[int]]) -> IntegerTables:
     """Return tables whose joint codes are bytes: those of byte b are what `tables` gives for codes[joint][b].
 
-    codes holds, for each joint, the code of each of the 256 bytes (runtime.live.codes.codes_of_bytes). Raises
+    codes holds, for each joint, the code of each of the 256 bytes (runtime.calibration.codes_of_bytes). Raises
     FirmwareError where they are not that many.
     """
     if [len(joint) for joint in codes] != [BYTES] * tables.n_joints:

@@ -4,7 +4,7 @@ from msgspec.structs import replace
 
 from thenar.drivers.calibration import GloveCalibration
 from thenar.runtime.build import Build
-from thenar.runtime.live.codes import codes_of_bytes
+from thenar.runtime.calibration import codes_of_bytes
 from thenar.runtime.manifest import Calibration
 
 from .on_bytes import on_bytes

@@ -1,4 +1,4 @@
-"""The scores of many frames at once, by the integer tables: what `runtime.scorer` gives frame by frame."""
+"""The scores of many frames at once, by the integer tables: what `runtime.scores` gives frame by frame."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -27,8 +27,7 @@ from msgspec import Meta
 from ..names import fault, nearest, shortened
 from ..toml_source import Place, Source, read_source
 from ..toml_struct import check_finite, convert
-from .preshape import Preshape, PreshapeError
-from .table import PreshapeTable
+from .selector import Preshape, PreshapeError, PreshapeTable
 
 SHIPPED = ("barrett_bh8", "parallel_gripper")
 

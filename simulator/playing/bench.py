@@ -13,7 +13,7 @@ from thenar.drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, 
 from thenar.drivers.emulated.pty_line import PtyLine
 from thenar.drivers.emulated.scanner import EmulatedScanner
 from thenar.runtime.harness.wiring import BusWiring, Harness
-from thenar.runtime.live.devices import sensors_of
+from thenar.runtime.sources.cyberglove import sensors_of
 
 from .cable import Cable
 from .levels import levels_of

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from mpmath import mpf
 
 from thenar.compiler.tables.collapse import ScoreTables
-from thenar.runtime.scorer import LANE_OFFSET, Scorer
+from thenar.runtime.scores import LANE_OFFSET, Scorer
 from thenar.runtime.tables import IntegerTables
 
 from ..reference.numbers import precisely

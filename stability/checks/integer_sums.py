@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.compiler.tables.furthest import furthest
-from thenar.runtime.scorer import LANE_OFFSET, Scorer
+from thenar.runtime.scores import LANE_OFFSET, Scorer
 from thenar.runtime.tables import (
     LIMIT,
     MAX_CLASSES,

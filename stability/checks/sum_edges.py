@@ -8,7 +8,7 @@ import numpy as np
 
 from thenar.compiler.tables.furthest import furthest
 from thenar.runtime.errors import BuildError
-from thenar.runtime.scorer import LANE_OFFSET, Scorer
+from thenar.runtime.scores import LANE_OFFSET, Scorer
 from thenar.runtime.tables import LIMIT, MAX_CLASSES, IntegerTables, tables_from_bytes, tables_to_bytes
 
 from ..finding import Finding, Worst

@@ -4,8 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from thenar.runtime.recognizer import Frame, Recognizer
-
 from ..finding import Finding, Worst
 from ..inputs.bare_build import bare_build
 from ..inputs.hard_tables import every_frame, whole_numbers
@@ -17,14 +15,13 @@ def ties(full: bool) -> Finding:
     for seed in range(30 if full else 3):
         tables = whole_numbers(seed, 5, 4, (3, 3), 1)
         build = bare_build(tables)
-        recognizer = Recognizer(build)
         for frame in every_frame(tables):
             bits, codes = np.array(frame.bits), np.array(frame.codes, np.uint16)
             scores = build.scores(bits, codes).tolist()
             best = first_best(scores)
             if scores.count(scores[best]) < 2:
                 continue
-            found = recognizer.recognise(Frame(0, bits, codes))
+            found = build.recognise(bits, codes)
             right = build.classify(bits, codes) == found.grasp == str(best) and found.margin == 0
             worst.see(float(not right), f"draw {seed}: {frame}")
     return worst.finding()

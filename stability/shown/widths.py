@@ -10,7 +10,7 @@ from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.tables.collapse import collapse
 from thenar.compiler.tables.quantise import quantise
 from thenar.compiler.tables.worstcase import Rounding
-from thenar.runtime.scorer import Scorer
+from thenar.runtime.scores import Scorer
 from thenar.runtime.tables import IntegerTables
 
 from ..checks.ties import first_best

@@ -13,7 +13,7 @@ import msgspec
 
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.files import is_special, read_file, sync_folder
-from thenar.runtime.recording.appending import AppendedFile
+from thenar.runtime.recording.writer import AppendedFile
 
 # Bytes; a frontier of the largest set answers a few million questions.
 LARGEST = 1 << 30

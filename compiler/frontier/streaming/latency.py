@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.live.policy import Policy
+from thenar.runtime.policy import Policy
 from thenar.runtime.tables import IntegerTables
 
 from ...tables.batch import integer_scores
@@ -22,7 +22,7 @@ _USUAL = Policy()
 
 @dataclass(frozen=True, slots=True)
 class Decider:
-    """How a grasp type is decided on; what that means stands in runtime.live.policy. Scans that end early decide alike.
+    """How a grasp type is decided on; what that means stands in runtime.policy. Scans that end early decide alike.
 
     kind  "single": the best type of every frame; "dwell": `lead` and `dwell_us` count, and `hold_us`; "sequential":
           `error_rate` and `spacing_us` do, and `hold_us`

@@ -10,7 +10,7 @@ import numpy as np
 
 from thenar.runtime.build import Build
 from thenar.runtime.harness.wiring import BusWiring
-from thenar.runtime.scanning.transactions import ports_of
+from thenar.runtime.scanning.ports import ports_of
 
 from ...firmware.avr_harness import harness
 from ...firmware.board import Board, BoardBus

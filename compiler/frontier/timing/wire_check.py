@@ -12,8 +12,8 @@ from msgspec.structs import replace
 from thenar.drivers.emulated.i2c import EmulatedBus, EmulatedChip, EmulatedI2c, WireCounters
 from thenar.drivers.errors import DeviceError
 from thenar.runtime.harness.wiring import BusWiring, Harness
+from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.timing import free_us, scan_us
-from thenar.runtime.scanning.whole import whole_scan
 
 from ..points import Check
 from .wire_client import Order, behind

@@ -12,8 +12,8 @@ import msgspec
 from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead
 from thenar.drivers.i2c.scan import Scan
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
+from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.timing import reading_of
-from thenar.runtime.scanning.whole import whole_scan
 
 # Checks of the chips' registers are traffic that is no scan's.
 _NEVER_S = 3600.0

@@ -9,11 +9,10 @@ from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.registry import CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import GloveWiring, Harness
-from thenar.runtime.scanning.costs import Costs
-from thenar.runtime.scanning.order import Unit, ports_in
+from thenar.runtime.scanning.plan import Costs, Unit, ports_in
+from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_board, propose_harness
 from thenar.runtime.scanning.timing import reading_of, scanner_us
-from thenar.runtime.scanning.whole import whole_scan
 
 from ...placement.costaware import PortCosts
 from .beside_wire import WIRE_ONLY, Beside

@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 from thenar.compiler.firmware.errors import FirmwareError
 from thenar.compiler.firmware.on_bytes import BYTES, on_bytes
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
-from thenar.runtime.live.codes import codes_of_bytes
+from thenar.runtime.calibration import codes_of_bytes
 from thenar.runtime.manifest import Calibration
-from thenar.runtime.scorer import Scorer
+from thenar.runtime.scores import Scorer
 from thenar.runtime.tables import IntegerTables
 
 

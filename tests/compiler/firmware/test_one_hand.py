@@ -7,7 +7,7 @@ from thenar.compiler.firmware.one_hand import for_one_hand
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.errors import SettingError
 from thenar.runtime.build import Build
-from thenar.runtime.live.codes import CodeTables
+from thenar.runtime.calibration import CodeTables
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
 

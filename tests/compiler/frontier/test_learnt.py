@@ -14,7 +14,7 @@ from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.tables.collapse import collapse
 from thenar.compiler.tables.quantise import quantise
-from thenar.runtime.scorer import Scorer
+from thenar.runtime.scores import Scorer
 
 COLUMNS = (3, 0, 7, 9)
 

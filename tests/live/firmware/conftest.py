@@ -20,7 +20,7 @@ from thenar.compiler.firmware.board_keys import glove_toml
 from thenar.compiler.firmware.board_loading import parse_board
 from thenar.compiler.firmware.generate import Request, firmware_files, fit_of
 from thenar.runtime.build import Build
-from thenar.runtime.sinks.line import Line
+from thenar.runtime.sinks.jsonl import Line
 
 ENDING_S = 20.0
 # By so much a frame may be younger than its age says.

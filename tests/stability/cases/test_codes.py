@@ -19,7 +19,7 @@ from thenar.compiler.recordings.errors import RecordingError, TableError
 from thenar.compiler.recordings.importer import import_file
 from thenar.compiler.tables.collapse import HIGHEST_CODE, collapse
 from thenar.compiler.tables.quantise import quantise
-from thenar.runtime.scorer import Scorer
+from thenar.runtime.scores import Scorer
 from thenar.stability.cases.codes import EVERY_CODE, hard_codes
 from thenar.stability.inputs.hard_cells import HARD_DOUBLES, NO_BITS, NO_CODES, NO_NUMBERS
 

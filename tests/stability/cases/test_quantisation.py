@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from thenar.compiler.tables.compare import float_slack
 from thenar.compiler.tables.worstcase import Rounding
-from thenar.runtime.scorer import LANE_OFFSET, Scorer
+from thenar.runtime.scores import LANE_OFFSET, Scorer
 from thenar.runtime.tables import IntegerTables
 from thenar.stability.checks.exact_frames import BothWays, lost
 from thenar.stability.checks.sum_edges import LAST, edge_tables

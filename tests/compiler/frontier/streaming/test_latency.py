@@ -16,10 +16,10 @@ from thenar.compiler.frontier.streaming.latency import Decider, decided_on, late
 from thenar.compiler.frontier.streaming.stream import Stream, stream_from
 from thenar.drivers.errors import SettingError, ThenarError
 from thenar.runtime.build import Build
-from thenar.runtime.live.frames import GloveFrame, SwitchFrame
-from thenar.runtime.live.joiner import LiveRecognizer
-from thenar.runtime.live.published import UNKNOWN
+from thenar.runtime.frames import GloveFrame, SwitchFrame
+from thenar.runtime.live.recogniser import LiveRecognizer
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Proof, Recognised, Source, Switch
+from thenar.runtime.published import UNKNOWN
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 CLASSES, SWITCHES, JOINTS = 4, 7, 3
@@ -96,7 +96,7 @@ def played_live(tables: IntegerTables, stream: Stream, step_us: int, decider: De
         state = int(np.searchsorted(stream.at_us, time_us, side="right")) - 1
         closed = sum(1 << place for place, column in enumerate(KEPT) if stream.bits[state, column])
         glove = GloveFrame(time_us, stream.codes[state].astype(np.uint8).tobytes()) if tables.n_joints else None
-        found.append(live.step(time_us, 0, SwitchFrame(time_us, closed), glove).grasp)
+        found.append(live.step(time_us, 0, SwitchFrame(time_us, closed), glove).grasp.grasp)
     return found
 
 

@@ -12,9 +12,9 @@ from thenar.drivers.i2c.registry import CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.checks import faults
 from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_board, propose_harness
 from thenar.runtime.scanning.timing import scan_us, scanner_us
-from thenar.runtime.scanning.whole import whole_scan
 
 sizes = st.integers(1, 200)
 
