@@ -6,12 +6,19 @@ import socket
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from cyclonedds.core import DDSException
 from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.pub import DataWriter
+from cyclonedds.qos import Policy, Qos
+from cyclonedds.topic import Topic
 
 from thenar.drivers.errors import SettingError
 
+from .messages import TYPE_HASHES
+
+_DEPTH = 10
 _MAX_DOMAIN = 232  # above it the ports of DDS would pass 65535
 _MAX_LENGTH = 200
 
@@ -99,3 +106,17 @@ def domain() -> int:
     if not text.isdecimal() or int(text) > _MAX_DOMAIN:
         raise SettingError(f"ROS_DOMAIN_ID is {text!r}: it is a whole number from 0 to {_MAX_DOMAIN}, or not set")
     return int(text)
+
+
+def writer(participant: DomainParticipant, name: str, kind: Any) -> Any:
+    """Return what writes messages of a kind to the ROS topic `name`: reliable, volatile, the last 10 kept."""
+    qos = Qos(
+        # Nobody may hold the writer up: what does not fit is refused at once.
+        Policy.Reliability.Reliable(max_blocking_time=0),
+        Policy.Durability.Volatile,
+        Policy.History.KeepLast(_DEPTH),
+        Policy.WriterDataLifecycle(autodispose=False),
+        Policy.DataRepresentation(use_cdrv0_representation=True, use_xcdrv2_representation=False),
+        Policy.Userdata(f"typehash={TYPE_HASHES[kind.__idl_typename__]};".encode()),
+    )
+    return DataWriter(participant, Topic(participant, dds_topic(name), kind), qos=qos)

@@ -23,6 +23,7 @@ else:
 import struct
 from typing import Any
 
+from ..preshape.selector import Preshape
 from ..published import JointAngles
 
 # REP-2011: ROS 2 from Iron on looks for it in the endpoint's user data, and warns where it is missing.
@@ -140,3 +141,10 @@ class PackedAngles(JointState):
     def serialize(self, *_: Any, **__: Any) -> bytes:
         """Return the bytes."""
         return bytes(self._bytes)
+
+
+def trajectory(preshape: Preshape) -> JointTrajectory:
+    """Return a preshape as a trajectory of one point, to be started on arrival (a stamp of zero)."""
+    seconds, rest = divmod(round(preshape.time_from_start_s * 1_000_000_000), 1_000_000_000)
+    point = JointTrajectoryPoint(list(preshape.positions), [], [], [], Duration(seconds, rest))
+    return JointTrajectory(Header(Time(0, 0), ""), list(preshape.joint_names), [point])

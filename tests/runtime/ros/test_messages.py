@@ -214,7 +214,7 @@ def test_a_string_that_is_packed_is_the_one_that_cyclone_writes(ros: ModuleType,
 
 
 def test_a_preshape_is_a_trajectory_of_one_point_that_starts_at_once(ros: ModuleType, preshape: Preshape) -> None:
-    from thenar.runtime.ros.topics import trajectory
+    from thenar.runtime.ros.messages import trajectory
 
     point = ros.JointTrajectoryPoint([0.0, 0.5], [], [], [], ros.Duration(1, 250_000_000))
     names = ["finger_1/prox_joint", "finger_1/med_joint"]
@@ -232,7 +232,7 @@ def decoders() -> dict[str, Any]:
 
 
 def test_the_tools_of_ros_2_read_a_preshape(ros: ModuleType, decoders: dict[str, Any], preshape: Preshape) -> None:
-    from thenar.runtime.ros.topics import trajectory
+    from thenar.runtime.ros.messages import trajectory
 
     read: SimpleNamespace = decoders["trajectory_msgs/msg/JointTrajectory"](written(trajectory(preshape)))
     assert tuple(read.joint_names) == preshape.joint_names
