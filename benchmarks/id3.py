@@ -63,7 +63,7 @@ def peak_mib() -> float:
 def measure_thenar(n: int, packed: bool) -> Measured:
     import numpy as np
 
-    from thenar.compiler.placement.digits import Digits
+    from thenar.compiler.placement.counts import Digits
     from thenar.compiler.placement.id3 import grow_id3
 
     before = peak_mib()

@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 
 from thenar.compiler import compile_build
-from thenar.drivers.cyberglove_frame import ALWAYS, PLUGGED
+from thenar.drivers.cyberglove_protocol import ALWAYS, PLUGGED
 from thenar.runtime import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness

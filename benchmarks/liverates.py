@@ -19,9 +19,8 @@ from liveplay import Played, board, glove, with_glove
 from livewire import Rate
 
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
-from thenar.drivers.emulated.pty_line import PtyLine
-from thenar.drivers.emulated.scanner import EmulatedScanner
-from thenar.drivers.emulated.scanner_board import ScannerBoard
+from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
+from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.scanning.timing import free_us, glove_us, scanner_us

@@ -11,11 +11,9 @@ from rich.progress import track
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.evaluation.folds import Fold
-from thenar.compiler.frontier.timing.wirings import port_costs
-from thenar.compiler.placement.baselines import available
-from thenar.compiler.placement.pairs import Pairs
-from thenar.compiler.placement.subset import Subset, best_subset
-from thenar.compiler.placement.ways import METHODS, Chooser, chooser
+from thenar.compiler.placement.methods.base import BEST, METHODS, PAPERS, Chooser
+from thenar.compiler.placement.optimum import Pairs, Subset, best_subset
+from thenar.compiler.placement.ports import port_costs
 from thenar.compiler.samples import Columns, Samples
 from thenar.compiler.workers import in_workers
 from thenar.runtime.scanning.ports import whole_scan
@@ -26,7 +24,6 @@ from thenar.runtime.scanning.timing import scan_us
 SHOWN = {False: (8, 16, 33), True: (8, 16)}
 MOST, WITHIN, ROUNDS = 40, 0.005, 100
 CONSOLE = Console(width=150)
-PAPERS, BOUNDED = "id3", "elimination"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,7 +85,7 @@ class Ways:
         ports = port_costs(propose_harness(names), names)
         start = process_time()
         learnt = (self.data.learning.rows(np.sort(fold.train)) for fold in self.data.folds)
-        self.chosen = [chooser(self.method, learning, ports) for learning in learnt]
+        self.chosen = [METHODS[self.method].chooser(learning, ports) for learning in learnt]
         self.seconds = (process_time() - start) / len(self.data.folds)
 
     def pruned(self) -> Point:
@@ -116,7 +113,7 @@ class Ways:
         return self.at(enough)
 
     def _kept(self, choose: Chooser, most: int) -> Columns:
-        if METHODS[self.method].parameter == "switches":
+        if METHODS[self.method].by_number:
             return choose(most)
         low, high = 0, len(self.data.learning.labels) + 1
         while low < high:
@@ -164,19 +161,20 @@ def papers(data: Data) -> tuple[bool, Point]:
 def bounded(task: tuple[Data, int]) -> tuple[int, int, Subset]:
     """Return m, the pairs alike in m switches that elimination keeps of all rows, and what bounded search says."""
     data, m = task
-    columns = chooser(BOUNDED, data.learning)(m)
+    columns = METHODS[BEST].chooser(data.learning)(m)
     return m, Pairs(data.learning).alike(columns), best_subset(data.learning, m, starts=(columns,))
 
 
 def measured(alone: Data, with_joints: Data, paper: dict[bool, Point], jobs: int) -> list[Line]:
     """Return every method's line, switches alone first. Joints are no matter to rivals."""
     ours = [name for name, method in METHODS.items() if method.ours]
+    rivals = [name for name, method in METHODS.items() if not method.ours and method.installed]
     wanted = {joints: point.rate - WITHIN for joints, point in paper.items()}
     # What takes longest begins first.
     tasks: list[tuple[Data, str, float | None]] = [
         (data, name, wanted[data.joints]) for data in (with_joints, alone) for name in reversed(ours)
     ]
-    tasks += [(alone, name, None) for name in available()]
+    tasks += [(alone, name, None) for name in rivals]
     lines = track(in_workers(measure, tasks, jobs), "methods", total=len(tasks), console=CONSOLE, transient=True)
-    order = [*ours, *available()]
+    order = [*ours, *rivals]
     return sorted(lines, key=lambda line: (line.joints, order.index(line.method)))

@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 
-from placementlines import BOUNDED, MOST, SHOWN, WITHIN, Line, Point
+from placementlines import MOST, SHOWN, WITHIN, Line, Point
 from rich.table import Table
 
-from thenar.compiler.placement.subset import Subset
-from thenar.compiler.placement.ways import METHODS
+from thenar.compiler.placement.methods.base import BEST, METHODS
+from thenar.compiler.placement.optimum import Subset
 
 
 def saved(lines: Sequence[Line], joints: bool, paper: Point) -> Table:
@@ -53,7 +53,7 @@ def kind(joints: bool) -> str:
 
 def bounds(found: Sequence[tuple[int, int, Subset]]) -> Table:
     """Return the table of how far elimination is from the best subset of few switches, chosen from all rows."""
-    found_pairs = (f"{BOUNDED}, %", "best found, %", "none below, %")
+    found_pairs = (f"{BEST}, %", "best found, %", "none below, %")
     heads = ("switches", *found_pairs, "at most from the best, points", "programs")
     table = Table(*heads, title="pairs of rows of different types that look alike, switches alone")
     for m, alike, best in sorted(found, key=lambda one: one[0]):

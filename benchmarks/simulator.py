@@ -23,7 +23,7 @@ from contacts import jaccard, of_settled, on_sets, row, solved, table, together,
 from thenar.simulator.contact.model import Contact, ContactModel
 from thenar.simulator.effects import contact_mujoco, contact_quasistatic
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.pipeline import compile_pipeline
+from thenar.simulator.running.pipeline import compile_pipeline
 from thenar.simulator.running.simulation import simulate
 from thenar.simulator.scenes.decode import load_scene
 from thenar.simulator.scenes.scene import Scene

@@ -12,7 +12,7 @@ from thenar.compiler.evaluation.fits import Fit, Training, run_fits
 from thenar.compiler.evaluation.populations import populations
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.recordings.graspset import GraspSet
-from thenar.simulator.pipeline.pipeline import DEFAULT_CONTACT
+from thenar.simulator.running.pipeline import DEFAULT_CONTACT
 from thenar.simulator.running.sampling import best_us
 from thenar.simulator.running.simulation import Simulated, simulate
 from thenar.simulator.scenes.scene import Scene

@@ -9,8 +9,7 @@ from .common import output_file, serial_port
 from .lines import echo
 
 if TYPE_CHECKING:
-    from thenar.drivers.calibration import GloveCalibration
-    from thenar.drivers.calibration_poses import Held
+    from thenar.drivers.calibration import GloveCalibration, Held
 
     from .calibrate_dialogue import Guide
 
@@ -63,7 +62,7 @@ def command(port: str, output: Path, subject: str | None, baud: int | None, sens
 
 
 def _calibrated(guide: "Guide", subject: str) -> "GloveCalibration":
-    from thenar.drivers.calibration_poses import FLAT, POSES, calibration
+    from thenar.drivers.calibration import FLAT, POSES, calibration
 
     poses = (FLAT, *(pose for pose in POSES if set(pose.degrees) & set(guide.info.names)))
     taken: list[Held] = []

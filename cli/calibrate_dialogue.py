@@ -7,10 +7,8 @@ import click
 from rich.live import Live
 from rich.table import Table
 
-from thenar.drivers.calibration import GloveCalibration
-from thenar.drivers.calibration_poses import Held, Pose, held, problems
-from thenar.drivers.cyberglove import CyberGlove
-from thenar.drivers.cyberglove_setup import GloveInfo
+from thenar.drivers.calibration import GloveCalibration, Held, Pose, held, problems
+from thenar.drivers.cyberglove import CyberGlove, GloveInfo
 from thenar.drivers.errors import DeviceError
 
 from .common import err

@@ -5,21 +5,21 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS
 
 from .common import any_path, existing_file, json_flag, out, output_file, print_json, progress, warning
 from .compile_asked import TABLE_BITS, Asked
+from .methods import WithMethods
 from .scan_tables import print_scan
 
 if TYPE_CHECKING:
     from thenar.compiler.artifact.compile import BuildReport
     from thenar.runtime.manifest import Manifest
 
-_CHIP = "mcp23017"
 _BOARD = "board"
 
 
-@click.command("compile")
+@click.command("compile", cls=WithMethods)
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option("-o", "--output", type=any_path, required=True, help="Folder of the build; a build there is replaced.")
 @click.option(
@@ -47,7 +47,7 @@ _BOARD = "board"
 @click.option(
     "--max-bins", type=click.IntRange(2), help="At most so many bins a joint: smaller tables.  [default: no limit]"
 )
-@click.option("--placement", default="id3", show_default=True, help="How switches are chosen: see thenar place.")
+@click.option("--placement", default="id3", show_default=True, help="How switches are chosen: see below.")
 @click.option("--keep", type=click.IntRange(1), help="How many switches, for placements that take a number.")
 @click.option("--width", type=click.IntRange(4, 16), default=16, show_default=True, help="Bits that every sum fits.")
 @click.option("--from", "from_frontier", type=existing_file, help="A frontier.json: build one of its points.")
@@ -59,7 +59,7 @@ _BOARD = "board"
 @click.option(
     "--chip",
     type=click.Choice([*CHIPS, _BOARD]),
-    help="The port expander to propose, or a switch-scanner board.  [default: mcp23017]",
+    help="The port expander to propose, or a switch-scanner board.  [default: the first]",
 )
 @click.option("--overwrite", is_flag=True, help="Let --propose replace a file that is there.")
 @json_flag
@@ -86,7 +86,7 @@ def command(context: click.Context, /, **options: Any) -> None:
             "itself, and stumps look at one at a time"
         )
     if asked.propose is not None:
-        _propose(made.manifest, asked.propose, asked.chip or _CHIP)
+        _propose(made.manifest, asked.propose, asked.chip or next(iter(CHIPS)))
     if asked.as_json:
         print_json(made.manifest)
         return
@@ -102,26 +102,34 @@ def command(context: click.Context, /, **options: Any) -> None:
 
 def _made(asked: Asked) -> "BuildReport":
     from thenar.compiler.artifact.compile import compile_build
+    from thenar.compiler.artifact.documents import BuildDocuments
     from thenar.compiler.artifact.made import no_documents
-    from thenar.compiler.frontier.timing.whole_glove import ports_of_whole_glove
+    from thenar.compiler.placement.ports import ports_of_whole_glove
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.harness.loading import load_harness
 
-    from .compile_documents import BuildDocuments
     from .from_frontier import picked
+    from .hand import hand_shape
 
     given = None if asked.glove is None else load_harness(asked.glove)
     grasp_set = GraspSet.load(asked.recordings)
     asked.check_hand(grasp_set.switch_names)
     chosen = None if asked.from_frontier is None else picked(asked.from_frontier, asked.point, grasp_set)
     with progress("compiling, then the paper's tables" if asked.report and asked.folds else "compiling") as told:
+        documents = BuildDocuments(
+            hand_shape(),
+            asked.hand_length,
+            None if chosen is None else chosen.frontier,
+            None if chosen is None else chosen.point.number,
+            told,
+        )
         return compile_build(
             grasp_set,
             asked.output,
             **(asked.training if chosen is None else asked.training | chosen.options),
             harness=given if chosen is None else chosen.wired(given),
             ports=ports_of_whole_glove(given, grasp_set.switch_names),
-            documents=BuildDocuments(told, chosen, asked.hand_length) if asked.report else no_documents,
+            documents=documents if asked.report else no_documents,
             progress=told,
         )
 

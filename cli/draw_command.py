@@ -107,23 +107,13 @@ def _without_grasps(numbers: bool, kept: list[tuple[str, Path]]) -> "Picture":
 
 def _placements(grasp_set: "GraspSet", prune: int) -> "Picture":
     """Return a hand for each subject and one for all rows pooled, or one hand if there is but one subject."""
-    import numpy as np
-
-    from thenar.compiler.placement.placement import place
+    from thenar.compiler.placement.placement import place_by_subject
     from thenar.simulator.handmaps.handmap import hand_map
     from thenar.simulator.handmaps.handpanels import kept
 
     hand_map().numbers_of(grasp_set.switch_names)  # a foreign set is refused before a tree is grown
-    subjects = np.unique(grasp_set.subjects).tolist()
-    groups = [(subject, grasp_set.rows(grasp_set.subjects == subject)) for subject in subjects]
-    if len(subjects) != 1:
-        groups.append(("pooled", grasp_set))
-    chosen = []
     with progress("growing a tree of each hand") as report:
-        for done, (title, rows) in enumerate(groups):
-            report(done, len(groups))
-            chosen.append((title, [switch.name for switch in place(rows, prune)[0].switches]))
-    return kept(chosen)
+        return kept([(title, list(found.names)) for title, found in place_by_subject(grasp_set, prune, report)])
 
 
 def _write(picture: "Picture", path: Path) -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .common import existing_file, json_flag, keep_apart, output_file, print_json, progress, warning
+from .methods import WithMethods, method_names
 
 if TYPE_CHECKING:
     from thenar.compiler.evaluation.study import Study
@@ -42,7 +43,7 @@ _COUNT = click.IntRange(min=1)
 _FOLDER = click.Path(file_okay=False, path_type=Path)
 
 
-@click.command()
+@click.command(cls=WithMethods)
 @click.argument("grasps", type=existing_file)
 @click.option("--subject", "subjects", multiple=True, metavar="NAME", help="Only this subject; may be given again.")
 @click.option("--folds", type=click.IntRange(min=2), default=4, show_default=True, help="Folds of cross-validation.")
@@ -75,6 +76,13 @@ _FOLDER = click.Path(file_okay=False, path_type=Path)
 )
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of the first repeat.")
 @click.option("--jobs", type=_COUNT, help="Worker processes. The result does not depend on it.  [default: all cores]")
+@click.option(
+    "--rivals",
+    callback=method_names,
+    default="cmim,mutual-information",
+    show_default=True,
+    help="Methods to compare ID3 with, by commas.",
+)
 @click.option(
     "--tables", callback=_tables, metavar="NAME,...", default=",".join(TABLES), show_default=True, help="Which tables."
 )

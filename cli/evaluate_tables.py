@@ -5,9 +5,9 @@ from rich.table import Table as Grid
 from rich.text import Text
 
 from thenar.compiler.evaluation.protocols import PROTOCOLS
-from thenar.compiler.evaluation.rates import Average, Rate
 from thenar.compiler.evaluation.study import Study
 from thenar.compiler.evaluation.tables import Cell, Spread, Table
+from thenar.compiler.text import interval
 
 from .common import out
 
@@ -64,20 +64,16 @@ def _grid(table: Table) -> Grid:
     if several:
         grid.add_column("average", justify="right")
     for row in table.rows:
-        average = [_interval(row.average)] if several else []
+        average = [Text(interval(row.average))] if several else []
         grid.add_row(Text(row.name), Text(row.what), _spread(row.switches), *map(_cell, row.cells), *average)
     return grid
 
 
 def _cell(cell: Cell) -> Text:
-    text = _interval(cell.rate)
+    text = Text(interval(cell.rate))
     if cell.draws is not None:
         text.append(f"\nfrom {100 * cell.draws.least:.1f} to {100 * cell.draws.most:.1f}")
     return text.append(_NO_INPUTS) if cell.no_inputs else text
-
-
-def _interval(rate: Rate | Average) -> Text:
-    return Text(f"{100 * rate.mean:.1f} [{100 * rate.low:.1f}, {100 * rate.high:.1f}]")
 
 
 def _spread(spread: Spread) -> str:

@@ -25,7 +25,7 @@ class Picked:
     @property
     def options(self) -> dict[str, object]:
         """The options of `compile_build` that the point settles."""
-        from thenar.compiler.placement.ways import METHODS
+        from thenar.compiler.placement.methods.base import METHODS
 
         setting = self.point.setting
         settled: dict[str, object] = {
@@ -38,7 +38,7 @@ class Picked:
         if setting.inputs == "joints":
             return settled
         number = int(setting.way.parameter)
-        parameter = "keep" if METHODS[setting.way.method].parameter == "switches" else "prune"
+        parameter = "keep" if METHODS[setting.way.method].by_number else "prune"
         return {**settled, "placement": setting.way.method, parameter: number}
 
     def wired(self, given: "Harness | None") -> "Wired | None":
@@ -94,8 +94,8 @@ def _check_point(point: "Point", grasp_set: "GraspSet", path: Path) -> None:
     """Raise FrontierError where a point cannot be built here: before the training, not after it."""
     from thenar.compiler.frontier.points import FrontierError
     from thenar.compiler.frontier.timing.wirings import AS_WIRED, BOARD, Wiring
-    from thenar.compiler.placement.ways import METHODS
-    from thenar.drivers.i2c.registry import CHIPS
+    from thenar.compiler.placement.methods.base import METHODS
+    from thenar.drivers.i2c.chips import CHIPS
     from thenar.runtime.harness.wiring import SLOWEST_HZ
     from thenar.runtime.names import shortened
 
@@ -105,7 +105,7 @@ def _check_point(point: "Point", grasp_set: "GraspSet", path: Path) -> None:
         raise FrontierError(f"{what} keeps switches that the recordings do not have: run thenar frontier on these")
     if setting.inputs != "joints" and setting.way.method not in METHODS:
         raise FrontierError(f"{what} takes a method that is not there: {shortened(repr(setting.way.method))}")
-    least = 1 if setting.inputs != "joints" and METHODS[setting.way.method].parameter == "switches" else 0
+    least = 1 if setting.inputs != "joints" and METHODS[setting.way.method].by_number else 0
     if not (setting.way.parameter.is_integer() and setting.way.parameter >= least):
         raise FrontierError(
             f"{what} takes {setting.way.parameter} for its method: it is a whole number from {least} on"

@@ -8,18 +8,13 @@ import click
 from thenar.compiler.frontier.targets import TARGETS
 
 from .common import any_path, err, existing_file, existing_folder, json_flag, out, print_json, progress
+from .methods import WithMethods, method_names
 
 if TYPE_CHECKING:
     from thenar.compiler.frontier.points import Frontier
 
 
-def _names(_context: click.Context, _parameter: click.Parameter, text: str | None) -> tuple[str, ...] | None:
-    if text is None:
-        return None
-    return tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip() and name.strip() != "none"))
-
-
-@click.command("frontier")
+@click.command("frontier", cls=WithMethods)
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option("-o", "--output", type=any_path, required=True, help="Folder for tables, pictures and the store.")
 @click.option("--glove", type=existing_file, help="A glove.toml: try its wiring as well, and choose by its ports.")
@@ -30,11 +25,11 @@ def _names(_context: click.Context, _parameter: click.Parameter, text: str | Non
 @click.option("--stream", type=existing_file, help="A set of whole movements: measure decision latency on it.")
 @click.option(
     "--methods",
-    callback=_names,
-    help="Placements to build from, by commas.  [default: elimination,id3,id3-cost,id3-ccp]",
+    callback=method_names,
+    help="Placement methods to build from, by commas.  [default: elimination and ID3, by cost with --glove]",
 )
 @click.option(
-    "--rivals", callback=_names, help="Placements to see beside them, by commas, or none.  [default: all installed]"
+    "--rivals", callback=method_names, help="Methods to compare them with, by commas, or none.  [default: most rivals]"
 )
 @click.option("--rounds", type=click.IntRange(1, 300), default=300, show_default=True, help="The most rounds to try.")
 @click.option("--repeats", type=click.IntRange(1), default=3, show_default=True, help="Repeats of the folds.")

@@ -57,7 +57,8 @@ def _title(frontier: "Frontier") -> str:
 def _cells(point: "Point") -> "tuple[Text, ...]":
     from rich.text import Text
 
-    from thenar.compiler.frontier.drawing.words import duration, interval, way_of, wiring_of
+    from thenar.compiler.frontier.drawing.words import way_of, wiring_of
+    from thenar.compiler.text import duration, interval
 
     setting = point.setting
     texts = (

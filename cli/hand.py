@@ -1,4 +1,4 @@
-"""The hand that reports and specs draw: the simulator's glove, where its switches are the recordings' own."""
+"""The hand that reports and specs draw: the simulator's glove."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -7,17 +7,14 @@ if TYPE_CHECKING:
     from thenar.compiler.hand import HandShape
 
 
-def hand_of(switch_names: Sequence[str], length_mm: float | None = None) -> "HandShape | None":
-    """Return the glove `murakami160` laid flat, for a hand of `length_mm`, if it has all of these switches.
-
-    None: of a glove of the user's own nobody knows where its switches lie.
-    """
+def hand_shape() -> "HandShape":
+    """Return the glove `murakami160` laid flat."""
     from thenar.compiler.hand import HandShape
     from thenar.simulator.handmaps.flathand import HAND
     from thenar.simulator.handmaps.handmap import PARTS, RADIUS_MM, hand_map
 
     glove = hand_map()
-    shape = HandShape(
+    return HandShape(
         length_mm=HAND.size.length_mm,
         names=glove.names,
         places=glove.places,
@@ -30,6 +27,11 @@ def hand_of(switch_names: Sequence[str], length_mm: float | None = None) -> "Han
         creases=glove.creases,
         labels=glove.labels,
     )
-    if not switch_names or not shape.knows(switch_names):
-        return None
-    return shape if length_mm is None else shape.scaled(length_mm)
+
+
+def hand_of(switch_names: Sequence[str], length_mm: float | None = None) -> "HandShape | None":
+    """Return that glove for a hand of `length_mm`, if it has all of these switches.
+
+    None: of a glove of the user's own nobody knows where its switches lie.
+    """
+    return hand_shape().fitted(switch_names, length_mm)

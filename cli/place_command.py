@@ -8,16 +8,17 @@ import click
 
 from .common import existing_file, json_flag, keep_apart, output_file, picture_file, print_json, progress
 from .lines import echo
+from .methods import WithMethods
 
 if TYPE_CHECKING:
+    from thenar.compiler.placement.methods.base import Method
+    from thenar.compiler.placement.placement import Placement
+    from thenar.compiler.placement.ports import PortCosts
     from thenar.compiler.recordings.graspset import GraspSet
-
-_PAPERS = "id3"
-_FOR_CROWDS = "elimination"
 
 
 @dataclass(frozen=True, slots=True)
-class _Options:
+class _Asked:
     """What the user asked for."""
 
     grasps: Path
@@ -34,50 +35,89 @@ class _Options:
     output: Path | None
     as_json: bool
 
+    @property
+    def chosen_by(self) -> "Method":
+        """The method asked for, or the usual one."""
+        from thenar.compiler.placement.methods.base import BEST, METHODS, PAPERS
+
+        return METHODS.named(self.method or (BEST if self.crowd else PAPERS))
+
     def check(self) -> None:
         """Raise UsageError if the options do not go together."""
+        from thenar.compiler.placement.methods.base import PAPERS
+
+        method = self.chosen_by
+        tree = method.name == PAPERS
         for wrong, reason in (
             (self.as_json and self.show_tree, "--tree is for people and --json for machines: take one of them"),
-            (self.show_tree and not self.of_tree, "--tree prints the tree of the paper's ID3 alone"),
-            (self.draw is not None and not (self.of_tree or self.crowd), "--draw draws ID3's tree, or a --crowd"),
+            (self.show_tree and not tree, "--tree prints the tree of the paper's ID3 alone"),
+            (self.draw is not None and not (tree or self.crowd), "--draw draws ID3's tree, or a --crowd"),
             (self.exact and self.crowd, "--exact judges one placement and --crowd looks for one: take one of them"),
-            (self.crowd and self.method == _PAPERS, "--crowd takes a method that is told how many switches to --keep"),
-            (self.joints and self.of_tree, "--joints is for the methods beside the paper's ID3"),
             (
-                self.by_size and self.prune is not None,
-                "--prune is for ID3: this method takes --keep",
+                self.crowd and not method.by_number,
+                "--crowd takes a method that is told how many switches to --keep",
             ),
-            (self.by_size and self.keep is None, "tell this method how many switches to --keep"),
-            (not self.by_size and self.keep is not None, "ID3 takes --prune S: to --keep a number, name a --method"),
+            (self.joints and tree, "--joints is for the methods beside the paper's ID3"),
+            (method.by_number and self.prune is not None, "--prune is for ID3: this method takes --keep"),
+            (method.by_number and self.keep is None, "tell this method how many switches to --keep"),
+            (
+                not method.by_number and self.keep is not None,
+                "ID3 takes --prune S: to --keep a number, name a --method",
+            ),
         ):
             if wrong:
                 raise click.UsageError(reason)
-        if self.glove is not None:
-            self._check_priced()
+        if self.glove is not None and (self.crowd or not method.uses_ports):
+            from thenar.compiler.placement.methods.base import METHODS
+
+            heeding = ", ".join(name for name, each in METHODS.items() if each.uses_ports)
+            raise click.UsageError(f"--glove says what scans cost: take it with a --method that heeds it: {heeding}")
         keep_apart(self.grasps, self.glove, self.draw, self.output)
 
-    def _check_priced(self) -> None:
-        from thenar.compiler.frontier.settings import PRICED_METHODS
+    def ports(self, grasp_set: "GraspSet") -> "PortCosts | None":
+        """Return what reading each switch costs."""
+        from thenar.compiler.placement.ports import ports_of_whole_glove
+        from thenar.runtime.harness.loading import load_harness
 
-        if self.crowd or self.method not in PRICED_METHODS:
+        harness = None if self.glove is None else load_harness(self.glove)
+        lacking = set() if harness is None else set(grasp_set.switch_names) - set(harness.switches)
+        if lacking:
             raise click.UsageError(
-                f"--glove says what scans cost: take it with a --method that heeds it: {', '.join(PRICED_METHODS)}"
+                f"{self.glove} has no place for {min(lacking)!r} of {self.grasps}: name the whole glove's glove.toml."
+            )
+        return ports_of_whole_glove(harness, grasp_set.switch_names)
+
+    def found(self) -> "Placement":
+        """Return the placement."""
+        from thenar.compiler.placement.placement import place
+        from thenar.compiler.placement.population import place_for_crowd
+        from thenar.compiler.recordings.graspset import GraspSet
+
+        grasp_set, method = GraspSet.load(self.grasps), self.chosen_by
+        with progress(f"choosing switches by {method.name}") as report:
+            if self.crowd:
+                return place_for_crowd(
+                    grasp_set,
+                    self.keep or 1,
+                    method=method.name,
+                    joints=self.joints,
+                    jobs=self.jobs or -1,
+                    on_done=report,
+                )
+            return place(
+                grasp_set,
+                float((self.keep if method.by_number else self.prune) or 0),
+                method=method.name,
+                joints=self.joints,
+                ports=self.ports(grasp_set) if method.uses_ports else None,
+                exact=self.exact,
+                on_round=report,
             )
 
-    @property
-    def of_tree(self) -> bool:
-        """Whether the paper's ID3 is all that is wanted."""
-        return self.method in (None, _PAPERS) and not self.exact and not self.crowd
 
-    @property
-    def by_size(self) -> bool:
-        """Whether the method takes a number of switches."""
-        return self.crowd or self.method not in (None, _PAPERS)
-
-
-@click.command("place")
+@click.command("place", cls=WithMethods)
 @click.argument("grasps", type=existing_file)
-@click.option("--method", metavar="NAME", help="How to choose; a wrong NAME lists them all.  [default: id3]")
+@click.option("--method", metavar="NAME", help="How to choose: see below.  [default: id3]")
 @click.option("--prune", type=click.IntRange(min=0), metavar="S", help="ID3: end nodes of fewer than S rows.")
 @click.option("--keep", type=click.IntRange(min=1), metavar="M", help="Other methods: keep at most M switches.")
 @click.option("--joints", is_flag=True, help="Choose what helps beside the joints (default: switches alone).")
@@ -107,78 +147,28 @@ def command(**options: Any) -> None:
         thenar place set.grasps --method id3-cost --keep 16 --glove glove.toml
         thenar place crowd.grasps --crowd --keep 16 --draw subjects.svg
     """
-    from thenar.compiler.recordings.graspset import GraspSet
-
-    asked = _Options(**options)
+    asked = _Asked(**options)
     asked.check()
-    grasp_set = GraspSet.load(asked.grasps)
-    found = _answer(asked, grasp_set)
+    placement = asked.found()
+    if asked.draw is not None:
+        from thenar.compiler.placement.drawing import draw_placement
+
+        draw_placement(placement, asked.draw)
     if asked.output is not None:
-        _store(found, asked.output)
+        _store(placement, asked.output)
     if asked.as_json:
-        print_json(found)
+        print_json(placement.document())
+        return
+    from .place_tables import print_placement
+
+    if asked.show_tree and placement.tree is not None:
+        echo(placement.tree.text(placement.all_names, placement.grasps))
+    print_placement(placement)
 
 
-def _answer(asked: _Options, grasp_set: "GraspSet") -> Any:
-    if asked.of_tree:
-        return _of_tree(asked, grasp_set)
-    return _of_crowd(asked, grasp_set) if asked.crowd else _of_method(asked, grasp_set)
-
-
-def _of_tree(asked: _Options, grasp_set: "GraspSet") -> Any:
-    from thenar.compiler.placement.placement import place
-
-    with progress(f"growing the tree of {asked.grasps.name}"):
-        placement, tree = place(grasp_set, asked.prune or 0)
-    types = [grasp_set.taxonomy.types[number] for number in map(int, tree.classes)]
-    if asked.draw is not None:
-        from thenar.compiler.placement.draw import draw_tree
-
-        draw_tree(tree, asked.draw, grasp_set.switch_names, types)
-    if asked.show_tree:
-        echo(tree.text(grasp_set.switch_names, types))
-    if not asked.as_json:
-        from .place_tree import print_placement
-
-        print_placement(placement)
-    return placement
-
-
-def _of_method(asked: _Options, grasp_set: "GraspSet") -> Any:
-    from thenar.compiler.frontier.timing.whole_glove import ports_of_whole_glove
-    from thenar.runtime.harness.loading import load_harness
-
-    from .place_chosen import chosen, print_chosen
-
-    method, parameter = asked.method or _PAPERS, asked.keep if asked.by_size else asked.prune
-    harness = None if asked.glove is None else load_harness(asked.glove)
-    lacking = set() if harness is None else set(grasp_set.switch_names) - set(harness.switches)
-    if lacking:
-        raise click.UsageError(
-            f"{asked.glove} has no place for {min(lacking)!r} of {asked.grasps}: name the whole glove's glove.toml."
-        )
-    ports = ports_of_whole_glove(harness, grasp_set.switch_names)
-    choice = chosen(grasp_set, method, float(parameter or 0), joints=asked.joints, exact=asked.exact, ports=ports)
-    if not asked.as_json:
-        print_chosen(choice)
-    return choice
-
-
-def _of_crowd(asked: _Options, grasp_set: "GraspSet") -> Any:
-    from .place_crowd import crowded, draw_crowd, print_crowd
-
-    method, keep = asked.method or _FOR_CROWDS, asked.keep or 1
-    placement = crowded(grasp_set, method, keep, joints=asked.joints, jobs=asked.jobs or -1)
-    if asked.draw is not None:
-        draw_crowd(placement, asked.draw)
-    if not asked.as_json:
-        print_crowd(placement)
-    return placement
-
-
-def _store(found: Any, path: Path) -> None:
+def _store(placement: "Placement", path: Path) -> None:
     import msgspec
 
     from thenar.runtime.files import write_atomically
 
-    write_atomically(path, msgspec.json.format(msgspec.json.encode(found), indent=2) + b"\n")
+    write_atomically(path, msgspec.json.format(msgspec.json.encode(placement.document()), indent=2) + b"\n")

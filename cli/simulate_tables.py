@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 from rich.text import Text
 
-from thenar.simulator.pipeline.pipeline import DEFAULT_CONTACT
-from thenar.simulator.pipeline.registry import CONTACTS
+from thenar.simulator.pipeline.effect import EFFECTS
 from thenar.simulator.running.explain import Explanation
+from thenar.simulator.running.pipeline import DEFAULT_CONTACT
 from thenar.simulator.running.report import GraspReport, Report, StepReport
 
 from .common import err, out, warning
@@ -172,7 +172,7 @@ def print_ablation(ablation: "Ablation") -> None:
         "changes in percentage points, of grasps that settled with and without; time of a few grasps, best of several"
     )
     for variant in ablation.variants:
-        if variant.without in CONTACTS:
+        if variant.without is not None and EFFECTS[variant.without].model is not None:
             console.print(f"without {variant.without}: {DEFAULT_CONTACT} closes the hands in its place")
 
 

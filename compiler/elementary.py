@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+LN_2 = 0.6931471805599453
 _INVERSE_LN2 = 1.4426950408889634
 # ln 2 in two parts (Cody and Waite): the high one ends in 21 zero bits, so k * _LN2_HIGH is exact for |k| < 2^21.
 _LN2_HIGH = 0.6931471803691238

@@ -36,6 +36,12 @@ class HandShape:
     creases: tuple[Floats, ...]
     labels: Floats
 
+    def fitted(self, names: Sequence[str], length_mm: float | None = None) -> "HandShape | None":
+        """Return the hand, of that length, if it has all the switches called `names`; None if not, or without names."""
+        if not names or not self.knows(names):
+            return None
+        return self if length_mm is None else self.scaled(length_mm)
+
     def scaled(self, length_mm: float) -> "HandShape":
         """Return the same hand, of another length: its proportions stay, and so does the size of a switch."""
         factor = length_mm / self.length_mm

@@ -7,9 +7,17 @@
     ]
 
 Two points say what an offset and a gain only say together with the order in which they are applied.
+
+The guided calibration finds them from poses that are held. In the first one, the flat hand, every joint counts as 0
+degrees; each later pose bends or spreads some of them. The angles of those poses are what hands commonly reach, not
+measurements of this one (the ranges of motion that orthopaedic textbooks give): who has measured a pose writes its
+angle into the file in place of ours.
 """
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from math import isfinite
+from statistics import median_low
 from typing import Annotated, Literal
 
 import msgspec
@@ -67,3 +75,96 @@ class GloveCalibration(
     def to_toml(self) -> str:
         """Return the calibration as the text of its file; numbers keep every digit."""
         return msgspec.toml.encode(self).decode("utf-8")
+
+
+# Further than this a sensor does not wander in a hand held still, in counts.
+STEADY = 8
+# Real gloves move 50 to 140 counts from flat hand to fist; what moves less than this was not moved.
+LEAST_TRAVEL = 10
+_ENDS = (1, 255)
+
+_FINGERS = ("index", "middle", "ring", "little")
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """A pose to hold: what to do, and how many degrees each sensor it is for then feels."""
+
+    name: str
+    instruction: str
+    degrees: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """What a pose gave: the middle byte of each sensor, and by how many counts each wandered meanwhile."""
+
+    raw: bytes
+    wander: tuple[int, ...]
+
+
+FLAT = Pose("flat hand", "Lay the hand flat on a table, wrist straight, fingers and thumb together.", {})
+POSES = (
+    Pose(
+        "fist",
+        "Make a tight fist, the thumb outside.",
+        {f"{finger}_{joint}": degrees for finger in _FINGERS for joint, degrees in (("mpj", 90.0), ("pij", 100.0))}
+        | {f"{finger}_dij": 70.0 for finger in _FINGERS},
+    ),
+    Pose(
+        "bent thumb",
+        "Open the hand; bend both outer joints of the thumb as far as they go.",
+        {"thumb_mpj": 50.0, "thumb_ij": 80.0},
+    ),
+    Pose(
+        "spread hand",
+        "Lay the hand flat again; spread thumb and fingers as far as they go.",
+        {"thumb_abduction": 60.0}
+        | dict.fromkeys(("middle_index_abduction", "ring_middle_abduction", "little_ring_abduction"), 20.0),
+    ),
+    Pose(
+        "thumb across",
+        "Touch the root of the little finger with the tip of the thumb.",
+        {"thumb_rotation": 60.0, "palm_arch": 20.0},
+    ),
+    Pose("wrist down", "Straighten the fingers; bend the wrist towards the palm.", {"wrist_pitch": 60.0}),
+    Pose("wrist aside", "Wrist straight again, then bent towards the little finger.", {"wrist_yaw": 30.0}),
+)
+
+
+def held(samples: Sequence[bytes]) -> Held:
+    """Return what samples of all sensors, at least one, amount to. The middle one: a glitch moves no median."""
+    columns = list(zip(*samples, strict=True))
+    raw = bytes(median_low(column) for column in columns)
+    return Held(raw, tuple(max(column) - min(column) for column in columns))
+
+
+def problems(names: Sequence[str], flat: Held | None, pose: Pose, found: Held) -> list[str]:
+    """Return what speaks against taking a pose, in sentences; `flat` is None when the pose is the flat hand itself."""
+    concerned = [place for place, name in enumerate(names) if flat is None or name in pose.degrees]
+    out = []
+    for place in concerned:
+        name, raw = names[place], found.raw[place]
+        if found.wander[place] > STEADY:
+            out.append(f"{name} wandered by {found.wander[place]} counts: hold still")
+        if raw in _ENDS:
+            out.append(f"{name} is at the end of its range ({raw}): does the glove fit, is the sensor whole?")
+        if flat is not None and abs(raw - flat.raw[place]) < LEAST_TRAVEL:
+            out.append(f"{name} went from {flat.raw[place]} to {raw} only: was the joint moved?")
+    return out
+
+
+def calibration(names: Sequence[str], flat: Held, found: Sequence[tuple[Pose, Held]], subject: str) -> GloveCalibration:
+    """Return the lines through the flat hand and the poses, in wire order; a sensor that did not move is left out."""
+    ends = {
+        name: (pose_held.raw[names.index(name)], degrees)
+        for pose, pose_held in found
+        for name, degrees in pose.degrees.items()
+        if name in names
+    }
+    lines = tuple(
+        SensorCalibration(name, raw_a=raw_a, value_a=0.0, raw_b=ends[name][0], value_b=ends[name][1])
+        for name, raw_a in zip(names, flat.raw, strict=True)
+        if name in ends and ends[name][0] != raw_a
+    )
+    return GloveCalibration(subject=subject, sensors=lines)

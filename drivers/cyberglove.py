@@ -7,18 +7,360 @@
 Everything that the sources of the protocol disagree on is accepted either way, or can be chosen: docs/cyberglove.md.
 """
 
+import logging
+from collections import deque
+from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass
+from time import monotonic, monotonic_ns
 from types import TracebackType
 from typing import Literal, Self
 
-from .cyberglove_commands import STOP, Command, query, setting
-from .cyberglove_dialogue import Dialogue
-from .cyberglove_frame import Counts
-from .cyberglove_records import Records, Timed
-from .cyberglove_setup import BAUD_RATES, GloveInfo, Wanted, find_line, set_up
-from .cyberglove_timing import period_words
-from .errors import DeviceError
+from .cyberglove_protocol import (
+    FASTEST,
+    INFORMATION,
+    POLL,
+    READY,
+    SENSORS_18,
+    SENSORS_22,
+    STOP,
+    STREAM,
+    Answer,
+    Command,
+    Record,
+    RecordCounts,
+    RecordDecoder,
+    Words,
+    find_answer,
+    masked_sensors,
+    period_words,
+    query,
+    sending_us,
+    setting,
+    shortest_us,
+    told_us,
+)
+from .errors import DeviceError, SettingError
 from .serial_line import SerialLine
+
+_LOG = logging.getLogger(__name__)
+
+# An answer's next byte is never further away: 16 ms in an FTDI adapter, 1 ms a byte at 9600 baud, the box's own time.
+_ANSWER_S = 0.2
+# After a Ctrl-C comes the rest of a record at most, which at 9600 baud takes 27 ms.
+_QUIET_S = 0.05
+# What a Ctrl-C itself may be answered with; whether it is, no source says.
+_STOPPED = STOP + b"\0"
+_LONGEST_S = 1.0
+_LONGEST = 4096  # bytes among which an answer is looked for; the information text has some hundreds
+_TRIES = 3
+
+
+class Dialogue:
+    """Asks over `line`. What goes wrong on the wire is asked again, after the box was made to stop whatever it does."""
+
+    def __init__(self, line: SerialLine) -> None:
+        self._line = line
+
+    def hush(self) -> None:
+        """End a stream, and drop what still comes. Raises DeviceError if it does not end."""
+        end = monotonic() + _LONGEST_S
+        while monotonic() < end:
+            self._line.write(STOP)
+            if not self._line.drain(_QUIET_S).strip(_STOPPED):
+                return
+        raise DeviceError(
+            f"{self._line.url}: what is there keeps sending after a Ctrl-C at {self._line.baud} baud: is it a"
+            " CyberGlove, and is this its baud rate?"
+        )
+
+    def ask(self, command: Command) -> bytes:
+        """Return the values of the answer. Raises DeviceError if three times none comes, or only errors."""
+        answer = None
+        for attempt in range(_TRIES):
+            if attempt:
+                self.hush()
+            answer = self._asked_once(command)
+            if answer is not None and answer.error is None:
+                return answer.values
+        raise DeviceError(f"{self._line.url}: {_complaint(command, answer, self._line.baud)}")
+
+    def _asked_once(self, command: Command) -> Answer | None:
+        self._line.write(command.request)
+        received, end = b"", monotonic() + _LONGEST_S
+        while monotonic() < end and len(received) < _LONGEST and (more := self._line.read(_ANSWER_S)):
+            received += more
+            answer = find_answer(command, received)
+            if answer is not None:
+                return answer
+        return find_answer(command, received, last=True)
+
+
+def _complaint(command: Command, answer: Answer | None, baud: int) -> str:
+    if answer is not None:
+        return f"the CyberGlove answers {command.name} with an error: {answer.error}"
+    return f"no CyberGlove answers {command.name} at {baud} baud: check its power, the cable and the baud rate"
+
+
+# The rates that the box can be set to without a change inside it, the usual first.
+BAUD_RATES = (115_200, 38_400, 19_200, 9_600)
+
+# After it is switched on, a box says for a while that it is not ready.
+_READY_S = 1.0
+_NAMES = {18: SENSORS_18, 22: SENSORS_22}
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """How a glove shall send.
+
+    words    the period (`cyberglove_protocol.period_words`)
+    poll     whether it shall be asked for each record, so that the host keeps the period
+    sensors  how many it must have; None: as many as it says
+    status   whether records shall carry the status byte
+    """
+
+    words: Words
+    poll: bool
+    sensors: int | None
+    status: bool
+
+
+@dataclass(frozen=True, slots=True)
+class GloveInfo:
+    """What was found at the end of the line.
+
+    baud        its rate
+    sensors     how many bytes of sensors a record has, 18 or 22
+    names       what they measure, in wire order
+    mask        the software mask, 3 bytes, the lowest bit of the first one first; empty where the box does not tell
+    right_hand  for which hand it is; None where the box does not tell
+    text        the box's information text
+    status      whether records carry the status byte
+    period_us   from one record to the next: as wanted, or the shortest that box and line should manage
+    notes       what is odd, in sentences for the user
+    """
+
+    baud: int
+    sensors: int
+    names: tuple[str, ...]
+    mask: bytes
+    right_hand: bool | None
+    text: str
+    status: bool
+    period_us: int
+    notes: tuple[str, ...] = ()
+
+
+def find_line(url: str, rates: Sequence[int]) -> SerialLine:
+    """Return an open line to a box that answers, at the first of `rates` at which it does. Raises DeviceError else."""
+    for baud in rates:
+        line = SerialLine(url, baud)
+        try:
+            dialogue = Dialogue(line)
+            dialogue.hush()
+            dialogue.ask(query("G"))
+        except DeviceError as reason:
+            line.close()
+            if len(rates) == 1:
+                raise
+            failure = reason
+        except BaseException:
+            line.close()
+            raise
+        else:
+            return line
+    tried = ", ".join(map(str, rates))
+    raise DeviceError(f"{url}: no CyberGlove answers at {tried} baud: check its power and the cable") from failure
+
+
+def set_up(line: SerialLine, wanted: Wanted) -> GloveInfo:
+    """Ask a box that answers what it is, and tell it how to send records.
+
+    Raises DeviceError if it does not answer, or is no glove that can be read.
+    """
+    dialogue = Dialogue(line)
+    notes = _until_ready(dialogue, line.url)
+    sensors = _sensors(dialogue, line.url, wanted.sensors)
+    mask = _optional(dialogue, query("M")) or b""
+    right, text = _optional(dialogue, query("R")), _optional(dialogue, INFORMATION) or b""
+    status = _configured(dialogue, wanted)
+    if wanted.status and not status:
+        notes += ("It sends no status byte: plug and wrist switch cannot be seen while it streams.",)
+    filtered = _optional(dialogue, query("F")) not in (None, b"\0")
+    told, shortest = told_us(wanted.words), shortest_us(sensors, line.baud, status=status, filtered=filtered)
+    if wanted.poll:
+        shortest += sending_us(len(POLL), line.baud)
+    return GloveInfo(
+        baud=line.baud,
+        sensors=sensors,
+        names=_names(mask, sensors),
+        mask=mask,
+        right_hand=None if right is None else right != b"\0",
+        text="".join(filter(str.isprintable, text.decode("ascii", "replace"))).strip(),
+        status=status,
+        period_us=round(max(told, shortest)),
+        notes=notes + _rate_note(told, shortest),
+    )
+
+
+def _configured(dialogue: Dialogue, wanted: Wanted) -> bool:
+    """Tell the box how to send, and return whether its records will carry the status byte."""
+    words = FASTEST if wanted.poll else wanted.words
+    dialogue.ask(setting("T", b"".join(word.to_bytes(2, "big") for word in words)))
+    _optional(dialogue, setting("D", b"\0"))  # a box without time stamps has none to switch off
+    return _optional(dialogue, setting("U", bytes([wanted.status]))) is not None and wanted.status
+
+
+def _until_ready(dialogue: Dialogue, url: str) -> tuple[str, ...]:
+    """Ask until the box is ready. Which of 1 and 2 means what, sources disagree: both pass, with a note."""
+    end = monotonic() + _READY_S
+    while (state := dialogue.ask(query("G"))[0]) != READY and monotonic() < end:
+        dialogue.hush()
+    if state == 0:
+        raise DeviceError(f"{url}: the CyberGlove's box is neither initialised nor has it a glove: is one plugged in?")
+    return () if state == READY else (f"?G says {state}, not {READY}: the glove is unplugged or not initialised.",)
+
+
+def _sensors(dialogue: Dialogue, url: str, expected: int | None) -> int:
+    answer = _optional(dialogue, query("N")) or _optional(dialogue, query("S"))
+    count = answer[0] if answer else expected
+    if count is None:
+        raise DeviceError(f"{url}: the CyberGlove does not say how many sensors it has: say so (sensors = 18, or 22)")
+    if expected is not None and count != expected:
+        raise SettingError(
+            f"{url}: the CyberGlove sends {count} sensors, not {expected}: write `sensors = {count}` under [cyberglove]"
+        )
+    if count not in _NAMES:
+        raise DeviceError(
+            f"{url}: the CyberGlove sends {count} sensors, neither 18 nor 22: another program masked some (its M"
+            " setting); switch the box off and on"
+        )
+    return count
+
+
+def _names(mask: bytes, count: int) -> tuple[str, ...]:
+    masked = masked_sensors(mask)
+    return masked if len(masked) == count else _NAMES[count]
+
+
+def _rate_note(told: float, shortest: float) -> tuple[str, ...]:
+    if not 0.0 < told < shortest:
+        return ()
+    return (
+        f"{1e6 / told:.0f} records a second are asked for, and box and line should manage {1e6 / shortest:.0f}: ask"
+        " for fewer if records come with the fault 'too fast'.",
+    )
+
+
+def _optional(dialogue: Dialogue, command: Command) -> bytes | None:
+    """Return the values of the answer, None where this box does not know the command: never for a lost answer."""
+    try:
+        return dialogue.ask(command)
+    except DeviceError:
+        dialogue.hush()
+        return None
+
+
+# When a poll is taken for lost: a record takes 27 ms at 9600 baud, an FTDI adapter adds 16.
+_POLLED_S = 0.2
+# When a glove is taken for dead of which no byte comes: soon, for it must be read again within a second of its return.
+_SILENT_S = 0.5
+# And when bytes come, but no record.
+_NOISY_S = 1.0
+_SILENT_PERIODS = 4
+# More than any line brings between two readings: what stood in buffers while the host was held up. It is read up to its
+# end, so far as that comes, before it is given times.
+_BACKLOG = 2048
+_LONGEST_BACKLOG = 1 << 18
+
+Timed = tuple[int, Record]
+
+
+class Records:
+    """Reads records from `line`, streamed, or polled as often as wanted. `counts` goes on where it is."""
+
+    def __init__(self, line: SerialLine, info: GloveInfo, wanted: Wanted, counts: RecordCounts) -> None:
+        self._line, self._info, self._counts = line, info, counts
+        self._poll, self._period_s = wanted.poll, told_us(wanted.words) / 1e6
+        periods_s = _SILENT_PERIODS * info.period_us / 1e6
+        self._silent_s, self._noisy_s = max(_SILENT_S, periods_s), max(_NOISY_S, periods_s)
+        self._last_us = 0
+        self.start()
+
+    def start(self) -> None:
+        """Begin, or begin again after the box was asked for something else."""
+        self._decoder = RecordDecoder(self._info.sensors, self._counts, self._info.status)
+        self._ready: deque[Timed] = deque()
+        self._heard_at = self._quiet_from = self._due = self._poll_at = monotonic()
+        self._asked = False
+        if not self._poll:
+            self._line.write(STREAM)
+
+    def read(self, timeout_s: float) -> Timed | None:
+        """Return the oldest record not yet returned and when it was in, in microseconds of the monotonic clock.
+
+        Of records that come in together each is a period older than the next, and a polled one was in before it was to
+        be asked for again: what stood in a buffer while the host was held up is not taken for new.
+
+        None if none is in by the timeout. Raises DeviceError when the line is gone, or no byte came for half a second,
+        or no record for a second (or for four periods, where these are longer).
+        """
+        end = monotonic() + timeout_s
+        while not self._ready:
+            self._ask()
+            now = monotonic()
+            self._receive(min(end, self._given_up_at, self._next_poll()) - now)
+            if not self._ready and now >= end:
+                return None
+        return self._ready.popleft()
+
+    def _ask(self) -> None:
+        now = monotonic()
+        if not self._poll or now < self._poll_at:
+            return
+        self._line.write(POLL)
+        if not self._asked:
+            self._asked, self._heard_at, self._quiet_from = True, now, now
+        self._poll_at = now + _POLLED_S
+        self._due = max(self._due + self._period_s, now)
+
+    def _next_poll(self) -> float:
+        return self._poll_at if self._poll else float("inf")
+
+    @property
+    def _given_up_at(self) -> float:
+        """When the glove is taken for dead if nothing more comes."""
+        return min(self._heard_at + self._silent_s, self._quiet_from + self._noisy_s)
+
+    def _receive(self, seconds: float) -> None:
+        data = self._waiting(seconds)
+        records = self._decoder.feed(data)
+        now_us = monotonic_ns() // 1000
+        if data:
+            self._heard_at = now_us / 1e6
+        if records:
+            newest_us = min(now_us, round((self._quiet_from + _POLLED_S) * 1e6)) if self._poll else now_us
+            for behind, record in zip(reversed(range(len(records))), records, strict=True):
+                self._last_us = max(self._last_us, newest_us - behind * self._info.period_us)
+                self._ready.append((self._last_us, record))
+            self._quiet_from, self._asked, self._poll_at = now_us / 1e6, False, self._due
+        elif now_us / 1e6 > self._given_up_at and self._is_expected():
+            silent = now_us / 1e6 - self._heard_at > self._silent_s
+            said = f"no byte for {self._silent_s:g}" if silent else f"no record for {self._noisy_s:g}"
+            raise DeviceError(f"{self._line.url}: the CyberGlove has sent {said} s: check its power and the cable")
+
+    def _waiting(self, seconds: float) -> bytes:
+        """Return what has come in, a backlog up to its end; its last record is then the newest there is."""
+        data = self._line.read(max(0.0, seconds))
+        if len(data) >= _BACKLOG:
+            while len(data) < _LONGEST_BACKLOG and (more := self._line.read(0.0)):
+                data += more
+        return data
+
+    def _is_expected(self) -> bool:
+        return self._asked or not self._poll
+
 
 Mode = Literal["stream", "poll"]
 
@@ -46,7 +388,7 @@ class CyberGlove:
         status: bool = True,
     ) -> None:
         self.url = url
-        self.counts = Counts()
+        self.counts = RecordCounts()
         self._rates = BAUD_RATES if baud is None else (baud,)
         self._wanted = Wanted(period_words(rate_hz), poll=mode == "poll", sensors=sensors, status=status)
         self._line: SerialLine | None = None

@@ -1,31 +1,88 @@
 """The switch-scanner board on a serial line: what it says, as sets of closed keys with their times."""
 
+import logging
 from collections import deque
-from time import monotonic
+from dataclasses import asdict, dataclass
+from time import monotonic, monotonic_ns
 from types import TracebackType
-from typing import Self
+from typing import NamedTuple, Self
 
-from .board_keys import BoardKeys
-from .board_times import BoardTimes
 from .errors import DeviceError
-from .scanner_frame import Counts, Frame
-from .scanner_link import Received, ScannerLink
-from .scanner_messages import (
+from .scanner_protocol import (
     DEGRADED,
     EARLY,
     NO_GRASP,
     Faults,
+    Frame,
+    FrameDecoder,
     FromBoard,
     GetState,
     Grasp,
     Hello,
+    Mask,
+    MessageError,
     SetDebounce,
     SetRate,
     ToBoard,
+    encode,
+    frame,
     from_board,
 )
-from .scanner_payload import MessageError
-from .scanner_reading import BoardGrasp, ScannerCounts, ScannerReading
+from .scanner_state import BoardKeys, BoardTimes
+from .serial_line import SerialLine
+
+_LOG = logging.getLogger(__name__)
+
+
+class ScannerReading(NamedTuple):
+    """The keys at one time, in the host's monotonic microseconds.
+
+    known holds the keys of which anything can be said: none from a lost frame until the board has told all of its keys
+    again, none that the board says it cannot read, and of a matrix without diodes only those that cannot be ghosts.
+    `closed` holds no others.
+    """
+
+    time_us: int
+    closed: Mask
+    known: Mask
+
+
+class BoardGrasp(NamedTuple):
+    """What a board recognised by itself, in a frame that it read at time_us, in the host's monotonic microseconds.
+
+    number    of the grasp type in the order of the build that the board carries; None: none was recognised
+    margin    the best score less the second, in steps of the build's tables; 65535 stands for more, too
+    degraded  whether an input was missing
+    early     whether the scan ended as soon as the rest of the switches could not matter
+    """
+
+    time_us: int
+    number: int | None
+    margin: int
+    degraded: bool
+    early: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ScannerCounts:
+    """What came in since the board was opened.
+
+    Sound frames; damaged, too short and too long ones; gaps in the numbers of the sound ones; misfits, which were sound
+    but said what this board cannot say. And how often the state was asked for, something being amiss, and the time.
+    """
+
+    frames: int
+    damaged: int
+    short: int
+    overlong: int
+    gaps: int
+    misfits: int
+    asked: int
+    pings: int
+
+
+# When it came in, in the host's monotonic microseconds, and a sound frame, or None for something that was none.
+Received = tuple[int, Frame | None]
 
 # Opening the port of an Arduino resets it, and its boot loader answers nobody for up to two seconds.
 _BOOT_S = 3.0
@@ -46,14 +103,15 @@ class Scanner:
 
     def __init__(self, url: str, baud: int = 115200) -> None:
         self.url, self.baud = url, baud
-        self._link: ScannerLink | None = None
+        self._line: SerialLine | None = None
         self._forget()
 
     def _forget(self) -> None:
         self.hello: Hello | None = None
         self.faults: Faults | None = None
         self.grasp: BoardGrasp | None = None
-        self._received = Counts()
+        self._decoder = FrameDecoder()
+        self._sequence = self._received_bytes = 0
         self._keys = BoardKeys()
         self._times = BoardTimes()
         self._waiting: deque[Received] = deque()
@@ -72,10 +130,10 @@ class Scanner:
         """Find the board. Raises DeviceError if none answers within three seconds, or one that speaks otherwise."""
         self.close()
         self._forget()
-        self._link = ScannerLink(self.url, self.baud)
-        self._received = self._link.counts
+        self._line = SerialLine(self.url, self.baud)
         try:
-            self.hello = self._greet(self._link)
+            self._line.write(b"\0")  # ends whatever stands half-sent in the board's receiver
+            self.hello = self._greet()
         except BaseException:
             self.close()
             raise
@@ -84,9 +142,9 @@ class Scanner:
     @property
     def counts(self) -> ScannerCounts:
         """What came in since the board was last opened."""
-        seen = self._received
-        received = seen.frames, seen.damaged, seen.short, seen.overlong
-        return ScannerCounts(*received, self._keys.gaps, self._misfits, self._asked, self._times.pings)
+        keys, times = self._keys, self._times
+        seen = asdict(self._decoder.counts)
+        return ScannerCounts(**seen, gaps=keys.gaps, misfits=self._misfits, asked=self._asked, pings=times.pings)
 
     @property
     def trip_us(self) -> int:
@@ -100,14 +158,14 @@ class Scanner:
 
     def read(self, timeout_s: float) -> ScannerReading | None:
         """Return the next reading, None if there was none in time. Raises DeviceError."""
-        link, end = self._open_link(), monotonic() + timeout_s
+        end = monotonic() + timeout_s
         if self._times.due:
             self._send(self._times.ping())
         reading = self._next()
         while reading is None:
             left = end - monotonic()
             self._ask_for_state()
-            self._waiting.extend(link.receive(max(0.0, min(left, _ASK_AGAIN_S))))
+            self._receive(max(0.0, min(left, _ASK_AGAIN_S)))
             reading = self._next()
             if left <= 0:
                 break
@@ -126,29 +184,37 @@ class Scanner:
 
     def close(self) -> None:
         """Close the line. Does no harm twice."""
-        link, self._link = self._link, None
-        if link is not None:
-            link.close()
+        line, self._line = self._line, None
+        if line is not None:
+            line.close()
 
-    def _open_link(self) -> ScannerLink:
-        if self._link is None:
+    def _opened(self) -> SerialLine:
+        if self._line is None:
             raise DeviceError(f"{self.url}: the scanner board is not open")
-        return self._link
+        return self._line
 
     def _send(self, message: ToBoard) -> None:
-        self._open_link().send(message)
+        self._opened().write(encode(frame(message, self._sequence)))
+        self._sequence += 1
+
+    def _receive(self, timeout_s: float) -> None:
+        """Add what came in to what waits, after waiting for something until the timeout."""
+        data = self._opened().read(timeout_s)
+        came_us = monotonic_ns() // 1000
+        self._received_bytes += len(data)
+        self._waiting.extend((came_us, received) for received in self._decoder.received(data))
 
     def _tell(self, setting: SetRate | SetDebounce) -> None:
         self._send(setting)
         self._told[setting.KIND] = setting
 
-    def _greet(self, link: ScannerLink) -> Hello:
+    def _greet(self) -> Hello:
         end, ping_at = monotonic() + _BOOT_S, 0.0
         while (now := monotonic()) < end:
             if now >= ping_at:
                 self._send(self._times.ping())
                 ping_at = now + _GREETING_S
-            self._waiting.extend(link.receive(max(0.0, ping_at - now)))
+            self._receive(max(0.0, ping_at - now))
             while self._waiting:
                 came_us, received = self._waiting.popleft()
                 if received is not None and received.kind == Hello.KIND:
@@ -156,8 +222,8 @@ class Scanner:
                     if self._times.answered:
                         return hello
         raise DeviceError(
-            f"{self.url}: no scanner board answered at {self.baud} baud in {_BOOT_S:g} s ({link.received_bytes} bytes"
-            f" came, {link.counts.frames} sound frames): check port, baud rate, power, and the board's firmware"
+            f"{self.url}: no scanner board answered at {self.baud} baud in {_BOOT_S:g} s ({self._received_bytes} bytes"
+            f" came, {self._decoder.counts.frames} sound frames): check port, baud rate, power and the board's firmware"
         )
 
     def _meet(self, received: Frame, came_us: int) -> Hello:
@@ -195,7 +261,8 @@ class Scanner:
         elif message is not None:
             keys.heard(message)
             if keys.trusted:
-                return ScannerReading(time_us, keys.closed & keys.known, keys.known)
+                known = keys.known
+                return ScannerReading(time_us, keys.closed & known, known)
         return ScannerReading(time_us, 0, 0) if was_trusted and not keys.trusted else None
 
     def _message(self, received: Frame | None) -> FromBoard | None:
@@ -204,7 +271,8 @@ class Scanner:
             self._keys.numbered(received.sequence)
             try:
                 return from_board(received, self._keys.keys)
-            except MessageError:
+            except MessageError as reason:
+                _LOG.warning("%s: a sound frame was refused: %s", self.url, reason)
                 self._misfits += 1
                 self._keys.misread()
         else:
@@ -220,6 +288,7 @@ class Scanner:
         """Ask for a full bitmap if there is none to be trusted, and again if none came."""
         now = monotonic()
         if not self._keys.trusted and now >= self._ask_at:
+            _LOG.info("%s: what the board said of its keys cannot be trusted: all of them are asked for", self.url)
             self._ask_at = now + _ASK_AGAIN_S
             self._asked += 1
             self._send(GetState())

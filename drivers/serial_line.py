@@ -18,6 +18,7 @@ from .ports import check_node, port_fault
 if TYPE_CHECKING:
     from serial import Serial
 
+BITS_A_BYTE = 10  # a start bit, 8 data bits, a stop bit
 _CHUNK = 4096
 # A line takes a command of a few bytes at once; one that has not within this time takes none any more.
 _WRITE_TIMEOUT_S = 1.0
@@ -32,6 +33,25 @@ _ADVICE = {
     errno.EAGAIN: "another program has it open: close that first",
     errno.EBUSY: "another program has it open: close that first",
 }
+
+
+class Pieces:
+    """Splits a stream at 00, which ends a frame and can stand nowhere else: the one sure place to fall back into step.
+
+    Of a piece longer than `longest` the first `longest` + 1 bytes are kept, so that its length tells; a stream without
+    zeros never fills the memory.
+    """
+
+    def __init__(self, longest: int) -> None:
+        self._keep = longest + 1
+        self._rest = b""
+
+    def feed(self, chunk: bytes) -> list[bytes]:
+        """Return the pieces that `chunk` ends, in order, without their zeros; empty ones too."""
+        pieces = chunk.split(b"\0")
+        pieces[0] = self._rest + pieces[0]
+        self._rest = pieces.pop()[: self._keep]
+        return [piece[: self._keep] for piece in pieces]
 
 
 class SerialLine:
@@ -104,7 +124,15 @@ class SerialLine:
 
     def _when_ready(self, timeout_s: float) -> bytes:
         ready, _, _ = select.select([self._port.fileno()], [], [], max(0.0, timeout_s))
-        return self._port.read(_CHUNK) if ready else b""
+        if not ready:
+            return b""
+        try:
+            data = os.read(self._port.fileno(), _CHUNK)  # pySerial would wait once more, in ten calls
+        except BlockingIOError:
+            return b""
+        if not data:
+            raise OSError("the other end has hung up")
+        return data
 
     def _in_slices(self, timeout_s: float) -> bytes:
         end = monotonic() + timeout_s

@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Debounce, GloveWiring, Harness, ScannerWiring

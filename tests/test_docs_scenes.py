@@ -9,11 +9,13 @@ import msgspec
 import pytest
 
 from thenar.simulator.body.shapes import Box, Cylinder, Sphere
-from thenar.simulator.pipeline.registry import NAMES, load
+from thenar.simulator.pipeline.effect import EFFECTS
 from thenar.simulator.scenes import shipped
 from thenar.simulator.scenes.decode import _File, load_scene
 from thenar.simulator.scenes.population import SURVEYS, Population
 from thenar.simulator.scenes.scene import Glove, Recording, SceneObject, Subject
+
+NAMES = tuple(EFFECTS)
 
 PAGE = (Path(__file__).parents[1] / "docs" / "scenes.md").read_text(encoding="utf-8")
 
@@ -88,7 +90,7 @@ def test_every_effect_is_documented_and_none_that_is_not_there() -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_an_effect_has_the_parameters_defaults_and_limits_of_the_page(name: str) -> None:
-    kind = load(name).Parameters
+    kind = EFFECTS[name].parameters
     documented = keyed([row for effect, row in effect_rows() if effect == name], "parameter")
     assert documented.keys() == {*kind.__struct_fields__} - {"after"}
     for key, row in documented.items():

@@ -9,10 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from thenar.drivers.emulated.pty_line import PtyLine
-from thenar.drivers.emulated.scanner import EmulatedScanner
-from thenar.drivers.emulated.scanner_board import ScannerBoard
-from thenar.drivers.scanner_messages import DEGRADED, NO_GRASP
+from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
+from thenar.drivers.emulated.serial_line import PtyLine
+from thenar.drivers.scanner_protocol import DEGRADED, NO_GRASP
 from thenar.runtime import Build
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"

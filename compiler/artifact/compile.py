@@ -15,8 +15,7 @@ from thenar.runtime.scanning.scanmap import ScanMap, scanmap_to_bytes
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from ..evaluation.folds import check_cut
-from ..frontier.timing.whole_glove import ports_of_whole_glove
-from ..placement.costaware import PortCosts
+from ..placement.ports import PortCosts, ports_of_whole_glove
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from ..tables.collapse import collapse
@@ -79,7 +78,7 @@ def compile_build(
     tolerance is the last; folds and seed cut the cross-validation whose rate goes into the build (0 folds: none).
     With table_bits 8, steps are coarse enough for firmware with 8-bit entries (quantise); with max_bins, no joint has
     more bins than that, so that tables stay small; no sum needs more than `width` bits, 4 to 16. `placement` is a
-    method of placement.ways, `keep` how many switches it keeps, where it is not pruned by S.
+    name of METHODS, `keep` how many switches it keeps, where it is not pruned by S.
     `ports` say what reading each switch costs, for methods that ask (None: on a glove of as few MCP23017 as will do).
     With a harness, the build says how to read its switches there; `documents` go into the folder with it.
     progress(done, total) is called as work is done. The same recordings, options and harness give the same bytes.

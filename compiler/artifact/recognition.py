@@ -9,7 +9,7 @@ from thenar.runtime.manifest import Options, Recognised
 
 from ..boosting.stumps import winners
 from ..evaluation.folds import weka_folds
-from ..placement.costaware import PortCosts
+from ..placement.ports import PortCosts
 from ..samples import Samples
 from .errors import CompileError
 from .training import Report, Trained, train

@@ -11,18 +11,14 @@ from thenar.runtime.manifest import Options
 from ..boosting.boost import boost
 from ..boosting.stumps import Stumps
 from ..limits import check_inputs, check_memory, check_types
-from ..placement.cooccurrence import Cooccurrence
-from ..placement.costaware import PortCosts
-from ..placement.id3 import grow_id3
+from ..placement.methods.base import METHODS, PAPERS
+from ..placement.placement import choose
+from ..placement.ports import PortCosts
 from ..placement.tree import Tree
-from ..placement.ways import METHODS, chooser
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
 from .ensemble import MAX_STUMPS
 from .errors import CompileError
-
-PAPERS = "id3"  # the method of the paper
-LN2 = 0.6931471805599453
 
 Report = Callable[[int, int], None]
 
@@ -78,7 +74,11 @@ def train(samples: Samples, options: Options, report: Report | None = None, port
 
     ports  what reading switches costs, for methods that ask
     """
-    columns, gains, tree = _placed(samples, options, ports)
+    # Without switches the tree is a leaf.
+    method = options.placement if samples.n_switches else PAPERS
+    parameter = options.keep or 0 if METHODS.named(method).by_number else options.prune
+    chosen = choose(samples, method, float(parameter), ports)
+    columns = chosen.columns
     if not columns and not samples.codes.shape[1]:
         raise CompileError("no switch is worth keeping: lower --prune, or record switches that differ between grasps")
     check_inputs(len(samples.grasps), len(columns), samples.codes.shape[1], CompileError)
@@ -95,30 +95,15 @@ def train(samples: Samples, options: Options, report: Report | None = None, port
     )
     if not stumps.n_rounds:
         raise CompileError("no input differs between rows: there is nothing to tell grasp types apart by")
-    return Trained(columns, gains, tree, stumps, history.stopped_early)
+    return Trained(columns, chosen.gains, chosen.tree, stumps, history.stopped_early)
 
 
 def check_placement(options: Options) -> None:
-    """Raise CompileError unless `options` name a method that there is, with the parameter that it takes."""
-    if options.placement not in METHODS:
-        raise CompileError(f"there is no placement {options.placement!r}: choose one of {', '.join(METHODS)}")
-    by_number = METHODS[options.placement].parameter == "switches"
+    """Raise MemberError unless `options` name a method that there is, CompileError unless with its own parameter."""
+    by_number = METHODS.named(options.placement).by_number
     if by_number and options.keep is None:
         raise CompileError(f"placement {options.placement!r} needs --keep: how many switches")
     if by_number and options.prune:
         raise CompileError(f"placement {options.placement!r} knows no --prune: say with --keep how many switches")
     if not by_number and options.keep is not None:
         raise CompileError(f"placement {options.placement!r} is pruned by --prune: it cannot --keep a given number")
-
-
-def _placed(
-    samples: Samples, options: Options, ports: PortCosts | None
-) -> tuple[Columns, tuple[float, ...], Tree | None]:
-    if options.placement == PAPERS or not samples.switches.shape[1]:
-        tree = grow_id3(samples.switches, samples.labels, min_samples=options.prune)
-        return tree.inputs, tree.gains, tree
-    parameter = options.prune if options.keep is None else options.keep
-    columns = chooser(options.placement, samples, ports)(float(parameter))
-    counts = Cooccurrence(samples.switches, samples.labels, len(samples.grasps))
-    alone = counts.information() / (len(samples.labels) * LN2)
-    return columns, tuple(float(alone[column]) for column in columns), None

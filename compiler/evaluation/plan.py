@@ -1,22 +1,25 @@
 """What to fit for each of the tables, before anything is fitted."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Literal
 
 import numpy as np
 
+from ..placement.methods.base import METHODS, PAPERS, Chooser
+from ..placement.methods.filters import random_placement
+from ..samples import Samples
 from .compositions import ALL_SWITCHES, SELECTED, Columns, Composition, available
 from .fits import Fit
-from .folds import Fold
-from .placements import Placements
+from .folds import Fold, Rows
 from .populations import Population
 from .protocols import Protocol, ProtocolName
 
 TableName = Literal["compositions", "generality", "pruning", "baselines"]
 Select = Callable[[Population, Fold], Columns]
 
+RIVALS = ("cmim", "mutual-information")
 DRAWS = 5  # random placements that a placement is compared with
 
 
@@ -53,14 +56,20 @@ class TablePlan:
 
 @dataclass(frozen=True, slots=True)
 class Planner:
-    """Plans the tables for populations of one set, with n_joints joints, ID3 pruned by S = `prune`."""
+    """Plans the tables for populations of one set.
+
+    samples  of all rows, with n_joints joints besides; prune: S of the paper's placements; rivals: methods of the
+             baselines. A method learns once from the same rows.
+    """
 
     parts: tuple[Population, ...]
-    placements: Placements
+    samples: Samples
     n_joints: int
     prune: int
     prune_list: tuple[int, ...]
     seed: int
+    rivals: tuple[str, ...] = RIVALS
+    _choosers: dict[tuple[str, bytes], Chooser] = field(default_factory=dict, init=False, repr=False)
 
     def table(self, name: TableName, protocol: Protocol) -> TablePlan:
         """Return the plan of a table under a protocol."""
@@ -81,7 +90,7 @@ class Planner:
         def chosen_by(giver: Population, part: Population, fold: Fold) -> Columns:
             # Another subject's placement has never seen this subject's rows: both protocols agree on it.
             own = part is giver
-            return self.own(protocol, part, fold) if own else self.placements.id3(giver.rows, self.prune)
+            return self.own(protocol, part, fold) if own else self.chosen(PAPERS, giver.rows, self.prune)
 
         return [
             self._row(giver.name, f"placement of subject {giver.name}", SELECTED, partial(chosen_by, giver))
@@ -92,34 +101,44 @@ class Planner:
         everyone = np.unique(np.concatenate([part.rows for part in self.parts]))
 
         def pooled(least: int, part: Population, fold: Fold) -> Columns:
-            return self.placements.id3(protocol.may_choose_pooled(everyone, fold), least)
+            return self.chosen(PAPERS, protocol.may_choose_pooled(everyone, fold), least)
 
         everything = self._row("all", "all switches", ALL_SWITCHES, lambda part, fold: ())
         pruned = [self._row(str(s), f"S = {s}", SELECTED, partial(pooled, s)) for s in self.prune_list]
         return [everything, *pruned]
 
     def _baselines(self, protocol: Protocol) -> list[RowPlan]:
-        def rival(choose: Callable[..., Columns], part: Population, fold: Fold) -> Columns:
-            return choose(protocol.may_choose(part, fold), len(self.own(protocol, part, fold)))
+        def rival(name: str, part: Population, fold: Fold) -> Columns:
+            return self.chosen(name, protocol.may_choose(part, fold), len(self.own(protocol, part, fold)))
 
         def drawn(draw: int, part: Population, fold: Fold) -> Columns:
-            return self.placements.random(len(self.own(protocol, part, fold)), self.seed + draw)
+            return random_placement(self._n_switches, len(self.own(protocol, part, fold)), self.seed + draw)
 
+        rivals = [METHODS.named(name) for name in self.rivals]
         draws = [self._row("random", f"mean of {DRAWS} draws", SELECTED, partial(drawn, draw)) for draw in range(DRAWS)]
         return [
-            self._row("ID3", "the paper's placement", SELECTED, partial(self.own, protocol)),
-            self._row("CMIM", "forward conditional mutual information", SELECTED, partial(rival, self.placements.cmim)),
-            self._row("top-k", "largest mutual information each", SELECTED, partial(rival, self.placements.top)),
+            self._row(METHODS[PAPERS].title, "the paper's placement", SELECTED, partial(self.own, protocol)),
+            *(self._row(each.title, each.help, SELECTED, partial(rival, each.name)) for each in rivals),
             _joined(draws),
         ]
 
     @property
     def _n_switches(self) -> int:
-        return int(self.placements.switches.shape[1])
+        return self.samples.n_switches
 
     def own(self, protocol: Protocol, part: Population, fold: Fold) -> Columns:
         """Return the placement that ID3 chooses for a fold from the population's own rows, as the protocol allows."""
-        return self.placements.id3(protocol.may_choose(part, fold), self.prune)
+        return self.chosen(PAPERS, protocol.may_choose(part, fold), self.prune)
+
+    def chosen(self, method: str, rows: Rows, parameter: int) -> Columns:
+        """Return the switches that a method keeps from these rows, in whatever order they are given."""
+        if not self._n_switches:
+            return ()
+        rows = np.sort(rows)
+        key = (method, rows.tobytes())
+        if key not in self._choosers:
+            self._choosers[key] = METHODS.named(method).chooser(self.samples.rows(rows))
+        return self._choosers[key](parameter)
 
     def _row(self, name: str, what: str, kind: Composition, select: Select) -> RowPlan:
         return RowPlan(name, what, tuple(self.cell(part, kind, select) for part in self.parts))

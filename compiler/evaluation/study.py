@@ -5,13 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..limits import check_memory, check_types
+from ..placement.methods.base import METHODS
 from ..recordings.graspset import GraspSet
+from ..samples import Samples
 from .compositions import inputs
 from .concerns import concerns
 from .errors import EvaluationError
 from .fits import Progress, Training, is_blind, run_fits
-from .placements import Placements
-from .plan import Planner, TableName
+from .plan import RIVALS, Planner, TableName
 from .populations import Population, Scheme, populations
 from .protocols import PROTOCOLS, ProtocolName
 from .tables import Reader, Table
@@ -32,6 +33,7 @@ class Options:
     repeats     of `stratified`, with seeds seed, seed + 1, ...
     prune       S of the placements of the compositions, the generality and the baselines
     prune_list  each S of the table of pooled and pruned placements
+    rivals      methods that ID3 is compared with in the baselines, besides random placements
     """
 
     subjects: tuple[str, ...] = ()
@@ -44,6 +46,7 @@ class Options:
     protocols: tuple[ProtocolName, ...] = ("paper", "honest")
     tables: tuple[TableName, ...] = TABLES
     seed: int = 1
+    rivals: tuple[str, ...] = RIVALS
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,16 +79,26 @@ def evaluate(
     """Return the tables that `options` ask for and the set has the inputs for.
 
     The result is the same for any number of `jobs` (worker processes; -1: all cores).
-    Raises EvaluationError if the set cannot be cut as asked.
+    Raises EvaluationError if the set cannot be cut as asked, MemberError for a rival that is no method.
     """
     options = options or Options()
+    for name in options.rivals:
+        if not METHODS.named(name).by_number:
+            raise EvaluationError(f"{name} takes S: a rival is a method that takes a number of switches")
     chosen = _of_subjects(grasp_set, options.subjects)
     parts = populations(chosen, options.scheme, options.folds, options.repeats, options.seed)
     reasons = {name: _why_not(name, chosen, parts, options.scheme) for name in options.tables}
     if any(reasons.get(name, "") is None for name in _OF_ALL_SWITCHES):
         _check_all_switches(chosen, parts)
-    placements = Placements(chosen.switches, chosen.labels)
-    planner = Planner(parts, placements, len(chosen.joints), options.prune, options.prune_list, options.seed)
+    planner = Planner(
+        parts,
+        Samples.of(chosen, "switches"),
+        len(chosen.joints),
+        options.prune,
+        options.prune_list,
+        options.seed,
+        options.rivals,
+    )
     protocols = [protocol for protocol in PROTOCOLS if protocol.name in options.protocols]
     plans = [planner.table(name, each) for name, reason in reasons.items() if reason is None for each in protocols]
     fits = [fit for plan in plans for row in plan.rows for cell in row.cells for fit in cell.fits]

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.harness import checks
 from thenar.runtime.harness.wiring import BusWiring, Harness
 from thenar.runtime.names import fault, nearest, shortened

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from thenar.drivers.i2c.chip import Write
+from thenar.drivers.i2c.chips import Write
 from thenar.runtime.harness.wiring import ChipWiring
 from thenar.runtime.scanning.scanmap import Port
 

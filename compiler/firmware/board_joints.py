@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
 
-from thenar.drivers.cyberglove_sensors import SENSORS_18, SENSORS_22
-from thenar.drivers.cyberglove_timing import period_words, shortest_us, told_us
+from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22, period_words, shortest_us, told_us
 from thenar.runtime.manifest import Calibration
 from thenar.runtime.names import list_names, nearest
 

@@ -1,6 +1,6 @@
 """The portable C of a scanner board: frames, protocol, debouncing, and when a scan may stop.
 
-The C does no input or output: bytes in, bytes out, times as arguments. It is the same as `drivers.scanner_frame`,
+The C does no input or output: bytes in, bytes out, times as arguments. It is the same as `drivers.scanner_protocol`,
 `drivers.emulated.scanner_board.ScannerBoard`, `drivers.debounce.Debouncer` and `runtime.scanning.decided.EarlyExit`,
 byte for byte, given the same scans, times and received bytes.
 """

@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 
+from ..placement.methods.base import BEST, PAPERS
 from .candidates import Choice
 from .closeup import Close, papers_tables
 from .points import Mark, Tried, Way
 from .screening import Screening, fastest_us
-from .settings import BEST, Search
+from .settings import Search
 
 # The paper's S.
 _PAPERS = (62.0,)
@@ -16,7 +17,7 @@ def choices_to_mark(n_switches: int, n_joints: int) -> dict[Choice, str]:
     """Return what to mark, with its name: the paper's placement and all switches, alone and with the joints."""
     if not n_switches:
         return {}
-    marked = {Way("id3", prune): f"paper, S = {prune:g}" for prune in _PAPERS}
+    marked = {Way(PAPERS, prune): f"paper, S = {prune:g}" for prune in _PAPERS}
     # Whichever method says so, to keep all of them is the same.
     marked[Way(BEST, float(n_switches))] = f"all of {n_switches}"
     alone = {Choice(way, "switches"): name for way, name in marked.items()}

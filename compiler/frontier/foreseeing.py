@@ -1,10 +1,11 @@
 """What a frontier's stages will cost, told before any has begun: so the time that is left does not grow on the way."""
 
+from ..placement.methods.base import METHODS
 from .closeup import PRICE_S, further, papers_depth
 from .material import Cuts, Material
 from .measured import TRIAL_S
 from .screening import QUICK_PRICE_S
-from .settings import BEST, SHAPES, Search, available_inputs, curve_ways, ways
+from .settings import SHAPES, Search, available_inputs, curve_ways, ways
 from .stages import fit_s, path_s
 
 # As it turns out: so many placements come on top of the finalists, for the marks; so many designs of a finalist are on
@@ -42,4 +43,4 @@ def foreseen(search: Search, material: Material, cuts: Cuts, simulated: bool) ->
 
 def _variants(method: str, inputs: int) -> range:
     """Return how often a method's placements are found: once, or for each of the inputs if it learns from joints."""
-    return range(inputs if method.startswith(BEST) else min(inputs, 1))
+    return range(inputs if METHODS[method].uses_joints else min(inputs, 1))

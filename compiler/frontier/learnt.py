@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..boosting.boost import boost
 from ..boosting.stumps import Stumps, winners
 from ..evaluation.folds import Fold
-from ..placement.ways import chooser
+from ..placement.methods.base import METHODS
 from ..samples import Columns
 from ..tables.batch import integer_scores
 from ..tables.collapse import collapse
@@ -50,7 +50,7 @@ def choose_path(task: PathTask) -> Path:
     """Return the placements that `task` asks for."""
     began = time.perf_counter()
     learning = task.material.learning(task.fold.train, task.key.joints)
-    choose = chooser(task.key.method, learning, task.material.ports)
+    choose = METHODS[task.key.method].chooser(learning, task.material.ports)
     columns = tuple(choose(parameter) for parameter in task.key.parameters)
     return Path(columns, time.perf_counter() - began)
 

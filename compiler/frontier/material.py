@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..evaluation.folds import Fold, Rows, check_cut, weka_folds
 from ..evaluation.groups import leave_one_out
 from ..limits import check_inputs, check_memory, check_types
-from ..placement.costaware import PortCosts
+from ..placement.ports import PortCosts
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from .points import FrontierError

@@ -46,7 +46,7 @@ class Time(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Way(Struct, frozen=True, forbid_unknown_fields=True):
-    """How switches are chosen: a method of `placement.ways`, and its parameter (S, or a number of switches)."""
+    """How switches are chosen: a name of `METHODS`, and its parameter (S, or a number of switches)."""
 
     method: str
     parameter: Annotated[float, Meta(ge=0.0, le=1e6)]

@@ -10,7 +10,8 @@ import numpy as np
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.harness.wiring import Harness
 
-from ..placement.baselines import RIVALS, available
+from ..placement.methods.base import METHODS, usual
+from ..placement.ports import ports_of_whole_glove
 from ..publication import check_folder, entries, publish_folder
 from ..recordings.graspset import GraspSet
 from .calibrating import equipment_for
@@ -20,7 +21,7 @@ from .foreseeing import foreseen
 from .material import Cuts, Material
 from .own_build import own_build
 from .points import Frontier, FrontierError, frontier_to_bytes
-from .settings import USUAL_METHODS, USUAL_RIVALS, WIRED_METHODS, Search
+from .settings import Search
 from .storing.asking import Desk
 from .storing.resuming import Effort
 from .storing.store import Store
@@ -28,7 +29,6 @@ from .streaming.movements import holds_movements
 from .streaming.stream import Stream
 from .streaming.streams import stream_of
 from .study import Study, Wanted, find_frontier
-from .timing.whole_glove import ports_of_whole_glove
 from .timing.wirings import wirings
 
 FRONTIER_NAME, TABLE_NAME, STORE_NAME = "frontier.json", "frontier.csv", "store.jsonl"
@@ -84,11 +84,11 @@ def _scope(grasp_set: GraspSet) -> str:
 
 def _search(request: Request) -> tuple[Search, tuple[str, ...]]:
     """Return what is tried, and a sentence on each rival that is not installed."""
-    rivals = USUAL_RIVALS if request.rivals is None else request.rivals
-    missing = [name for name in rivals if name in RIVALS and name not in available()]
+    rivals = usual(ours=False) if request.rivals is None else request.rivals
+    missing = [name for name in rivals if name in METHODS and not METHODS[name].installed]
     there = tuple(name for name in rivals if name not in missing)
     search = Search(
-        methods=request.methods or (USUAL_METHODS if request.glove is None else WIRED_METHODS),
+        methods=request.methods or usual(ours=True, wired=request.glove is not None),
         rivals=there,
         rounds=request.rounds,
         repeats=request.repeats,
@@ -96,7 +96,9 @@ def _search(request: Request) -> tuple[Search, tuple[str, ...]]:
         max_bins=request.max_bins,
         seed=request.seed,
     )
-    return search, tuple(f"{name} was left out: PySensors is not installed (python-sensors)" for name in missing)
+    return search, tuple(
+        f"{name} was left out: it needs {METHODS[name].install}, which is not installed" for name in missing
+    )
 
 
 def _study(request: Request, grasp_set: GraspSet, harness: Harness | None, search: Search, desk: Desk) -> Study:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..placement.ways import METHODS
+from ..placement.methods.base import METHODS
 from .candidates import NO_SWITCHES, Choice, Screened, rate_of
 from .equipment import Equipment
 from .learnt import Fit
@@ -103,4 +103,4 @@ def _curve(learner: Learner, name: str, totals: dict[Choice, tuple[int, int]]) -
             kept = sum(len(learner.columns(choice, fold)) for fold in folds) / len(folds)
             points[kept] = rate_of((correct,), total)
     sizes = tuple(sorted(points))
-    return Curve(name, METHODS[name].what, METHODS[name].ours, sizes, tuple(points[size] for size in sizes))
+    return Curve(name, METHODS[name].help, METHODS[name].ours, sizes, tuple(points[size] for size in sizes))

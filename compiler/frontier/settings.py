@@ -1,28 +1,15 @@
 """What the frontier tries: placements under which parameters, rounds, widths, folds."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from thenar.runtime.manifest import Inputs, TableBits
 
-from ..placement.ways import METHODS
+from ..placement.methods.base import METHODS, usual
 from .points import FrontierError, Way
 
-# Numbers of switches, as far as the glove has them; the paper's own sizes are near 26 to 66.
-SIZES = (1, 2, 3, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 28, 33, 40, 50, 66, 100, 130)
-# Of methods that are there to be seen beside: a coarser ladder.
-OTHER_SIZES = (4, 8, 12, 16, 20, 24, 28, 33, 40, 50, 66)
-# The paper's S, and beyond, until next to nothing is left of the tree.
-PRUNES = (0, 10, 13, 29, 62, 100, 150, 200, 300, 400, 600, 1000)
 # Rivals are only seen beside ours: a few sizes show their curves.
 CURVE_SIZES = (4, 8, 16, 33, 66)
-BEST = "elimination"  # tried at every size, all switches included
-USUAL_METHODS = (BEST, "id3", "id3-cost", "id3-ccp")
-# Where the glove's own wiring is known, and may be kept: by what its ports cost.
-WIRED_METHODS = (BEST, "elimination-cost", "id3", "id3-cost")
-# What the ports cost has a say in these alone.
-PRICED_METHODS = ("elimination-cost", "id3-cost")
-USUAL_RIVALS = ("rfe", "forest", "mrmr", "mutual-information", "random", "sspoc", "qr")
 ROUNDS = (1, 2, 3, 5, 8, 12, 20, 30, 50, 75, 100, 150, 200, 300)
 
 
@@ -42,15 +29,15 @@ TABLED = (10, 30, 100)
 class Search:
     """How much is tried.
 
-    methods     names of `placement.ways`: ours, that may be built; rivals: curves to see beside them
+    methods     names of `METHODS`: those that may be built; rivals: curves to see beside them
     folds       of the stratified folds, cut `repeats` times with seeds seed, seed + 1, ...
     screening   rounds with which every placement is screened, on the folds of the first repeat
     rounds      the most rounds that those on the front are trained for
     finalists   the most placements that are looked at closely
     """
 
-    methods: tuple[str, ...] = USUAL_METHODS
-    rivals: tuple[str, ...] = USUAL_RIVALS
+    methods: tuple[str, ...] = field(default_factory=lambda: usual(ours=True))
+    rivals: tuple[str, ...] = field(default_factory=lambda: usual(ours=False))
     folds: int = 4
     repeats: int = 3
     seed: int = 1
@@ -60,10 +47,9 @@ class Search:
     max_bins: int | None = None
 
     def __post_init__(self) -> None:
-        """Raise FrontierError where nothing could come of it."""
+        """Raise MemberError for a method that is not there, FrontierError where nothing could come of it."""
         for name in (*self.methods, *self.rivals):
-            if name not in METHODS:
-                raise FrontierError(f"there is no method {name!r}: choose among {', '.join(METHODS)}")
+            METHODS.named(name)
         if min(self.repeats, self.screening, self.rounds, self.finalists) < 1 or not self.methods:
             raise FrontierError("a frontier needs a method, a repeat, a round and a finalist at least")
 
@@ -85,11 +71,7 @@ class Search:
 
 def ways(method: str, n_switches: int) -> tuple[Way, ...]:
     """Return the placements of a method that are tried among so many switches."""
-    if METHODS[method].parameter == "S":
-        return tuple(Way(method, float(prune)) for prune in PRUNES)
-    if not method.startswith(BEST):
-        return tuple(Way(method, float(size)) for size in OTHER_SIZES if size < n_switches)
-    return tuple(Way(method, float(size)) for size in (*(size for size in SIZES if size < n_switches), n_switches))
+    return tuple(Way(method, float(parameter)) for parameter in METHODS[method].ladder(n_switches))
 
 
 def curve_ways(method: str, n_switches: int) -> tuple[Way, ...]:

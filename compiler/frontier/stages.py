@@ -4,23 +4,23 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from ..evaluation.folds import Fold
+from ..placement.methods.base import METHODS
 from ..samples import Columns
 from .candidates import NO_SWITCHES, Choice
 from .learnt import Fit, FitKey, FitTask, Path, PathKey, PathTask, choose_path, fit_stages
 from .material import Cuts, Material
 from .points import Way
-from .settings import BEST, PRICED_METHODS, Shape
+from .settings import Shape
 from .storing.asking import Desk
 
 # Expected seconds of one core, for so many rows: they only say how the time that is left is told.
 _ROWS = 3000
-_PATH_S = {BEST: 5.0, "elimination-cost": 5.0, "elimination-boosted": 9.0, "rfe": 6.0, "sspoc": 4.0}
 _ROUND_S, _TABLE_S = 0.009, 0.06
 
 
 def path_s(method: str, rows: int) -> float:
     """Return the expected seconds of all placements of a method."""
-    return _PATH_S.get(method, 0.5) * rows / _ROWS
+    return METHODS[method].seconds * rows / _ROWS
 
 
 def fit_s(rounds: int, tables: int, rows: int) -> float:
@@ -53,7 +53,7 @@ class Learner:
                     tuple(dict.fromkeys(parameters)),
                     joints,
                     self.cuts.names[fold],
-                    self.material.wired if method in PRICED_METHODS else "",
+                    self.material.wired if METHODS[method].uses_ports else "",
                 ),
                 self.material,
                 fold,
@@ -108,5 +108,5 @@ class Learner:
 
 
 def _learns_from_joints(choice: Choice) -> bool:
-    """Return whether the choice of switches looks at the joints: only elimination does, with others inputs share it."""
-    return choice.joints and choice.way.method.startswith(BEST)
+    """Return whether the choice of switches looks at the joints; where it does not, inputs share it."""
+    return choice.joints and METHODS[choice.way.method].uses_joints

@@ -7,8 +7,6 @@ from msgspec.structs import replace
 
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
 
-from .packages import PACKAGES
-
 GROUND, SUPPLY = "GND", "VCC"
 
 
@@ -85,7 +83,7 @@ def _of_chips(harness: Harness, numbers: Mapping[str, int]) -> Iterator[End]:
             used += 1
             unit = Unit(f"U{used}", chip.place, bus, chip)
             other = GROUND if chip.closed == "low" else SUPPLY
-            package = PACKAGES[chip.kind]
+            package = chip.chip.package
             yield from (End(numbers[name], unit, pin, package.number(pin), other) for pin, name in kept.items())
 
 

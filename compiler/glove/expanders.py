@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 
+from thenar.drivers.i2c import tca9548a
+from thenar.drivers.i2c.chips.base import GROUND as GROUND_PINS
+from thenar.drivers.i2c.chips.base import RESET, Package
+from thenar.drivers.i2c.chips.base import SUPPLY as SUPPLY_PINS
 from thenar.runtime.harness.wiring import Harness, MuxChannel
 
 from .circuit import Circuit, Kind, capacitor, header, resistor
 from .ends import GROUND, SUPPLY, End, Unit
-from .packages import GROUND as GROUND_PINS
-from .packages import MUX, PACKAGES, RESET, Package
-from .packages import SUPPLY as SUPPLY_PINS
 
 _DECOUPLING = capacitor("100n", "one close to each supply pin")
 _BULK = capacitor("10u", "where the host's plug comes in")
@@ -35,28 +36,28 @@ def _add_expander(circuit: Circuit, unit: Unit, ends: Sequence[End]) -> None:
     wiring = unit.wiring
     if wiring is None:
         return
-    package = PACKAGES[wiring.kind]
-    circuit.put(unit.ref, _kind(package, wiring.chip.pins), name=unit.place)
-    _add_power(circuit, unit.ref, package, wiring.address)
+    chip, package = wiring.chip, wiring.chip.package
+    circuit.put(unit.ref, _kind(package, chip.pins), name=unit.place)
+    _add_power(circuit, unit.ref, package, wiring.address - chip.addresses[0])
     sda, scl = _wires(unit.bus, wiring.mux)
     circuit.join(sda, unit.ref, package.number("SDA"))
     circuit.join(scl, unit.ref, package.number("SCL"))
-    if not package.pulls_up:
+    if not chip.pulls_up:
         used = {end.pin for end in ends}
-        for pin in wiring.chip.pins:
+        for pin in chip.pins:
             if pin not in used:  # An input that floats draws current; these are never outputs.
                 circuit.join(GROUND, unit.ref, package.number(pin))
 
 
-def _add_power(circuit: Circuit, ref: str, package: Package, address: int) -> None:
-    """Connect supply, ground, address and reset of a chip."""
+def _add_power(circuit: Circuit, ref: str, package: Package, above: int) -> None:
+    """Connect supply, ground, reset and address of a chip, so far above its lowest one."""
     for number, name in enumerate(package.pins, start=1):
         if name in GROUND_PINS:
             circuit.join(GROUND, ref, str(number))
         if name in SUPPLY_PINS:
             circuit.join(SUPPLY, ref, str(number))
             circuit.between("C", _DECOUPLING, SUPPLY, GROUND)
-    for name, high in package.selects(address):
+    for name, high in package.selects(above):
         circuit.join(SUPPLY if high else GROUND, ref, package.number(name))
     if RESET in package.pins:
         circuit.join(f"{ref}_{RESET}", ref, package.number(RESET))
@@ -65,14 +66,14 @@ def _add_power(circuit: Circuit, ref: str, package: Package, address: int) -> No
 
 def _add_muxes(circuit: Circuit, bus: int, channels: Sequence[tuple[int, int]], clock_hz: int) -> None:
     for address in dict.fromkeys(address for address, _ in channels):
-        ref = circuit.next("U", _kind(MUX, ()))
-        _add_power(circuit, ref, MUX, address)
+        ref = circuit.next("U", _kind(tca9548a.PACKAGE, ()))
+        _add_power(circuit, ref, tca9548a.PACKAGE, address - tca9548a.ADDRESSES[0])
         for wire, pin in zip(_wires(bus, None), ("SDA", "SCL"), strict=True):
-            circuit.join(wire, ref, MUX.number(pin))
+            circuit.join(wire, ref, tca9548a.PACKAGE.number(pin))
         for channel in (channel for at, channel in channels if at == address):
             pair = _wires(bus, MuxChannel(address=address, channel=channel))
             for wire, pin in zip(pair, (f"SD{channel}", f"SC{channel}"), strict=True):
-                circuit.join(wire, ref, MUX.number(pin))
+                circuit.join(wire, ref, tca9548a.PACKAGE.number(pin))
                 circuit.between("R", _pull_up(clock_hz), SUPPLY, wire)
 
 

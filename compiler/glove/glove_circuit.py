@@ -7,7 +7,6 @@ from thenar.runtime.harness.wiring import Harness
 from .circuit import Circuit, Kind, Node, header, resistor, two_pins
 from .ends import GROUND, SUPPLY, End, Unit
 from .expanders import add_expanders
-from .packages import PACKAGES
 from .placing import PlacedSwitch
 from .wires import Wire, net_of
 
@@ -95,7 +94,7 @@ def _add_pull(circuit: Circuit, end: End, net: str) -> None:
         return
     if end.other == SUPPLY:
         circuit.between("R", _PULL_DOWN, net, GROUND)
-    elif not PACKAGES[wiring.kind].pulls_up:
+    elif not wiring.chip.pulls_up:
         circuit.between("R", _PULL_UP, net, SUPPLY)
 
 

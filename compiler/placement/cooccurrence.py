@@ -5,17 +5,11 @@ n * I(class; a | b) is, with f(n) = n ln n and the counts n_cab of class c and v
     sum f(n_cab) - sum f(n_ab) - sum f(n_cb) + sum f(n_b);    without b, as if b were constant
 """
 
-from collections import Counter
-from collections.abc import Iterator
-
 import numpy as np
 import numpy.typing as npt
 
-from .logsums import sign_of_f_sum
+from .exact import Counts, Floats, compare, error_bound, n_log_n
 
-Counts = npt.NDArray[np.int64]
-
-_UNIT: float = 2.0**-53
 # Of the numbers (classes, bits) that are looked at together: their tables and logarithms take some 40 MiB.
 _BLOCK = 1 << 18
 
@@ -30,22 +24,14 @@ class Cooccurrence:
         self._totals = np.bincount(labels, minlength=n_classes)
         ones = self._ones.sum(axis=0)
         self.varying = np.flatnonzero((ones > 0) & (ones < len(X)))
-        n = max(float(len(X)), 2.0)
-        # Four sums, each of at most n ln n, of 6 (K + 1) terms of a relative 8 units: see gain._error_bound.
-        self.error_bound = 4 * n * float(np.log(n)) * (6 * (n_classes + 1) + 16) * _UNIT
+        # Four sums, each of at most n ln n, of 6 (K + 1) terms together.
+        self.error_bound = error_bound(len(X), 6 * (n_classes + 1), 4)
 
-    def information(self, given: int | None = None) -> npt.NDArray[np.float64]:
+    def information(self, given: int | None = None) -> Floats:
         """Return n * I(class; a | given) for every bit a, (d,), in nats."""
         step = max(1, _BLOCK // len(self._totals))
-        return np.concatenate(
-            [
-                sum(
-                    (sign * _f(counts).sum(axis=(0, 2, 3)) for sign, counts in _parts(self._tables(given, bits))),
-                    np.zeros(1),
-                )
-                for bits in (slice(start, start + step) for start in range(0, max(1, len(self._packed)), step))
-            ]
-        )
+        starts = range(0, max(1, len(self._packed)), step)
+        return np.concatenate([_information(self._tables(given, slice(start, start + step))) for start in starts])
 
     def kinds(self) -> tuple[list[int], npt.NDArray[np.intp]]:
         """Return a bit of each kind, those of a kind having equal counts in every class, and each bit's kind (d,)."""
@@ -54,12 +40,12 @@ class Cooccurrence:
 
     def sign(self, one: tuple[int, int | None], other: tuple[int, int | None]) -> int:
         """Return the sign of I(class; a | b) of pair `one` minus that of pair `other`, exactly."""
-        difference: Counter[int] = Counter()
-        for (bit, given), sign in ((one, 1), (other, -1)):
-            for part_sign, counts in _parts(self._tables(given, slice(bit, bit + 1))):
-                for count in counts.ravel().tolist():
-                    difference[count] += sign * part_sign
-        return sign_of_f_sum(difference)
+        return compare(*self._terms(*one), *self._terms(*other))
+
+    def _terms(self, bit: int, given: int | None) -> tuple[Counts, Counts]:
+        """Return the counts whose f are added in n * I(class; bit | given), and those whose f are subtracted."""
+        cells, bits, classes, rest = (part.ravel() for part in _parts(self._tables(given, slice(bit, bit + 1))))
+        return np.concatenate([cells, rest]), np.concatenate([bits, classes])
 
     def _tables(self, given: int | None, bits: slice) -> Counts:
         """Return counts (K, bits, 2 values of the bit, 2 values of `given` or 1)."""
@@ -94,14 +80,16 @@ def _by_class(
     return packed, starts
 
 
-def _parts(tables: Counts) -> Iterator[tuple[int, Counts]]:
-    """Yield sign and counts of the four sums, each of four axes: class, bit, its value, value of what is given."""
-    yield 1, tables
-    yield -1, tables.sum(axis=0, keepdims=True)
-    yield -1, tables.sum(axis=2, keepdims=True)
-    yield 1, tables.sum(axis=(0, 2), keepdims=True)
+def _parts(tables: Counts) -> tuple[Counts, Counts, Counts, Counts]:
+    """Return the counts of the four sums, each of four axes: class, bit, its value, value of what is given."""
+    return (
+        tables,
+        tables.sum(axis=0, keepdims=True),
+        tables.sum(axis=2, keepdims=True),
+        tables.sum(axis=(0, 2), keepdims=True),
+    )
 
 
-def _f(counts: Counts) -> npt.NDArray[np.float64]:
-    floats = counts.astype(np.float64)
-    return np.asarray(floats * np.log(np.maximum(floats, 1.0)))
+def _information(tables: Counts) -> Floats:
+    cells, bits, classes, rest = (n_log_n(part).sum(axis=(0, 2, 3)) for part in _parts(tables))
+    return np.asarray(cells - bits - classes + rest)

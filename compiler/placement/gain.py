@@ -1,14 +1,13 @@
-"""Information gain: the input that has the most of it, exactly, and how much that is.
+"""Information gain: the input that has the most of it, or the most for its cost, exactly, and how much that is.
 
-With f(n) = n ln n, counts n_vc of class c at value v, n_v = sum over c and n = sum over v,
+With f(n) = n ln n, counts n_vc of class c at value v, n_v and n_c their sums and n the number of rows,
 
-    n * gain = constant + sum over v of [ sum over c of f(n_vc) - f(n_v) ]
+    n * gain = f(n) - sum over c of f(n_c) + sum over v of [ sum over c of f(n_vc) - f(n_v) ]
 
-in which only the sum, the score, depends on the input. The counts are whole numbers, so where floating point cannot
-separate two scores, whole-number arithmetic can (`logsums`).
+in which only the sum over v, the score, depends on the input. Where floating point cannot separate two inputs, whole
+numbers can (`exact`).
 """
 
-from collections import Counter
 from dataclasses import dataclass
 from functools import lru_cache
 from math import fsum
@@ -18,13 +17,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..elementary import log
-from .logsums import sign_of_f_sum
-
-Counts = npt.NDArray[np.int64]
-
-_LN_2 = 0.6931471805599453
-_UNIT: float = 2.0**-53
+from ..elementary import LN_2, log
+from .exact import Counts, Floats, compare, error_bound, first_best, n_log_n
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,74 +65,60 @@ def best_position(node: Node, columns: npt.NDArray[np.intp]) -> int | None:
     if not varies.any():
         return None
     scores[~varies] = -np.inf
-    close = np.flatnonzero(scores >= scores.max() - 2 * _error_bound(node))
+    close = np.flatnonzero(scores >= scores.max() - 2 * _score_bound(node))
     if len(close) == 1:
         return int(close[0])
-    return _exact_best(node, close[np.argsort(columns[close])])
+    close = close[np.argsort(columns[close])]
+    tables = node.tables(close)
+    return int(close[first_best(tables.reshape(len(close), -1), tables.sum(axis=1))])
 
 
-def _scores(node: Node) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
+def best_per_cost(node: Node, costs: Counts) -> int | None:
+    """Return the number of the switch of largest gain / cost at `node` of bits, None if none varies there.
+
+    costs (d,), whole, > 0. Of equal switches the cheapest wins, then the lowest number.
+    """
+    scores, varies = _scores(node)
+    varying = np.flatnonzero(varies)
+    if not len(varying):
+        return None
+    n, classes = int(node.totals.sum()), len(node.totals)
+    own = float(n_log_n(np.array(n)) - n_log_n(node.totals).sum())
+    gains = (scores[varying] + own) / costs[varying]
+    # Of two values: 3 (K + 1) terms, whose absolute values are f(n) in sum over the classes, values, both, and rows.
+    slack = error_bound(n, 3 * (classes + 1), 4) / costs[varying]
+    close = varying[gains + slack >= (gains - slack).max()]
+    close = close[np.lexsort((close, costs[close]))]
+    tables = node.tables(close)
+    plus = np.column_stack([tables.reshape(len(close), -1), np.full(len(close), n)])
+    minus = np.column_stack([tables.sum(axis=1), tables.sum(axis=2)])
+    return int(close[first_best(plus, minus, costs[close])])
+
+
+def _scores(node: Node) -> tuple[Floats, npt.NDArray[np.bool_]]:
     """Return each input's score and whether it has more than one value at the node."""
     first = node.first_values()
     first_sizes, cell_sizes = first.sum(axis=0), node.cells.sum(axis=0)
-    inside = _f(node.cells).sum(axis=0) - _f(cell_sizes)
+    inside = n_log_n(node.cells).sum(axis=0) - n_log_n(cell_sizes)
     largest = cell_sizes
     if len(node.starts) != len(inside):
         inside = np.add.reduceat(inside, node.starts)
         largest = np.maximum.reduceat(largest, node.starts)
-    scores = _f(first).sum(axis=0) - _f(first_sizes) + inside
+    scores = n_log_n(first).sum(axis=0) - n_log_n(first_sizes) + inside
     return scores, np.maximum(largest, first_sizes) < node.totals.sum()
 
 
-def _f(counts: Counts) -> npt.NDArray[np.float64]:
-    floats = counts.astype(np.float64)
-    return np.asarray(floats * np.log(np.maximum(floats, 1.0)))
-
-
-def _error_bound(node: Node) -> float:
-    """Bound the error of a score.
-
-    A term f(m) is off by 16 relative units of 2^-53 at most (the logarithm by 4 ulp, the product by half of one). The
-    sum of T terms adds at most T - 1 units of the sum of their absolute values, which is at most 2 f(n), since the sum
-    over v of f(n_v) is at most f(n). T is K + 1 for each value; no input has more values than all cells leave to it.
+def _score_bound(node: Node) -> float:
+    """Bound the error of a score: of K + 1 terms for each value, whose absolute values are 2 f(n) in sum, since the sum
+    over v of f(n_v) is at most f(n). No input has more values than all cells leave to it.
     """
-    n = float(node.totals.sum())
     most_values = node.cells.shape[1] - len(node.starts) + 2
-    terms: int = (len(node.totals) + 1) * most_values
-    return 2 * n * float(np.log(max(n, 2.0))) * (terms + 16) * _UNIT
-
-
-def _exact_best(node: Node, close: npt.NDArray[np.intp]) -> int:
-    """Return the first of `close` whose score no other of them exceeds.
-
-    Inputs with the same collection of terms tie at once; one of each collection is compared.
-    """
-    tables = node.tables(close)
-    terms = _terms(tables)
-    best, rivals = 0, np.arange(len(close))
-    while True:
-        rivals = rivals[(terms[rivals] != terms[rivals[0]]).any(axis=1)]
-        if not len(rivals):
-            return int(close[best])
-        if compare_scores(tables[rivals[0]], tables[best]) > 0:
-            best = int(rivals[0])
-
-
-def _terms(tables: Counts) -> Counts:
-    """Return the counts that stand in each table's score (n_tables, n_terms), in ascending order; f(0) = f(1) = 0."""
-    parts = (np.where(part > 1, part, 0) for part in (tables.reshape(len(tables), -1), tables.sum(axis=1)))
-    return np.concatenate([np.sort(part, axis=1) for part in parts], axis=1)
+    return error_bound(int(node.totals.sum()), (len(node.totals) + 1) * most_values, 2)
 
 
 def compare_scores(one: npt.NDArray[Any], other: npt.NDArray[Any]) -> int:
     """Return the sign of score(one) - score(other), exactly; tables (K, n_values) of whole counts."""
-    difference: Counter[int] = Counter()
-    for table, sign in ((one, 1), (other, -1)):
-        for count in table.ravel().tolist():
-            difference[count] += sign
-        for count in table.sum(axis=0).tolist():
-            difference[count] -= sign
-    return sign_of_f_sum(difference)
+    return compare(one, one.sum(axis=0), other, other.sum(axis=0))
 
 
 def gain_bits(table: Counts) -> float:
@@ -158,15 +138,15 @@ def gain_bits(table: Counts) -> float:
     terms = [_n_log_n(m) for row in counts for m in row] + [_n_log_n(n)]
     terms += [-_n_log_n(m) for m in totals + sizes]
     # However small, it is not zero.
-    return max(fsum(terms) / (n * _LN_2), float_info.min)
+    return max(fsum(terms) / (n * LN_2), float_info.min)
 
 
 def entropy_bits(totals: list[int]) -> float:
     """Return H(C), in bits, of the class counts `totals`; as reproducible as `gain_bits`."""
     n = sum(totals)
-    return max(fsum([_n_log_n(n), *(-_n_log_n(m) for m in totals)]) / (n * _LN_2), 0.0)
+    return max(fsum([_n_log_n(n), *(-_n_log_n(m) for m in totals)]) / (n * LN_2), 0.0)
 
 
 @lru_cache(maxsize=1 << 16)
 def _n_log_n(n: int) -> float:
-    return n * float(log(np.array(float(n)))) if n > 1 else 0.0
+    return float(n_log_n(np.array(n), log))

@@ -7,9 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from . import gain
-from .counting import Counter, Counts
-from .digits import Digits
+from .counts import Counter, Digits
 from .errors import PlacementError
+from .exact import Counts
 from .inputs import check_labels, check_matrix
 from .tree import Node, Tree
 

@@ -1,85 +1,296 @@
-"""The placement: the switches of a set of grasps that ID3 asks for, in its order, and what each brought."""
+"""The placement: which switches of a set of grasps a method keeps, in its order, and how it came out."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from itertools import accumulate
-from typing import TYPE_CHECKING
+from typing import Any, Literal
 
 import msgspec
 import numpy as np
 
+from ..elementary import LN_2
 from ..limits import check_types
+from ..recordings.graspset import GraspSet
+from ..samples import Columns, Samples
+from .cooccurrence import Cooccurrence
 from .errors import PlacementError
 from .gain import entropy_bits
 from .id3 import grow_id3
+from .methods.base import METHODS, PAPERS
+from .optimum import Pairs, best_subset
+from .ports import PortCosts
 from .tree import Tree
 
-if TYPE_CHECKING:
-    from ..recordings.graspset import GraspSet
+Progress = Callable[[int, int], None]
+# What a placement for many subjects is bettered for: nothing, the mean over subjects, or those that are served worst.
+Aim = Literal["plain", "mean", "worst tenth"]
 
 
-class Chosen(msgspec.Struct, frozen=True):
-    """One switch that is kept: its number in the set, its name, the bits it brought, and the share of the grasp types'
-    entropy that it and those before it brought together.
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """The columns that a method keeps, in its order; what each brought, in bits: to the tree of the paper's ID3, which
+    is None where another method chose, and alone otherwise.
+    """
+
+    columns: Columns
+    gains: tuple[float, ...]
+    tree: Tree | None
+
+
+def choose(samples: Samples, method: str = PAPERS, parameter: float = 0.0, ports: PortCosts | None = None) -> Chosen:
+    """Choose switches of `samples` by a method of `METHODS`, whose parameter is S or a number of switches.
+
+    `ports` are the costs for methods that heed them. Raises MemberError for a method that is not there, PlacementError
+    where it cannot choose.
+    """
+    if method == PAPERS:
+        tree = grow_id3(samples.switches, samples.labels, min_samples=int(parameter))
+        return Chosen(tree.inputs, tree.gains, tree)
+    columns = METHODS.named(method).chooser(samples, ports)(parameter)
+    counts = Cooccurrence(samples.switches, samples.labels, samples.n_classes)
+    alone = counts.information() / (len(samples.labels) * LN_2)
+    return Chosen(columns, tuple(float(alone[column]) for column in columns), None)
+
+
+class Kept(msgspec.Struct, frozen=True, omit_defaults=True):
+    """One switch that is kept: its number in the set and its name; of ID3 also the bits it brought, and the share of
+    the grasp types' entropy that it and those before it brought together.
     """
 
     number: int
     name: str
-    gain_bits: float
-    cumulative_share: float
+    gain_bits: float | None = None
+    cumulative_share: float | None = None
 
 
-class Placement(msgspec.Struct, frozen=True):
-    """What `thenar place` finds: the switches in order, and how the tree came out.
-
-    zero_gain_nodes   decisions at which no switch gains anything alone: the lowest-numbered that varies is asked
-    undecided_leaves  leaves of several grasp types whose rows agree in every switch
+class Exactly(msgspec.Struct, frozen=True):
+    """Pairs of rows of different grasp types that look alike: in the placement, in the best subset of as many switches
+    that was found, and the least that any such subset leaves. proved: the best found is the best there is.
     """
 
-    switches: tuple[Chosen, ...]
-    n_switches: int
-    kept_share: float
-    entropy_bits: float
-    zero_gain_nodes: int
-    undecided_leaves: int
-    decision_nodes: int
-    leaves: int
-    depth: int
-    prune: int
+    pairs: int
+    alike: int
+    best_found: int
+    least: int
+    best: tuple[Kept, ...]
+    proved: bool
+
+
+class Served(msgspec.Struct, frozen=True):
+    """Recognition rates, 0..1, of subjects that nothing was learnt from: the mean over them, the mean of the tenth of
+    them (at least one) with the lowest rates, and the lowest.
+    """
+
+    mean: float
+    worst_tenth: float
+    lowest: float
+
+    @property
+    def worth(self) -> float:
+        """What standard placements are compared by: the mean and the worst tenth, in equal parts."""
+        return (self.mean + self.worst_tenth) / 2
+
+
+class CurvePoint(msgspec.Struct, frozen=True):
+    """Held-out subjects, recognised with the placement and the classifier that so many other subjects gave: means over
+    the draws of these, one aim.
+    """
+
+    subjects: int
+    aim: Aim
+    served: Served
+
+
+class Standard(msgspec.Struct, frozen=True):
+    """How a placement for many subjects was found, and how well it serves them.
+
+    columns   learnt from all subjects with `aim`, in the order of the method
+    aim       what did best among the subjects learnt from, the first of equal ones: `tried` says by how much
+    held_out  subjects that the curve is measured on; subjects: all there are
+    rows      that were learnt from for the placement
+    """
+
+    columns: Columns
+    method: str
+    aim: Aim
+    subjects: int
+    held_out: int
+    rows: int
+    tried: tuple[CurvePoint, ...]
+    curve: tuple[CurvePoint, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Placement:
+    """The kept switches of a set, and how they were found.
+
+    parameter  S, or how many switches to keep at most; joints: whether the joints had a say
+    all_names  the names of all switches of the set; grasps: the types that occur, which the tree's classes index
+    tree       of the paper's ID3; exact: how far from the best, if that was asked for; study: of many subjects
+    """
+
+    method: str
+    parameter: float
+    joints: bool
+    switches: tuple[Kept, ...]
     rows: int
     fingerprint: str
+    all_names: tuple[str, ...]
+    grasps: tuple[str, ...]
+    tree: Tree | None = None
+    exact: Exactly | None = None
+    study: Standard | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the kept switches."""
+        return tuple(kept.name for kept in self.switches)
+
+    @property
+    def n_switches(self) -> int:
+        """The number of switches there were to choose from."""
+        return len(self.all_names)
+
+    @property
+    def how(self) -> str:
+        """How the method chooses, in a sentence."""
+        return METHODS.named(self.method).help
 
     @property
     def gain_bits(self) -> float:
-        """What all switches brought together."""
-        return sum(chosen.gain_bits for chosen in self.switches)
+        """What all switches brought to the tree together."""
+        return sum(kept.gain_bits or 0.0 for kept in self.switches)
+
+    @property
+    def entropy_bits(self) -> float:
+        """What there is to know: the entropy of the tree's grasp types."""
+        return 0.0 if self.tree is None else entropy_bits(list(self.tree.nodes[0].counts))
+
+    def document(self) -> dict[str, Any]:
+        """Return what `thenar place` writes as JSON.
+
+        zero_gain_nodes are decisions at which no switch gains anything alone: the lowest-numbered that varies is asked;
+        undecided_leaves are those of several grasp types whose rows agree in every switch.
+        """
+        found = {
+            "method": self.method,
+            "what": self.how,
+            "parameter": self.parameter,
+            "joints": self.joints,
+            "switches": self.switches,
+            "n_switches": self.n_switches,
+            "rows": self.rows,
+            "fingerprint": self.fingerprint,
+            "exact": self.exact,
+        }
+        if self.study is not None:
+            found["study"] = self.study
+        if self.tree is not None:
+            found |= {
+                "kept_share": len(self.switches) / self.n_switches,
+                "entropy_bits": self.entropy_bits,
+                "zero_gain_nodes": self.tree.n_zero_gain,
+                "undecided_leaves": self.tree.n_undecided,
+                "decision_nodes": len(self.tree.nodes) - self.tree.n_leaves,
+                "leaves": self.tree.n_leaves,
+                "depth": self.tree.depth,
+                "prune": self.tree.min_samples,
+            }
+        return found
 
 
-def place(grasp_set: "GraspSet", prune: int = 0) -> tuple[Placement, Tree]:
-    """Choose switches of `grasp_set` with ID3, pruned by S = `prune`; return the placement and the tree.
+def place(
+    grasp_set: GraspSet,
+    parameter: float = 0.0,
+    *,
+    method: str = PAPERS,
+    joints: bool = False,
+    ports: PortCosts | None = None,
+    exact: bool = False,
+    on_round: Progress | None = None,
+) -> Placement:
+    """Choose switches of all rows of a set.
 
-    The tree's classes are numbers of grasp types in the taxonomy, so that a tie goes to the lowest of these.
-    Raises PlacementError if the set has no switches, no rows, or more grasp types than a build can hold.
+    Parameters
+    ----------
+    grasp_set : GraspSet
+        What is learnt from. A tie between grasp types goes to the first of them in the taxonomy.
+    parameter : float
+        The paper's S (rows below which a node decides nothing), or how many switches to keep at most, as the method
+        takes it.
+    method : str
+        A name in `METHODS`.
+    joints : bool
+        Choose what helps most where the joints are read as well. Only elimination looks at them.
+    ports : PortCosts or None
+        What reading each switch costs, for methods that heed it; None: all cost the same.
+    exact : bool
+        Also search for the best subset of as many switches.
+    on_round : callable or None
+        Called with (done, all) after every round of that search.
+
+    Raises
+    ------
+    MemberError
+        If there is no such method.
+    PlacementError
+        If the set has no switches, no rows, or more grasp types than a build can hold.
     """
-    if not grasp_set.switch_names:
-        raise PlacementError("the set has no switches to place: it holds joints only")
-    check_types(len(np.unique(grasp_set.labels)), PlacementError)
-    tree = grow_id3(grasp_set.switches, grasp_set.labels, min_samples=prune)
-    entropy = entropy_bits(list(tree.nodes[0].counts))
-    chosen = tuple(
-        Chosen(number, grasp_set.switch_names[number], gain, together / entropy)
-        for number, gain, together in zip(tree.inputs, tree.gains, accumulate(tree.gains), strict=True)
-    )
-    n_switches, decisions = len(grasp_set.switch_names), len(tree.nodes) - tree.n_leaves
+    samples = samples_of(grasp_set, joints=joints)
+    chosen = choose(samples, method, parameter, ports)
+    kept = kept_of(grasp_set, chosen.columns)
+    if chosen.tree is not None:
+        entropy = entropy_bits(list(chosen.tree.nodes[0].counts))
+        together = accumulate(chosen.gains)
+        kept = tuple(
+            Kept(one.number, one.name, gain, so_far / entropy)
+            for one, gain, so_far in zip(kept, chosen.gains, together, strict=True)
+        )
     return Placement(
-        switches=chosen,
-        n_switches=n_switches,
-        kept_share=len(chosen) / n_switches,
-        entropy_bits=entropy,
-        zero_gain_nodes=tree.n_zero_gain,
-        undecided_leaves=tree.n_undecided,
-        decision_nodes=decisions,
-        leaves=tree.n_leaves,
-        depth=tree.depth,
-        prune=prune,
+        method=method,
+        parameter=parameter,
+        joints=joints,
+        switches=kept,
         rows=len(grasp_set),
         fingerprint=grasp_set.fingerprint(),
-    ), tree
+        all_names=grasp_set.switch_names,
+        grasps=samples.grasps,
+        tree=chosen.tree,
+        exact=_exactly(grasp_set, samples, chosen.columns, on_round) if exact else None,
+    )
+
+
+def place_by_subject(grasp_set: GraspSet, prune: int, on_done: Progress) -> list[tuple[str, Placement]]:
+    """Return the paper's placement from the rows of each subject, by name, and from all rows "pooled" if they are of
+    several; `on_done(done, all)` is called before each of them.
+    """
+    subjects = np.unique(grasp_set.subjects).tolist()
+    groups = [(subject, grasp_set.rows(grasp_set.subjects == subject)) for subject in subjects]
+    if len(subjects) != 1:
+        groups.append(("pooled", grasp_set))
+    found = []
+    for done, (title, rows) in enumerate(groups):
+        on_done(done, len(groups))
+        found.append((title, place(rows, prune)))
+    return found
+
+
+def samples_of(grasp_set: GraspSet, *, joints: bool) -> Samples:
+    """Return the rows of a set to choose switches from, with the joints' codes or without."""
+    if not grasp_set.switch_names:
+        raise PlacementError("the set has no switches to place: it holds joints only")
+    if not len(grasp_set):
+        raise PlacementError("there are no rows: a placement is learnt from at least one labelled grasp")
+    check_types(len(np.unique(grasp_set.labels)), PlacementError)
+    return Samples.of(grasp_set, "both" if joints else "switches")
+
+
+def kept_of(grasp_set: GraspSet, columns: Columns) -> tuple[Kept, ...]:
+    """Return switches with their names."""
+    return tuple(Kept(number, grasp_set.switch_names[number]) for number in columns)
+
+
+def _exactly(grasp_set: GraspSet, samples: Samples, columns: Columns, on_round: Progress | None) -> Exactly:
+    best = best_subset(samples, len(columns), starts=(columns,), on_round=on_round)
+    alike = Pairs(samples).alike(columns)
+    return Exactly(best.pairs, alike, best.alike, best.least, kept_of(grasp_set, best.columns), best.proved)

@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from ..text import counted
 from .errors import PlacementError
 from .inputs import check_matrix
 
@@ -241,15 +242,10 @@ def _summary(tree: Tree) -> str:
     )
     if tree.n_zero_gain:
         said += (
-            f"; at {count_of(tree.n_zero_gain, 'node')} no input gains anything alone, the lowest-numbered varying one "
+            f"; at {counted(tree.n_zero_gain, 'node')} no input gains anything alone, the lowest-numbered varying one "
             "was taken"
         )
     if tree.n_undecided:
-        leaves = count_of(tree.n_undecided, "leaf", "leaves")
+        leaves = counted(tree.n_undecided, "leaf", "leaves")
         said += f"; at {leaves} rows of several classes agree in every input"
     return said
-
-
-def count_of(number: int, one: str, many: str = "") -> str:
-    """Return "1 node" or "2 nodes"; `many` where it is not `one` with an s."""
-    return f"{number} {one if number == 1 else many or one + 's'}"

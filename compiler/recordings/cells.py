@@ -13,8 +13,7 @@ from .arrays import AnyArray
 from .graspset import CODES
 from .names import check_room, fault
 from .spreadsheet import text_of
-from .table import Column
-from .texts import pieces
+from .table import Column, pieces
 
 MISSING_NUMBERS = frozenset({"", "?", "na", "nan"})
 MISSING_NAMES = frozenset({"", "?"})

@@ -1,22 +1,201 @@
-"""Tables as they come: CSV, CSV.gz, npz here, ARFF in arff.py; out come named columns of text or numbers."""
+"""Tables of labelled grasps in: CSV, Weka's ARFF, npz.
+
+ARFF has numeric and nominal attributes, quoted names and values, `?` for a missing value. It is read here and not by
+scipy, whose reader loses quotes in nominal values, knows no rows, and is not on a board.
+"""
 
 import csv
+import gzip
+import io
+import os
+import re
+import zlib
 from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import accumulate, chain
 from pathlib import Path
+from typing import BinaryIO, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.files import open_file
+
 from .arrays import AnyArray
 from .errors import RecordingError, TableError
-from .limits import COLUMNS, ROWS
-from .names import check_names, list_names
+from .limits import COLUMNS, LARGEST, LONGEST_LINE, ROWS, unpacked
+from .names import check_names, list_names, shortened
 from .npz import read_arrays
-from .opening import open_lines
 from .spreadsheet import text_of
-from .texts import TextRows
+
+
+@contextmanager
+def open_lines(path: Path) -> Iterator[Iterator[str]]:
+    """Open a text file, gzipped or not, behind its byte order mark; a fault of its content becomes a TableError."""
+    zipped = path.suffix.lower() == ".gz"
+    try:
+        with open_file(path, TableError) as raw:
+            size = os.fstat(raw.fileno()).st_size
+            if size > LARGEST:
+                raise TableError(f"{path.name} is larger than {LARGEST} bytes, the most that is read of a table")
+            file = io.BufferedReader(_Unpacked(path.name, raw, unpacked(size))) if zipped else raw
+            with io.TextIOWrapper(file, "utf-8-sig", newline="") as text:
+                yield _lines(path.name, text)
+    except (gzip.BadGzipFile, EOFError, zlib.error) as reason:
+        raise TableError(f"{path.name} is damaged: {reason}") from reason
+    except UnicodeDecodeError as reason:
+        raise TableError(f"{path.name} is not UTF-8 text: {reason.reason}; save it as UTF-8") from reason
+
+
+class _Unpacked(io.RawIOBase):
+    """What a packed file unpacks to, as long as it is no more than `limit` bytes."""
+
+    def __init__(self, what: str, packed: BinaryIO, limit: int) -> None:
+        super().__init__()
+        self._what = what
+        self._file = gzip.GzipFile(fileobj=packed)
+        self._limit = limit
+        self._left = limit
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: "memoryview[int]") -> int:  # type: ignore[override]
+        data = self._file.read(len(buffer))
+        self._left -= len(data)
+        if self._left < 0:
+            raise TableError(
+                f"{self._what} unpacks to more than {self._limit} bytes, the most for a file of its size: "
+                "unpack it, then it is read as it is"
+            )
+        buffer[: len(data)] = data
+        return len(data)
+
+
+def _lines(what: str, text: io.TextIOWrapper) -> Iterator[str]:
+    number = 0
+    while line := text.readline(LONGEST_LINE):
+        number += 1
+        if len(line) == LONGEST_LINE and line[-1] not in "\r\n":
+            raise TableError(f"{what} line {number} is longer than {LONGEST_LINE} characters")
+        yield line
+
+
+# Cells that are held as str at a time, while a block is filled or a column is read.
+_CELLS = 1 << 18
+_READ = 1 << 14
+
+
+@dataclass(frozen=True, slots=True)
+class _Block:
+    """Rows of a table, column after column: their `text`, where each column ends in it, and the cells' lengths."""
+
+    rows: int
+    text: bytes
+    ends: NDArray[np.unsignedinteger]  # (columns,) bytes
+    lengths: NDArray[np.unsignedinteger]  # (columns * rows,) characters
+
+    def column(self, number: int) -> list[str]:
+        """Return the cells of a column, in these rows."""
+        start = int(self.ends[number - 1]) if number else 0
+        text = self.text[start : int(self.ends[number])].decode()
+        lengths = self.lengths[number * self.rows : (number + 1) * self.rows].tolist()
+        if lengths.count(1) == self.rows:
+            return list(text)
+        return [text[end - length : end] for length, end in zip(lengths, accumulate(lengths), strict=True)]
+
+
+class TextRows:
+    """Takes the rows of a table of `width` columns, each a list of as many cells; then gives its columns."""
+
+    def __init__(self, width: int) -> None:
+        self._width = width
+        self._rows: list[list[str]] = []
+        self._blocks: list[_Block] = []
+
+    def append(self, row: list[str]) -> None:
+        """Take the next row."""
+        self._rows.append(row)
+        if len(self._rows) * self._width >= _CELLS:
+            self._store()
+
+    def columns(self) -> "list[TextColumn]":
+        """Return the columns; no row is appended after that."""
+        if self._rows:
+            self._store()
+        return [TextColumn(self._blocks, number) for number in range(self._width)]
+
+    def _store(self) -> None:
+        columns = list(zip(*self._rows, strict=True))
+        texts = ["".join(column).encode() for column in columns]
+        lengths = np.fromiter(map(len, chain.from_iterable(columns)), np.uint32, len(self._rows) * self._width)
+        self._blocks.append(
+            _Block(
+                len(self._rows),
+                b"".join(texts),
+                _small(np.cumsum([*map(len, texts)], dtype=np.uint64)),
+                _small(lengths),
+            )
+        )
+        self._rows = []
+
+
+class TextColumn(Sequence[str]):
+    """One column of a table."""
+
+    def __init__(self, blocks: list[_Block], number: int) -> None:
+        self._blocks = blocks
+        self._number = number
+
+    def __len__(self) -> int:
+        return sum(block.rows for block in self._blocks)
+
+    def __iter__(self) -> Iterator[str]:
+        return chain.from_iterable(block.column(self._number) for block in self._blocks)
+
+    @overload
+    def __getitem__(self, row: int) -> str: ...
+
+    @overload
+    def __getitem__(self, row: slice) -> list[str]: ...
+
+    def __getitem__(self, row: int | slice) -> str | list[str]:
+        if isinstance(row, slice):
+            return list(self)[row]
+        for block in self._blocks:
+            if row < block.rows:
+                return block.column(self._number)[row]
+            row -= block.rows
+        raise IndexError("the column has fewer rows")
+
+    def pieces(self) -> Iterator[list[str]]:
+        """Yield the cells in lists of some thousands, which are dearer to make than to walk through."""
+        piece: list[str] = []
+        for block in self._blocks:
+            piece += block.column(self._number)
+            if len(piece) >= _READ:
+                yield piece
+                piece = []
+        if piece:
+            yield piece
+
+
+def pieces(column: Sequence[str] | NDArray[np.generic]) -> Iterator[list[str]]:
+    """Yield the cells of a column of text, in whatever it is, in lists of some thousands."""
+    if isinstance(column, TextColumn):
+        yield from column.pieces()
+        return
+    for start in range(0, len(column), _READ):
+        piece = column[start : start + _READ]
+        yield piece.tolist() if isinstance(piece, np.ndarray) else list(piece)
+
+
+def _small(numbers: NDArray[np.unsignedinteger]) -> NDArray[np.unsignedinteger]:
+    """Return `numbers` in as few bytes as hold their largest."""
+    return numbers.astype(np.min_scalar_type(int(numbers.max(initial=0))))
+
 
 # Text as it was read, or an array of numbers or of str.
 Column = Sequence[str] | AnyArray
@@ -47,8 +226,6 @@ def read_table(path: Path, delimiter: str = ",") -> Table:
         if path.suffix.lower() == ".npz":
             table = _read_npz(path)
         elif suffixes.endswith((".arff", ".arff.gz")):
-            from .arff import read_arff
-
             with open_lines(path) as lines:
                 table = read_arff(path.name, lines)
         elif suffixes.endswith((".csv", ".csv.gz")):
@@ -103,3 +280,96 @@ def _read_npz(path: Path) -> Table:
     if len(lengths) > 1:
         raise TableError(f"{path.name}: its arrays have {list_names(list(map(str, sorted(lengths))))} rows, no table")
     return Table(path.name, columns, np.arange(1, lengths.pop() + 1))
+
+
+# A value: quoted, where a backslash takes the next character as it is, or a word; a quote that nothing closes takes the
+# rest of the line. Commas and blanks part values. No quantifier gives back what it took: so the time is linear.
+_QUOTED = r"""'(?:\\.|[^'\\])*+'|"(?:\\.|[^"\\])*+\""""
+_VALUE = re.compile(rf"""{_QUOTED}|['"].*+|[^\s,{{}}'"%]++""")
+_CLOSED = re.compile(_QUOTED)
+_ATTRIBUTE = re.compile(rf"@attribute\s++({_VALUE.pattern})\s++(.+)", re.IGNORECASE)
+_NUMERIC = ("numeric", "real", "integer")
+
+# The values an attribute may have; None for numbers.
+_Kinds = dict[str, frozenset[str] | None]
+
+
+def read_arff(what: str, text: Iterable[str]) -> Table:
+    """Return the table in the lines `text` of an ARFF file that messages call `what`.
+
+    Its rows are counted from the first after @data; numbers are left as text for the importer to read. Raises
+    TableError naming the line or the row that is wrong.
+    """
+    lines = enumerate(text, start=1)
+    kinds = _header(what, lines)
+    cells, count = TextRows(len(kinds)), 0
+    for _, line in lines:
+        data = line.strip()
+        if data and not data.startswith("%"):
+            count += 1
+            if count > ROWS:
+                raise TableError(f"{what} has more than {ROWS} rows, the most that are read of a table")
+            cells.append(_values(f"{what} row {count}", data, len(kinds)))
+    columns = dict(zip(kinds, cells.columns(), strict=True))
+    for name, values in kinds.items():
+        for number, cell in enumerate(columns[name] if values else (), start=1):
+            if cell != "?" and cell not in (values or ()):
+                shown = f"{shortened(repr(cell))} is not among the values of attribute {shortened(repr(name))}"
+                raise TableError(f"{what} row {number}: {shown}")
+    return Table(what, columns, np.arange(1, count + 1))
+
+
+def _header(what: str, lines: Iterator[tuple[int, str]]) -> _Kinds:
+    """Read up to @data."""
+    kinds: _Kinds = {}
+    listed = 0
+    for number, line in lines:
+        word = line.strip().split(maxsplit=1)[0].lower() if line.strip() else "%"
+        if word == "@data":
+            return kinds
+        if word == "@attribute":
+            name, kind = _attribute(f"{what} line {number}", line.strip())
+            if name in kinds:
+                raise TableError(f"{what} line {number}: attribute {shortened(repr(name))} occurs twice")
+            kinds[name] = kind
+            listed += len(kind or ())
+            if len(kinds) > COLUMNS or listed > ROWS:
+                raise TableError(f"{what} line {number}: more than {COLUMNS} attributes, or {ROWS} values of them")
+        elif word != "@relation" and not word.startswith("%"):
+            shown = shortened(repr(word))
+            raise TableError(f"{what} line {number}: {shown} stands where @attribute or @data should")
+    raise TableError(f"{what} is no ARFF: it has no line @data")
+
+
+def _attribute(where: str, line: str) -> tuple[str, frozenset[str] | None]:
+    match = _ATTRIBUTE.match(line)
+    if match is None:
+        raise TableError(f"{where}: an attribute has a name and a type: {shortened(repr(line))}")
+    name, kind = _unquote(where, match[1]), match[2].strip()
+    if kind.split(maxsplit=1)[0].lower() in _NUMERIC:
+        return name, None
+    if not kind.startswith("{") or "}" not in kind:
+        shown = f"attribute {shortened(repr(name))} is {shortened(kind)}"
+        raise TableError(f"{where}: {shown}; only numeric and nominal ones are read")
+    return name, frozenset(_unquote(where, value) for value in _VALUE.findall(kind))
+
+
+def _values(where: str, line: str, width: int) -> list[str]:
+    if not any(sign in line for sign in "'\"{}%"):
+        values = line.replace(",", " ").split()
+    elif _VALUE.sub("", line).strip(", \t"):
+        sparse = ": sparse rows are not read" if line.startswith("{") else ""
+        raise TableError(f"{where} cannot be read as values{sparse}: {shortened(repr(line))}")
+    else:
+        values = [_unquote(where, value) for value in _VALUE.findall(line)]
+    if len(values) != width:
+        raise TableError(f"{where} has {len(values)} values, the header {width} attributes")
+    return values
+
+
+def _unquote(where: str, value: str) -> str:
+    if value[0] not in "'\"":
+        return value
+    if not _CLOSED.fullmatch(value):
+        raise TableError(f"{where} cannot be read as values: nothing closes the quote of {shortened(repr(value))}")
+    return re.sub(r"\\(.)", r"\1", value[1:-1])

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..evaluation.study import Study
-from .numbers import percent
+from ..text import NBSP, percent
 
 # Wider tables cannot be read; the list of what is mistaken most often can.
 WIDEST = 40
@@ -70,7 +70,7 @@ def _subjects(columns: Sequence[str]) -> str:
 def _row(grasp: str, number: int, counts: Counts) -> ConfusionRow:
     total = int(counts.sum())
     cells = tuple(_cell(count, total, column == number) for column, count in enumerate(counts.tolist()))
-    return ConfusionRow(grasp, cells, f"{total:,}", percent(counts[number] / total) if total else "")
+    return ConfusionRow(grasp, cells, f"{total:,}", percent(counts[number] / total, NBSP) if total else "")
 
 
 def _cell(count: int, total: int, hit: bool) -> CountCell:

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 from ..frontier.points import Frontier, Point
+from ..text import NBSP
 from .charts import Chart, axis, figure, logarithmic
 from .frontier_traces import (
     Cost,
@@ -17,7 +18,6 @@ from .frontier_traces import (
     short,
     stars,
 )
-from .numbers import NBSP
 
 
 def frontier_charts(frontier: Frontier) -> tuple[Chart, ...]:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from ..frontier.points import Frontier
-from .numbers import interval, microseconds
+from ..text import interval, microseconds
 from .plain_table import PlainTable
 
 

@@ -6,8 +6,8 @@ from typing import Any
 
 from ..frontier.pareto import front
 from ..frontier.points import Curve, Mark, Point, Rate, Tried
+from ..text import interval, microseconds
 from .charts import words
-from .numbers import interval, microseconds
 from .point_view import point_words
 
 Trace = dict[str, Any]

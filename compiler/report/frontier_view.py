@@ -7,10 +7,10 @@ from ..frontier.drawing.sentence import sentence
 from ..frontier.drawing.words import featured
 from ..frontier.points import Frontier, Point
 from ..hand import HandShape
+from ..text import NBSP, counted, interval, microseconds
+from ..text import sentence as as_sentence
 from .frontier_tables import frontier_tables
 from .hand_picture import HandPicture, hand_picture
-from .numbers import NBSP, counted, interval, microseconds
-from .numbers import sentence as as_sentence
 from .plain_table import PlainTable
 from .point_view import Detail, point_detail, point_latency, point_placement
 

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
+from ..text import NBSP, counted, percent
 from .content import ReportContent
 from .guarantee import Guarantee
-from .numbers import counted, share_of
 from .plain_table import PlainTable
 
 
@@ -23,7 +23,7 @@ def guarantee_view(content: ReportContent) -> GuaranteeView:
         f"Scores are sums of integers, {proof.scale:.1f} steps to a unit of score. No sum of them, in any order and "
         f"with any inputs missing, goes beyond {proof.bound:,} steps, and so none leaves {proof.width} bits.",
         f"Rounding moves no score by more than {proof.error:g} steps, so that a lead of more than "
-        f"{proof.safe_margin:g} steps keeps its grasp type: {share_of(proof.covered, rows)} rows trained on have it. "
+        f"{proof.safe_margin:g} steps keeps its grasp type: {_share(proof.covered, rows)} rows trained on have it. "
         f"{counted(proof.changed, 'row')} changed grasp type.",
     )
     found = content.guarantee
@@ -36,7 +36,7 @@ def _worst(found: Guarantee) -> str:
     return (
         f"At worst, over every frame there is and not only those recorded, {found.leader} loses {found.loss:.3f} steps "
         f"of its lead over {found.rival}. Worked out exactly, ties in whole steps included, a lead of more than "
-        f"{found.safe_margin:.3f} steps is safe: {share_of(found.covered, found.rows)} rows trained on have it."
+        f"{found.safe_margin:.3f} steps is safe: {_share(found.covered, found.rows)} rows trained on have it."
     )
 
 
@@ -53,3 +53,7 @@ def _table(found: Guarantee, width: int) -> PlainTable:
         ("Furthest that a sum can get from zero, steps", f"{abs(found.reach):,}", f"{most:,}"),
     )
     return PlainTable("Differences beside their bounds", ("What", "Found", "Bound"), rows)
+
+
+def _share(count: int, total: int) -> str:
+    return f"{count:,} of {total:,}" + (f" ({percent(count / total, NBSP)})" if total else "")

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from thenar.runtime.manifest import Recognised
 
+from ..text import NBSP, counted, percent, sentence
 from .content import ReportContent
-from .numbers import counted, percent, sentence
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ def _sentence(content: ReportContent) -> str:
     rate = honest_rate(content)
     if rate is None:
         return f"{said}; what to expect of new grasps was not measured."
-    return f"{said}: {percent(rate.rate)} of grasps that it was not trained on."
+    return f"{said}: {percent(rate.rate, NBSP)} of grasps that it was not trained on."
 
 
 def _facts(content: ReportContent) -> list[Fact]:
@@ -57,7 +57,7 @@ def _facts(content: ReportContent) -> list[Fact]:
     rates = [
         Fact(
             "Recognised, honest folds" if rate.protocol == "honest" else "Recognised, rows trained on",
-            percent(rate.rate),
+            percent(rate.rate, NBSP),
             f"{rate.correct:,} of {rate.total:,} rows" + (f", {rate.folds} folds" if rate.folds else ""),
         )
         for rate in sorted(manifest.rates, key=lambda rate: rate.protocol)

@@ -5,6 +5,7 @@ from functools import lru_cache
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from ..text import counted
 from .confusion_view import ConfusionView, confusion_view, study_confusions
 from .content import ReportContent
 from .embedding import embed
@@ -12,7 +13,6 @@ from .frontier_charts import frontier_charts
 from .frontier_view import frontier_view
 from .guarantee_view import guarantee_view
 from .hand_picture import HandPicture, hand_picture
-from .numbers import counted
 from .overview import honest_rate, overview
 from .placement_view import placement_view
 from .provenance import provenance

@@ -8,9 +8,9 @@ from thenar.runtime.manifest import Manifest, Switch
 
 from ..hand import HandShape
 from ..placement.gain import entropy_bits
+from ..placement.methods.base import METHODS
 from ..placement.tree import Tree
-from ..placement.ways import METHODS
-from .numbers import percent
+from ..text import NBSP, percent
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class PlacementView:
 def placement_view(manifest: Manifest, tree: Tree | None, hand: HandShape | None) -> PlacementView:
     """Return what is said of the placement; shares are known where a tree chose it, parts where there is a hand."""
     method, switches = manifest.options.placement, manifest.switches
-    how = METHODS[method].what if method in METHODS else "Chosen by another version of thenar"
+    how = METHODS[method].help if method in METHODS else "Chosen by another version of thenar"
     if tree is not None:
         bits = "brought the tree; together is what it and those before it brought, as a share of all there is to know"
     else:
@@ -67,7 +67,7 @@ def _kept(switches: Sequence[Switch], tree: Tree | None, hand: HandShape | None)
             part="" if hand is None else hand.part_names[parts[switch.name]],
             column=switch.column,
             gain=f"{switch.gain:.3f}",
-            share=percent(gain / entropy) if entropy else "",
+            share=percent(gain / entropy, NBSP) if entropy else "",
         )
         for order, (switch, gain) in enumerate(zip(switches, together, strict=True), 1)
     )

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ..frontier.points import Point, Time
-from .numbers import DASH, counted, interval, microseconds
+from ..text import DASH, counted, interval, microseconds
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ import msgspec
 
 from thenar.runtime.manifest import Manifest, Options
 
-from .numbers import counted
+from ..text import counted
 
 Pairs = tuple[tuple[str, str], ...]
 

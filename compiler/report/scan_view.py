@@ -7,7 +7,7 @@ from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, scan_us, scanner_us
 
-from .numbers import counted, microseconds, percent
+from ..text import NBSP, counted, microseconds, percent
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,8 @@ def _of_chips(scan: ScanMap, harness: Harness) -> list[str]:
     muxes = f", {counted(time.selects, 'write')} to muxes among them" if time.selects else ""
     return [
         f"A whole scan is {counted(len(scan.ports) + time.selects, 'transaction')}{muxes}: {microseconds(time.us)} µs "
-        f"on the wire, {percent(time.share)} of the {microseconds(time.full_us)} µs that all {wired} wired ones take."
+        f"on the wire, {percent(time.share, NBSP)} of the {microseconds(time.full_us)} µs that all {wired} wired ones "
+        "take."
     ]
 
 

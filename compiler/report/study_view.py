@@ -6,7 +6,7 @@ from ..evaluation.plan import TableName
 from ..evaluation.protocols import PROTOCOLS
 from ..evaluation.study import Study
 from ..evaluation.tables import Cell, Row, Spread, Table
-from .numbers import NBSP, counted, interval, sentence
+from ..text import NBSP, counted, interval, sentence
 
 _TITLES: dict[TableName, str] = {
     "compositions": "Compositions of inputs (the paper's Tables II and V)",

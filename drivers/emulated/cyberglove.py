@@ -12,10 +12,9 @@ from time import monotonic
 from types import TracebackType
 from typing import Self
 
-from ..cyberglove_timing import TICKS_HZ, digitising_us, shortest_us, told_us
-from .cyberglove_box import Action, CyberGloveBox, Doubts
-from .cyberglove_state import GloveState
-from .pty_line import PtyLine
+from ..cyberglove_protocol import TICKS_HZ, digitising_us, shortest_us, told_us
+from .cyberglove_box import Action, CyberGloveBox, Doubts, GloveState
+from .serial_line import PtyLine
 
 _RESTART_S = 1.75  # from the vendor's manual, as ViSTA quotes it
 

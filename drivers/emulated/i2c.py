@@ -7,6 +7,7 @@ must be a process of its own, started with `EmulatedI2c.environment`; kernel mod
 import json
 import shutil
 import subprocess
+import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
@@ -17,11 +18,11 @@ from types import TracebackType
 from typing import Any, Literal, Self
 
 from ..errors import DeviceError, SettingError
-from .i2c_models import MODELS
+from ..i2c.chips import CHIPS, Device
 
 _PYTHON = "/usr/bin/python3"
 # Isolated, it has neither the current folder nor the user's on its path, whose modules are none of ours.
-_SERVE = "import runpy, sys; sys.path.insert(0, sys.argv[1]); runpy.run_module(sys.argv[2], run_name='__main__')"
+_SERVE = "import runpy, sys; sys.path.append(sys.argv[1]); runpy.run_module(sys.argv[2], run_name='__main__')"
 _INSTALL = "install the packages umockdev, gir1.2-umockdev-1.0 and python3-gi (Debian, Ubuntu)"
 
 AdapterKind = Literal["any", "bcm2835", "designware", "i2c-gpio", "smbus-only"]
@@ -82,16 +83,16 @@ class EmulatedI2c:
     """
 
     def __init__(self, buses: Sequence[EmulatedBus]) -> None:
-        unknown = sorted({chip.kind for bus in buses for chip in bus.chips} - set(MODELS))
+        unknown = sorted({chip.kind for bus in buses for chip in bus.chips} - set(CHIPS))
         if unknown:
-            raise SettingError(f"cannot emulate {', '.join(unknown)}; what can be emulated: {', '.join(MODELS)}")
+            raise SettingError(f"cannot emulate {', '.join(unknown)}; what can be emulated: {', '.join(CHIPS)}")
         wrapper = shutil.which("umockdev-wrapper")
         if wrapper is None:
             raise DeviceError(f"the program umockdev-wrapper is missing: {_INSTALL}")
         self._levels = [[(1 << 24) - 1 for _ in bus.chips] for bus in buses]
         self._errors = TemporaryFile("w+")  # noqa: SIM115 - it lives as long as the server; a pipe would fill up
         self._server = subprocess.Popen(
-            [wrapper, _PYTHON, "-I", "-c", _SERVE, str(Path(__file__).parents[2]), "drivers.emulated.i2c_server"],
+            [wrapper, _PYTHON, "-I", "-c", _SERVE, _folder(__name__), f"{__package__}.i2c_server"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
@@ -101,7 +102,7 @@ class EmulatedI2c:
         self._lock = Lock()
         self._root: str | None = None
         try:
-            self._root = self._tell([asdict(bus) for bus in buses])
+            self._root = self._tell([_described(bus) for bus in buses])
         except BaseException:
             self.close()
             raise
@@ -143,7 +144,7 @@ class EmulatedI2c:
 
     def replace(self, bus: int, chip: int, kind: str) -> None:
         """Put a new chip of another kind in the place of a chip."""
-        self._fault(bus, "become", chip, kind)
+        self._fault(bus, "become", chip, _model(kind))
 
     def reset(self, bus: int, chip: int) -> None:
         """Let a power glitch bring a chip back to its defaults."""
@@ -225,3 +226,22 @@ class EmulatedI2c:
         self._end()
         self._errors.seek(0)
         return self._errors.read().strip().rpartition("\n")[2]
+
+
+def _described(bus: EmulatedBus) -> dict[str, Any]:
+    """Return a bus as the server's first line has it: each chip's model in place of its kind."""
+    chips = [{"model": _model(chip.kind), **asdict(chip)} for chip in bus.chips]
+    for chip in chips:
+        del chip["kind"]
+    return {**asdict(bus), "chips": chips}
+
+
+def _model(kind: str) -> tuple[str, str, str]:
+    """Return where another Python finds the class that emulates a chip: a folder of modules, module and name."""
+    model: type[Device] = CHIPS.named(kind).model
+    return _folder(model.__module__), model.__module__, model.__qualname__
+
+
+def _folder(module: str) -> str:
+    """Return the folder in which the import of `module` begins."""
+    return str(Path(sys.modules[module].__file__ or "").absolute().parents[module.count(".")])

@@ -36,7 +36,7 @@ ADAPTERS = {
 
 
 @dataclass
-class Fault:
+class TransferFault:
     """Transfers that go wrong with errno `code`: those to `address` (None: all), so many `times` (None: until healed).
 
     `batches` alone: only transfers of more than one write and read.
@@ -64,7 +64,7 @@ class Adapter:
         self.wire = wire
         self.kind = kind
         self.temper = ADAPTERS[kind]
-        self.faults: list[Fault] = []
+        self.faults: list[TransferFault] = []
         self.claimed: set[int] = set()
         self.stuck_for: int | None = None
         self.calls = 0

@@ -1,10 +1,11 @@
 """Serves emulated I2C buses as device nodes through umockdev; spoken to in JSON lines on stdin and stdout.
 
-Started by `umockdev-wrapper /usr/bin/python3 -I` as `drivers.emulated.i2c_server`: it needs the system's Python, which
-has PyGObject, and no other package. Each line in is [verb, arguments...] of `Server`; each line out is the answer.
+It is started by `umockdev-wrapper /usr/bin/python3 -I`: it needs the system's Python, which has PyGObject, and no other
+package. Each line in is [verb, arguments...] of `Server`; each line out is the answer.
 """
 
 import errno
+import importlib
 import json
 import struct
 import sys
@@ -19,7 +20,8 @@ import gi
 gi.require_version("UMockdev", "1.0")
 from gi.repository import GLib, UMockdev  # noqa: E402
 
-from .i2c_adapter import I2C_BLOCK, Adapter, Fault  # noqa: E402
+from ..i2c.chips.base import Device  # noqa: E402
+from .i2c_adapter import I2C_BLOCK, Adapter, TransferFault  # noqa: E402
 from .i2c_wire import Message, Station, Wire  # noqa: E402
 
 I2C_SLAVE, I2C_SLAVE_FORCE, I2C_FUNCS, I2C_RDWR, I2C_SMBUS = 0x703, 0x706, 0x705, 0x707, 0x720
@@ -29,7 +31,7 @@ _MESSAGE = struct.Struct("=HHHxxQ")
 _SPIN_S = 100e-6
 
 
-class Node:
+class EmulatedNode:
     """One /dev/i2c-N. The handler runs in umockdev's thread; `lock` keeps it apart from the commands."""
 
     def __init__(self, testbed: Any, device: str, adapter: Adapter, paced: bool) -> None:
@@ -149,10 +151,10 @@ class Server:
 
     def __init__(self, testbed: Any, buses: list[dict[str, Any]]) -> None:
         self._nodes = [
-            Node(
+            EmulatedNode(
                 testbed,
                 bus["device"],
-                Adapter(Wire([Station(**chip) for chip in bus["chips"]], bus["clock_hz"]), bus["adapter"]),
+                Adapter(Wire([_station(**chip) for chip in bus["chips"]], bus["clock_hz"]), bus["adapter"]),
                 bus["paced"],
             )
             for bus in buses
@@ -195,10 +197,10 @@ class Server:
 
 
 _FAULTS: dict[str, Callable[..., None]] = {
-    "error": lambda adapter, *fault: adapter.faults.append(Fault(*fault)),
+    "error": lambda adapter, *fault: adapter.faults.append(TransferFault(*fault)),
     "absent": lambda adapter, chip, absent: setattr(adapter.wire.stations[chip], "absent", absent),
     "absent_mux": lambda adapter, mux: adapter.wire.absent_muxes.add(mux),
-    "become": lambda adapter, chip, kind: adapter.wire.stations[chip].become(kind),
+    "become": lambda adapter, chip, model: adapter.wire.stations[chip].become(_model(*model)),
     "reset": lambda adapter, chip: adapter.wire.stations[chip].device.reset(),
     "poke": lambda adapter, chip, register, value: adapter.wire.stations[chip].device.poke(register, value),
     "poke_mux": lambda adapter, mux, value: adapter.wire.muxes[mux].poke(0, value),
@@ -206,6 +208,18 @@ _FAULTS: dict[str, Callable[..., None]] = {
     "stick": Adapter.stick,
     "heal": Adapter.heal,
 }
+
+
+def _station(model: tuple[str, str, str], address: int, mux: int | None, channel: int | None) -> Station:
+    return Station(_model(*model), address, mux, channel)
+
+
+def _model(folder: str, module: str, name: str) -> type[Device]:
+    """Return the class `name` of a chip's module, which the imports of `folder` find."""
+    if folder not in sys.path:
+        sys.path.append(folder)
+    model: type[Device] = getattr(importlib.import_module(module), name)
+    return model
 
 
 def _wait_until(moment: float) -> None:

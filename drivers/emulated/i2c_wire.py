@@ -1,14 +1,13 @@
 """SDA and SCL: who answers at an address, what it costs in bytes and SCL periods, and what goes wrong on the way.
 
-Runs under any Python 3.11 without packages: the system's own serves it to /dev/i2c-N.
+It needs the standard library alone: the system's own Python serves it to /dev/i2c-N.
 """
 
 from collections import Counter
 from dataclasses import dataclass, field
 
-from .i2c_device import Device
-from .i2c_models import model
-from .i2c_mux import Tca9548a
+from ..i2c.chips.base import Device
+from ..i2c.tca9548a import MuxModel
 
 # Nine SCL periods a byte, one a START and one the STOP; then the bus is free for so long, by the clock's class.
 BUS_FREE_US = ((100_000, 4.7), (400_000, 1.3), (1_000_000, 0.5))
@@ -31,7 +30,7 @@ class Message:
 class Station:
     """A chip in its place: straight on the bus, or on a channel of the mux at address `mux`."""
 
-    kind: str
+    model: type[Device]
     address: int
     mux: int | None = None
     channel: int | None = None
@@ -39,14 +38,12 @@ class Station:
     device: Device = field(init=False)
 
     def __post_init__(self) -> None:
-        self.become(self.kind)
+        self.device = self.model()
 
-    def become(self, kind: str) -> None:
-        """Put a new chip of this kind in the place; the pins stay wired."""
-        old = self.device.levels if hasattr(self, "device") else None
-        self.device = model(kind)
-        if old is not None:
-            self.device.levels = old & (1 << self.device.pins) - 1
+    def become(self, model: type[Device]) -> None:
+        """Put a new chip of another kind in the place; the pins stay wired."""
+        levels, self.device = self.device.levels, model()
+        self.device.levels = levels & (1 << self.device.pins) - 1
 
 
 Place = tuple[int, int | None, int | None, int | None]  # address, mux, channel, register (where there are registers)
@@ -58,7 +55,7 @@ class Wire:
     def __init__(self, stations: list[Station], clock_hz: int) -> None:
         self.stations = stations
         self.clock_hz = clock_hz
-        self.muxes = {station.mux: Tca9548a() for station in stations if station.mux is not None}
+        self.muxes = {station.mux: MuxModel() for station in stations if station.mux is not None}
         self.absent_muxes: set[int] = set()
         self.sda_low = False
         self.traffic: Counter[Place] = Counter()

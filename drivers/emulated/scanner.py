@@ -1,4 +1,4 @@
-"""A scanner board on an emulated serial line."""
+"""An emulated scanner board: what it sends when, and what it answers; and that board on a serial line."""
 
 from collections import deque
 from threading import Condition, Thread
@@ -6,10 +6,214 @@ from time import monotonic_ns
 from types import TracebackType
 from typing import Self
 
-from .pty_line import PtyLine
-from .scanner_board import ScannerBoard
+from ..scanner_protocol import (
+    PROTOCOL,
+    WITHOUT_DIODES,
+    Event,
+    Faults,
+    FrameDecoder,
+    FromBoard,
+    GetState,
+    Grasp,
+    Heartbeat,
+    Hello,
+    Lost,
+    Mask,
+    MessageError,
+    Ping,
+    SetDebounce,
+    SetRate,
+    State,
+    ToBoard,
+    encode,
+    frame,
+    to_board,
+)
+from .serial_line import PtyLine
 
-Mask = int
+
+def read_without_diodes(closed: Mask, rows: int, columns: int) -> Mask:
+    """Return which keys, bits row * columns + column, read closed when those in `closed` are.
+
+    Current finds any way from a row to a column through closed keys: rows that share a closed column are one wire.
+    """
+    width = (1 << columns) - 1
+    wires: list[tuple[set[int], Mask]] = []
+    for row in range(rows):
+        held = closed >> row * columns & width
+        joined = [wire for wire in wires if wire[1] & held]
+        wires = [wire for wire in wires if not wire[1] & held]
+        members = {row}.union(*(wire[0] for wire in joined))
+        for _, others in joined:
+            held |= others
+        wires.append((members, held))
+    return sum(held << row * columns for members, held in wires for row in members)
+
+
+_CLOCK = (1 << 32) - 1
+_FASTEST_US = 100
+_MOST_MARGIN = 0xFFFF
+_FAULTS_EVERY_US = 1_000_000
+
+
+class ScannerBoard:
+    """The board's firmware as a model, in its own microseconds since boot, which never go back.
+
+    rows, columns  of its keys; one row: wired directly       diodes  whether the keys of a matrix have any
+    scan_us        from scan to scan                          state_us, heartbeat_us  of what it sends, 0: none
+    clock_us       what its 32 bit clock shows at boot        board   its number
+
+    Without STATEs it sends an EVENT for every change. It does not debounce: what it is told of that it only says again.
+    """
+
+    def __init__(
+        self,
+        rows: int,
+        columns: int,
+        *,
+        diodes: bool = True,
+        scan_us: int = 1000,
+        state_us: int = 0,
+        heartbeat_us: int = 50_000,
+        clock_us: int = 0,
+        board: int = 1,
+    ) -> None:
+        self.rows, self.columns, self.diodes, self.clock_us, self.board = rows, columns, diodes, clock_us, board
+        self.rate = SetRate(scan_us, state_us, heartbeat_us)
+        self.debounce = SetDebounce(0, 0)
+        self.overruns = self.refused = self.dropped = 0
+        self._closed: Mask = 0
+        self._lost: Mask = 0
+        self._scanned = False
+        self._sequence = 0
+        self._decoder = FrameDecoder()
+        self._state_at = self._heartbeat_at = self._faults_at = 0
+        self._scan_at: int | None = None
+        self._told = (0, 0, 0)
+
+    def boot(self, now: int) -> list[bytes]:
+        """Return what it sends first: an end, so that nothing before it can matter, and its HELLO.
+
+        Of its keys it says nothing before it has scanned them all, at once.
+        """
+        self._scan_at = now
+        return [b"\0" + self._sent(self._hello(0, now))]
+
+    def touch(self, now: int) -> None:
+        """Note that keys changed: the next scan sees it."""
+        if self._scan_at is None:
+            self._scan_at = _after(0, self.rate.scan_us, now)
+
+    def next_us(self) -> int | None:
+        """Return when it will send again, or look at changed keys. None: not by itself."""
+        due = []
+        if self._scanned:
+            due += [self._state_at] * (self.rate.state_us > 0) + [self._heartbeat_at] * (self.rate.heartbeat_us > 0)
+        due += [] if self._scan_at is None else [self._scan_at]
+        due += [self._faults_at] * (self._told != self._faults())
+        return min(due, default=None)
+
+    def scan(self, closed: Mask, now: int, *, unread: Mask = 0, whole: bool = True) -> list[bytes]:
+        """Read the keys and return the frames that are due.
+
+        unread  keys that keep their state, since they were not read      whole  whether all were tried: those are lost
+        """
+        self._scan_at = None
+        sent = self._keys(closed, unread, whole, now) if self._scanned or whole else []
+        if self._told != self._faults() and now >= self._faults_at:
+            self._told, self._faults_at = self._faults(), now + _FAULTS_EVERY_US
+            sent.append(self._sent(Faults(self._clock(now), *self._told, 0)))
+        return sent
+
+    def recognised(self, grasp: int, margin: int, flags: int, now: int) -> list[bytes]:
+        """Return what it sends of a grasp; a margin beyond what the frame can say is the largest that it can."""
+        return [self._sent(Grasp(self._clock(now), grasp, min(margin, _MOST_MARGIN), flags))]
+
+    def receive(self, data: bytes, now: int) -> list[bytes]:
+        """Return the answers to the frames that `data` completes."""
+        answers = []
+        for received in self._decoder.feed(data):
+            try:
+                answers += self._answer(to_board(received), now)
+            except MessageError:
+                self.refused += 1
+        return answers
+
+    def _answer(self, message: ToBoard, now: int) -> list[bytes]:
+        match message:
+            case GetState():
+                return self._all_keys(now) if self._scanned else []  # the first scan answers
+            case SetRate():
+                scan_us = max(message.scan_us, _FASTEST_US)
+                state_us, heartbeat_us = (
+                    max(period, scan_us) if period else 0 for period in (message.state_us, message.heartbeat_us)
+                )
+                self.rate = SetRate(scan_us, state_us, heartbeat_us)
+                self._state_at = self._heartbeat_at = now
+            case SetDebounce():
+                self.debounce = message
+        return [self._sent(self._hello(message.token if isinstance(message, Ping) else 0, now))]
+
+    def _keys(self, closed: Mask, unread: Mask, whole: bool, now: int) -> list[bytes]:
+        """Take a scan and return what it sends of keys. The first one tells all of them, and has no changes."""
+        before, lost, first = self._closed, self._lost, not self._scanned
+        self._closed = before & unread | self._read(closed) & ~unread
+        self._lost = unread if whole else lost & unread
+        self._scanned = True
+        if self.rate.state_us:
+            sent = self._due_state(now)
+        else:
+            sent = [self._sent(event) for event in self._events(before ^ self._closed, now) if not first]
+        beats = first or bool(self.rate.heartbeat_us and now >= self._heartbeat_at)
+        return sent + self._all_keys(now, lost=self._lost != lost, beats=beats)
+
+    def _all_keys(self, now: int, *, lost: bool = False, beats: bool = True) -> list[bytes]:
+        """Return a LOST, if it is news or there are any before a HEARTBEAT; and the HEARTBEAT."""
+        tells = lost or (beats and self._lost != 0)
+        sent = [self._sent(Lost(self._lost, self.rows * self.columns))] if tells else []
+        return [*sent, self._heartbeat(now)] if beats else sent
+
+    def _due_state(self, now: int) -> list[bytes]:
+        if now < self._state_at:
+            return []
+        self._state_at = _after(self._state_at, self.rate.state_us, now)
+        return [self._sent(State(self._closed, self.rows * self.columns))]
+
+    def _heartbeat(self, now: int) -> bytes:
+        if self.rate.heartbeat_us:
+            self._heartbeat_at = _after(self._heartbeat_at, self.rate.heartbeat_us, now)
+        return self._sent(Heartbeat(self._clock(now), self._closed, self.rows * self.columns))
+
+    def _events(self, changed: Mask, now: int) -> list[Event]:
+        keys = [key for key in range(changed.bit_length()) if changed >> key & 1]
+        return [Event(self._clock(now), key, self._closed >> key & 1) for key in keys]
+
+    def _hello(self, token: int, now: int) -> Hello:
+        flags = 0 if self.diodes else WITHOUT_DIODES
+        who = (PROTOCOL, flags, token, self.board, 1, 0, 0, self.rows, self.columns)
+        rate, debounce = self.rate, self.debounce
+        how = (rate.scan_us, rate.state_us, rate.heartbeat_us, debounce.press_us, debounce.release_us)
+        return Hello(*who, *how, self._clock(now))
+
+    def _faults(self) -> tuple[int, int, int]:
+        bad = self._decoder.counts
+        return self.overruns, self.refused + bad.damaged + bad.short + bad.overlong, self.dropped
+
+    def _read(self, closed: Mask) -> Mask:
+        return closed if self.diodes else read_without_diodes(closed, self.rows, self.columns)
+
+    def _sent(self, message: FromBoard) -> bytes:
+        encoded = encode(frame(message, self._sequence))
+        self._sequence += 1
+        return encoded
+
+    def _clock(self, now: int) -> int:
+        return (now + self.clock_us) & _CLOCK
+
+
+def _after(last: int, period: int, now: int) -> int:
+    """Return the first time after `now` on the schedule of `last`."""
+    return last + ((now - last) // period + 1) * period
 
 
 class EmulatedScanner:
@@ -95,5 +299,5 @@ class EmulatedScanner:
         return monotonic_ns() // 1000 - self._booted_us
 
     def _send(self, frames: list[bytes]) -> None:
-        for frame in frames:
-            self.line.send(frame)
+        for each in frames:
+            self.line.send(each)

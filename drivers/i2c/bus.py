@@ -1,19 +1,176 @@
 """An I2C bus with port expanders: which chips are there, how they do, and scans of their ports."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from enum import Enum
+from time import monotonic
 from types import TracebackType
 from typing import Self
 
-from ..errors import SettingError
-from .chip import Chip, Reading
-from .keeper import Keeper
-from .member import ChipState, Member
-from .node import Node, Query
-from .routes import Route
-from .scan import Batching, Scan
+from ..errors import DeviceError, SettingError
+from .chips import Chip, Reading
+from .keeper import ChipState, Keeper, PlacedChip, Route
+from .node import MOST_MESSAGES, REFUSED, Node, Query, Run
 from .tca9548a import ADDRESSES, CHANNELS
-from .ways import Port, Way
+
+
+class Way(Enum):
+    """From the best to what always works.
+
+    i2c-gpio takes any batch; designware (Raspberry Pi 5, many PCs) one address a transfer, else EINVAL; bcm2835
+    (Raspberry Pi 0 to 4) one read a transfer, else EOPNOTSUPP; adapters without I2C_RDWR do SMBus only.
+    """
+
+    CHANNEL = "all ports that no mux is switched between, in one transfer"
+    CHIP = "all ports of a chip in one transfer"
+    PORT = "a transfer for every port"
+    SMBUS = "an SMBus transfer for every port"
+
+    def lower(self) -> "Way":
+        """Return the next that asks less of the adapter; of the last, itself."""
+        ways = list(Way)
+        return ways[min(ways.index(self) + 1, len(ways) - 1)]
+
+
+@dataclass(eq=False, slots=True)
+class Port:
+    """A port to read: whose, how, and which bits of the answer a chip in order keeps at 1.
+
+    believed: an answer that looked wrong and was found to be right, and how often its chip had been checked by then.
+    """
+
+    member: PlacedChip
+    query: Query
+    high: int
+    believed: tuple[bytes, int] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Ports, by their numbers in the scan, that one transfer reads."""
+
+    route: Route | None
+    ports: tuple[tuple[int, Port], ...]
+
+
+def cut(ports: Sequence[Port], way: Way) -> Iterator[Group]:
+    """Return the groups that read the ports of the chips that are there, in their order."""
+    gathered: list[tuple[int, Port]] = []
+    for number, port in enumerate(ports):
+        if not port.member.present:
+            continue
+        if gathered and not _fits(port, [other for _, other in gathered], way):
+            yield Group(gathered[0][1].member.route, tuple(gathered))
+            gathered = []
+        gathered.append((number, port))
+    if gathered:
+        yield Group(gathered[0][1].member.route, tuple(gathered))
+
+
+def _fits(port: Port, gathered: Sequence[Port], way: Way) -> bool:
+    last = gathered[-1]
+    if way in (Way.PORT, Way.SMBUS) or port.member.route != last.member.route:
+        return False
+    if way is Way.CHIP and port.member is not last.member:
+        return False
+    return sum(other.query.messages for other in gathered) + port.query.messages <= MOST_MESSAGES
+
+
+class Batching:
+    """The way of a bus: all scans share what one of them has found out."""
+
+    def __init__(self, way: Way) -> None:
+        self.way = way
+
+
+class Scan:
+    """Ports in a fixed order, read by as few transfers as the adapter allows."""
+
+    def __init__(self, node: Node, keeper: Keeper, batching: Batching, ports: Sequence[Port]) -> None:
+        self._node = node
+        self._keeper = keeper
+        self._batching = batching
+        self._ports = ports
+        self._revision = -1
+        self._way = batching.way
+        self._groups: list[tuple[Group, Run]] = []
+
+    def read(self) -> list[int | None]:
+        """Return each port's answer, bit i being pin reading.pins[i]; None where the chip is absent or has failed.
+
+        Every answer was read in this call. Raises DeviceError if the device node is gone; after `open` it works again.
+        """
+        keeper = self._keeper
+        if monotonic() >= keeper.due:
+            self._attend()
+        if self._revision != keeper.revision or self._way is not self._batching.way:
+            self._plan()
+        answers: list[int | None] = [None] * len(self._ports)
+        for group, run in self._groups:
+            try:
+                if group.route is not None:
+                    keeper.routes.select(group.route)
+                found: Sequence[bytes | None] = run()
+            except OSError as error:
+                found = self._one_by_one(group, error)
+            for (number, port), answer in zip(group.ports, found, strict=True):
+                if answer is None or not port.member.present:  # lost, maybe while its neighbours were read
+                    continue
+                value = int.from_bytes(answer, "little")
+                if 0 in answer or value & port.high != port.high:
+                    answers[number] = self._doubt(port, answer)
+                else:
+                    answers[number] = value
+        return answers
+
+    def _attend(self) -> None:
+        self._need_open()
+        self._keeper.attend()
+
+    def _need_open(self) -> None:
+        if not self._node.is_open:
+            raise DeviceError(f"{self._node.device} is not open: open the bus first")
+
+    def _plan(self) -> None:
+        self._need_open()
+        self._revision, self._way = self._keeper.revision, self._batching.way
+        groups = cut(self._ports, self._way)
+        self._groups = [(group, self._node.prepare([port.query for _, port in group.ports])) for group in groups]
+
+    def _one_by_one(self, group: Group, error: OSError) -> list[bytes | None]:
+        """Read the ports of a transfer that failed each by itself; where batches are refused, ask less from now on."""
+        if error.errno in REFUSED and self._way is self._batching.way:  # else it was lowered since `_plan`
+            self._lower(len(group.ports) > 1)
+        self._keeper.routes.forget()
+        return [self._alone(port) for _, port in group.ports]
+
+    def _lower(self, batch: bool) -> None:
+        way = self._batching.way.lower() if batch else Way.SMBUS
+        self._batching.way = way
+        self._node.plain_i2c = way is not Way.SMBUS
+
+    def _alone(self, port: Port) -> bytes | None:
+        if not port.member.present:
+            return None
+        return self._keeper.attempt(port.member, lambda: self._node.query(port.query))
+
+    def _doubt(self, port: Port, answer: bytes) -> int | None:
+        """Return an answer that looks wrong only when it is right; else what is read once the reason is gone.
+
+        A byte of zeros is what SDA held low reads as, on adapters that do not notice; it is also eight closed switches.
+        A 0 where the chip pulls up tells that it was reset.
+        """
+        member = port.member
+        if port.believed != (answer, member.checked):
+            self._keeper.feel()
+            if member.present:
+                self._keeper.check(member)
+            again = self._alone(port)
+            if again is None:
+                return None
+            port.believed = (again, member.checked)
+            answer = again
+        return int.from_bytes(answer, "little")
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +178,7 @@ class ChipAt:
     """A chip in its place: straight on the bus, or on a channel of the TCA9548A at address `mux`; and the pins used."""
 
     chip: Chip
+    address: int
     used: frozenset[int]
     mux: int | None = None
     channel: int | None = None
@@ -49,7 +207,7 @@ class I2cBus:
         """
         self.device, self.clock_hz = device, clock_hz
         _refuse_clashes(device, chips)
-        self._members = tuple(Member(device, at.chip, at.used, _route(at)) for at in chips)
+        self._members = tuple(PlacedChip(device, at.chip, at.address, at.used, _route(at)) for at in chips)
         self._node = Node(device)
         self._keeper = Keeper(self._node, self._members, check_every_s)
         self._batching = Batching(Way.CHANNEL)
@@ -107,15 +265,15 @@ class I2cBus:
     def _port(self, port: PortRead) -> Port:
         member = self._members[port.chip]
         reading = port.reading
-        return Port(member, Query(member.chip.address, reading.command, reading.length), reading.high)
+        return Port(member, Query(member.address, reading.command, reading.length), reading.high)
 
 
-def _control(member: Member) -> Port:
+def _control(member: PlacedChip) -> Port:
     watched = member.watched
     if watched is None:
         reading = member.chip.readings[0]
-        return Port(member, Query(member.chip.address, reading.command, reading.length), 0)
-    return Port(member, Query(member.chip.address, watched.data[:1], len(watched.expect)), 0)
+        return Port(member, Query(member.address, reading.command, reading.length), 0)
+    return Port(member, Query(member.address, watched.data[:1], len(watched.expect)), 0)
 
 
 def _route(at: ChipAt) -> Route | None:
@@ -123,10 +281,11 @@ def _route(at: ChipAt) -> Route | None:
 
 
 def _refuse_clashes(device: str, chips: Sequence[ChipAt]) -> None:
-    direct = {at.chip.address for at in chips if at.mux is None}
+    direct = {at.address for at in chips if at.mux is None}
     seen: set[tuple[int, Route | None]] = set()
     for at in chips:
-        address, route = at.chip.address, _route(at)
+        at.chip.check_address(at.address)
+        address, route = at.address, _route(at)
         if (at.mux is None) != (at.channel is None) or (route and not _possible(route)):
             raise SettingError(f"{device}: a tca9548a is at 0x70 to 0x77 and has channels 0 to 7; this is none: {at}")
         if (address, route) in seen or (route and address in direct):

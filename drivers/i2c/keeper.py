@@ -1,16 +1,17 @@
 """Keeps the chips of a bus at work: sets them up, tries again, gives up for a while, notices resets and stuck lines."""
 
 import errno
-from collections.abc import Callable, Sequence
+import logging
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from time import monotonic
 from typing import TypeVar
 
-from . import words
-from .member import Member
-from .node import NOBODY, Node, Query
-from .recognising import ImpostorError, read_back, set_up, whats_there
-from .routes import Routes, place
+from .chips import CHIPS, Chip, Write
+from .node import NOBODY, NOBODY_THERE, STUCK, Node, Query, failure, stuck
+from .tca9548a import control
 
+_LOG = logging.getLogger(__name__)
 T = TypeVar("T")
 
 TRIES = 3
@@ -18,6 +19,168 @@ TRIES = 3
 # found again and again not to be the chip it should be is tried less often, for trying writes to it.
 RETRY_S = 0.9
 RETRY_IMPOSTOR_S = 10.0
+
+# So often a mux must leave its address unacknowledged before it counts as gone: a glitch may swallow one.
+_NAKS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """A channel of the mux at address `mux`."""
+
+    mux: int
+    channel: int
+
+
+def place(device: str, what: str, address: int, route: Route | None) -> str:
+    """Name a chip by where it is."""
+    behind = f" (channel {route.channel} of the tca9548a at 0x{route.mux:02X})" if route else ""
+    return f"{device}: the {what} at 0x{address:02X}{behind}"
+
+
+class Routes:
+    """The muxes of a bus. Only one channel of them all is connected at a time; chips off the muxes are always reached.
+
+    What was selected is remembered, and forgotten at any failure behind a mux: a mux that was reset acknowledges
+    nothing for the chips behind it, and the next try selects again.
+
+    mux  the address of the mux that was spoken to last
+    """
+
+    def __init__(self, node: Node, muxes: Iterable[int]) -> None:
+        self._node = node
+        self._connected = set(muxes)  # those that may have a channel on: all, until they were seen to
+        self.selected: Route | None = None
+        self.mux: int | None = None
+
+    def select(self, route: Route | None) -> None:
+        """Connect `route`, and nothing else, unless it is connected. Raises OSError, with nothing selected, if not."""
+        if route is None or route == self.selected:
+            return
+        self.selected = None
+        for other in sorted(self._connected - {route.mux}):
+            self._release(other)
+        self._connected.add(route.mux)
+        self._tell(route.mux, route.channel)
+        self.selected = route
+
+    def holds(self) -> bool:
+        """Read the mux's register back: is what was selected still connected? Raises OSError."""
+        selected = self.selected
+        if selected is None:
+            return True
+        return self._node.query(Query(selected.mux, b"", 1)) == control(selected.channel)
+
+    def forget(self) -> None:
+        """Select again next time."""
+        self.selected = None
+
+    def _release(self, mux: int) -> None:
+        """Disconnect all channels of a mux. One that is gone takes with it what is behind it.
+
+        Raises OSError where it may still be connected: its chips would answer together with those of the other mux.
+        """
+        for left in reversed(range(_NAKS)):
+            try:
+                self._tell(mux, None)
+            except OSError as error:
+                if error.errno not in NOBODY_THERE:
+                    raise
+                if not left:
+                    return
+            else:
+                self._connected.discard(mux)
+                return
+
+    def _tell(self, mux: int, channel: int | None) -> None:
+        self.mux = mux
+        self._node.write(mux, control(channel))
+
+
+class ImpostorError(Exception):
+    """What answers at an address is not the chip that should be there."""
+
+
+def set_up(node: Node, chip: Chip, address: int, used: frozenset[int]) -> None:
+    """Write the chip's registers and read them back. Raises OSError of a transfer, ImpostorError of a wrong answer."""
+    for write in chip.setup(used):
+        node.write(address, write.data)
+        if write.expect and not write.holds(read_back(node, chip, address, write)):
+            raise ImpostorError
+
+
+def read_back(node: Node, chip: Chip, address: int, write: Write) -> bytes:
+    """Return the bytes that stand where `write` put its own."""
+    return node.query(Query(address, write.data[:1] if chip.registers else b"", len(write.expect)))
+
+
+def whats_there(node: Node, address: int) -> str:
+    """Return, in words, what answers at an address: the first kind whose set-up holds, which leaves its pins inputs.
+
+    Kinds without registers come last, for what is written to look for registers drives their pins.
+    """
+    for chip in sorted(CHIPS.values(), key=lambda chip: chip.registers, reverse=True):
+        if address in chip.addresses and _behaves_like(node, chip, address):
+            return f"something that behaves like a {chip.name}"
+    return "something unknown"
+
+
+def _behaves_like(node: Node, chip: Chip, address: int) -> bool:
+    try:
+        set_up(node, chip, address, frozenset())
+    except (OSError, ImpostorError):
+        return False
+    return True
+
+
+@dataclass(frozen=True, slots=True)
+class ChipState:
+    """How a chip is doing. `errors` counts what failed, retries that helped included; `last_error` stays."""
+
+    kind: str
+    address: int
+    mux: int | None
+    channel: int | None
+    present: bool
+    errors: int
+    last_error: str
+
+
+@dataclass(eq=False, slots=True)
+class PlacedChip:
+    """A chip in its place on the bus at `device`. `due` is when it is seen to next; `checked` counts its checks."""
+
+    device: str
+    chip: Chip
+    address: int
+    used: frozenset[int]
+    route: Route | None
+    present: bool = False
+    errors: int = 0
+    last_error: str = ""
+    due: float = 0.0
+    checked: int = 0
+
+    @property
+    def watched(self) -> Write | None:
+        """What a reset would lose."""
+        return self.chip.watched(self.used)
+
+    @property
+    def named(self) -> str:
+        """The chip and where it is, for messages."""
+        return place(self.device, self.chip.name, self.address, self.route)
+
+    @property
+    def state(self) -> ChipState:
+        """What others may know."""
+        mux, channel = (self.route.mux, self.route.channel) if self.route else (None, None)
+        return ChipState(self.chip.name, self.address, mux, channel, self.present, self.errors, self.last_error)
+
+    def blame(self, error: str) -> None:
+        """Count a failure."""
+        self.errors += 1
+        self.last_error = error
 
 
 class Keeper:
@@ -28,7 +191,7 @@ class Keeper:
     device node is gone, and nothing else.
     """
 
-    def __init__(self, node: Node, members: Sequence[Member], check_every_s: float) -> None:
+    def __init__(self, node: Node, members: Sequence[PlacedChip], check_every_s: float) -> None:
         self._node = node
         self._members = members
         self._check_every_s = check_every_s
@@ -67,7 +230,7 @@ class Keeper:
                 self._bring_up(member, 1)
         self._schedule()
 
-    def attempt(self, member: Member, action: Callable[[], T], tries: int = TRIES) -> T | None:
+    def attempt(self, member: PlacedChip, action: Callable[[], T], tries: int = TRIES) -> T | None:
         """Do something with a chip behind its route, up to three times; then it is absent, and None is returned."""
         for left in reversed(range(tries)):
             try:
@@ -83,7 +246,7 @@ class Keeper:
                     break
         return None
 
-    def check(self, member: Member) -> None:
+    def check(self, member: PlacedChip) -> None:
         """Read back what a reset of the chip or of its mux would have lost, and restore it."""
         member.checked += 1
         fine = self.attempt(member, lambda: self._in_order(member))
@@ -97,17 +260,21 @@ class Keeper:
             self._node.query(Query(NOBODY, b"", 1))
         except OSError as error:
             code = error.errno
-            if code not in words.STUCK:  # no acknowledge, by whatever errno this adapter tells it
+            if code not in STUCK:  # no acknowledge, by whatever errno this adapter tells it
+                if self.trouble:
+                    _LOG.warning("%s: the bus is free again", self._node.device)
                 self.trouble = ""
                 return
-        self.trouble = words.stuck(self._node.device, code)
+        if not self.trouble:
+            _LOG.warning("%s", stuck(self._node.device, code))
+        self.trouble = stuck(self._node.device, code)
         for member in self._members:
             member.present = False
             member.last_error = self.trouble
             member.due = monotonic()
         self._changed()
 
-    def _in_order(self, member: Member) -> bool:
+    def _in_order(self, member: PlacedChip) -> bool:
         """Return whether the chip holds its registers. A mux that connects something else is set again."""
         if member.route and not self.routes.holds():
             named = place(self._node.device, "tca9548a", member.route.mux, None)
@@ -115,12 +282,12 @@ class Keeper:
             self.routes.forget()
             self.routes.select(member.route)
         watched = member.watched
-        if watched is None or watched.holds(read_back(self._node, member.chip, watched)):
+        if watched is None or watched.holds(read_back(self._node, member.chip, member.address, watched)):
             return True
         member.blame(f"{member.named} had lost its registers (was its supply off for a moment?): it was set up again")
         return False
 
-    def _bring_up(self, member: Member, tries: int) -> None:
+    def _bring_up(self, member: PlacedChip, tries: int) -> None:
         """Set a chip up; it is present then. If something else is there, say what."""
         was = member.present
         member.present = False
@@ -136,31 +303,34 @@ class Keeper:
                 member.due = monotonic() + self._check_every_s
                 break
         if was or member.present:
+            _LOG.info("%s is %s", member.named, "set up" if member.present else "gone")
             self._changed()
 
-    def _set_up(self, member: Member) -> bool:
-        self._node.claim(member.chip.address)
-        set_up(self._node, member.chip, member.used)
+    def _set_up(self, member: PlacedChip) -> bool:
+        self._node.claim(member.address)
+        set_up(self._node, member.chip, member.address, member.used)
         return True
 
-    def _refuse(self, member: Member) -> None:
+    def _refuse(self, member: PlacedChip) -> None:
         self.feel()  # a line held low answers for every chip
         if self.trouble:
             return
-        there = whats_there(self._node, member.chip.address)
+        there = whats_there(self._node, member.address)
         found = f"{member.named} is not there, but {there}: check the harness and the chip's address pins"
         # The first time it may also have been a supply or a contact that came and went during the set-up.
         member.due = monotonic() + (RETRY_IMPOSTOR_S if found == member.last_error else RETRY_S)
         member.blame(found)
 
-    def _note(self, member: Member, error: OSError) -> None:
+    def _note(self, member: PlacedChip, error: OSError) -> None:
         """Blame the mux where it failed, else the chip."""
         named = member.named
         if member.route and self.routes.selected != member.route and self.routes.mux is not None:
             named = place(self._node.device, "tca9548a", self.routes.mux, None)
-        member.blame(words.failure(named, error.errno))
+        member.blame(failure(named, error.errno))
 
-    def _lose(self, member: Member, error: OSError) -> None:
+    def _lose(self, member: PlacedChip, error: OSError) -> None:
+        if member.present:
+            _LOG.warning("%s", member.last_error)
         member.present = False
         member.due = monotonic() + RETRY_S
         self._changed()
@@ -168,7 +338,7 @@ class Keeper:
             return
         if error.errno == errno.ENODEV:  # nobody there, on some adapters; on most, the adapter itself is gone
             self._renew()
-        elif error.errno not in words.NOBODY_THERE:
+        elif error.errno not in NOBODY_THERE:
             self.feel()
 
     def _unstick(self) -> None:

@@ -1,4 +1,4 @@
-"""A device node /dev/i2c-N: transfers as the kernel takes them, by I2C messages or, where it must be, by SMBus."""
+"""A device node /dev/i2c-N: transfers as the kernel takes them, and what the errno of one that failed means."""
 
 import errno
 import os
@@ -13,6 +13,39 @@ from ..ports import check_node, device_fault
 
 if TYPE_CHECKING:
     from smbus2 import SMBus, i2c_msg
+
+# No acknowledge: bcm2835 and designware, i2c-gpio, i2c-stub.
+NOBODY_THERE = frozenset({errno.EREMOTEIO, errno.ENXIO, errno.ENODEV})
+# A line may be held low.
+STUCK = frozenset({errno.ETIMEDOUT, errno.EBUSY, errno.EAGAIN})
+# The adapter's driver refuses the batch, not the chip.
+REFUSED = frozenset({errno.EOPNOTSUPP, errno.EINVAL})
+
+_MEANINGS = {
+    errno.ETIMEDOUT: "the transfer did not end: SCL or SDA is held low, or the chip stretches the clock",
+    errno.EAGAIN: "the adapter lost SDA to somebody else: is the line held low, or is there another master?",
+    errno.EIO: "the transfer broke off: check cable length, pull-ups and supply",
+    errno.EBUSY: "busy: a driver of the kernel has the address (unbind it), or SDA is held low",
+    errno.EOPNOTSUPP: "this adapter cannot do such a transfer: use another adapter",
+}
+
+
+def failure(named: str, code: int | None) -> str:
+    """Return what to say of a transfer with what is `named`."""
+    words = f"does not work: {_MEANINGS.get(code or errno.EIO, 'the transfer failed: check cable and adapter')}"
+    if code in NOBODY_THERE:
+        words = "does not answer: check its supply, its wires and its address pins"
+    return f"{named} {words} (errno {code})"
+
+
+def stuck(device: str, code: int | None) -> str:
+    """Return what to say of a bus on which nothing goes any more."""
+    found = "SDA reads low all the time" if code is None else f"every transfer fails (errno {code})"
+    return (
+        f"{device} is stuck: {found}. Tries go on once a second; if they do not help, look for a wire to ground, take "
+        "the chips' supply away for a moment, or clock SCL nine times by hand (unbind the adapter's driver first)"
+    )
+
 
 MOST_MESSAGES = 42
 _FUNC_I2C = 0x00000001

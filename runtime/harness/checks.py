@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 
 from thenar.drivers.errors import SettingError
 from thenar.drivers.i2c import tca9548a
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS
 from thenar.drivers.ports import device_fault, port_fault
 
 from ..names import fault, nearest, shortened
@@ -13,8 +13,6 @@ from .wiring import BusWiring, ChipWiring, GloveWiring, Harness
 
 Fault = tuple[Place, str]
 _SENSORS = (18, 22)
-# Their inputs are latches written high: what is not pulled down reads as high, whatever the switch does.
-_PULLED_UP = tuple(CHIPS[kind] for kind in ("pcf8574", "pcf8574a", "pcf8575"))
 
 
 def faults(harness: Harness) -> Iterator[Fault]:
@@ -63,20 +61,20 @@ def _of_chip(place: Place, chip: ChipWiring, bus: BusWiring) -> Iterator[Fault]:
         yield (*place, "kind"), f"there is no chip {chip.kind!r}{nearest(chip.kind, list(CHIPS))}"
     kind = CHIPS[chip.kind]
     try:
-        kind(chip.address)
+        kind.check_address(chip.address)
     except SettingError as reason:
         yield (*place, "address"), str(reason)
     usable = [pin for pin in kind.pins if pin not in kind.not_inputs]
     for pin in chip.pins:
         if pin not in kind.pins:
-            yield (*place, "pins", pin), f"a {kind.kind} has no pin {pin!r}{nearest(pin, usable)}"
+            yield (*place, "pins", pin), f"a {kind.name} has no pin {pin!r}{nearest(pin, usable)}"
         if pin in kind.not_inputs:
             yield (*place, "pins", pin), f"must not be an input: {kind.not_inputs[pin]}; use another pin"
-    if chip.closed == "high" and kind in _PULLED_UP:
-        yield (*place, "closed"), f"a {kind.kind} pulls its inputs up by itself: let switches pull them down"
+    if chip.closed == "high" and not kind.registers:  # what is not pulled down reads as high, whatever the switch does
+        yield (*place, "closed"), f"a {kind.name} pulls its inputs up by itself: let switches pull them down"
     slowest = min(kind.clock_hz, tca9548a.CLOCK_HZ if chip.mux else kind.clock_hz)
     if bus.clock_hz > slowest:
-        which = kind.kind if slowest == kind.clock_hz else "TCA9548A"
+        which = kind.name if slowest == kind.clock_hz else "TCA9548A"
         yield (*place[:2], "clock_hz"), f"{bus.clock_hz} Hz is too fast for the {which}: at most {slowest}"
 
 

@@ -10,8 +10,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta, Struct, field
 
-from thenar.drivers.i2c.chip import Chip
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS, Chip
 
 # A board's bitmap has no room for more.
 MOST_KEYS = 2000
@@ -75,7 +74,7 @@ class ChipWiring(_Table, frozen=True):
     @property
     def chip(self) -> Chip:
         """What the driver knows of such a chip."""
-        return CHIPS[self.kind](self.address)
+        return CHIPS[self.kind]
 
     @property
     def numbered_pins(self) -> dict[int, str]:

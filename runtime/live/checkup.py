@@ -8,8 +8,8 @@ from time import monotonic, perf_counter
 import msgspec
 
 from thenar.drivers.errors import ThenarError
-from thenar.drivers.i2c.scan import Scan
-from thenar.drivers.scanner_reading import BoardGrasp
+from thenar.drivers.i2c.bus import Scan
+from thenar.drivers.scanner import BoardGrasp
 
 from ..harness.wiring import GloveWiring, Harness, ScannerWiring
 from ..scanning.scanmap import ScanMap

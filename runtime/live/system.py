@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from thenar.drivers.calibration import GloveCalibration
-from thenar.drivers.cyberglove_sensors import SENSORS_18, SENSORS_22
+from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22
 
 from ..build import Build
 from ..calibration import Joints, load_calibration

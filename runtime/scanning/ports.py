@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping, Sequence
 from itertools import combinations
 
-from thenar.drivers.i2c.chip import Chip, Reading
+from thenar.drivers.i2c.chips import Chip, Reading
 
 from ..harness.wiring import ChipWiring, Harness
 from .scanmap import SCHEMA, Pair, Port, ScanMap
@@ -20,7 +20,7 @@ def cover(chip: Chip, pins: Collection[int]) -> tuple[Reading, ...]:
         enough = [some for some in combinations(chip.readings, count) if wanted <= _shown(some)]
         if enough:
             return min(enough, key=lambda some: sum(reading.scl_periods for reading in some))
-    raise ValueError(f"a {chip.kind} has no readings of its pins {sorted(wanted - _shown(chip.readings))}")
+    raise ValueError(f"a {chip.name} has no readings of its pins {sorted(wanted - _shown(chip.readings))}")
 
 
 def ports_of(harness: Harness, numbers: Mapping[str, int]) -> tuple[Port, ...]:

@@ -4,8 +4,7 @@ from collections.abc import Iterator, Sequence
 from itertools import islice
 
 from thenar.drivers.i2c import tca9548a
-from thenar.drivers.i2c.chip import Chip
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS, Chip
 
 from ..errors import HarnessError
 from ..harness.wiring import MOST_KEYS, BusWiring, ChipWiring, GloveWiring, Harness, MuxChannel, ScannerWiring
@@ -62,13 +61,13 @@ def propose_board(
     return Harness(name=name, cyberglove=cyberglove, scanners=(board,) if switch_names else ())
 
 
-def _inputs(chip: type[Chip]) -> list[str]:
+def _inputs(chip: Chip) -> list[str]:
     """Return the names of the pins that one transaction can show and that may be inputs."""
     whole = max(chip.readings, key=lambda reading: reading.length)
     return [name for name in (chip.pins[pin] for pin in whole.pins if pin >= 0) if name not in chip.not_inputs]
 
 
-def _places(chip: type[Chip], count: int) -> list[tuple[int, MuxChannel | None]]:
+def _places(chip: Chip, count: int) -> list[tuple[int, MuxChannel | None]]:
     """Return an address for each of `count` chips, and a channel for those behind the mux: few channels, and of the
     addresses as many before the mux as these channels allow.
     """
@@ -78,14 +77,14 @@ def _places(chip: type[Chip], count: int) -> list[tuple[int, MuxChannel | None]]
     channels = -(-count // addresses)
     if channels > len(tca9548a.CHANNELS):
         raise HarnessError(
-            f"{count} {chip.kind} for so many switches, one bus has room for {len(tca9548a.CHANNELS) * addresses}: "
+            f"{count} {chip.name} for so many switches, one bus has room for {len(tca9548a.CHANNELS) * addresses}: "
             "choose a chip with more pins, or share the switches between buses by hand"
         )
     before = (channels * addresses - count) // (channels - 1)
     return list(islice(_behind(chip, before, channels), count))
 
 
-def _behind(chip: type[Chip], before: int, channels: int) -> Iterator[tuple[int, MuxChannel | None]]:
+def _behind(chip: Chip, before: int, channels: int) -> Iterator[tuple[int, MuxChannel | None]]:
     yield from ((address, None) for address in chip.addresses[:before])
     for channel in range(channels):
         for address in chip.addresses[before:]:

@@ -11,10 +11,10 @@ from math import fsum
 
 from msgspec import Struct
 
-from thenar.drivers.cyberglove_timing import sending_us, shortest_us
+from thenar.drivers.cyberglove_protocol import sending_us, shortest_us
 from thenar.drivers.i2c import tca9548a
-from thenar.drivers.i2c.chip import Reading
-from thenar.drivers.scanner_frame import OVERHEAD
+from thenar.drivers.i2c.chips import Reading
+from thenar.drivers.scanner_protocol import OVERHEAD
 
 from ..harness.wiring import GloveWiring, Harness, ScannerWiring
 from .ports import ports_of

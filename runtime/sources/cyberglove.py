@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from thenar.drivers.cyberglove import CyberGlove
-from thenar.drivers.cyberglove_timing import shortest_us
+from thenar.drivers.cyberglove_protocol import shortest_us
 
 from ..frames import GloveFrame
 from ..harness.wiring import GloveWiring, Harness

@@ -3,8 +3,7 @@
 import time
 from collections.abc import Iterator, Sequence
 
-from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead
-from thenar.drivers.i2c.scan import Scan
+from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead, Scan
 
 from ..calibration import Joints
 from ..frames import GloveFrame, Mask, Newest, Rewired, SwitchFrame, now_us
@@ -126,7 +125,7 @@ def _chip_at(harness: Harness, bus: int, number: int, ports: list[Port]) -> Chip
         reading_of(port, harness).pins[bit] for port in ports if port.chip == number for bit, _ in port.switches
     )
     mux, channel = (None, None) if chip.mux is None else (chip.mux.address, chip.mux.channel)
-    return ChipAt(chip.chip, used, mux, channel)
+    return ChipAt(chip.chip, chip.address, used, mux, channel)
 
 
 def _bus_period_us(scan: ScanMap, harness: Harness) -> int:

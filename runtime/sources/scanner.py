@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Sequence
 from math import ceil
 
-from thenar.drivers.cyberglove_timing import BITS_A_BYTE
 from thenar.drivers.scanner import Scanner
+from thenar.drivers.serial_line import BITS_A_BYTE
 
 from ..frames import PERIODS, Pauses, Rewired, SwitchFrame
 from ..harness.wiring import Debounce, Harness, ScannerWiring

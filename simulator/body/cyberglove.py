@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.compiler.recordings.graspset import Joint
-from thenar.drivers.cyberglove_sensors import SENSORS_18
+from thenar.drivers.cyberglove_protocol import SENSORS_18
 
 from ..streams import Draw, Draws, Site
 from .anthropometry import FAN_DEG

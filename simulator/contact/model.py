@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..body.condition import Condition
-from ..pipeline.batch import Batch
 
 Floats = NDArray[np.float64]
 
@@ -49,35 +48,9 @@ class Load:
     grip_n: Floats
 
 
-# An object that slid so far was dropped: ours.
-SLID_OUT_MM = 20.0
-
-
 class ContactModel(Protocol):
     """Closes hands on objects."""
 
     def solve(self, loads: Sequence[Load]) -> list[Contact]:
         """Return how the hands rest, a Contact a load. No repetition depends on which others are solved beside it."""
         ...
-
-
-def load_of(batch: Batch) -> Load:
-    """Return what a batch tells its hands."""
-    return Load(batch.condition, batch.posture_deg, batch.pose, batch.grip_n)
-
-
-def slid_mm(batch: Batch) -> Floats:
-    """Return how far (n,) each object lies from where the hand was told to hold it."""
-    x, y, z = (batch.pose[:, :3] - batch.commanded_pose[:, :3]).T
-    distance: Floats = np.sqrt(x * x + y * y + z * z)
-    return distance
-
-
-def take(batch: Batch, contact: Contact) -> None:
-    """Let the hands of a batch rest as solved. A grasp whose object slid out of the hand has not settled: what holds it
-    then is no hand.
-    """
-    batch.commanded_deg, batch.commanded_pose = batch.posture_deg, batch.pose
-    batch.posture_deg, batch.pose, batch.forces_n = contact.posture_deg, contact.pose, contact.forces_n
-    batch.settled, batch.between_n = contact.settled & (slid_mm(batch) <= SLID_OUT_MM), contact.between_n
-    batch.residual_n, batch.residual_nmm = contact.residual_n, contact.residual_nmm

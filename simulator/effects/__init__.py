@@ -1,1 +1,1 @@
-"""The effects, one module each, imported only when a scene lists them (registry.py)."""
+"""The effects, one module each: `MEMBER` is the record of it (pipeline/effect.py)."""

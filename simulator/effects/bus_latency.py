@@ -27,16 +27,6 @@ class Parameters(EffectParameters, frozen=True):
     jitter_us: Annotated[float, Meta(ge=0.0, le=1e6)] = 0.0
 
 
-EFFECT = Effect(
-    name="bus.latency",
-    summary="ports are read one after the other",
-    stage="frame",
-    reads=("on_us",),
-    writes=("delay_us",),
-    timed=True,
-)
-
-
 def prepare(parameters: Parameters, setting: Setting) -> Step:
     """Return the step that says how long after the frame's start each switch is read: when its port's reading ends.
 
@@ -71,3 +61,16 @@ def _jittered(parameters: Parameters, rows: NDArray[np.intp]) -> Step:
         batch.delay_us = np.cumsum(parameters.us_per_port + longer, axis=2)[:, :, ports.of(switches)]
 
     return step
+
+
+MEMBER = Effect(
+    name="bus.latency",
+    summary="ports are read one after the other",
+    stage="frame",
+    place=2,
+    reads=("on_us",),
+    writes=("delay_us",),
+    timed=True,
+    parameters=Parameters,
+    prepare=prepare,
+)

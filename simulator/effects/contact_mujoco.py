@@ -2,6 +2,7 @@
 
 from typing import Annotated
 
+import msgspec
 from msgspec import Meta
 
 from ..body.layout import murakami160
@@ -11,7 +12,7 @@ from ..pipeline.effect import Effect, EffectParameters, Setting
 
 
 class Parameters(EffectParameters, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How time is stepped, and what skin, friction and the hold on the object are.
+    """How MuJoCo steps time, and what skin, friction and the hold on the object are.
 
     dt_ms, steps     60 steps of 5 ms come closer to rest than 100 of 2 ms, and cost less; what steps too long make of a
                      grasp is reported as not settled
@@ -32,23 +33,28 @@ class Parameters(EffectParameters, frozen=True, forbid_unknown_fields=True, kw_o
     weld_nm_per_rad: Annotated[float, Meta(gt=0.0, le=20.0)] = 5.0
 
 
-EFFECT = Effect(
+def model(parameters: Parameters, setting: Setting) -> ContactModel:
+    """Return the contact model. Raises SimMissingError where MuJoCo is not installed: a scene is read without it."""
+    try:
+        from ..contact.mujoco import Dynamics, MujocoContact
+    except ImportError as missing:
+        raise SimMissingError(f"contact.mujoco needs MuJoCo ({missing}): pip install 'thenar[sim]'") from missing
+    given = msgspec.structs.asdict(parameters)
+    del given["after"]
+    return MujocoContact(Dynamics(**given), murakami160())
+
+
+MEMBER = Effect(
     name="contact.mujoco",
     summary="the hand closes on the object in MuJoCo: rigid bodies, friction, time",
     stage="contact",
+    place=2,
     reads=("posture_deg", "pose", "grip_n"),
     writes=(
         *("posture_deg", "pose", "commanded_deg", "commanded_pose", "forces_n"),
         *("settled", "residual_n", "residual_nmm", "between_n"),
     ),
     conflicts=("contact.quasistatic",),
+    parameters=Parameters,
+    model=model,
 )
-
-
-def model(parameters: Parameters, setting: Setting) -> ContactModel:
-    """Return the contact model. Raises SimMissingError where MuJoCo is not installed: a scene is read without it."""
-    try:
-        from ..contact.mujoco_grasp import MujocoContact
-    except ImportError as missing:
-        raise SimMissingError(f"contact.mujoco needs MuJoCo ({missing}): pip install 'thenar[sim]'") from missing
-    return MujocoContact(parameters, murakami160())

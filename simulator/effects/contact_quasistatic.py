@@ -38,19 +38,6 @@ class Parameters(EffectParameters, frozen=True):
     most_steps: Annotated[int, msgspec.Meta(ge=1, le=1000)] = 40
 
 
-EFFECT = Effect(
-    name="contact.quasistatic",
-    summary="hand and object at rest: skin springs, sticking friction, weight",
-    stage="contact",
-    reads=("posture_deg", "pose", "grip_n"),
-    writes=(
-        *("posture_deg", "pose", "commanded_deg", "commanded_pose", "forces_n"),
-        *("settled", "residual_n", "residual_nmm", "between_n"),
-    ),
-    conflicts=("contact.mujoco",),
-)
-
-
 class Quasistatic:
     """The contact model of hands and objects at rest."""
 
@@ -111,3 +98,19 @@ def _bundles(loads: list[Load]) -> list[list[Load]]:
 def model(parameters: Parameters, setting: Setting) -> ContactModel:
     """Return the contact model."""
     return Quasistatic(parameters)
+
+
+MEMBER = Effect(
+    name="contact.quasistatic",
+    summary="hand and object at rest: skin springs, sticking friction, weight",
+    stage="contact",
+    place=1,
+    reads=("posture_deg", "pose", "grip_n"),
+    writes=(
+        *("posture_deg", "pose", "commanded_deg", "commanded_pose", "forces_n"),
+        *("settled", "residual_n", "residual_nmm", "between_n"),
+    ),
+    conflicts=("contact.mujoco",),
+    parameters=Parameters,
+    model=model,
+)

@@ -34,19 +34,6 @@ class Parameters(EffectParameters, frozen=True):
     levels: Annotated[int, Meta(ge=1, le=100)] = 10
 
 
-EFFECT = Effect(
-    name="contact.ramp",
-    summary="the grip grows, and switches close one by one",
-    stage="switch",
-    reads=(
-        *("commanded_deg", "commanded_pose", "grip_n", "forces_n", "thresholds_n"),
-        *("settled", "residual_n", "residual_nmm", "on_us", "off_us"),
-    ),
-    writes=("on_us", "off_us", "settled", "residual_n", "residual_nmm"),
-    timed=True,
-)
-
-
 def prepare(parameters: Parameters, setting: Setting, contact: ContactModel) -> Together:
     """Return what times every switch. Raises SceneError where the grip is not full when the row is read."""
     rise_us = 1e3 * parameters.rise_ms
@@ -120,3 +107,19 @@ def _between(forces_n: Floats, thresholds_n: Floats, level: NDArray[np.intp]) ->
 
 def _times(time_us: Floats, there: Bits) -> Integers:
     return np.where(there, np.ceil(np.where(there, time_us, 0.0)).astype(np.int64), NEVER)
+
+
+MEMBER = Effect(
+    name="contact.ramp",
+    summary="the grip grows, and switches close one by one",
+    stage="switch",
+    place=2,
+    reads=(
+        *("commanded_deg", "commanded_pose", "grip_n", "forces_n", "thresholds_n"),
+        *("settled", "residual_n", "residual_nmm", "on_us", "off_us"),
+    ),
+    writes=("on_us", "off_us", "settled", "residual_n", "residual_nmm"),
+    timed=True,
+    parameters=Parameters,
+    together=prepare,
+)

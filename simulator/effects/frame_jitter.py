@@ -17,16 +17,6 @@ class Parameters(EffectParameters, frozen=True):
     sd_us: Annotated[float, Meta(gt=0.0, le=1e6)] = 300.0
 
 
-EFFECT = Effect(
-    name="frame.jitter",
-    summary="frames start early or late, in order",
-    stage="frame",
-    reads=("frame_us",),
-    writes=("frame_us",),
-    timed=True,
-)
-
-
 def prepare(parameters: Parameters, setting: Setting) -> Step:
     """Return the step that moves every frame by a normal deviate of its own, and keeps them in order."""
     rows = drawn_rows(setting)
@@ -36,3 +26,16 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
         batch.frame_us = np.sort(batch.frame_us + shift.astype(np.int64), axis=1)
 
     return step
+
+
+MEMBER = Effect(
+    name="frame.jitter",
+    summary="frames start early or late, in order",
+    stage="frame",
+    place=1,
+    reads=("frame_us",),
+    writes=("frame_us",),
+    timed=True,
+    parameters=Parameters,
+    prepare=prepare,
+)

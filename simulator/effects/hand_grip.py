@@ -17,15 +17,6 @@ class Parameters(EffectParameters, frozen=True):
     log_sd: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.25
 
 
-EFFECT = Effect(
-    name="hand.grip",
-    summary="grip force varies from repetition to repetition",
-    stage="posture",
-    reads=("grip_n",),
-    writes=("grip_n",),
-)
-
-
 def prepare(parameters: Parameters, setting: Setting) -> Step:
     """Return the step that multiplies the grip by a lognormal factor of median 1."""
 
@@ -33,3 +24,15 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
         batch.grip_n = batch.grip_n * exp(parameters.log_sd * draw.per_repetition().normal())
 
     return step
+
+
+MEMBER = Effect(
+    name="hand.grip",
+    summary="grip force varies from repetition to repetition",
+    stage="posture",
+    place=4,
+    reads=("grip_n",),
+    writes=("grip_n",),
+    parameters=Parameters,
+    prepare=prepare,
+)

@@ -22,15 +22,6 @@ class Parameters(EffectParameters, frozen=True):
     sd_deg: Annotated[float, Meta(ge=0.0, le=45.0)] = 2.5
 
 
-EFFECT = Effect(
-    name="hand.object_pose",
-    summary="the object lies a little elsewhere in each repetition",
-    stage="posture",
-    reads=("pose",),
-    writes=("pose",),
-)
-
-
 def prepare(parameters: Parameters, setting: Setting) -> Step:
     """Return the step that shifts and turns the object by normal deviates."""
 
@@ -72,3 +63,15 @@ def _cross(a: Floats, b: Floats) -> Floats:
         ],
         axis=1,
     )
+
+
+MEMBER = Effect(
+    name="hand.object_pose",
+    summary="the object lies a little elsewhere in each repetition",
+    stage="posture",
+    place=3,
+    reads=("pose",),
+    writes=("pose",),
+    parameters=Parameters,
+    prepare=prepare,
+)

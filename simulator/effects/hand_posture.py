@@ -17,15 +17,6 @@ class Parameters(EffectParameters, frozen=True):
     sd_deg: Annotated[float, Meta(ge=0.0, le=45.0)] = 1.5
 
 
-EFFECT = Effect(
-    name="hand.posture",
-    summary="joint angles vary from repetition to repetition",
-    stage="posture",
-    reads=("posture_deg",),
-    writes=("posture_deg",),
-)
-
-
 def prepare(parameters: Parameters, setting: Setting) -> Step:
     """Return the step that shifts every joint by a normal deviate of its own, within what it can reach."""
 
@@ -34,3 +25,15 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
         batch.posture_deg = np.clip(shifted, LIMITS_DEG[:, 0], LIMITS_DEG[:, 1])
 
     return step
+
+
+MEMBER = Effect(
+    name="hand.posture",
+    summary="joint angles vary from repetition to repetition",
+    stage="posture",
+    place=2,
+    reads=("posture_deg",),
+    writes=("posture_deg",),
+    parameters=Parameters,
+    prepare=prepare,
+)

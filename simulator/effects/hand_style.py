@@ -28,15 +28,6 @@ class Parameters(EffectParameters, frozen=True):
     log_sd: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.15
 
 
-EFFECT = Effect(
-    name="hand.style",
-    summary="every subject has habits of posture, also by grasp type, and a grip of their own",
-    stage="posture",
-    reads=("posture_deg", "grip_n"),
-    writes=("posture_deg", "grip_n"),
-)
-
-
 def prepare(parameters: Parameters, setting: Setting) -> Step:
     """Return the step that gives the posture and the grip of a batch its subject's style."""
 
@@ -48,3 +39,15 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
         batch.grip_n = batch.grip_n * exp(parameters.log_sd * own[-1:])
 
     return step
+
+
+MEMBER = Effect(
+    name="hand.style",
+    summary="every subject has habits of posture, also by grasp type, and a grip of their own",
+    stage="posture",
+    place=1,
+    reads=("posture_deg", "grip_n"),
+    writes=("posture_deg", "grip_n"),
+    parameters=Parameters,
+    prepare=prepare,
+)

@@ -31,16 +31,6 @@ class Parameters(EffectParameters, frozen=True):
     opening_deg: Annotated[float, Meta(ge=0.0, le=90.0)] = 20.0
 
 
-EFFECT = Effect(
-    name="hand.transition",
-    summary="the hand comes from the grasp before",
-    stage="sense",
-    reads=("previous_deg", "posture_deg", "frame_us", "sensors_deg"),
-    writes=("sensors_deg",),
-    timed=True,
-)
-
-
 def prepare(parameters: Parameters, setting: Setting) -> Step:
     """Return the step that moves the angles of the frames before contact. Raises SceneError where there are none."""
     if not (frame_times(setting) < 0).any():
@@ -74,3 +64,16 @@ def path(start_deg: Floats, end_deg: Floats, way: Floats, opening_deg: float) ->
     left = 1.0 - t
     opened = straight - np.where(_FLEXES, opening_deg, 0.0) * (_BUMP * cubed * cubed * left * left * left)
     return np.maximum(opened, np.minimum(straight, LIMITS_DEG[:, 0]))
+
+
+MEMBER = Effect(
+    name="hand.transition",
+    summary="the hand comes from the grasp before",
+    stage="sense",
+    place=1,
+    reads=("previous_deg", "posture_deg", "frame_us", "sensors_deg"),
+    writes=("sensors_deg",),
+    timed=True,
+    parameters=Parameters,
+    prepare=prepare,
+)

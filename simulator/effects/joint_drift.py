@@ -16,15 +16,6 @@ class Parameters(EffectParameters, frozen=True):
     deg_per_session: Annotated[float, Meta(ge=0.0, le=90.0)] = 5.0
 
 
-EFFECT = Effect(
-    name="joint.drift",
-    summary="joint sensors drift, trial by trial, each subject's in their own way",
-    stage="sense",
-    reads=("trials", "sensors_deg"),
-    writes=("sensors_deg",),
-)
-
-
 def prepare(parameters: Parameters, setting: Setting) -> Step:
     """Return the step that shifts every sensor in proportion to the trials that went before."""
 
@@ -34,3 +25,15 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
         batch.sensors_deg = batch.sensors_deg + (gone[:, None] * whole)[:, None]
 
     return step
+
+
+MEMBER = Effect(
+    name="joint.drift",
+    summary="joint sensors drift, trial by trial, each subject's in their own way",
+    stage="sense",
+    place=3,
+    reads=("trials", "sensors_deg"),
+    writes=("sensors_deg",),
+    parameters=Parameters,
+    prepare=prepare,
+)

@@ -24,15 +24,6 @@ class Parameters(EffectParameters, frozen=True):
     trial_sd_deg: _Degrees = 0.0
 
 
-EFFECT = Effect(
-    name="joint.noise",
-    summary="joint sensors are off a little, in every frame and for a whole repetition",
-    stage="sense",
-    reads=("sensors_deg",),
-    writes=("sensors_deg",),
-)
-
-
 def prepare(parameters: Parameters, setting: Setting) -> Step:
     """Return the step that adds normal noise to every sensor."""
     rows = drawn_rows(setting)
@@ -43,3 +34,15 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
         batch.sensors_deg = batch.sensors_deg + (parameters.trial_sd_deg * deviates[:, :1] + of_frame)
 
     return step
+
+
+MEMBER = Effect(
+    name="joint.noise",
+    summary="joint sensors are off a little, in every frame and for a whole repetition",
+    stage="sense",
+    place=2,
+    reads=("sensors_deg",),
+    writes=("sensors_deg",),
+    parameters=Parameters,
+    prepare=prepare,
+)

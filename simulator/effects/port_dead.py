@@ -33,15 +33,6 @@ class Parameters(EffectParameters, frozen=True):
             raise ValueError("say which `ports` are dead or their `count`, not both")
 
 
-EFFECT = Effect(
-    name="port.dead",
-    summary="whole ports read as open",
-    stage="read",
-    reads=("bits",),
-    writes=("bits",),
-)
-
-
 def prepare(parameters: Parameters, setting: Setting) -> Step:
     """Return the step that opens every switch of the dead ports. Raises SceneError where there are no such ports."""
     switches = len(murakami160())
@@ -66,3 +57,15 @@ def _chooser(parameters: Parameters, there: int) -> Callable[[Draw], Bits]:
     if count > there:
         raise SceneError(f"effects.port.dead.count: {count} ports cannot be dead: the glove has {there}")
     return lambda draw: drawn(draw, there, count)
+
+
+MEMBER = Effect(
+    name="port.dead",
+    summary="whole ports read as open",
+    stage="read",
+    place=5,
+    reads=("bits",),
+    writes=("bits",),
+    parameters=Parameters,
+    prepare=prepare,
+)

@@ -29,16 +29,6 @@ class Parameters(EffectParameters, frozen=True):
     off_ms: Annotated[float, Meta(ge=0.0, le=1000.0)] = 8.0
 
 
-EFFECT = Effect(
-    name="switch.bounce",
-    summary="closing and opening contacts chatter",
-    stage="read",
-    reads=("bits", "on_us", "off_us", "frame_us", "delay_us"),
-    writes=("bits",),
-    timed=True,
-)
-
-
 def prepare(parameters: Parameters, setting: Setting) -> Step:
     """Return the step that flips the bits read while their contact chatters."""
 
@@ -69,3 +59,16 @@ def _flipped(batch: Batch, edge_us: Integers, next_us: Integers, length_us: Floa
     flipped = np.zeros_like(batch.bits)
     flipped[row, :, switch] = within & (np.floor(edges[:, None] * part * part) % 2.0 == 1.0)
     return flipped
+
+
+MEMBER = Effect(
+    name="switch.bounce",
+    summary="closing and opening contacts chatter",
+    stage="read",
+    place=1,
+    reads=("bits", "on_us", "off_us", "frame_us", "delay_us"),
+    writes=("bits",),
+    timed=True,
+    parameters=Parameters,
+    prepare=prepare,
+)

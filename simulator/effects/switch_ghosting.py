@@ -20,15 +20,6 @@ class Parameters(EffectParameters, frozen=True):
     """Nothing to set: a row of the matrix is a port, a column one of its sixteen places."""
 
 
-EFFECT = Effect(
-    name="switch.ghosting",
-    summary="a matrix without diodes closes the fourth corner",
-    stage="read",
-    reads=("bits",),
-    writes=("bits",),
-)
-
-
 def prepare(parameters: Parameters, setting: Setting) -> Step:
     """Return the step that closes every switch to which current finds a way."""
 
@@ -59,3 +50,15 @@ def _columns(bits: Bits) -> NDArray[np.uint16]:
     bytes_ = np.packbits(bits, axis=-1, bitorder="little")
     packed[..., : bytes_.shape[-1]] = bytes_
     return np.moveaxis(packed.view("<u2"), -1, 0)
+
+
+MEMBER = Effect(
+    name="switch.ghosting",
+    summary="a matrix without diodes closes the fourth corner",
+    stage="read",
+    place=4,
+    reads=("bits",),
+    writes=("bits",),
+    parameters=Parameters,
+    prepare=prepare,
+)

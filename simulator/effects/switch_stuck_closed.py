@@ -10,21 +10,24 @@ class Parameters(StuckParameters, frozen=True):
     """Which switches. One that is also stuck open (switch.stuck_open) reads closed."""
 
 
-EFFECT = Effect(
-    name="switch.stuck_closed",
-    summary="some switches always read closed",
-    stage="read",
-    reads=("bits",),
-    writes=("bits",),
-    after=("switch.stuck_open",),
-)
-
-
 def prepare(parameters: Parameters, setting: Setting) -> Step:
     """Return the step that closes them. Raises SceneError where the glove has no such switch."""
-    stuck = chooser(EFFECT.name, parameters)
+    stuck = chooser(MEMBER.name, parameters)
 
     def step(batch: Batch, draw: Draw) -> None:
         batch.bits = batch.bits | stuck(draw)
 
     return step
+
+
+MEMBER = Effect(
+    name="switch.stuck_closed",
+    summary="some switches always read closed",
+    stage="read",
+    place=3,
+    reads=("bits",),
+    writes=("bits",),
+    after=("switch.stuck_open",),
+    parameters=Parameters,
+    prepare=prepare,
+)

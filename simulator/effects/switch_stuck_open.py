@@ -10,20 +10,23 @@ class Parameters(StuckParameters, frozen=True):
     """Which switches. One that is also stuck closed (switch.stuck_closed) reads closed."""
 
 
-EFFECT = Effect(
-    name="switch.stuck_open",
-    summary="some switches never read closed",
-    stage="read",
-    reads=("bits",),
-    writes=("bits",),
-)
-
-
 def prepare(parameters: Parameters, setting: Setting) -> Step:
     """Return the step that opens them. Raises SceneError where the glove has no such switch."""
-    stuck = chooser(EFFECT.name, parameters)
+    stuck = chooser(MEMBER.name, parameters)
 
     def step(batch: Batch, draw: Draw) -> None:
         batch.bits = batch.bits & ~stuck(draw)
 
     return step
+
+
+MEMBER = Effect(
+    name="switch.stuck_open",
+    summary="some switches never read closed",
+    stage="read",
+    place=2,
+    reads=("bits",),
+    writes=("bits",),
+    parameters=Parameters,
+    prepare=prepare,
+)

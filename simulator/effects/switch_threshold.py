@@ -19,15 +19,6 @@ class Parameters(EffectParameters, frozen=True):
     sd_n: Annotated[float, Meta(ge=0.0, le=5.0)] = 0.15
 
 
-EFFECT = Effect(
-    name="switch.threshold",
-    summary="each switch closes at a force of its own",
-    stage="switch",
-    reads=("thresholds_n",),
-    writes=("thresholds_n",),
-)
-
-
 def prepare(parameters: Parameters, setting: Setting) -> Step:
     """Return the step that shifts every threshold by a normal deviate, the glove's own."""
 
@@ -36,3 +27,15 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
         batch.thresholds_n = np.maximum(batch.thresholds_n + parameters.sd_n * deviates, LEAST_N)
 
     return step
+
+
+MEMBER = Effect(
+    name="switch.threshold",
+    summary="each switch closes at a force of its own",
+    stage="switch",
+    place=1,
+    reads=("thresholds_n",),
+    writes=("thresholds_n",),
+    parameters=Parameters,
+    prepare=prepare,
+)

@@ -21,16 +21,6 @@ class Parameters(EffectParameters, frozen=True):
     rate: Annotated[float, Meta(gt=0.0, lt=1.0)] = 1e-4
 
 
-EFFECT = Effect(
-    name="wire.damaged_bytes",
-    summary="bits are turned on the serial lines",
-    stage="wire",
-    reads=("traffic",),
-    writes=("traffic",),
-    on_wire=True,
-)
-
-
 def damaged(data: Bytes, chances: NDArray[np.float64], rate: float) -> Bytes:
     """Return the bytes as they arrive, for one uniform number each, any shape: below `rate` it says which bit turns."""
     bit = np.minimum(8.0 * chances / rate, 7.0).astype(np.uint8)
@@ -47,3 +37,16 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
         batch.traffic = replace(traffic, data=damaged(traffic.data, chances, parameters.rate))
 
     return step
+
+
+MEMBER = Effect(
+    name="wire.damaged_bytes",
+    summary="bits are turned on the serial lines",
+    stage="wire",
+    place=2,
+    reads=("traffic",),
+    writes=("traffic",),
+    on_wire=True,
+    parameters=Parameters,
+    prepare=prepare,
+)

@@ -19,16 +19,6 @@ class Parameters(EffectParameters, frozen=True):
     rate: Annotated[float, Meta(gt=0.0, lt=1.0)] = 1e-4
 
 
-EFFECT = Effect(
-    name="wire.lost_bytes",
-    summary="bytes are lost on the serial lines",
-    stage="wire",
-    reads=("traffic",),
-    writes=("traffic",),
-    on_wire=True,
-)
-
-
 def arrives(chances: NDArray[np.float64], rate: float) -> NDArray[np.bool_]:
     """Return which bytes arrive, for one uniform number each, any shape."""
     return chances >= rate
@@ -44,3 +34,16 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
         batch.traffic = replace(traffic, arrives=traffic.arrives & arrives(chances, parameters.rate))
 
     return step
+
+
+MEMBER = Effect(
+    name="wire.lost_bytes",
+    summary="bytes are lost on the serial lines",
+    stage="wire",
+    place=1,
+    reads=("traffic",),
+    writes=("traffic",),
+    on_wire=True,
+    parameters=Parameters,
+    prepare=prepare,
+)

@@ -6,12 +6,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..body.condition import Condition
-from .traffic import Traffic
+from ..contact.model import Contact, Load
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Traffic:
+    """The bytes of n repetitions, F frames each; of a frame's B bytes the first `scanner` go over the scanner's line,
+    the others over the CyberGlove's.
+
+    A byte keeps its place from sending to receiving, so that what happens to one never shifts the fate of another.
+
+    data    (n, F, B) uint8  as they arrive
+    at_us   (n, F, B)        when each has arrived in full
+    arrives (n, F, B)        False where one is lost on the way
+    """
+
+    data: NDArray[np.uint8]
+    at_us: NDArray[np.int64]
+    arrives: NDArray[np.bool_]
+    scanner: int
+
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Bits = NDArray[np.bool_]
 
+# An object that slid so far was dropped: ours.
+SLID_OUT_MM = 20.0
 # The time of a switch that never closes or never opens.
 NEVER = np.iinfo(np.int64).max
 
@@ -71,3 +92,22 @@ class Batch:
 
     def __len__(self) -> int:
         return len(self.repetitions)
+
+    def load(self) -> Load:
+        """Return what the batch tells its hands."""
+        return Load(self.condition, self.posture_deg, self.pose, self.grip_n)
+
+    def slid_mm(self) -> Floats:
+        """Return how far (n,) each object lies from where the hand was told to hold it."""
+        x, y, z = (self.pose[:, :3] - self.commanded_pose[:, :3]).T
+        distance: Floats = np.sqrt(x * x + y * y + z * z)
+        return distance
+
+    def take(self, contact: Contact) -> None:
+        """Let the hands rest as solved. A grasp whose object slid out of the hand has not settled: what holds it then
+        is no hand.
+        """
+        self.commanded_deg, self.commanded_pose = self.posture_deg, self.pose
+        self.posture_deg, self.pose, self.forces_n = contact.posture_deg, contact.pose, contact.forces_n
+        self.settled, self.between_n = contact.settled & (self.slid_mm() <= SLID_OUT_MM), contact.between_n
+        self.residual_n, self.residual_nmm = contact.residual_n, contact.residual_nmm

@@ -1,23 +1,27 @@
-"""What an effect is: one module of `thenar.simulator.effects` that changes a batch in one way.
+"""What an effect is: one record of one way to change a batch, in one module of `thenar.simulator.effects`.
 
 Such a module holds three things:
 
     class Parameters(EffectParameters)         what a scene may set, with defaults and limits
-    EFFECT = Effect(...)                       where it belongs, what it reads and writes
     def prepare(parameters, setting) -> Step   everything that is done once; the step does the rest, batch by batch
+    MEMBER = Effect(...)                       its name, where it belongs, what it reads and writes, and these two
 
-A contact model has `model(parameters, setting) -> ContactModel` instead, and contact.ramp's `prepare` is given it
-and returns a `Together`.
+A contact model has `model(parameters, setting) -> ContactModel` instead of `prepare`. An effect that asks the contact
+model again has `together(parameters, setting, contact) -> Together`.
 
 `Effect.name` is the key of the scene: [effects.joint.noise] is "joint.noise", in the module effects/joint_noise.py.
+Other packages add effects by entry points in the group `thenar.effects`.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import msgspec
 
+from thenar.drivers.members import Members
+
+from ..contact.model import ContactModel
 from ..streams import Draw
 from .batch import Batch
 
@@ -39,11 +43,14 @@ class EffectParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, 
 class Effect:
     """What the pipeline must know of an effect.
 
+    place          among the effects of its stage, where nothing else decides
     reads, writes  fields of `Batch`
     after          effects that act before it when they are listed too
     conflicts      effects that cannot be listed beside it
     timed          True where the effect lives in time, so that whole streams of frames are simulated
     on_wire        True where it acts on bytes, so that frames are sent and received as bytes
+    parameters     what a scene may set
+    prepare, model, together   one of them makes what acts
     """
 
     name: str
@@ -51,10 +58,20 @@ class Effect:
     stage: Stage
     reads: tuple[str, ...]
     writes: tuple[str, ...]
+    place: int = 0
     after: tuple[str, ...] = ()
     conflicts: tuple[str, ...] = ()
     timed: bool = False
     on_wire: bool = False
+    parameters: type[EffectParameters] = EffectParameters
+    prepare: Callable[[Any, "Setting"], Step] | None = None
+    model: Callable[[Any, "Setting"], ContactModel] | None = None
+    together: Callable[[Any, "Setting", ContactModel], Together] | None = None
+
+    @property
+    def rank(self) -> tuple[int, int]:
+        """Who goes first where nothing else decides."""
+        return STAGES.index(self.stage), self.place
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,3 +94,6 @@ class Setting:
     release_us: int
     timed: bool
     on_wire: bool
+
+
+EFFECTS = Members("effect", Effect, "thenar.simulator.effects", "thenar.effects")

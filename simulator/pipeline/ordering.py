@@ -1,33 +1,27 @@
 """In which order the steps of a scene act.
 
 Stage by stage. Within a stage, an effect acts after the glove's own step that makes what it touches, and before the one
-that reads what it alters; after those that `Effect.after` and the scene's `after` name; and else in registry order.
+that reads what it alters; after those that `Effect.after` and the scene's `after` name; and else by its rank.
 """
 
 import heapq
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
 
 from thenar.compiler.recordings.names import nearest
 
 from ..errors import SceneError
-from .effect import STAGES, Effect
-from .registry import NAMES
+from .effect import STAGES, Effect, EffectParameters
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A step that wants its place: `own` steps stand in the order they have, `after` is what the scene says of it."""
+    """A step that wants its place: `own` steps keep the order they have, `parameters` are what the scene sets."""
 
     effect: Effect
     own: bool
-    after: tuple[str, ...] = ()
-
-    @property
-    def rank(self) -> int:
-        """Who goes first where nothing else decides."""
-        return NAMES.index(self.effect.name) if self.effect.name in NAMES else -1
+    parameters: EffectParameters = field(default_factory=EffectParameters)
 
 
 def in_order(places: Sequence[Place]) -> list[Place]:
@@ -54,13 +48,13 @@ def _check_after(places: Sequence[Place]) -> None:
     listed = [place.effect.name for place in places if not place.own]
     for place in places:
         name, stage = place.effect.name, place.effect.stage
-        for other in place.after:
+        for other in place.parameters.after:
             if other not in listed:
                 raise SceneError(
                     f"effects.{name}.after: the scene lists no effect {other!r}{nearest(other, listed)}: "
                     "list it too, or leave it out here"
                 )
-        for other in (*place.after, *place.effect.after):
+        for other in (*place.parameters.after, *place.effect.after):
             if stages.get(other, 0) > STAGES.index(stage):
                 raise SceneError(
                     f"effects.{name}.after: a circle: {name} -> {other} -> {name}: {other!r} belongs to the stage "
@@ -75,10 +69,10 @@ def _sorted(places: list[Place]) -> Iterator[Place]:
         sorter.prepare()
     except CycleError as reason:
         raise SceneError(f"effects act after each other in a circle: {' -> '.join(reason.args[1])}") from None
-    ready: list[tuple[int, str]] = []
+    ready: list[tuple[tuple[int, int], str]] = []
     while sorter.is_active():
         for name in sorter.get_ready():
-            heapq.heappush(ready, (by_name[name].rank, name))
+            heapq.heappush(ready, (by_name[name].effect.rank, name))
         _, name = heapq.heappop(ready)
         yield by_name[name]
         sorter.done(name)
@@ -86,7 +80,7 @@ def _sorted(places: list[Place]) -> Iterator[Place]:
 
 def _waits_for(place: Place, places: list[Place]) -> set[str]:
     """Return the names of those of one stage that act before `place`."""
-    named = {*place.after, *place.effect.after} & {other.effect.name for other in places}
+    named = {*place.parameters.after, *place.effect.after} & {other.effect.name for other in places}
     return named | {other.effect.name for other in places if other is not place and _precedes(other, place, places)}
 
 

@@ -10,15 +10,14 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.drivers import cyberglove_frame as glove
-from thenar.drivers import scanner_frame as scanner
+from thenar.drivers import cyberglove_protocol as glove
+from thenar.drivers import scanner_protocol as scanner
 
 from ..body.layout import murakami160
 from ..errors import SceneError
 from ..streams import Draw
-from .batch import Batch
-from .effect import Effect, Setting, Step
-from .traffic import Traffic
+from .batch import Batch, Traffic
+from .effect import Effect, EffectParameters, Setting, Step
 
 Bits = NDArray[np.bool_]
 Bytes = NDArray[np.uint8]
@@ -32,7 +31,7 @@ _BITS_A_BYTE = 10
 _DIGITISED_US = 250 * glove.SENSORS
 
 
-def _send(setting: Setting) -> Step:
+def _send(parameters: EffectParameters, setting: Setting) -> Step:
     _check_rate(setting)
 
     def send(batch: Batch, draw: Draw) -> None:
@@ -57,7 +56,7 @@ def _check_rate(setting: Setting) -> None:
         )
 
 
-def _receive(setting: Setting) -> Step:
+def _receive(parameters: EffectParameters, setting: Setting) -> Step:
     return receive
 
 
@@ -132,12 +131,12 @@ def _decoded(data: Bytes, at_us: Integers, feed: Feed) -> Iterator[tuple[int, by
 
 
 def _payloads() -> Feed:
-    decoder = scanner.Decoder()
+    decoder = scanner.FrameDecoder()
     return lambda chunk: [frame.payload for frame in decoder.feed(chunk) if frame.kind == scanner.STATE]
 
 
 def _sensors() -> Feed:
-    decoder = glove.Decoder()
+    decoder = glove.RecordDecoder()
     return lambda chunk: [record.sensors for record in decoder.feed(chunk) if record.fault is None]
 
 
@@ -146,25 +145,21 @@ def _newest(came: Bits) -> NDArray[np.intp]:
     return np.maximum.accumulate(np.where(came, np.arange(came.shape[1]), -1), axis=1)
 
 
-SEND = (
-    Effect(
-        name="glove.send",
-        summary="puts frames and records on the serial lines as bytes",
-        stage="wire",
-        reads=("bits", "raw", "frame_us", "delay_us"),
-        writes=("traffic",),
-        on_wire=True,
-    ),
-    _send,
+SEND = Effect(
+    name="glove.send",
+    summary="puts frames and records on the serial lines as bytes",
+    stage="wire",
+    reads=("bits", "raw", "frame_us", "delay_us"),
+    writes=("traffic",),
+    on_wire=True,
+    prepare=_send,
 )
-RECEIVE = (
-    Effect(
-        name="glove.receive",
-        summary="decodes the bytes that arrive, as a driver does",
-        stage="wire",
-        reads=("traffic", "bits", "settled"),
-        writes=("bits", "raw", "lost", "settled"),
-        on_wire=True,
-    ),
-    _receive,
+RECEIVE = Effect(
+    name="glove.receive",
+    summary="decodes the bytes that arrive, as a driver does",
+    stage="wire",
+    reads=("traffic", "bits", "settled"),
+    writes=("bits", "raw", "lost", "settled"),
+    on_wire=True,
+    prepare=_receive,
 )

@@ -10,8 +10,8 @@ import msgspec
 
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, EmulatedI2c
-from thenar.drivers.emulated.pty_line import PtyLine
 from thenar.drivers.emulated.scanner import EmulatedScanner
+from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.harness.wiring import BusWiring, Harness
 from thenar.runtime.sources.cyberglove import sensors_of
 

@@ -16,7 +16,7 @@ def cable_of(scene: Scene, line: int) -> Cable | None:
     The draws of every line are its own, and the same for the same seed.
     """
     rates = {listed.name: listed.parameters for listed in scene.effects}
-    lost, damaged = rates.get(wire_lost_bytes.EFFECT.name), rates.get(wire_damaged_bytes.EFFECT.name)
+    lost, damaged = rates.get(wire_lost_bytes.MEMBER.name), rates.get(wire_damaged_bytes.MEMBER.name)
     if lost is None and damaged is None:
         return None
     random = np.random.Generator(np.random.Philox(key=[scene.seed, line]))

@@ -6,8 +6,8 @@ from thenar.compiler.workers import workers_of
 
 from ..pipeline.frames import at_a_time
 from ..pipeline.ledger import Entry, Ledger
-from ..pipeline.pipeline import Pipeline, Stop, compile_pipeline
 from ..scenes.scene import Scene
+from .pipeline import Pipeline, Stop, compile_pipeline
 from .sampling import middle_session, sample
 from .session import Session
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from ..contact.model import SLID_OUT_MM, slid_mm
-from ..pipeline.batch import Batch
+from ..pipeline.batch import SLID_OUT_MM, Batch
 
 
 class Unsettled(msgspec.Struct, frozen=True):
@@ -65,7 +64,7 @@ def _unsettled(batch: Batch, row: int) -> Unsettled:
 def _why(batch: Batch, row: int) -> str:
     if batch.lost is not None and batch.lost[row].all():
         return "no frame arrived whole"
-    slid = slid_mm(batch)[row]
+    slid = batch.slid_mm()[row]
     if slid > SLID_OUT_MM:
         return f"the object slid {slid:.0f} mm, out of the hand"
     force, moment = batch.residual_n[row], batch.residual_nmm[row]

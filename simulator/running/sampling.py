@@ -8,9 +8,9 @@ import numpy as np
 from ..pipeline.batch import Batch
 from ..pipeline.frames import at_a_time
 from ..pipeline.ledger import Ledger
-from ..pipeline.pipeline import Pipeline, compile_pipeline
 from ..planning.postures import Postures
 from ..scenes.scene import Scene
+from .pipeline import Pipeline, compile_pipeline
 from .session import Session, conditions_of, session_of
 
 _ROUNDS = 3

@@ -17,10 +17,10 @@ from ..errors import SceneError
 from ..pipeline.batch import Batch
 from ..pipeline.frames import at_a_time, hold_frame
 from ..pipeline.ledger import Ledger
-from ..pipeline.pipeline import Pipeline, compile_pipeline
 from ..planning.postures import Postures
 from ..scenes.scene import Scene
 from .notes import Notes, Unsettled, notes_of
+from .pipeline import Pipeline, compile_pipeline
 from .report import Report, grasp_reports, step_reports
 from .rows import Codes, Rows, grasp_set, joined, rows_of
 from .session import Session, sessions

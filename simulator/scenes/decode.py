@@ -15,8 +15,7 @@ from thenar.runtime.toml_source import Source, read_source
 from thenar.runtime.toml_struct import as_list, as_table, check_finite, convert
 
 from ..errors import SceneError, ThenarError
-from ..pipeline import registry
-from ..pipeline.effect import EffectParameters
+from ..pipeline.effect import EFFECTS
 from ..pipeline.ordering import Place as Ordered
 from ..pipeline.ordering import in_order
 from . import shipped
@@ -44,7 +43,7 @@ class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 def load_scene(name_or_path: str | Path) -> Scene:
     """Return the scene that is shipped under a name, or lies in a TOML file: what has a suffix or a folder is a file.
 
-    Imports the modules of the effects that it lists, and no others. Raises SceneError with file, line and key.
+    Raises SceneError with file, line and key.
     """
     path = Path(name_or_path)
     source = read_source(_file(path), SceneError)
@@ -141,8 +140,12 @@ class _Decoder:
 
     def _effects(self) -> tuple[Listed, ...]:
         tables = dict(self._effect_tables())
-        listed = tuple(Listed(name, self._parameters(name, tables[name])) for name in registry.NAMES if name in tables)
-        places = [Ordered(registry.load(name).EFFECT, own=False, after=each.after) for name, each in listed]
+        listed = tuple(
+            Listed(name, convert(self.source, ("effects", *name.split(".")), tables[name], effect.parameters))
+            for name, effect in EFFECTS.items()
+            if name in tables
+        )
+        places = [Ordered(EFFECTS[name], own=False, parameters=each) for name, each in listed]
         try:
             in_order(places)
         except SceneError as reason:
@@ -167,11 +170,7 @@ class _Decoder:
                 yield f"{group}.{name}", table
 
     def _check_effect(self, name: str, place: tuple[str, ...]) -> None:
-        if name not in registry.NAMES:
-            raise self.source.error(place, f"there is no effect {name!r}{nearest(name, registry.NAMES)}")
+        if name not in EFFECTS:
+            raise self.source.error(place, f"there is no effect {name!r}{nearest(name, tuple(EFFECTS))}")
         if len(place) != 3:
             raise self.source.error(place, f"write the name without quotes: [effects.{name}]")
-
-    def _parameters(self, name: str, table: object) -> EffectParameters:
-        kind: type[EffectParameters] = registry.load(name).Parameters
-        return convert(self.source, ("effects", *name.split(".")), table, kind)

@@ -9,12 +9,12 @@ from thenar.compiler.evaluation.errors import EvaluationError
 from thenar.compiler.evaluation.study import Options, evaluate
 from thenar.simulator import load_scene, simulate
 from thenar.simulator.effects.contact_quasistatic import Parameters
-from thenar.simulator.pipeline.registry import load
+from thenar.simulator.pipeline.effect import EFFECTS
 from thenar.simulator.scenes.scene import Listed, Scene
 
 KEPT = ("hand.posture", "joint.noise")
 # So much noise that it matters to joints, and to nothing else.
-NOISE = Listed("joint.noise", load("joint.noise").Parameters(sd_deg=40.0))
+NOISE = Listed("joint.noise", EFFECTS["joint.noise"].parameters(sd_deg=40.0))
 
 
 def scene_of(repetitions: int, subjects: int = 1) -> Scene:

@@ -11,10 +11,10 @@ from threading import Timer
 
 import pytest
 
-from thenar.drivers.calibration_poses import FLAT, POSES
-from thenar.drivers.cyberglove_sensors import SENSORS_18, SENSORS_22
+from thenar.drivers.calibration import FLAT, POSES
+from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
-from thenar.drivers.emulated.pty_line import PtyLine
+from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.calibration import load_calibration
 
 # Dialogues over a pty, in real time.

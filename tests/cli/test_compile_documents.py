@@ -156,7 +156,7 @@ def test_a_method_that_takes_a_number_keeps_it(thenar: Thenar, gloved_file: Path
         (("--placement", "elimination"), "needs --keep"),
         (("--placement", "elimination", "--keep", 2, "--prune", 3), "knows no --prune"),
         (("--keep", 2), "cannot --keep a given number"),
-        (("--placement", "crystal-ball", "--keep", 2), "there is no placement 'crystal-ball'"),
+        (("--placement", "crystal-ball", "--keep", 2), "there is no placement method 'crystal-ball'"),
     ],
 )
 def test_a_method_gets_its_own_parameter(

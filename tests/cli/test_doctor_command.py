@@ -7,11 +7,10 @@ import pytest
 
 from thenar.compiler import GraspSet, compile_build
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
-from thenar.drivers.cyberglove_sensors import SENSORS_18
+from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
-from thenar.drivers.emulated.pty_line import PtyLine
-from thenar.drivers.emulated.scanner import EmulatedScanner
-from thenar.drivers.emulated.scanner_board import ScannerBoard
+from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
+from thenar.drivers.emulated.serial_line import PtyLine
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
 

@@ -10,7 +10,7 @@ Captured = pytest.CaptureFixture[str]
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("--methods", "nonsense"), "there is no method 'nonsense'"),
+        (("--methods", "nonsense"), "there is no placement method 'nonsense'"),
         (("--budget-us", "5", "--rate", "0.5"), "give one of them"),
         (("--rate", "1.5"), "1.5 is not in the range"),
         (("--dask", "nowhere"), "no Dask scheduler answers at 'nowhere'"),

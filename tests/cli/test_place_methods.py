@@ -131,7 +131,7 @@ def test_a_standard_placement_is_printed_stored_and_drawn(
         (["--method", "elimination"], "tell this method how many switches to --keep"),
         (["--keep", "3"], "ID3 takes --prune S"),
         (["--method", "cmim", "--keep", "3", "--prune", "4"], "--prune is for ID3"),
-        (["--method", "elimintion", "--keep", "3"], "there is no placement method 'elimintion': there are id3"),
+        (["--method", "elimintion", "--keep", "3"], "there is no placement method 'elimintion': choose one of"),
         (["--method", "cmim", "--keep", "3", "--tree"], "--tree prints the tree of the paper's ID3"),
         (["--method", "cmim", "--keep", "3", "--draw", "a.svg"], "--draw draws ID3's tree, or a --crowd"),
         (["--crowd", "--keep", "3", "--exact"], "--exact judges one placement"),

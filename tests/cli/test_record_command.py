@@ -17,8 +17,8 @@ import pytest
 from thenar.cli import run
 from thenar.compiler import GraspSet
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
-from thenar.drivers.emulated.pty_line import PtyLine
 from thenar.drivers.emulated.scanner import EmulatedScanner
+from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.recording.guide import read_journal
 
 # Collections over ptys, in real time.

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from thenar.compiler.boosting.stumpfit import Targets, _tie_bound
 from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.placement.cooccurrence import Cooccurrence
-from thenar.compiler.placement.gain import Node, _error_bound
-from thenar.compiler.placement.logsums import _log_sum
+from thenar.compiler.placement.exact import _log_sum, error_bound
+from thenar.compiler.placement.gain import Node, _score_bound
 from thenar.compiler.tables.collapse import ScoreTables, collapse
 from thenar.compiler.tables.compare import COLLAPSE_TOLERANCE, compare, float_slack, rounding_error
 from thenar.compiler.tables.quantise import quantise
@@ -31,6 +31,12 @@ def test_information_of_pairs_counts_four_sums_of_six_terms_a_class(n: int, clas
     assert counts.error_bound == pytest.approx(4 * rows * log(rows) * (6 * (classes + 1) + 16) * UNIT, rel=1e-12, abs=0)
 
 
+@given(st.integers(1, 60), st.integers(1, 40), st.integers(1, 4))
+def test_a_sum_of_counts_times_their_logarithms_counts_its_terms_and_sixteen(n: int, terms: int, times: int) -> None:
+    rows = max(n, 2)
+    assert error_bound(n, terms, times) == pytest.approx(times * rows * log(rows) * (terms + 16) * UNIT, rel=1e-12)
+
+
 @given(st.integers(1, 50), st.integers(1, 5), st.lists(st.integers(1, 4), min_size=1, max_size=4))
 def test_a_score_of_gain_counts_a_term_a_class_and_value(n: int, classes: int, cells: list[int]) -> None:
     totals = np.bincount(np.arange(n) % classes, minlength=classes)
@@ -39,7 +45,7 @@ def test_a_score_of_gain_counts_a_term_a_class_and_value(n: int, classes: int, c
     # An input of all cells but one for each other input; and its first value, which has no cell.
     values = sum(cells) - (len(cells) - 1) + 1
     terms, rows = (classes + 1) * values, max(n, 2)
-    assert _error_bound(node) == pytest.approx(2 * n * log(rows) * (terms + 16) * UNIT, rel=1e-12, abs=0)
+    assert _score_bound(node) == pytest.approx(2 * rows * log(rows) * (terms + 16) * UNIT, rel=1e-12, abs=0)
 
 
 @given(st.integers(1, 40), st.floats(1.5, 10.0), st.floats(1e-3, 1.0))

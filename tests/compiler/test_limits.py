@@ -17,8 +17,8 @@ from thenar.compiler.frontier.material import Material
 from thenar.compiler.frontier.points import FrontierError
 from thenar.compiler.limits import check_inputs, check_memory
 from thenar.compiler.placement.errors import PlacementError
+from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.placement.placement import place
-from thenar.compiler.placement.ways import chooser
 from thenar.compiler.samples import Samples, SamplesError
 from thenar.drivers.errors import ThenarError
 
@@ -114,7 +114,7 @@ def wide(make_set: Make) -> GraspSet:
 @pytest.mark.parametrize("method", ["cmim", "mrmr", "mutual-information"])
 def test_of_many_switches_few_are_chosen_without_counting_all_pairs(wide: GraspSet, method: str) -> None:
     began = process_time()
-    placement = chooser(method, Samples(wide.switches, wide.codes, wide.labels, tuple("01")))(5)
+    placement = METHODS[method].chooser(Samples(wide.switches, wide.codes, wide.labels, tuple("01")))(5)
     assert len(set(placement)) == 5
     assert process_time() - began < 10 * SECONDS
 

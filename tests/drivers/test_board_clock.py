@@ -1,7 +1,7 @@
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from thenar.drivers.board_clock import BoardClock
+from thenar.drivers.scanner_state import BoardClock
 
 WRAP = 1 << 32
 START = 10_000_000_000

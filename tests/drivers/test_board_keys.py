@@ -1,10 +1,19 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.board_keys import BoardKeys
-from thenar.drivers.emulated.scanner_board import ScannerBoard
-from thenar.drivers.scanner_frame import Decoder
-from thenar.drivers.scanner_messages import WITHOUT_DIODES, Event, Faults, FromBoard, Heartbeat, Lost, State, from_board
+from thenar.drivers.emulated.scanner import ScannerBoard
+from thenar.drivers.scanner_protocol import (
+    WITHOUT_DIODES,
+    Event,
+    Faults,
+    FrameDecoder,
+    FromBoard,
+    Heartbeat,
+    Lost,
+    State,
+    from_board,
+)
+from thenar.drivers.scanner_state import BoardKeys
 
 KEYS = 12
 EVERY = (1 << KEYS) - 1
@@ -93,7 +102,7 @@ def test_whatever_frames_are_missing_what_is_known_is_true(
     steps: list[tuple[int, int]], missing: set[int], beat: int, damaged: bool
 ) -> None:
     """A board tells every change, of keys and of what it can read, and now and then all; nothing else is believed."""
-    board, decoder = ScannerBoard(1, KEYS, heartbeat_us=beat), Decoder()
+    board, decoder = ScannerBoard(1, KEYS, heartbeat_us=beat), FrameDecoder()
     board.boot(0)
     keys, truth = BoardKeys(1, KEYS), BoardKeys(1, KEYS)
     for now, (closed, unread) in enumerate(steps):

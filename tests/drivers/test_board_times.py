@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.board_times import BoardTimes
-from thenar.drivers.scanner_messages import Event, Faults, FromBoard, Heartbeat, Hello, State
+from thenar.drivers.scanner_protocol import Event, Faults, FromBoard, Heartbeat, Hello, State
+from thenar.drivers.scanner_state import BoardTimes
 
 KEYS = 8
 START_US = 10_000_000_000

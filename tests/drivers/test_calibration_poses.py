@@ -2,8 +2,8 @@ from collections import Counter
 
 import pytest
 
-from thenar.drivers.calibration_poses import FLAT, POSES, Held, calibration, held, problems
-from thenar.drivers.cyberglove_sensors import SENSORS_18, SENSORS_22
+from thenar.drivers.calibration import FLAT, POSES, Held, calibration, held, problems
+from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22
 
 FIST = POSES[0]
 

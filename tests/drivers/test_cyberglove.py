@@ -12,12 +12,10 @@ from time import monotonic, monotonic_ns
 import pytest
 
 from thenar.drivers.cyberglove import CyberGlove
-from thenar.drivers.cyberglove_frame import Record
-from thenar.drivers.cyberglove_sensors import MASK_18, MASK_22, SENSORS_18, SENSORS_22
+from thenar.drivers.cyberglove_protocol import MASK_18, MASK_22, SENSORS_18, SENSORS_22, Record
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
-from thenar.drivers.emulated.cyberglove_box import CyberGloveBox, Doubts
-from thenar.drivers.emulated.cyberglove_state import GloveState
-from thenar.drivers.emulated.pty_line import PtyLine
+from thenar.drivers.emulated.cyberglove_box import CyberGloveBox, Doubts, GloveState
+from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.serial_line import SerialLine
 

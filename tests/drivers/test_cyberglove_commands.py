@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.cyberglove_commands import ANSWERED, INFORMATION, SET, Answer, find_answer, query, setting
+from thenar.drivers.cyberglove_protocol import ANSWERED, INFORMATION, SET, Answer, find_answer, query, setting
 from thenar.drivers.errors import SettingError
 
 LETTERS = sorted(ANSWERED)

@@ -1,7 +1,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.cyberglove_sensors import MASK_18, MASK_22, SENSORS_18, SENSORS_22, masked_sensors
+from thenar.drivers.cyberglove_protocol import MASK_18, MASK_22, SENSORS_18, SENSORS_22, masked_sensors
 
 # As Shadow (22) and toon (18) list them, under our names.
 OF_22 = """thumb_rotation thumb_mpj thumb_ij thumb_abduction index_mpj index_pij index_dij middle_mpj middle_pij

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.cyberglove_timing import digitising_us, period_words, sending_us, shortest_us, told_us
+from thenar.drivers.cyberglove_protocol import digitising_us, period_words, sending_us, shortest_us, told_us
 from thenar.drivers.errors import SettingError
 
 

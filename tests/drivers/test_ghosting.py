@@ -1,8 +1,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.emulated.matrix import read_without_diodes
-from thenar.drivers.ghosting import ambiguous
+from thenar.drivers.emulated.scanner import read_without_diodes
+from thenar.drivers.scanner_state import ambiguous
 
 MATRICES = st.tuples(st.integers(1, 5), st.integers(1, 5)).flatmap(
     lambda size: st.tuples(st.just(size[0]), st.just(size[1]), st.integers(0, (1 << size[0] * size[1]) - 1))

@@ -11,13 +11,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers import cyberglove_frame, scanner_frame
-from thenar.drivers.cyberglove_commands import ANSWERED, INFORMATION, SET, Answer, Command, find_answer, query, setting
-from thenar.drivers.cyberglove_frame import Record
-from thenar.drivers.emulated.cyberglove_box import CyberGloveBox, Doubts
-from thenar.drivers.emulated.cyberglove_state import GloveState
-from thenar.drivers.scanner_messages import FromBoard, Heartbeat, State, frame, from_board
-from thenar.drivers.scanner_payload import MessageError
+from thenar.drivers import cyberglove_protocol, scanner_protocol
+from thenar.drivers.cyberglove_protocol import (
+    ANSWERED,
+    INFORMATION,
+    SET,
+    Answer,
+    Command,
+    Record,
+    find_answer,
+    query,
+    setting,
+)
+from thenar.drivers.emulated.cyberglove_box import CyberGloveBox, Doubts, GloveState
+from thenar.drivers.scanner_protocol import FromBoard, Heartbeat, MessageError, State, frame, from_board
 
 KEYS = 40
 Feed = Callable[[bytes], list[Any]]
@@ -34,18 +41,18 @@ class Parser:
 
 def glove(sensors: int, status: bool) -> Parser:
     def make() -> tuple[Feed, Callable[[], int]]:
-        decoder = cyberglove_frame.Decoder(sensors, status=status)
+        decoder = cyberglove_protocol.RecordDecoder(sensors, status=status)
         return decoder.feed, lambda: len(decoder._pieces._rest)
 
     byte = 0x83 if status else None
     records = [Record(bytes([value] * sensors), value % 2 == 0, None, byte) for value in (1, 71, 83, 101, 255)]
     records += [Record(b"S" * sensors, True, fault, byte) for fault in ("too fast", "unplugged")]
-    return Parser(make, tuple(map(cyberglove_frame.encode, records)), sensors + 5)
+    return Parser(make, tuple(map(cyberglove_protocol.encode, records)), sensors + 5)
 
 
-def scanner(read: Callable[[scanner_frame.Frame], Any]) -> Parser:
+def scanner(read: Callable[[scanner_protocol.Frame], Any]) -> Parser:
     def make() -> tuple[Feed, Callable[[], int]]:
-        decoder = scanner_frame.Decoder()
+        decoder = scanner_protocol.FrameDecoder()
         return (
             lambda chunk: [read(received) for received in decoder.feed(chunk)],
             lambda: len(decoder._pieces._rest),
@@ -54,11 +61,11 @@ def scanner(read: Callable[[scanner_frame.Frame], Any]) -> Parser:
     every = (1 << KEYS) - 1
     messages: list[FromBoard] = [State(0, KEYS), State(every, KEYS), Heartbeat(0, 0, KEYS)]
     messages.append(Heartbeat(2**32 - 1, every, KEYS))
-    frames = tuple(scanner_frame.encode(frame(message, number)) for number, message in enumerate(messages))
-    return Parser(make, frames, scanner_frame.MAX_PAYLOAD + scanner_frame.OVERHEAD)
+    frames = tuple(scanner_protocol.encode(frame(message, number)) for number, message in enumerate(messages))
+    return Parser(make, frames, scanner_protocol.MAX_PAYLOAD + scanner_protocol.OVERHEAD)
 
 
-def message_or_misfit(received: scanner_frame.Frame) -> Any:
+def message_or_misfit(received: scanner_protocol.Frame) -> Any:
     try:
         return from_board(received, KEYS)
     except MessageError as error:

@@ -1,7 +1,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.pieces import Pieces
+from thenar.drivers.serial_line import Pieces
 
 # Zeros often enough that there are pieces of every length.
 STREAMS = st.lists(st.sampled_from([0, 0, 1, 2, 255])).map(bytes)

@@ -11,14 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from thenar.drivers import scanner_frame
-from thenar.drivers.emulated.pty_line import PtyLine
-from thenar.drivers.emulated.scanner import EmulatedScanner
-from thenar.drivers.emulated.scanner_board import ScannerBoard
+from thenar.drivers import scanner_protocol
+from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
+from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.drivers.errors import DeviceError, SettingError
-from thenar.drivers.scanner import Scanner
-from thenar.drivers.scanner_messages import Event, FromBoard, Heartbeat, Hello, State, frame
-from thenar.drivers.scanner_reading import ScannerReading
+from thenar.drivers.scanner import Scanner, ScannerReading
+from thenar.drivers.scanner_protocol import Event, FromBoard, Heartbeat, Hello, State, frame
 
 KEYS = 160
 EVERY = (1 << KEYS) - 1
@@ -62,7 +60,7 @@ def until(scanner: Scanner, wanted: Callable[[ScannerReading], bool]) -> Scanner
 
 
 def sent(message: FromBoard, number: int) -> bytes:
-    return scanner_frame.encode(frame(message, number))
+    return scanner_protocol.encode(frame(message, number))
 
 
 def test_it_finds_the_board_and_its_keys(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:
@@ -361,9 +359,9 @@ class Scripted:
     """A board that says what it is told to, when it is told to, and notes what it is asked."""
 
     def __init__(self, line: PtyLine) -> None:
-        self.line, self.number, self.asked = line, 0, Queue[scanner_frame.Frame]()
+        self.line, self.number, self.asked = line, 0, Queue[scanner_protocol.Frame]()
         self.answers_pings = True
-        self._decoder = scanner_frame.Decoder()
+        self._decoder = scanner_protocol.FrameDecoder()
         line.receive = self._receive
 
     def say(self, message: FromBoard) -> None:

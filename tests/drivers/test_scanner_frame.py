@@ -5,13 +5,13 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from thenar.drivers.scanner_frame import (
+from thenar.drivers.scanner_protocol import (
     MAX_PAYLOAD,
     OVERHEAD,
     STATE,
-    Counts,
-    Decoder,
     Frame,
+    FrameCounts,
+    FrameDecoder,
     encode,
     pack_bits,
     unpack_bits,
@@ -34,7 +34,7 @@ def chunked(stream: bytes, cuts: list[int]) -> list[bytes]:
 
 def states(stream: bytes) -> list[Frame]:
     """Return what a driver of 160 switches takes for theirs."""
-    return [frame for frame in Decoder().feed(stream) if len(frame.payload) == 20]
+    return [frame for frame in FrameDecoder().feed(stream) if len(frame.payload) == 20]
 
 
 def stuffing(encoded: bytes | bytearray) -> set[int]:
@@ -53,7 +53,7 @@ def passed_when_damaged(frame: Frame, places: range) -> list[Frame]:
         for turned in range(1, 256):
             damaged = bytearray(encoded * 2)
             damaged[place] ^= turned
-            passed += [found for found in Decoder().feed(bytes(damaged)) if found != frame]
+            passed += [found for found in FrameDecoder().feed(bytes(damaged)) if found != frame]
     return passed
 
 
@@ -78,18 +78,18 @@ def test_a_frame_is_written_as_the_protocol_says() -> None:
 @example(Frame(0, 0, bytes(MAX_PAYLOAD)))
 @example(Frame(255, 255, b"\xff" * MAX_PAYLOAD))
 def test_what_is_encoded_is_decoded_and_its_length_is_known(frame: Frame) -> None:
-    decoder = Decoder()
+    decoder = FrameDecoder()
     encoded = encode(frame)
     assert len(encoded) == len(frame.payload) + OVERHEAD
     assert encoded.index(0) == len(encoded) - 1
     assert decoder.feed(encoded) == [frame]
-    assert decoder.counts == Counts(frames=1)
+    assert decoder.counts == FrameCounts(frames=1)
 
 
 @given(st.lists(st.one_of(FRAMES.map(encode), st.binary(max_size=300))), st.lists(st.integers(0, 10_000)))
 def test_any_chunks_give_the_same_frames_and_the_same_counts(parts: list[bytes], cuts: list[int]) -> None:
     stream = b"".join(parts)
-    at_once, in_chunks = Decoder(), Decoder()
+    at_once, in_chunks = FrameDecoder(), FrameDecoder()
     expected = at_once.feed(stream)
     assert [frame for chunk in chunked(stream, cuts) for frame in in_chunks.feed(chunk)] == expected
     assert in_chunks.counts == at_once.counts
@@ -97,7 +97,7 @@ def test_any_chunks_give_the_same_frames_and_the_same_counts(parts: list[bytes],
 
 @given(st.binary(max_size=2000), FRAMES)
 def test_after_garbage_and_a_zero_the_next_frame_is_found(garbage: bytes, frame: Frame) -> None:
-    assert Decoder().feed(garbage + b"\0" + encode(frame))[-1] == frame
+    assert FrameDecoder().feed(garbage + b"\0" + encode(frame))[-1] == frame
 
 
 @given(STATES, st.integers(0, 24))
@@ -132,13 +132,13 @@ def test_no_damaged_byte_of_these_frames_gives_another_one() -> None:
 
 
 def test_what_was_wrong_is_counted() -> None:
-    decoder = Decoder()
+    decoder = FrameDecoder()
     good = encode(Frame(STATE, 1, b"abc"))
     bad = bytes([good[0], good[1] ^ 1]) + good[2:]
     crc = crc_bit_by_bit(b"a")
     short = bytes([4, ord("a"), crc >> 8, crc & 0xFF, 0])  # whole, but for its number
     decoder.feed(b"\0\0" + good + bad + b"\x05a\0" + b"\x02a\0" + short + b"\xff" * 5000 + b"\0" + good)
-    assert decoder.counts == Counts(frames=2, damaged=2, short=2, overlong=1)
+    assert decoder.counts == FrameCounts(frames=2, damaged=2, short=2, overlong=1)
 
 
 def test_a_payload_that_does_not_fit_is_refused() -> None:

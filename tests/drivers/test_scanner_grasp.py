@@ -4,11 +4,10 @@ from time import monotonic, monotonic_ns
 
 import pytest
 
-from thenar.drivers.emulated.pty_line import PtyLine
 from thenar.drivers.emulated.scanner import EmulatedScanner
-from thenar.drivers.scanner import Scanner
-from thenar.drivers.scanner_messages import DEGRADED, EARLY, NO_GRASP
-from thenar.drivers.scanner_reading import BoardGrasp
+from thenar.drivers.emulated.serial_line import PtyLine
+from thenar.drivers.scanner import BoardGrasp, Scanner
+from thenar.drivers.scanner_protocol import DEGRADED, EARLY, NO_GRASP
 
 KEYS = 12
 EVERY = (1 << KEYS) - 1

@@ -7,20 +7,21 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from thenar.drivers import scanner_frame
-from thenar.drivers.scanner_frame import Frame
-from thenar.drivers.scanner_messages import (
+from thenar.drivers import scanner_protocol
+from thenar.drivers.scanner_protocol import (
     DEGRADED,
     MOST_KEYS,
     PROTOCOL,
     Event,
     Faults,
+    Frame,
     FromBoard,
     GetState,
     Grasp,
     Heartbeat,
     Hello,
     Lost,
+    MessageError,
     Ping,
     SetDebounce,
     SetRate,
@@ -30,7 +31,6 @@ from thenar.drivers.scanner_messages import (
     from_board,
     to_board,
 )
-from thenar.drivers.scanner_payload import MessageError
 
 KEYS = 40
 U8, U16, U32 = st.integers(0, 0xFF), st.integers(0, 0xFFFF), st.integers(0, 0xFFFFFFFF)
@@ -100,7 +100,7 @@ def test_messages_are_written_as_the_documentation_draws_them(
 
 @given(st.one_of(FROM_BOARD, TO_BOARD), st.integers(0, 100_000))
 def test_what_is_written_is_read(message: FromBoard | ToBoard, number: int) -> None:
-    (received,) = scanner_frame.Decoder().feed(scanner_frame.encode(frame(message, number)))
+    (received,) = scanner_protocol.FrameDecoder().feed(scanner_protocol.encode(frame(message, number)))
     assert received.sequence == number % 256
     assert read(received) == message
 
@@ -157,14 +157,14 @@ def test_a_board_of_no_keys_or_more_than_fit_a_frame_is_refused(rows: int, colum
 def test_the_most_keys_just_fit_a_heartbeat() -> None:
     every = (1 << MOST_KEYS) - 1
     heartbeat = Heartbeat(0, every, MOST_KEYS)
-    (received,) = scanner_frame.Decoder().feed(scanner_frame.encode(frame(heartbeat, 0)))
+    (received,) = scanner_protocol.FrameDecoder().feed(scanner_protocol.encode(frame(heartbeat, 0)))
     assert from_board(received, MOST_KEYS) == heartbeat
 
 
 @given(st.lists(st.booleans(), min_size=1, max_size=160))
 def test_the_bitmap_is_that_of_scanner_frame(bits: list[bool]) -> None:
     closed = sum(1 << key for key, bit in enumerate(bits) if bit)
-    assert State(closed, len(bits)).payload() == scanner_frame.pack_bits(np.array(bits)).tobytes()
+    assert State(closed, len(bits)).payload() == scanner_protocol.pack_bits(np.array(bits)).tobytes()
 
 
 @pytest.mark.parametrize(
@@ -179,7 +179,7 @@ def test_the_period_of_a_board_is_the_shorter_of_what_it_sends(
 def test_the_frames_in_the_documentation_are_sound_ones() -> None:
     text = (Path(__file__).parents[2] / "docs" / "scanner-board.md").read_text()
     shown = [bytes.fromhex(found) for found in re.findall(r"`((?:[0-9a-f]{2} )+00)`", text)]
-    decoder = scanner_frame.Decoder()
+    decoder = scanner_protocol.FrameDecoder()
     assert [read(received) for encoded in shown for received in decoder.feed(encoded)] == [
         State(1 << 0 | 1 << 9 | 1 << 39, 40),
         Event(0x01020304, 39, 1),
@@ -189,4 +189,4 @@ def test_the_frames_in_the_documentation_are_sound_ones() -> None:
         GetState(),
         Ping(0x1234),
     ]
-    assert decoder.counts == scanner_frame.Counts(frames=len(shown))
+    assert decoder.counts == scanner_protocol.FrameCounts(frames=len(shown))

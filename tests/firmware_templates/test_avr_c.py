@@ -13,7 +13,7 @@ from thenar.compiler.firmware.board_scan import config_of, readings, switches_of
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.layout import arrange
 from thenar.compiler.firmware.protocol import decided_files, protocol_files
-from thenar.drivers.cyberglove_sensors import SENSORS_18
+from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.manifest import Calibration, Manifest, Options, Proof, Source, Switch
 from thenar.runtime.tables import IntegerTables
 

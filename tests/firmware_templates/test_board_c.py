@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.firmware.protocol import BoardConfig, protocol_files
-from thenar.drivers import scanner_frame
-from thenar.drivers.emulated.scanner_board import ScannerBoard
-from thenar.drivers.scanner_messages import (
+from thenar.drivers import scanner_protocol
+from thenar.drivers.emulated.scanner import ScannerBoard
+from thenar.drivers.scanner_protocol import (
     DEGRADED,
     EARLY,
     NO_GRASP,
@@ -29,8 +29,8 @@ from thenar.drivers.scanner_messages import (
     State,
     frame,
     from_board,
+    to_bitmap,
 )
-from thenar.drivers.scanner_payload import to_bitmap
 
 SharedLibrary = Callable[..., ctypes.CDLL]
 WRAP = 1 << 32
@@ -203,9 +203,9 @@ ASKED = st.one_of(
     st.builds(SetDebounce, SHORT, SHORT),
     st.just(GetState()),
     st.builds(Ping, SHORT),
-).map(lambda message: scanner_frame.encode(frame(message, 0)))
-UNKNOWN = st.builds(scanner_frame.Frame, st.integers(0, 0x20), st.just(0), st.binary(max_size=20)).map(
-    scanner_frame.encode
+).map(lambda message: scanner_protocol.encode(frame(message, 0)))
+UNKNOWN = st.builds(scanner_protocol.Frame, st.integers(0, 0x20), st.just(0), st.binary(max_size=20)).map(
+    scanner_protocol.encode
 )
 KEYS = st.one_of(
     st.sampled_from([0, 1, 3]), st.integers(0, (1 << 300) - 1), st.integers(0, 299).map(lambda key: 1 << key)
@@ -261,11 +261,11 @@ def test_it_sends_what_the_model_sends_when_the_model_sends_it(
 
 
 def kinds(sent: bytes) -> list[int]:
-    return [received.kind for received in scanner_frame.Decoder().feed(sent)]
+    return [received.kind for received in scanner_protocol.FrameDecoder().feed(sent)]
 
 
 def said(sent: bytes, keys: int = 8) -> list[FromBoard]:
-    return [from_board(received, keys) for received in scanner_frame.Decoder().feed(sent)]
+    return [from_board(received, keys) for received in scanner_protocol.FrameDecoder().feed(sent)]
 
 
 def test_it_begins_with_an_end_and_a_hello(eight: Board) -> None:
@@ -277,7 +277,7 @@ def test_it_begins_with_an_end_and_a_hello(eight: Board) -> None:
 
 
 def test_it_says_nothing_of_keys_before_its_first_whole_scan_and_then_all(eight: Board) -> None:
-    get_state = scanner_frame.encode(frame(GetState(), 0))
+    get_state = scanner_protocol.encode(frame(GetState(), 0))
     eight.boot(0)
     assert eight.receive(get_state, 10) == b""
     assert eight.scan(0b111, 20, unread=0b11, whole=False) == b""
@@ -319,7 +319,7 @@ def test_schedules_are_kept_across_the_wrap_of_the_clock(eight: Board) -> None:
 
 def test_states_come_in_step_after_a_late_scan(eight: Board) -> None:
     eight.ready()
-    eight.receive(scanner_frame.encode(frame(SetRate(1000, 10_000, 0), 0)), 0)
+    eight.receive(scanner_protocol.encode(frame(SetRate(1000, 10_000, 0), 0)), 0)
     told = [now for now in (0, 9_000, 12_000, 19_000, 20_000, 57_000, 59_000, 60_000) if eight.scan(0, now)]
     assert told == [0, 12_000, 20_000, 57_000, 60_000]
 
@@ -328,15 +328,15 @@ def test_schedules_go_on_from_when_the_host_asked(eight: Board) -> None:
     eight.ready()
     eight.scan(0, 1000)
     # The HEARTBEAT that is due at 50000 is sent for the asking, and not again; a new rate begins when it comes in.
-    assert said(eight.receive(scanner_frame.encode(frame(GetState(), 0)), 50_500)) == [Heartbeat(50_500, 0, 8)]
+    assert said(eight.receive(scanner_protocol.encode(frame(GetState(), 0)), 50_500)) == [Heartbeat(50_500, 0, 8)]
     assert eight.scan(0, 51_000) == b""
-    eight.receive(scanner_frame.encode(frame(SetRate(1000, 10_000, 0), 0)), 57_000)
+    eight.receive(scanner_protocol.encode(frame(SetRate(1000, 10_000, 0), 0)), 57_000)
     assert [now for now in range(60_000, 90_000, 1000) if eight.scan(0, now)] == [60_000, 67_000, 77_000, 87_000]
 
 
 def test_failed_transactions_are_told_once_a_second(eight: Board) -> None:
     eight.ready()
-    eight.receive(scanner_frame.encode(frame(SetRate(1000, 0, 0), 0)), 0)
+    eight.receive(scanner_protocol.encode(frame(SetRate(1000, 0, 0), 0)), 0)
     eight.library.thenar_board_bus_fault()
     eight.library.thenar_board_bus_fault()
     assert said(eight.scan(0, 1000)) == [Faults(1000, 0, 0, 0, 2)]
@@ -348,11 +348,11 @@ def test_failed_transactions_are_told_once_a_second(eight: Board) -> None:
 
 def test_a_frame_that_finds_no_room_leaves_a_gap_in_the_numbers_and_is_counted(eight: Board) -> None:
     eight.ready()
-    eight.receive(scanner_frame.encode(frame(SetRate(1000, 0, 0), 0)), 0)
+    eight.receive(scanner_protocol.encode(frame(SetRate(1000, 0, 0), 0)), 0)
     eight.full = True
     assert eight.scan(0b1, 1000) == b""
     eight.full = False
-    received = scanner_frame.Decoder().feed(eight.scan(0b11, 1_001_000))
+    received = scanner_protocol.FrameDecoder().feed(eight.scan(0b11, 1_001_000))
     # HELLO 0, HEARTBEAT 1 and HELLO 2 came; EVENT 3, and ERROR 4 that counted it, were lost.
     assert [one.sequence for one in received] == [5, 6]
     assert [from_board(one, 8) for one in received] == [Event(1_001_000, 1, 1), Faults(1_001_000, 0, 0, 2, 0)]
@@ -375,7 +375,7 @@ def test_a_grasp_is_told_when_it_changes_and_after_every_heartbeat(eight: Board)
         if eight.grasp(grasp, 9, flags, now)
     ]
     assert told == [1, 3, 5, 7]
-    eight.receive(scanner_frame.encode(frame(GetState(), 0)), 9)
+    eight.receive(scanner_protocol.encode(frame(GetState(), 0)), 9)
     assert said(eight.grasp(NO_GRASP, 0xFFFF, EARLY, 10)) == [Grasp(10, NO_GRASP, 0xFFFF, EARLY)]
     assert eight.grasp(NO_GRASP, 0xFFFF, EARLY, 11) == b""
 
@@ -394,7 +394,7 @@ def test_a_grasp_that_finds_no_room_is_told_as_soon_as_there_is_some(shared_libr
 @pytest.mark.parametrize("state_us", [0, 10_000], ids=["HEARTBEAT", "STATE"])
 def test_what_is_due_and_finds_no_room_is_due_at_the_next_scan(eight: Board, state_us: int) -> None:
     eight.ready()
-    eight.receive(scanner_frame.encode(frame(SetRate(1000, state_us, 10_000 - state_us), 0)), 0)
+    eight.receive(scanner_protocol.encode(frame(SetRate(1000, state_us, 10_000 - state_us), 0)), 0)
     eight.scan(0, 0)
     eight.full = True
     assert eight.scan(0, 10_000) == b""
@@ -416,7 +416,7 @@ def test_bits_beyond_the_last_key_are_not_sent(shared_library: SharedLibrary) ->
 def test_no_host_makes_it_faster_than_it_can_be(shared_library: SharedLibrary) -> None:
     board = Board(shared_library, replace(CONFIGS["8 keys"], fastest_us=400))
     board.boot(0)
-    (hello,) = said(board.receive(scanner_frame.encode(frame(SetRate(399, 1, 0), 0)), 0))
+    (hello,) = said(board.receive(scanner_protocol.encode(frame(SetRate(399, 1, 0), 0)), 0))
     assert isinstance(hello, Hello)
     assert (hello.scan_us, hello.state_us, hello.heartbeat_us) == (400, 400, 0)
     assert board.library.thenar_board_scan_us() == 400
@@ -426,7 +426,7 @@ def test_debouncing_that_is_asked_for_is_done(eight: Board) -> None:
     eight.boot(0)
     bitmap = ctypes.create_string_buffer(b"\1", 1)
     eight.library.thenar_debounce(bitmap, b"\1", 0)
-    eight.receive(scanner_frame.encode(frame(SetDebounce(5000, 10_000), 0)), 0)
+    eight.receive(scanner_protocol.encode(frame(SetDebounce(5000, 10_000), 0)), 0)
     for now, expected in ((1000, b"\1"), (9000, b"\1"), (12_000, b"\0")):
         bitmap.raw = b"\0"
         eight.library.thenar_debounce(bitmap, b"\1", now)
@@ -436,7 +436,7 @@ def test_debouncing_that_is_asked_for_is_done(eight: Board) -> None:
 def test_a_key_that_was_lost_is_taken_as_it_is_read_again(eight: Board) -> None:
     """Its release does not wait for what it was before; that of a key that was read all the time does."""
     eight.ready()
-    eight.receive(scanner_frame.encode(frame(SetDebounce(5000, 10_000), 0)), 0)
+    eight.receive(scanner_protocol.encode(frame(SetDebounce(5000, 10_000), 0)), 0)
     bitmap = ctypes.create_string_buffer(1)
 
     def scan(closed: int, known: int, now: int) -> list[FromBoard]:

@@ -1,4 +1,4 @@
-"""The C decoder and encoder against drivers.scanner_frame, on streams as bad cables make them."""
+"""The C decoder and encoder against drivers.scanner_protocol, on streams as bad cables make them."""
 
 import ctypes
 from collections.abc import Callable
@@ -8,8 +8,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from thenar.compiler.firmware.protocol import BoardConfig, protocol_files
-from thenar.drivers import scanner_frame
-from thenar.drivers.scanner_frame import MAX_PAYLOAD, OVERHEAD, Frame
+from thenar.drivers import scanner_protocol
+from thenar.drivers.scanner_protocol import MAX_PAYLOAD, OVERHEAD, Frame
 
 SharedLibrary = Callable[..., ctypes.CDLL]
 NOTHING, GOOD, DAMAGED, SHORT, OVERLONG = range(5)
@@ -70,7 +70,7 @@ SOUND = st.builds(Frame, BYTE, BYTE, PAYLOADS)
 @st.composite
 def damaged(draw: st.DrawFn) -> bytes:
     """A frame of which a cable has changed, left out or added something."""
-    wire = bytearray(scanner_frame.encode(draw(SOUND)))
+    wire = bytearray(scanner_protocol.encode(draw(SOUND)))
     at, other = draw(st.integers(0, len(wire) - 1)), draw(BYTE)
     match draw(st.integers(0, 3)):
         case 0:
@@ -85,14 +85,14 @@ def damaged(draw: st.DrawFn) -> bytes:
 
 
 STREAMS = st.lists(
-    st.one_of(SOUND.map(scanner_frame.encode), damaged(), st.binary(max_size=40), st.sampled_from([b"\0", b"\0\0"])),
+    st.one_of(SOUND.map(scanner_protocol.encode), damaged(), st.binary(max_size=40), st.sampled_from([b"\0", b"\0\0"])),
     max_size=8,
 ).map(b"".join)
 
 
 @given(SOUND)
 def test_a_frame_is_encoded_as_pythons(frames: Frames, sound: Frame) -> None:
-    assert frames.encode(sound) == scanner_frame.encode(sound)
+    assert frames.encode(sound) == scanner_protocol.encode(sound)
 
 
 @given(STREAMS)
@@ -100,12 +100,12 @@ def test_a_frame_is_encoded_as_pythons(frames: Frames, sound: Frame) -> None:
 @example(b"\x01" * 255 + b"\0")
 @example(b"\x01" * 256 + b"\0")
 @example(b"\xff" * 255 + b"\0")
-@example(b"\xff" * 256 + b"\0" + scanner_frame.encode(Frame(1, 2, b"")))
-@example(b"\x01" * 1000 + b"\0\0" + scanner_frame.encode(Frame(1, 2, bytes(250))))
+@example(b"\xff" * 256 + b"\0" + scanner_protocol.encode(Frame(1, 2, b"")))
+@example(b"\x01" * 1000 + b"\0\0" + scanner_protocol.encode(Frame(1, 2, bytes(250))))
 @example(b"\x04\xff\xff\x01\0")  # of three bytes
 @example(b"\x03\xff\xff\x01\0")  # two zeros at the end
 def test_of_any_stream_it_makes_the_frames_and_the_counts_that_python_makes(frames: Frames, stream: bytes) -> None:
-    python = scanner_frame.Decoder()
+    python = scanner_protocol.FrameDecoder()
     expected = python.feed(stream)
     found, lengths, outcomes = frames.decode(stream)
     assert lengths == [len(frame.payload) for frame in expected]
@@ -116,6 +116,6 @@ def test_of_any_stream_it_makes_the_frames_and_the_counts_that_python_makes(fram
 
 @given(STREAMS, SOUND)
 def test_after_an_end_it_is_in_step_again(frames: Frames, stream: bytes, sound: Frame) -> None:
-    found, lengths, _ = frames.decode(stream + b"\0" + scanner_frame.encode(sound))
+    found, lengths, _ = frames.decode(stream + b"\0" + scanner_protocol.encode(sound))
     assert found[-1] == Frame(sound.kind, sound.sequence, sound.payload[: frames.kept])
     assert lengths[-1] == len(sound.payload)

@@ -12,7 +12,7 @@ import numpy as np
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import own
-from thenar.drivers.cyberglove_sensors import SENSORS_18
+from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import Harness
 

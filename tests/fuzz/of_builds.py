@@ -278,8 +278,8 @@ def _resume(data: bytes, folder: Path) -> None:
 
 
 def _placements() -> list[bytes]:
-    placement, _ = place(grasp_set(), 0)
-    return [msgspec.json.encode(placement), msgspec.json.encode(SWITCHES), "\n".join(SWITCHES).encode()]
+    placement = place(grasp_set())
+    return [msgspec.json.encode(placement.document()), msgspec.json.encode(SWITCHES), "\n".join(SWITCHES).encode()]
 
 
 def _kept(data: bytes, folder: Path) -> None:

@@ -10,41 +10,29 @@ from random import Random
 from material import Format
 from mutating import altered
 
-from thenar.drivers import cyberglove_commands, cyberglove_frame, scanner_frame, scanner_messages
-from thenar.drivers.board_keys import BoardKeys
-from thenar.drivers.board_times import BoardTimes
-from thenar.drivers.emulated.cyberglove_box import CyberGloveBox, Doubts
-from thenar.drivers.emulated.cyberglove_state import GloveState
-from thenar.drivers.emulated.scanner_board import ScannerBoard
+from thenar.drivers import cyberglove_protocol, scanner_protocol
+from thenar.drivers.emulated.cyberglove_box import CyberGloveBox, Doubts, GloveState
+from thenar.drivers.emulated.scanner import ScannerBoard
 from thenar.drivers.errors import ThenarError
-from thenar.drivers.scanner_messages import (
-    PROTOCOL,
-    Event,
-    FromBoard,
-    GetState,
-    Heartbeat,
-    Hello,
-    Ping,
-    State,
-    ToBoard,
-)
+from thenar.drivers.scanner_protocol import PROTOCOL, Event, FromBoard, GetState, Heartbeat, Hello, Ping, State, ToBoard
+from thenar.drivers.scanner_state import BoardKeys, BoardTimes
 
 _KEYS = 40
-_RECORD = cyberglove_frame.Record(b"S" * 18)
-_STATE = scanner_frame.Frame(scanner_frame.STATE, 0, bytes(5))
+_RECORD = cyberglove_protocol.Record(b"S" * 18)
+_STATE = scanner_protocol.Frame(scanner_protocol.STATE, 0, bytes(5))
 _COMMANDS = [
-    *map(cyberglove_commands.query, cyberglove_commands.ANSWERED),
-    *(cyberglove_commands.setting(letter, bytes(size)) for letter, size in cyberglove_commands.SET.items()),
-    cyberglove_commands.INFORMATION,
+    *map(cyberglove_protocol.query, cyberglove_protocol.ANSWERED),
+    *(cyberglove_protocol.setting(letter, bytes(size)) for letter, size in cyberglove_protocol.SET.items()),
+    cyberglove_protocol.INFORMATION,
 ]
 _ANSWERS = b"?G\3\0?S\x12\0?T\x04\x80\0\1\0?iCyberGlove\r\n\0e?\0"
 
 
 def _glove_says() -> list[bytes]:
-    record = cyberglove_frame.Record(bytes(range(60, 78)))
+    record = cyberglove_protocol.Record(bytes(range(60, 78)))
     # The first byte chooses to which command an answer is sought.
     answers = [bytes([place]) + _ANSWERS for place in range(0, 40, 3)]
-    return [cyberglove_frame.encode(record) * 3, *answers]
+    return [cyberglove_protocol.encode(record) * 3, *answers]
 
 
 def _glove(data: bytes, _folder: Path) -> None:
@@ -58,20 +46,20 @@ def _glove(data: bytes, _folder: Path) -> None:
 def _records(data: bytes) -> None:
     """Read a CyberGlove's records, at once and in two parts, and a sound one after."""
     for sensors, status in ((18, False), (22, True)):
-        whole, parts = (cyberglove_frame.Decoder(sensors, status=status) for _ in range(2))
+        whole, parts = (cyberglove_protocol.RecordDecoder(sensors, status=status) for _ in range(2))
         half = len(data) // 2
         assert whole.feed(data) == parts.feed(data[:half]) + parts.feed(data[half:])
         assert len(whole._pieces._rest) < 30
-    decoder = cyberglove_frame.Decoder()
+    decoder = cyberglove_protocol.RecordDecoder()
     decoder.feed(data + b"\0")
-    assert decoder.feed(cyberglove_frame.encode(_RECORD)) == [_RECORD]
+    assert decoder.feed(cyberglove_protocol.encode(_RECORD)) == [_RECORD]
 
 
 def _answer(data: bytes) -> None:
     """Look for the answer to a command, which the first byte chooses."""
     command = _COMMANDS[data[0] % len(_COMMANDS)] if data else _COMMANDS[0]
     for last in (False, True):
-        answer = cyberglove_commands.find_answer(command, data[1:], last=last)
+        answer = cyberglove_protocol.find_answer(command, data[1:], last=last)
         assert answer is None or answer.error or answer.values in data
 
 
@@ -79,54 +67,54 @@ def _board_says() -> list[bytes]:
     hello = Hello(PROTOCOL, 0, 1, 1, 1, 0, 0, 1, _KEYS, 1000, 0, 50_000, 0, 0, 0)
     messages: list[FromBoard | ToBoard] = [hello, State(5, _KEYS), Heartbeat(7, 5, _KEYS), Event(9, 3, 1)]
     messages += [Ping(1), GetState()]
-    frames = [scanner_messages.frame(message, number) for number, message in enumerate(messages)]
-    return [scanner_frame.encode(frame) for frame in frames] + [b"".join(map(scanner_frame.encode, frames))]
+    frames = [scanner_protocol.frame(message, number) for number, message in enumerate(messages)]
+    return [scanner_protocol.encode(frame) for frame in frames] + [b"".join(map(scanner_protocol.encode, frames))]
 
 
 def _changed_frames(data: bytes, random: Random) -> bytes:
     """Change what frames say, with the CRC of what they say then; or the bytes on the line."""
-    frames = scanner_frame.Decoder().feed(data)
+    frames = scanner_protocol.FrameDecoder().feed(data)
     if not frames or random.random() < 0.3:
         return altered(data, random)
     at = random.randrange(len(frames))
     body = altered(bytes((frames[at].kind, frames[at].sequence)) + frames[at].payload, random)[:252]
-    frames[at] = scanner_frame.Frame(body[0], body[1], body[2:]) if len(body) > 1 else _STATE
+    frames[at] = scanner_protocol.Frame(body[0], body[1], body[2:]) if len(body) > 1 else _STATE
     if random.random() < 0.2:
         frames.insert(random.randrange(len(frames)), random.choice(frames))
-    return b"".join(map(scanner_frame.encode, frames))
+    return b"".join(map(scanner_protocol.encode, frames))
 
 
 def _board(data: bytes, _folder: Path) -> None:
     """Read a scanner board's frames, at once and in two parts, and a sound one after; as the host and as the board."""
-    whole, parts = scanner_frame.Decoder(), scanner_frame.Decoder()
+    whole, parts = scanner_protocol.FrameDecoder(), scanner_protocol.FrameDecoder()
     half = len(data) // 2
     found = whole.feed(data)
     assert found == parts.feed(data[:half]) + parts.feed(data[half:])
     assert len(whole._pieces._rest) < 260
     whole.feed(b"\0")
-    assert whole.feed(scanner_frame.encode(_STATE)) == [_STATE]
+    assert whole.feed(scanner_protocol.encode(_STATE)) == [_STATE]
     for keys in (BoardKeys(1, _KEYS), BoardKeys()):
         _heard(found, keys)
     board = ScannerBoard(1, _KEYS)
-    for answer in scanner_frame.Decoder().feed(b"".join(board.receive(data, 0))):
-        scanner_messages.from_board(answer, _KEYS)
+    for answer in scanner_protocol.FrameDecoder().feed(b"".join(board.receive(data, 0))):
+        scanner_protocol.from_board(answer, _KEYS)
 
 
-def _heard(received: list[scanner_frame.Frame], keys: BoardKeys) -> None:
+def _heard(received: list[scanner_protocol.Frame], keys: BoardKeys) -> None:
     """Take what frames say of so many keys; none before a HELLO."""
     times = BoardTimes()
     for number, frame in enumerate(received):
         keys.numbered(frame.sequence)
         with contextlib.suppress(ThenarError):
-            scanner_messages.to_board(frame)
+            scanner_protocol.to_board(frame)
         try:
-            message = scanner_messages.from_board(frame, keys.keys)
+            message = scanner_protocol.from_board(frame, keys.keys)
         except ThenarError:
             keys.misread()
         else:
-            assert scanner_messages.frame(message, frame.sequence) == frame
+            assert scanner_protocol.frame(message, frame.sequence) == frame
             assert times.stamp(message, number) <= number
-            if not isinstance(message, scanner_messages.Hello | scanner_messages.Faults):
+            if not isinstance(message, scanner_protocol.Hello | scanner_protocol.Faults):
                 keys.heard(message)
         assert keys.closed >> keys.keys == 0
 

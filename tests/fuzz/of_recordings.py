@@ -12,7 +12,7 @@ from mutating_mcap import mcap_file
 
 from thenar.compiler.recordings.mcap_recording import import_recordings
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
-from thenar.drivers.cyberglove_sensors import SENSORS_18
+from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.build import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame

@@ -11,11 +11,11 @@ from mutating import json_file, toml_file
 from thenar.compiler.firmware.board_loading import load_board
 from thenar.compiler.firmware.generate import Request, firmware_files, fit_of
 from thenar.compiler.firmware.library import Fit
-from thenar.compiler.frontier.timing.whole_glove import ports_of_whole_glove
 from thenar.compiler.glove.files import spec_files
+from thenar.compiler.placement.ports import ports_of_whole_glove
 from thenar.compiler.recordings.objects import collected
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
-from thenar.drivers.cyberglove_sensors import SENSORS_18
+from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.build import Build
 from thenar.runtime.calibration import AngleReader, codes_of_bytes, load_calibration
 from thenar.runtime.harness.loading import load_harness, parse_harness
@@ -31,8 +31,8 @@ from thenar.runtime.scanning.timing import scan_us
 from thenar.simulator.body.anthropometry import Size
 from thenar.simulator.body.condition import Thing
 from thenar.simulator.body.hand import Hand
-from thenar.simulator.pipeline.pipeline import compile_pipeline
 from thenar.simulator.planning.postures import Postures
+from thenar.simulator.running.pipeline import compile_pipeline
 from thenar.simulator.running.session import conditions_of
 from thenar.simulator.scenes import shipped
 from thenar.simulator.scenes.catalogue import load_catalogue

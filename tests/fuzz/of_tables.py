@@ -70,7 +70,7 @@ def _npz() -> bytes:
 
 
 def _grasps() -> bytes:
-    from thenar.compiler.recordings import file
+    from thenar.compiler.recordings import graspset as file
     from thenar.runtime.sealed import seal
 
     return seal(file.KIND, file.VERSION, file._pack(grasp_set()))

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from thenar.compiler.firmware.protocol import BoardConfig, protocol_files
-from thenar.drivers import scanner_frame
-from thenar.drivers.scanner_messages import GetState, Ping, SetDebounce, SetRate, ToBoard, frame
+from thenar.drivers import scanner_protocol
+from thenar.drivers.scanner_protocol import GetState, Ping, SetDebounce, SetRate, ToBoard, frame
 
 FLAGS = ("-std=c99", "-g", "-O2", "-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all")
 
@@ -18,9 +18,9 @@ def corpus(tmp_path: Path) -> Path:
     """What a host says when all is well, and what it never says."""
     messages: list[ToBoard] = [SetRate(1000, 0, 50_000), SetRate(500, 2000, 0), SetDebounce(5000, 10_000)]
     messages += [GetState(), Ping(1)]
-    wire = [scanner_frame.encode(frame(message, number)) for number, message in enumerate(messages)]
-    others = [scanner_frame.Frame(0x11, 0, bytes(250)), scanner_frame.Frame(0x77, 9, b"\1" * 13)]
-    said = [*wire, b"".join(wire * 3), *map(scanner_frame.encode, others), b"\1" * 600 + b"\0" + wire[0]]
+    wire = [scanner_protocol.encode(frame(message, number)) for number, message in enumerate(messages)]
+    others = [scanner_protocol.Frame(0x11, 0, bytes(250)), scanner_protocol.Frame(0x77, 9, b"\1" * 13)]
+    said = [*wire, b"".join(wire * 3), *map(scanner_protocol.encode, others), b"\1" * 600 + b"\0" + wire[0]]
     folder = tmp_path / "corpus"
     folder.mkdir()
     for number, data in enumerate(said):

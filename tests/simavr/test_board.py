@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import serial
 
-from thenar.drivers.emulated.i2c_models import MODELS
-from thenar.drivers.emulated.matrix import read_without_diodes
+from thenar.drivers.emulated.scanner import read_without_diodes
+from thenar.drivers.i2c.chips import CHIPS
 
 PARTS = ("atmega328p", "atmega2560")
 BAUD = 1_000_000
@@ -244,7 +244,7 @@ def test_a_start_waits_until_the_bus_is_free(monitor: Callable[..., Monitor]) ->
 @pytest.mark.parametrize("kind", ["mcp23017", "mcp23008", "pca9555", "tca9555", "tca6424a"])
 def test_chips_do_as_the_models_that_the_drivers_are_tested_with(monitor: Callable[..., Monitor], kind: str) -> None:
     """Random writes, reads with and without a register, and switches: all bytes equal."""
-    model = MODELS[kind]()
+    model = CHIPS[kind].model()
     on = monitor(f"chip {kind} 0x22", *(f"key {pin} 0x22 {pin} low" for pin in range(model.pins)))
     rng = np.random.default_rng(3)
     registers = 0x10 if kind == "tca6424a" else 0x16

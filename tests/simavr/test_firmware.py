@@ -14,8 +14,8 @@ import serial
 
 from thenar.compiler.firmware.board_loading import parse_board
 from thenar.compiler.firmware.generate import Request, firmware_files, fit_of
-from thenar.drivers import scanner_frame
-from thenar.drivers.scanner_messages import Faults, FromBoard, GetState, Heartbeat, Hello, Lost, Ping, frame, from_board
+from thenar.drivers import scanner_protocol
+from thenar.drivers.scanner_protocol import Faults, FromBoard, GetState, Heartbeat, Hello, Lost, Ping, frame, from_board
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import SCHEMA, Manifest, Options, Proof, Source, Switch
 from thenar.runtime.tables import IntegerTables
@@ -69,7 +69,7 @@ class Running:
     def __init__(self, stack: ExitStack, board: Any) -> None:
         self.board = board
         self.line = stack.enter_context(serial.Serial(str(board.ports["uart0"]), BAUD, timeout=0.2))
-        self._decoder = scanner_frame.Decoder()
+        self._decoder = scanner_protocol.FrameDecoder()
 
     def heard(self) -> list[FromBoard]:
         """Return what has come in, or comes in soon."""
@@ -116,7 +116,7 @@ def test_a_host_that_never_stops_asking_stops_no_scan(firmware: Callable[..., Ru
     """The watchdog would reset a board that does not scan for a second: its clock would begin anew."""
     on = firmware(PINS, ["rise 0"])
     began_us = on.booted()[-1].time_us  # type: ignore[union-attr]
-    flood, enough = scanner_frame.encode(frame(Ping(7), 0)) * 100, Event()
+    flood, enough = scanner_protocol.encode(frame(Ping(7), 0)) * 100, Event()
 
     def ask() -> None:
         while not enough.is_set():
@@ -166,7 +166,7 @@ def test_the_wires_of_a_matrix_may_take_20_us_to_rise(firmware: Callable[..., Ru
         on.board.set_keys([bool(closed >> key & 1) for key in range(len(SWITCHES))])
         (beat,) = (message for message in on.booted() if isinstance(message, Heartbeat))
         assert beat.closed == closed
-        on.line.write(scanner_frame.encode(frame(GetState(), 0)))
+        on.line.write(scanner_protocol.encode(frame(GetState(), 0)))
         again = on.until(lambda message: isinstance(message, Heartbeat))[-1]
         assert again.closed == closed  # type: ignore[union-attr]
     assert "short" not in on.board.said

@@ -10,10 +10,11 @@ from thenar.simulator.body.condition import Condition, Held, Pad, Thing
 from thenar.simulator.body.hand import Hand
 from thenar.simulator.body.shapes import Cylinder
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import EffectParameters, Setting
-from thenar.simulator.pipeline.registry import NAMES, load
+from thenar.simulator.pipeline.effect import EFFECTS, EffectParameters, Setting
 from thenar.simulator.scenes.scene import Glove, Listed, Recording, Scene, SceneObject, Subject
 from thenar.simulator.streams import Draw, Draws, Site
+
+NAMES = tuple(EFFECTS)
 
 BAR = Cylinder(diameter_mm=40.0, length_mm=120.0)
 # Fingers bent round it, the thumb in opposition, order of DOF.
@@ -57,7 +58,7 @@ def _draw(effect: str, batch: Batch, seed: int = 7) -> Draw:
 
 
 def _scene(effects: Sequence[str | tuple[str, EffectParameters]] = (), **changes: object) -> Scene:
-    pairs = [(given, load(given).Parameters()) if isinstance(given, str) else given for given in effects]
+    pairs = [(given, EFFECTS[given].parameters()) if isinstance(given, str) else given for given in effects]
     listed = tuple(Listed(*pair) for pair in sorted(pairs, key=lambda pair: NAMES.index(pair[0])))
     usual = {
         "name": "small",

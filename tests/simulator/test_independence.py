@@ -13,11 +13,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.effect import EFFECTS
 from thenar.simulator.pipeline.ledger import Ledger
-from thenar.simulator.pipeline.pipeline import Pipeline, compile_pipeline
-from thenar.simulator.pipeline.registry import CONTACTS, NAMES, load
+from thenar.simulator.running.pipeline import Pipeline, compile_pipeline
 from thenar.simulator.scenes.scene import Scene
 from thenar.simulator.streams import Draw
+
+NAMES = tuple(EFFECTS)
+CONTACTS = tuple(name for name, effect in EFFECTS.items() if effect.model)
 
 SceneMaker = Callable[..., Scene]
 BatchMaker = Callable[..., Batch]
@@ -41,7 +44,7 @@ LIVELY: dict[str, dict[str, object]] = {
 
 
 def lively(names: Iterable[str]) -> list[tuple]:
-    return [(name, load(name).Parameters(**LIVELY.get(name, {}))) for name in names]
+    return [(name, EFFECTS[name].parameters(**LIVELY.get(name, {}))) for name in names]
 
 
 @pytest.fixture(scope="module")

@@ -4,8 +4,8 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.simulator.pipeline.effect import EffectParameters
-from thenar.simulator.pipeline.pipeline import compile_pipeline
 from thenar.simulator.planning.postures import Postures
+from thenar.simulator.running.pipeline import compile_pipeline
 from thenar.simulator.scenes import shipped
 from thenar.simulator.scenes.decode import load_scene
 from thenar.simulator.scenes.scene import Scene, Subject

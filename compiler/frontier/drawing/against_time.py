@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ...text import duration
 from ..points import Frontier, Mark, Point, Tried
 from .artists import (
     draw_best,
@@ -18,7 +19,7 @@ from .artists import (
 )
 from .chart import key, rates, sheet, times
 from .labels import Label, Labels
-from .words import duration, featured, inputs_of
+from .words import featured, inputs_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

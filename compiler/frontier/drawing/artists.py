@@ -3,12 +3,13 @@
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from ...text import counted, percent
 from ..pareto import front
 from ..points import Mark, Point, Rate, Tried
 from .chart import COLOURS, GREY, INK, NAMES, SHAPES
 from .labels import Label
 from .room import FAINT, LINE
-from .words import inputs_of, percent, shorten, switches
+from .words import inputs_of, shorten
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -103,12 +104,12 @@ def mark_label(x: float, mark: Mark, cost: str = "") -> Label:
     """Return the words for a mark, and what it costs."""
     name = shorten(mark.name)
     if str(mark.n_switches) not in name:
-        name = f"{name} ({switches(mark.n_switches)})"
+        name = f"{name} ({counted(mark.n_switches, 'switch', 'switches')})"
     return Label(((x, mark.rate.mean),), (f"{name}\n{_and_rate(cost, mark.rate)}",), INK)
 
 
 def _and_rate(cost: str, rate: Rate) -> str:
-    return f"{cost}, {percent(rate)}" if cost else percent(rate)
+    return f"{cost}, {percent(rate.mean)}" if cost else percent(rate.mean)
 
 
 def _whiskers(axes: "Axes", labels: "Labels", shown: Sequence[tuple[float, Rate]], colour: str) -> None:

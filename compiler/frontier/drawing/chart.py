@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 from thenar.runtime.manifest import Inputs
 
+from ...text import counted, duration
 from ..points import Frontier, Rate
-from .words import duration, shorten
+from .words import shorten
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,9 +44,8 @@ def sheet(frontier: Frontier, title: str) -> tuple["Figure", "Axes"]:
 
 
 def _under(frontier: Frontier) -> str:
-    name, people = shorten(frontier.source), frontier.subjects
     return (
-        f"{name}: {frontier.rows:,} grasps of {people} {'person' if people == 1 else 'people'}, "
+        f"{shorten(frontier.source)}: {frontier.rows:,} grasps of {counted(frontier.subjects, 'person', 'people')}, "
         f"{len(frontier.grasps)} types; {frontier.target}; "
         f"{frontier.folds} folds x {frontier.repeats}, placement inside the fold, 95 % intervals"
     )

@@ -1,7 +1,8 @@
 """The one sentence that reads the frontier's picture."""
 
+from ...text import counted, duration, interval, listed, percent
 from ..points import Frontier, Mark, Point
-from .words import duration, featured, interval, percent, switches
+from .words import featured
 
 
 def sentence(frontier: Frontier) -> str:
@@ -14,19 +15,19 @@ def sentence(frontier: Frontier) -> str:
         f"on {frontier.target}, recognise {interval(point.rate)} % of the grasps"
     )
     against = [_mark(mark) for mark in frontier.marks]
-    return f"{said}, against {_listed(against)}." if against else f"{said}."
+    return f"{said}, against {listed(against)}." if against else f"{said}."
 
 
 def _inputs(frontier: Frontier, point: Point) -> str:
     some = f"{len(point.switches)} of {frontier.n_switches} switches"
-    joints = f"{frontier.n_joints} joint{'s' if frontier.n_joints != 1 else ''}"
+    joints = counted(frontier.n_joints, "joint")
     return {"switches": some, "joints": joints, "both": f"{some} and {joints}"}[point.setting.inputs]
 
 
 def _mark(mark: Mark) -> str:
-    name = mark.name if str(mark.n_switches) in mark.name else f"{switches(mark.n_switches)} ({mark.name})"
-    return f"{percent(mark.rate)} in {duration(mark.frame_us)} with {name}"
-
-
-def _listed(parts: list[str]) -> str:
-    return ", ".join(parts[:-1]) + (" and " if len(parts) > 1 else "") + parts[-1]
+    name = (
+        mark.name
+        if str(mark.n_switches) in mark.name
+        else f"{counted(mark.n_switches, 'switch', 'switches')} ({mark.name})"
+    )
+    return f"{percent(mark.rate.mean)} in {duration(mark.frame_us)} with {name}"

@@ -1,39 +1,17 @@
-"""How the frontier's numbers are written for people, on pictures, in tables and in the sentence."""
+"""How a frontier's points are named, on pictures, in tables and in the sentence."""
 
-from ..points import Frontier, Mark, Point, Rate, Setting
+from ...text import counted
+from ..points import Frontier, Mark, Point, Setting
 
 _LONGEST = 40  # letters of a name on a picture
 _SPARED = 0.005  # what a rate may lack and still count as level: half a point
-
-
-def duration(us: float) -> str:
-    """Return a time to three digits: "440 us", "2.05 ms", "1.5 s"."""
-    for unit, size in (("s", 1e6), ("ms", 1e3)):
-        if us >= 0.9995 * size:
-            return f"{us / size:.3g} {unit}"
-    return f"{us:.3g} us"
-
-
-def percent(rate: Rate) -> str:
-    """Return a rate without its interval: "92.9 %"."""
-    return f"{100 * rate.mean:.1f} %"
-
-
-def interval(rate: Rate) -> str:
-    """Return a rate in percent with its interval: "92.9 [92.1, 93.7]"."""
-    return f"{100 * rate.mean:.1f} [{100 * rate.low:.1f}, {100 * rate.high:.1f}]"
 
 
 def inputs_of(point: Point) -> str:
     """Return what a point reads: "33 switches", "joints alone", "8 switches + joints"."""
     if point.setting.inputs == "joints":
         return "joints alone"
-    return switches(len(point.switches)) + (" + joints" if point.setting.inputs == "both" else "")
-
-
-def switches(count: int) -> str:
-    """Return a number of switches: "1 switch", "33 switches"."""
-    return f"{count} switch{'es' if count != 1 else ''}"
+    return counted(len(point.switches), "switch", "switches") + (" + joints" if point.setting.inputs == "both" else "")
 
 
 def shorten(name: str) -> str:

@@ -9,7 +9,7 @@ from fcntl import ioctl
 from pathlib import Path
 from statistics import median
 
-from thenar.drivers.i2c.chip import Reading
+from thenar.drivers.i2c.chips import Reading
 
 from ...firmware.generate import PLATFORMS
 from ...firmware.targets import target_of

@@ -7,8 +7,7 @@ from math import fsum
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.drivers.cyberglove_frame import OVERHEAD
-from thenar.drivers.cyberglove_timing import sending_us, shortest_us
+from thenar.drivers.cyberglove_protocol import OVERHEAD, sending_us, shortest_us
 from thenar.runtime.harness.wiring import Harness, ScannerWiring
 from thenar.runtime.scanning.decided import Decided
 from thenar.runtime.scanning.plan import Costs, plan_scan

@@ -9,8 +9,7 @@ from contextlib import ExitStack
 
 import msgspec
 
-from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead
-from thenar.drivers.i2c.scan import Scan
+from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead, Scan
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.timing import reading_of
@@ -45,7 +44,7 @@ def _scan_of(harness: Harness, number: int, stack: ExitStack) -> Scan:
 
 
 def _chips(wiring: BusWiring) -> list[ChipAt]:
-    return [ChipAt(chip.chip, frozenset(chip.numbered_pins), *behind(chip)) for chip in wiring.chips]
+    return [ChipAt(chip.chip, chip.address, frozenset(chip.numbered_pins), *behind(chip)) for chip in wiring.chips]
 
 
 def behind(chip: ChipWiring) -> tuple[int, int] | tuple[None, None]:

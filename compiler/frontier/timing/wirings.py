@@ -1,27 +1,18 @@
 """What a glove may be wired to: as it is, or as a new one would be, with port expanders at a clock or on a board."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from msgspec.structs import replace
 
 from thenar.drivers.i2c import tca9548a
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import GloveWiring, Harness
-from thenar.runtime.scanning.plan import Costs, Unit, ports_in
-from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_board, propose_harness
-from thenar.runtime.scanning.timing import reading_of, scanner_us
-
-from ...placement.costaware import PortCosts
-from .beside_wire import WIRE_ONLY, Beside
 
 AS_WIRED, BOARD = "as wired", "board"
 
-# One of each sort: a tca9555 reads as a pca9555 does, and an mcp23008 as half an mcp23017; eight pins of a pcf8574, at
-# 100 kHz, take longer than the sixteen of a pcf8575.
-KINDS = ("mcp23017", "pcf8575", "pca9555", "tca6424a")
 # Standard mode, Fast mode, Fast-mode Plus.
 CLOCKS_HZ = (100_000, 400_000, 1_000_000)
 BAUDS = (115_200, 1_000_000)
@@ -86,54 +77,16 @@ def wirings(given: Harness | None, target: str = "host") -> tuple[Wiring, ...]:
     """
     avr = target.startswith("avr")
     found = [] if given is None or not given.switches or (avr and not _of_an_avr(given)) else [_as_wired(given)]
-    for kind in KINDS:
-        if avr and not CHIPS[kind].registers:
-            continue
-        clocks = (hz for hz in CLOCKS_HZ if hz <= CHIPS[kind].clock_hz and (not avr or hz in _AVR_HZ))
-        found += [Wiring(kind, hz, muxes=not avr) for hz in clocks]
+    for chip in CHIPS.values():
+        if chip.tried and (chip.registers or not avr):
+            clocks = (hz for hz in CLOCKS_HZ if hz <= chip.clock_hz and (not avr or hz in _AVR_HZ))
+            found += [Wiring(chip.name, hz, muxes=not avr) for hz in clocks]
     return tuple(found if avr else [*found, *(Wiring(BOARD, baud) for baud in BAUDS)])
 
 
 def names_of(count: int) -> list[str]:
     """Return names for the switches of a glove that is only tried: s0, s1, ..."""
     return [f"s{number}" for number in range(count)]
-
-
-def port_costs(harness: Harness, names: Sequence[str], beside: Beside = WIRE_ONLY) -> PortCosts:
-    """Return what reading each port costs where all switches `names` hang on the ports of a whole scan.
-
-    A selection of a mux's channel is shared evenly by the ports that need it. A port is charged as a whole even if a
-    shorter reading would show the one switch that is kept. A board is one port: it always sends all its keys. Raises
-    HarnessError if a switch is wired to nothing.
-    """
-    scan = whole_scan(harness, names)
-    costs = Costs(scan.ports, harness)
-    us = [beside.reading_us(reading_of(port, harness)) for port in scan.ports]
-    for unit in costs.units:
-        for place, share_us in _shares(unit, costs):
-            us[place] += share_us
-    port_of: dict[int, int] = {}
-    for number, port in enumerate(scan.ports):
-        port_of |= dict.fromkeys((switch for _, switch in port.switches), number)
-    for board, pairs in zip(harness.scanners, scan.scanners, strict=True):
-        port_of |= dict.fromkeys((switch for _, switch in pairs), len(us))
-        us.append(scanner_us(board))
-    lacking = next((name for number, name in enumerate(names) if number not in port_of), None)
-    if lacking is not None:
-        raise HarnessError(
-            f"harness {harness.name!r} has no pin or key for {lacking!r}: add it to its file, or leave --glove out"
-        )
-    return PortCosts(tuple(port_of[number] for number in range(len(names))), tuple(us))
-
-
-def _shares(unit: Unit, costs: Costs) -> Iterator[tuple[int, float]]:
-    """Yield each port of a unit with its own time and its share of what the whole unit takes beyond those."""
-    ports = ports_in(unit)
-    # After all ports but itself, a port of a shared channel costs itself alone.
-    everything = sum(1 << port for port in ports)
-    alone = [costs.after(everything, port) for port in ports]
-    beyond = (costs.of(unit) - sum(alone)) / len(ports)
-    yield from ((port, (ns + beyond) / 1000) for port, ns in zip(ports, alone, strict=True))
 
 
 def _as_wired(given: Harness) -> Wiring:

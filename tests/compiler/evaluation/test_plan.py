@@ -4,11 +4,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thenar.compiler.evaluation.placements import Placements
+from thenar.compiler import grow_id3
 from thenar.compiler.evaluation.plan import DRAWS, Planner, RowPlan, TableName, TablePlan
 from thenar.compiler.evaluation.populations import populations
 from thenar.compiler.evaluation.protocols import HONEST, PAPER, Protocol
+from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.samples import Samples
 
 Make = Callable[..., GraspSet]
 both_protocols = pytest.mark.parametrize("protocol", [PAPER, HONEST], ids=lambda protocol: protocol.name)
@@ -16,7 +18,7 @@ both_protocols = pytest.mark.parametrize("protocol", [PAPER, HONEST], ids=lambda
 
 def planner_of(grasps: GraspSet, prune: int = 0, repeats: int = 2) -> Planner:
     parts = populations(grasps, "stratified", 4, repeats, 1)
-    return Planner(parts, Placements(grasps.switches, grasps.labels), len(grasps.joints), prune, (0, 30), 1)
+    return Planner(parts, Samples.of(grasps, "switches"), len(grasps.joints), prune, (0, 30), 1)
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +64,7 @@ def test_off_the_diagonal_both_protocols_take_the_others_placement(planner: Plan
     paper, honest = (planner.table("generality", protocol) for protocol in (PAPER, HONEST))
     for i, line in enumerate(paper.rows):
         giver = planner.parts[i]
-        given = tuple(sorted(planner.placements.id3(giver.rows, 0)))
+        given = tuple(sorted(planner.chosen("id3", giver.rows, 0)))
         for j, cell in enumerate(line.cells):
             if i != j:
                 assert cell == honest.rows[i].cells[j]
@@ -81,7 +83,7 @@ def test_pruning_starts_from_all_switches_and_takes_one_placement_for_all_subjec
         for cell in line.cells:
             for fit in cell.fits:
                 seen = everyone if protocol is PAPER else np.setdiff1d(everyone, fit.fold.test)
-                assert fit.columns == tuple(sorted(planner.placements.id3(seen, least)))
+                assert fit.columns == tuple(sorted(planner.chosen("id3", seen, least)))
 
 
 @both_protocols
@@ -100,11 +102,11 @@ def test_baselines_have_as_many_switches_as_id3_in_every_fold(planner: Planner, 
 @both_protocols
 def test_baselines_choose_from_the_rows_that_id3_may_choose_from(planner: Planner, protocol: Protocol) -> None:
     table = planner.table("baselines", protocol)
-    for name, choose in (("CMIM", planner.placements.cmim), ("top-k", planner.placements.top)):
+    for name, method in (("CMIM", "cmim"), ("top-k", "mutual-information")):
         for cell in row(table, name).cells:
             for fit in cell.fits:
                 seen = cell.part.rows if protocol is PAPER else fit.fold.train
-                assert fit.columns == tuple(sorted(choose(seen, len(fit.columns))))
+                assert fit.columns == tuple(sorted(planner.chosen(method, seen, len(fit.columns))))
 
 
 def test_pruning_by_s_makes_the_placements_of_all_tables_smaller(make_grasps: Make) -> None:
@@ -124,3 +126,23 @@ def test_random_draws_differ_and_follow_the_seed(planner: Planner) -> None:
 
     assert len(set(drawn(1))) > 1
     assert drawn(1) == drawn(1) != drawn(100)
+
+
+def test_every_method_sees_exactly_the_rows_given_in_whatever_order(make_grasps: Make) -> None:
+    grasps, rows = make_grasps(noise=0.3), np.arange(5, 40)
+    used, fresh = planner_of(grasps), planner_of(grasps)
+    seen = Samples.of(grasps, "switches").rows(rows)
+    assert used.chosen("id3", rows, 4) == grow_id3(seen.switches, seen.labels, min_samples=4).inputs
+    assert used.chosen("id3", rows, 20) == fresh.chosen("id3", rows[::-1], 20) != used.chosen("id3", rows, 0)
+    assert used.chosen("id3", rows[:20], 0) == fresh.chosen("id3", rows[:20], 0)
+    for name in ("cmim", "mutual-information"):
+        assert used.chosen(name, rows, 3) == METHODS[name].chooser(seen)(3) == fresh.chosen(name, rows, 3)
+
+
+def test_any_method_can_be_a_rival(make_grasps: Make) -> None:
+    table = replace(planner_of(make_grasps()), rivals=("mrmr",)).table("baselines", HONEST)
+    assert [line.name for line in table.rows] == ["ID3", "mrmr", "random"]
+
+
+def test_a_set_without_switches_has_an_empty_placement(make_grasps: Make) -> None:
+    assert planner_of(make_grasps(n_switches=0)).chosen("id3", np.arange(5, 40), 0) == ()

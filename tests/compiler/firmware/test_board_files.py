@@ -12,8 +12,8 @@ from thenar.compiler.firmware.board_makefile import board_makefile
 from thenar.compiler.firmware.board_scan import config_of, readings, shortest_scan_us, switches_of
 from thenar.compiler.firmware.errors import FirmwareError
 from thenar.compiler.firmware.layout import arrange
-from thenar.drivers.cyberglove_sensors import SENSORS_18, SENSORS_22
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22
+from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
 
@@ -120,7 +120,7 @@ def test_chips_without_a_kept_switch_are_not_touched_and_the_others_set_up_as_th
 ) -> None:
     source = generate(UNO + CHIPS_TOML)["thenar_expanders.c"]
     assert "0x21" not in source
-    writes = [*CHIPS["mcp23017"](0x20).setup(frozenset({0, 13, 14})), *CHIPS["tca6424a"](0x22).setup(frozenset({17}))]
+    writes = [*CHIPS["mcp23017"].setup(frozenset({0, 13, 14})), *CHIPS["tca6424a"].setup(frozenset({17}))]
     rows = [[int(n, 16) for n in re.findall(r"0x(\w+)u", row)] for row in expander_rows(source, "writes")]
     assert rows == [[*write.data, *(write.expect or b"\0")] for write in writes]
     assert re.findall(r"\{0x(\w+)u, (\d+)u, (\d+)u\}", source) == [("20", "0", "3"), ("22", "4", "6")]

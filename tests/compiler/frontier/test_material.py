@@ -6,7 +6,7 @@ import pytest
 from thenar.compiler.frontier.material import Cuts, Material
 from thenar.compiler.frontier.points import FrontierError
 from thenar.compiler.frontier.settings import Search
-from thenar.compiler.placement.costaware import PortCosts
+from thenar.compiler.placement.ports import PortCosts
 from thenar.compiler.recordings.graspset import GraspSet
 
 SEARCH = Search(methods=("id3",), rivals=(), repeats=2)

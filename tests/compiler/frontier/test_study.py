@@ -17,11 +17,12 @@ from thenar.compiler.evaluation.folds import weka_folds
 from thenar.compiler.frontier.points import Frontier, FrontierError, Point, frontier_from_bytes
 from thenar.compiler.frontier.preparing import Request, run_frontier
 from thenar.compiler.frontier.study import Wanted
-from thenar.compiler.placement.ways import chooser
+from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.compiler.tables.collapse import collapse
 from thenar.compiler.tables.quantise import quantise
+from thenar.drivers.members import MemberError
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scores import Scorer
@@ -117,7 +118,7 @@ def rows_recognised(grasp_set: GraspSet, point: Point, train: Rows, test: Rows) 
     if setting.inputs != "joints":
         beside = codes if setting.way.method == "elimination" else codes[:, :0]
         learning = Samples(grasp_set.switches[train], beside[train], labels[train], tuple("0123"))
-        columns = chooser(setting.way.method, learning)(setting.way.parameter)
+        columns = METHODS[setting.way.method].chooser(learning)(setting.way.parameter)
     bits = grasp_set.switches[:, list(columns)]
     X = np.hstack([bits.astype(np.uint16), codes])
     stumps, _ = boost(X[train], labels[train], 4, rounds=setting.rounds)
@@ -283,7 +284,7 @@ def test_a_build_of_other_switches_is_refused(tmp_path: Path, make_set: Make) ->
 
 
 def test_an_unknown_rival_is_told(tmp_path: Path, make_set: Make) -> None:
-    with pytest.raises(FrontierError, match="there is no method 'nonsense'"):
+    with pytest.raises(MemberError, match="there is no placement method 'nonsense'"):
         found_of(asked(tmp_path, make_set(), rivals=("nonsense",)))
 
 

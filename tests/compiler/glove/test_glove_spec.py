@@ -9,7 +9,7 @@ from thenar.compiler.glove.errors import SpecError
 from thenar.compiler.glove.glove_spec import glove_spec
 from thenar.compiler.glove.placing import BODY_MM
 from thenar.compiler.hand import HandShape
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import GloveWiring, Harness, ScannerWiring
 from thenar.runtime.manifest import Manifest

@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 
 from thenar.compiler.glove.files import spec_files
 from thenar.compiler.glove.glove_spec import glove_spec
-from thenar.compiler.glove.packages import PACKAGES
 from thenar.compiler.hand import HandShape
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.harness.loading import load_harness, parse_harness
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel, ScannerWiring
 from thenar.runtime.manifest import Manifest
@@ -46,8 +45,8 @@ def check(netlist: "Netlist", harness: Harness, names: tuple[str, ...]) -> None:
 
 
 def check_address(netlist: "Netlist", ref: str, chip: ChipWiring) -> None:
-    lowest = min(CHIPS[chip.kind].addresses)
-    straps = [name for name, _ in PACKAGES[chip.kind].selects(lowest)]
+    lowest = min(chip.chip.addresses)
+    straps = [name for name, _ in chip.chip.package.selects(0)]
     levels = [netlist.net_of(ref, netlist.pin_of(ref, name)) for name in straps]
     assert set(levels) <= {"VCC", "GND"}
     assert lowest + sum(1 << bit for bit, net in enumerate(levels) if net == "VCC") == chip.address

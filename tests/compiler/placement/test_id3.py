@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from sklearn.tree import DecisionTreeClassifier
 
 from thenar.compiler import grow_id3
-from thenar.compiler.placement.digits import Digits
+from thenar.compiler.placement.counts import Digits
 from thenar.compiler.placement.gain import entropy_bits
 from thenar.compiler.placement.tree import Tree
 

@@ -1,14 +1,22 @@
 """The fit beside scikit-learn's, which minimises the same sum, and beside itself with the rows in another order."""
 
+import math
+from random import Random
+
 import numpy as np
 import numpy.typing as npt
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 from sklearn.linear_model import LogisticRegression
 
-from thenar.compiler.placement.logistic import RIDGE, Logistic
+from thenar.compiler.placement.logistic import RIDGE, Logistic, dot, exact_sum
 
 Bits = npt.NDArray[np.bool_]
 Labels = npt.NDArray[np.intp]
+Floats = npt.NDArray[np.float64]
+NUMBERS = arrays(np.float64, st.integers(0, 60), elements=st.floats(-1e9, 1e9))
 
 
 def grasps(seed: int, n: int = 200, s: int = 12, classes: int = 4) -> tuple[Bits, Labels]:
@@ -67,3 +75,21 @@ def test_a_single_class_needs_no_rows() -> None:
     fit = Logistic(np.array([[True, False, True]]), np.zeros(3, np.intp), 1)
     fit.improve(5)
     assert not fit.rows.any()
+
+
+@given(NUMBERS, st.randoms(use_true_random=False))
+def test_a_sum_is_the_same_in_every_order(values: Floats, random: Random) -> None:
+    shuffled = values.tolist()
+    random.shuffle(shuffled)
+    assert exact_sum(np.array(shuffled)) == exact_sum(values)
+
+
+@given(NUMBERS)
+def test_a_sum_is_right_but_for_the_grid(values: Floats) -> None:
+    bound = np.abs(values).max(initial=0.0) * len(values) ** 2 * 2.0**-51 + len(values) * 2.0**-1000
+    assert abs(exact_sum(values) - math.fsum(values)) <= bound
+
+
+@given(arrays(np.float64, (3, 4), elements=st.floats(-1e-160, 1e-160)))
+def test_products_next_to_the_smallest_doubles_do_no_harm(values: Floats) -> None:
+    assert abs(dot(values, values)) <= 1e-300

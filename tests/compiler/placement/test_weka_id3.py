@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from thenar.compiler.placement.counting import Counter
-from thenar.compiler.placement.digits import Digits
+from thenar.compiler.placement.counts import Counter, Digits
 from thenar.compiler.placement.gain import Node, best_position, compare_scores, gain_bits
 
 LARGEST = "paper14_bits"

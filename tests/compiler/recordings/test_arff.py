@@ -3,9 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from thenar.compiler.recordings.arff import read_arff
 from thenar.compiler.recordings.errors import TableError
-from thenar.compiler.recordings.table import Table, read_table
+from thenar.compiler.recordings.table import Table, read_arff, read_table
 
 HEADER = """% a comment
 @RELATION 'a b'

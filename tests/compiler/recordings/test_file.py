@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given, settings
 
 from thenar.compiler.recordings.arrays import pack, unpack
-from thenar.compiler.recordings.file import KIND, VERSION
-from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.recordings.graspset import KIND, VERSION, GraspSet
 from thenar.runtime.errors import SealError
 from thenar.runtime.sealed import seal, unseal
 

@@ -15,10 +15,10 @@ from thenar.compiler.report.content import ReportContent
 from thenar.compiler.report.frontier_charts import frontier_charts
 from thenar.compiler.report.frontier_view import COLUMNS, frontier_view
 from thenar.compiler.report.hand_picture import hand_picture
-from thenar.compiler.report.numbers import DASH
 from thenar.compiler.report.placement_view import placement_view
 from thenar.compiler.report.scan_view import scan_view
 from thenar.compiler.report.tree_view import MOST_NODES, tree_view
+from thenar.compiler.text import DASH
 
 
 @given(arrays(np.intp, (4, 4), elements=st.integers(0, 50)))

@@ -4,12 +4,18 @@ from time import monotonic
 
 import pytest
 
-from thenar.drivers.cyberglove_commands import query, setting
-from thenar.drivers.cyberglove_dialogue import Dialogue
-from thenar.drivers.cyberglove_frame import Decoder, Fault, Record
-from thenar.drivers.cyberglove_timing import period_words, shortest_us
+from thenar.drivers.cyberglove import Dialogue
+from thenar.drivers.cyberglove_protocol import (
+    Record,
+    RecordDecoder,
+    RecordFault,
+    period_words,
+    query,
+    setting,
+    shortest_us,
+)
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
-from thenar.drivers.emulated.pty_line import PtyLine
+from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.drivers.serial_line import SerialLine
 
 SOON_S = 10.0
@@ -28,9 +34,9 @@ def client(line: PtyLine) -> Iterator[SerialLine]:
         yield client
 
 
-def records(client: SerialLine, count: int, decoder: Decoder | None = None) -> list[Record]:
+def records(client: SerialLine, count: int, decoder: RecordDecoder | None = None) -> list[Record]:
     """Return as many records as asked for, fewer if they take too long."""
-    decoder, found, end = decoder or Decoder(), list[Record](), monotonic() + SOON_S
+    decoder, found, end = decoder or RecordDecoder(), list[Record](), monotonic() + SOON_S
     while len(found) < count and (left := end - monotonic()) > 0:
         found += decoder.feed(client.read(left))
     return found
@@ -70,7 +76,7 @@ def test_asked_for_more_than_it_can_it_says_so_in_every_record(line: PtyLine, cl
 
 
 def test_what_is_done_to_the_glove_shows_in_its_records(line: PtyLine, client: SerialLine) -> None:
-    decoder = Decoder(22, status=True)
+    decoder = RecordDecoder(22, status=True)
     with EmulatedCyberGlove(line, sensors=22) as glove:
         Dialogue(client).ask(setting("U", b"\1"))
         for number in range(5):
@@ -79,7 +85,7 @@ def test_what_is_done_to_the_glove_shows_in_its_records(line: PtyLine, client: S
             glove.plugged = number != 3
             glove.turn_switch(number == 4)
             client.write(b"G")
-            fault: Fault | None = "unplugged" if number == 3 else None
+            fault: RecordFault | None = "unplugged" if number == 3 else None
             status = 0x80 | (number != 3) | 0x06 * (number == 4)
             assert records(client, 1, decoder) == [Record(values, streamed=False, fault=fault, status=status)]
         assert glove.light

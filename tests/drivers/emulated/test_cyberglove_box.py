@@ -4,11 +4,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.cyberglove_commands import ANSWERED, SET, find_answer, query, setting
-from thenar.drivers.cyberglove_frame import Decoder
-from thenar.drivers.cyberglove_sensors import MASK_18, MASK_22
-from thenar.drivers.emulated.cyberglove_box import Action, CyberGloveBox, Doubts
-from thenar.drivers.emulated.cyberglove_state import GloveState
+from thenar.drivers.cyberglove_protocol import (
+    ANSWERED,
+    MASK_18,
+    MASK_22,
+    SET,
+    RecordDecoder,
+    find_answer,
+    query,
+    setting,
+)
+from thenar.drivers.emulated.cyberglove_box import Action, CyberGloveBox, Doubts, GloveState
 from thenar.drivers.errors import SettingError
 
 VALUES = bytes(range(60, 78))
@@ -155,7 +161,7 @@ def test_only_bytes_that_a_sensor_can_have_are_taken_and_the_driver_reads_them(v
             one.state.set(values)
         return
     one.state.set(values)
-    (record,) = Decoder(status=status).feed(one.state.record(streamed=True))
+    (record,) = RecordDecoder(status=status).feed(one.state.record(streamed=True))
     assert record.sensors == values
     assert (record.status is not None) == status
 

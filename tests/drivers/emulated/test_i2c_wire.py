@@ -4,9 +4,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.emulated.i2c_adapter import ADAPTERS, BYTE, BYTE_DATA, I2C_BLOCK, QUICK, WORD_DATA, Adapter, Fault
-from thenar.drivers.emulated.i2c_models import MODELS
+from thenar.drivers.emulated.i2c_adapter import (
+    ADAPTERS,
+    BYTE,
+    BYTE_DATA,
+    I2C_BLOCK,
+    QUICK,
+    WORD_DATA,
+    Adapter,
+    TransferFault,
+)
 from thenar.drivers.emulated.i2c_wire import Message, NakError, Station, Wire
+from thenar.drivers.i2c.chips import CHIPS
 
 
 def write(address: int, *data: int) -> Message:
@@ -18,7 +27,7 @@ def read(address: int, length: int) -> Message:
 
 
 def mcp(levels: int = 0xFFFF, mux: int | None = None, channel: int | None = None) -> Station:
-    station = Station("mcp23017", 0x20, mux, channel)
+    station = Station(CHIPS["mcp23017"].model, 0x20, mux, channel)
     station.device.levels = levels
     station.device.poke(0x0C, 0xFF)
     station.device.poke(0x0D, 0xFF)
@@ -26,7 +35,7 @@ def mcp(levels: int = 0xFFFF, mux: int | None = None, channel: int | None = None
 
 
 def test_registers_follow_each_other_and_wrap_in_a_chip_after_reset() -> None:
-    wire = Wire([Station("mcp23017", 0x20)], 100_000)
+    wire = Wire([Station(CHIPS["mcp23017"].model, 0x20)], 100_000)
     (answer,) = wire.transfer([write(0x20, 0x00), read(0x20, 24)])[1:]
     assert answer == b"\xff\xff" + bytes(20) + b"\xff\xff"
 
@@ -43,7 +52,7 @@ def test_without_sequence_the_pointer_stays_in_its_pair_in_bank_0_and_where_it_i
 
 
 def test_an_mcp23017_shows_pulled_up_inputs_inverted_ones_and_its_outputs() -> None:
-    station = Station("mcp23017", 0x20)
+    station = Station(CHIPS["mcp23017"].model, 0x20)
     station.device.levels = 0x00FF
     wire = Wire([station], 100_000)
     wire.transfer([write(0x20, 0x0C, 0x0F)])
@@ -57,7 +66,7 @@ def test_an_mcp23017_shows_pulled_up_inputs_inverted_ones_and_its_outputs() -> N
 
 
 def test_a_pca9555_answers_the_other_port_of_the_pair_next_and_keeps_its_command() -> None:
-    station = Station("pca9555", 0x20)
+    station = Station(CHIPS["pca9555"].model, 0x20)
     station.device.levels = 0x1234
     wire = Wire([station], 100_000)
     assert wire.transfer([write(0x20, 0x01), read(0x20, 3)])[1] == bytes.fromhex("123412")
@@ -65,7 +74,7 @@ def test_a_pca9555_answers_the_other_port_of_the_pair_next_and_keeps_its_command
 
 
 def test_a_tca6424a_goes_round_its_three_ports_only_when_told_to() -> None:
-    station = Station("tca6424a", 0x22)
+    station = Station(CHIPS["tca6424a"].model, 0x22)
     station.device.levels = 0x563412
     wire = Wire([station], 100_000)
     assert wire.transfer([write(0x22, 0x81), read(0x22, 4)])[1] == bytes.fromhex("34561234")
@@ -73,7 +82,7 @@ def test_a_tca6424a_goes_round_its_three_ports_only_when_told_to() -> None:
 
 
 def test_the_latches_of_a_pcf8575_take_turns_from_every_start_on() -> None:
-    station = Station("pcf8575", 0x20)
+    station = Station(CHIPS["pcf8575"].model, 0x20)
     station.device.levels = 0x3412
     wire = Wire([station], 100_000)
     wire.transfer([write(0x20, 0xF0, 0xFF)])
@@ -104,7 +113,7 @@ def test_chips_of_one_address_on_two_connected_channels_answer_both() -> None:
     )
 )
 def test_bytes_and_scl_periods_are_counted_as_data_sheets_draw_them(messages: list[Message]) -> None:
-    wire = Wire([Station("pca9555", 0x20)], 400_000)
+    wire = Wire([Station(CHIPS["pca9555"].model, 0x20)], 400_000)
     wire.transfer(messages)
     payload = sum(message.length if message.data is None else len(message.data) for message in messages)
     assert sum(wire.traffic.values()) == len(messages) + payload
@@ -144,7 +153,9 @@ OTHER = [write(0x21, 0x12), read(0x21, 1)]
     ],
 )
 def test_an_adapter_lets_through_what_its_driver_does(kind: str, messages: list[Message], code: int | None) -> None:
-    adapter = Adapter(Wire([Station("mcp23017", 0x20), Station("mcp23017", 0x21)], 100_000), kind)
+    adapter = Adapter(
+        Wire([Station(CHIPS["mcp23017"].model, 0x20), Station(CHIPS["mcp23017"].model, 0x21)], 100_000), kind
+    )
     if code is None:
         assert len(adapter.rdwr(messages)) == len(messages)
         return
@@ -178,16 +189,16 @@ def test_smbus_transfers_are_made_of_the_same_messages() -> None:
 
 def test_a_fault_lasts_as_many_transfers_as_it_is_told() -> None:
     adapter = Adapter(Wire([mcp()], 100_000), "any")
-    adapter.faults.append(Fault(errno.EIO, address=0x20, times=2))
+    adapter.faults.append(TransferFault(errno.EIO, address=0x20, times=2))
     for _ in range(2):
         with pytest.raises(OSError):
             adapter.rdwr(PAIR)
     assert adapter.rdwr(PAIR)[1] == b"\xff"
 
 
-@pytest.mark.parametrize("kind", MODELS)
+@pytest.mark.parametrize("kind", CHIPS)
 def test_a_chip_put_in_place_of_another_keeps_the_wires(kind: str) -> None:
-    station = Station("tca6424a", 0x22)
+    station = Station(CHIPS["tca6424a"].model, 0x22)
     station.device.levels = 0x123456
-    station.become(kind)
+    station.become(CHIPS[kind].model)
     assert station.device.levels == 0x123456 & (1 << station.device.pins) - 1

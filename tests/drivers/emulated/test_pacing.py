@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.emulated.pacing import Outgoing
+from thenar.drivers.emulated.serial_line import Outgoing
 
 BYTE_S = 0.001
 GAPS = st.lists(st.tuples(st.integers(0, 60), st.integers(1, 30)), min_size=1, max_size=20)

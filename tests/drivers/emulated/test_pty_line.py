@@ -8,7 +8,7 @@ from time import monotonic
 import pytest
 import serial
 
-from thenar.drivers.emulated.pty_line import PtyLine
+from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.drivers.errors import DeviceError
 
 EVERY_BYTE = bytes(range(256))

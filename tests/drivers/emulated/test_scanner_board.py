@@ -2,9 +2,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers import scanner_frame
-from thenar.drivers.emulated.scanner_board import ScannerBoard
-from thenar.drivers.scanner_messages import (
+from thenar.drivers import scanner_protocol
+from thenar.drivers.emulated.scanner import ScannerBoard
+from thenar.drivers.scanner_protocol import (
     WITHOUT_DIODES,
     Event,
     Faults,
@@ -25,11 +25,11 @@ from thenar.drivers.scanner_messages import (
 
 
 def said(sent: list[bytes], keys: int = 8) -> list[FromBoard]:
-    return [from_board(received, keys) for received in scanner_frame.Decoder().feed(b"".join(sent))]
+    return [from_board(received, keys) for received in scanner_protocol.FrameDecoder().feed(b"".join(sent))]
 
 
 def asked(board: ScannerBoard, message: ToBoard, now: int) -> FromBoard:
-    (answer,) = said(board.receive(scanner_frame.encode(frame(message, 0)), now))
+    (answer,) = said(board.receive(scanner_protocol.encode(frame(message, 0)), now))
     return answer
 
 
@@ -56,7 +56,7 @@ def test_it_begins_with_an_end_and_a_hello_and_tells_all_keys_once_it_has_scanne
     assert isinstance(hello, Hello)
     assert (hello.rows, hello.columns, hello.flags, hello.board, hello.time_us) == (2, 4, WITHOUT_DIODES, 77, 5)
     assert board.next_us() == 5
-    assert board.receive(scanner_frame.encode(frame(GetState(), 0)), 6) == []
+    assert board.receive(scanner_protocol.encode(frame(GetState(), 0)), 6) == []
     assert board.scan(0, 6, unread=0b1, whole=False) == []
     assert said(board.scan(0b101, 7)) == [Heartbeat(7, 0b101, 8)]
     assert board.next_us() is None
@@ -69,7 +69,7 @@ def test_keys_that_cannot_be_read_keep_their_state_and_are_told_when_they_change
     assert said(board.scan(0, 2000, unread=0b1010)) == [Event(2000, 2, 0), Lost(0b1010, 8)]
     assert said(board.scan(0, 3000, unread=0b1010)) == []
     assert said(board.scan(0, 50_000, unread=0b1010)) == [Lost(0b1010, 8), Heartbeat(50_000, 0b10, 8)]
-    get_state = scanner_frame.encode(frame(GetState(), 0))
+    get_state = scanner_protocol.encode(frame(GetState(), 0))
     assert said(board.receive(get_state, 50_001)) == [Lost(0b1010, 8), Heartbeat(50_001, 0b10, 8)]
     assert said(board.scan(0b10, 51_000, unread=0b1111_1000, whole=False)) == [Lost(0b1000, 8)]
     assert said(board.scan(0, 52_000)) == [Event(52_000, 1, 0), Lost(0, 8)]
@@ -105,7 +105,7 @@ def test_heartbeats_and_states_keep_their_schedule(period_us: int) -> None:
 def test_frames_are_numbered_in_the_order_they_are_sent() -> None:
     board = ScannerBoard(1, 8, heartbeat_us=1000)
     sent = b"".join(board.boot(0) + run(board, 300_000))
-    numbers = [received.sequence for received in scanner_frame.Decoder().feed(sent)]
+    numbers = [received.sequence for received in scanner_protocol.FrameDecoder().feed(sent)]
     assert numbers == [number % 256 for number in range(len(numbers))]
 
 
@@ -127,7 +127,7 @@ def test_commands_are_answered_by_what_holds_from_then_on() -> None:
 def test_what_it_cannot_understand_is_counted_and_told_once_a_second() -> None:
     board = scanned(ScannerBoard(1, 8, heartbeat_us=0))
     damaged = b"\x05nonsense\0"
-    unknown = scanner_frame.encode(scanner_frame.Frame(0x77, 0, b""))
+    unknown = scanner_protocol.encode(scanner_protocol.Frame(0x77, 0, b""))
     assert board.receive(damaged + unknown, 0) == []
     assert board.next_us() == 0
     assert said(board.scan(0, 10)) == [Faults(10, 0, 2, 0, 0)]

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 from thenar.drivers.errors import ThenarError
 from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS
 
 if TYPE_CHECKING:
-    from thenar.drivers.i2c.scan import Scan
+    from thenar.drivers.i2c.bus import Scan
 
 
 class Client:
@@ -62,9 +62,9 @@ class Client:
 
 
 def _chip(kind: str, address: int, mux: int | None = None, channel: int | None = None) -> ChipAt:
-    chip = CHIPS[kind](address)
+    chip = CHIPS[kind]
     used = frozenset(pin for pin, name in enumerate(chip.pins) if name not in chip.not_inputs)
-    return ChipAt(chip, used, mux, channel)
+    return ChipAt(chip, address, used, mux, channel)
 
 
 def main() -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS
 
 MakeRig = Callable[..., Any]
 NEVER_CHECKED = 3600.0
@@ -141,7 +141,7 @@ def test_more_ports_than_the_kernel_takes_messages_are_read_in_two_transfers(rig
 
 def test_two_chips_that_would_answer_at_one_address_are_refused() -> None:
     def at(mux: int | None = None, channel: int | None = None) -> ChipAt:
-        return ChipAt(CHIPS["mcp23017"](0x20), frozenset({0}), mux, channel)
+        return ChipAt(CHIPS["mcp23017"], 0x20, frozenset({0}), mux, channel)
 
     for chips in ([at(), at()], [at(), at(0x70, 1)], [at(0x70, 1), at(0x70, 1)]):
         with pytest.raises(SettingError, match="two chips would answer at 0x20"):
@@ -171,8 +171,8 @@ def test_a_file_is_no_bus_and_is_not_even_opened(tmp_path: Path) -> None:
 
 
 def test_a_bus_that_was_not_opened_or_was_closed_says_so(rig: MakeRig) -> None:
-    chip = CHIPS["mcp23017"](0x20)
-    scan = I2cBus("/dev/i2c-7", [ChipAt(chip, frozenset())]).prepare([PortRead(0, chip.readings[0])])
+    chip = CHIPS["mcp23017"]
+    scan = I2cBus("/dev/i2c-7", [ChipAt(chip, 0x20, frozenset())]).prepare([PortRead(0, chip.readings[0])])
     with pytest.raises(DeviceError, match="is not open"):
         scan.read()
     glove = rig(("mcp23017", 0x20))

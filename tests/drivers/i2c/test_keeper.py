@@ -4,10 +4,9 @@ from collections.abc import Sequence
 import pytest
 
 from thenar.drivers.errors import DeviceError
-from thenar.drivers.i2c.keeper import Keeper
-from thenar.drivers.i2c.member import Member
+from thenar.drivers.i2c.chips import CHIPS
+from thenar.drivers.i2c.keeper import Keeper, PlacedChip
 from thenar.drivers.i2c.node import Node, Query, Run
-from thenar.drivers.i2c.registry import CHIPS
 
 
 class DeadNode(Node):
@@ -34,7 +33,7 @@ class DeadNode(Node):
 @pytest.mark.parametrize("code", [errno.EREMOTEIO, errno.ENXIO, errno.EIO, errno.ETIMEDOUT])
 def test_an_adapter_that_is_gone_is_noticed_whatever_it_says_of_its_chips(code: int) -> None:
     node = DeadNode(code)
-    chips = [Member(node.device, CHIPS["mcp23017"](address), frozenset(), None) for address in (0x20, 0x21)]
+    chips = [PlacedChip(node.device, CHIPS["mcp23017"], address, frozenset(), None) for address in (0x20, 0x21)]
     keeper = Keeper(node, chips, check_every_s=1.0)
     keeper.begin()
     assert not any(chip.present for chip in chips)

@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 
 from thenar.drivers.emulated.i2c_adapter import Adapter
 from thenar.drivers.emulated.i2c_wire import Message, Station, Wire
+from thenar.drivers.i2c.chips import CHIPS
+from thenar.drivers.i2c.keeper import ImpostorError, read_back, set_up, whats_there
 from thenar.drivers.i2c.node import Node, Query, Run
-from thenar.drivers.i2c.recognising import ImpostorError, read_back, set_up, watched, whats_there
-from thenar.drivers.i2c.registry import CHIPS
 
 # Kinds that are told by their addresses or not at all: the same registers under two names.
 ALIKE = {"tca9555": "pca9555", "pcf8574a": "pcf8574"}
@@ -25,7 +25,7 @@ class WireNode(Node):
 
     def __init__(self, kind: str, address: int) -> None:
         super().__init__("/dev/i2c-7")
-        self.station = Station(kind, address)
+        self.station = Station(CHIPS[kind].model, address)
         self.adapter = Adapter(Wire([self.station], 100_000), "any")
 
     def write(self, address: int, data: bytes) -> None:
@@ -65,13 +65,13 @@ leftovers = st.lists(st.tuples(st.integers(0, 0x1A), st.integers(0, 255)), max_s
 def test_every_reading_gives_the_pins_whatever_the_chip_was_left_with(
     kind: str, levels: int, leftovers: list[tuple[int, int]]
 ) -> None:
-    chip = CHIPS[kind](address_of(kind))
-    node = node_with(kind, chip.address, levels)
+    chip, address = CHIPS[kind], address_of(kind)
+    node = node_with(kind, address, levels)
     for register, value in leftovers:
         node.station.device.poke(register, value)
-    set_up(node, chip, inputs(kind))
+    set_up(node, chip, address, inputs(kind))
     for reading in chip.readings:
-        answer = int.from_bytes(node.query(Query(chip.address, reading.command, reading.length)), "little")
+        answer = int.from_bytes(node.query(Query(address, reading.command, reading.length)), "little")
         seen = {pin: answer >> bit & 1 for bit, pin in enumerate(reading.pins)}
         assert all(seen[pin] == node.station.device.levels >> pin & 1 for pin in seen if pin in inputs(kind))
 
@@ -87,7 +87,7 @@ def test_a_chip_that_is_another_is_found_out_unless_all_its_pins_are_low(said: s
     if not CHIPS[said].registers and not all(port & 0xF9 for port in ports):
         return
     with pytest.raises(ImpostorError):
-        set_up(node_with(there, address, pins), CHIPS[said](address), inputs(said))
+        set_up(node_with(there, address, pins), CHIPS[said], address, inputs(said))
 
 
 @pytest.mark.parametrize("there", sorted(set(CHIPS) - set(ALIKE)))
@@ -111,36 +111,35 @@ def test_a_chip_left_in_bank_1_by_a_crash_is_brought_back_to_bank_0() -> None:
     node = node_with("mcp23017", 0x20, 0x2A15)
     node.station.device.poke(0x0A, 0xA0)  # BANK and SEQOP
     node.station.device.poke(0x00, 0x00)
-    chip = CHIPS["mcp23017"](0x20)
-    set_up(node, chip, inputs("mcp23017"))
+    set_up(node, CHIPS["mcp23017"], 0x20, inputs("mcp23017"))
     assert node.query(Query(0x20, b"\x12", 2)) == bytes((0x15, 0x2A))
 
 
 @pytest.mark.parametrize("kind", CHIPS)
 def test_a_reset_shows_in_what_is_watched_of_every_chip_that_a_reset_harms(kind: str) -> None:
-    chip = CHIPS[kind](address_of(kind))
-    node = node_with(kind, chip.address, 0xFFFFFF)
-    set_up(node, chip, inputs(kind))
-    watch = watched(chip, inputs(kind))
+    chip, address = CHIPS[kind], address_of(kind)
+    node = node_with(kind, address, 0xFFFFFF)
+    set_up(node, chip, address, inputs(kind))
+    watch = chip.watched(inputs(kind))
     if watch is None:
         assert not chip.registers  # all pins high is both its reset and its set-up
         return
-    assert watch.holds(read_back(node, chip, watch))
+    assert watch.holds(read_back(node, chip, address, watch))
     node.station.device.reset()
-    assert not watch.holds(read_back(node, chip, watch))
+    assert not watch.holds(read_back(node, chip, address, watch))
 
 
 def test_only_used_pins_of_an_mcp23017_are_pulled_up_and_the_two_that_are_no_inputs() -> None:
     node = node_with("mcp23017", 0x20, 0xFFFF)
-    set_up(node, CHIPS["mcp23017"](0x20), frozenset({0, 9}))
+    set_up(node, CHIPS["mcp23017"], 0x20, frozenset({0, 9}))
     assert node.query(Query(0x20, b"\x0c", 2)) == bytes((0x81, 0x82))
 
 
 @pytest.mark.parametrize("kind", ["mcp23017", "mcp23008"])
 def test_lost_pull_ups_show_in_the_bits_that_stay_high(kind: str) -> None:
-    chip = CHIPS[kind](0x20)
+    chip = CHIPS[kind]
     node = node_with(kind, 0x20, 0xFFFF)
-    set_up(node, chip, inputs(kind))
+    set_up(node, chip, 0x20, inputs(kind))
     for reading in chip.readings:
         query = Query(0x20, reading.command, reading.length)
         assert int.from_bytes(node.query(query), "little") & reading.high == reading.high

@@ -4,19 +4,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.i2c.member import Member
+from thenar.drivers.i2c.bus import Port, Way, cut
+from thenar.drivers.i2c.chips import CHIPS
+from thenar.drivers.i2c.keeper import PlacedChip, Route
 from thenar.drivers.i2c.node import MOST_MESSAGES, Query
-from thenar.drivers.i2c.registry import CHIPS
-from thenar.drivers.i2c.routes import Route
-from thenar.drivers.i2c.ways import Port, Way, cut
 
 MEMBERS = [
-    Member("/dev/i2c-7", CHIPS["mcp23017"](0x20 + n % 4), frozenset(), route, present=n != 3)
+    PlacedChip("/dev/i2c-7", CHIPS["mcp23017"], 0x20 + n % 4, frozenset(), route, present=n != 3)
     for n, route in enumerate([None, None, None, None, Route(0x70, 1), Route(0x70, 1), Route(0x70, 2)])
 ]
 ports = st.lists(
     st.builds(
-        lambda member, command: Port(member, Query(member.chip.address, command, 1), 0),
+        lambda member, command: Port(member, Query(member.address, command, 1), 0),
         st.sampled_from(MEMBERS),
         st.sampled_from([b"", b"\x12"]),
     ),

@@ -13,9 +13,8 @@ import pytest
 from thenar.compiler.firmware.board_loading import parse_board
 from thenar.compiler.firmware.one_hand import for_one_hand
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
-from thenar.drivers.emulated.pty_line import PtyLine
-from thenar.drivers.scanner import Scanner
-from thenar.drivers.scanner_reading import BoardGrasp
+from thenar.drivers.emulated.serial_line import PtyLine
+from thenar.drivers.scanner import BoardGrasp, Scanner
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Proof, Recognised, Source, Switch
 from thenar.runtime.tables import IntegerTables, tables_to_bytes

@@ -10,9 +10,8 @@ from typing import Any, Protocol
 import pytest
 
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
-from thenar.drivers.emulated.pty_line import PtyLine
-from thenar.drivers.emulated.scanner import EmulatedScanner
-from thenar.drivers.emulated.scanner_board import ScannerBoard
+from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
+from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.harness.wiring import Debounce, GloveWiring, ScannerWiring
 from thenar.runtime.live.sources import Keeper
 from thenar.runtime.sources.cyberglove import GloveDevice

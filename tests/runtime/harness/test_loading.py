@@ -5,8 +5,8 @@ import pytest
 from msgspec.structs import replace
 
 from thenar.drivers.errors import ThenarError
-from thenar.drivers.i2c import registry
-from thenar.drivers.i2c.pcf8574 import Pcf8574
+from thenar.drivers.i2c.chips import CHIPS
+from thenar.drivers.i2c.chips.pcf8574 import Pcf8574
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness import checks, wiring
 from thenar.runtime.harness.loading import load_harness, parse_harness
@@ -180,11 +180,10 @@ def test_two_chips_that_would_answer_together_are_refused(
 
 def test_a_chip_at_the_address_of_a_mux_is_refused(load: Load, monkeypatch: pytest.MonkeyPatch) -> None:
     class Odd(Pcf8574):
-        kind = "odd"
+        name = "odd"
         addresses = range(0x70, 0x71)
-        __slots__ = ()
 
-    kinds = {**registry.CHIPS, "odd": Odd}
+    kinds = {**CHIPS, "odd": Odd()}
     for module in (checks, wiring):
         monkeypatch.setattr(module, "CHIPS", kinds)
     text = BUS + "[[bus.chip]]\nkind = 'odd'\naddress = 0x70\n" + place(0x20, 0)

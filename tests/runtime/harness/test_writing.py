@@ -3,7 +3,7 @@ from collections.abc import Callable
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS
 from thenar.drivers.ports import port_fault
 from thenar.runtime.harness.checks import faults
 from thenar.runtime.harness.wiring import (
@@ -36,11 +36,11 @@ def harnesses(draw: st.DrawFn) -> Harness:
         mux = draw(st.none() | st.builds(MuxChannel, address=st.just(0x73), channel=st.just(address)))
         chips.append(
             ChipWiring(
-                kind=kind.kind,
+                kind=kind.name,
                 address=kind.addresses[address % len(kind.addresses)],
                 mux=mux,
                 pins={pin: next(left) for pin in pins},
-                closed=draw(st.sampled_from(["low"] if kind.kind.startswith("pcf") else ["low", "high"])),
+                closed=draw(st.sampled_from(["low", "high"] if kind.registers else ["low"])),
             )
         )
     board = ScannerWiring(port="p", switches=("", *(next(left) for _ in range(draw(st.integers(0, 4))))))

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 from hypothesis import strategies as st
 
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel, ScannerWiring
 
 _KINDS = ("mcp23017", "pcf8575", "tca6424a", "mcp23008")
@@ -26,11 +26,11 @@ def _harnesses(draw: st.DrawFn, chips: int = 3, pins: int = 6) -> Harness:
         used = draw(st.lists(st.sampled_from(usable), max_size=pins, unique=True))
         buses[bus].append(
             ChipWiring(
-                kind=kind.kind,
+                kind=kind.name,
                 address=0x20 + number,
                 mux=None if behind is None else MuxChannel(address=behind[0], channel=behind[1]),
                 pins={pin: f"s{switch + index}" for index, pin in enumerate(used)},
-                closed=draw(st.sampled_from(["low"] if kind.kind.startswith("pcf") else ["low", "high"])),
+                closed=draw(st.sampled_from(["low", "high"] if kind.registers else ["low"])),
             )
         )
         switch += len(used)

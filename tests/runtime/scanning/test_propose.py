@@ -2,7 +2,7 @@ from itertools import combinations_with_replacement
 
 import pytest
 
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.checks import faults
 from thenar.runtime.harness.wiring import GloveWiring, MuxChannel

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.i2c.registry import CHIPS
+from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.harness.checks import faults
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
 from thenar.runtime.scanning.ports import cover, ports_of
@@ -69,13 +69,13 @@ def test_no_set_of_readings_is_smaller_or_as_small_and_shorter(harnesses: Harnes
 def test_a_port_without_a_wanted_switch_is_left_alone_where_that_costs_no_transaction(
     kind: str, pins: list[int], readings: list[str]
 ) -> None:
-    chip = CHIPS[kind](CHIPS[kind].addresses[0])
+    chip = CHIPS[kind]
     assert [reading.name for reading in cover(chip, pins)] == readings
 
 
 @pytest.mark.parametrize("kind", _KINDS)
 def test_every_input_of_every_kind_is_shown_by_a_reading(kind: str) -> None:
-    chip = CHIPS[kind](CHIPS[kind].addresses[0])
+    chip = CHIPS[kind]
     for pin, name in enumerate(chip.pins):
         if name not in chip.not_inputs:
             assert len(cover(chip, [pin])) == 1

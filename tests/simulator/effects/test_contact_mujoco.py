@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import mujoco
 import numpy as np
 import pytest
@@ -22,8 +23,7 @@ from thenar.simulator.body.pose import Pose
 from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
 from thenar.simulator.contact.grip import GRAVITY, STIFFNESS, torques
 from thenar.simulator.contact.model import Contact, Load
-from thenar.simulator.contact.mujoco_grasp import MujocoContact
-from thenar.simulator.contact.mujoco_model import build
+from thenar.simulator.contact.mujoco import Dynamics, MujocoContact, build
 from thenar.simulator.effects.contact_mujoco import Parameters, model
 from thenar.simulator.pipeline.effect import Setting
 
@@ -37,6 +37,14 @@ SHAPES = (BALL, Cylinder(diameter_mm=60.0, length_mm=90.0), Box(60.0, 60.0, 60.0
 ROUND_IT_DEG = np.array([40.0, 10.0, 20.0, 20.0] + [0.0, 35.0, 40.0, 25.0] * 4)
 BELOW = np.array([95.0, 5.0, -50.0, 0.0, 0.0, 0.0])
 OUT_OF_REACH = np.array([900.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
+def dynamics(**changes: float) -> Dynamics:
+    given = msgspec.structs.asdict(Parameters(**changes))  # type: ignore[arg-type]
+    del given["after"]
+    return Dynamics(**given)
+
+
 WELD_N_PER_MM = Parameters().weld_n_per_m / 1e3
 TIPS = tuple(Pad(7 * digit + 6, 0.2) for digit in range(5))
 
@@ -79,7 +87,7 @@ def same(a: Contact, b: Contact) -> bool:
 @settings(max_examples=30)
 def test_every_part_lies_where_the_hand_says(size: Size, angles: np.ndarray) -> None:
     hand = Hand(size)
-    bodies = build(hand, holding().thing, Parameters())
+    bodies = build(hand, holding().thing, dynamics())
     data = mujoco.MjData(bodies)
     data.qpos[:20] = angles
     mujoco.mj_kinematics(bodies, data)
@@ -101,7 +109,7 @@ def test_every_part_lies_where_the_hand_says(size: Size, angles: np.ndarray) -> 
 @pytest.mark.parametrize("digit", range(5))
 def test_a_digit_ends_where_its_last_sphere_of_skin_does(digit: int) -> None:
     hand = Hand(Size(185.0, 83.0))
-    bodies = build(hand, holding().thing, Parameters())
+    bodies = build(hand, holding().thing, dynamics())
     tip = bodies.geom(CAPSULES[3 * digit + 2])
     last = np.flatnonzero(hand.sphere_capsules == 3 * digit + 2)[-1]
     assert (tip.pos[0] + tip.size[1]) * 1e3 == pytest.approx(hand.sphere_offsets[last])
@@ -109,7 +117,7 @@ def test_a_digit_ends_where_its_last_sphere_of_skin_does(digit: int) -> None:
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: type(shape).__name__)
 def test_the_object_has_its_shape_and_lies_as_its_pose_says(shape: Shape) -> None:
-    bodies = build(Hand(Size(185.0, 83.0)), Thing("thing", shape, 0.1), Parameters())
+    bodies = build(Hand(Size(185.0, 83.0)), Thing("thing", shape, 0.1), dynamics())
     thing = bodies.geom("object")
     turn = np.empty(9)
     mujoco.mju_quat2Mat(turn, thing.quat)
@@ -118,7 +126,7 @@ def test_the_object_has_its_shape_and_lies_as_its_pose_says(shape: Shape) -> Non
 
 
 def test_an_unloaded_joint_returns_to_its_commanded_angle() -> None:
-    bodies = build(holding().hand, holding().thing, Parameters())
+    bodies = build(holding().hand, holding().thing, dynamics())
     data = mujoco.MjData(bodies)
     bodies.qpos_spring[:20] = np.radians(ROUND_IT_DEG)
     data.qpos[:20] = np.radians(ROUND_IT_DEG + np.resize([8.0, -8.0], 20))
@@ -258,7 +266,7 @@ def test_an_object_that_still_moves_is_reported_though_all_forces_on_it_balance(
     condition = holding(mass_kg=0.3)
     load = Load(condition, *told(condition, 12))
     now, then = (
-        MujocoContact(Parameters(weld_n_per_m=20.0, weld_nm_per_rad=0.005, steps=steps), murakami160()).solve([load])[0]
+        MujocoContact(dynamics(weld_n_per_m=20.0, weld_nm_per_rad=0.005, steps=steps), murakami160()).solve([load])[0]
         for steps in (200, 202)
     )
     # In 10 ms it turns by 0.001 rad at 0.1 rad/s, and slides by 0.03 mm at 3 mm/s.
@@ -276,7 +284,7 @@ def test_objects_of_next_to_no_size_are_something_to_mujoco(solve: Callable[...,
 
 
 def test_a_hand_of_a_hundredth_is_built_and_one_of_full_size_stays_as_it_is() -> None:
-    small, whole = (build(Hand(Size(185.0 * s, 83.0 * s)), holding().thing, Parameters()) for s in (0.01, 1.0))
+    small, whole = (build(Hand(Size(185.0 * s, 83.0 * s)), holding().thing, dynamics()) for s in (0.01, 1.0))
     assert small.body_mass[1:].min() >= 1e-12
     assert whole.body_mass[1:16].min() > 1e-3
     assert whole.body_inertia[1:16].min() > 1e-8
@@ -288,7 +296,7 @@ def test_the_longest_step_a_scene_may_ask_for_is_too_long_for_the_stiffest_skin(
 
 def test_what_goes_wrong_stays_wrong(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)  # MuJoCo leaves its log here
-    bodies = build(holding().hand, holding().thing, Parameters())
+    bodies = build(holding().hand, holding().thing, dynamics())
     data = mujoco.MjData(bodies)
     data.qpos[3] = np.nan
     mujoco.mj_step(bodies, data)
@@ -297,7 +305,7 @@ def test_what_goes_wrong_stays_wrong(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_no_part_of_the_hand_meets_another() -> None:
-    bodies = build(holding().hand, holding(pose=OUT_OF_REACH).thing, Parameters())
+    bodies = build(holding().hand, holding(pose=OUT_OF_REACH).thing, dynamics())
     data = mujoco.MjData(bodies)
     data.qpos[:20] = np.radians(np.array([60.0, 50.0, 60.0, 60.0] + [0.0, 90.0, 100.0, 80.0] * 4))  # a fist
     data.qpos[20] = 0.9
@@ -306,7 +314,7 @@ def test_no_part_of_the_hand_meets_another() -> None:
 
 
 def test_a_joint_stops_at_its_range() -> None:
-    bodies = build(holding().hand, holding().thing, Parameters())
+    bodies = build(holding().hand, holding().thing, dynamics())
     assert np.degrees(bodies.jnt_range[:20]) == pytest.approx(LIMITS_DEG)
     assert bodies.jnt_limited[:20].all()
     assert [bodies.joint(number).name for number in range(20)] == list(DOF)
@@ -321,9 +329,9 @@ WITHOUT_MUJOCO = """
 import sys
 sys.modules["mujoco"] = None
 from thenar.simulator.errors import SimMissingError
-from thenar.simulator.pipeline.registry import load
-effect = load("contact.mujoco")
-parameters = effect.Parameters(steps=3)
+from thenar.simulator.pipeline.effect import EFFECTS
+effect = EFFECTS["contact.mujoco"]
+parameters = effect.parameters(steps=3)
 try:
     effect.model(parameters, None)
 except SimMissingError as wrong:

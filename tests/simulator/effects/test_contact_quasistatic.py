@@ -11,7 +11,7 @@ from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.layout import murakami160
 from thenar.simulator.body.pose import Pose
 from thenar.simulator.contact.model import Contact, ContactModel, Load
-from thenar.simulator.effects.contact_quasistatic import EFFECT, Parameters, model
+from thenar.simulator.effects.contact_quasistatic import MEMBER, Parameters, model
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import Setting
 from thenar.simulator.planning.postures import Postures
@@ -171,9 +171,9 @@ def test_skins_at_the_ends_of_what_may_be_asked_for_come_to_numbers(
 
 
 def test_it_conflicts_with_the_other_model_and_declares_what_it_writes() -> None:
-    assert EFFECT.conflicts == ("contact.mujoco",)
-    assert EFFECT.stage == "contact"
-    assert set(EFFECT.writes) <= set(Batch.__dataclass_fields__)
+    assert MEMBER.conflicts == ("contact.mujoco",)
+    assert MEMBER.stage == "contact"
+    assert set(MEMBER.writes) <= set(Batch.__dataclass_fields__)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.hand import LIMITS_DEG
-from thenar.simulator.effects.hand_style import EFFECT, Parameters, prepare
+from thenar.simulator.effects.hand_style import MEMBER, Parameters, prepare
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import Setting
 from thenar.simulator.streams import Draw
@@ -31,7 +31,7 @@ def style(
     ) -> tuple[np.ndarray, np.ndarray]:
         batch = make_batch(range(2), make_condition(subject, grasp, thing))
         batch.posture_deg, batch.grip_n = np.tile(MIDDLE, (2, 1)), np.full(2, 10.0)
-        prepare(parameters or Parameters(), make_setting())(batch, make_draw(EFFECT.name, batch))
+        prepare(parameters or Parameters(), make_setting())(batch, make_draw(MEMBER.name, batch))
         return batch.posture_deg - MIDDLE, batch.grip_n / 10.0
 
     return run

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from thenar.simulator.body.condition import Condition
-from thenar.simulator.effects.joint_drift import EFFECT, Parameters, prepare
+from thenar.simulator.effects.joint_drift import MEMBER, Parameters, prepare
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import Setting
 from thenar.simulator.streams import Draw
@@ -28,7 +28,7 @@ def drift(
         batch.trials = np.array(trials)
         batch.sensors_deg = np.zeros((len(trials), 2, 18))
         prepare(Parameters(deg_per_session=deg_per_session), make_setting(session_trials=100))(
-            batch, make_draw(EFFECT.name, batch)
+            batch, make_draw(MEMBER.name, batch)
         )
         return batch.sensors_deg
 

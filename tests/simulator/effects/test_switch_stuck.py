@@ -34,7 +34,7 @@ def read(
         batch = make_batch(range(3), make_condition(subject))
         batch.bits = np.random.default_rng(5).random((3, 2, 160)) < 0.5
         for module, parameters in effects:
-            module.prepare(module.Parameters(**parameters), make_setting())(batch, make_draw(module.EFFECT.name, batch))
+            module.prepare(module.Parameters(**parameters), make_setting())(batch, make_draw(module.MEMBER.name, batch))
         return batch.bits
 
     return run
@@ -84,7 +84,7 @@ def test_open_and_closed_ones_are_drawn_apart_and_closed_wins(read: Read) -> Non
     both = read((switch_stuck_open, {"switches": (4, 5)}), (switch_stuck_closed, {"switches": (5, 6)}))
     assert not both[:, :, 4].any()
     assert both[:, :, 5].all()
-    assert "switch.stuck_open" in switch_stuck_closed.EFFECT.after
+    assert "switch.stuck_open" in switch_stuck_closed.MEMBER.after
 
 
 @pytest.mark.parametrize(("module", "value"), BOTH)
@@ -103,7 +103,7 @@ def test_switches_that_are_not_there_are_refused_with_the_place(
     given = module.Parameters(**parameters)  # type: ignore[attr-defined]
     with pytest.raises(SceneError) as caught:
         module.prepare(given, make_setting())  # type: ignore[attr-defined]
-    for word in (f"effects.{module.EFFECT.name}", *words):  # type: ignore[attr-defined]
+    for word in (f"effects.{module.MEMBER.name}", *words):  # type: ignore[attr-defined]
         assert word in str(caught.value)
 
 

@@ -5,9 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.simulator.effects.wire_damaged_bytes import Parameters, damaged, prepare
-from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.batch import Batch, Traffic
 from thenar.simulator.pipeline.effect import Setting
-from thenar.simulator.pipeline.traffic import Traffic
 
 MakeBatch = Callable[..., Batch]
 

@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 from thenar.simulator.effects.wire_lost_bytes import Parameters, arrives, prepare
-from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.batch import Batch, Traffic
 from thenar.simulator.pipeline.effect import Setting
-from thenar.simulator.pipeline.traffic import Traffic
 
 MakeBatch = Callable[..., Batch]
 

@@ -24,11 +24,13 @@ FORCES = arrays(np.float64, (2, 5), elements=st.sampled_from([0.0, 0.999, 1.0, 1
 @pytest.fixture(scope="session")
 def take(make_draw: DrawMaker) -> Callable[..., None]:
     """Return a function that takes a batch through one of the glove's own steps, which draws nothing."""
-    steps = {effect.name: make for effect, make in glove.STEPS}
+    steps = {effect.name: effect for effect in glove.STEPS}
 
     def run(name: str, batch: Batch, setting: Setting) -> None:
         draw = make_draw(name, batch)
-        steps[name](setting)(batch, draw)
+        effect = steps[name]
+        assert effect.prepare is not None
+        effect.prepare(effect.parameters(), setting)(batch, draw)
         assert not draw.draws.counts
 
     return run

@@ -1,34 +1,26 @@
-"""Effects by name."""
+"""The registry of effects."""
 
 from pathlib import Path
 
 import pytest
 
 from thenar.simulator import effects
-from thenar.simulator.errors import SceneError
-from thenar.simulator.pipeline.effect import EffectParameters
-from thenar.simulator.pipeline.registry import CONTACTS, NAMES, load
+from thenar.simulator.pipeline.effect import EFFECTS, STAGES, EffectParameters
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_a_name_loads_the_module_that_says_it_is_that_effect(name: str) -> None:
-    module = load(name)
-    assert module.EFFECT.name == name
-    assert issubclass(module.Parameters, EffectParameters)
-    assert callable(module.model if name in CONTACTS else module.prepare)
+@pytest.mark.parametrize("name", EFFECTS)
+def test_a_record_has_parameters_with_defaults_and_one_thing_that_makes_what_acts(name: str) -> None:
+    effect = EFFECTS[name]
+    assert effect.name == name
+    assert issubclass(effect.parameters, EffectParameters)
+    assert sum(maker is not None for maker in (effect.prepare, effect.model, effect.together)) == 1
     # A scene may list it without saying more.
-    assert module.Parameters() == module.Parameters()
+    assert effect.parameters() == effect.parameters()
 
 
-def test_every_module_of_effects_has_its_name_and_no_name_stands_twice() -> None:
+def test_every_module_of_effects_has_the_name_of_its_effect_and_they_come_in_the_order_of_stages() -> None:
     modules = {path.stem for path in Path(effects.__path__[0]).glob("*.py")} - {"__init__"}
-    assert modules == {name.replace(".", "_") for name in NAMES}
-    assert len(set(NAMES)) == len(NAMES)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "words"), [("joint.nois", "did you mean 'joint.noise'"), ("zzz", "there are: hand.style, hand.posture")]
-)
-def test_another_name_is_refused_with_the_nearest_or_all(wrong: str, words: str) -> None:
-    with pytest.raises(SceneError, match=words):
-        load(wrong)
+    assert modules == {name.replace(".", "_") for name in EFFECTS}
+    stages = [STAGES.index(effect.stage) for effect in EFFECTS.values()]
+    assert stages == sorted(stages)
+    assert len({effect.rank for effect in EFFECTS.values()}) == len(EFFECTS)

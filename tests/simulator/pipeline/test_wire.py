@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers import scanner_frame as scanner
+from thenar.drivers import scanner_protocol as scanner
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import Setting
+from thenar.simulator.pipeline.effect import Effect, Setting, Step
 from thenar.simulator.pipeline.wire import RECEIVE, SEND
 from thenar.simulator.streams import Draw
 
@@ -18,6 +18,11 @@ MakeDraw = Callable[..., Draw]
 MakeSetting = Callable[..., Setting]
 
 FRAMES, STATE_BYTES, RECORD_BYTES = 5, 26, 20
+
+
+def prepared(effect: Effect, setting: Setting) -> Step:
+    assert effect.prepare is not None
+    return effect.prepare(effect.parameters(), setting)
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +35,7 @@ def make_sent(make_batch: MakeBatch, make_draw: MakeDraw, make_setting: MakeSett
         batch.bits = random.random((*frame_us.shape, switches)) < 0.1
         batch.raw = random.integers(1, 256, (*frame_us.shape, 18)).astype(np.uint8)
         batch.settled = np.ones(len(batch), dtype=np.bool_)
-        SEND[1](make_setting(timed=True))(batch, make_draw("glove.send", batch))
+        prepared(SEND, make_setting(timed=True))(batch, make_draw("glove.send", batch))
         return batch
 
     return make
@@ -38,7 +43,7 @@ def make_sent(make_batch: MakeBatch, make_draw: MakeDraw, make_setting: MakeSett
 
 @pytest.fixture(scope="module")
 def receive(make_draw: MakeDraw, make_setting: MakeSetting) -> Callable[[Batch], None]:
-    return lambda batch: RECEIVE[1](make_setting(timed=True))(batch, make_draw("glove.receive", batch))
+    return lambda batch: prepared(RECEIVE, make_setting(timed=True))(batch, make_draw("glove.receive", batch))
 
 
 def every_10_ms(repetitions: int = 2) -> np.ndarray:
@@ -201,11 +206,11 @@ def test_a_repetition_is_received_the_same_alone(make_sent: Callable, receive: C
 def test_bytes_are_counted(make_sent: Callable, make_draw: MakeDraw, make_setting: MakeSetting) -> None:
     batch = make_sent(every_10_ms(3))
     draw = make_draw("glove.send", batch)
-    SEND[1](make_setting(timed=True))(batch, draw)
+    prepared(SEND, make_setting(timed=True))(batch, draw)
     assert draw.draws.counts == {"bytes sent": 3 * FRAMES * (STATE_BYTES + RECORD_BYTES)}
 
 
 def test_frames_faster_than_the_line_are_refused(make_setting: MakeSetting) -> None:
     with pytest.raises(SceneError, match=r"recording.rate_hz: 500 frames .* at most 160"):
-        SEND[1](make_setting(timed=True, period_us=2000))
-    SEND[1](make_setting(timed=True, period_us=6237))
+        prepared(SEND, make_setting(timed=True, period_us=2000))
+    prepared(SEND, make_setting(timed=True, period_us=6237))

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thenar.drivers.cyberglove_sensors import SENSORS_18
+from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.session import Label, Session

@@ -2,8 +2,8 @@ import msgspec
 import pytest
 
 from thenar.simulator.errors import SceneError
-from thenar.simulator.pipeline.pipeline import compile_pipeline
 from thenar.simulator.running.explain import explain
+from thenar.simulator.running.pipeline import compile_pipeline
 from thenar.simulator.scenes.decode import load_scene
 
 QUICK = load_scene("quick")

@@ -10,11 +10,11 @@ import pytest
 from thenar.simulator import load_scene, simulate
 from thenar.simulator.effects.contact_quasistatic import Parameters
 from thenar.simulator.errors import SceneError
+from thenar.simulator.pipeline.effect import EFFECTS
 from thenar.simulator.pipeline.ledger import Ledger
-from thenar.simulator.pipeline.pipeline import compile_pipeline
-from thenar.simulator.pipeline.registry import load
 from thenar.simulator.planning.postures import Postures
 from thenar.simulator.running.explain import explain
+from thenar.simulator.running.pipeline import compile_pipeline
 from thenar.simulator.running.report import Report
 from thenar.simulator.running.session import sessions
 from thenar.simulator.running.simulation import Simulated
@@ -106,7 +106,7 @@ def test_another_seed_makes_another_set(quick: Simulated) -> None:
 
 def test_the_more_frames_the_fewer_repetitions_are_simulated_at_a_time() -> None:
     """10 001 frames each: four at a time, or the two batches of three that make at least four."""
-    jitter = Listed("frame.jitter", load("frame.jitter").Parameters())
+    jitter = Listed("frame.jitter", EFFECTS["frame.jitter"].parameters())
     recording = msgspec.structs.replace(QUICK.recording, rate_hz=10_000.0, hold_ms=1000.0)
     scene = msgspec.structs.replace(QUICK, recording=recording, effects=(jitter,), subjects=QUICK.subjects[:1])
     seen: list[int] = []
@@ -202,7 +202,7 @@ def test_a_scene_in_which_nothing_settles_is_an_error() -> None:
 
 
 def test_a_scene_of_which_no_byte_arrives_says_so_and_blames_no_hand() -> None:
-    lossy = Listed("wire.lost_bytes", load("wire.lost_bytes").Parameters(rate=0.999))
+    lossy = Listed("wire.lost_bytes", EFFECTS["wire.lost_bytes"].parameters(rate=0.999))
     scene = msgspec.structs.replace(QUICK, effects=(*QUICK.effects, lossy))
     with pytest.raises(SceneError, match="of the first, no frame arrived whole"):
         simulate(scene, jobs=1)

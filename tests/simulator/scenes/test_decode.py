@@ -1,16 +1,16 @@
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from thenar.simulator.errors import SceneError
-from thenar.simulator.pipeline.registry import NAMES, load
+from thenar.simulator.pipeline.effect import EFFECTS
 from thenar.simulator.scenes.catalogue import load_catalogue
 from thenar.simulator.scenes.decode import load_scene
 from thenar.simulator.scenes.population import Population, draw_subjects
 from thenar.simulator.scenes.scene import Glove, Recording, Scene, Subject
+
+NAMES = tuple(EFFECTS)
 
 LEAST = """\
 seed = 1
@@ -81,8 +81,8 @@ def test_everything_that_is_said_is_kept(scene: Load, tmp_path: Path) -> None:
 def test_effects_come_in_the_order_of_the_registry_with_their_parameters(scene: Load) -> None:
     found = scene(LEAST + "[effects.joint.noise]\nsd_deg = 3\n[effects.hand.grip]\n[effects.joint.drift]\n").effects
     assert [name for name, _ in found] == ["hand.grip", "joint.noise", "joint.drift"]
-    assert found[0].parameters == load("hand.grip").Parameters()
-    assert found[1].parameters == load("joint.noise").Parameters(sd_deg=3.0)
+    assert found[0].parameters == EFFECTS["hand.grip"].parameters()
+    assert found[1].parameters == EFFECTS["joint.noise"].parameters(sd_deg=3.0)
 
 
 @pytest.mark.parametrize(
@@ -94,24 +94,13 @@ def test_effects_come_in_the_order_of_the_registry_with_their_parameters(scene: 
     ],
 )
 def test_an_effect_may_be_spelled_in_every_way_of_toml(scene: Load, text: str) -> None:
-    assert scene(LEAST + text).effects == (("joint.noise", load("joint.noise").Parameters(sd_deg=3.0)),)
+    assert scene(LEAST + text).effects == (("joint.noise", EFFECTS["joint.noise"].parameters(sd_deg=3.0)),)
 
 
 def test_every_effect_may_be_listed_without_parameters(scene: Load) -> None:
     names = [name for name in NAMES if name != "contact.mujoco"]
     found = scene(LEAST + "".join(f"[effects.{name}]\n" for name in names))
     assert [name for name, _ in found.effects] == names
-
-
-def test_only_the_effects_that_are_listed_are_imported(tmp_path: Path) -> None:
-    path = tmp_path / "mine.toml"
-    path.write_text(LEAST + "[effects.joint.noise]\n[effects.switch.bounce]\n")
-    program = (
-        "import sys; from thenar.simulator.scenes.decode import load_scene; load_scene(sys.argv[1]);"
-        "print(*sorted(name for name in sys.modules if name.startswith('thenar.simulator.effects.')))"
-    )
-    done = subprocess.run([sys.executable, "-c", program, str(path)], check=True, capture_output=True, text=True)
-    assert done.stdout.split() == ["thenar.simulator.effects.joint_noise", "thenar.simulator.effects.switch_bounce"]
 
 
 def test_a_population_is_drawn_with_the_seed_of_the_scene(scene: Load) -> None:

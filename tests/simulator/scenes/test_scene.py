@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.simulator.body.shapes import Sphere
-from thenar.simulator.pipeline.registry import load
+from thenar.simulator.pipeline.effect import EFFECTS
 from thenar.simulator.scenes.scene import Recording, Scene, SceneObject, Subject
 
 MakeScene = Callable[..., Scene]
@@ -64,7 +64,7 @@ def test_a_session_has_the_trials_of_one_subject(make_scene: MakeScene) -> None:
 def test_frames_and_bytes_are_there_if_the_rows_or_an_effect_want_them(
     make_scene: MakeScene, rows: str, effects: list[str], timed: bool, on_wire: bool
 ) -> None:
-    setting = make_scene(recording=Recording(rows=rows)).setting(load(name).EFFECT for name in effects)  # type: ignore[arg-type]
+    setting = make_scene(recording=Recording(rows=rows)).setting(EFFECTS[name] for name in effects)  # type: ignore[arg-type]
     assert (setting.timed, setting.on_wire) == (timed, on_wire)
 
 

@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from thenar.compiler.frontier.drawing.sentence import sentence
-from thenar.compiler.frontier.drawing.words import duration, featured, wiring_of
+from thenar.compiler.frontier.drawing.words import featured, wiring_of
 
 
 def test_it_says_how_many_switches_how_much_time_how_much_recognition_and_against_what(examples: Any) -> None:
@@ -40,17 +40,6 @@ def test_where_no_point_is_level_the_best_is_spoken_of(examples: Any) -> None:
     best = featured(examples.example_frontier(picked=None, marks=()))
     assert best is not None
     assert best.number == 10
-
-
-@pytest.mark.parametrize(
-    ("us", "said"),
-    [
-        *((0.0, "0 us"), (61.54, "61.5 us"), (440, "440 us"), (999.4, "999 us")),
-        *((999.6, "1 ms"), (2052, "2.05 ms"), (1.5e6, "1.5 s")),
-    ],
-)
-def test_times_are_told_to_three_digits(us: float, said: str) -> None:
-    assert duration(us) == said
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,238 @@
+"""Backward elimination: the switch whose row of the score tables is missed least goes, again and again.
+
+The tables are those that boosting heads for (`logistic`), of all switches that are left and of the joints. While many
+switches are left, the few whose rows cost least to replace by their means go at once; of the last FINE, one goes at a
+time, and the likeliest CANDIDATES for it are tried: the tables are fitted on without each, since the others may stand
+in for it. Of equally likely ones the lowest number goes, of equally good candidates the likeliest.
+
+With the times of ports, a rise is held against what the port takes, shared out over those of its switches that are
+left: the last one of a port pays for all of it.
+
+`elimination-boosted` does the same on the tables of boosting itself: LogitBoost learns from all switches that are left,
+and the joints; its stumps collapse to one row of scores a switch. Those that cost least go, BOOSTED_SHARE of them at
+once while many are left; boosting then starts anew. Of equally cheap ones the lowest number goes first.
+
+The joints' codes, where there are any, are always kept. Of many rows, a sample is looked at.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...boosting.boost import boost
+from ...elementary import LN_2, add_up, exp, log, softmax
+from ...samples import Columns, Samples
+from ...tables.collapse import collapse
+from ..exact import Floats
+from ..logistic import Logistic
+from ..ports import PortCosts
+from .base import BEST, FINE, Method, first_of
+
+Bits = NDArray[np.bool_]
+
+# One at a time goes of so many that are left, and so many candidates are tried for it.
+LAST, CANDIDATES = 40, 6
+# Of the switches that are left, how many go at once while they are many.
+SHARE = 0.05
+# Steps of L-BFGS: at first, for a candidate, and after a removal.
+FIRST_STEPS, TRIAL_STEPS, STEPS = 60, 3, 5
+# What the mean time of a port counts, where a switch itself counts 1.
+PORT_WEIGHT = 16.0
+MOST_ROWS = 8192
+BINS = 8
+BOOSTED_ROUNDS, BOOSTED_SHARE = 40, 0.12
+# So many factors in 0.5 .. 1 are multiplied before their exponents are taken out again: 2^-512 is far from underflow.
+_FACTORS = 512
+
+
+def elimination_order(samples: Samples, ports: PortCosts | None = None) -> Columns:
+    """Return the switches that vary in `samples`, the last one to go first.
+
+    Takes the time of some 1500 evaluations of the tables for 160 switches, whatever they are.
+    """
+    return _Elimination(sampled(samples), ports).order()
+
+
+def boosted_elimination_order(samples: Samples) -> Columns:
+    """Return the switches that vary in `samples`, the last one to go first: some 35 trainings for 160 switches."""
+    rows = sampled(samples)
+    left = np.flatnonzero(_varying(rows))
+    gone: list[int] = []
+    while len(left) > 1:
+        cheapest = np.argsort(_boosted_costs(rows, left), kind="stable")[: max(1, int(BOOSTED_SHARE * len(left)))]
+        gone += left[cheapest].tolist()
+        left = np.delete(left, cheapest)
+    return tuple(left.tolist() + gone[::-1])
+
+
+def _boosted_costs(samples: Samples, left: NDArray[np.intp]) -> Floats:
+    """Return (len(left),) by how much the loss rises without each of the switches `left`."""
+    X = samples.kept(tuple(left.tolist()))
+    stumps, _ = boost(X, samples.labels, samples.n_classes, rounds=BOOSTED_ROUNDS, max_bins=BINS)
+    rows = collapse(stumps, len(left)).switch_rows
+    probability = softmax(np.ascontiguousarray(stumps.scores(X).T))
+    return removal_rises(probability, np.ascontiguousarray(samples.switches[:, left].T), rows, samples.labels)
+
+
+class _Elimination:
+    def __init__(self, samples: Samples, ports: PortCosts | None) -> None:
+        self._left: list[int] = np.flatnonzero(_varying(samples)).tolist()
+        self._bits = np.ascontiguousarray(samples.switches.T[self._left])
+        self._labels, self._ports = samples.labels, ports
+        self._gone: list[int] = []
+        columns = np.concatenate([self._bits, thermometer(samples.codes)])
+        self._fit = Logistic(columns, samples.labels, samples.n_classes)
+
+    def order(self) -> Columns:
+        if len(self._left) > 1:
+            self._fit.improve(FIRST_STEPS)
+        while len(self._left) > 1:
+            rises = removal_rises(self._fit.probability, self._bits, self._fit.rows[: len(self._left)], self._labels)
+            likeliest = np.argsort(rises / self._costs(), kind="stable").tolist()
+            if len(self._left) > LAST:
+                worst = likeliest[: max(1, int(SHARE * len(self._left)))]
+                self._fit = self._fit.without(worst)
+                self._fit.improve(STEPS)
+            else:
+                worst = [self._try(likeliest[:CANDIDATES])]
+            self._drop(worst)
+        return tuple(self._left + self._gone[::-1])
+
+    def _try(self, candidates: list[int]) -> int:
+        """Go on without the candidate (a position) whose absence, once the others stand in for it, costs least."""
+        fits = [self._fit.without([position]) for position in candidates]
+        for fit in fits:
+            fit.improve(TRIAL_STEPS)
+        costs = self._costs()
+        rises = [(fit.loss - self._fit.loss) / costs[p] for fit, p in zip(fits, candidates, strict=True)]
+        best = rises.index(min(rises))
+        self._fit = fits[best]
+        self._fit.improve(STEPS - TRIAL_STEPS)
+        return candidates[best]
+
+    def _drop(self, positions: list[int]) -> None:
+        self._gone += [self._left[position] for position in positions]
+        self._left = [column for position, column in enumerate(self._left) if position not in set(positions)]
+        self._bits = np.delete(self._bits, positions, axis=0)
+
+    def _costs(self) -> Floats:
+        """Return what each switch that is left costs; only how they compare matters."""
+        if self._ports is None:
+            return np.ones(len(self._left))
+        return 1.0 + PORT_WEIGHT * self._ports.shares(self._left)
+
+
+def _varying(samples: Samples) -> Bits:
+    return np.asarray(samples.switches.any(axis=0) & ~samples.switches.all(axis=0))
+
+
+def sampled(samples: Samples) -> Samples:
+    """Return MOST_ROWS rows at most, spread evenly over each class's rows, in order: classes keep their shares."""
+    if len(samples.labels) <= MOST_ROWS:
+        return samples
+    by_class = np.argsort(samples.labels, kind="stable")
+    spread = np.arange(MOST_ROWS) * len(by_class) // MOST_ROWS
+    return samples.rows(np.sort(by_class[spread]))
+
+
+def thermometer(codes: NDArray[np.uint16]) -> NDArray[np.bool_]:
+    """Return bits (b, n) of codes (n, j): for each joint, whether the code exceeds each of its BINS - 1 quantiles.
+
+    Thresholds that no code exceeds, or that are equal, give no bit.
+    """
+    n = len(codes)
+    rows = []
+    for column in codes.T:
+        quantiles = np.sort(column)[np.arange(1, BINS) * n // BINS]
+        rows += [column > threshold for threshold in np.unique(quantiles) if threshold < column.max()]
+    return np.array(rows, dtype=np.bool_).reshape(len(rows), n)
+
+
+def removal_rises(probability: Floats, bits: NDArray[np.bool_], rows: Floats, labels: NDArray[np.intp]) -> Floats:
+    """Return the rise (s,) of the sum of -ln P(label) for each switch whose row is replaced by its mean.
+
+    probability (K, n) with all rows in place, bits (s, n), rows (s, K), labels (n,). Removal changes the scores of a
+    frame by one of two vectors d (K,), whether the switch is closed or open; the loss then rises by
+    ln(sum over k of P_k exp d_k) - d_label.
+    """
+    n_classes, n = probability.shape
+    member = (labels == np.arange(n_classes)[:, np.newaxis]).astype(np.float64)
+    closed_of_class = bits.astype(np.float64) @ member.T
+    share = closed_of_class.sum(axis=1, keepdims=True) / n
+    closed, opened = rows * (share - 1.0), rows * share
+    own = add_up((closed_of_class * closed + (member.sum(axis=1) - closed_of_class) * opened).T)
+    return sums_of_logs(_shares_after(probability, np.ascontiguousarray(bits.T), exp(closed), exp(opened))) - own
+
+
+def _shares_after(probability: Floats, bits: NDArray[np.bool_], closed: Floats, opened: Floats) -> Floats:
+    """Return the sum (n, s) over classes of P times its factor (s, K), added class by class."""
+    # Not as a matrix product: its bits would depend on the machine.
+    total = np.zeros(bits.shape)
+    for shares, if_closed, if_open in zip(probability, closed.T, opened.T, strict=True):
+        factors = np.where(bits, if_closed, if_open)
+        factors *= shares[:, np.newaxis]
+        total += factors
+    return total
+
+
+def sums_of_logs(factors: Floats) -> Floats:
+    """Return the sum over axis 0 of ln `factors` (n, s), all > 0: (s,), as logarithms of products.
+
+    Factors are multiplied in a fixed order, first halves by second halves, with their exponents taken out.
+    """
+    product, powers = np.frexp(factors)
+    exponents = powers.sum(axis=0, dtype=np.int64)
+    while len(product) > 1:
+        joined = 1
+        while len(product) > 1 and joined < _FACTORS:
+            product, joined = _halved(product), joined * 2
+        product, powers = np.frexp(product)
+        exponents += powers.sum(axis=0, dtype=np.int64)
+    sums: Floats = log(product[0]) + exponents * LN_2
+    return sums
+
+
+def _halved(product: Floats) -> Floats:
+    half = len(product) // 2
+    first = product[: len(product) - half].copy()
+    first[:half] *= product[len(product) - half :]
+    return first
+
+
+MEMBER = (
+    Method(
+        name=BEST,
+        help="The switch whose row of the score tables is missed least goes, again and again: tables fitted whole",
+        learn=lambda samples, _: first_of(elimination_order(samples)),
+        ours=True,
+        uses_joints=True,
+        sizes=FINE,
+        all_too=True,
+        tried="always",
+        seconds=5.0,
+        rank=1,
+    ),
+    Method(
+        name="elimination-cost",
+        help="Elimination that holds what a switch is worth against its part of the time to read its port",
+        learn=lambda samples, ports: first_of(elimination_order(samples, ports)),
+        ours=True,
+        uses_joints=True,
+        uses_ports=True,
+        sizes=FINE,
+        all_too=True,
+        tried="wired",
+        seconds=5.0,
+        rank=2,
+    ),
+    Method(
+        name="elimination-boosted",
+        help="The same on boosted tables: LogitBoost starts anew once the switches whose removal costs least are gone",
+        learn=lambda samples, _: first_of(boosted_elimination_order(samples)),
+        ours=True,
+        uses_joints=True,
+        sizes=FINE,
+        all_too=True,
+        seconds=9.0,
+        rank=3,
+    ),
+)

@@ -1,0 +1,299 @@
+"""How far a placement of m switches is from the best there is: a bounded search.
+
+The objective is the number of pairs of grasps of different types that look alike, equal in every kept switch: no
+classifier tells these apart. It says nothing of what a given classifier makes of the rest; but unlike a recognition
+rate it can be bounded over all subsets of m switches. Every switch that is added tells fewer new pairs apart than it
+would have before (the number told apart is submodular), so for every set S, be it good or bad, and every T
+
+    alike(T) >= alike(S) - sum over a in T of gain(a | S)         (Nemhauser, Wolsey, Math. Programming 14, 1978)
+
+One such line for each of many S makes an integer program in one variable a switch, whose optimum is a bound; its answer
+is a subset that is evaluated, and gives the next lines. Where bound and best subset meet, the subset is proved best.
+"""
+
+import math
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..samples import Columns, Samples
+from .errors import PlacementError
+from .exact import Counts
+
+Numbers = NDArray[np.intp]
+
+# The program is scaled so that a thousandth of all pairs is 1; HiGHS holds constraints to 1e-6 of that.
+_UNIT, _SLACK = 1000.0, 1e-5
+# Nodes of branch and bound for one program. What is cut off there still has a bound; a clock would not be repeatable.
+_NODES = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Subset:
+    """The best subset of m switches that was found, as numbers of pairs of rows of different types that look alike.
+
+    columns  in the order of what they bring, the next best one first
+    pairs    pairs there are
+    alike    pairs that look alike in `columns`
+    least    no subset of so many switches leaves fewer
+    nodes    integer programs that were solved
+    """
+
+    columns: Columns
+    pairs: int
+    alike: int
+    least: int
+    nodes: int
+
+    @property
+    def value(self) -> float:
+        """Return the share of the pairs that `columns` tell apart."""
+        return self.share_apart(self.alike)
+
+    @property
+    def bound(self) -> float:
+        """Return the share of the pairs that no subset of so many switches exceeds."""
+        return self.share_apart(self.least)
+
+    @property
+    def gap(self) -> float:
+        """Return how much better, at most, the best subset is: a share of all pairs."""
+        return self.bound - self.value
+
+    @property
+    def proved(self) -> bool:
+        """Return whether no subset is better."""
+        return self.alike <= self.least
+
+    def share_apart(self, alike: int) -> float:
+        """Return the share of the pairs told apart where so many look alike; 1 if there are none."""
+        return 1.0 - alike / self.pairs if self.pairs else 1.0
+
+
+def best_subset(
+    samples: Samples,
+    m: int,
+    *,
+    rounds: int = 10,
+    starts: tuple[Columns, ...] = (),
+    on_round: Callable[[int, int], None] | None = None,
+) -> Subset:
+    """Return the best subset of m switches that `rounds` integer programs find, and a bound on all others.
+
+    starts    placements of at most m switches to start from besides the greedy one: the answer is no worse than they
+    on_round  is called with (done, rounds) after every integer program
+
+    The objective is that of this module. Raises PlacementError if m or rounds is negative.
+    """
+    if m < 0 or rounds < 0:
+        raise PlacementError(f"m = {m} and rounds = {rounds} must be at least 0")
+    pairs = Pairs(samples)
+    search = _Search(pairs, min(m, len(pairs.varying)))
+    for start in dict.fromkeys([(), *(start[: search.m] for start in starts)]):
+        search.offer(swapped(pairs, filled(pairs, start, search.m)))
+    nodes = 0
+    while nodes < rounds and search.open:
+        search.step()
+        nodes += 1
+        if on_round is not None:
+            on_round(nodes, rounds)
+    order = filled(pairs, (), search.m, among=search.best)
+    return Subset(order, pairs.total, search.alike, search.least, nodes)
+
+
+class Pairs:
+    """The pairs of rows of different grasp types, and how many of them look alike in some of the switches.
+
+    Two rows look alike in some switches if they are equal in every one of these. All counts are exact whole numbers.
+    Joints are not looked at.
+
+    total      pairs there are
+    varying    (v,) numbers of the switches that ever change
+    """
+
+    def __init__(self, samples: Samples) -> None:
+        bits = samples.switches
+        self.varying: Numbers = np.flatnonzero(bits.any(axis=0) & ~bits.all(axis=0))
+        packed = np.packbits(bits[:, self.varying], axis=1)
+        kinds = _numbered(packed) * samples.n_classes + samples.labels
+        # Rows of one type that are alike in everything are one row that counts so often.
+        _, first, counts = np.unique(kinds, return_index=True, return_counts=True)
+        self._bits, self._labels, self._counts = bits[first], samples.labels[first], counts.astype(np.float64)
+        self._n_classes = samples.n_classes
+        self.total = self.alike(())
+
+    def alike(self, columns: Columns) -> int:
+        """Return how many pairs look alike in `columns`."""
+        groups, cells = self._cut(columns)
+        return (_squares(np.bincount(groups, self._counts)) - _squares(np.bincount(cells, self._counts))) // 2
+
+    def gains(self, columns: Columns) -> Counts:
+        """Return (s,) how many of the pairs alike in `columns` each further switch, alone, tells apart."""
+        groups, cells = self._cut(columns)
+        mixed = np.bincount(groups, self._counts)[groups] > np.bincount(cells, self._counts)[cells]
+        left = self._halves(groups, mixed) - self._halves(cells, mixed)
+        return np.asarray(self.alike(columns) - left // 2, dtype=np.int64)
+
+    def _cut(self, columns: Columns) -> tuple[Numbers, Numbers]:
+        """Return the number of every row's group (rows alike in `columns`), and of its cell (those of its type)."""
+        groups = _numbered(np.packbits(self._bits[:, list(columns)], axis=1))
+        cells = np.unique(groups * self._n_classes + self._labels, return_inverse=True)[1]
+        return groups, cells
+
+    def _halves(self, parts: Numbers, rows: NDArray[np.bool_]) -> Counts:
+        """Return for every switch (s,) the sum, over the two halves into which it cuts each part, of size squared."""
+        from scipy.sparse import csr_matrix
+
+        numbers = np.unique(parts[rows], return_inverse=True)[1]
+        shape = (int(numbers.max(initial=-1)) + 1, len(numbers))
+        sums = csr_matrix((self._counts[rows], (numbers, np.arange(len(numbers)))), shape=shape)
+        closed = sums @ self._bits[rows].astype(np.float64)
+        opened = sums.sum(axis=1) - closed
+        squares: NDArray[np.float64] = (np.square(closed) + np.square(opened)).sum(axis=0)
+        return np.asarray(squares).ravel().astype(np.int64)
+
+
+def _numbered(packed: NDArray[np.uint8]) -> Numbers:
+    """Return for every row (n,) the number of its pattern."""
+    if not packed.shape[1]:
+        return np.zeros(len(packed), dtype=np.intp)
+    return np.asarray(np.unique(packed, axis=0, return_inverse=True)[1], dtype=np.intp).ravel()
+
+
+def _squares(sizes: NDArray[np.generic]) -> int:
+    return int(np.square(sizes.astype(np.int64)).sum())
+
+
+def filled(pairs: Pairs, columns: Columns, m: int, among: Columns | None = None) -> Columns:
+    """Return `columns` and, after them, what tells most further pairs apart, one by one, until there are m.
+
+    among  what may be taken (None: every switch that varies); it must hold enough. Ties go to the lowest number.
+    """
+    allowed = pairs.varying if among is None else np.array(sorted(among), dtype=np.intp)
+    while len(columns) < m:
+        open_ones = allowed[~np.isin(allowed, columns)]
+        gains = pairs.gains(columns)[open_ones]
+        columns = (*columns, int(open_ones[gains.argmax()]))
+    return columns
+
+
+def swapped(pairs: Pairs, columns: Columns) -> Columns:
+    """Return `columns` after exchanging one for a better one, over and over, until no exchange leaves fewer alike."""
+    least = pairs.alike(columns)
+    place = tried = 0
+    while tried < len(columns):
+        other = filled(pairs, columns[:place] + columns[place + 1 :], len(columns))
+        tried += 1
+        if (found := pairs.alike(other)) < least:
+            columns, least, tried = other, found, 0
+        place = (place + 1) % len(columns)
+    return columns
+
+
+class Bounding:
+    """Lines  alike(T) >= alike - sum over a in T of gains[a]  that hold for every T of m of the `varying` switches."""
+
+    def __init__(self, varying: NDArray[np.intp], total: int, m: int) -> None:
+        self._varying, self._total, self._m = varying, max(total, 1), m
+        self._gains: list[NDArray[np.floating]] = []
+        self._alike: list[float] = []
+
+    def add(self, alike: int, gains: Counts) -> None:
+        """Take one line: of a set that leaves `alike` pairs, of which each switch (s,) tells gains[a] apart."""
+        self._gains.append(gains[self._varying] * (_UNIT / self._total))
+        self._alike.append(alike * (_UNIT / self._total))
+
+    def solve(self) -> tuple[int, Columns]:
+        """Return how many pairs are alike at least in any m switches, and m switches for which the lines allow least.
+
+        The second is empty if none was found among the nodes that are looked at.
+        """
+        from scipy.optimize import Bounds, LinearConstraint, milp
+
+        v = len(self._varying)
+        lines = np.column_stack([np.array(self._gains), np.ones(len(self._gains))])
+        size = np.append(np.ones(v), 0.0)
+        with _silent():
+            found = milp(
+                np.append(np.zeros(v), 1.0),
+                constraints=[
+                    LinearConstraint(lines, lb=np.array(self._alike)),
+                    LinearConstraint(size[np.newaxis], lb=self._m, ub=self._m),
+                ],
+                integrality=size,
+                bounds=Bounds(0.0, np.append(np.ones(v), _UNIT)),
+                options={"node_limit": _NODES, "mip_rel_gap": 0.0},
+            )
+        columns = () if found.x is None else tuple(self._varying[found.x[:v] > 0.5].tolist())
+        bound = found.mip_dual_bound
+        least = 0 if bound is None or not math.isfinite(bound) else math.ceil((bound - _SLACK) * self._total / _UNIT)
+        return max(least, 0), columns
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Let nothing onto stdout: HiGHS writes there from C, now and then, whatever it is told."""
+    sys.stdout.flush()
+    kept = os.dup(1)
+    with open(os.devnull, "wb") as nothing:  # noqa: PTH123 - no path of ours
+        os.dup2(nothing.fileno(), 1)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+
+
+@dataclass(slots=True)
+class _Search:
+    """The best subset of m so far, which leaves `alike` pairs alike, and `least`, below which none can get."""
+
+    pairs: Pairs
+    m: int
+    bounding: Bounding = field(init=False)
+    best: Columns = ()
+    alike: int = field(init=False)
+    least: int = field(init=False)
+    stuck: bool = False
+    _seen: set[frozenset[int]] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        self.bounding = Bounding(self.pairs.varying, self.pairs.total, self.m)
+        self.alike = self.pairs.total
+        everything: Columns = tuple(self.pairs.varying.tolist())
+        self.least = self.pairs.alike(everything) if self.m else self.alike
+
+    @property
+    def open(self) -> bool:
+        """Whether anything is left to look for: not proved yet, and the last integer program told something new."""
+        return self.least < self.alike and not self.stuck
+
+    def offer(self, columns: Columns) -> bool:
+        """Take a subset of m, and the lines it gives; return whether it was a new one."""
+        if frozenset(columns) in self._seen:
+            return False
+        self._seen.add(frozenset(columns))
+        if (alike := self.pairs.alike(columns)) <= self.alike:
+            self.best, self.alike = columns, alike
+        for part in _parts(columns):
+            self.bounding.add(self.pairs.alike(part), self.pairs.gains(part))
+        return True
+
+    def step(self) -> None:
+        """Solve one integer program, and evaluate its answer."""
+        least, columns = self.bounding.solve()
+        self.least = min(max(self.least, least), self.alike)
+        self.stuck = len(columns) != self.m or not self.offer(columns)
+
+
+def _parts(columns: Columns) -> Iterator[Columns]:
+    """Yield the sets whose lines are of use about `columns`: itself, all but one of it, and its beginnings."""
+    yield columns
+    for place in range(len(columns)):
+        yield columns[:place] + columns[place + 1 :]
+        yield columns[:place]

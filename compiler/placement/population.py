@@ -1,0 +1,292 @@
+"""A standard placement: one for many subjects, those it serves worst included, and how many subjects it takes.
+
+Placements are learnt from some subjects and recognise others, who are never learnt from. Three are held beside each
+other: as a method chooses them, and bettered for the mean over subjects or for the worst-served tenth. Which of the
+three is taken is decided among the subjects that are learnt from, on a fifth of them that is kept aside, by the mean
+and the worst tenth in equal parts.
+
+What a method chooses last, and what it would choose next, it can hardly tell apart from the rows it looks at: another
+draw of rows chooses others. So these are exchanged, one by one, as long as half of the subjects then recognise the
+other half better: on the mean over subjects, or over the tenth that is served worst. Weights in place of exchanges
+(the worst-served tenth counted more, every subject by how badly it is served) gained no more than another draw of rows
+did.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..boosting.boost import boost
+from ..boosting.stumps import winners
+from ..recordings.graspset import GraspSet
+from ..samples import Columns, Samples
+from ..workers import in_workers
+from .errors import PlacementError
+from .methods.base import BEST, METHODS
+from .placement import Aim, CurvePoint, Placement, Progress, Served, Standard, kept_of, samples_of
+
+Numbers = NDArray[np.intp]
+
+AIMS: tuple[Aim, ...] = ("plain", "mean", "worst tenth")
+
+LEAST_SUBJECTS = 8
+WORST_SHARE = 0.1
+_HELD_OUT = 0.2
+_SIZES = (2, 5, 10, 20, 40, 80, 160)
+# So many of the switches chosen last, and of those chosen next, may change places, in so many exchanges at most.
+REACH, EXCHANGES = 4, 2
+# With fewer subjects nothing is exchanged: the worst tenth is a handful, and with 10 to 40 of the 200 what exchanges
+# won within them was lost on others more often than not.
+ENOUGH_SUBJECTS = 80
+_ASKED_OF_EACH = 50
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What a study of a crowd takes.
+
+    keep     switches to keep; method: one of `METHODS` whose parameter is a number of switches
+    rows     at most so many are learnt from to place, equally many of every subject; a classifier learns from all
+    rounds   of LogitBoost that judges a placement
+    repeats  other draws of subjects for every point of the learning curve
+    """
+
+    keep: int
+    method: str = BEST
+    rows: int = 3000
+    rounds: int = 40
+    repeats: int = 2
+    seed: int = 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Crowd:
+    """Rows of many subjects: `samples` of n rows, and whose each row is, subjects (n,) intp."""
+
+    samples: Samples
+    subjects: Numbers
+
+    def of(self, subjects: Numbers) -> "Crowd":
+        """Return the rows of some subjects."""
+        return self._part(np.flatnonzero(np.isin(self.subjects, subjects)))
+
+    def drawn(self, rows: int, seed: int) -> "Crowd":
+        """Return about so many rows, equally many of every subject, drawn with `seed`; all where there are no more."""
+        there = np.unique(self.subjects)
+        if rows >= len(self.subjects):
+            return self
+        each = max(rows // len(there), 1)
+        random = np.random.default_rng(seed)
+        own = (random.permutation(np.flatnonzero(self.subjects == subject))[:each] for subject in there)
+        return self._part(np.sort(np.concatenate(list(own))))
+
+    def _part(self, rows: Numbers) -> "Crowd":
+        return replace(self, samples=self.samples.rows(rows), subjects=self.subjects[rows])
+
+
+def rates(learnt: Crowd, asked: Crowd, columns: Columns, rounds: int) -> NDArray[np.float64]:
+    """Return the recognition rate of every subject of `asked`, in the order of their numbers.
+
+    LogitBoost of so many rounds learns the switches `columns`, and the joints if there are any, from `learnt`.
+    """
+    samples = learnt.samples
+    stumps, _ = boost(samples.kept(columns), samples.labels, samples.n_classes, rounds=rounds)
+    right = winners(stumps.scores(asked.samples.kept(columns))) == asked.samples.labels
+    numbers = np.unique(asked.subjects, return_inverse=True)[1]
+    return np.asarray(np.bincount(numbers, right) / np.bincount(numbers), dtype=np.float64)
+
+
+def served(rates: NDArray[np.float64]) -> Served:
+    """Return how the subjects of these rates (n,) are served."""
+    ordered = np.sort(rates)
+    worst = ordered[: max(round(WORST_SHARE * len(ordered)), 1)]
+    return Served(float(rates.mean()), float(worst.mean()), float(ordered[0]))
+
+
+@dataclass(slots=True)
+class Refining:
+    """The placement `kept` of a method, the switches `spare` that it would choose next, and how subjects of `crowd` are
+    served by what is tried: LogitBoost of `rounds` rounds learns from `rows` rows.
+    """
+
+    crowd: Crowd
+    kept: Columns
+    spare: Columns
+    rows: int
+    rounds: int
+    seed: int
+    _halves: tuple[tuple[Crowd, Crowd], ...] = field(init=False)
+    _known: dict[frozenset[int], NDArray[np.float64]] = field(default_factory=dict, init=False)
+
+    def __post_init__(self) -> None:
+        people = np.random.default_rng([self.seed, 2]).permutation(np.unique(self.crowd.subjects))
+        one, other = self.crowd.of(people[::2]), self.crowd.of(people[1::2])
+        learnt = [half.drawn(self.rows // 2, self.seed) for half in (one, other)]
+        asked = [half.drawn(_ASKED_OF_EACH * len(np.unique(half.subjects)), self.seed) for half in (other, one)]
+        self._halves = tuple(zip(learnt, asked, strict=True))
+
+    def best(self, aim: Aim) -> Columns:
+        """Return the placement as the method chose it ("plain"), or after the exchanges that serve `aim` best.
+
+        Nothing is exchanged without a gain, nor with fewer than ENOUGH_SUBJECTS.
+        """
+        if aim == "plain" or len(np.unique(self.crowd.subjects)) < ENOUGH_SUBJECTS:
+            return self.kept
+        columns = self.kept
+        for _ in range(EXCHANGES):
+            better = max([columns, *self._exchanges(columns)], key=lambda tried: self._value(tried, aim))
+            if better == columns:
+                break
+            columns = better
+        return columns
+
+    def _exchanges(self, columns: Columns) -> list[Columns]:
+        edge = (*self.kept[-REACH:], *self.spare)
+        return [
+            tuple(new if column == old else column for column in columns)
+            for old in columns
+            if old in edge
+            for new in edge
+            if new not in columns
+        ]
+
+    def _value(self, columns: Columns, aim: Aim) -> float:
+        key = frozenset(columns)
+        if key not in self._known:
+            order = tuple(sorted(columns))
+            parts = [rates(learnt, asked, order, self.rounds) for learnt, asked in self._halves]
+            self._known[key] = np.concatenate(parts)
+        found = served(self._known[key])
+        return found.worst_tenth if aim == "worst tenth" else found.mean
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Task:
+    """Learn from some subjects of a crowd, recognise others."""
+
+    crowd: Crowd
+    learnt: Numbers
+    asked: Numbers
+    take: Asked
+    seed: int
+    place: int
+
+
+def place_for_crowd(
+    grasp_set: GraspSet,
+    keep: int,
+    *,
+    method: str = BEST,
+    joints: bool = False,
+    jobs: int = -1,
+    on_done: Progress | None = None,
+) -> Placement:
+    """Choose at most `keep` switches for all subjects of a set; the placement's `study` says whom they serve how well.
+
+    Raises PlacementError as `place` does, and for fewer than eight subjects; MemberError where there is no such method.
+    """
+    samples = samples_of(grasp_set, joints=joints)
+    crowd = Crowd(samples, np.unique(grasp_set.subjects, return_inverse=True)[1])
+    study = standard_placement(crowd, Asked(keep, method), jobs, on_done)
+    return Placement(
+        method=method,
+        parameter=float(keep),
+        joints=joints,
+        switches=kept_of(grasp_set, study.columns),
+        rows=len(grasp_set),
+        fingerprint=grasp_set.fingerprint(),
+        all_names=grasp_set.switch_names,
+        grasps=samples.grasps,
+        study=study,
+    )
+
+
+def standard_placement(crowd: Crowd, take: Asked, jobs: int = 1, on_done: Progress | None = None) -> Standard:
+    """Return one placement for all subjects of `crowd`, and the rate against the number of subjects learnt from.
+
+    `on_done(done, all)` is called after every piece of work. The same arguments give the same answer, whatever `jobs`.
+    Raises PlacementError for fewer than eight subjects, and for a method that takes no number of switches.
+    """
+    if not METHODS.named(take.method).by_number:
+        raise PlacementError(f"{take.method} takes S: a standard placement takes a method of a number of switches")
+    people = np.unique(crowd.subjects)
+    if len(people) < LEAST_SUBJECTS:
+        raise PlacementError(
+            f"the set has {len(people)} subject(s): a standard placement is learnt from at least {LEAST_SUBJECTS}"
+        )
+    people = np.random.default_rng(take.seed).permutation(people)
+    asked, learnt = _apart(people)
+    tasks = [_trial(crowd, learnt, take), *_curve(crowd, learnt, asked, take)]
+    found: dict[int, tuple[Served, ...]] = {}
+    for done, (place, answer) in enumerate(in_workers(_work, tasks, jobs), 1):
+        found[place] = answer
+        if on_done is not None:
+            on_done(done, len(tasks) + 1)
+    points = _points(tasks, found)
+    tried, curve = points[: len(AIMS)], points[len(AIMS) :]
+    aim = max(tried, key=lambda point: point.served.worth).aim
+    columns = _refining(crowd, take, take.seed).best(aim)
+    if on_done is not None:
+        on_done(len(tasks) + 1, len(tasks) + 1)
+    rows = len(crowd.drawn(take.rows, take.seed).subjects)
+    return Standard(columns, take.method, aim, len(people), len(asked), rows, tried, curve)
+
+
+def _apart(people: Numbers) -> tuple[Numbers, Numbers]:
+    """Return a fifth of the people, to be recognised, and the others, to learn from."""
+    held_out = max(round(_HELD_OUT * len(people)), 1)
+    return people[:held_out], people[held_out:]
+
+
+def _trial(crowd: Crowd, learnt: Numbers, take: Asked) -> _Task:
+    """Return the task that the aims are compared by, within the people learnt from."""
+    asked, rest = _apart(learnt)
+    return _Task(crowd.of(learnt), rest, asked, take, take.seed, 0)
+
+
+def _curve(crowd: Crowd, learnt: Numbers, asked: Numbers, take: Asked) -> list[_Task]:
+    """Return the tasks of the learning curve: numbers of subjects, draws of them."""
+    sizes = [*(size for size in _SIZES if size < len(learnt)), len(learnt)]
+    tasks: list[_Task] = []
+    for size in sizes:
+        draws = take.repeats if size < len(learnt) else 1
+        for seed in range(take.seed, take.seed + draws):
+            some = np.random.default_rng([seed, size]).permutation(learnt)[:size]
+            tasks.append(_Task(crowd.of(np.append(some, asked)), some, asked, take, seed, len(tasks) + 1))
+    return tasks
+
+
+def _work(task: _Task) -> tuple[int, tuple[Served, ...]]:
+    """Return the task's place, and how the people asked are served for each aim."""
+    learnt, asked = task.crowd.of(task.learnt), task.crowd.of(task.asked)
+    refining = _refining(learnt, task.take, task.seed)
+    placements = [refining.best(aim) for aim in AIMS]
+    found = {columns: served(rates(learnt, asked, columns, task.take.rounds)) for columns in placements}
+    return task.place, tuple(found[columns] for columns in placements)
+
+
+def _refining(crowd: Crowd, take: Asked, seed: int) -> Refining:
+    """Return the method's placement, from rows drawn evenly over the subjects, ready to be bettered."""
+    choose = METHODS.named(take.method).chooser(crowd.drawn(take.rows, seed).samples)
+    kept = choose(take.keep)
+    spare = tuple(column for column in choose(take.keep + REACH) if column not in kept)
+    return Refining(crowd, kept, spare, take.rows, take.rounds, seed)
+
+
+def _points(tasks: list[_Task], found: dict[int, tuple[Served, ...]]) -> tuple[CurvePoint, ...]:
+    """Return the means over the draws for every aim, those of the trial first."""
+    draws: dict[tuple[bool, int], list[tuple[Served, ...]]] = {}
+    for task in tasks:
+        draws.setdefault((task.place == 0, len(task.learnt)), []).append(found[task.place])
+    return tuple(
+        CurvePoint(size, aim, _mean([one[number] for one in several]))
+        for (_, size), several in draws.items()
+        for number, aim in enumerate(AIMS)
+    )
+
+
+def _mean(several: list[Served]) -> Served:
+    """Return the mean of every rate."""
+    fields = np.array([(one.mean, one.worst_tenth, one.lowest) for one in several]).mean(axis=0)
+    return Served(*fields.tolist())

@@ -1,0 +1,115 @@
+"""What reading switches costs: port by port, on the glove that grasps are recorded with."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from math import fsum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.runtime.errors import HarnessError
+from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.scanning.plan import Costs, Unit, ports_in
+from thenar.runtime.scanning.ports import whole_scan
+from thenar.runtime.scanning.propose import propose_harness
+from thenar.runtime.scanning.timing import scanner_us
+
+from .errors import PlacementError
+
+
+@dataclass(frozen=True, slots=True)
+class PortCosts:
+    """Scan time port by port: reading port p takes us[p] once, however many of its switches are kept.
+
+    port_of  (s,) the port of every switch, an index of `us`
+    us       (ports,) microseconds, >= 0
+
+    Raises PlacementError where a switch is on a port that is not there, or a time is negative or not finite.
+    """
+
+    port_of: tuple[int, ...]
+    us: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if any(not 0 <= port < len(self.us) for port in self.port_of):
+            raise PlacementError(f"every switch must be on one of the {len(self.us)} ports whose times are given")
+        if any(not 0 <= us < float("inf") for us in self.us):
+            raise PlacementError("the time that reading a port takes must be finite and at least 0 us")
+
+    def scan_us(self, columns: Iterable[int]) -> float:
+        """Return the time that reading the switches `columns` takes."""
+        return sum(self.us[port] for port in sorted({self.port_of[column] for column in columns}))
+
+    def shares(self, kept: Iterable[int]) -> NDArray[np.float64]:
+        """Return, for every switch of `kept`, its port's time shared out over those of `kept` on it, over the mean time
+        of a port; 0 where no port takes any time.
+        """
+        on = np.array([self.port_of[column] for column in kept], dtype=np.intp)
+        us = np.array(self.us)
+        mean = fsum(self.us) / len(self.us) if any(self.us) else 1.0
+        shares: NDArray[np.float64] = us[on] / (np.bincount(on, minlength=len(us))[on] * mean)
+        return shares
+
+    def marginal_costs(self, kept: Iterable[int]) -> NDArray[np.int64]:
+        """Return, for every switch, sum of all ports' times + number of ports * time that it adds to `kept`.
+
+        Whole nanoseconds, so that comparisons are exact; all 1 where no port takes any time.
+        """
+        times = np.array([round(us * 1000) for us in self.us], dtype=np.int64)
+        if not times.any():
+            return np.ones(len(self.port_of), dtype=np.int64)
+        left = times * len(times)
+        left[sorted({self.port_of[column] for column in kept})] = 0
+        costs: NDArray[np.int64] = times.sum() + left[np.array(self.port_of, dtype=np.intp)]
+        return costs
+
+
+def ports_of_whole_glove(harness: Harness | None, names: Sequence[str]) -> PortCosts | None:
+    """Return what the ports cost that all switches `names` hang on: in `harness`, or where there is none, on as few
+    MCP23017 as will do, in the order of the names.
+
+    None where a harness lacks switches, as that of a reduced glove does, or there is no room for so many.
+    """
+    if not names or (harness is not None and not set(names) <= set(harness.switches)):
+        return None
+    try:
+        return port_costs(harness or propose_harness(names), names)
+    except HarnessError:
+        return None
+
+
+def port_costs(harness: Harness, names: Sequence[str]) -> PortCosts:
+    """Return what reading each port costs where all switches `names` hang on the ports of a whole scan.
+
+    A selection of a mux's channel is shared evenly by the ports that need it. A port is charged as a whole even if a
+    shorter reading would show the one switch that is kept. A board is one port: it always sends all its keys. Raises
+    HarnessError if a switch is wired to nothing.
+    """
+    scan = whole_scan(harness, names)
+    costs = Costs(scan.ports, harness)
+    us = [0.0] * len(scan.ports)
+    for unit in costs.units:
+        for place, share_us in _shares(unit, costs):
+            us[place] += share_us
+    port_of: dict[int, int] = {}
+    for number, port in enumerate(scan.ports):
+        port_of |= dict.fromkeys((switch for _, switch in port.switches), number)
+    for board, pairs in zip(harness.scanners, scan.scanners, strict=True):
+        port_of |= dict.fromkeys((switch for _, switch in pairs), len(us))
+        us.append(scanner_us(board))
+    lacking = next((name for number, name in enumerate(names) if number not in port_of), None)
+    if lacking is not None:
+        raise HarnessError(
+            f"harness {harness.name!r} has no pin or key for {lacking!r}: add it to its file, or leave --glove out"
+        )
+    return PortCosts(tuple(port_of[number] for number in range(len(names))), tuple(us))
+
+
+def _shares(unit: Unit, costs: Costs) -> Iterator[tuple[int, float]]:
+    """Yield each port of a unit with its own time and its share of what the whole unit takes beyond those."""
+    ports = ports_in(unit)
+    # After all ports but itself, a port of a shared channel costs itself alone.
+    everything = sum(1 << port for port in ports)
+    alone = [costs.after(everything, port) for port in ports]
+    beyond = (costs.of(unit) - sum(alone)) / len(ports)
+    yield from ((port, (ns + beyond) / 1000) for port, ns in zip(ports, alone, strict=True))

@@ -1,0 +1,61 @@
+"""Numbers in words: how reports, pictures, tables and sentences write rates, times and counts."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+DASH = "–"
+NBSP = "\N{NO-BREAK SPACE}"
+
+
+class Interval(Protocol):
+    """A rate in 0..1 with its 95 % interval."""
+
+    @property
+    def mean(self) -> float:
+        """The rate."""
+
+    @property
+    def low(self) -> float:
+        """Lower end."""
+
+    @property
+    def high(self) -> float:
+        """Upper end."""
+
+
+def percent(share: float, space: str = " ") -> str:
+    """Return "96.3 %" for 0.963."""
+    return f"{100 * share:.1f}{space}%"
+
+
+def interval(rate: Interval | None) -> str:
+    """Return "96.3 [95.1, 97.2]", in percent; a dash for no rate."""
+    return DASH if rate is None else f"{100 * rate.mean:.1f} [{100 * rate.low:.1f}, {100 * rate.high:.1f}]"
+
+
+def microseconds(us: float) -> str:
+    """Return a number of microseconds for a column of them: "48.1", "1,736"."""
+    return f"{us:.1f}" if us < 100 else f"{us:,.0f}"
+
+
+def duration(us: float) -> str:
+    """Return a time to three digits, in the unit that suits it: "440 us", "2.05 ms", "1.5 s"."""
+    for unit, size in (("s", 1e6), ("ms", 1e3)):
+        if us >= 0.9995 * size:
+            return f"{us / size:.3g} {unit}"
+    return f"{us:.3g} us"
+
+
+def counted(number: int, one: str, many: str = "") -> str:
+    """Return "1 node" or "2 nodes"; `many` is the plural where it is not `one` with an s."""
+    return f"{number:,} {one if number == 1 else many or one + 's'}"
+
+
+def listed(parts: Sequence[str]) -> str:
+    """Return "a, b and c"."""
+    return ", ".join(parts[:-1]) + (" and " if len(parts) > 1 else "") + "".join(parts[-1:])
+
+
+def sentence(words: str) -> str:
+    """Return words from within a sentence as a sentence."""
+    return f"{words[:1].upper()}{words[1:].removesuffix('.')}."

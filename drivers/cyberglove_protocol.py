@@ -1,0 +1,310 @@
+"""The CyberGlove's serial protocol: its sensors, its commands and answers, how fast it sends, its records.
+
+It is the vendor's manual as public drivers quote it (ViSTA, FreeVR, Shadow's serial_glove, VESS, asr, toon);
+docs/cyberglove.md says where they disagree.
+
+**Sensors.** The box has 24 slots, of which two are never sent: the abduction of the index, which no glove measures, and
+the last.
+
+**Commands.** Upper-case letters are binary: what follows them, and what comes back, are bytes. A query is '?' and a
+letter. An answer is an echo of the command's letters, the values, and a NUL; as values may be 0, its exact length tells
+where it ends. Only the information text ends by itself, with CR LF NUL. An answer may also be an error: 'e' and what
+was wrong, with the echo before it or not (both are understood).
+
+**Periods.** The period is two 16-bit words; their product counts ticks of 1/115200 s, whatever the baud rate; 0 is "as
+fast as you can". How fast that is, one driver quotes from the vendor's SerialCommands document: a record is digitised
+sensor by sensor, then sent. The driver warns by it and refuses nothing.
+
+**Records.** 'G' (polled) or 'S' (streamed), one byte a sensor, the status byte if it is on, NUL. Sensors send 1 to 255,
+never 0, so a NUL is an end; but G and S are sensor values too, so a record is one only if it also has the exact length.
+A glove in trouble puts 'es' (asked for records faster than it can send them) or 'eg' (glove not plugged in) before the
+NUL; 'e', 's' and 'g' are sensor values as well, and only the two bytes too many tell. The highest bit of the status
+byte is always 1. Time stamps, which may hold zeros, are left switched off.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import ceil, isfinite
+from typing import Literal
+
+from .errors import SettingError
+from .serial_line import BITS_A_BYTE, Pieces
+
+_FINGER_SLOTS = ("mpj", "pij", "dij")
+# In slot order; a mask's bit is the slot's place, the lowest bit of the first byte first. "" is never sent.
+_SLOTS = (
+    *("thumb_rotation", "thumb_mpj", "thumb_ij", "thumb_abduction"),
+    *(f"index_{joint}" for joint in _FINGER_SLOTS),
+    "",
+    *(f"middle_{joint}" for joint in _FINGER_SLOTS),
+    "middle_index_abduction",
+    *(f"ring_{joint}" for joint in _FINGER_SLOTS),
+    "ring_middle_abduction",
+    *(f"little_{joint}" for joint in _FINGER_SLOTS),
+    "little_ring_abduction",
+    *("palm_arch", "wrist_pitch", "wrist_yaw", ""),
+)
+
+MASK_18 = bytes.fromhex("3F BB 7B")
+MASK_22 = bytes.fromhex("7F FF 7F")
+
+
+def masked_sensors(mask: bytes) -> tuple[str, ...]:
+    """Return the sensors that a mask of 3 bytes lets through, in wire order."""
+    bits = int.from_bytes(mask, "little")
+    return tuple(name for slot, name in enumerate(_SLOTS) if name and bits >> slot & 1)
+
+
+# The order on the wire. The 18-sensor glove has no sensors on the outermost finger joints; the wrist's are always last.
+SENSORS_18 = masked_sensors(MASK_18)
+SENSORS_22 = masked_sensors(MASK_22)
+
+
+STOP = b"\x03"  # Ctrl-C
+RESTART = b"\x12"  # Ctrl-R
+POLL, STREAM = b"G", b"S"  # also what their records begin with
+
+# What ?G says when all is well: bit 0 initialised, bit 1 glove connected (two of seven sources swap the bits).
+READY = 3
+
+_TEXT_END = b"\r\n\0"
+_ERRORS = {
+    b"?": "unknown command",
+    b"n": "wrong number of values, or a wrong value",
+    b"y": "the external synchronisation comes too fast",
+    b"g": "no glove is plugged in",
+    b"s": "sampling too fast",
+}
+
+# Bytes in the answer to ?X, by X; after X as a setting. docs/cyberglove.md says what each letter means.
+ANSWERED: Mapping[str, int] = (
+    dict.fromkeys("BDFGJLNQRSUWY", 1) | dict.fromkeys("KMP", 3) | dict.fromkeys("TV", 4) | {"A": 6}
+)
+SET: Mapping[str, int] = dict.fromkeys("BDFJLNQUWY", 1) | {"M": 3, "T": 4}
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """What is sent, what the answer begins with, and how many bytes of values it then has; None: text."""
+
+    request: bytes
+    echo: bytes
+    values: int | None
+
+    @property
+    def name(self) -> str:
+        """The command as a message names it."""
+        return self.echo.decode("ascii")
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What the box answered: values (or text), or else what it complains of."""
+
+    values: bytes
+    error: str | None = None
+
+
+INFORMATION = Command(b"?i", b"?i", None)
+
+
+def query(letter: str) -> Command:
+    """Return the query ?X of a letter X. Raises SettingError if the box has none."""
+    if letter not in ANSWERED:
+        raise SettingError(f"a CyberGlove has no query ?{letter}: it has ?{', ?'.join(sorted(ANSWERED))}")
+    echo = b"?" + letter.encode("ascii")
+    return Command(echo, echo, ANSWERED[letter])
+
+
+def setting(letter: str, values: bytes) -> Command:
+    """Return the command that sets X to `values`. Raises SettingError if it takes other values."""
+    if len(values) != SET.get(letter):
+        raise SettingError(
+            f"a CyberGlove's {letter} cannot be set to {len(values)} bytes: settings are "
+            + ", ".join(f"{letter} ({length})" for letter, length in sorted(SET.items()))
+        )
+    echo = letter.encode("ascii")
+    return Command(echo + values, echo, 0)
+
+
+def find_answer(command: Command, received: bytes, *, last: bool = False) -> Answer | None:
+    """Return the answer in what was received since the command, or None while there is none yet.
+
+    What comes before it is skipped, NUL by NUL: rests of a stream, the echo of a Ctrl-C. `last` says that nothing more
+    will come: then what could have become a longer answer is taken for what it is.
+    """
+    while received:
+        answer = _at_start(command, received, last)
+        if answer is not None:
+            return answer
+        if not last and received.startswith(command.echo):
+            return None
+        received = received.partition(b"\0")[2]
+    return None
+
+
+def _at_start(command: Command, received: bytes, last: bool) -> Answer | None:
+    values = _text(command, received) if command.values is None else _values(command, received)
+    return Answer(values) if values is not None else _error(command, received, last)
+
+
+def _values(command: Command, received: bytes) -> bytes | None:
+    begin = len(command.echo)
+    end = begin + (command.values or 0)
+    if not received.startswith(command.echo) or received[end : end + 1] != b"\0":
+        return None
+    return received[begin:end]
+
+
+def _text(command: Command, received: bytes) -> bytes | None:
+    end = received.find(_TEXT_END)
+    return received[len(command.echo) : end] if received.startswith(command.echo) and end >= 0 else None
+
+
+def _error(command: Command, received: bytes, last: bool) -> Answer | None:
+    found = re.match(rb"(%b)?e([?nygs])(\r\n)?\0" % re.escape(command.echo), received)
+    if found is None or (found[1] and not last and _may_grow(command, found.end())):
+        return None
+    return Answer(b"", _ERRORS[found[2]])
+
+
+def _may_grow(command: Command, size: int) -> bool:
+    """Return whether `size` bytes that read as an error may be the beginning of values."""
+    return command.values is not None and size <= len(command.echo) + command.values
+
+
+TICKS_HZ = 115_200
+DIGITISED_US = 250.0
+FILTERED_US = 125.6
+_WORD = 0xFFFF
+
+Words = tuple[int, int]
+FASTEST: Words = (0, 0)
+
+
+def period_words(rate_hz: float | None) -> Words:
+    """Return the two words that ask for the rate nearest to `rate_hz`; without one, for the fastest.
+
+    Raises SettingError if no glove can be told such a rate.
+    """
+    if rate_hz is None:
+        return FASTEST
+    if not isfinite(rate_hz) or rate_hz <= 0.0 or TICKS_HZ / rate_hz > _WORD * _WORD:
+        raise SettingError(f"a CyberGlove cannot send {rate_hz:g} records a second: ask for 1 to 160")
+    ticks = max(1, round(TICKS_HZ / rate_hz))
+    times = ceil(ticks / _WORD)
+    return round(ticks / times), times
+
+
+def told_us(words: Words) -> float:
+    """Return the period in microseconds that the words tell; 0 for the fastest."""
+    return words[0] * words[1] * 1e6 / TICKS_HZ
+
+
+def digitising_us(sensors: int, filtered: bool = False) -> float:
+    """Return how long the box takes to digitise so many sensors, through its digital filter or not."""
+    return sensors * (DIGITISED_US + FILTERED_US * filtered)
+
+
+def shortest_us(sensors: int, baud: int, *, status: bool = False, filtered: bool = False) -> float:
+    """Return the shortest period in microseconds that the line and the box allow."""
+    return digitising_us(sensors, filtered) + sending_us(sensors + OVERHEAD + status, baud)
+
+
+def sending_us(size: int, baud: int) -> float:
+    """Return how long `size` bytes take on the line, in microseconds: 8 data bits, a start bit, a stop bit."""
+    return size * BITS_A_BYTE * 1e6 / baud
+
+
+SENSORS = 18
+# A record's length on the wire is its sensors plus these; the status byte is one more.
+OVERHEAD = 2
+
+# Bits of the status byte: a glove is plugged into the box; the wrist's switch; the wrist's light; always 1.
+PLUGGED, SWITCH, LIGHT, ALWAYS = 0x01, 0x02, 0x04, 0x80
+
+RecordFault = Literal["too fast", "unplugged"]
+_FAULTS: dict[bytes, RecordFault] = {b"es": "too fast", b"eg": "unplugged"}
+_ENDINGS: dict[RecordFault | None, bytes] = {None: b"", **{fault: ending for ending, fault in _FAULTS.items()}}
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One reading: the sensors' bytes in wire order, streamed or polled, what the glove complains of, its status byte.
+
+    Of a glove that is unplugged the sensors mean nothing.
+    """
+
+    sensors: bytes
+    streamed: bool = True
+    fault: RecordFault | None = None
+    status: int | None = None
+
+
+@dataclass(slots=True)
+class RecordCounts:
+    """What came in: good records, those with a fault among them; pieces that were none, by what was wrong."""
+
+    records: int = 0
+    too_fast: int = 0
+    unplugged: int = 0
+    wrong_start: int = 0
+    wrong_length: int = 0
+
+    @property
+    def resyncs(self) -> int:
+        """How often bytes were skipped up to the next NUL."""
+        return self.wrong_start + self.wrong_length
+
+
+def encode(record: Record) -> bytes:
+    """Return the record as it goes on the wire, its NUL included. Raises ValueError where sensor or status is 0."""
+    if 0 in record.sensors:
+        raise ValueError(f"sensor {record.sensors.index(0)} is 0, which ends a CyberGlove record: values are 1 to 255")
+    if record.status == 0:
+        raise ValueError("a status byte of 0 would end the CyberGlove record: its highest bit is always 1")
+    start = STREAM if record.streamed else POLL
+    status = b"" if record.status is None else bytes([record.status])
+    return start + record.sensors + status + _ENDINGS[record.fault] + b"\0"
+
+
+@dataclass(slots=True)
+class RecordDecoder:
+    """Bytes in, records of so many sensors out; what is none is counted and skipped to the next NUL. Nothing raises.
+
+    status: whether the glove was told to append its status byte.
+    """
+
+    sensors: int = SENSORS
+    counts: RecordCounts = field(default_factory=RecordCounts)
+    status: bool = False
+    _pieces: Pieces = field(init=False)
+    _body: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._body = 1 + self.sensors + self.status
+        self._pieces = Pieces(self._body + 2)
+
+    def feed(self, chunk: bytes) -> list[Record]:
+        """Return the records that `chunk` completes, oldest first."""
+        found = (self._record(piece) for piece in self._pieces.feed(chunk) if piece)
+        return [record for record in found if record is not None]
+
+    def _record(self, piece: bytes) -> Record | None:
+        start, ending = piece[:1], piece[self._body :]
+        if start not in (POLL, STREAM):
+            self.counts.wrong_start += 1
+            return None
+        fault = _FAULTS.get(ending)
+        if len(piece) < self._body or (ending and fault is None):
+            self.counts.wrong_length += 1
+            return None
+        self._count(fault)
+        status = piece[self._body - 1] if self.status else None
+        return Record(piece[1 : self.sensors + 1], start == STREAM, fault, status)
+
+    def _count(self, fault: RecordFault | None) -> None:
+        self.counts.records += 1
+        self.counts.too_fast += fault == "too fast"
+        self.counts.unplugged += fault == "unplugged"

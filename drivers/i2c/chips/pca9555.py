@@ -1,0 +1,111 @@
+"""NXP PCA9555 and TI TCA9555: two ports of eight pins with pull-ups of 100 kohm, in pairs of registers."""
+
+from abc import abstractmethod
+from typing import ClassVar
+
+from .base import TSSOP24, Chip, Device, Package, Reading, Write, byte_pins, pins_of_24, port_pins
+
+_INPUT_0, _INPUT_1, _OUTPUT, _POLARITY, _CONFIGURATION = 0, 1, 2, 4, 6
+
+# The outputs are unused while all pins are inputs: what stands in them tells a set-up chip from one that was reset.
+_SIGNATURE = b"\xaa\x55"
+
+
+class BankedModel(Device):
+    """Banks of inputs, outputs, polarities and configurations, `stride` registers apart; pins as the world has them."""
+
+    _ports: ClassVar[int]
+    _stride: ClassVar[int]
+
+    def reset(self) -> None:
+        """Do as after power-on."""
+        self._outputs = [0xFF] * self._ports
+        self._polarities = [0x00] * self._ports
+        self._inputs = [0xFF] * self._ports
+        self._pointer = 0
+        self._moves = True
+
+    def read(self, length: int) -> bytes:
+        """Return the bytes of one message that reads."""
+        answer = bytearray()
+        for _ in range(length):
+            answer.append(self._load())
+            self._advance()
+        return bytes(answer)
+
+    def write(self, data: bytes) -> None:
+        """Take the bytes of one message that writes."""
+        if data:
+            self._command(data[0])
+        for byte in data[1:]:
+            bank, port = divmod(self._pointer, self._stride)
+            if bank and port < self._ports:
+                (self._outputs, self._polarities, self._inputs)[bank - 1][port] = byte
+            self._advance()
+
+    @abstractmethod
+    def _command(self, byte: int) -> None:
+        """Take the byte of a message that says where to write, or to read from."""
+
+    def _advance(self) -> None:
+        if self._moves:
+            bank, port = divmod(self._pointer, self._stride)
+            self._pointer = bank * self._stride + (port + 1) % self._ports
+
+    def _load(self) -> int:
+        bank, port = divmod(self._pointer, self._stride)
+        if port >= self._ports:
+            return 0
+        if bank:
+            return (self._outputs, self._polarities, self._inputs)[bank - 1][port]
+        inputs = self._inputs[port]
+        return (self.port(port) & inputs | self._outputs[port] & ~inputs & 0xFF) ^ self._polarities[port]
+
+
+class Pca9555Model(BankedModel):
+    """Pairs of registers 0 to 7; the byte after a register's is the other's of its pair."""
+
+    pins, _ports, _stride = 16, 2, 2
+
+    def _command(self, byte: int) -> None:
+        self._pointer = byte & 7
+
+
+class Pca9555(Chip):
+    """Pins P00 to P07 and P10 to P17. SCL up to 400 kHz. The byte after a port's is the other port's, always."""
+
+    name = "pca9555"
+    rank = 6
+    addresses = range(0x20, 0x28)
+    clock_hz = 400_000
+    pins = port_pins(0, 1)
+    readings = (
+        Reading("0", bytes((_INPUT_0,)), byte_pins(0)),
+        Reading("1", bytes((_INPUT_1,)), byte_pins(1)),
+        Reading("01", bytes((_INPUT_0,)), byte_pins(0, 1)),
+    )
+    model = Pca9555Model
+    package = Package("PCA9555PW,118", "NXP", "PCA9555PW", TSSOP24, pins_of_24("VSS", "VDD"))
+
+    def setup(self, used: frozenset[int]) -> tuple[Write, ...]:
+        """Return the writes that make all pins inputs, read as they are.
+
+        The first pair is read back twice over: a chip whose pointer goes on would show other registers then.
+        """
+        return (
+            Write(bytes((_CONFIGURATION,)) + b"\xff\xff", b"\xff\xff" * 2),
+            Write(bytes((_POLARITY,)) + b"\x00\x00", b"\x00\x00"),
+            Write(bytes((_OUTPUT,)) + _SIGNATURE, _SIGNATURE),
+        )
+
+
+class Tca9555(Pca9555):
+    """TI's chip of the same registers and addresses."""
+
+    name = "tca9555"
+    rank = 7
+    tried = False
+    package = Package("TCA9555PWR", "Texas Instruments", "TCA9555PWR", TSSOP24, pins_of_24("GND", "VCC"))
+
+
+MEMBER = Pca9555(), Tca9555()

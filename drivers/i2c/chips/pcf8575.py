@@ -1,0 +1,66 @@
+"""NXP and TI PCF8575: sixteen quasi-bidirectional pins and no registers."""
+
+from .base import TSSOP24, Chip, Device, Package, Reading, Write, byte_pins, pins_of_24, port_pins
+
+
+class Pcf8575Model(Device):
+    """Two latches of eight pins and no registers, whose bytes take turns from every START on."""
+
+    pins = 16
+    has_registers = False
+
+    def reset(self) -> None:
+        """Do as after power-on."""
+        self._latches = [0xFF, 0xFF]
+
+    def write(self, data: bytes) -> None:
+        """Take the bytes of one message that writes."""
+        for number, byte in enumerate(data):
+            self._latches[number % 2] = byte
+
+    def read(self, length: int) -> bytes:
+        """Return the bytes of one message that reads."""
+        return bytes(self._latches[number % 2] & self.port(number % 2) for number in range(length))
+
+    def poke(self, register: int, value: int) -> None:
+        """Put `value` where nobody wrote it."""
+        self._latches[register & 1] = value
+
+
+class Pcf8575(Chip):
+    """Pins P00 to P07 and P10 to P17, each with a current source of about 100 uA. SCL up to 400 kHz.
+
+    Bytes go in pairs, P0 then P1, always: an odd number of them would swap the ports of what follows. A PCF8575C has
+    no current sources: it needs resistors to the supply.
+    """
+
+    name = "pcf8575"
+    rank = 3
+    addresses = range(0x20, 0x28)
+    clock_hz = 400_000
+    pins = port_pins(0, 1)
+    readings = (Reading("P", b"", byte_pins(0, 1)),)
+    registers = False
+    model = Pcf8575Model
+    package = Package(
+        part="PCF8575PWR",
+        maker="Texas Instruments",
+        symbol="PCF8575",
+        footprint=TSSOP24,
+        pins=pins_of_24("GND", "VCC"),
+        note="not the PCF8575C, which has no current sources",
+    )
+
+    def setup(self, used: frozenset[int]) -> tuple[Write, ...]:
+        """Return the writes that release all pins; before, each port is driven low for one read, and must be low.
+
+        See `Pcf8574.setup` for why. A PCF8574 has the last byte of a pair on all its pins, and fails.
+        """
+        return (
+            Write(b"\x00\xff", b"\x00\x00", b"\xff\x00"),
+            Write(b"\xff\x00", b"\x00\x00", b"\x00\xff"),
+            Write(b"\xff\xff"),
+        )
+
+
+MEMBER = Pcf8575()

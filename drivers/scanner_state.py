@@ -1,0 +1,204 @@
+"""What is known of a scanner board: which of its keys are closed, and when it sent what it said."""
+
+from itertools import combinations
+from time import monotonic_ns
+
+from .scanner_protocol import WITHOUT_DIODES, Event, FromBoard, Heartbeat, Hello, Lost, Mask, Ping, State
+
+
+def ambiguous(closed: Mask, rows: int, columns: int) -> Mask:
+    """Return the keys, bits row * columns + column, that read closed but may be ghosts of others.
+
+    Current finds a way through three closed corners of a rectangle and closes the fourth for the reader; which of the
+    four is the ghost cannot be seen. Where two rows have two columns or more in common, all of those are doubtful. What
+    reads open is open.
+    """
+    row = (1 << columns) - 1
+    held = [(shift, closed >> shift & row) for shift in range(0, rows * columns, columns)]
+    crowded = [(shift, bits) for shift, bits in held if bits & (bits - 1)]
+    doubtful = 0
+    for (one, bits), (other, others) in combinations(crowded, 2):
+        common = bits & others
+        if common & (common - 1):
+            doubtful |= common << one | common << other
+    return doubtful
+
+
+class BoardKeys:
+    """The keys of a board, as its HELLO gives them, which was the frame numbered `sequence`.
+
+    They are unknown until a HEARTBEAT comes, with the frame before it: that is a LOST if there are keys that the board
+    cannot read.
+    """
+
+    def __init__(self, rows: int = 0, columns: int = 0, flags: int = 0, sequence: int = 0) -> None:
+        self._rows, self._columns, self._flags, self._sequence = rows, columns, flags, sequence
+        self.keys = rows * columns
+        self._all = (1 << self.keys) - 1
+        self.closed: Mask = 0
+        self.lost: Mask = 0
+        self.gaps = 0
+        self._follows = True  # the frame before the last one was read, too
+        self._unread = False  # the last one was sound, but could not be read
+        self._is_lost = self._after_lost = False  # the last one, and the one before it, were LOSTs
+        self.restarted()
+
+    @property
+    def trusted(self) -> bool:
+        """Whether nothing is missing of what the board told of its keys."""
+        return self._has_bitmap and self._has_lost
+
+    @property
+    def known(self) -> Mask:
+        """The keys of which it can be said whether they are closed."""
+        if not self.trusted:
+            return 0
+        readable = self._all & ~self.lost
+        if not self._flags & WITHOUT_DIODES:
+            return readable
+        return readable & ~ambiguous(self.closed, self._rows, self._columns)
+
+    def restarted(self) -> None:
+        """Note that the board begins anew: nothing of what it told before holds."""
+        self._has_bitmap = self._has_lost = False
+
+    def damaged(self) -> None:
+        """Note that something came in which was no frame: it may have been an EVENT. A LOST would leave a gap."""
+        self._has_bitmap = False
+
+    def misread(self) -> None:
+        """Note that the last frame could not be read: it may have been anything."""
+        self._unread = True
+        self.restarted()
+
+    def numbered(self, sequence: int) -> None:
+        """Note the number of a frame; a gap before it means that frames were lost, or that the board restarted."""
+        gap = sequence != (self._sequence + 1) & 0xFF
+        self._follows, self._unread, self._sequence = not (gap or self._unread), False, sequence
+        self._after_lost, self._is_lost = self._is_lost, False
+        if gap:
+            self.gaps += 1
+            self.restarted()
+
+    def heard(self, message: FromBoard) -> None:
+        """Take what the frame numbered last says of keys. An EVENT changes nothing before there is a bitmap."""
+        match message:
+            case State():
+                self.closed, self._has_bitmap = message.closed, True
+            case Heartbeat():
+                self.closed, self._has_bitmap = message.closed, True
+                self._not_lost()
+            case Lost():
+                self.lost, self._has_lost, self._is_lost = message.lost, True, True
+            case Event() if self._has_bitmap:
+                bit = 1 << message.key
+                self.closed = self.closed | bit if message.edge else self.closed & ~bit
+
+    def _not_lost(self) -> None:
+        """Take a HEARTBEAT that follows another frame than a LOST to say that all keys can be read."""
+        if self._follows and not self._after_lost:
+            self.lost, self._has_lost = 0, True
+
+
+_MODULUS = 1 << 32
+# A ceramic resonator is wrong by up to 0.5 %: so much the offset may grow between two frames, 1/128 of what has passed.
+_DRIFT_SHIFT = 7
+
+
+class BoardClock:
+    """Finds the offset between the clocks as the smallest delay seen, forgotten no faster than clocks drift apart.
+
+    Delays only ever add to it, so the smallest is the nearest to the truth. A host that falls behind, and reads what
+    has long stood in a buffer, thus gets the times at which it was sent, not those at which it was read. The board's
+    clock wraps after 71.6 minutes; it may restart at any time.
+
+    A delay that all frames share does not show in that offset. Frames that the host asked for bound it from the other
+    side: they were not sent before they were asked for. `trip_us` is what lies between the two bounds.
+    """
+
+    def __init__(self) -> None:
+        self._board: int | None = None
+        self._offset = 0
+        self._least: int | None = None
+        self._guessed = False
+
+    @property
+    def trip_us(self) -> int:
+        """By how much a frame may have been sent before the time that `host_us` gave it; 0 before one was asked for."""
+        return 0 if self._least is None else self._offset - self._least
+
+    def host_us(self, board_us: int, came_us: int, asked_us: int | None = None) -> int:
+        """Return the host's time of `board_us` (0 to 2**32 - 1), sent in a frame that came in at `came_us`: not later.
+
+        asked_us  when the host asked for this very frame, if it did: the board cannot have sent it before
+        """
+        if self._board is None:
+            self._board, self._offset = board_us, came_us - board_us
+        passed, trip_us = (board_us - self._board) % _MODULUS, self.trip_us
+        drift_us = passed >> _DRIFT_SHIFT
+        self._board += passed
+        self._offset = min(came_us - self._board, self._offset + drift_us)
+        if self._least is not None:
+            self._least -= drift_us
+            # Where the bounds cross, the board has started again: on the same line, until it is asked anew.
+            self._guessed |= self._least > self._offset
+            if self._guessed:
+                self._least = min(self._least, self._offset - trip_us)
+        if asked_us is not None:
+            asked = asked_us - self._board
+            self._offset = max(self._offset, asked)
+            self._least = asked if self._least is None or self._guessed else max(self._least, asked)
+            self._guessed = False
+        return self._board + self._offset
+
+
+# How often a PING bounds the delay that all messages share; between two of them clocks drift apart by 2 ms at most.
+_PING_US = 250_000
+# At most this many PINGs are under way: an answer that takes longer than they do says nothing.
+_UNDER_WAY = 64
+_TOKENS = 0xFFFF
+
+
+class BoardTimes:
+    """Gives every message its time, in the host's monotonic microseconds: never one before the last one's.
+
+    late_us   how late the last message with a time came in, which those without one are taken to share
+    pings     how often the board's time was asked for
+    answered  whether an answer ever came
+    """
+
+    def __init__(self) -> None:
+        self._clock = BoardClock()
+        self.late_us = 0
+        self._time_us = self._asked_us = 0
+        self._asked: dict[int, int] = {}
+        self.pings = 0
+        self.answered = False
+
+    def ping(self) -> Ping:
+        """Return a message that asks for the time."""
+        token = self.pings % _TOKENS + 1
+        self._asked_us = self._asked[token] = monotonic_ns() // 1000
+        self.pings += 1
+        if len(self._asked) > _UNDER_WAY:
+            del self._asked[next(iter(self._asked))]
+        return Ping(token)
+
+    @property
+    def due(self) -> bool:
+        """Whether the time should be asked for again."""
+        return monotonic_ns() // 1000 - self._asked_us >= _PING_US
+
+    @property
+    def trip_us(self) -> int:
+        """By how much a message may have been sent before the time that it was given: a delay that all share."""
+        return self._clock.trip_us
+
+    def stamp(self, message: FromBoard | None, came_us: int) -> int:
+        """Return the time of what came in. What carries none is taken to be as late as the last that did."""
+        if message is not None and not isinstance(message, State | Lost):
+            asked_us = self._asked.get(message.token) if isinstance(message, Hello) else None
+            self.answered |= asked_us is not None
+            self.late_us = came_us - self._clock.host_us(message.time_us, came_us, asked_us)
+        self._time_us = max(self._time_us, came_us - self.late_us)
+        return self._time_us

@@ -1,0 +1,357 @@
+"""Grasps in MuJoCo: the hand takes a posture and a grip, time runs until it rests, and the contacts are read.
+
+The model has the same capsules on the same joints as hand.py, in metres and kilograms. Every capsule of a digit is a
+body whose own axes are those of `Skeleton.frames`; the palm's are fixed. The object slides and turns on springs about
+its commanded pose, a soft weld. Gravity is off: the true weight is applied as a force, so that a light object can be
+given inertia enough for a stable step.
+"""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ..body.condition import Thing
+from ..body.hand import CAPSULES, DOF, LIMITS_DEG, Hand, Skeleton
+from ..body.layout import Patch, Switches
+from ..body.pose import Pose
+from ..body.shapes import Box, Cylinder, Shape, Sphere
+from .grip import GRAVITY, STIFFNESS, torques
+from .model import Contact, Load
+from .split import split
+
+Floats = NDArray[np.float64]
+
+JOINTS = len(DOF)
+OBJECT = "object"
+MM, N_MM = 1e-3, 1e-3  # one millimetre in metres, one newton millimetre in newton metres
+# What the dynamics need and rest does not know: rotor inertia of the joints (kg m2), density of the fingers (kg/m3),
+# and the least mass (kg) and moment of inertia (kg m2) of an object. The springs on them are then slow enough for 5 ms.
+_ARMATURE, _DENSITY, _LEAST_MASS, _LEAST_INERTIA = 2e-4, 1000.0, 0.1, 2e-4
+# MuJoCo refuses what has next to no size (m) or mass (kg, kg m2): so much has everything, far below what is felt.
+_LEAST_SIZE, _LEAST_PART = 1e-9, 1e-12
+# Share of a contact that MuJoCo's solver takes as a hard constraint; the skin is the rest.
+_IMPEDANCE = 0.9
+# MuJoCo's friction creeps, the less the higher this ratio: at 1 nothing sticks for as long as a grasp takes to settle.
+_GRIPS = 20.0
+# Bits of who meets whom: parts of the hand meet the object, never one another.
+_HAND, _OBJECT = 1, 2
+
+
+@dataclass(frozen=True, slots=True)
+class Dynamics:
+    """How time is stepped, and how skin, friction and the hold on the object are (effects/contact_mujoco.py)."""
+
+    dt_ms: float
+    steps: int
+    friction: float
+    skin_n_per_mm: float
+    reach_mm: float
+    weld_n_per_m: float
+    weld_nm_per_rad: float
+
+
+def build(hand: Hand, thing: Thing, dynamics: Dynamics) -> mujoco.MjModel:
+    """Return the model of `hand` and `thing`: joints 0 to 19 in the order of DOF, then the object's three slides and
+    its ball joint; the object is the last body; geoms bear the names of CAPSULES and `OBJECT`.
+    """
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    spec.compiler.boundmass = spec.compiler.boundinertia = _LEAST_PART
+    spec.option.timestep = dynamics.dt_ms / 1e3
+    spec.option.gravity = [0.0, 0.0, 0.0]
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    spec.option.impratio = _GRIPS
+    spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    _add_hand(spec, hand, dynamics.friction)
+    _add_object(spec, thing, dynamics)
+    model = spec.compile()
+    _soften(model, dynamics.skin_n_per_mm / MM)
+    return model
+
+
+def _add_hand(spec: mujoco.MjSpec, hand: Hand, friction: float) -> None:
+    skeleton = hand.skeleton(np.zeros((JOINTS, 1)))
+    for digit in range(5):
+        body = spec.worldbody
+        for segment in range(3):
+            body = _add_segment(body, skeleton, 3 * digit + segment)
+            for joint in (0, 1) if segment == 0 else (segment + 1,):
+                _add_joint(body, skeleton, digit, joint, segment)
+            _add_capsule(body, hand, 3 * digit + segment, np.zeros(3), np.eye(3), friction)
+    for capsule in range(15, len(CAPSULES)):
+        origin, frame = skeleton.origins[capsule, :, 0] * MM, skeleton.frames[capsule, :, :, 0]
+        _add_capsule(spec.worldbody, hand, capsule, origin, frame, friction)
+
+
+def _add_segment(parent: mujoco.MjsBody, skeleton: Skeleton, capsule: int) -> mujoco.MjsBody:
+    origin, frame = skeleton.origins[capsule, :, 0], skeleton.frames[capsule, :, :, 0]
+    if capsule % 3:
+        beneath = skeleton.frames[capsule - 1, :, :, 0]
+        origin = _seen_from(beneath, origin - skeleton.origins[capsule - 1, :, 0])
+        frame = _seen_from(beneath, frame)
+    return parent.add_body(name=CAPSULES[capsule], pos=origin * MM, quat=_quaternion(frame))
+
+
+def _add_joint(body: mujoco.MjsBody, skeleton: Skeleton, digit: int, joint: int, segment: int) -> None:
+    number = 4 * digit + joint
+    stiffness = STIFFNESS[number] * N_MM
+    body.add_joint(
+        name=DOF[number],
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        range=np.radians(LIMITS_DEG[number]),
+        axis=_seen_from(skeleton.frames[3 * digit + segment, :, :, 0], skeleton.axes[digit, joint, :, 0]),
+        stiffness=[stiffness, 0.0, 0.0],
+        damping=[_critical(stiffness, _ARMATURE), 0.0, 0.0],
+        armature=_ARMATURE,
+    )
+
+
+def _add_capsule(
+    body: mujoco.MjsBody, hand: Hand, capsule: int, origin: Floats, frame: Floats, friction: float
+) -> None:
+    begin, end = (origin + frame[:, 0] * along * MM for along in _span_mm(hand, capsule))
+    body.add_geom(
+        name=CAPSULES[capsule],
+        type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+        fromto=[*begin, *end],
+        size=[hand.radii[capsule] * MM, 0.0, 0.0],
+        density=_DENSITY,
+        contype=_HAND,
+        conaffinity=_OBJECT,
+        priority=1,
+        friction=[friction, 0.0, 0.0],
+        solimp=[_IMPEDANCE, _IMPEDANCE, 1.0, 0.5, 1.0],
+    )
+
+
+def _span_mm(hand: Hand, capsule: int) -> tuple[float, float]:
+    """Return where the axis of a capsule begins and ends: at the joints, and where there is none at the first or last
+    sphere of skin (hand.py), so that a digit has its round tip and what passes the wrist touches nothing.
+    """
+    skin = hand.sphere_offsets[hand.sphere_capsules == capsule]
+    begins_at_joint, ends_at_joint = capsule < 15, capsule < 15 and capsule % 3 < 2
+    return 0.0 if begins_at_joint else float(skin.min()), float(hand.lengths[capsule] if ends_at_joint else skin.max())
+
+
+def _add_object(spec: mujoco.MjSpec, thing: Thing, dynamics: Dynamics) -> None:
+    kind, size, quaternion = _geom(thing.shape)
+    mass, inertia = _inertia(thing)
+    body = spec.worldbody.add_body(
+        name=OBJECT, mass=mass, inertia=inertia, ipos=[0.0] * 3, iquat=[1.0, 0.0, 0.0, 0.0], explicitinertial=True
+    )
+    slide, turn = dynamics.weld_n_per_m, dynamics.weld_nm_per_rad
+    for axis in np.eye(3):
+        _add_spring(body, mujoco.mjtJoint.mjJNT_SLIDE, axis, slide, _critical(slide, mass))
+    _add_spring(body, mujoco.mjtJoint.mjJNT_BALL, np.eye(3)[2], turn, _critical(turn, float(np.max(inertia))))
+    body.add_geom(name=OBJECT, type=kind, size=size, quat=quaternion, density=0.0, contype=_OBJECT, conaffinity=_HAND)
+
+
+def _add_spring(body: mujoco.MjsBody, kind: mujoco.mjtJoint, axis: Floats, stiffness: float, damping: float) -> None:
+    body.add_joint(type=kind, axis=axis, stiffness=[stiffness, 0.0, 0.0], damping=[damping, 0.0, 0.0])
+
+
+def _critical(stiffness: float, inertia: float) -> float:
+    """Return the damping that brings a mass on a spring to rest soonest."""
+    return 2.0 * float(np.sqrt(stiffness * inertia))
+
+
+def _geom(shape: Shape) -> tuple[mujoco.mjtGeom, Floats, list[float]]:
+    """Return kind, half sizes in metres (none is 0) and turn of the primitive; rounded edges are left sharp."""
+    half = np.maximum(np.array(shape.extent_mm()) / 2 * MM, _LEAST_SIZE)
+    straight = [1.0, 0.0, 0.0, 0.0]
+    match shape:
+        case Sphere():
+            return mujoco.mjtGeom.mjGEOM_SPHERE, half, straight
+        case Cylinder():  # MuJoCo's lies along z, ours along x
+            return mujoco.mjtGeom.mjGEOM_CYLINDER, half[[1, 0, 2]], [np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0]
+        case Box():
+            return mujoco.mjtGeom.mjGEOM_BOX, half, straight
+
+
+def _inertia(thing: Thing) -> tuple[float, Floats]:
+    """Return mass and principal moments of a box of the object's size, each at least what a stable step needs."""
+    mass = max(thing.mass_kg, _LEAST_MASS)
+    square = (np.array(thing.shape.extent_mm()) * MM) ** 2
+    return mass, np.maximum(mass * (square.sum() - square) / 12.0, _LEAST_INERTIA)
+
+
+def _seen_from(frame: Floats, vectors: Floats) -> Floats:
+    """Return vectors (3, ...) of the hand in the axes that are the columns of `frame` (3, 3)."""
+    return np.stack([np.add.reduce((axis * vectors.T).T, axis=0) for axis in frame.T])
+
+
+def _quaternion(frame: Floats) -> Floats:
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(frame).ravel())
+    return quaternion
+
+
+def _soften(model: mujoco.MjModel, skin_n_per_m: float) -> None:
+    """Give every capsule skin of one stiffness, critically damped.
+
+    A contact that rests at depth r bears aref / R = (solref / d^2) d r * d / ((1 - d) A), with impedance d and A the
+    sum of both bodies' inverse masses (MuJoCo's documentation, Computation, Dynamics): solved for solref.
+    """
+    inverse_mass = model.body_invweight0[model.geom_bodyid, 0]
+    stiffness = skin_n_per_m * (1.0 - _IMPEDANCE) * (inverse_mass + model.body(OBJECT).invweight0[0])
+    model.geom_solref[:, 0], model.geom_solref[:, 1] = -stiffness, -2.0 * np.sqrt(stiffness)
+
+
+_SLIDES = slice(JOINTS, JOINTS + 3)
+_BALL = slice(JOINTS + 3, JOINTS + 6)
+_TURN = slice(JOINTS + 3, JOINTS + 7)  # of qpos, where a turn takes four numbers
+# At rest: neither joint nor object turns faster than this (rad/s; motion dies within some 20 ms, so little of it moves
+# a fingertip by tenths of a mm) or slides as fast, at a lever's end (m); and what nothing balances on the object is at
+# most so many newtons and such a share of all contacts. On a soft hold, little damped, balance alone is no rest.
+_SPEED, _LEVER, _UNBALANCED_N, _UNBALANCED_SHARE = 0.1, 0.03, 0.1, 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """One repetition at rest: angles (20,) in radians, pose (6,), capsules_n (20,), what nothing balances, and whether
+    MuJoCo warned of nothing and joints and object stand still.
+    """
+
+    angles: Floats
+    pose: Floats
+    capsules_n: Floats
+    residual_n: float
+    residual_nmm: float
+    settled: bool
+
+
+@dataclass(frozen=True, slots=True)
+class MujocoContact:
+    """The contact model of rigid-body dynamics with friction."""
+
+    dynamics: Dynamics
+    layout: tuple[Patch, ...]
+
+    def solve(self, loads: Sequence[Load]) -> list[Contact]:
+        """Return how the hands rest (contact.ContactModel), one repetition after another."""
+        with _warnings_counted_only():
+            return [self._solve(load) for load in loads]
+
+    def _solve(self, load: Load) -> Contact:
+        condition = load.condition
+        hand, shape = condition.hand, condition.thing.shape
+        angles = np.radians(load.posture_deg.T)
+        moments = load.grip_n * torques(condition, hand.skeleton(angles), Pose.of(load.pose.T))
+        bench = Bench(hand, condition.thing, condition.held.down, self.dynamics)
+        rests = [bench.rest(*told) for told in zip(angles.T, load.pose, moments.T, strict=True)]
+        angles = np.array([rest.angles for rest in rests])
+        pose = np.array([rest.pose for rest in rests])
+        capsules_n = np.array([rest.capsules_n for rest in rests])
+        switches = Switches(hand, self.layout)
+        gaps = Pose.of(pose.T).distance(shape, switches.tops(hand.skeleton(angles.T)))[0]
+        forces_n, between_n = split(switches, self.dynamics.reach_mm - gaps, capsules_n.T)
+        return Contact(
+            posture_deg=np.degrees(angles),
+            pose=pose,
+            forces_n=forces_n.T,
+            capsules_n=capsules_n,
+            between_n=between_n,
+            settled=np.array([rest.settled for rest in rests]),
+            residual_n=np.array([rest.residual_n for rest in rests]),
+            residual_nmm=np.array([rest.residual_nmm for rest in rests]),
+            steps=len(rests) * self.dynamics.steps,
+        )
+
+
+class Bench:
+    """A hand and an object on MuJoCo's bench, used again for every repetition."""
+
+    def __init__(self, hand: Hand, thing: Thing, down: Floats, dynamics: Dynamics) -> None:
+        self._dynamics = dynamics
+        self._model = build(hand, thing, dynamics)
+        self._data = mujoco.MjData(self._model)
+        self._weight = thing.mass_kg * GRAVITY * down
+        self._object = self._model.geom(OBJECT).id
+        names = [self._model.geom(number).name for number in range(self._model.ngeom)]
+        self._capsules = np.array([CAPSULES.index(name) if name != OBJECT else -1 for name in names])
+
+    def rest(self, angles: Floats, pose: Floats, moments: Floats) -> Rest:
+        """Return how the hand rests that is told angles (20,) in radians round an object at pose (6,), and whose
+        muscles turn its joints by moments (20,) in N mm. Nothing of the grasp before is left in the data.
+        """
+        data, model = self._data, self._model
+        mujoco.mj_resetData(model, data)
+        data.qpos[:] = _places(angles, pose)
+        model.qpos_spring[:] = data.qpos
+        data.qfrc_applied[:JOINTS] = moments * N_MM
+        data.xfrc_applied[-1, :3] = self._weight
+        mujoco.mj_step(model, data, self._dynamics.steps)
+        mujoco.mj_forward(model, data)
+        if data.warning.number.any() or not np.isfinite(data.qacc).all():
+            return Rest(angles, pose, np.zeros(len(CAPSULES)), np.inf, np.inf, settled=False)
+        return self._read()
+
+    def _read(self) -> Rest:
+        data = self._data
+        capsules_n, force, moment = self._contacts()
+        force = force + self._weight + data.qfrc_spring[_SLIDES]
+        turn = data.xmat[-1].reshape(3, 3)
+        moment = moment + np.add.reduce(turn.T * data.qfrc_spring[_BALL][:, None], axis=0)
+        residual_n, residual_nmm = _length(force), _length(moment) / N_MM
+        return Rest(
+            angles=data.qpos[:JOINTS].copy(),
+            pose=_pose(data.qpos),
+            capsules_n=capsules_n,
+            residual_n=residual_n,
+            residual_nmm=residual_nmm,
+            settled=self._stands_still() and residual_n <= _UNBALANCED_N + _UNBALANCED_SHARE * float(capsules_n.sum()),
+        )
+
+    def _stands_still(self) -> bool:
+        speeds = np.abs(self._data.qvel)
+        speeds[_SLIDES] /= _LEVER
+        return float(speeds.max()) <= _SPEED
+
+    def _contacts(self) -> tuple[Floats, Floats, Floats]:
+        """Return the normal forces on the capsules (20,), and on the object the contacts' force and their moment about
+        its centre (3,).
+        """
+        contacts = self._data.contact
+        meeting = contacts.efc_address >= 0
+        address = contacts.efc_address[meeting]
+        flipped = np.where(contacts.geom[meeting, 0] == self._object, -1.0, 1.0)
+        loads = np.stack([self._data.efc_force[address + axis] for axis in range(3)], axis=1)
+        frames = contacts.frame[meeting].reshape(-1, 3, 3)
+        forces = np.add.reduce(np.moveaxis(frames * loads[:, :, None], 1, 0), axis=0) * flipped[:, None]
+        arms = contacts.pos[meeting] - self._data.xpos[-1]
+        capsules = self._capsules[np.where(flipped > 0, contacts.geom[meeting, 0], contacts.geom[meeting, 1])]
+        normal = np.zeros(len(CAPSULES))
+        np.add.at(normal, capsules, loads[:, 0])
+        return normal, np.add.reduce(forces, axis=0), np.add.reduce(np.cross(arms, forces), axis=0)
+
+
+@contextmanager
+def _warnings_counted_only() -> Iterator[None]:
+    """Keep MuJoCo from writing a warning to the console and into a file of the working folder: `MjData` counts them."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda message: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+def _places(angles: Floats, pose: Floats) -> Floats:
+    turn = np.array([1.0, 0.0, 0.0, 0.0])
+    mujoco.mju_quatIntegrate(turn, pose[3:], 1.0)
+    return np.concatenate([angles, pose[:3] * MM, turn])
+
+
+def _pose(places: Floats) -> Floats:
+    turn = np.empty(3)
+    mujoco.mju_quat2Vel(turn, places[_TURN], 1.0)
+    return np.concatenate([places[_SLIDES] / MM, turn])
+
+
+def _length(vector: Floats) -> float:
+    return float(np.sqrt(np.add.reduce(vector * vector)))

@@ -1,0 +1,141 @@
+"""The pipeline: what a scene calls for, compiled once into one list of steps, and nothing else.
+
+Of effects that the scene does not list nothing is prepared; no step asks whether it is enabled.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from time import perf_counter_ns
+
+import msgspec
+
+from thenar.compiler.recordings.names import nearest
+
+from ..contact.model import ContactModel
+from ..errors import SceneError
+from ..pipeline.batch import Batch
+from ..pipeline.effect import EFFECTS, Effect, Setting, Step, Together
+from ..pipeline.glove import STEPS
+from ..pipeline.ledger import Ledger
+from ..pipeline.ordering import Place, in_order
+from ..scenes.scene import Scene
+from ..streams import Draw, Draws, Site
+
+# What closes the hand on its object where the scene names no other: every scene needs one.
+DEFAULT_CONTACT = "contact.quasistatic"
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """One step of a pipeline; `own` if it is there whatever effects the scene lists."""
+
+    effect: Effect
+    act: Together
+    own: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Pipeline:
+    """The steps of a scene, in order."""
+
+    setting: Setting
+    stops: tuple[Stop, ...]
+
+    def run(self, batches: Sequence[Batch], ledger: Ledger) -> None:
+        """Take batches through all steps, and enter in the ledger what each step cost.
+
+        They go side by side, which saves time where hands are closed; none depends on which others are there.
+        """
+        repetitions = sum(map(len, batches))
+        for stop in self.stops:
+            draws = Draws()
+            sites = [Draw(self.setting.seed, stop.effect.name, _site(batch), draws) for batch in batches]
+            began = perf_counter_ns()
+            stop.act(batches, sites)
+            ledger.enter(stop.effect.name, stop.own, len(batches), repetitions, perf_counter_ns() - began, draws)
+
+
+def _site(batch: Batch) -> Site:
+    condition = batch.condition
+    return Site(condition.subject, condition.grasp, condition.thing.name, batch.repetitions)
+
+
+def _each(step: Step) -> Together:
+    def act(batches: Sequence[Batch], draws: Sequence[Draw]) -> None:
+        for batch, draw in zip(batches, draws, strict=True):
+            step(batch, draw)
+
+    return act
+
+
+def _closing(model: ContactModel) -> Together:
+    def act(batches: Sequence[Batch], draws: Sequence[Draw]) -> None:
+        contacts = model.solve([batch.load() for batch in batches])
+        for batch, contact, draw in zip(batches, contacts, draws, strict=True):
+            batch.take(contact)
+            draw.count("solver steps", contact.steps)
+
+    return act
+
+
+def compile_pipeline(scene: Scene, without: str | None = None) -> Pipeline:
+    """Return the steps of `scene`, less the listed effect `without`.
+
+    Raises SceneError where effects conflict, wait for one another in a circle, or cannot do with their parameters;
+    SimMissingError where one needs a package that is not installed.
+    """
+    listed = list(_listed(scene, without))
+    setting = scene.setting(place.effect for place in listed)
+    own = [Place(effect, own=True) for effect in _own_steps(setting)]
+    ordered = in_order([*own, *listed])
+    acts = {place.effect.name: _prepared(place, setting) for place in own}
+    closing = next(place for place in listed if place.effect.model is not None)
+    assert closing.effect.model is not None
+    model = closing.effect.model(closing.parameters, setting)
+    acts[closing.effect.name] = _closing(model)
+    for place in listed:
+        if place.effect.together is not None:
+            acts[place.effect.name] = place.effect.together(place.parameters, setting, model)
+        elif place is not closing:
+            acts[place.effect.name] = _prepared(place, setting)
+    return Pipeline(setting, tuple(Stop(place.effect, acts[place.effect.name], place.own) for place in ordered))
+
+
+def _listed(scene: Scene, without: str | None) -> Iterator[Place]:
+    """Yield the effects that the scene lists, and a contact model where it names none: there must be one."""
+    names = [listed.name for listed in scene.effects]
+    _check_without(names, without)
+    closes = False
+    for name, parameters in scene.effects:
+        if name != without:
+            after = tuple(other for other in parameters.after if other != without)
+            place = Place(EFFECTS[name], own=False, parameters=msgspec.structs.replace(parameters, after=after))
+            closes = closes or place.effect.model is not None
+            yield place
+    if not closes:
+        effect = EFFECTS[DEFAULT_CONTACT]
+        yield Place(effect, own=True, parameters=effect.parameters())
+
+
+def _check_without(names: list[str], without: str | None) -> None:
+    if without is None:
+        return
+    if without not in names:
+        raise SceneError(f"effect {without!r} cannot be left out: the scene does not list it{nearest(without, names)}")
+    if without == DEFAULT_CONTACT:
+        raise SceneError(f"effect {without!r} cannot be left out: without it nothing closes the hand on its object")
+
+
+def _own_steps(setting: Setting) -> tuple[Effect, ...]:
+    if not setting.on_wire:
+        return STEPS
+    from ..pipeline.wire import RECEIVE, SEND
+
+    return (*STEPS, SEND, RECEIVE)
+
+
+def _prepared(place: Place, setting: Setting) -> Together:
+    effect = place.effect
+    if effect.prepare is None:
+        raise SceneError(f"effect {effect.name!r} has nothing that acts: give its record a `prepare`")
+    return _each(effect.prepare(place.parameters, setting))

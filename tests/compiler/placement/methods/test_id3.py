@@ -1,0 +1,149 @@
+"""The family of ID3: beside the trees themselves, and cost-aware growth beside its definition written out, with gains
+as exact products of whole numbers.
+"""
+
+import heapq
+from collections import Counter
+from fractions import Fraction
+from math import prod
+
+import numpy as np
+import numpy.typing as npt
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.compiler import grow_id3
+from thenar.compiler.placement.methods.base import METHODS
+from thenar.compiler.placement.methods.id3 import cost_aware_order, every_third
+from thenar.compiler.placement.ports import PortCosts
+from thenar.compiler.placement.pruning import errors_spared, weakest_links
+from thenar.compiler.samples import Samples
+
+Bits = npt.NDArray[np.bool_]
+Labels = npt.NDArray[np.int64]
+
+
+@st.composite
+def learnings(draw: st.DrawFn) -> Samples:
+    random = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    n, s = draw(st.integers(1, 60)), draw(st.integers(1, 10))
+    labels = random.integers(0, 4, n)
+    switches = (random.random((4, s)) < 0.5)[labels] ^ (random.random((n, s)) < random.choice([0.0, 0.2]))
+    # Class 4 is never met: numbers of the tree's classes are not those of the labels.
+    return Samples(switches, np.zeros((n, 0), np.uint16), labels + (labels > 1), tuple("01234"))
+
+
+@given(learnings(), st.integers(0, 61))
+def test_one_tree_answers_for_every_s_as_the_papers_pruned_tree_does(samples: Samples, s: int) -> None:
+    assert METHODS["id3"].chooser(samples)(s) == grow_id3(samples.switches, samples.labels, min_samples=s).inputs
+
+
+@given(learnings(), st.integers(0, 11))
+def test_no_more_switches_are_kept_than_asked_for(samples: Samples, most: int) -> None:
+    for name in ("id3-ccp", "id3-rep", "id3-cost"):
+        kept = METHODS[name].chooser(samples)(most)
+        assert len(set(kept)) == len(kept) <= most
+
+
+@given(learnings())
+def test_links_that_bring_nothing_cost_no_input_unless_asked_to(samples: Samples) -> None:
+    assert METHODS["id3-ccp"].chooser(samples)(10) == grow_id3(samples.switches, samples.labels).inputs
+
+
+@given(learnings())
+def test_reduced_error_pruning_grows_on_two_thirds_and_prunes_on_the_rest(samples: Samples) -> None:
+    out = every_third(samples.labels)
+    tree = grow_id3(samples.switches[~out], samples.labels[~out])
+    numbers = np.array([tree.classes.index(label) for label in samples.labels[out].tolist()], dtype=np.intp)
+    path = weakest_links(tree, errors_spared(tree, samples.switches[out], numbers))
+    assert METHODS["id3-rep"].chooser(samples)(10) == path.placement(10, path.n_useless)
+
+
+def test_every_third_row_of_each_class_is_held_out() -> None:
+    labels = np.array([1, 0, 1, 1, 0, 0, 0, 2, 1, 1, 1])
+    assert np.flatnonzero(every_third(labels)).tolist() == [3, 5, 10]
+
+
+@st.composite
+def data(draw: st.DrawFn) -> tuple[Bits, Labels]:
+    random = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    n, d, classes = draw(st.integers(1, 20)), draw(st.integers(1, 6)), draw(st.integers(1, 4))
+    return random.random((n, d)) < random.choice([0.2, 0.5]), random.integers(0, classes, n)
+
+
+@st.composite
+def data_and_ports(draw: st.DrawFn) -> tuple[Bits, Labels, PortCosts]:
+    X, y = draw(data())
+    us = draw(st.lists(st.sampled_from([0.0, 1.0, 2.0, 3.0]), min_size=1, max_size=3))
+    port_of = draw(st.lists(st.integers(0, len(us) - 1), min_size=X.shape[1], max_size=X.shape[1]))
+    return X, y, PortCosts(tuple(port_of), tuple(us))
+
+
+def order_of(X: Bits, y: Labels, ports: PortCosts) -> tuple[int, ...]:
+    return cost_aware_order(Samples(X, np.zeros((len(y), 0), np.uint16), y, tuple("0123")), ports)
+
+
+def power(*columns: npt.NDArray[np.generic]) -> int:
+    return prod(m**m for m in Counter(zip(*(column.tolist() for column in columns), strict=True)).values())
+
+
+def gain(x: Bits, y: Labels) -> Fraction:
+    """Return e to the power of n * gain."""
+    return Fraction(power(x, y) * len(y) ** len(y), power(x) * power(y))
+
+
+def order_by_definition(X: Bits, y: Labels, ports: PortCosts) -> tuple[int, ...]:
+    found: list[int] = []
+    waiting = [(-len(y), 0, tuple(range(len(y))))]
+    made = 1
+    while waiting:
+        rows = list(heapq.heappop(waiting)[2])
+        varying = [c for c in range(X.shape[1]) if 0 < X[rows, c].sum() < len(rows)]
+        if len(set(y[rows].tolist())) < 2 or not varying:
+            continue
+        read = {ports.port_of[c] for c in found}
+        # In whole microseconds, over the sum of all ports' times.
+        costs = [int(sum(ports.us) + len(ports.us) * ports.us[p] * (p not in read)) or 1 for p in ports.port_of]
+        best = min(varying, key=lambda c: (costs[c], c))
+        for c in sorted(varying, key=lambda c: (costs[c], c)):
+            if gain(X[rows, c], y[rows]) ** costs[best] > gain(X[rows, best], y[rows]) ** costs[c]:
+                best = c
+        if best not in found:
+            found.append(best)
+        for value in (False, True):
+            part = tuple(row for row in rows if X[row, best] == value)
+            heapq.heappush(waiting, (-len(part), made, part))
+            made += 1
+    return tuple(found)
+
+
+@given(data_and_ports())
+def test_switches_are_found_as_defined(drawn: tuple[Bits, Labels, PortCosts]) -> None:
+    X, y, ports = drawn
+    assert order_of(X, y, ports) == order_by_definition(X, y, ports)
+
+
+@given(data(), st.integers(0, 20))
+def test_where_all_cost_alike_every_s_of_the_papers_tree_is_a_beginning(drawn: tuple[Bits, Labels], s: int) -> None:
+    X, y = drawn
+    order = order_of(X, y, PortCosts((0,) * X.shape[1], (0.0,)))
+    pruned = grow_id3(X, y, min_samples=s).inputs
+    assert set(order[: len(pruned)]) == set(pruned)
+
+
+def test_a_switch_on_a_port_that_is_read_anyway_is_preferred() -> None:
+    y = np.repeat(np.arange(4), 6)
+    whole = np.isin(y, [0, 1])
+    best, nearly = np.isin(y, [0, 2]), np.isin(y, [0, 2])
+    nearly[0] = False
+    X = np.stack([whole, best, nearly], axis=1)
+    assert order_of(X, y, PortCosts((0, 1, 0), (0.0, 0.0)))[:2] == (0, 1)
+    assert order_of(X, y, PortCosts((0, 1, 0), (40.0, 40.0)))[:2] == (0, 2)
+
+
+def test_half_the_gain_at_half_the_cost_is_as_good_and_the_cheaper_wins() -> None:
+    y = np.repeat(np.arange(4), 2)
+    one_bit, half_a_bit = y < 2, np.array([0, 0, 1, 1, 0, 1, 0, 1], bool)
+    X = np.stack([one_bit, half_a_bit], axis=1)
+    assert order_of(X, y, PortCosts((0, 1), (5.0, 1.0)))[0] == 1
+    assert order_of(X, y, PortCosts((0, 1), (4.999, 1.0)))[0] == 0

@@ -1,0 +1,105 @@
+"""The rivals: what each ranks first, and what all of them keep to."""
+
+import sys
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from thenar.compiler.placement.errors import PlacementError
+from thenar.compiler.placement.methods.base import METHODS
+from thenar.compiler.samples import Samples
+
+RIVALS = [
+    pytest.param(name, marks=pytest.mark.skipif(not method.installed, reason=f"{method.install} is not installed"))
+    for name, method in METHODS.items()
+    if not method.ours
+]
+TELLING = (7, 2, 5)
+
+
+def told_by_three(rows: int = 240, switches: int = 12, types: int = 8) -> Samples:
+    """Three switches spell the type out; two never change; the others are noise."""
+    random = np.random.default_rng(3)
+    labels = np.arange(rows) % types
+    bits = random.random((rows, switches)) < 0.3
+    for place, column in enumerate(TELLING):
+        bits[:, column] = (labels >> place) & 1
+    bits[:, 0], bits[:, 11] = False, True
+    return Samples(bits, np.zeros((rows, 0), np.uint16), labels, tuple(map(str, range(types))))
+
+
+@pytest.fixture(scope="module")
+def learning() -> Samples:
+    return told_by_three()
+
+
+@pytest.mark.parametrize("name", ["rfe", "forest", "mrmr", "cmim", "mutual-information"])
+def test_who_looks_at_labels_finds_the_switches_that_tell_the_types(name: str, learning: Samples) -> None:
+    assert set(METHODS[name].chooser(learning)(3)) == set(TELLING)
+
+
+@pytest.mark.parametrize("name", RIVALS)
+def test_placements_are_nested_repeatable_and_of_switches_that_vary(name: str, learning: Samples) -> None:
+    choose, again = METHODS[name].chooser(learning), METHODS[name].chooser(learning)
+    everything = choose(100)
+    assert sorted(everything) == list(range(1, 11))
+    for m in range(12):
+        assert choose(m) == again(m) == everything[:m]
+
+
+@pytest.mark.parametrize("name", RIVALS)
+def test_where_nothing_varies_or_one_type_is_left_nothing_is_chosen(name: str, learning: Samples) -> None:
+    still = Samples(np.ones((6, 3), bool), np.zeros((6, 0), np.uint16), np.arange(6) % 2, tuple("01"))
+    alike = Samples(learning.switches, learning.codes, np.zeros(len(learning.labels), np.intp), tuple("01"))
+    assert METHODS[name].chooser(still)(2) == METHODS[name].chooser(alike)(2) == ()
+
+
+def test_joints_are_not_looked_at(learning: Samples) -> None:
+    telling = learning.labels[:, None].astype(np.uint16)
+    beside = Samples(learning.switches, telling, learning.labels, tuple(map(str, range(learning.n_classes))))
+    assert METHODS["forest"].chooser(beside)(10) == METHODS["forest"].chooser(learning)(10)
+
+
+def information(a: npt.NDArray[np.intp], b: npt.NDArray[np.intp]) -> float:
+    joint = np.histogram2d(a, b, bins=(int(a.max()) + 1, int(b.max()) + 1))[0] / len(a)
+    apart = np.outer(joint.sum(axis=1), joint.sum(axis=0))
+    seen = joint > 0
+    return float((joint[seen] * np.log(joint[seen] / apart[seen])).sum())
+
+
+def test_mrmr_is_pengs_definition() -> None:
+    random = np.random.default_rng(8)
+    labels = random.integers(0, 4, 150)
+    bits = (random.random((150, 9)) < 0.4) ^ (labels[:, None] > np.arange(9) % 4)
+    numbers = bits.astype(np.intp)
+    chosen: list[int] = []
+    while len(chosen) < 9:
+        scores = {
+            a: information(numbers[:, a], labels)
+            - sum(information(numbers[:, a], numbers[:, b]) for b in chosen) / max(len(chosen), 1)
+            for a in range(9)
+            if a not in chosen
+        }
+        chosen.append(max(scores, key=lambda a: scores[a]))
+    learning = Samples(bits, np.zeros((150, 0), np.uint16), labels, tuple("0123"))
+    assert METHODS["mrmr"].chooser(learning)(9) == tuple(chosen)
+
+
+def test_recursive_elimination_drops_the_copy_that_importance_alone_keeps() -> None:
+    random = np.random.default_rng(1)
+    labels = np.arange(400) % 4
+    strong, weak = (labels & 1).astype(bool), (labels >> 1).astype(bool) ^ (random.random(400) < 0.15)
+    copy = strong ^ (random.random(400) < 0.1)
+    learning = Samples(np.column_stack([strong, copy, weak]), np.zeros((400, 0), np.uint16), labels, tuple("0123"))
+    assert set(METHODS["rfe"].chooser(learning)(2)) == {0, 2}
+    assert set(METHODS["mutual-information"].chooser(learning)(2)) == {0, 1}
+
+
+@pytest.mark.parametrize("name", ["sspoc", "qr"])
+def test_without_pysensors_its_methods_say_what_to_install(
+    name: str, learning: Samples, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pysensors", None)
+    with pytest.raises(PlacementError, match="pip install python-sensors"):
+        METHODS[name].chooser(learning)

@@ -1,0 +1,169 @@
+"""Standard placements: of a crowd whose subjects press different switches, and bettered by exchanges at the edge."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from thenar.compiler.placement import population
+from thenar.compiler.placement.errors import PlacementError
+from thenar.compiler.placement.placement import Aim
+from thenar.compiler.placement.population import (
+    EXCHANGES,
+    Asked,
+    Crowd,
+    Refining,
+    rates,
+    served,
+    standard_placement,
+)
+from thenar.compiler.samples import Columns, Samples
+
+TYPES, EACH = 4, 24
+ODD = tuple(range(1, 40, 4))  # subjects whose hands press switches 2 and 3 instead of 0 and 1
+
+
+def crowd(people: int = 40, odd: tuple[int, ...] = ODD) -> Crowd:
+    random = np.random.default_rng(6)
+    subjects = np.repeat(np.arange(people), EACH)
+    labels = np.arange(people * EACH) % TYPES
+    bits = random.random((len(labels), 8)) < 0.2
+    told = np.stack([labels & 1, labels >> 1], axis=1).astype(bool) ^ (random.random((len(labels), 2)) < 0.02)
+    others = np.isin(subjects, odd)
+    bits[~others, 0:2] = told[~others]
+    bits[others, 2:4] = told[others]
+    return Crowd(Samples(bits, np.zeros((len(labels), 0), np.uint16), labels, tuple(map(str, range(TYPES)))), subjects)
+
+
+TAKE = Asked(keep=2, method="cmim", rows=600, rounds=10, repeats=2)
+
+
+def test_two_switches_serve_the_many_and_four_serve_the_odd_ones_too() -> None:
+    two, four = standard_placement(crowd(), TAKE), standard_placement(crowd(), replace(TAKE, keep=4))
+    assert set(four.columns) == {0, 1, 2, 3}
+    assert set(two.columns) <= {0, 1, 2, 3}
+    best = max(point.served.worst_tenth for point in four.curve)
+    assert best > max(point.served.worst_tenth for point in two.curve)
+
+
+def test_the_curve_rises_with_the_number_of_subjects_and_names_every_aim() -> None:
+    found = standard_placement(crowd(odd=()), TAKE)
+    assert (found.subjects, found.held_out) == (40, 8)
+    assert [(point.subjects, point.aim) for point in found.curve] == [
+        (size, aim) for size in (2, 5, 10, 20, 32) for aim in ("plain", "mean", "worst tenth")
+    ]
+    assert found.curve[-3].served.mean >= found.curve[0].served.mean > 0.9
+    assert all(p.served.lowest <= p.served.worst_tenth <= p.served.mean for p in (*found.curve, *found.tried))
+
+
+def test_the_aim_is_the_one_that_did_better_among_those_learnt_from() -> None:
+    found = standard_placement(crowd(), TAKE)
+    worth = {point.aim: point.served.worth for point in found.tried}
+    assert worth[found.aim] == max(worth.values())
+
+
+def test_nothing_is_learnt_from_held_out_subjects() -> None:
+    whole = crowd()
+    found = standard_placement(whole, TAKE)
+    people = np.random.default_rng(TAKE.seed).permutation(np.arange(40))
+    held_out = np.isin(whole.subjects, people[:8])
+    spoilt = whole.samples.labels.copy()
+    spoilt[held_out] = (spoilt[held_out] + 1) % TYPES
+    other = standard_placement(replace(whole, samples=replace(whole.samples, labels=spoilt)), TAKE)
+    assert other.tried == found.tried
+    assert other.curve[-3].served.mean < 0.3 < found.curve[-3].served.mean
+
+
+def test_any_number_of_processes_gives_the_same_answer() -> None:
+    told: list[tuple[int, int]] = []
+    one = standard_placement(crowd(16), TAKE, 1, lambda done, all_: told.append((done, all_)))
+    assert one == standard_placement(crowd(16), TAKE, 2)
+    assert told[-1][0] == told[-1][1] == len(told)
+
+
+def test_few_subjects_are_refused() -> None:
+    with pytest.raises(PlacementError, match="7 subject"):
+        standard_placement(crowd(7), TAKE)
+
+
+def test_rows_are_drawn_evenly_and_repeatably() -> None:
+    drawn = crowd().drawn(400, 3)
+    assert set(np.bincount(drawn.subjects).tolist()) == {10}
+    assert np.array_equal(drawn.samples.switches, crowd().drawn(400, 3).samples.switches)
+    assert len(crowd().drawn(10**6, 3).subjects) == 40 * EACH
+
+
+def test_service_is_the_mean_the_worst_tenth_and_the_lowest() -> None:
+    given = served(np.array([0.5, 0.7, *[0.9] * 18]))
+    assert [given.mean, given.worst_tenth] == pytest.approx([0.87, 0.6])
+    assert given.lowest == 0.5
+    assert given.worth == pytest.approx((0.87 + 0.6) / 2)
+    assert served(np.array([0.8, 0.4])).worst_tenth == 0.4
+
+
+def test_rates_are_each_subjects_own() -> None:
+    whole = crowd()
+    found = rates(whole, whole, (0, 1), 10)
+    assert found.shape == (40,)
+    assert found[list(ODD)].max() < np.delete(found, ODD).min()
+
+
+OF_EACH, PEOPLE = 40, 20
+FEW = (3, 11)
+
+
+@pytest.fixture
+def _twenty_are_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(population, "ENOUGH_SUBJECTS", 8)
+
+
+def edgy(people: int = PEOPLE) -> Crowd:
+    """Return people whom switches 0 and 1 serve; a FEW of them press 0 at random, and 2 tells what 0 does of all, less
+    well; 3 and above tell nothing.
+    """
+    random = np.random.default_rng(8)
+    subjects = np.repeat(np.arange(people), OF_EACH)
+    labels = np.arange(people * OF_EACH) % TYPES
+    bits = random.random((len(labels), 7)) < 0.5
+    low, high = (labels & 1).astype(bool), (labels >> 1).astype(bool)
+    few = np.isin(subjects, FEW)
+    bits[:, 0] = np.where(few, bits[:, 0], low)
+    bits[:, 1] = high
+    bits[:, 2] = low ^ (random.random(len(labels)) < 0.12)
+    return Crowd(Samples(bits, np.zeros((len(labels), 0), np.uint16), labels, tuple(map(str, range(TYPES)))), subjects)
+
+
+def refining(kept: Columns, spare: Columns, people: int = PEOPLE) -> Refining:
+    return Refining(edgy(people), kept, spare, rows=400, rounds=10, seed=1)
+
+
+@pytest.mark.usefixtures("_twenty_are_enough")
+@pytest.mark.parametrize(("aim", "wanted"), [("plain", {1, 4}), ("mean", {0, 1}), ("worst tenth", {1, 2})])
+def test_each_aim_finds_the_exchange_that_serves_it(aim: Aim, wanted: set[int]) -> None:
+    """Without 0 nobody is served well; 0 serves the many to perfection, 2 everybody almost so."""
+    assert set(refining((1, 4), (0, 2, 5)).best(aim)) == wanted
+
+
+@pytest.mark.usefixtures("_twenty_are_enough")
+def test_what_is_exchanged_takes_the_place_of_what_goes() -> None:
+    assert refining((4, 1), (0, 5)).best("mean") == (0, 1)
+
+
+@pytest.mark.usefixtures("_twenty_are_enough")
+def test_a_placement_that_nothing_betters_stays_as_it_is() -> None:
+    assert refining((1, 0), (3, 4, 5)).best("mean") == (1, 0)
+    assert refining((1, 0), ()).best("worst tenth") == (1, 0)
+
+
+@pytest.mark.usefixtures("_twenty_are_enough")
+def test_only_the_edge_changes_and_only_so_often() -> None:
+    assert refining((3, 4, 5, 6), (0, 1, 2)).best("mean")[:EXCHANGES] != (3, 4)
+    kept = (3, 4, 5, 6)
+    assert len(set(refining(kept, (0, 1, 2)).best("mean")) - set(kept)) == EXCHANGES
+    assert refining((3, 0, 4, 1, 5), (2,)).best("worst tenth")[0] == 3
+
+
+@pytest.mark.usefixtures("_twenty_are_enough")
+def test_few_subjects_are_left_to_the_method() -> None:
+    assert refining((1, 4), (0, 2), people=7).best("mean") == (1, 4)
+    assert refining((1, 4), (0, 2), people=8).best("mean") == (1, 0)

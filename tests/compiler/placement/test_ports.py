@@ -1,0 +1,67 @@
+"""What reading switches costs, port by port, and on a glove as it is wired."""
+
+from math import fsum
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.compiler.placement.errors import PlacementError
+from thenar.compiler.placement.ports import PortCosts, port_costs
+from thenar.runtime.errors import HarnessError
+from thenar.runtime.scanning.ports import whole_scan
+from thenar.runtime.scanning.propose import propose_board, propose_harness
+from thenar.runtime.scanning.timing import scan_us, scanner_us
+
+sizes = st.integers(1, 200)
+
+
+def names_of(count: int) -> list[str]:
+    return [f"s{number}" for number in range(count)]
+
+
+def test_reading_a_port_costs_once() -> None:
+    ports = PortCosts((0, 0, 1, 2), (10.0, 20.0, 40.0))
+    assert [ports.scan_us(kept) for kept in ((), (0,), (0, 1), (1, 3), (3, 2, 1, 0))] == [0.0, 10.0, 10.0, 50.0, 70.0]
+
+
+def test_a_port_is_shared_out_over_those_kept_on_it() -> None:
+    ports = PortCosts((0, 0, 1, 1), (10.0, 30.0))
+    assert ports.shares([0, 1, 3]).tolist() == [0.25, 0.25, 1.5]
+    assert PortCosts((0,), (0.0,)).shares([0]).tolist() == [0.0]
+
+
+@pytest.mark.parametrize(("port_of", "us"), [((1,), (1.0,)), ((-1,), (1.0,)), ((0,), (-1.0,)), ((0,), (float("nan"),))])
+def test_ports_must_be_there_and_take_some_time(port_of: tuple[int, ...], us: tuple[float, ...]) -> None:
+    with pytest.raises(PlacementError):
+        PortCosts(port_of, us)
+
+
+@given(sizes, st.sampled_from(["mcp23017", "pca9555", "tca6424a", "pcf8575"]))
+def test_all_ports_together_cost_what_a_whole_scan_takes(size: int, kind: str) -> None:
+    harness = propose_harness(names_of(size), kind)
+    costs = port_costs(harness, names_of(size))
+    assert fsum(costs.us) == pytest.approx(scan_us(whole_scan(harness, harness.switches), harness).us)
+    assert sorted(set(costs.port_of)) == list(range(len(costs.us)))
+
+
+def test_ports_behind_a_channel_share_its_selection() -> None:
+    harness = propose_harness(names_of(130))
+    costs = port_costs(harness, names_of(130))
+    channels = [chip.mux and chip.mux.channel for chip in harness.buses[0].chips]
+    assert set(channels) == {None, 0, 1}
+    for port, channel in enumerate(channels[:-1]):
+        share = 0 if channel is None else (20 * 2.5 + 1.3) / channels.count(channel)
+        assert costs.us[port] == pytest.approx(48 * 2.5 + 1.3 + share)
+
+
+def test_a_board_is_one_port_that_costs_its_whole_frame() -> None:
+    harness = propose_board(names_of(50))
+    assert port_costs(harness, ["s3", "s40"]) == port_costs(harness, ["s40", "s3"])
+    costs = port_costs(harness, ["s3", "s40"])
+    assert (costs.port_of, costs.us) == ((0, 0), (scanner_us(harness.scanners[0]),))
+
+
+def test_a_switch_that_is_wired_to_nothing_is_named() -> None:
+    with pytest.raises(HarnessError, match="'thumb'"):
+        port_costs(propose_harness(["index"]), ["index", "thumb"])

@@ -1,0 +1,39 @@
+import pytest
+
+from thenar.compiler.text import DASH, NBSP, counted, duration, interval, listed, microseconds, percent, sentence
+
+
+class Rate:
+    mean, low, high = 0.9634, 0.9512, 0.97249
+
+
+def test_rates_have_one_digit_and_a_missing_one_is_a_dash() -> None:
+    assert percent(0.9634) == "96.3 %"
+    assert percent(0.9634, NBSP) == f"96.3{NBSP}%"
+    assert interval(Rate()) == "96.3 [95.1, 97.2]"
+    assert interval(None) == DASH
+
+
+@pytest.mark.parametrize(
+    ("us", "said"),
+    [
+        *((0.0, "0 us"), (61.54, "61.5 us"), (440, "440 us"), (999.4, "999 us")),
+        *((999.6, "1 ms"), (2052, "2.05 ms"), (1.5e6, "1.5 s")),
+    ],
+)
+def test_a_time_has_three_digits(us: float, said: str) -> None:
+    assert duration(us) == said
+
+
+def test_a_column_of_microseconds_has_no_more_digits_than_can_be_read() -> None:
+    assert [microseconds(us) for us in (48.12, 99.96, 1736.1)] == ["48.1", "100.0", "1,736"]
+
+
+def test_counts_agree_with_their_nouns() -> None:
+    assert [counted(n, "node") for n in (0, 1, 2000)] == ["0 nodes", "1 node", "2,000 nodes"]
+    assert counted(2, "leaf", "leaves") == "2 leaves"
+
+
+def test_lists_and_sentences() -> None:
+    assert [listed(parts) for parts in ([], ["a"], ["a", "b"], ["a", "b", "c"])] == ["", "a", "a and b", "a, b and c"]
+    assert sentence("no tools were there") == sentence("no tools were there.") == "No tools were there."

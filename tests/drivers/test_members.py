@@ -1,0 +1,111 @@
+"""The registry of the members of a kind: thenar's own in their order, then those of other packages."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from thenar.drivers.members import MemberError, Members
+
+
+@dataclass(frozen=True)
+class Sort:
+    name: str
+    rank: int = 0
+
+
+def write_package(folder: Path, **modules: str) -> None:
+    """Write a package of modules that define members of the class Sort."""
+    folder.mkdir()
+    (folder / "__init__.py").touch()
+    for name, text in modules.items():
+        (folder / f"{name}.py").write_text(f"from test_members import Sort\n{text}\n")
+
+
+def write_distribution(folder: Path, name: str, **points: str) -> None:
+    """Write the metadata of a distribution with entry points, as pip does."""
+    metadata = folder / f"{name}-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+    lines = "".join(f"{point} = {value}\n" for point, value in points.items())
+    (metadata / "entry_points.txt").write_text(f"[thenar.sorts]\n{lines}[thenar.chips]\n{lines}")
+
+
+@pytest.fixture
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a folder on the path of imports."""
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setitem(sys.modules, "test_members", sys.modules[__name__])
+    return tmp_path
+
+
+@pytest.fixture
+def members(site: Path, request: pytest.FixtureRequest) -> Callable[..., Members[Sort]]:
+    """Return what makes the registry of a package of these modules."""
+
+    def made(**modules: str) -> Members[Sort]:
+        package = f"package_of_{request.node.name.partition('[')[0]}"
+        write_package(site / package, **modules)
+        return Members("sort", Sort, package, "thenar.sorts")
+
+    return made
+
+
+OTHER = "from test_members import Sort\nONE = Sort('one')\nTWO = Sort('two')\nNONE = 3\n"
+
+
+def test_members_come_by_rank_then_by_name_and_a_module_may_define_several_or_none(
+    members: Callable[..., Members[Sort]],
+) -> None:
+    found = members(
+        a="MEMBER = Sort('late', 2), Sort('b')", b="MEMBER = Sort('early', -1)", c="", d="MEMBER = Sort('a')"
+    )
+    assert list(found) == ["early", "a", "b", "late"]
+    assert (len(found), found["late"].rank, found.named("a")) == (4, 2, Sort("a"))
+
+
+def test_members_of_other_packages_come_last_in_the_order_of_their_entry_points(
+    site: Path, members: Callable[..., Members[Sort]]
+) -> None:
+    (site / "other_last.py").write_text(OTHER)
+    write_distribution(site, "somebody", b="other_last:ONE", a="other_last:TWO")
+    assert list(members(a="MEMBER = Sort('z', 9)")) == ["z", "two", "one"]
+
+
+def test_a_name_that_there_is_not_is_answered_with_all_that_there_are(members: Callable[..., Members[Sort]]) -> None:
+    with pytest.raises(MemberError, match="there is no sort 'x': choose one of a, b"):
+        members(a="MEMBER = Sort('b'), Sort('a')").named("x")
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ("other_bad:ONE", "two packages define the sort 'one': uninstall one of them"),
+        ("no_such_module:ONE", "cannot be loaded: No module named 'no_such_module'; mend or uninstall it"),
+        ("other_bad:THREE", "cannot be loaded: module 'other_bad' has no attribute 'THREE'; mend or uninstall it"),
+        ("other_bad:NONE", r"the sort 'b' \(other_bad:NONE\) of another package is no Sort: docs/extending.md says"),
+    ],
+)
+def test_a_member_of_another_package_that_cannot_be_one_is_refused_in_a_sentence(
+    site: Path, members: Callable[..., Members[Sort]], value: str, said: str
+) -> None:
+    (site / "other_bad.py").write_text(OTHER)
+    write_distribution(site, "somebody", b=value)
+    registry = members(a="MEMBER = Sort('one')")
+    with pytest.raises(MemberError, match=said):
+        list(registry)
+
+
+@pytest.mark.parametrize("value", ["no_such_module:MEMBER", "json:dumps"])
+def test_a_command_says_so_and_exits_with_2(tmp_path: Path, value: str) -> None:
+    write_distribution(tmp_path, "somebody", odd=value)
+    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
+    command = [sys.executable, "-P", "-m", "thenar.cli", "compile", "--help"]
+    done = subprocess.run(command, env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(f"thenar: the I2C chip 'odd' ({value}) of another package")
+    assert done.stderr.count("\n") == 1

@@ -1,0 +1,277 @@
+"""The pipeline: what a scene lists, in order, and what cannot be compiled."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from thenar.simulator.body.condition import Condition
+from thenar.simulator.errors import SceneError
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.effect import EFFECTS, STAGES
+from thenar.simulator.pipeline.ledger import Ledger
+from thenar.simulator.running.pipeline import compile_pipeline
+from thenar.simulator.scenes.scene import Scene
+
+NAMES = tuple(EFFECTS)
+CONTACTS = tuple(name for name, effect in EFFECTS.items() if effect.model)
+
+SceneMaker = Callable[..., Scene]
+BatchMaker = Callable[..., Batch]
+
+OWN = {
+    "glove.recall",
+    "glove.threshold",
+    "glove.close",
+    "glove.frames",
+    "glove.sense",
+    "glove.encode",
+    "glove.sample",
+}
+WIRED = {"glove.send", "glove.receive"}
+OTHERS = [name for name in NAMES if name not in CONTACTS]
+EVERYTHING = ["contact.quasistatic", *OTHERS]
+SUBSETS = st.sets(st.sampled_from(OTHERS)).flatmap(
+    lambda others: st.sampled_from(CONTACTS).map(lambda contact: [contact, *sorted(others)])
+)
+
+
+def listed_with(name: str, **parameters: object) -> tuple:
+    return name, EFFECTS[name].parameters(**parameters)
+
+
+def light() -> list[tuple]:
+    """Return all effects but the contact models: the ramp in two levels, the bus as it reads all that it can."""
+    special: dict[str, dict[str, object]] = {"contact.ramp": {"levels": 2}, "bus.latency": {"jitter_us": 20.0}}
+    return [listed_with(name, **special.get(name, {})) for name in OTHERS]
+
+
+def order(scene: Scene, without: str | None = None) -> list[str]:
+    return [stop.effect.name for stop in compile_pipeline(scene, without).stops]
+
+
+@given(names=SUBSETS)
+def test_a_pipeline_holds_the_scenes_effects_and_the_gloves_own_steps_and_nothing_else(
+    make_scene: SceneMaker, names: list[str]
+) -> None:
+    stops = compile_pipeline(make_scene(names)).stops
+    on_wire = any(name.startswith("wire.") for name in names)
+    assert sorted(stop.effect.name for stop in stops if not stop.own) == sorted(names)
+    assert {stop.effect.name for stop in stops if stop.own} == OWN | (WIRED if on_wire else set())
+
+
+@given(names=SUBSETS, seed=st.integers(0, 100))
+def test_the_order_is_that_of_stages_and_registry_however_the_scene_lists_them(
+    make_scene: SceneMaker, names: list[str], seed: int
+) -> None:
+    scene = make_scene(names)
+    shuffled = np.random.default_rng(seed).permutation(len(names))
+    other = make_scene(names, name="other")
+    mixed = Scene(**{f: getattr(other, f) for f in other.__struct_fields__} | {"effects": _pick(scene, shuffled)})
+    assert order(mixed) == order(scene)
+    stops = compile_pipeline(scene).stops
+    stages = [STAGES.index(stop.effect.stage) for stop in stops]
+    assert stages == sorted(stages)
+    for stage in STAGES:
+        ranks = [NAMES.index(s.effect.name) for s in stops if not s.own and s.effect.stage == stage]
+        assert ranks == sorted(ranks)
+
+
+def _pick(scene: Scene, places: np.ndarray) -> tuple:
+    return tuple(scene.effects[place] for place in places)
+
+
+def test_the_order_of_everything(make_scene: SceneMaker) -> None:
+    assert " ".join(order(make_scene(EVERYTHING))) == (
+        "glove.recall hand.style hand.posture hand.object_pose hand.grip contact.quasistatic "
+        "glove.threshold switch.threshold glove.close contact.ramp "
+        "glove.frames frame.jitter bus.latency "
+        "glove.sense hand.transition joint.noise joint.drift glove.encode "
+        "glove.sample switch.bounce switch.stuck_open switch.stuck_closed switch.ghosting port.dead "
+        "glove.send wire.lost_bytes wire.damaged_bytes glove.receive"
+    )
+
+
+class Watched(Batch):
+    """A batch that notes which of its fields are read and written."""
+
+    def __getattribute__(self, name: str) -> object:
+        if name in FIELDS:
+            object.__getattribute__(self, "seen").append(("reads", name))
+        return super().__getattribute__(name)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name in FIELDS:
+            object.__getattribute__(self, "seen").append(("writes", name))
+        super().__setattr__(name, value)
+
+    def taken(self) -> tuple[set[str], set[str]]:
+        """Return what was read and what was written since the last time."""
+        seen: list[tuple[str, str]] = object.__getattribute__(self, "seen")
+        reads, writes = ({name for kind, name in seen if kind == asked} for asked in ("reads", "writes"))
+        seen.clear()
+        return reads, writes
+
+
+FIELDS = set(Batch.__dataclass_fields__) - {"condition", "repetitions"}
+
+
+@pytest.mark.parametrize("contact", CONTACTS)
+def test_every_step_reads_and_writes_what_it_says(make_scene: SceneMaker, make_batch: BatchMaker, contact: str) -> None:
+    plain = make_batch(range(2))
+    batch = Watched.__new__(Watched)
+    object.__setattr__(batch, "seen", [])
+    batch.__init__(plain.condition, plain.repetitions, plain.trials, plain.previous_deg)  # type: ignore[misc]
+    batch.taken()
+    for name in OTHERS:
+        assert {*EFFECTS[name].reads, *EFFECTS[name].writes} <= FIELDS
+    pipeline = compile_pipeline(make_scene([contact, *light()]))
+    written = {"trials", "previous_deg", "delay_us", "lost"}
+    for stop in pipeline.stops:
+        single = type(pipeline)(pipeline.setting, (stop,))
+        single.run([batch], Ledger())
+        effect, (reads, writes) = stop.effect, batch.taken()
+        assert writes == set(effect.writes), effect.name
+        # Whether a field is read that the step itself writes is its own affair.
+        assert (reads ^ set(effect.reads)) <= set(effect.writes), effect.name
+        assert set(effect.reads) <= written, effect.name
+        written |= writes
+
+
+def test_a_scene_without_a_contact_model_gets_the_default_as_the_gloves_own(make_scene: SceneMaker) -> None:
+    stops = compile_pipeline(make_scene(["hand.grip"])).stops
+    assert [(s.effect.name, s.own) for s in stops if s.effect.stage in ("posture", "contact")] == [
+        ("glove.recall", True),
+        ("hand.grip", False),
+        ("contact.quasistatic", True),
+    ]
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "contact.quasistatic"])
+def test_leaving_an_effect_out_is_the_scene_without_it(make_scene: SceneMaker, name: str) -> None:
+    contact = "contact.mujoco" if name == "contact.mujoco" else "contact.quasistatic"
+    names = [contact, *OTHERS]
+    rest = [other for other in names if other != name]
+    left, never = compile_pipeline(make_scene(names), without=name), compile_pipeline(make_scene(rest))
+    assert [(stop.effect, stop.own) for stop in left.stops] == [(stop.effect, stop.own) for stop in never.stops]
+    assert left.setting == never.setting
+
+
+def test_leaving_out_the_only_effect_in_time_leaves_one_frame(make_scene: SceneMaker) -> None:
+    scene = make_scene(["hand.grip", "frame.jitter"])
+    assert compile_pipeline(scene).setting.timed
+    assert not compile_pipeline(scene, without="frame.jitter").setting.timed
+
+
+@pytest.mark.parametrize(
+    ("without", "words"),
+    [
+        ("joint.noise", ["'joint.noise'", "does not list it", "joint.drift"]),
+        ("contact.quasistatic", ["'contact.quasistatic'", "nothing closes the hand"]),
+        ("no.such", ["'no.such'", "does not list it"]),
+    ],
+)
+def test_what_cannot_be_left_out_is_refused_with_the_reason(
+    make_scene: SceneMaker, without: str, words: list[str]
+) -> None:
+    with pytest.raises(SceneError) as caught:
+        compile_pipeline(make_scene(["contact.quasistatic", "joint.drift"]), without)
+    assert all(word in str(caught.value) for word in words)
+
+
+def test_two_contact_models_are_refused(make_scene: SceneMaker) -> None:
+    with pytest.raises(SceneError, match=r"'contact\.quasistatic' and 'contact\.mujoco' exclude each other"):
+        compile_pipeline(make_scene([*CONTACTS]))
+
+
+def test_after_puts_an_effect_behind_one_that_follows_it_in_the_registry(make_scene: SceneMaker) -> None:
+    plain = make_scene(["joint.noise", "joint.drift"])
+    turned = make_scene([listed_with("joint.noise", after=("joint.drift",)), "joint.drift"])
+    assert [name for name in order(plain) if name.startswith("joint.")] == ["joint.noise", "joint.drift"]
+    assert [name for name in order(turned) if name.startswith("joint.")] == ["joint.drift", "joint.noise"]
+    # What the scene said of an effect that is left out is not said any more.
+    assert "joint.drift" not in order(turned, without="joint.drift")
+
+
+def test_after_an_effect_of_an_earlier_stage_changes_nothing(make_scene: SceneMaker) -> None:
+    said = make_scene(["hand.grip", listed_with("joint.noise", after=("hand.grip",))])
+    assert order(said) == order(make_scene(["hand.grip", "joint.noise"]))
+
+
+@pytest.mark.parametrize(
+    ("effects", "words"),
+    [
+        (
+            [("hand.grip", ("joint.noise",)), ("joint.noise", ())],
+            ["effects.hand.grip.after", "hand.grip -> joint.noise -> hand.grip", "'sense'", "'posture'"],
+        ),
+        (
+            [("joint.noise", ("joint.drift",)), ("joint.drift", ("joint.noise",))],
+            ["circle", "joint.noise", "joint.drift", "->"],
+        ),
+        ([("joint.noise", ("joint.noise",))], ["circle", "joint.noise -> joint.noise"]),
+        (
+            [("switch.stuck_open", ("switch.stuck_closed",)), ("switch.stuck_closed", ())],
+            ["circle", "switch.stuck_open", "switch.stuck_closed"],
+        ),
+        (
+            [("switch.threshold", ("contact.ramp",)), ("contact.ramp", ())],
+            ["circle", "switch.threshold", "glove.close", "contact.ramp"],
+        ),
+        ([("joint.noise", ("joint.drift",))], ["effects.joint.noise.after", "no effect 'joint.drift'", "leave it out"]),
+        (
+            [("joint.noise", ("joint.drfit",)), ("joint.drift", ())],
+            ["effects.joint.noise.after", "'joint.drfit'", "did you mean 'joint.drift'"],
+        ),
+        ([("joint.noise", ("glove.sense",))], ["no effect 'glove.sense'"]),
+    ],
+)
+def test_an_after_that_cannot_be_is_refused_with_its_place_and_its_circle(
+    make_scene: SceneMaker, effects: list[tuple[str, tuple[str, ...]]], words: list[str]
+) -> None:
+    with pytest.raises(SceneError) as caught:
+        compile_pipeline(make_scene([listed_with(name, after=after) for name, after in effects]))
+    for word in words:
+        assert word in str(caught.value)
+
+
+def outcome(batch: Batch, row: int) -> dict[str, bytes]:
+    names = ["posture_deg", "pose", "grip_n", "forces_n", "settled", "residual_n", "on_us", "off_us", "frame_us"]
+    found = {name: np.asarray(getattr(batch, name)[row]).tobytes() for name in [*names, "bits", "sensors_deg", "raw"]}
+    return found | ({} if batch.lost is None else {"lost": batch.lost[row].tobytes()})
+
+
+@settings(max_examples=4, deadline=None)
+@given(company=st.lists(st.integers(0, 50), min_size=2, max_size=5, unique=True))
+@pytest.mark.parametrize(
+    "contact", [listed_with("contact.quasistatic", most_steps=12), listed_with("contact.mujoco", steps=20)]
+)
+def test_a_repetition_comes_out_the_same_in_any_batch_and_beside_any_other(
+    make_scene: SceneMaker,
+    make_batch: BatchMaker,
+    make_condition: Callable[..., Condition],
+    contact: tuple,
+    company: list[int],
+) -> None:
+    pipeline = compile_pipeline(make_scene([contact, *light()]))
+    row = len(company) // 2
+    alone, together = make_batch([company[row]]), make_batch(company)
+    beside = make_batch(company[1:], make_condition(grasp="Tip", grip_n=4.0))
+    pipeline.run([alone], Ledger())
+    pipeline.run([beside, together], Ledger())
+    assert outcome(alone, 0) == outcome(together, row)
+
+
+def test_a_run_enters_every_step_with_its_batches(make_scene: SceneMaker, make_batch: BatchMaker) -> None:
+    pipeline, ledger = compile_pipeline(make_scene(["hand.grip", "joint.noise"])), Ledger()
+    pipeline.run([make_batch(range(3)), make_batch(range(2))], ledger)
+    pipeline.run([make_batch(range(4))], ledger)
+    assert list(ledger.entries) == [stop.effect.name for stop in pipeline.stops]
+    for entry in ledger.entries.values():
+        assert (entry.calls, entry.grasps) == (3, 9)
+        assert entry.nanoseconds > 0
+    assert ledger.entries["hand.grip"].draws == 9
+    assert ledger.entries["joint.noise"].draws == 9 * 2 * 18
+    assert ledger.entries["contact.quasistatic"].counters["solver steps"] >= 9
