@@ -1,5 +1,6 @@
 """`thenar compile`: recordings in, a build folder out."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -7,16 +8,18 @@ import click
 
 from thenar.drivers.i2c.chips import CHIPS
 
-from .common import any_path, existing_file, json_flag, out, output_file, print_json, progress, warning
-from .compile_asked import TABLE_BITS, Asked
+from .common import any_path, existing_file, json_flag, keep_apart, out, output_file, print_json, progress, warning
 from .methods import WithMethods
 from .scan_tables import print_scan
+from .trainer_options import asked_settings, trainer_options
 
 if TYPE_CHECKING:
-    from thenar.compiler.artifact.compile import BuildReport
+    from thenar.compiler.artifact.documents import BuildReport
     from thenar.runtime.manifest import Manifest
 
 _BOARD = "board"
+# What a point of a frontier says.
+_SETTLED = ("prune", "rounds", "inputs", "table_bits", "max_bins", "placement", "keep", "width")
 
 
 @click.command("compile", cls=WithMethods)
@@ -25,7 +28,6 @@ _BOARD = "board"
 @click.option(
     "--prune", type=click.IntRange(0), default=0, show_default=True, help="ID3 splits no fewer rows than this."
 )
-@click.option("--rounds", type=click.IntRange(1), default=100, show_default=True, help="Rounds of LogitBoost.")
 @click.option(
     "--inputs",
     type=click.Choice(["both", "switches", "joints"]),
@@ -33,19 +35,16 @@ _BOARD = "board"
     show_default=True,
     help="What to use.",
 )
-@click.option("--shrinkage", type=float, default=1.0, show_default=True, help="Share of each round that is kept.")
-@click.option("--tolerance", type=float, help="Stop after a round that changes the mean loss by less than this.")
+@trainer_options
 @click.option("--folds", type=int, default=4, show_default=True, help="Folds of the rate in build.json; 0 for none.")
 @click.option("--seed", type=int, default=1, show_default=True, help="Seed of the folds.")
 @click.option(
     "--table-bits",
-    type=click.Choice(list(TABLE_BITS)),
+    type=click.Choice(["16", "8"]),
+    callback=lambda _context, _parameter, bits: int(bits),
     default="16",
     show_default=True,
     help="8: coarser steps, so that firmware can store a byte an entry.",
-)
-@click.option(
-    "--max-bins", type=click.IntRange(2), help="At most so many bins a joint: smaller tables.  [default: no limit]"
 )
 @click.option("--placement", default="id3", show_default=True, help="How switches are chosen: see below.")
 @click.option("--keep", type=click.IntRange(1), help="How many switches, for placements that take a number.")
@@ -64,7 +63,22 @@ _BOARD = "board"
 @click.option("--overwrite", is_flag=True, help="Let --propose replace a file that is there.")
 @json_flag
 @click.pass_context
-def command(context: click.Context, /, **options: Any) -> None:
+def command(
+    context: click.Context,
+    /,
+    recordings: Path,
+    output: Path,
+    from_frontier: Path | None,
+    point: int | None,
+    report: bool,
+    hand_length: float | None,
+    glove: Path | None,
+    propose: Path | None,
+    chip: str | None,
+    overwrite: bool,
+    as_json: bool,
+    **asked: Any,
+) -> None:
     """Choose the switches, train, and write integer tables with their proof.
 
     The folder holds build.json, tables.bin and ensemble.bin, the classifier in C in firmware/, and with --glove
@@ -77,33 +91,8 @@ def command(context: click.Context, /, **options: Any) -> None:
         thenar compile set.grasps -o build/ --glove glove.toml
         thenar compile set.grasps -o build/ --from frontier/frontier.json --point 7
     """
-    asked = Asked(**options)
-    asked.check(context)
-    made = _made(asked)
-    if made.only_answer is not None:
-        warning(
-            f"the build recognises every row as {made.only_answer}: no input tells grasp types apart by "
-            "itself, and stumps look at one at a time"
-        )
-    if asked.propose is not None:
-        _propose(made.manifest, asked.propose, asked.chip or next(iter(CHIPS)))
-    if asked.as_json:
-        print_json(made.manifest)
-        return
-    _print(made, asked.output)
-    if made.harness is not None and made.scan is not None:
-        print_scan(made.scan, made.harness)
-    if asked.propose is not None:
-        out().print(
-            f"{asked.propose}: a harness for the kept switches; wire the glove so, then compile with "
-            f"--glove {asked.propose}"
-        )
-
-
-def _made(asked: Asked) -> "BuildReport":
     from thenar.compiler.artifact.compile import compile_build
-    from thenar.compiler.artifact.documents import BuildDocuments
-    from thenar.compiler.artifact.made import no_documents
+    from thenar.compiler.artifact.documents import Documents
     from thenar.compiler.placement.ports import ports_of_whole_glove
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.harness.loading import load_harness
@@ -111,27 +100,77 @@ def _made(asked: Asked) -> "BuildReport":
     from .from_frontier import picked
     from .hand import hand_shape
 
-    given = None if asked.glove is None else load_harness(asked.glove)
-    grasp_set = GraspSet.load(asked.recordings)
-    asked.check_hand(grasp_set.switch_names)
-    chosen = None if asked.from_frontier is None else picked(asked.from_frontier, asked.point, grasp_set)
-    with progress("compiling, then the paper's tables" if asked.report and asked.folds else "compiling") as told:
-        documents = BuildDocuments(
-            hand_shape(),
-            asked.hand_length,
-            None if chosen is None else chosen.frontier,
-            None if chosen is None else chosen.point.number,
-            told,
+    _check_proposal(propose, chip, glove, overwrite=overwrite)
+    _check_point(context, from_frontier, point)
+    if hand_length is not None and not report:
+        raise click.UsageError("--hand-length is of the hand in spec/, which --no-report leaves out: give one of them.")
+    keep_apart(recordings, glove, propose, from_frontier)
+    options = asked_settings(context, asked) | asked
+    given = None if glove is None else load_harness(glove)
+    grasp_set = GraspSet.load(recordings)
+    hand = hand_shape() if report else None
+    if hand is not None and hand_length is not None and hand.fitted(grasp_set.switch_names) is None:
+        raise click.UsageError(
+            "--hand-length: the switches of these recordings are not those of murakami160, and where they lie is not "
+            "known."
         )
-        return compile_build(
+    chosen = None if from_frontier is None else picked(from_frontier, point, grasp_set)
+    documents = Documents(hand, hand_length) if report else None
+    if chosen is not None:
+        options |= chosen.options
+        documents = documents and replace(documents, frontier=chosen.frontier, point=chosen.point.number)
+    with progress("compiling, then the paper's tables" if report and asked["folds"] else "compiling") as told:
+        made = compile_build(
             grasp_set,
-            asked.output,
-            **(asked.training if chosen is None else asked.training | chosen.options),
+            output,
             harness=given if chosen is None else chosen.wired(given),
             ports=ports_of_whole_glove(given, grasp_set.switch_names),
-            documents=documents if asked.report else no_documents,
+            documents=documents,
             progress=told,
+            **options,
         )
+    if made.only_answer is not None:
+        warning(
+            f"the build recognises every row as {made.only_answer}: no input tells grasp types apart by "
+            "itself, and stumps look at one at a time"
+        )
+    if propose is not None:
+        _propose(made.manifest, propose, chip or next(iter(CHIPS)))
+    if as_json:
+        print_json(made.manifest)
+        return
+    _print(made, output)
+    if made.harness is not None and made.scan is not None:
+        print_scan(made.scan, made.harness)
+    if propose is not None:
+        out().print(
+            f"{propose}: a harness for the kept switches; wire the glove so, then compile with --glove {propose}"
+        )
+
+
+def _check_proposal(propose: Path | None, chip: str | None, glove: Path | None, *, overwrite: bool) -> None:
+    """Raise UsageError for what does not go with --propose: before the training, not after it."""
+    if propose is None:
+        if chip is not None or overwrite:
+            raise click.UsageError("--chip and --overwrite say how to --propose a harness: name the file to write.")
+        return
+    if glove is not None:
+        raise click.UsageError("--glove reads a wiring, --propose writes a new one: give one of them.")
+    if propose.exists() and not overwrite:
+        raise click.UsageError(f"{propose} is there already: name another file, or add --overwrite.")
+
+
+def _check_point(context: click.Context, from_frontier: Path | None, point: int | None) -> None:
+    """Raise UsageError for what does not go with --from."""
+    if from_frontier is None:
+        if point is not None:
+            raise click.UsageError("--point is one of a frontier: name its file with --from.")
+        return
+    for name in _SETTLED:
+        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
+            raise click.UsageError(
+                f"--{name.replace('_', '-')} is settled by the point that --from names: leave it out."
+            )
 
 
 def _propose(manifest: "Manifest", path: Path, chip: str) -> None:

@@ -7,6 +7,7 @@ import click
 
 from .common import existing_file, json_flag, keep_apart, output_file, print_json, progress, warning
 from .methods import WithMethods, method_names
+from .trainer_options import asked_settings, trainer_options
 
 if TYPE_CHECKING:
     from thenar.compiler.evaluation.study import Study
@@ -55,7 +56,7 @@ _FOLDER = click.Path(file_okay=False, path_type=Path)
     help="Leave out a subject, an object, or a range of trials (as many as folds) at a time, instead of random rows.",
 )
 @click.option("--repeats", type=_COUNT, default=3, show_default=True, help="Repeats of random folds, other seeds each.")
-@click.option("--rounds", type=_COUNT, default=100, show_default=True, help="Rounds of boosting.")
+@trainer_options
 @click.option("--prune", type=click.IntRange(min=0), default=0, show_default=True, help="S: smallest node ID3 splits.")
 @click.option(
     "--prune-list",
@@ -90,7 +91,10 @@ _FOLDER = click.Path(file_okay=False, path_type=Path)
 @click.option("--plot", "folder", type=_FOLDER, metavar="FOLDER", help="Draw the confusion matrices there.")
 @click.option("-o", "--output", type=output_file, metavar="FILE", help="Write the whole result there, as JSON.")
 @json_flag
+@click.pass_context
 def command(
+    context: click.Context,
+    /,
     grasps: Path,
     jobs: int | None,
     confusion: bool,
@@ -115,7 +119,9 @@ def command(
     from thenar.compiler.evaluation.study import Options, evaluate
     from thenar.compiler.recordings.graspset import GraspSet
 
-    options = msgspec.convert(asked, Options)
+    training = asked_settings(context, asked)
+    named = {name: training.pop(name) for name in ("trainer", "rounds") if name in training}
+    options = msgspec.convert(asked | named | {"settings": training}, Options)
     if (confusion or folder is not None) and "compositions" not in options.tables:
         raise click.UsageError("--confusion and --plot show the compositions: name them among --tables")
     keep_apart(grasps, output)

@@ -4,9 +4,8 @@ from rich.console import Console
 from rich.table import Table as Grid
 from rich.text import Text
 
-from thenar.compiler.evaluation.protocols import PROTOCOLS
-from thenar.compiler.evaluation.study import Study
-from thenar.compiler.evaluation.tables import Cell, Spread, Table
+from thenar.compiler.evaluation.populations import PROTOCOLS
+from thenar.compiler.evaluation.study import Cell, Spread, Study, Table
 from thenar.compiler.text import interval
 
 from .common import out

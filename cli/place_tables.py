@@ -58,16 +58,7 @@ def _of_tree(placement: "Placement", tree: "Tree") -> Iterator[str]:
         yield "all rows are of one grasp type: there is nothing to tell apart"
     elif placement.rows < tree.min_samples:
         yield f"no decision was made: the {placement.rows} rows are fewer than S = {tree.min_samples}"
-    if tree.n_zero_gain:
-        yield (
-            f"at {tree.n_zero_gain} of the decisions no switch gains anything alone: "
-            "the lowest-numbered one that varies was taken"
-        )
-    if tree.n_undecided:
-        yield (
-            f"at {tree.n_undecided} of the leaves rows of several grasp types agree in every switch: "
-            "no switch tells them apart"
-        )
+    yield from tree.remarks("switch")
 
 
 def _of_exact(exact: "Exactly", m: int) -> Iterator[str]:

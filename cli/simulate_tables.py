@@ -14,7 +14,7 @@ from thenar.simulator.running.report import GraspReport, Report, StepReport
 from .common import err, out, warning
 
 if TYPE_CHECKING:  # simulating needs no compiler; ablation does
-    from .ablation import Ablation, Change, Recognised, Variant
+    from thenar.compiler.evaluation.ablation import Ablation, Change, Recognised, Variant
 
 _SHOWN = 10  # unsettled repetitions that are named one by one
 _OWN = "dim"  # how own steps look

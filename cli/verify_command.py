@@ -11,8 +11,9 @@ from .verify_firmware import Kinds, print_firmware, verdict
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from thenar.compiler.artifact.verify import Verification, WorstCase
+    from thenar.compiler.artifact.verify import Verification
     from thenar.compiler.artifact.verify_firmware import Kind
+    from thenar.compiler.tables.compare import WorstCase
 
 _SHOWN = 20
 
@@ -45,17 +46,12 @@ def command(build: Path, recordings: Path, firmware: "tuple[Kind, ...]", as_json
         thenar verify build/ set.grasps
         thenar verify build/ set.grasps --firmware host,avr,cortex-m
     """
-    from thenar.compiler.artifact.verify import verify_build
+    from thenar.compiler.artifact.verify import verify
     from thenar.compiler.recordings.graspset import GraspSet
 
     grasp_set = GraspSet.load(recordings)
-    with progress("verifying") as report:
-        found = verify_build(build, grasp_set, report)
-    if firmware:
-        from thenar.compiler.artifact.verify_firmware import verify_firmware
-
-        with progress("compiling and running firmware") as report:
-            found = found.with_firmware(verify_firmware(build, grasp_set, firmware, report))
+    with progress("verifying, compiling and running firmware" if firmware else "verifying") as report:
+        found = verify(build, grasp_set, firmware, report)
     if as_json:
         print_json(found)
     else:

@@ -7,8 +7,7 @@ import click
 from .common import out
 
 if TYPE_CHECKING:
-    from thenar.compiler.artifact.firmware_trial import Difference, TargetCheck
-    from thenar.compiler.artifact.verify_firmware import FirmwareVerification
+    from thenar.compiler.artifact.verify_firmware import Difference, FirmwareVerification, TargetCheck
 
 # Spelled out so that --help imports nothing.
 KINDS = ("host", "avr", "cortex-m")

@@ -82,6 +82,15 @@ class Samples:
         """Return some of the rows, by number or by mask (n,)."""
         return Samples(self.switches[chosen], self.codes[chosen], self.labels[chosen], self.grasps)
 
+    def keeping(self, columns: Columns) -> "Samples":
+        """Return the same rows with the switches `columns` alone, in their order, and all joints."""
+        return Samples(self.switches[:, list(columns)], self.codes, self.labels, self.grasps)
+
+    @property
+    def inputs(self) -> NDArray[np.uint16]:
+        """The inputs as one matrix (n, s + j): the switches' bits, then the joints' codes."""
+        return np.hstack([self.switches, self.codes], dtype=np.uint16)
+
     def kept(self, columns: Columns) -> NDArray[np.uint16]:
         """Return what is trained on, (n, kept + j): the switches `columns` in their order, then the joints' codes."""
-        return np.hstack([self.switches[:, list(columns)].astype(np.uint16), self.codes])
+        return self.keeping(columns).inputs

@@ -4,6 +4,7 @@ import hashlib
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -63,7 +64,7 @@ class Build:
         self.scorer = Scorer(tables)
 
     @classmethod
-    def load(cls, folder: str | PathLike[str]) -> "Build":
+    def load(cls, folder: str | PathLike[str]) -> Self:
         """Return the build in `folder`.
 
         Raises BuildError or SealError, naming the file, if one is missing, damaged, truncated, oversized, from another

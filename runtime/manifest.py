@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from typing import Annotated, Literal, TypeVar
 
 import msgspec
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, field
 from msgspec.structs import replace
 
 from .errors import BuildError
@@ -30,6 +30,12 @@ _T = TypeVar("_T")
 Name = Annotated[str, Meta(min_length=1)]
 
 
+def _written(default: _T) -> _T:
+    """Return a field that has a default and is written all the same."""
+    made: _T = field(default_factory=lambda: default)
+    return made
+
+
 class Source(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """The recordings: SHA-256 of their content, number of rows, taxonomy, number of switches to choose from; and what
     simulated them, which recordings leave out.
@@ -43,25 +49,43 @@ class Source(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
 
 
 class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Every option of `thenar compile`; left out are tolerance, max_bins and keep where there is none, and table_bits,
-    placement and width where they are 16, "id3" and 16.
+    """Every option of `thenar compile`, with its default; of those from `tolerance` on, defaults are left out.
 
-    placement is the method that chooses the switches, keep how many, where it is not pruned by S; no sum of the tables
-    needs more than `width` bits.
+    Parameters
+    ----------
+    prune : int
+        The paper's S: ID3 splits no fewer rows.
+    rounds, shrinkage, tolerance, max_bins : int, float, float or None, int or None
+        Settings of LogitBoost: how many rounds, the share of each that is kept, the change of the mean loss below
+        which a round is the last, and the most bins of a joint.
+    inputs : {"both", "switches", "joints"}
+        Which of the recordings' inputs are used.
+    folds, seed : int
+        Of the cross-validation whose rate goes into the build; 0 folds: none.
+    table_bits : {16, 8}
+        With 8, steps are coarse enough for firmware with 8-bit entries.
+    placement, keep : str, int or None
+        The method that chooses the switches, and how many it keeps, where it is not pruned by S.
+    width : int
+        No sum of the tables needs more bits, 4 to 16.
+    trainer, settings : str, dict
+        What makes the model, and the settings that only it takes, by name.
     """
 
-    prune: Count
-    rounds: Annotated[int, Meta(ge=1, le=2**53)]
-    inputs: Inputs
-    shrinkage: Annotated[float, Meta(gt=0.0, le=1.0)]
-    folds: Count
-    seed: int
+    prune: Count = _written(0)
+    rounds: Annotated[int, Meta(ge=1, le=2**53)] = _written(100)
+    inputs: Inputs = _written("both")
+    shrinkage: Annotated[float, Meta(gt=0.0, le=1.0)] = _written(1.0)
+    folds: Count = _written(4)
+    seed: int = _written(1)
     tolerance: Annotated[float, Meta(ge=0.0)] | None = None
     table_bits: TableBits = 16
     max_bins: Annotated[int, Meta(ge=2, le=2**53)] | None = None
     placement: Name = "id3"
     keep: Annotated[int, Meta(ge=1, le=2**53)] | None = None
     width: Annotated[int, Meta(ge=4, le=16)] = 16
+    trainer: Name = "logitboost"
+    settings: dict[Name, Value] = {}
 
 
 class Switch(Struct, frozen=True, forbid_unknown_fields=True):
@@ -183,13 +207,15 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
         yield from _wrong_names(kind, names)
     source = manifest.source
     yield from _wrong_names("units", (joint.unit for joint in manifest.joints))
-    yield from _wrong_names("texts", (manifest.thenar, source.taxonomy, manifest.options.placement))
+    options = manifest.options
+    texts = (manifest.thenar, source.taxonomy, options.placement, options.trainer, *options.settings)
+    yield from _wrong_names("texts", texts)
     yield from _wrong_names("texts", filter(None, [source.simulated]), 2 * LONGEST_NAME)
     yield from _wrong_columns(manifest)
     for joint in manifest.joints:
         if joint.code_a == joint.code_b or joint.value_a == joint.value_b:
             yield "gives a joint two points that make no line"
-    proof, options = manifest.proof, manifest.options
+    proof = manifest.proof
     if proof.width != options.width or max(proof.covered, proof.changed) > manifest.source.rows:
         yield "proves something of other tables than it describes"
     if any(rate.correct > rate.total for rate in manifest.rates) or manifest.stopped_after > options.rounds:

@@ -1,159 +1,266 @@
 """`compile_build`: recordings in, a build folder out."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import hashlib
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import version
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
+from msgspec.structs import replace
 
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME
 from thenar.runtime.harness.wiring import Harness
-from thenar.runtime.manifest import Inputs, Manifest, Options, TableBits, manifest_from_bytes, manifest_to_bytes
+from thenar.runtime.manifest import (
+    SCHEMA,
+    Calibration,
+    Manifest,
+    Options,
+    Proof,
+    Recognised,
+    Source,
+    Switch,
+    TableBits,
+    manifest_from_bytes,
+    manifest_to_bytes,
+)
 from thenar.runtime.scanning.plan import plan_scan
-from thenar.runtime.scanning.scanmap import ScanMap, scanmap_to_bytes
+from thenar.runtime.scanning.scanmap import scanmap_to_bytes
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from ..evaluation.folds import check_cut
 from ..placement.ports import PortCosts, ports_of_whole_glove
-from ..recordings.graspset import GraspSet
-from ..samples import Samples
+from ..recordings.graspset import GraspSet, Joint
+from ..samples import Columns, Samples
 from ..tables.collapse import collapse
 from ..tables.compare import Comparison, compare
 from ..tables.quantise import quantise
-from .carried import made_firmware
-from .describing import describe
+from ..trainers.base import Training, changed
+from .documents import BuildReport, Documents, Progress
 from .ensemble import ensemble_to_bytes
 from .errors import CompileError
-from .made import Documents, Made, no_documents
-from .recognition import cross_validated
 from .staging import check_target, publish
-from .training import Trained, check_placement, material_of, train
+from .training import Tested, Trained, check_placement, cross_validated, samples_of, train
+from .verify_firmware import made_firmware
 
 # A wiring, or what makes one for the names of the kept switches.
 Wired = Harness | Callable[[Sequence[str]], Harness]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class BuildReport:
-    """Where the build is, what its `build.json` says of it, how to read the harness it was compiled for, if it was for
-    one, and the one grasp type that it gives all rows, if it does: then the inputs tell nothing that stumps, which add
-    up, can tell. `firmware` is a sentence: what its firmware is laid out for, or why there is none. `harness` is the
-    wiring that `scan` reads.
-    """
-
-    folder: Path
-    manifest: Manifest
-    tables_bytes: int
-    only_answer: str | None
-    firmware: str
-    scan: ScanMap | None = None
-    harness: Harness | None = None
-
-
 def compile_build(
     grasp_set: GraspSet,
     folder: str | Path,
+    options: Options | None = None,
     *,
-    prune: int = 0,
-    rounds: int = 100,
-    inputs: Inputs = "both",
-    shrinkage: float = 1.0,
-    tolerance: float | None = None,
-    folds: int = 4,
-    seed: int = 1,
-    table_bits: TableBits = 16,
-    max_bins: int | None = None,
-    placement: str = "id3",
-    keep: int | None = None,
-    width: int = 16,
     harness: Wired | None = None,
     ports: PortCosts | None = None,
-    documents: Documents = no_documents,
-    progress: Callable[[int, int], None] | None = None,
+    documents: Documents | None = None,
+    progress: Progress | None = None,
+    **changes: Any,
 ) -> BuildReport:
     """Choose the placement, train, collapse, quantise, prove, and write the build `folder`, whole or not at all.
 
-    prune is the paper's S, inputs which of switches and joints to use; a round that changes the mean loss by less than
-    tolerance is the last; folds and seed cut the cross-validation whose rate goes into the build (0 folds: none).
-    With table_bits 8, steps are coarse enough for firmware with 8-bit entries (quantise); with max_bins, no joint has
-    more bins than that, so that tables stay small; no sum needs more than `width` bits, 4 to 16. `placement` is a
-    name of METHODS, `keep` how many switches it keeps, where it is not pruned by S.
-    `ports` say what reading each switch costs, for methods that ask (None: on a glove of as few MCP23017 as will do).
-    With a harness, the build says how to read its switches there; `documents` go into the folder with it.
-    progress(done, total) is called as work is done. The same recordings, options and harness give the same bytes.
-    Raises CompileError, HarnessError if the harness lacks a kept switch, or what placement and boosting raise of their
-    options.
+    The same recordings, options and harness give the same bytes.
+
+    Parameters
+    ----------
+    grasp_set : GraspSet
+        The recordings.
+    folder : path
+        The folder to write: new, empty, or a build, which is replaced.
+    options : Options, optional
+        How to choose, train and quantise.
+    harness : Harness or callable, optional
+        A wiring, or what makes one for the names of the kept switches: the build says how to read its switches there.
+    ports : PortCosts, optional
+        What reading each switch costs, for methods that ask; None: on a glove of as few MCP23017 as will do.
+    documents : Documents, optional
+        A report and the spec of the glove, to go into the folder.
+    progress : callable, optional
+        Called with (done, total) as work is done.
+    **changes
+        Single options, such as `prune=13` or `rounds=50`, instead of those in `options`, and settings of the trainer.
+
+    Returns
+    -------
+    BuildReport
+        Where the build is, and what is known of it.
+
+    Raises
+    ------
+    CompileError
+        If the recordings, the options or the folder do not allow a build.
+    HarnessError
+        If the harness lacks a kept switch.
+
+    Notes
+    -----
+    A placement, boosting or a trainer may raise an error of its own, a ThenarError, over its options.
+
+    Examples
+    --------
+    >>> from thenar.compiler import GraspSet, compile_build
+    >>> report = compile_build(GraspSet.load("set.grasps"), "build", rounds=10, folds=0)
+    >>> report.manifest.options.rounds
+    10
     """
     target = check_target(Path(folder))
-    least = None if tolerance is None else float(tolerance)
-    options = Options(
-        prune, rounds, inputs, float(shrinkage), folds, seed, least, table_bits, max_bins, placement, keep, width
-    )
-    _check(options)
-    samples = material_of(grasp_set, options)
-    if folds:
-        check_cut(len(grasp_set), folds, "rows")
-    steps = _Steps(progress, rounds, folds)
+    asked = _sound(changed(options or Options(), changes))
+    samples = samples_of(grasp_set, asked)
+    if asked.folds:
+        check_cut(len(grasp_set), asked.folds, "rows")
+    steps = _Steps(progress, asked.folds)
     ports = ports or ports_of_whole_glove(None, grasp_set.switch_names)
-    trained = train(samples, options, steps.round_done, ports)
-    bits = trained.kept(samples)
-    integers = quantise(collapse(trained.stumps, len(trained.columns)), bits, samples.codes, width, table_bits)
-    names = [grasp_set.switch_names[column] for column in trained.columns]
-    wired = harness(names) if callable(harness) else harness
-    scan = None if wired is None else plan_scan(names, integers, wired, bits, samples.codes)
-    files = _files(integers, trained, scan)
-    comparison = compare(trained.stumps, integers, bits, samples.codes)
-    tested = cross_validated(samples, options, steps.fold_done, ports) if folds else None
-    described = manifest_to_bytes(describe(grasp_set, options, samples, trained, integers, comparison, tested, files))
-    manifest = manifest_from_bytes(described)
-    firmware, note = made_firmware(manifest, integers)
-    made = Made(
-        grasp_set=grasp_set,
-        manifest=manifest,
-        trained=trained,
-        tables=integers,
-        tables_bytes=len(files[TABLES_NAME]),
-        comparison=comparison,
-        confusion=None if tested is None else tested.confusion,
-        harness=wired,
-        scan=scan,
-        firmware=note,
-        only_answer=_only_answer(comparison, samples),
-    )
-    written = {path: text.encode() for path, text in firmware.items()}
-    publish({**files, **written, **documents(made), MANIFEST_NAME: described}, target)
-    return BuildReport(target, manifest, made.tables_bytes, made.only_answer, note, scan, wired)
+    trained = train(samples, asked, steps.trained, ports)
+    joints = tuple(range(samples.codes.shape[1]))
+    made = Making(grasp_set, samples, joints, asked, trained, harness)
+    tested = cross_validated(samples, asked, steps.tested, ports) if asked.folds else None
+    return made.publish(target, tested, documents, progress)
 
 
-def _check(options: Options) -> None:
+def _sound(options: Options) -> Options:
+    """Return the options as they are written, whoever spells them. Raises CompileError for what makes no sense."""
     if options.table_bits not in get_args(TableBits):
         raise CompileError(f"tables of {options.table_bits} bits: firmware has entries of 8 or 16")
     if not 4 <= options.width <= 16:
         raise CompileError(f"sums of {options.width} bits: tables have 4 to 16")
     check_placement(options)
-
-
-def _files(integers: IntegerTables, trained: Trained, scan: ScanMap | None) -> dict[str, bytes]:
-    """Return name -> content of what `build.json` holds digests of."""
-    files = {TABLES_NAME: tables_to_bytes(integers), ENSEMBLE_NAME: ensemble_to_bytes(trained.stumps)}
-    return files if scan is None else {**files, SCAN_NAME: scanmap_to_bytes(scan)}
-
-
-def _only_answer(comparison: Comparison, samples: Samples) -> str | None:
-    answers = np.unique(comparison.deployed)
-    return samples.grasps[answers[0]] if len(answers) == 1 else None
+    values = Training.of(options).settings
+    # A name that is equal to a default is left out if it is the very same string.
+    return replace(
+        options,
+        shrinkage=float(options.shrinkage),
+        tolerance=None if options.tolerance is None else float(options.tolerance),
+        placement=sys.intern(options.placement),
+        trainer=sys.intern(options.trainer),
+        settings={
+            name: float(value)
+            for name, value in values.items()
+            if value is not None and name not in Options.__struct_fields__
+        },
+    )
 
 
 class _Steps:
-    """Work done, counted in boosting rounds: one training on all rows, one for each fold."""
+    """Work done, counted in the steps of a training: one training on all rows, one for each fold."""
 
-    def __init__(self, report: Callable[[int, int], None] | None, rounds: int, folds: int) -> None:
-        self._report, self._rounds, self._folds = report, rounds, folds
+    def __init__(self, report: Progress | None, folds: int) -> None:
+        self._report, self._folds, self._steps = report, folds, 1
 
-    def round_done(self, done: int, _rounds: int) -> None:
+    def trained(self, done: int, steps: int) -> None:
+        self._steps = steps
         if self._report is not None:
-            self._report(done, self._rounds * (1 + self._folds))
+            self._report(done, steps * (1 + self._folds))
 
-    def fold_done(self, done: int, _folds: int) -> None:
-        self.round_done(self._rounds * (1 + done), self._rounds)
+    def tested(self, done: int, _folds: int) -> None:
+        self.trained(self._steps * (1 + done), self._steps)
+
+
+class Making:
+    """A build in the making: integers of what was trained, held against it, and how to read its switches.
+
+    `samples` have all switches, and the codes of `joints`, columns of the recordings.
+    """
+
+    def __init__(
+        self,
+        grasp_set: GraspSet,
+        samples: Samples,
+        joints: Columns,
+        options: Options,
+        trained: Trained,
+        harness: Wired | None,
+    ) -> None:
+        self.grasp_set, self.samples, self.joints = grasp_set, samples, joints
+        self.options, self.trained = options, trained
+        kept = samples.keeping(trained.columns)
+        tables = collapse(trained.model, kept.n_switches)
+        self.integers = quantise(tables, kept.switches, kept.codes, options.width, options.table_bits)
+        names = [grasp_set.switch_names[column] for column in trained.columns]
+        self.harness = harness(names) if callable(harness) else harness
+        self.scan = None
+        if self.harness is not None:
+            self.scan = plan_scan(names, self.integers, self.harness, kept.switches, kept.codes)
+        self.comparison = compare(trained.model, self.integers, kept.switches, kept.codes)
+
+    def publish(
+        self, target: Path, tested: Tested | None, documents: Documents | None, progress: Progress | None
+    ) -> BuildReport:
+        """Write the build as `target`, with the `documents` that are asked for."""
+        files = {TABLES_NAME: tables_to_bytes(self.integers), ENSEMBLE_NAME: ensemble_to_bytes(self.trained.model)}
+        if self.scan is not None:
+            files[SCAN_NAME] = scanmap_to_bytes(self.scan)
+        described = manifest_to_bytes(self._manifest(tested, files))
+        manifest = manifest_from_bytes(described)
+        firmware, note = made_firmware(manifest, self.integers)
+        report = BuildReport(
+            folder=target,
+            manifest=manifest,
+            tables=self.integers,
+            tables_bytes=len(files[TABLES_NAME]),
+            only_answer=self._only_answer(),
+            firmware=note,
+            scan=self.scan,
+            harness=self.harness,
+            grasp_set=self.grasp_set,
+            trained=self.trained,
+            comparison=self.comparison,
+            confusion=None if tested is None else tested.confusion,
+        )
+        files |= {path: text.encode() for path, text in firmware.items()}
+        if documents is not None:
+            files |= documents.files(report, progress)
+        publish(files | {MANIFEST_NAME: described}, target)
+        return report
+
+    def _only_answer(self) -> str | None:
+        answers = np.unique(self.comparison.deployed)
+        return self.samples.grasps[answers[0]] if len(answers) == 1 else None
+
+    def _manifest(self, tested: Tested | None, files: Mapping[str, bytes]) -> Manifest:
+        """Return what `build.json` says, not sealed yet; `files` are name -> content of what lies beside it."""
+        digests = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
+        grasp_set, options = self.grasp_set, self.options
+        correct = int(np.count_nonzero(self.comparison.deployed == self.samples.labels))
+        rates = [Recognised("training", 0, options.seed, correct, len(self.samples.labels))]
+        switches = zip(self.trained.columns, self.trained.gains, strict=True)
+        return Manifest(
+            schema=SCHEMA,
+            checksum="",
+            thenar=version("thenar"),
+            tables_sha256=digests[TABLES_NAME],
+            ensemble_sha256=digests[ENSEMBLE_NAME],
+            source=Source(
+                fingerprint=grasp_set.fingerprint(),
+                rows=len(grasp_set),
+                taxonomy=grasp_set.taxonomy.name,
+                switches=len(grasp_set.switch_names),
+                simulated=grasp_set.simulated,
+            ),
+            options=options,
+            grasps=self.samples.grasps,
+            switches=tuple(Switch(column, grasp_set.switch_names[column], gain) for column, gain in switches),
+            joints=tuple(_calibration(column, grasp_set.joints[column]) for column in self.joints),
+            proof=_proof(self.integers, self.comparison, options.width),
+            rates=tuple(rates if tested is None else [*rates, tested.rate]),
+            stopped_after=self.trained.stopped_after,
+            zero_gain_nodes=self.trained.zero_gain_nodes,
+            scan_sha256=digests.get(SCAN_NAME),
+        )
+
+
+def _calibration(column: int, joint: Joint) -> Calibration:
+    return Calibration(column, joint.name, joint.unit, joint.code_a, joint.value_a, joint.code_b, joint.value_b)
+
+
+def _proof(integers: IntegerTables, comparison: Comparison, width: int) -> Proof:
+    return Proof(
+        width=width,
+        scale=integers.scale,
+        bound=integers.bound,
+        error=comparison.integer_bound,
+        safe_margin=comparison.safe_margin,
+        covered=int(np.count_nonzero(comparison.covered)),
+        changed=len(comparison.changed),
+    )

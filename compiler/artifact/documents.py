@@ -1,63 +1,115 @@
-"""The documents that go with a build: its report, and the spec of its glove."""
+"""What is known of a complete build, and the documents that go into its folder: its report, the spec of its glove."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from ..evaluation.errors import EvaluationError
-from ..evaluation.study import Options, Study, evaluate
-from ..frontier.points import Frontier
-from ..glove.files import spec_files
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.scanning.scanmap import ScanMap
+from thenar.runtime.tables import IntegerTables
+
+from ..evaluation.folds import EvaluationError
 from ..hand import HandShape
-from ..report.content import ReportContent
-from ..report.guarantee import guarantee_of
-from ..report.page import report_html
-from .made import REPORT_NAME, SPEC_FOLDER, Made
+from ..recordings.graspset import GraspSet
+from ..tables.compare import Comparison, worst_case
+from .training import Trained
 
+if TYPE_CHECKING:
+    from ..evaluation.study import Study
+    from ..frontier.points import Frontier
+
+REPORT_NAME, SPEC_FOLDER = "report.html", "spec"
 _SMALL = 5000  # rows times rounds
 
+Progress = Callable[[int, int], None]
 
-@dataclass(frozen=True, slots=True)
-class BuildDocuments:
-    """Makes `report.html` and, where switches are kept, `spec/`: the `documents` of `compile_build`.
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BuildReport:
+    """A build, and what is known of it.
+
+    Attributes
+    ----------
+    folder : Path
+        Where it is.
+    manifest : Manifest
+        The content of `build.json`.
+    tables : IntegerTables
+        What runs; `tables_bytes` is the size of `tables.bin`.
+    only_answer : str or None
+        The one grasp type that it gives all rows, if it does: then the inputs tell nothing that a sum over them can
+        tell.
+    firmware : str
+        A sentence: what its firmware is laid out for, or why there is none.
+    scan, harness : ScanMap, Harness or None
+        How to read the switches, and the wiring that this reads; None where it was compiled for none.
+    grasp_set, trained, comparison
+        What was trained on, what came of it, and its rows through the model, its tables and the integers.
+    confusion : ndarray of int, shape (K, K), or None
+        How often rows of each grasp type were answered by each in the folds; None without folds.
+    """
+
+    folder: Path
+    manifest: Manifest
+    tables: IntegerTables
+    tables_bytes: int
+    only_answer: str | None
+    firmware: str
+    scan: ScanMap | None
+    harness: Harness | None
+    grasp_set: GraspSet
+    trained: Trained
+    comparison: Comparison
+    confusion: NDArray[np.intp] | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Documents:
+    """`report.html` and, where switches are kept, `spec/`: to go into a build's folder.
 
     Parameters
     ----------
     hand : HandShape, optional
-        The glove laid flat. It is drawn where it has all the switches; without one, no switch has a place.
+        The glove that was recorded, laid flat: pictures show the switches on it, if it has them all.
     hand_length : float, optional
-        Length of the wearer's hand in mm, for the spec. The default is the length of `hand`.
-    frontier : Frontier, optional
-        The frontier that the report shows.
-    point : int, optional
-        Number of the frontier's point that is built.
-    progress : callable, optional
-        `progress(done, total)` is called as the paper's tables are made.
+        Of whom the reduced glove is for, mm; None: as long as `hand`.
+    frontier, point : Frontier and int, optional
+        The frontier that a point of which is built, and the point's number.
     """
 
     hand: HandShape | None = None
     hand_length: float | None = None
-    frontier: Frontier | None = None
+    frontier: "Frontier | None" = None
     point: int | None = None
-    progress: Callable[[int, int], None] | None = None
 
-    def __call__(self, made: Made) -> Mapping[str, bytes]:
+    def files(self, made: BuildReport, progress: Progress | None = None) -> Mapping[str, bytes]:
         """Return path in the build's folder -> content."""
-        files = {REPORT_NAME: self._report(made)}
-        if made.manifest.switches:
-            kept = [switch.name for switch in made.manifest.switches]
-            hand = None if self.hand is None else self.hand.fitted(kept, self.hand_length)
+        from ..glove.files import spec_files
+
+        files = {REPORT_NAME: self._report(made, progress)}
+        if names := [switch.name for switch in made.manifest.switches]:
+            hand = None if self.hand is None else self.hand.fitted(names, self.hand_length)
             spec = spec_files(made.manifest, made.scan, made.harness, hand)
             files |= {f"{SPEC_FOLDER}/{name}": content for name, content in spec.items()}
         return files
 
-    def _report(self, made: Made) -> bytes:
-        study, no_study = self._study(made)
+    def _report(self, made: BuildReport, progress: Progress | None) -> bytes:
+        from ..report.content import ReportContent
+        from ..report.page import report_html
+
+        study, no_study = _study(made, progress)
+        names = [switch.name for switch in made.manifest.switches]
         return report_html(
             ReportContent(
                 manifest=made.manifest,
                 tables=made.tables,
                 tables_bytes=made.tables_bytes,
-                rounds=made.trained.stumps.n_rounds,
+                rounds=made.trained.rounds,
                 firmware=made.firmware,
                 only_answer=made.only_answer,
                 tree=made.trained.tree,
@@ -69,29 +121,35 @@ class BuildDocuments:
                 hand=None if self.hand is None else self.hand.fitted(made.grasp_set.switch_names),
                 scan=made.scan,
                 harness=made.harness,
-                guarantee=guarantee_of(made.trained.stumps, made.tables, made.comparison, made.manifest.grasps),
+                comparison=made.comparison,
+                worst=worst_case(made.trained.model, made.tables, made.comparison, made.manifest.grasps, names),
             )
         )
 
-    def _study(self, made: Made) -> tuple[Study | None, str]:
-        """Return the paper's tables, honest and once, of the build's own folds, rounds and seed; or why there are none.
 
-        Last of all: by then, nothing is wrong with the build.
-        """
-        asked = made.manifest.options
-        if not asked.folds:
-            return None, "The build was compiled without folds."
-        options = Options(
-            folds=asked.folds,
-            repeats=1,
-            rounds=asked.rounds,
-            protocols=("honest",),
-            tables=("compositions", "generality", "pruning"),
-            seed=asked.seed,
-        )
-        # Little work is done before other processes are up.
-        jobs = 1 if len(made.grasp_set) * asked.rounds < _SMALL else -1
-        try:
-            return evaluate(made.grasp_set, options, jobs, self.progress), ""
-        except EvaluationError as reason:
-            return None, f"These recordings have none: {reason}."
+def _study(made: BuildReport, progress: Progress | None) -> "tuple[Study | None, str]":
+    """Return the paper's tables, honest and once, of the build's own folds, trainer and seed; or why there are none.
+
+    Last of all: by then, nothing is wrong with the build.
+    """
+    from ..evaluation.study import Options, evaluate
+
+    asked = made.manifest.options
+    if not asked.folds:
+        return None, "The build was compiled without folds."
+    options = Options(
+        folds=asked.folds,
+        repeats=1,
+        rounds=asked.rounds,
+        protocols=("honest",),
+        tables=("compositions", "generality", "pruning"),
+        seed=asked.seed,
+        trainer=asked.trainer,
+        settings=asked.settings,
+    )
+    # Little work is done before other processes are up.
+    jobs = 1 if len(made.grasp_set) * asked.rounds < _SMALL else -1
+    try:
+        return evaluate(made.grasp_set, options, jobs, progress), ""
+    except EvaluationError as reason:
+        return None, f"These recordings have none: {reason}."

@@ -1,9 +1,12 @@
-"""`ensemble.bin`: the stumps that a build was collapsed from, kept so that the build can be verified.
+"""`ensemble.bin`: the model that a build was collapsed from, kept so that the build can be verified.
 
-A sealed npz (recordings/arrays.py) of columns (M, K) int32, thresholds (M, K) float64 and values (M, K, 3) float64,
-with a JSON header {"n_inputs", "shrinkage"}.
+A sealed npz (recordings/arrays.py). Format 1, of LogitBoost: columns (M, K) int32, thresholds (M, K) float64 and values
+(M, K, 3) float64, with a JSON header {"n_inputs", "shrinkage"}. Format 2, of every other trainer: bias (K,),
+switch_rows (s, K), bins (j,) int64, thresholds (sum of bins - 1,) uint16 and joint_rows (sum of bins, K), else float64,
+with the header {}.
 """
 
+from collections.abc import Mapping
 from typing import Annotated
 
 import msgspec
@@ -16,16 +19,19 @@ from thenar.runtime.tables import MAX_CLASSES, MAX_JOINTS, MAX_SWITCHES
 
 from ..boosting.stumps import Stumps
 from ..recordings.arrays import AnyArray, pack, unpack
+from ..tables.collapse import Model, ScoreTables
 
 KIND = b"THNRENSM"
-VERSION = 1
+STUMPS, TABLES = 1, 2  # formats
 MAX_BYTES = 1 << 30
 
 # Some hundred bytes less than these make a gigabyte: a column, a threshold and three values each.
 MAX_STUMPS = 29_000_000
 
-_DTYPES = {"columns": "<i4", "thresholds": "<f8", "values": "<f8"}
-
+_DTYPES = {
+    STUMPS: {"columns": "<i4", "thresholds": "<f8", "values": "<f8"},
+    TABLES: {"bias": "<f8", "switch_rows": "<f8", "bins": "<i8", "thresholds": "<u2", "joint_rows": "<f8"},
+}
 
 # Beyond what boosting gives (boost.LARGEST_Z_MAX), and of thresholds beyond every code.
 _LARGEST_VALUE, _LARGEST_THRESHOLD = 1e6, 1e6
@@ -36,31 +42,69 @@ class _Header(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     shrinkage: Annotated[float, Meta(gt=0.0, le=1.0)]
 
 
-def ensemble_to_bytes(stumps: Stumps) -> bytes:
-    """Return the content of `ensemble.bin`; the same stumps give the same bytes."""
-    header = msgspec.json.encode(_Header(stumps.n_inputs, stumps.shrinkage))
-    arrays: dict[str, AnyArray] = {
-        "columns": stumps.columns,
-        "thresholds": stumps.thresholds,
-        "values": stumps.values,
-    }
-    return seal(KIND, VERSION, pack(header, {name: array.astype(_DTYPES[name]) for name, array in arrays.items()}))
+class _NoHeader(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    pass
 
 
-def ensemble_from_bytes(data: bytes, what: str = "ensemble.bin") -> Stumps:
-    """Return the stumps of an `ensemble.bin`, which messages call `what`.
+def ensemble_to_bytes(model: Model) -> bytes:
+    """Return the content of `ensemble.bin`; the same model gives the same bytes."""
+    arrays: dict[str, AnyArray]
+    if isinstance(model, Stumps):
+        version, header = STUMPS, msgspec.json.encode(_Header(model.n_inputs, model.shrinkage))
+        arrays = {"columns": model.columns, "thresholds": model.thresholds, "values": model.values}
+    else:
+        version, header = TABLES, msgspec.json.encode(_NoHeader())
+        arrays = {
+            "bias": model.bias,
+            "switch_rows": model.switch_rows,
+            "bins": np.array([len(rows) for rows in model.joint_rows]),
+            "thresholds": np.concatenate([np.zeros(0), *model.thresholds]),
+            "joint_rows": np.concatenate([np.zeros((0, model.n_classes)), *model.joint_rows]),
+        }
+    written = {name: array.astype(_DTYPES[version][name]) for name, array in arrays.items()}
+    return seal(KIND, version, pack(header, written))
+
+
+def ensemble_from_bytes(data: bytes, what: str = "ensemble.bin") -> Model:
+    """Return the model of an `ensemble.bin`, which messages call `what`.
 
     Raises SealError for a file that is foreign, truncated, altered or newer, BuildError for one that contradicts
     itself.
     """
-    _, payload = unseal(data, KIND, VERSION, what)
+    version, payload = unseal(data, KIND, TABLES, what)
     header_bytes, arrays = unpack(payload, what)
+    dtypes = _DTYPES.get(version, {})
+    if {name: array.dtype for name, array in arrays.items()} != {n: np.dtype(d) for n, d in dtypes.items()}:
+        raise BuildError(f"{what} is damaged: it holds other arrays than {', '.join(dtypes)}")
     try:
-        header = msgspec.json.decode(header_bytes, type=_Header)
+        header = msgspec.json.decode(header_bytes, type=_Header if version == STUMPS else _NoHeader)
     except (ValueError, RecursionError) as wrong:
         raise BuildError(f"{what} is damaged: {wrong}") from None
-    if {name: array.dtype for name, array in arrays.items()} != {n: np.dtype(d) for n, d in _DTYPES.items()}:
-        raise BuildError(f"{what} is damaged: it holds other arrays than {', '.join(_DTYPES)}")
+    return _stumps(header, arrays, what) if isinstance(header, _Header) else _tables(arrays, what)
+
+
+def model_fault(model: Model, n_switches: int, n_joints: int, n_classes: int) -> str:
+    """Return what is wrong with a model of so many inputs and classes, as it follows "a model that"; "" if nothing."""
+    if isinstance(model, Stumps):
+        sizes, wanted = (model.n_inputs, model.n_classes), (n_switches + n_joints, n_classes)
+        return (
+            "" if sizes == wanted else f"has {sizes[0]} inputs and {sizes[1]} classes, not {wanted[0]} and {wanted[1]}"
+        )
+    shapes = [model.bias.shape, model.switch_rows.shape, *(rows.shape for rows in model.joint_rows)]
+    bins = [(len(thresholds) + 1, n_classes) for thresholds in model.thresholds]
+    if len(bins) != n_joints or shapes != [(n_classes,), (n_switches, n_classes), *bins]:
+        return f"has tables of other shapes than {n_switches} switches, {n_joints} joints and {n_classes} classes"
+    if any(
+        thresholds.dtype != np.uint16 or (np.diff(thresholds.astype(int)) < 1).any() for thresholds in model.thresholds
+    ):
+        return "has thresholds that are no codes, or do not rise"
+    # Written so that what is no number fails as well.
+    if not all((np.abs(rows) <= _LARGEST_VALUE).all() for rows in (model.bias, model.switch_rows, *model.joint_rows)):
+        return "holds numbers beyond a million, or that are none"
+    return ""
+
+
+def _stumps(header: _Header, arrays: Mapping[str, AnyArray], what: str) -> Stumps:
     columns = arrays["columns"].astype(np.int32)
     if columns.ndim != 2 or not columns.size or not 2 <= columns.shape[1] <= MAX_CLASSES:
         raise BuildError(f"{what} is damaged: it has stumps of shape {columns.shape}, not of rounds and grasp types")
@@ -69,7 +113,23 @@ def ensemble_from_bytes(data: bytes, what: str = "ensemble.bin") -> Stumps:
     if arrays["thresholds"].shape != columns.shape or arrays["values"].shape != (*columns.shape, 3):
         raise BuildError(f"{what} is damaged: its arrays are of different ensembles")
     thresholds, values = arrays["thresholds"].astype(np.float64), arrays["values"].astype(np.float64)
-    # Written so that what is no number fails as well.
     if not ((np.abs(thresholds) <= _LARGEST_THRESHOLD).all() and (np.abs(values) <= _LARGEST_VALUE).all()):
         raise BuildError(f"{what} is damaged: it holds numbers beyond a million, or that are none")
     return Stumps(header.n_inputs, columns, thresholds, values, header.shrinkage)
+
+
+def _tables(arrays: Mapping[str, AnyArray], what: str) -> ScoreTables:
+    bias, switch_rows, joint_rows = (arrays[name].astype(np.float64) for name in ("bias", "switch_rows", "joint_rows"))
+    bins, thresholds = arrays["bins"].astype(np.int64), arrays["thresholds"].astype(np.uint16)
+    dimensions = (bias.ndim, switch_rows.ndim, bins.ndim, thresholds.ndim, joint_rows.ndim)
+    if dimensions != (1, 2, 1, 1, 2) or not 2 <= len(bias) <= MAX_CLASSES or len(bins) > MAX_JOINTS:
+        raise BuildError(f"{what} is damaged: its arrays are no tables")
+    if (bins < 1).any() or sum(bins.tolist()) != len(joint_rows) or len(thresholds) != len(joint_rows) - len(bins):
+        raise BuildError(f"{what} is damaged: its arrays are of different tables")
+    ends = np.cumsum(bins)[:-1]
+    steps = np.split(thresholds, ends - np.arange(1, len(bins))) if len(bins) else []
+    rows = np.split(joint_rows, ends) if len(bins) else []
+    tables = ScoreTables(bias, switch_rows, tuple(steps), tuple(rows))
+    if fault := model_fault(tables, len(switch_rows), len(bins), len(bias)):
+        raise BuildError(f"{what} is damaged: it {fault}")
+    return tables

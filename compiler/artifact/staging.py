@@ -9,8 +9,8 @@ from ..firmware.library_names import FIRMWARE_NAME, LIBRARY_FILES
 from ..glove.files import NAMES
 from ..glove.folder import users_files
 from ..publication import check_folder, publish_folder, sweep
+from .documents import REPORT_NAME, SPEC_FOLDER
 from .errors import CompileError
-from .made import REPORT_NAME, SPEC_FOLDER
 
 # A build that was compiled for no harness has no scan map, one that is too large for any microcontroller no firmware,
 # one without a report no spec.

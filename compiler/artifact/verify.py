@@ -1,28 +1,27 @@
-"""`verify_build`: is what runs what was trained, on every row of these recordings and in the worst frame there is?"""
+"""`verify`: is what runs what was trained, on every row of these recordings and in the worst frame there is?"""
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from thenar.runtime.build import ENSEMBLE_NAME, Build, read_member
 from thenar.runtime.errors import BuildError
-from thenar.runtime.tables import LIMIT
+from thenar.runtime.scanning.decided import Decided
+from thenar.runtime.scanning.scanmap import ScanMap
+from thenar.runtime.tables import IntegerTables
 
-from ..boosting.stumps import TIE, Stumps
+from ..boosting.stumps import Stumps
 from ..recordings.graspset import GraspSet
-from ..tables.collapse import collapse
-from ..tables.compare import Comparison, compare
-from ..tables.furthest import furthest
-from ..tables.worstcase import Rounding
-from .ensemble import MAX_BYTES, ensemble_from_bytes
+from ..tables.collapse import Model
+from ..tables.compare import Comparison, WorstCase, compare, worst_case
+from .documents import Progress
+from .ensemble import MAX_BYTES, ensemble_from_bytes, model_fault
 from .errors import CompileError
-from .scanned import ScanCheck, check_scan
 from .select import select_inputs
-from .verify_firmware import FirmwareVerification
+from .verify_firmware import FirmwareVerification, Kind, verify_firmware
 
 
 class ChangedRow(Struct, frozen=True):
@@ -35,31 +34,16 @@ class ChangedRow(Struct, frozen=True):
     margin: float
 
 
-class WorstCase(Struct, frozen=True, kw_only=True):
-    """What integers can do at worst, in steps, exactly and over every frame there is, recorded or not.
+class ScanCheck(Struct, frozen=True):
+    """What became of rows that were scanned port by port until they were decided.
 
-    In the frame `closed` (names of kept switches) and `codes`, the lead of grasp type `leader` over `rival` loses most.
-    A margin above safe_margin keeps its grasp type: true of `covered` rows, of which `covered_changed` change all the
-    same. `reach` is the furthest that a sum gets from zero, in any order, whole or with inputs missing: for `reaching`.
+    ports are those of the scan map, mean_read how many of them were read on average; changed counts the rows that have
+    another grasp type then than after a whole scan.
     """
 
-    leader: str
-    rival: str
-    loss: float
-    bound: float
-    closed: tuple[str, ...]
-    codes: tuple[int, ...]
-    safe_margin: float
-    covered: int
-    covered_changed: int
-    reaching: str
-    reach: int
-    limit: int = LIMIT
-
-    @property
-    def holds(self) -> bool:
-        """Whether no lead can lose more than the bound, and no covered row changes."""
-        return self.loss <= self.bound and not self.covered_changed
+    ports: int
+    mean_read: float
+    changed: int
 
 
 class Verification(Struct, frozen=True, kw_only=True):
@@ -87,27 +71,58 @@ class Verification(Struct, frozen=True, kw_only=True):
     holds: bool
     firmware: FirmwareVerification | None = None
 
-    def with_firmware(self, firmware: FirmwareVerification) -> "Verification":
-        """Return the same with what was found of compiled classifiers, which must hold too."""
-        return replace(self, firmware=firmware, holds=self.holds and firmware.holds)
 
-
-def verify_build(
-    folder: str | Path, grasp_set: GraspSet, progress: Callable[[int, int], None] | None = None
+def verify(
+    folder: str | Path,
+    grasp_set: GraspSet,
+    firmware: Sequence[Kind] = (),
+    progress: Progress | None = None,
 ) -> Verification:
-    """Compare ensemble, float tables and integer tables on every row of `grasp_set`, compiled from or not, and beyond.
+    """Compare a build's model, float tables and integer tables on every row of recordings, and beyond them.
 
-    Columns are found by name. Raises BuildError or SealError for a folder that is no sound build, CompileError for
-    recordings that lack its inputs.
+    Parameters
+    ----------
+    folder : path
+        The build.
+    grasp_set : GraspSet
+        Recordings, compiled from or not. Columns are found by name.
+    firmware : sequence of {"host", "avr", "cortex-m"}
+        What to compile the classifier for as well, to hold its scores against Python's.
+    progress : callable, optional
+        Called with (done, total) as rows and compiled classifiers are done.
+
+    Returns
+    -------
+    Verification
+        Differences and the bounds that they must keep; `holds` says whether they do.
+
+    Raises
+    ------
+    BuildError, SealError
+        If the folder is no sound build.
+    CompileError
+        If the recordings lack its inputs, or have no rows.
+    FirmwareError
+        If a tool is missing, or a part cannot hold the build.
+
+    Examples
+    --------
+    >>> from thenar.compiler import GraspSet, compile_build, verify
+    >>> grasp_set = GraspSet.load("set.grasps")
+    >>> report = compile_build(grasp_set, "build", rounds=5, folds=0)
+    >>> verify("build", grasp_set).holds
+    True
     """
     if not len(grasp_set):
         raise CompileError("the recordings have no rows: there is nothing to verify")
     build = Build.load(folder)
-    stumps = _load_ensemble(Path(folder), build)
+    model = _load_ensemble(Path(folder), build)
     bits, codes = select_inputs(grasp_set, build.manifest)
-    comparison = compare(stumps, build.tables, bits, codes, progress)
-    worst = _worst(stumps, build, comparison)
+    comparison = compare(model, build.tables, bits, codes, progress)
+    names = [switch.name for switch in build.manifest.switches]
+    worst = worst_case(model, build.tables, comparison, build.grasps, names)
     scan = None if build.scan is None else check_scan(build.scan, build.tables, bits, codes, comparison.deployed)
+    tried = verify_firmware(folder, grasp_set, firmware, progress) if firmware else None
     grasps = np.array(build.grasps)
     return Verification(
         same_recordings=grasp_set.fingerprint() == build.manifest.source.fingerprint,
@@ -124,45 +139,44 @@ def verify_build(
         worst=worst,
         changed=_changed(comparison, grasps, grasp_set),
         scan=scan,
-        holds=comparison.holds and worst.holds and not (scan and scan.changed),
+        holds=comparison.holds and worst.holds and not (scan and scan.changed) and (tried is None or tried.holds),
+        firmware=tried,
     )
 
 
-def _load_ensemble(folder: Path, build: Build) -> Stumps:
+def _load_ensemble(folder: Path, build: Build) -> Model:
     path = folder / ENSEMBLE_NAME
-    stumps = ensemble_from_bytes(read_member(path, MAX_BYTES, build.manifest.ensemble_sha256), str(path))
-    inputs = build.tables.n_switches + build.tables.n_joints
-    options = build.manifest.options
-    belongs = (stumps.n_inputs, stumps.n_classes, stumps.shrinkage) == (
-        inputs,
-        build.tables.n_classes,
-        options.shrinkage,
-    )
-    if not belongs or stumps.n_rounds > options.rounds:
+    model = ensemble_from_bytes(read_member(path, MAX_BYTES, build.manifest.ensemble_sha256), str(path))
+    tables, options = build.tables, build.manifest.options
+    foreign = bool(model_fault(model, tables.n_switches, tables.n_joints, tables.n_classes))
+    if isinstance(model, Stumps):
+        foreign |= model.shrinkage != options.shrinkage or model.n_rounds > options.rounds
+    if foreign:
         raise BuildError(f"{path} is the ensemble of another build: compile the build again")
-    return stumps
+    return model
 
 
-def _worst(stumps: Stumps, build: Build, comparison: Comparison) -> WorstCase:
-    integers = build.tables
-    rounding = Rounding(collapse(stumps, integers.n_switches), integers)
-    frame, furthest_sum = rounding.worst_of_all(), furthest(integers)
-    safe = float(rounding.safe_margin())
-    # Scores that the ensemble takes for tied are decided by the number of the class.
-    covered = comparison.margins > max(safe, TIE * integers.scale) + 2 * comparison.slack
-    return WorstCase(
-        leader=build.grasps[frame.leader],
-        rival=build.grasps[frame.rival],
-        loss=float(frame.loss),
-        bound=comparison.safe_margin + 2 * comparison.slack,
-        closed=tuple(s.name for s, bit in zip(build.manifest.switches, frame.bits.tolist(), strict=True) if bit),
-        codes=tuple(frame.codes.tolist()),
-        safe_margin=safe,
-        covered=int(np.count_nonzero(covered)),
-        covered_changed=int(np.count_nonzero(covered[comparison.changed])),
-        reaching=build.grasps[furthest_sum.grasp],
-        reach=furthest_sum.total,
-    )
+def check_scan(
+    scan: ScanMap,
+    tables: IntegerTables,
+    bits: NDArray[np.bool_],
+    codes: NDArray[np.uint16],
+    deployed: NDArray[np.intp],
+) -> ScanCheck:
+    """Scan all rows, bits (n, s) and codes (n, j), port by port.
+
+    deployed (n,) are their classes as the integers run: what a whole scan gives.
+    """
+    ports = [[switch for _, switch in port.switches] for port in scan.ports]
+    frames = Decided(tables, ports, bits, codes)
+    pending = np.ones(len(frames), bool)
+    read, changed = 0, 0
+    for number in range(len(ports)):
+        read += int(np.count_nonzero(pending))
+        leaders, decided = frames.after((2 << number) - 1)
+        changed += int(np.count_nonzero(leaders[pending & decided] != deployed[pending & decided]))
+        pending &= ~decided
+    return ScanCheck(len(ports), read / len(frames), changed)
 
 
 def _changed(comparison: Comparison, grasps: NDArray[np.str_], grasp_set: GraspSet) -> tuple[ChangedRow, ...]:

@@ -1,23 +1,33 @@
-"""`verify_firmware`: do compiled classifiers answer as Python does, in every score of every frame that is tried?"""
+"""Do compiled classifiers answer as Python does, in every score of every frame that is tried?
+
+And is the firmware that a build carries what would be made of it today?
+"""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 from msgspec import Struct
 
 from thenar.runtime.build import Build
+from thenar.runtime.files import read_file
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.tables import IntegerTables
 
+from ..firmware.answers import Answers
 from ..firmware.choose import choose
+from ..firmware.classifier import classifier_files
 from ..firmware.errors import FirmwareError
-from ..firmware.library import Fit, smallest_fit
-from ..firmware.probes import Probes, extreme_frames, random_frames
-from ..firmware.running import toolchain_missing
+from ..firmware.folder import LARGEST
+from ..firmware.host_runner import run as run_on_host
+from ..firmware.library import Fit, library_files, smallest_fit
+from ..firmware.library_names import FIRMWARE_NAME, LIBRARY_FILES, LIBRARY_NAME
+from ..firmware.probes import Probes, extreme_frames, joined, random_frames
+from ..firmware.running import run, toolchain_missing
 from ..firmware.targets import TARGETS
 from ..recordings.graspset import GraspSet
-from .carried import Carried, carried_firmware
-from .firmware_trial import ANSWERS, FirmwareTrial, TargetCheck
 from .select import select_inputs
 
 Kind = Literal["host", "avr", "cortex-m"]
@@ -25,6 +35,139 @@ KINDS: tuple[Kind, ...] = ("host", "avr", "cortex-m")
 RANDOM_FRAMES = 10_000
 _SEED = 1
 _CORES = ("cortex-m0plus", "cortex-m4")
+Answer = Literal["classify", "update"]
+ANSWERS: tuple[Answer, ...] = ("classify", "update")
+
+
+class Carried(Struct, frozen=True):
+    """Whether a build has the folder `firmware/`, and which of its files are not what thenar makes of the build now."""
+
+    present: bool
+    outdated: tuple[str, ...]
+
+
+def made_firmware(manifest: Manifest, tables: IntegerTables) -> tuple[dict[str, str], str]:
+    """Return path in the build -> text of its firmware, and a sentence that says what for, or why there is none."""
+    try:
+        fit = smallest_fit(tables)
+        made = library_files(manifest, fit)
+    except FirmwareError as reason:
+        return {}, f"no firmware: {reason}"
+    return {f"{FIRMWARE_NAME}/{name}": text for name, text in made.items()}, f"firmware {fit.words}"
+
+
+def carried_firmware(folder: Path, build: Build) -> Carried:
+    """Return how the firmware in the build `folder` stands."""
+    if not (folder / FIRMWARE_NAME).is_dir():
+        return Carried(False, ())
+    made, _ = made_firmware(build.manifest, build.tables)
+    now = {name: text.encode() for name, text in made.items()}
+    names = [f"{FIRMWARE_NAME}/{name}" for name in LIBRARY_FILES]
+    return Carried(True, tuple(name for name in names if now.get(name) != _content(folder / name)))
+
+
+def _content(path: Path) -> bytes | None:
+    try:
+        return read_file(path, LARGEST, FirmwareError)
+    except (OSError, FirmwareError):
+        return None
+
+
+class Difference(Struct, frozen=True):
+    """A frame that is answered otherwise: which it is, what is closed and coded in it, and both answers."""
+
+    frame: str
+    closed: tuple[str, ...]
+    codes: tuple[int, ...]
+    grasp: str
+    scores: tuple[int, ...]
+    compiled_grasp: str
+    compiled_scores: tuple[int, ...]
+
+
+class TargetCheck(Struct, frozen=True, kw_only=True):
+    """What came of one part.
+
+    layout     which layout was compiled, and why
+    answer     "classify": every frame from nothing; "update": from what changed since the frame before
+    frames     how many were answered, `differing` of them with another score or grasp type than in Python
+    first      the first of those
+    misnamed   how many grasp types thenar_NAME_grasp calls otherwise than the manifest; None: not asked, on an AVR
+    worst      what the slowest answer took, in `unit`, and `stack` the bytes that answers need; None: not counted
+    """
+
+    part: str
+    layout: str
+    answer: Answer
+    frames: int
+    differing: int
+    first: Difference | None
+    misnamed: int | None
+    worst: int | None
+    unit: str
+    stack: int | None
+
+
+class FirmwareTrial:
+    """Frames, in three lots, and Python's scores of them: those of the very `Build` that the runtime runs."""
+
+    def __init__(self, build: Build, rows: Probes, extreme: Probes, random: Probes) -> None:
+        self._build, self._lots = build, (("row", rows), ("extreme frame", extreme), ("random frame", random))
+        self._frames = joined(rows, extreme, random)
+        pairs = zip(self._frames.bits, self._frames.codes, strict=True)
+        self._scores = np.array([build.lanes(bits, codes) for bits, codes in pairs]) - LANE_OFFSET
+
+    def check(self, fit: Fit, answer: Answer) -> TargetCheck:
+        """Compile the classifier as `fit` says and hold its answers against Python's. Raises FirmwareError."""
+        answers = self._run(fit, incremental=answer == "update")
+        wrong = (answers.scores != self._scores).any(axis=1) | (answers.classes != self._scores.argmax(axis=1))
+        return TargetCheck(
+            part=fit.target.part,
+            layout=fit.choice.why,
+            answer=answer,
+            frames=len(wrong),
+            differing=int(np.count_nonzero(wrong)),
+            first=self._difference(int(wrong.argmax()), answers) if wrong.any() else None,
+            misnamed=self._misnamed(answers),
+            worst=None if answers.cost is None else int(answers.cost.max()),
+            unit=answers.unit,
+            stack=answers.stack,
+        )
+
+    def _misnamed(self, answers: Answers) -> int | None:
+        if answers.names is None:
+            return None
+        return sum(name != grasp for name, grasp in zip(answers.names, self._build.grasps, strict=True))
+
+    def _run(self, fit: Fit, *, incremental: bool) -> Answers:
+        layout, target = fit.choice.layout, fit.target
+        files = classifier_files(LIBRARY_NAME, self._build.manifest, layout, avr=target.kind == "avr")
+        frames = layout.frame_bytes(self._frames.bits, self._frames.codes)
+        if target.kind == "host":
+            return run_on_host(files, LIBRARY_NAME, layout, target, frames, incremental=incremental, sanitize=True)
+        return run(files, LIBRARY_NAME, layout, target, frames, incremental=incremental)
+
+    def _difference(self, frame: int, answers: Answers) -> Difference:
+        build, bits, codes = self._build, self._frames.bits[frame], self._frames.codes[frame]
+        return Difference(
+            frame=self._name(frame),
+            closed=tuple(switch.name for switch, bit in zip(build.manifest.switches, bits, strict=True) if bit),
+            codes=tuple(codes.tolist()),
+            grasp=build.grasps[int(self._scores[frame].argmax())],
+            scores=tuple(self._scores[frame].tolist()),
+            compiled_grasp=self._grasp(int(answers.classes[frame])),
+            compiled_scores=tuple(answers.scores[frame].tolist()),
+        )
+
+    def _name(self, frame: int) -> str:
+        for name, lot in self._lots:
+            if frame < len(lot):
+                return f"{name} {frame}"
+            frame -= len(lot)
+        raise IndexError(frame)
+
+    def _grasp(self, number: int) -> str:
+        return self._build.grasps[number] if number < len(self._build.grasps) else f"type {number}, which there is not"
 
 
 class FirmwareVerification(Struct, frozen=True, kw_only=True):
@@ -56,7 +199,7 @@ def verify_firmware(
     "cortex-m" both cores. Each is run from nothing for every frame, and once more from the changes between frames, on
     "host" and "cortex-m" with every switch set by set_switch() and every name asked for. Of a
     build that no AVR holds, host runs the layout of the larger core. Raises FirmwareError where a tool is missing or a
-    part cannot hold the build, else as `verify_build` does.
+    part cannot hold the build, else as `verify` does.
     """
     build = Build.load(folder)
     fits = [fit for kind in KINDS if kind in kinds for fit in _fits(build.tables, kind)]

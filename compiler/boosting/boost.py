@@ -6,7 +6,6 @@ Where Weka's own answer hangs on rounding, thenar goes on in a stable way instea
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,14 +30,6 @@ class BoostingError(ThenarError, ValueError):
     """The training set or an option makes no sense to LogitBoost."""
 
 
-@dataclass(frozen=True, slots=True)
-class History:
-    """How training went."""
-
-    losses: tuple[float, ...]  # mean of -ln P(true class) before the first round and after every round
-    stopped_early: bool  # the change of the loss fell below the tolerance
-
-
 def boost(
     X: NDArray[np.generic],
     labels: NDArray[np.intp],
@@ -51,12 +42,13 @@ def boost(
     weights: Floats | None = None,
     max_bins: int | None = None,
     on_round: Callable[[int, int], None] | None = None,
-) -> tuple[Stumps, History]:
+) -> tuple[Stumps, tuple[float, ...]]:
     """Train `rounds` rounds on X (n, d) numbers (NaN: missing), labels (n,) in 0..n_classes-1, weights (n,) >= 0.
 
     Stops early where the mean log-likelihood changes by less than `tolerance` in a round (Weka's -L; None: never), or
     where no column varies. With `max_bins` (2 or more) no column has more bins than that; they hold rows as evenly as
-    can be. `on_round(done, rounds)` is called after every round. Raises BoostingError.
+    can be. `on_round(done, rounds)` is called after every round. Return the ensemble, and the losses before the first
+    round and after every round: the mean of -ln P(true class). Raises BoostingError.
     """
     _check_options(rounds, shrinkage, z_max, tolerance, max_bins)
     _check_rows(X, labels, n_classes, weights)
@@ -82,7 +74,7 @@ def boost(
         stopped = tolerance is not None and abs(losses[-2] - losses[-1]) < tolerance
         if on_round is not None:
             on_round(len(fitted), rounds)
-    return _stack(fitted, X.shape[1], n_classes, shrinkage), History(tuple(losses), stopped)
+    return _stack(fitted, X.shape[1], n_classes, shrinkage, stopped), tuple(losses)
 
 
 def working_targets(
@@ -105,7 +97,7 @@ def weights_and_responses(
 
 
 def _stack(
-    fitted: list[tuple[NDArray[np.int32], Floats, Floats]], n_inputs: int, n_classes: int, shrinkage: float
+    fitted: list[tuple[NDArray[np.int32], Floats, Floats]], n_inputs: int, n_classes: int, shrinkage: float, early: bool
 ) -> Stumps:
     rounds = len(fitted)
     return Stumps(
@@ -114,6 +106,7 @@ def _stack(
         np.array([thresholds for _, thresholds, _ in fitted]).reshape(rounds, n_classes),
         np.array([values for _, _, values in fitted]).reshape(rounds, n_classes, 3),
         shrinkage,
+        early,
     )
 
 
@@ -137,12 +130,14 @@ def _check_rows(X: NDArray[np.generic], labels: NDArray[np.intp], n_classes: int
         raise BoostingError(f"inputs {X.shape} and labels {labels.shape} must be (n, d) and (n,) with at least one row")
     if labels.min() < 0 or labels.max() >= n_classes:
         raise BoostingError(f"labels run from {labels.min()} to {labels.max()}, classes from 0 to {n_classes - 1}")
-    if weights is not None and not _are_weights(weights, labels.shape):
-        raise BoostingError("row weights must be (n,) finite numbers of at least 0, not all 0")
+    if weights is not None:
+        check_weights(weights, len(X))
     if X.dtype.kind == "f" and np.isinf(X).any():
         row, column = np.argwhere(np.isinf(X))[0]
         raise BoostingError(f"row {row}, column {column} is infinite; a joint angle is finite or NaN for missing")
 
 
-def _are_weights(weights: Floats, shape: tuple[int, ...]) -> bool:
-    return weights.shape == shape and bool(np.isfinite(weights).all() and (weights >= 0).all() and weights.any())
+def check_weights(weights: Floats, n: int) -> None:
+    """Raise BoostingError unless these are weights of n rows."""
+    if weights.shape != (n,) or not (np.isfinite(weights).all() and (weights >= 0).all() and weights.any()):
+        raise BoostingError("row weights must be (n,) finite numbers of at least 0, none negative, and not all zero")

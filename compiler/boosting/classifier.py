@@ -1,18 +1,18 @@
 """LogitBoost on decision stumps as a scikit-learn estimator."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, ClassifierMixin
-from sklearn.utils import Tags
+from sklearn.utils import Tags, check_array
 from sklearn.utils.multiclass import check_classification_targets
-from sklearn.utils.validation import _check_sample_weight, check_is_fitted, validate_data
+from sklearn.utils.validation import check_is_fitted, validate_data
 
 from ..elementary import softmax
-from .boost import BoostingError, boost
-from .stumps import winners
+from .boost import BoostingError, boost, check_weights
+from .stumps import TIE, winners
 
 Floats = NDArray[np.float64]
 
@@ -21,25 +21,46 @@ class LogitBoostClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc
     """Additive logistic regression on decision stumps, multi-class as Weka 3.6's LogitBoost computes it.
 
     Inputs are bits, integer codes or floating-point numbers, X (n, d); NaN is a missing value, which gets a branch of
-    its own. A threshold lies midway between two neighbouring values of the training set.
+    its own. A threshold lies midway between two neighbouring values of the training set. It is what `compile_build`
+    trains, and `compile` makes a build of a fitted one.
 
     Parameters
     ----------
-    rounds : number of boosting rounds; each fits one stump a class (the paper: 100).
-    shrinkage : factor on every stump's answer, in [1e-6, 1] (Weka's -H).
-    z_max : clamp of the working response and of every stump's answer, in (1, 100] (Weka 3.6: the constant 3).
-    tolerance : stop where the mean log-likelihood changes by less than this in a round (Weka's -L); None never stops.
-    classes : labels that exist even where y lacks some of them (a fold without a rare class); None: those in y.
+    rounds : int, default=100
+        Number of boosting rounds; each fits one stump a class (the paper: 100).
+    shrinkage : float, default=1.0
+        Factor on every stump's answer, in [1e-6, 1] (Weka's -H).
+    z_max : float, default=3.0
+        Clamp of the working response and of every stump's answer, in (1, 100] (Weka 3.6: the constant 3).
+    tolerance : float, optional
+        Training stops where the mean log-likelihood changes by less than this in a round (Weka's -L); None never stops.
+    max_bins : int, optional
+        No input has more bins than this (2 or more); they hold rows as evenly as can be. None: one for each value.
+    classes : sequence, optional
+        Labels that exist even where y lacks some of them (a fold without a rare class). None: those in y.
 
     Attributes
     ----------
-    classes_ : (K,) labels, in the order of the columns of scores and probabilities.
-    stumps_ : the `Stumps`, `n_rounds_` rounds of K.
-    losses_ : (n_rounds_ + 1,) mean of -ln P(true class) on the training rows before and after every round.
-    stopped_early_ : whether `tolerance` ended the training.
+    classes_ : ndarray, shape (K,)
+        The labels, in the order of the columns of scores and probabilities.
+    stumps_ : Stumps
+        The ensemble, `n_rounds_` rounds of K stumps.
+    n_rounds_ : int
+        The rounds that were trained.
+    losses_ : ndarray of float, shape (n_rounds_ + 1,)
+        Mean of -ln P(true class) on the training rows before and after every round.
 
-    `sample_weight` counts a row that many times, in the stumps and in the losses; 0 removes it.
-    Source: Friedman, Hastie, Tibshirani, Annals of Statistics 28 (2000), algorithm 6; docs/weka-parity.md.
+    References
+    ----------
+    Friedman, Hastie, Tibshirani, Annals of Statistics 28 (2000), algorithm 6; docs/weka-parity.md.
+
+    Examples
+    --------
+    >>> from thenar.compiler import LogitBoostClassifier
+    >>> X, y = [[0, 10], [0, 200], [1, 30], [1, 220]], ["tip", "power", "tip", "power"]
+    >>> classifier = LogitBoostClassifier(rounds=5).fit(X, y)
+    >>> classifier.predict([[0, 20], [0, 215]]).tolist()
+    ['tip', 'power']
     """
 
     def __init__(
@@ -48,28 +69,58 @@ class LogitBoostClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc
         shrinkage: float = 1.0,
         z_max: float = 3.0,
         tolerance: float | None = None,
+        max_bins: int | None = None,
         classes: Sequence[Any] | None = None,
     ) -> None:
         self.rounds = rounds
         self.shrinkage = shrinkage
         self.z_max = z_max
         self.tolerance = tolerance
+        self.max_bins = max_bins
         self.classes = classes
 
-    def fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> Self:
-        """Train on X (n, d) and labels y (n,). Raises ValueError saying what does not fit."""
+    def fit(
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        sample_weight: ArrayLike | None = None,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> Self:
+        """Train on X (n, d) and labels y (n,).
+
+        Parameters
+        ----------
+        X : array-like, shape (n, d)
+            Numbers; NaN is a missing value.
+        y : array-like, shape (n,)
+            Labels.
+        sample_weight : array-like, shape (n,), optional
+            A row counts so many times, in the stumps and in the losses; 0 removes it.
+        progress : callable, optional
+            Called with (rounds done, rounds) after every round.
+
+        Returns
+        -------
+        LogitBoostClassifier
+            The same, fitted.
+
+        Raises
+        ------
+        BoostingError
+            A ValueError, if a parameter, a weight or a label makes no sense.
+        """
         inputs, targets = validate_data(self, X, y, ensure_all_finite="allow-nan", dtype=_kept_dtypes(X))
-        check_classification_targets(targets)
-        weights = None
-        if sample_weight is not None:
-            weights = _check_sample_weight(sample_weight, inputs, dtype=np.float64, ensure_non_negative=True)
+        if self.classes is None:
+            check_classification_targets(targets)
         self.classes_ = np.unique(targets) if self.classes is None else np.asarray(self.classes)
-        labels = self._index(targets)
-        if weights is not None:
+        labels, weights = self._index(targets), None
+        if sample_weight is not None:
+            weights = check_array(sample_weight, ensure_2d=False, dtype=np.float64, input_name="sample_weight")
+            check_weights(weights, len(inputs))
             # A row of no weight is a row that is not there: its values make no thresholds (in Weka they do).
             kept = weights > 0
             inputs, labels, weights = inputs[kept], labels[kept], weights[kept]
-        self.stumps_, history = boost(
+        self.stumps_, losses = boost(
             inputs,
             labels,
             len(self.classes_),
@@ -78,29 +129,33 @@ class LogitBoostClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc
             z_max=self.z_max,
             tolerance=self.tolerance,
             weights=weights,
+            max_bins=self.max_bins,
+            on_round=progress,
         )
         self.n_rounds_ = self.stumps_.n_rounds
-        self.losses_ = np.array(history.losses)
-        self.stopped_early_ = history.stopped_early
+        self.losses_ = np.array(losses)
         return self
 
-    def scores(self, X: ArrayLike) -> Floats:
-        """Return the additive scores F (n, K); the class of the largest is the answer, its lowest number at a tie."""
-        inputs = self._inputs(X)
-        return self.stumps_.scores(inputs)
+    def decision_function(self, X: ArrayLike) -> Floats:
+        """Return the additive scores F (n, K) of X (n, d); of two classes the second's less the first's, (n,).
 
-    def staged_scores(self, X: ArrayLike) -> Iterator[Floats]:
-        """Yield the scores (n, K) after 1, 2, ... rounds: one training serves every number of rounds."""
+        The class of the largest score is the answer, the lowest number at a tie.
+        """
+        return self._decided(self._scores(X))
+
+    def staged_decision_function(self, X: ArrayLike) -> Iterator[Floats]:
+        """Yield the scores after 1, 2, ... rounds: one training serves every number of rounds."""
         inputs = self._inputs(X)
-        return self.stumps_.staged_scores(inputs)
+        return map(self._decided, self.stumps_.staged_scores(inputs))
 
     def predict_proba(self, X: ArrayLike) -> Floats:
         """Return class probabilities (n, K), columns as in `classes_`."""
-        return np.ascontiguousarray(softmax(np.ascontiguousarray(self.scores(X).T)).T)
+        scores = self._scores(X)
+        return np.ascontiguousarray(softmax(np.ascontiguousarray(scores.T)).T)
 
     def predict(self, X: ArrayLike) -> NDArray[Any]:
         """Return the label (n,) of the largest score."""
-        best = winners(self.scores(X))
+        best = winners(self._scores(X))
         labels: NDArray[Any] = self.classes_[best]
         return labels
 
@@ -109,6 +164,17 @@ class LogitBoostClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc
         tags = super().__sklearn_tags__()
         tags.input_tags.allow_nan = True
         return tags
+
+    def _decided(self, scores: Floats) -> Floats:
+        if len(self.classes_) != 2:
+            return scores
+        lead = scores[:, 1] - scores[:, 0]
+        # Tied scores, which go to the first class, lead by nothing.
+        return np.where(np.abs(lead) <= TIE, 0.0, lead)
+
+    def _scores(self, X: ArrayLike) -> Floats:
+        inputs = self._inputs(X)
+        return self.stumps_.scores(inputs)
 
     def _inputs(self, X: ArrayLike) -> NDArray[Any]:
         check_is_fitted(self)

@@ -26,6 +26,7 @@ class Stumps:
     thresholds: Floats  # (M, K)
     values: Floats  # (M, K, 3) what is answered left, right, and where the input is missing
     shrinkage: float
+    stopped_early: bool = False  # a tolerance ended the training
 
     @property
     def n_rounds(self) -> int:

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..boosting.boost import boost
 from ..boosting.stumps import winners
+from ..samples import Columns, Samples
+from ..tables.collapse import model_scores
+from ..trainers.base import Training
 from ..workers import in_workers
-from .compositions import Columns
 from .folds import Fold
 
 Inputs = NDArray[np.uint16]
@@ -21,20 +22,14 @@ Progress = Callable[[int, int], None]
 class Fit:
     """Train on a fold's training rows and these columns, classes `grasps` (ascending labels); then test the fold.
 
-    Two fits are one if they are of the same `Fold` object and the same columns.
+    The first `n_switches` columns are switches, the others joints. Two fits are one if they are of the same `Fold`
+    object and the same columns.
     """
 
     fold: Fold
     columns: Columns
     grasps: tuple[int, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Training:
-    """How every classifier is trained: the rounds of boosting, and the factor on every stump's answer."""
-
-    rounds: int = 100
-    shrinkage: float = 1.0
+    n_switches: int = 0
 
 
 def predictions(X: Inputs, labels: Labels, fit: Fit, training: Training) -> Labels:
@@ -48,9 +43,10 @@ def predictions(X: Inputs, labels: Labels, fit: Fit, training: Training) -> Labe
     if is_blind(X, fit):
         return np.full(len(fit.fold.test), grasps[np.bincount(trained).argmax()])
     part = X[:, fit.columns]
-    inputs = part[fit.fold.train]
-    stumps, _ = boost(inputs, trained, len(grasps), rounds=training.rounds, shrinkage=training.shrinkage)
-    return grasps[winners(stumps.scores(part[fit.fold.test]))]
+    bits, codes = part[:, : fit.n_switches].astype(bool), part[:, fit.n_switches :]
+    rows, names = fit.fold.train, tuple(map(str, fit.grasps))
+    model = training.train(Samples(bits[rows], codes[rows], trained, names))
+    return grasps[winners(model_scores(model, bits[fit.fold.test], codes[fit.fold.test]))]
 
 
 def is_blind(X: Inputs, fit: Fit) -> bool:

@@ -1,4 +1,4 @@
-"""Four-fold stratified cross-validation exactly as Weka 3.6 cuts it."""
+"""Folds: stratified exactly as Weka 3.6 cuts them, and those that keep what belongs together on one side of the cut."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,8 +6,48 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import EvaluationError
-from .javarandom import JavaRandom
+from thenar.drivers.errors import ThenarError
+
+
+class EvaluationError(ThenarError, ValueError):
+    """The set cannot be cut or compared as asked: too few rows, subjects, objects or blocks, or an unknown name."""
+
+
+_MULTIPLIER = 0x5DEECE66D
+_INCREMENT = 0xB
+_MASK = (1 << 48) - 1
+
+
+class JavaRandom:
+    """The 48-bit linear congruential generator of java.util.Random, seeded as `new Random(seed)`."""
+
+    def __init__(self, seed: int) -> None:
+        self._state = (seed ^ _MULTIPLIER) & _MASK
+
+    def next_bits(self, bits: int) -> int:
+        """Return the next `bits` (1 to 32) random bits, as a number that is not negative."""
+        self._state = (self._state * _MULTIPLIER + _INCREMENT) & _MASK
+        return self._state >> (48 - bits)
+
+    def next_int(self, bound: int) -> int:
+        """Return a uniform integer in [0, bound), as nextInt(bound); ValueError unless 0 < bound < 2^31."""
+        if not 0 < bound < 1 << 31:
+            raise ValueError(f"bound {bound} is not in 1..2147483647")
+        if bound & (bound - 1) == 0:
+            return bound * self.next_bits(31) >> 31
+        while True:
+            drawn = self.next_bits(31)
+            remainder = drawn % bound
+            # The last, incomplete run of `bound` numbers below 2^31 would favour small remainders: draw again.
+            if drawn - remainder + bound <= 1 << 31:
+                return remainder
+
+    def shuffle(self, items: list[int]) -> None:
+        """Shuffle `items` in place: for i from the end down to 1, swap items i and nextInt(i + 1)."""
+        for i in range(len(items) - 1, 0, -1):
+            j = self.next_int(i + 1)
+            items[i], items[j] = items[j], items[i]
+
 
 Rows = NDArray[np.intp]
 
@@ -76,3 +116,45 @@ def _cut(order: list[int], n_folds: int, fold: int, random: JavaRandom) -> Fold:
     train = order[:start] + order[stop:]
     random.shuffle(train)
     return Fold(np.array(train, dtype=np.intp), np.array(order[start:stop], dtype=np.intp), str(fold + 1))
+
+
+def leave_one_out(groups: NDArray[np.str_], what: str) -> list[Fold]:
+    """Return one fold for each name in groups (n,): test on its rows, train on all others; in the order of names.
+
+    `what` is the word for a group ("subject", "object"). Raises EvaluationError if there is only one.
+    """
+    names = np.unique(groups).tolist()
+    if len(names) < 2:
+        raise EvaluationError(
+            f"leaving one {what} out needs two or more; all {len(groups)} rows are of {what} {', '.join(names)!r}"
+        )
+    return [_fold(groups == name, name) for name in names]
+
+
+def block_folds(trials: NDArray[np.int64], n_folds: int) -> list[Fold]:
+    """Return folds by recording block: the trial numbers (n,), in order, cut into `n_folds` contiguous ranges.
+
+    Neighbouring trials resemble each other (the glove has not moved on the hand); this cut never trains on one and
+    tests on the other, but at the borders. Raises EvaluationError if there are fewer trial numbers than folds.
+    """
+    numbers = np.unique(trials)
+    if len(numbers) < 2:
+        raise EvaluationError(
+            f"all {len(trials)} rows have trial number {', '.join(map(str, numbers))}: blocks need trial numbers "
+            "(name their column in columns.toml)"
+        )
+    check_cut(len(numbers), n_folds, "trial numbers")
+    blocks = np.array_split(numbers, n_folds)
+    return [_fold(np.isin(trials, block), _range(block)) for block in blocks]
+
+
+def _fold(tested: NDArray[np.bool_], name: str) -> Fold:
+    return Fold(train=_where(~tested), test=_where(tested), name=name)
+
+
+def _where(mask: NDArray[np.bool_]) -> Rows:
+    return np.flatnonzero(mask)
+
+
+def _range(block: NDArray[np.int64]) -> str:
+    return f"trials {block[0]}-{block[-1]}" if len(block) > 1 else f"trial {block[0]}"

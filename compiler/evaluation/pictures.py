@@ -8,13 +8,12 @@ import numpy as np
 from thenar.runtime.files import write_atomically
 
 from ..pictures import painting, rendered
-from .study import Study
-from .tables import Row, Table
+from .study import Row, Study, Table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from .tables import Confusion
+    from .study import Confusion
 
 
 def draw_confusions(study: Study, folder: Path) -> list[Path]:

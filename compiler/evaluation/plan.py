@@ -1,4 +1,4 @@
-"""What to fit for each of the tables, before anything is fitted."""
+"""What to fit for each of the tables: which inputs, which placement, which folds."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -6,15 +6,65 @@ from functools import partial
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..placement.methods.base import METHODS, PAPERS, Chooser
 from ..placement.methods.filters import random_placement
-from ..samples import Samples
-from .compositions import ALL_SWITCHES, SELECTED, Columns, Composition, available
+from ..recordings.graspset import GraspSet
+from ..samples import Columns, Samples
 from .fits import Fit
 from .folds import Fold, Rows
-from .populations import Population
-from .protocols import Protocol, ProtocolName
+from .populations import Population, Protocol, ProtocolName
+
+
+@dataclass(frozen=True, slots=True)
+class Composition:
+    """Which inputs a classifier gets: the joints (Angle), the placement's switches (Sel-Co), the others (NoSel-Co)."""
+
+    name: str
+    what: str
+    angle: bool
+    selected: bool
+    others: bool
+
+    @property
+    def needs_placement(self) -> bool:
+        """Whether its columns depend on which switches were selected."""
+        return self.selected != self.others
+
+    @property
+    def has_switches(self) -> bool:
+        """Whether it takes any switches."""
+        return self.selected or self.others
+
+    def columns(self, placement: Columns, n_switches: int, n_joints: int) -> Columns:
+        """Return the ascending columns of `inputs` that it takes, given the selected switches."""
+        kept = set(placement)
+        switches = (s for s in range(n_switches) if (self.selected if s in kept else self.others))
+        return (*switches, *range(n_switches, n_switches + n_joints * self.angle))
+
+
+COMPOSITIONS = (
+    Composition("I", "Angle + All-Co", angle=True, selected=True, others=True),
+    Composition("II", "Angle + Sel-Co", angle=True, selected=True, others=False),
+    Composition("III", "Angle + NoSel-Co", angle=True, selected=False, others=True),
+    Composition("IV", "Angle", angle=True, selected=False, others=False),
+    Composition("V", "All-Co", angle=False, selected=True, others=True),
+    Composition("VI", "Sel-Co", angle=False, selected=True, others=False),
+    Composition("VII", "NoSel-Co", angle=False, selected=False, others=True),
+)
+ANGLE_SELECTED, ANGLE, ALL_SWITCHES, SELECTED = COMPOSITIONS[1], COMPOSITIONS[3], COMPOSITIONS[4], COMPOSITIONS[5]
+
+
+def available(n_switches: int, n_joints: int) -> tuple[Composition, ...]:
+    """Return the compositions that a set has the inputs for: without switches only IV, without joints V, VI and VII."""
+    return tuple(c for c in COMPOSITIONS if (n_joints or not c.angle) and (n_switches or not c.has_switches))
+
+
+def inputs(grasp_set: GraspSet) -> NDArray[np.uint16]:
+    """Return what compositions take columns of: (n, s + j), the switches' bits, then the joints' codes."""
+    return np.hstack([grasp_set.switches.astype(np.uint16), grasp_set.codes])
+
 
 TableName = Literal["compositions", "generality", "pruning", "baselines"]
 Select = Callable[[Population, Fold], Columns]
@@ -148,7 +198,8 @@ class Planner:
 
         def fit(fold: Fold) -> Fit:
             placement = select(part, fold) if kind.needs_placement else ()
-            return Fit(fold, kind.columns(placement, self._n_switches, self.n_joints), part.grasps)
+            columns = kind.columns(placement, self._n_switches, self.n_joints)
+            return Fit(fold, columns, part.grasps, sum(column < self._n_switches for column in columns))
 
         return CellPlan(part, tuple(tuple(map(fit, folds)) for folds in part.repeats))
 

@@ -1,4 +1,4 @@
-"""Populations: whose rows a column of the tables is about, and how they are cut into folds."""
+"""Populations: whose rows a column of the tables is about, how they are cut, and which may choose a placement."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,9 +7,7 @@ from typing import Literal
 import numpy as np
 
 from ..recordings.graspset import GraspSet
-from .errors import EvaluationError
-from .folds import Fold, Rows, weka_folds
-from .groups import block_folds, leave_one_out
+from .folds import EvaluationError, Fold, Rows, block_folds, leave_one_out, weka_folds
 
 Scheme = Literal["stratified", "subject", "object", "block"]
 
@@ -80,3 +78,74 @@ def _of_subject(grasp_set: GraspSet, name: str, cut: _Cut) -> Population:
 
 def _population(grasp_set: GraspSet, name: str, rows: Rows, repeats: tuple[tuple[Fold, ...], ...]) -> Population:
     return Population(name, rows, tuple(np.unique(grasp_set.labels[rows]).tolist()), repeats)
+
+
+ProtocolName = Literal["paper", "honest"]
+
+
+@dataclass(frozen=True, slots=True)
+class Protocol:
+    """A protocol's name, and one sentence on what it means."""
+
+    name: ProtocolName
+    meaning: str
+
+    def may_choose(self, part: Population, fold: Fold) -> Rows:
+        """Return the rows from which the placement for this fold may be chosen."""
+        return part.rows if self.name == "paper" else fold.train
+
+    def may_choose_pooled(self, everyone: Rows, fold: Fold) -> Rows:
+        """Return the rows from which a placement common to all subjects may be chosen for this fold."""
+        return everyone if self.name == "paper" else np.setdiff1d(everyone, fold.test)
+
+
+PAPER = Protocol(
+    "paper",
+    "The placement is chosen once, from all rows, test rows included, as the paper did: optimistic.",
+)
+HONEST = Protocol(
+    "honest",
+    "The placement is chosen anew inside each training fold; no test row has a say: what to expect of new grasps.",
+)
+PROTOCOLS = (PAPER, HONEST)
+
+
+def concerns(grasp_set: GraspSet, parts: tuple[Population, ...], scheme: Scheme, n_folds: int) -> tuple[str, ...]:
+    """Return a sentence if the grasps are simulated, and for each grasp type that is alone, too rare for the folds, or
+    tested but never trained.
+    """
+    made = grasp_set.simulated
+    simulated = [f"these grasps are simulated ({made}): the rates are not those of recorded ones"] if made else []
+    alone = [
+        f"subject {part.name}: every row is of {grasp_set.taxonomy.types[part.grasps[0]]}, nothing is to be told apart"
+        for part in parts
+        if len(part.grasps) == 1
+    ]
+    found = [text for part in parts for text in _untrained(grasp_set, part)]
+    if scheme == "stratified":
+        found = [text for part in parts for text in _rare(grasp_set, part, n_folds)] + found
+    return tuple(simulated + alone + found)
+
+
+def _rare(grasp_set: GraspSet, part: Population, n_folds: int) -> list[str]:
+    counts = np.bincount(grasp_set.labels[part.rows], minlength=len(grasp_set.taxonomy.types))
+    return [
+        f"subject {part.name} has {counts[label]} row(s) of {grasp_set.taxonomy.types[label]}: "
+        f"fewer than the {n_folds} folds, so some folds do not test it"
+        for label in part.grasps
+        if counts[label] < n_folds
+    ]
+
+
+def _untrained(grasp_set: GraspSet, part: Population) -> list[str]:
+    """Name the grasp types that some fold tests without having trained them, with the number of rows lost so."""
+    lost: dict[int, int] = {}
+    for fold in part.repeats[0]:
+        tested = grasp_set.labels[fold.test]
+        for label in np.setdiff1d(tested, grasp_set.labels[fold.train]).tolist():
+            lost[label] = lost.get(label, 0) + int(np.count_nonzero(tested == label))
+    return [
+        f"{count} row(s) of {grasp_set.taxonomy.types[label]} of subject {part.name} are tested by a fold that trains "
+        "no such row: they cannot be recognised"
+        for label, count in sorted(lost.items())
+    ]

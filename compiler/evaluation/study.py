@@ -1,21 +1,134 @@
-"""An evaluation: the paper's tables for the user's own recordings."""
+"""An evaluation: the paper's tables for the user's own recordings, from fits that are each done once."""
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from statistics import fmean
+from typing import Self
 
 import numpy as np
+
+from thenar.runtime.manifest import Options as Manifested
 
 from ..limits import check_memory, check_types
 from ..placement.methods.base import METHODS
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
-from .compositions import inputs
-from .concerns import concerns
-from .errors import EvaluationError
-from .fits import Progress, Training, is_blind, run_fits
-from .plan import RIVALS, Planner, TableName
-from .populations import Population, Scheme, populations
-from .protocols import PROTOCOLS, ProtocolName
-from .tables import Reader, Table
+from ..trainers.base import Training, changed
+from .fits import Fit, Labels, Progress, is_blind, run_fits
+from .folds import EvaluationError
+from .plan import RIVALS, CellPlan, Planner, RowPlan, TableName, TablePlan, inputs
+from .populations import PROTOCOLS, Population, ProtocolName, Scheme, concerns, populations
+from .rates import Average, Rate
+
+Predictions = Mapping[Fit, Labels]
+Confusion = tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """Least, mean and most of something that may differ from fold to fold."""
+
+    least: float
+    mean: float
+    most: float
+
+    @classmethod
+    def of(cls, values: Iterable[float]) -> Self:
+        """Return the spread of one or more values."""
+        listed = list(values)
+        return cls(min(listed), fmean(listed), max(listed))
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """The rate of one row of a table on one population.
+
+    switches   how many switches the classifiers had         draws  spread of the rates of random draws; else None
+    no_inputs  fits without any input that varies: they answer the most frequent grasp type of their training rows
+    confusion  (K, K) counts over all repeats, row: true, column: recognised, K as in Study.grasps; None but for
+               compositions
+    """
+
+    rate: Rate
+    switches: Spread
+    no_inputs: int
+    draws: Spread | None
+    confusion: Confusion | None
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A row of a table: its short name, what it is, its switches, its cells and their average."""
+
+    name: str
+    what: str
+    switches: Spread
+    cells: tuple[Cell, ...]
+    average: Average
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table in the paper's layout: a column a subject."""
+
+    name: TableName
+    protocol: ProtocolName
+    columns: tuple[str, ...]
+    rows: tuple[Row, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Reader:
+    """Reads rates off predictions: the true labels (n,), the labels that occur, the number of switches, and which fits
+    were blind.
+    """
+
+    labels: Labels
+    grasps: tuple[int, ...]
+    n_switches: int
+    predictions: Predictions
+    blind: frozenset[Fit]
+
+    def table(self, plan: TablePlan) -> Table:
+        """Return the table of a plan."""
+        columns = tuple(cell.part.name for cell in plan.rows[0].cells)
+        rows = tuple(self._row(row, confusing=plan.name == "compositions") for row in plan.rows)
+        return Table(plan.name, plan.protocol, columns, rows)
+
+    def cell(self, plan: CellPlan, *, confusing: bool) -> Cell:
+        """Return the cell of a plan, with its confusion matrix if `confusing`."""
+        correct = tuple(sum(map(self._correct, run)) for run in plan.runs)
+        repeats = len(plan.part.repeats)
+        rate = Rate.of(correct, plan.part.total, repeats if len(correct) > repeats else 1)
+        counts = [sum(column < self.n_switches for column in fit.columns) for fit in plan.fits]
+        blind = sum(fit in self.blind for fit in plan.fits)
+        confusion = self._confusion(plan.fits) if confusing else None
+        return Cell(rate, Spread.of(counts), blind, _draws(rate, repeats), confusion)
+
+    def _row(self, plan: RowPlan, *, confusing: bool) -> Row:
+        cells = tuple(self.cell(cell, confusing=confusing) for cell in plan.cells)
+        spreads = [cell.switches for cell in cells]
+        switches = Spread(min(s.least for s in spreads), fmean(s.mean for s in spreads), max(s.most for s in spreads))
+        return Row(plan.name, plan.what, switches, cells, Average.of(tuple(cell.rate for cell in cells)))
+
+    def _correct(self, fit: Fit) -> int:
+        return int(np.count_nonzero(self.predictions[fit] == self.labels[fit.fold.test]))
+
+    def _confusion(self, fits: list[Fit]) -> Confusion:
+        counts = np.zeros((len(self.grasps), len(self.grasps)), dtype=np.intp)
+        for fit in fits:
+            true = np.searchsorted(self.grasps, self.labels[fit.fold.test])
+            np.add.at(counts, (true, np.searchsorted(self.grasps, self.predictions[fit])), 1)
+        return tuple(map(tuple, counts.tolist()))
+
+
+def _draws(rate: Rate, repeats: int) -> Spread | None:
+    """Return the spread of the draws' own rates, each over its `repeats`; None if there is one draw only."""
+    if len(rate.correct) == repeats:
+        return None
+    draws = np.reshape(rate.correct, (-1, repeats)).mean(axis=1) / rate.total
+    return Spread.of(draws.tolist())
+
 
 TABLES: tuple[TableName, ...] = ("compositions", "generality", "pruning", "baselines")
 
@@ -34,6 +147,7 @@ class Options:
     prune       S of the placements of the compositions, the generality and the baselines
     prune_list  each S of the table of pooled and pruned placements
     rivals      methods that ID3 is compared with in the baselines, besides random placements
+    trainer     what makes every classifier, with its `settings`; rounds are LogitBoost's
     """
 
     subjects: tuple[str, ...] = ()
@@ -47,6 +161,8 @@ class Options:
     tables: tuple[TableName, ...] = TABLES
     seed: int = 1
     rivals: tuple[str, ...] = RIVALS
+    trainer: str = "logitboost"
+    settings: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +201,7 @@ def evaluate(
     for name in options.rivals:
         if not METHODS.named(name).by_number:
             raise EvaluationError(f"{name} takes S: a rival is a method that takes a number of switches")
+    training = Training.of(changed(Manifested(rounds=options.rounds, trainer=options.trainer), options.settings))
     chosen = _of_subjects(grasp_set, options.subjects)
     parts = populations(chosen, options.scheme, options.folds, options.repeats, options.seed)
     reasons = {name: _why_not(name, chosen, parts, options.scheme) for name in options.tables}
@@ -103,7 +220,7 @@ def evaluate(
     plans = [planner.table(name, each) for name, reason in reasons.items() if reason is None for each in protocols]
     fits = [fit for plan in plans for row in plan.rows for cell in row.cells for fit in cell.fits]
     X = inputs(chosen)
-    predictions = run_fits(X, chosen.labels, fits, Training(options.rounds), jobs, progress)
+    predictions = run_fits(X, chosen.labels, fits, training, jobs, progress)
     grasps = tuple(np.unique(chosen.labels).tolist())
     blind = frozenset(fit for fit in predictions if is_blind(X, fit))
     reader = Reader(chosen.labels, grasps, len(chosen.switch_names), predictions, blind)

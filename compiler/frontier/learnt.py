@@ -12,9 +12,8 @@ from ..boosting.stumps import Stumps, winners
 from ..evaluation.folds import Fold
 from ..placement.methods.base import METHODS
 from ..samples import Columns
-from ..tables.batch import integer_scores
 from ..tables.collapse import collapse
-from ..tables.quantise import quantise
+from ..tables.quantise import integer_scores, quantise
 from .material import Material
 from .settings import Shape
 

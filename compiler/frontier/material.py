@@ -8,8 +8,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from ..evaluation.folds import Fold, Rows, check_cut, weka_folds
-from ..evaluation.groups import leave_one_out
+from ..evaluation.folds import Fold, Rows, check_cut, leave_one_out, weka_folds
 from ..limits import check_inputs, check_memory, check_types
 from ..placement.ports import PortCosts
 from ..recordings.graspset import GraspSet

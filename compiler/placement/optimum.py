@@ -51,28 +51,9 @@ class Subset:
     nodes: int
 
     @property
-    def value(self) -> float:
-        """Return the share of the pairs that `columns` tell apart."""
-        return self.share_apart(self.alike)
-
-    @property
-    def bound(self) -> float:
-        """Return the share of the pairs that no subset of so many switches exceeds."""
-        return self.share_apart(self.least)
-
-    @property
-    def gap(self) -> float:
-        """Return how much better, at most, the best subset is: a share of all pairs."""
-        return self.bound - self.value
-
-    @property
     def proved(self) -> bool:
-        """Return whether no subset is better."""
+        """Whether no subset is better."""
         return self.alike <= self.least
-
-    def share_apart(self, alike: int) -> float:
-        """Return the share of the pairs told apart where so many look alike; 1 if there are none."""
-        return 1.0 - alike / self.pairs if self.pairs else 1.0
 
 
 def best_subset(

@@ -47,9 +47,14 @@ def choose(samples: Samples, method: str = PAPERS, parameter: float = 0.0, ports
         tree = grow_id3(samples.switches, samples.labels, min_samples=int(parameter))
         return Chosen(tree.inputs, tree.gains, tree)
     columns = METHODS.named(method).chooser(samples, ports)(parameter)
+    return Chosen(columns, information_alone(samples, columns), None)
+
+
+def information_alone(samples: Samples, columns: Columns) -> tuple[float, ...]:
+    """Return the information (bits) on the grasp type that each of the switches `columns` holds alone."""
     counts = Cooccurrence(samples.switches, samples.labels, samples.n_classes)
     alone = counts.information() / (len(samples.labels) * LN_2)
-    return Chosen(columns, tuple(float(alone[column]) for column in columns), None)
+    return tuple(float(alone[column]) for column in columns)
 
 
 class Kept(msgspec.Struct, frozen=True, omit_defaults=True):

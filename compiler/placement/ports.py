@@ -36,10 +36,6 @@ class PortCosts:
         if any(not 0 <= us < float("inf") for us in self.us):
             raise PlacementError("the time that reading a port takes must be finite and at least 0 us")
 
-    def scan_us(self, columns: Iterable[int]) -> float:
-        """Return the time that reading the switches `columns` takes."""
-        return sum(self.us[port] for port in sorted({self.port_of[column] for column in columns}))
-
     def shares(self, kept: Iterable[int]) -> NDArray[np.float64]:
         """Return, for every switch of `kept`, its port's time shared out over those of `kept` on it, over the mean time
         of a port; 0 where no port takes any time.

@@ -4,7 +4,7 @@ Nodes stand in preorder: a node, then its children's subtrees in the order of th
 of values of each node are all that is needed to know the children.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -130,6 +130,17 @@ class Tree(msgspec.Struct, frozen=True, dict=True):
         """Number of leaves of several classes whose rows agree in every input; pruned ones are none of them."""
         return sum(node.is_mixed_leaf and node.size >= self.min_samples for node in self.nodes)
 
+    def remarks(self, what: str = "input") -> Iterator[str]:
+        """Yield what should not pass in silence: decisions without a gain, and leaves that nothing tells apart."""
+        if self.n_zero_gain:
+            yield (
+                f"at {counted(self.n_zero_gain, 'node')} no {what} gains anything alone, "
+                "the lowest-numbered varying one was taken"
+            )
+        if self.n_undecided:
+            leaves = counted(self.n_undecided, "leaf", "leaves")
+            yield f"at {leaves} rows of several classes agree in every {what}"
+
     def predict(self, X: npt.ArrayLike) -> npt.NDArray[Any]:
         """Return the label (n,) of each row of X (n, n_inputs); a value not met in growing gets the node's majority."""
         matrix = check_matrix(X)
@@ -240,12 +251,4 @@ def _summary(tree: Tree) -> str:
         f"{len(tree.inputs)} of {tree.n_inputs} inputs, {len(tree.nodes)} nodes, {tree.n_leaves} leaves, "
         f"depth {tree.depth}{pruned}"
     )
-    if tree.n_zero_gain:
-        said += (
-            f"; at {counted(tree.n_zero_gain, 'node')} no input gains anything alone, the lowest-numbered varying one "
-            "was taken"
-        )
-    if tree.n_undecided:
-        leaves = counted(tree.n_undecided, "leaf", "leaves")
-        said += f"; at {leaves} rows of several classes agree in every input"
-    return said
+    return "; ".join([said, *tree.remarks()])

@@ -14,8 +14,8 @@ from ..evaluation.study import Study
 from ..frontier.points import Frontier
 from ..hand import HandShape
 from ..placement.tree import Tree
+from ..tables.compare import Comparison, WorstCase
 from .errors import ReportError
-from .guarantee import Guarantee
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +32,8 @@ class ReportContent:
     frontier      of which the report tells; point: the number of the one that the build is, None if it is none of them
     hand          where the recordings' switches lie
     scan, harness the scan map and the harness that it was made for
-    guarantee     the worst that integers can do, over every frame there is
+    comparison    the rows trained on, through the model, its tables and the integers
+    worst         the worst that integers can do, over every frame there is
 
     Raises ReportError where parts do not belong together.
     """
@@ -52,7 +53,8 @@ class ReportContent:
     hand: HandShape | None = None
     scan: ScanMap | None = None
     harness: Harness | None = None
-    guarantee: Guarantee | None = None
+    comparison: Comparison | None = None
+    worst: WorstCase | None = None
 
     def __post_init__(self) -> None:
         grasps = len(self.manifest.grasps)

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
+from ..tables.compare import Comparison, WorstCase
 from ..text import NBSP, counted, percent
 from .content import ReportContent
-from .guarantee import Guarantee
 from .plain_table import PlainTable
 
 
@@ -26,31 +26,31 @@ def guarantee_view(content: ReportContent) -> GuaranteeView:
         f"{proof.safe_margin:g} steps keeps its grasp type: {_share(proof.covered, rows)} rows trained on have it. "
         f"{counted(proof.changed, 'row')} changed grasp type.",
     )
-    found = content.guarantee
-    if found is None:
+    found, worst = content.comparison, content.worst
+    if found is None or worst is None:
         return GuaranteeView(sentences, None)
-    return GuaranteeView((*sentences, _worst(found)), _table(found, proof.width))
+    return GuaranteeView((*sentences, _worst(worst, len(found.margins))), _table(found, worst, proof.width))
 
 
-def _worst(found: Guarantee) -> str:
+def _worst(worst: WorstCase, rows: int) -> str:
     return (
-        f"At worst, over every frame there is and not only those recorded, {found.leader} loses {found.loss:.3f} steps "
-        f"of its lead over {found.rival}. Worked out exactly, ties in whole steps included, a lead of more than "
-        f"{found.safe_margin:.3f} steps is safe: {_share(found.covered, found.rows)} rows trained on have it."
+        f"At worst, over every frame there is and not only those recorded, {worst.leader} loses {worst.loss:.3f} steps "
+        f"of its lead over {worst.rival}. Worked out exactly, ties in whole steps included, a lead of more than "
+        f"{worst.safe_margin:.3f} steps is safe: {_share(worst.covered, rows)} rows trained on have it."
     )
 
 
-def _table(found: Guarantee, width: int) -> PlainTable:
-    most = 2 ** (width - 1) - 1
+def _table(found: Comparison, worst: WorstCase, width: int) -> PlainTable:
+    most, integer_bound = 2 ** (width - 1) - 1, found.integer_bound + found.slack
     rows = (
         (
             "Ensemble against float tables, units of score",
             f"{found.collapse_difference:.3g}",
             f"{found.collapse_bound:.3g}",
         ),
-        ("Float tables against integers, steps", f"{found.integer_difference:.3f}", f"{found.integer_bound:.3f}"),
-        ("Most that a lead can lose, steps, all frames", f"{found.loss:.3f}", f"{found.loss_bound:.3f}"),
-        ("Furthest that a sum can get from zero, steps", f"{abs(found.reach):,}", f"{most:,}"),
+        ("Float tables against integers, steps", f"{found.integer_difference:.3f}", f"{integer_bound:.3f}"),
+        ("Most that a lead can lose, steps, all frames", f"{worst.loss:.3f}", f"{worst.bound:.3f}"),
+        ("Furthest that a sum can get from zero, steps", f"{abs(worst.reach):,}", f"{most:,}"),
     )
     return PlainTable("Differences beside their bounds", ("What", "Found", "Bound"), rows)
 

@@ -8,6 +8,7 @@ import msgspec
 from thenar.runtime.manifest import Manifest, Options
 
 from ..text import counted
+from ..trainers.base import TRAINERS
 
 Pairs = tuple[tuple[str, str], ...]
 
@@ -47,8 +48,11 @@ def provenance(manifest: Manifest, scan: bool) -> Provenance:
 
 def _options(options: Options) -> Pairs:
     """Return every option that is set, by the name that `thenar compile` gives it."""
-    values = [(field.name, getattr(options, field.name)) for field in msgspec.structs.fields(options)]
-    return tuple((f"--{name.replace('_', '-')}", _plain(value)) for name, value in values if value is not None)
+    names = {trainer.name: {setting.name for setting in trainer.settings} for trainer in TRAINERS.values()}
+    foreign = set().union(*names.values()) - names.get(options.trainer, set()) | {"settings"}
+    fields = [field.name for field in msgspec.structs.fields(options) if field.name not in foreign]
+    values = {name: getattr(options, name) for name in fields} | options.settings
+    return tuple((f"--{name.replace('_', '-')}", _plain(value)) for name, value in values.items() if value is not None)
 
 
 def _plain(value: object) -> str:

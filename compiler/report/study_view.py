@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 from ..evaluation.plan import TableName
-from ..evaluation.protocols import PROTOCOLS
-from ..evaluation.study import Study
-from ..evaluation.tables import Cell, Row, Spread, Table
+from ..evaluation.populations import PROTOCOLS
+from ..evaluation.study import Cell, Row, Spread, Study, Table
 from ..text import NBSP, counted, interval, sentence
 
 _TITLES: dict[TableName, str] = {

@@ -41,6 +41,11 @@ class ScoreTables:
         """Kept switches and joints together."""
         return len(self.switch_rows) + len(self.thresholds)
 
+    @property
+    def n_classes(self) -> int:
+        """Number K of classes."""
+        return len(self.bias)
+
     def scores(self, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> Floats:
         """Return F (n, K) of the kept switches (n, s) and the joints' codes (n, j)."""
         # Row after row and not as a matrix product, whose bits depend on the machine.
@@ -52,12 +57,24 @@ class ScoreTables:
         return scores
 
 
-def collapse(stumps: Stumps, n_switches: int) -> ScoreTables:
-    """Return the score tables of an ensemble over [kept switches | joint codes], the first `n_switches` being switches.
+# What trainers make: score tables, or an ensemble that collapses to them.
+Model = Stumps | ScoreTables
 
-    Equal to `stumps.scores` on bits and codes 0..65535 up to the rounding of sums (1e-12 of what is summed), however
-    many rounds there are: all that an input adds is summed with compensation, and rounded once.
+
+def model_scores(model: Model, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> Floats:
+    """Return a model's own scores F (n, K) of the kept switches (n, s) and the joints' codes (n, j)."""
+    return model.scores(np.hstack([bits, codes])) if isinstance(model, Stumps) else model.scores(bits, codes)
+
+
+def collapse(model: Model, n_switches: int) -> ScoreTables:
+    """Return the score tables of a model over [kept switches | joint codes], the first `n_switches` being switches.
+
+    Those of an ensemble are equal to its scores on bits and codes 0..65535 up to the rounding of sums (1e-12 of what is
+    summed), however many rounds there are: all that an input adds is summed with compensation, and rounded once.
     """
+    if isinstance(model, ScoreTables):
+        return model
+    stumps = model
     left, right = _answers(stumps, 0), _answers(stumps, 1)
     columns, floors = stumps.columns.ravel(), np.floor(stumps.thresholds.ravel())
     bias = np.zeros(stumps.n_classes)

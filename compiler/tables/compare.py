@@ -1,16 +1,19 @@
 """The same frames through the ensemble, the float tables and the integer tables: differences held against bounds."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
 
 from thenar.runtime.scores import LANE_OFFSET, Scorer
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.tables import LIMIT, IntegerTables
 
-from ..boosting.stumps import Stumps, winners
-from .collapse import Floats, ScoreTables, collapse
+from ..boosting.stumps import TIE, Stumps, winners
+from .collapse import Floats, Model, ScoreTables, collapse, model_scores
+from .furthest import furthest
+from .worstcase import Rounding
 
 COLLAPSE_TOLERANCE = 1e-12  # of the sum of the magnitudes that are added up
 
@@ -51,6 +54,60 @@ class Comparison:
         return collapsed and rounded and not self.covered[self.changed].any()
 
 
+class WorstCase(Struct, frozen=True, kw_only=True):
+    """What integers can do at worst, in steps, exactly and over every frame there is, recorded or not.
+
+    In the frame `closed` (names of kept switches) and `codes`, the lead of grasp type `leader` over `rival` loses most.
+    A margin above safe_margin keeps its grasp type: true of `covered` rows, of which `covered_changed` change all the
+    same. `reach` is the furthest that a sum gets from zero, in any order, whole or with inputs missing: for `reaching`.
+    """
+
+    leader: str
+    rival: str
+    loss: float
+    bound: float
+    closed: tuple[str, ...]
+    codes: tuple[int, ...]
+    safe_margin: float
+    covered: int
+    covered_changed: int
+    reaching: str
+    reach: int
+    limit: int = LIMIT
+
+    @property
+    def holds(self) -> bool:
+        """Whether no lead can lose more than the bound, and no covered row changes."""
+        return self.loss <= self.bound and not self.covered_changed
+
+
+def worst_case(
+    model: Model, integers: IntegerTables, comparison: Comparison, grasps: Sequence[str], switches: Sequence[str]
+) -> WorstCase:
+    """Return what is proved of `integers` over all frames, and which of the rows of `comparison` that covers.
+
+    They were made of `model`; `grasps` and `switches` are the names of its classes and kept switches.
+    """
+    rounding = Rounding(collapse(model, integers.n_switches), integers)
+    frame, furthest_sum = rounding.worst_of_all(), furthest(integers)
+    safe = float(rounding.safe_margin())
+    # Scores that the ensemble takes for tied are decided by the number of the class.
+    covered = comparison.margins > max(safe, TIE * integers.scale) + 2 * comparison.slack
+    return WorstCase(
+        leader=grasps[frame.leader],
+        rival=grasps[frame.rival],
+        loss=float(frame.loss),
+        bound=comparison.safe_margin + 2 * comparison.slack,
+        closed=tuple(name for name, bit in zip(switches, frame.bits.tolist(), strict=True) if bit),
+        codes=tuple(frame.codes.tolist()),
+        safe_margin=safe,
+        covered=int(np.count_nonzero(covered)),
+        covered_changed=int(np.count_nonzero(covered[comparison.changed])),
+        reaching=grasps[furthest_sum.grasp],
+        reach=furthest_sum.total,
+    )
+
+
 def rounding_error(n_inputs: int) -> float:
     """Return the most steps that rounding can move a score: half for the bias, half for the row of each input."""
     return (n_inputs + 1) / 2
@@ -69,34 +126,40 @@ def float_slack(tables: ScoreTables, scale: float) -> float:
 
 
 def compare(
-    stumps: Stumps,
+    model: Model,
     integers: IntegerTables,
     bits: Flags,
     codes: NDArray[np.uint16],
     report: Callable[[int, int], None] | None = None,
 ) -> Comparison:
     """Send the kept switches (n, s) and codes (n, j) through all three; the integers frame by frame, as they run."""
-    tables = collapse(stumps, bits.shape[1])
-    by_stumps = stumps.scores(np.hstack([bits, codes]))
+    tables = collapse(model, bits.shape[1])
+    by_model = model_scores(model, bits, codes)
     by_tables = tables.scores(bits, codes)
     by_integers = _deployed_scores(integers, bits, codes, report)
     steps = by_tables * integers.scale
     best_two = np.sort(steps, axis=1)[:, -2:]
     margins = best_two[:, 1] - best_two[:, 0]
     error, slack = rounding_error(tables.n_inputs), float_slack(tables, integers.scale)
-    magnitudes = 2 * stumps.shrinkage * np.abs(stumps.values[:, :, :2]).max(axis=(1, 2)).sum()
     return Comparison(
-        collapse_difference=float(np.abs(by_stumps - by_tables).max()),
-        collapse_bound=COLLAPSE_TOLERANCE * float(magnitudes),
+        collapse_difference=float(np.abs(by_model - by_tables).max()),
+        collapse_bound=COLLAPSE_TOLERANCE * _magnitudes(model),
         integer_difference=float(np.abs(steps - by_integers).max()),
         integer_bound=error,
         slack=slack,
         safe_margin=2 * error,
-        trained=winners(by_stumps),
+        trained=winners(by_model),
         deployed=by_integers.argmax(axis=1),
         margins=margins,
         covered=margins > 2 * (error + slack),
     )
+
+
+def _magnitudes(model: Model) -> float:
+    """Return the sum of the magnitudes that an ensemble adds up; from tables to themselves nothing is lost."""
+    if not isinstance(model, Stumps):
+        return 0.0
+    return float(2 * model.shrinkage * np.abs(model.values[:, :, :2]).max(axis=(1, 2)).sum())
 
 
 def _deployed_scores(

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.compiler.boosting.boost import boost
-from thenar.compiler.placement.gain import Counts, best_position, compare_scores
+from thenar.compiler.placement.exact import Counts
+from thenar.compiler.placement.gain import best_position, compare_scores
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.placement.tree import Tree
 

@@ -55,12 +55,12 @@ def _rest(sets: Iterator[HardSet], rounds: int) -> Iterator[Finding]:
     shares = Worst("P of a class on a contradictory frame, in the end", "shares of the counts", 1.0, "x rounding")
     losses = Worst("the loss in the end", "the entropy left, 60 digits", 1.0, "x rounding")
     for hard in sets:
-        stumps, history = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds, weights=hard.weights)
+        stumps, falling = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds, weights=hard.weights)
         *_, last = moments(hard, stumps)
         shares.see(resting_error(hard, last), hard.name, last.shares.size)
         least = entropy_left(hard)
         allowed = loss_rounding(hard.n_classes, float(least)) + idle_loss(hard, last)
-        losses.see(distance(history.losses[-1], least) / allowed, hard.name)
+        losses.see(distance(falling[-1], least) / allowed, hard.name)
     yield from (shares.finding(), losses.finding())
 
 
@@ -101,8 +101,8 @@ def _noise(rounds: int) -> Iterator[Finding]:
     below = Worst("losses are above the entropy left", REFERENCE, 0.0, "rounds")
     rises = Worst("rise of the loss, where it must fall", "convexity", 1.0, "x rounding")
     for hard, shrinkage in noisy_sets():
-        stumps, history = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds, shrinkage=shrinkage)
-        _see_losses(hard, history.losses, below)
+        stumps, falling = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds, shrinkage=shrinkage)
+        _see_losses(hard, falling, below)
         before = None
         for number, moment in enumerate(moments(hard, stumps)):
             at = f"{hard.name}, round {number}"

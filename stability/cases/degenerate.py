@@ -114,11 +114,11 @@ def _one_class(rounds: int) -> Finding:
     off = Worst("share, score and loss of the only class", "1, 0 and 0", 0, "score")
     for grasp_set in (_ONE_ROW, _ONE_CLASS):
         X = np.hstack([grasp_set.switches, grasp_set.codes])
-        stumps, history = boost(X, grasp_set.labels, 1, rounds=rounds)
+        stumps, falling = boost(X, grasp_set.labels, 1, rounds=rounds)
         scores = stumps.scores(X)
         shares = softmax(np.ascontiguousarray(scores.T))
-        error = max(float(np.abs(shares - 1).max()), float(np.abs(scores).max()), *history.losses)
-        off.see(error, f"{len(X)} rows", tried=len(history.losses))
+        error = max(float(np.abs(shares - 1).max()), float(np.abs(scores).max()), *falling)
+        off.see(error, f"{len(X)} rows", tried=len(falling))
     return off.finding()
 
 

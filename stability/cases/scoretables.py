@@ -9,9 +9,8 @@ from mpmath import mpf
 from numpy.typing import NDArray
 
 from thenar.compiler.boosting.stumps import Stumps
-from thenar.compiler.tables.balance import balance
 from thenar.compiler.tables.collapse import ScoreTables, collapse
-from thenar.compiler.tables.quantise import quantise
+from thenar.compiler.tables.quantise import balance, quantise
 
 from ..checks.roundings import ROUNDING, SMALLEST, part_of
 from ..finding import Case, Finding, Worst

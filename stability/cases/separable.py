@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from thenar.compiler.boosting.boost import History, boost
+from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import Stumps, winners
 from thenar.compiler.tables.collapse import collapse
 from thenar.compiler.tables.quantise import quantise
@@ -63,13 +63,13 @@ def _trained(runs: list[tuple[HardSet, int, bool]]) -> Iterator[Finding]:
     overflow = Worst("largest sum of the integer tables, any order", "all rows' extremes", LIMIT, "steps")
     wrong = Worst("frames not named right by ensemble and integers", "their labels", 0.0, "frames")
     for hard, rounds, must_fall in runs:
-        stumps, history = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds)
+        stumps, fallen = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds)
         before: Moment | None = None
         for number, moment in enumerate(moments(hard, stumps)):
             at = f"{hard.name}, round {number}"
             outside.see(float(not _in_range(hard, moment)), at)
             sums.see(_sum_error(moment), at)
-            told.see(float(moment.loss != history.losses[number]), at)
+            told.see(float(moment.loss != fallen[number]), at)
             if before is not None and must_fall:
                 rises.see(_rise(hard, before, moment), at)
             if number & (number - 1) == 0:
@@ -135,14 +135,14 @@ def _stopped(sets: list[HardSet]) -> Iterator[Finding]:
     """The tolerance ends training in the first round that changes the loss by less, keeps it, and is told."""
     worst = Worst("trainings that the tolerance ends in another round", "the losses without it", 0.0, "trainings")
     for hard in sets:
-        long, history = boost(hard.X, hard.labels, hard.n_classes, rounds=100)
-        changes = np.abs(np.diff(history.losses))
+        long, losses = boost(hard.X, hard.labels, hard.n_classes, rounds=100)
+        changes = np.abs(np.diff(losses))
         for tolerance in (0.0, 1e-12, 1e-6, 1e-3):
             stumps, short = boost(hard.X, hard.labels, hard.n_classes, rounds=100, tolerance=tolerance)
             small = np.flatnonzero(changes < tolerance)
             due = int(small[0]) + 1 if small.size else 100
-            holds = stumps.n_rounds == due and short.stopped_early == bool(small.size)
-            holds &= short.losses == history.losses[: due + 1] and _same(stumps, long.first(due))
+            holds = stumps.n_rounds == due and stumps.stopped_early == bool(small.size)
+            holds &= short == losses[: due + 1] and _same(stumps, long.first(due))
             worst.see(float(not holds), f"{hard.name}, tolerance {tolerance:g}")
     yield worst.finding()
 
@@ -151,7 +151,7 @@ def _same(one: Stumps, other: Stumps) -> bool:
     return one.values.tobytes() == other.values.tobytes() and one.columns.tobytes() == other.columns.tobytes()
 
 
-def _rising(n: int) -> Iterator[tuple[HardSet, Stumps, History]]:
+def _rising(n: int) -> Iterator[tuple[HardSet, Stumps, tuple[float, ...]]]:
     """Yield trainings of two classes of 12 to 33 declared, separable and on few frames, whose loss rises somewhere."""
     rng = np.random.default_rng(1)
     while n:
@@ -159,25 +159,25 @@ def _rising(n: int) -> Iterator[tuple[HardSet, Stumps, History]]:
         labels = rng.integers(0, 2, len(X))
         hard = HardSet("two classes of many", X, labels, int(rng.integers(12, 34)), 0)
         if np.ptp(X, axis=0).any():
-            stumps, history = boost(X, labels, hard.n_classes, rounds=40)
-            if (np.diff(history.losses) > 1e-6).any():
+            stumps, losses = boost(X, labels, hard.n_classes, rounds=40)
+            if (np.diff(losses) > 1e-6).any():
                 n -= 1
-                yield hard, stumps, history
+                yield hard, stumps, losses
 
 
-def _told(trainings: Iterator[tuple[HardSet, Stumps, History]]) -> Finding:
+def _told(trainings: Iterator[tuple[HardSet, Stumps, tuple[float, ...]]]) -> Finding:
     """Where the loss does rise, the rise is true: before and after it the loss is that of the scores."""
     worst = Worst("the loss, where it may rise (2 classes, many declared)", "60 digits", 1.0, "x rounding")
-    for hard, stumps, history in trainings:
+    for hard, stumps, losses in trainings:
         scores = [np.zeros((len(hard.X), hard.n_classes)), *stumps.staged_scores(hard.X)]
-        for number in _around(history):
+        for number in _around(losses):
             truth = mean_loss(scores[number].tolist(), hard.labels.tolist())
-            error = distance(history.losses[number], truth)
+            error = distance(losses[number], truth)
             worst.see(error / loss_rounding(hard.n_classes, float(truth)), f"{hard.n_classes} classes, round {number}")
     return worst.finding()
 
 
-def _around(history: History) -> list[int]:
+def _around(losses: tuple[float, ...]) -> list[int]:
     """Return the rounds before and after the largest rise."""
-    rise = int(np.diff(history.losses).argmax())
+    rise = int(np.diff(losses).argmax())
     return [rise, rise + 1]

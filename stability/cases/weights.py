@@ -65,9 +65,9 @@ def _extreme(rounds: int) -> Iterator[Finding]:
         (imbalanced(10**6), 0),
         (sinking, 1100),
     ]:
-        stumps, history = boost(hard.X, hard.labels, hard.n_classes, rounds=first + rounds, weights=hard.weights)
+        stumps, falling = boost(hard.X, hard.labels, hard.n_classes, rounds=first + rounds, weights=hard.weights)
         for number, moment in enumerate(moments(hard, stumps)):
-            outside.see(float(not _in_range(moment, history.losses[number])), f"{hard.name}, round {number}")
+            outside.see(float(not _in_range(moment, falling[number])), f"{hard.name}, round {number}")
             if first <= number < stumps.n_rounds and (number < first + 12 or number % 10 == 0):
                 see_round(hard, stumps, number, moment.scores, 3.0, chosen, answers)
         outside.see(float(not (np.abs(stumps.values) <= 3.0).all()), hard.name)

@@ -33,10 +33,10 @@ class Learnt:
 
 def learn(hard: HardSet, rounds: int = ROUNDS) -> Learnt:
     """Learn from `hard` all that there is to learn. ID3 knows no weights."""
-    stumps, history = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds, weights=hard.weights)
+    stumps, falling = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds, weights=hard.weights)
     tables = collapse(stumps, hard.n_switches)
     integers = quantise(tables, hard.bits, hard.codes)
-    return Learnt(grow_id3(hard.X, hard.labels), stumps, history.losses, tables, integers)
+    return Learnt(grow_id3(hard.X, hard.labels), stumps, falling, tables, integers)
 
 
 def numbers(learnt: Learnt, inputs: Sequence[int], classes: Sequence[int]) -> Iterator[tuple[str, NDArray[Any]]]:

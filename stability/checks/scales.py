@@ -2,8 +2,8 @@
 
 import math
 
-from thenar.compiler.tables.balance import balance
 from thenar.compiler.tables.collapse import ScoreTables
+from thenar.compiler.tables.quantise import balance
 
 from ..finding import Finding, Worst
 from ..inputs.hard_tables import dominated, drawn, quantised, rows_of

@@ -3,11 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.evaluation.compositions import inputs
-from thenar.compiler.evaluation.fits import Fit, Training, predictions
+from thenar.compiler.evaluation.fits import Fit, predictions
+from thenar.compiler.evaluation.plan import inputs
 from thenar.compiler.evaluation.populations import Population, Scheme, populations
-from thenar.compiler.evaluation.tables import Cell
+from thenar.compiler.evaluation.study import Cell
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.trainers.base import Training
 
 from .small_sets import make_set
 
@@ -48,6 +49,7 @@ def guessed_untrained(grasp_set: GraspSet, scheme: Scheme) -> int:
     wrong = 0
     for part in parts_of(grasp_set, scheme):
         for fold in part.folds:
-            found = predictions(X, labels, Fit(fold, tuple(range(X.shape[1])), part.grasps), Training(rounds=10))
+            fit = Fit(fold, tuple(range(X.shape[1])), part.grasps, len(grasp_set.switch_names))
+            found = predictions(X, labels, fit, Training("logitboost", {"rounds": 10}))
             wrong += int((~np.isin(found, labels[fold.train])).sum())
     return wrong

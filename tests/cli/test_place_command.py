@@ -56,7 +56,7 @@ def test_nodes_at_which_nothing_gains_are_said(
     )
     exclusive_or.save(tmp_path / "xor.grasps")
     assert run(["place", str(tmp_path / "xor.grasps")]) == 0
-    assert "at 1 of the decisions no switch gains anything alone" in capsys.readouterr().out
+    assert "at 1 node no switch gains anything alone" in capsys.readouterr().out
 
 
 def test_a_set_without_switches_is_refused(
@@ -93,7 +93,7 @@ def test_a_mistake_is_one_sentence_and_code_two(
     [
         (["cup", "cup"], [], "all rows are of one grasp type: there is nothing to tell apart"),
         (["cup", "pen"], ["--prune", "3"], "no decision was made: the 2 rows are fewer than S = 3"),
-        (["cup", "pen"], [], "at 1 of the leaves rows of several grasp types agree in every switch"),
+        (["cup", "pen"], [], "at 1 leaf rows of several classes agree in every switch"),
     ],
 )
 def test_a_placement_of_no_switch_says_why(

@@ -11,7 +11,7 @@ import pytest
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.artifact.errors import CompileError
 from thenar.compiler.boosting.boost import BoostingError, boost
-from thenar.compiler.evaluation.errors import EvaluationError
+from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.evaluation.study import Options, evaluate
 from thenar.compiler.frontier.material import Material
 from thenar.compiler.frontier.points import FrontierError

@@ -17,7 +17,7 @@ from mutating import Mutate, altered, json_file, npz_file, sealed
 
 from thenar.cli.from_frontier import picked
 from thenar.cli.kept_files import kept_names
-from thenar.compiler.artifact.verify import verify_build
+from thenar.compiler.artifact.verify import verify
 from thenar.compiler.firmware.folder import sums, write_folder
 from thenar.compiler.firmware.generate import Request, firmware_files, fit_of
 from thenar.compiler.frontier import points
@@ -99,7 +99,7 @@ def _live(build: Build, _folder: Path) -> None:
 
 
 def _verified(_build: Build, folder: Path) -> None:
-    verify_build(folder, grasp_set())
+    verify(folder, grasp_set())
 
 
 def _spec(build: Build, _folder: Path) -> None:

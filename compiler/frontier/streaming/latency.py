@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from thenar.runtime.policy import Policy
 from thenar.runtime.tables import IntegerTables
 
-from ...tables.batch import integer_scores
+from ...tables.quantise import integer_scores
 from ..points import DecisionKind, FrontierError, Latency
 from .deciding import NOTHING, Decisions, decisions, stretches
 from .stream import Stream

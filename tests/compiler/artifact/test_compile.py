@@ -13,8 +13,8 @@ import pytest
 
 from thenar.compiler import GraspSet, compile_build, grow_id3
 from thenar.compiler.artifact.errors import CompileError
-from thenar.compiler.artifact.verify import verify_build
-from thenar.compiler.evaluation.errors import EvaluationError
+from thenar.compiler.artifact.verify import verify
+from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.drivers.errors import ThenarError
 from thenar.runtime import Build
 from thenar.runtime.manifest import Inputs
@@ -164,7 +164,7 @@ def test_tables_for_narrow_entries_are_coarser_say_so_and_hold(grasp_set: GraspS
     assert narrow.proof.scale < wide.proof.scale / 8
     assert (narrow.proof.error, narrow.proof.safe_margin) == (wide.proof.error, wide.proof.safe_margin)
     assert narrow.proof.bound == Build.load(tmp_path / "narrow").tables.bound < wide.proof.bound
-    found = verify_build(tmp_path / "narrow", grasp_set)
+    found = verify(tmp_path / "narrow", grasp_set)
     assert found.holds
     assert (found.covered, len(found.changed)) == (narrow.proof.covered, narrow.proof.changed)
 
@@ -176,7 +176,7 @@ def test_joints_of_few_bins_make_small_tables_that_hold(grasp_set: GraspSet, tmp
     assert max(map(len, Build.load(tmp_path / "every").tables.thresholds)) > 2
     assert max(map(len, Build.load(tmp_path / "few").tables.thresholds)) <= 2
     assert few.tables_bytes < every.tables_bytes
-    assert verify_build(tmp_path / "few", grasp_set).holds
+    assert verify(tmp_path / "few", grasp_set).holds
 
 
 def test_wide_tables_are_what_a_build_has_unless_told_and_build_json_is_as_it_was(

@@ -7,12 +7,12 @@ import pytest
 
 from thenar.compiler import compile_build
 from thenar.compiler.artifact.select import select_inputs
-from thenar.compiler.artifact.training import material_of, train
-from thenar.compiler.artifact.verify import verify_build
+from thenar.compiler.artifact.training import samples_of, train
+from thenar.compiler.artifact.verify import verify
 from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.evaluation.folds import weka_folds
 from thenar.compiler.recordings.importer import import_file
-from thenar.compiler.tables.collapse import collapse
+from thenar.compiler.tables.collapse import collapse, model_scores
 from thenar.compiler.tables.quantise import quantise
 from thenar.runtime import Build
 from thenar.runtime.manifest import Inputs, Options
@@ -30,7 +30,7 @@ def test_a_build_of_real_recordings_holds_and_recognises(
     varying = np.flatnonzero(grasp_set.switches.any(axis=0) & ~grasp_set.switches.all(axis=0))
     assert {switch.column for switch in manifest.switches} <= set(varying.tolist())
 
-    found = verify_build(tmp_path / "build", grasp_set)
+    found = verify(tmp_path / "build", grasp_set)
     assert found.holds
     assert found.covered == len(grasp_set)
 
@@ -47,17 +47,17 @@ def test_integers_recognise_within_a_fifth_of_a_point_of_what_the_ensemble_does_
 ) -> None:
     grasp_set, _ = import_file(icub_table, COLUMNS / "icub.toml")
     options = Options(0, 100, inputs, 1.0, 4, 1)
-    material = material_of(grasp_set, options)
+    material = samples_of(grasp_set, options)
     by_ensemble = by_integers = 0
     for fold in weka_folds(material.labels, options.folds, options.seed):
-        part, test = material.rows(fold.train), material.rows(fold.test)
-        trained = train(part, options)
-        tables = collapse(trained.stumps, len(trained.columns))
-        integers = quantise(tables, trained.kept(part), part.codes, entry_bits=entry_bits)
-        scores = trained.kept(test) @ integers.switch_rows.astype(int) + integers.bias
+        trained = train(material.rows(fold.train), options)
+        part, test = (material.rows(rows).keeping(trained.columns) for rows in (fold.train, fold.test))
+        tables = collapse(trained.model, len(trained.columns))
+        integers = quantise(tables, part.switches, part.codes, entry_bits=entry_bits)
+        scores = test.switches @ integers.switch_rows.astype(int) + integers.bias
         for codes, thresholds, rows in zip(test.codes.T, integers.thresholds, integers.joint_rows, strict=True):
             scores += rows[np.searchsorted(thresholds, codes)]
-        found = winners(trained.stumps.scores(np.hstack([trained.kept(test), test.codes])))
+        found = winners(model_scores(trained.model, test.switches, test.codes))
         by_ensemble += int(np.count_nonzero(found == test.labels))
         by_integers += int(np.count_nonzero(scores.argmax(axis=1) == test.labels))
     assert by_ensemble > len(grasp_set) / 2

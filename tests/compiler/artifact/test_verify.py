@@ -1,4 +1,5 @@
 import hashlib
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -9,12 +10,20 @@ import pytest
 from msgspec.structs import replace as replace_fields
 
 from thenar.compiler import GraspSet, compile_build
+from thenar.compiler.artifact.documents import REPORT_NAME
 from thenar.compiler.artifact.ensemble import ensemble_from_bytes
 from thenar.compiler.artifact.errors import CompileError
-from thenar.compiler.artifact.verify import verify_build
+from thenar.compiler.artifact.staging import MEMBERS
+from thenar.compiler.artifact.verify import ScanCheck, check_scan, verify
 from thenar.compiler.tables.collapse import collapse
 from thenar.runtime import Build, BuildError
+from thenar.runtime.build import SCAN_NAME
+from thenar.runtime.errors import HarnessError
+from thenar.runtime.harness.wiring import BusWiring, Harness
 from thenar.runtime.manifest import manifest_from_bytes, manifest_to_bytes
+from thenar.runtime.scanning.plan import check_harness
+from thenar.runtime.scanning.propose import propose_harness
+from thenar.runtime.scanning.scanmap import scanmap_to_bytes
 from thenar.runtime.tables import IntegerTables, tables_from_bytes, tables_to_bytes
 
 Make = Callable[..., GraspSet]
@@ -44,7 +53,7 @@ def _seal(folder: Path, tables: IntegerTables) -> None:
 
 
 def test_a_build_holds_on_the_recordings_it_was_made_from(folder: Path, grasp_set: GraspSet) -> None:
-    found = verify_build(folder, grasp_set)
+    found = verify(folder, grasp_set)
     proof = manifest_from_bytes((folder / "build.json").read_bytes()).proof
     assert found.holds
     assert found.same_recordings
@@ -55,7 +64,7 @@ def test_a_build_holds_on_the_recordings_it_was_made_from(folder: Path, grasp_se
 
 
 def test_the_worst_frame_is_told_whether_recorded_or_not(folder: Path, grasp_set: GraspSet) -> None:
-    worst = verify_build(folder, grasp_set).worst
+    worst = verify(folder, grasp_set).worst
     build = Build.load(folder)
     bits = [switch.name in worst.closed for switch in build.manifest.switches]
     stumps = ensemble_from_bytes((folder / "ensemble.bin").read_bytes())
@@ -79,7 +88,7 @@ def test_a_fault_that_no_recorded_row_shows_does_not_hold(folder: Path, grasp_se
     rows = np.vstack([tables.joint_rows[0], tables.joint_rows[0][-1:] + np.array([-30, 0, 0, 0], np.int16)])
     thresholds = (np.append(tables.thresholds[0], np.uint16(300)), *tables.thresholds[1:])
     _seal(folder, replace(tables, thresholds=thresholds, joint_rows=(rows, *tables.joint_rows[1:])))
-    found = verify_build(folder, grasp_set)
+    found = verify(folder, grasp_set)
     assert found.integer_difference <= found.integer_bound
     assert found.worst.loss > found.worst.bound
     assert found.worst.codes[0] == 301
@@ -92,7 +101,7 @@ def test_other_recordings_with_their_columns_in_another_order_will_do(folder: Pa
         other.switches[:, ::-1], other.switch_names[::-1], other.codes[:, ::-1], other.joints[::-1],
         other.grasps, other.taxonomy, other.subjects, other.objects, other.trials,
     )  # fmt: skip
-    found, straight = verify_build(folder, shuffled), verify_build(folder, other)
+    found, straight = verify(folder, shuffled), verify(folder, other)
     assert not found.same_recordings
     assert found.holds
     assert found == straight
@@ -101,14 +110,14 @@ def test_other_recordings_with_their_columns_in_another_order_will_do(folder: Pa
 
 def test_tables_that_are_not_the_ensembles_do_not_hold(folder: Path, grasp_set: GraspSet) -> None:
     _silence(folder, 1)
-    found = verify_build(folder, grasp_set)
+    found = verify(folder, grasp_set)
     assert not found.holds
     assert found.integer_difference > found.integer_bound
 
 
 def test_every_changed_row_is_told(folder: Path, grasp_set: GraspSet) -> None:
     _silence(folder, 3)
-    found = verify_build(folder, grasp_set)
+    found = verify(folder, grasp_set)
     assert found.changed
     assert found.covered_changed > 0
     for row in found.changed:
@@ -122,7 +131,7 @@ def test_every_changed_row_is_told(folder: Path, grasp_set: GraspSet) -> None:
 
 def test_missing_inputs_are_named(folder: Path, make_set: Make) -> None:
     with pytest.raises(CompileError, match="lack joints that the build needs: j2"):
-        verify_build(folder, make_set(joints=2))
+        verify(folder, make_set(joints=2))
 
 
 def test_codes_that_mean_something_else_are_refused(folder: Path, grasp_set: GraspSet) -> None:
@@ -133,26 +142,26 @@ def test_codes_that_mean_something_else_are_refused(folder: Path, grasp_set: Gra
         grasp_set.grasps, grasp_set.taxonomy, grasp_set.subjects, grasp_set.objects, grasp_set.trials,
     )  # fmt: skip
     with pytest.raises(CompileError, match="joint j1 is coded differently here: code 0 is 10 deg, in the build 0 deg"):
-        verify_build(folder, other)
+        verify(folder, other)
 
 
 def test_the_point_at_which_codes_mean_something_else_is_named(folder: Path, grasp_set: GraspSet) -> None:
     steeper = replace(grasp_set.joints[1], value_b=200.0)
     other = replace(grasp_set, joints=(grasp_set.joints[0], steeper, grasp_set.joints[2]))
     with pytest.raises(CompileError, match=r"code 255 is 200 deg, in the build 127\.5 deg"):
-        verify_build(folder, other)
+        verify(folder, other)
 
 
 def test_the_ensemble_of_another_build_is_refused(folder: Path, make_set: Make, tmp_path: Path) -> None:
     compile_build(make_set(seed=3), tmp_path / "other", rounds=15, folds=0)
     (folder / "ensemble.bin").write_bytes((tmp_path / "other" / "ensemble.bin").read_bytes())
     with pytest.raises(BuildError, match=r"ensemble\.bin is not the one"):
-        verify_build(folder, make_set())
+        verify(folder, make_set())
 
 
 def test_recordings_without_rows_are_refused(folder: Path, grasp_set: GraspSet) -> None:
     with pytest.raises(CompileError, match="no rows"):
-        verify_build(folder, grasp_set.rows(np.array([], int)))
+        verify(folder, grasp_set.rows(np.array([], int)))
 
 
 @pytest.mark.slow
@@ -161,5 +170,122 @@ def test_verifying_hundreds_of_classes_is_no_slower_than_compiling_them(make_set
     began = perf_counter()
     compile_build(many, tmp_path / "build", rounds=10, folds=0)
     compiled = perf_counter()
-    assert verify_build(tmp_path / "build", many).holds
+    assert verify(tmp_path / "build", many).holds
     assert perf_counter() - compiled <= compiled - began
+
+
+@pytest.fixture(scope="module")
+def harness(grasp_set: GraspSet) -> Harness:
+    """All switches of the recordings, seven a chip; kept ones among them."""
+    return propose_harness(grasp_set.switch_names, "mcp23008")
+
+
+def _bytes(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+
+
+def test_the_build_holds_a_map_of_the_harness_and_says_its_checksum(
+    grasp_set: GraspSet, harness: Harness, tmp_path: Path
+) -> None:
+    report = compile_build(grasp_set, tmp_path / "build", rounds=4, folds=0, harness=harness)
+    files = _bytes(tmp_path / "build")
+    assert set(files) == MEMBERS - {REPORT_NAME}
+    assert report.manifest.scan_sha256 == hashlib.sha256(files[SCAN_NAME]).hexdigest()
+    assert report.scan is not None
+    assert files[SCAN_NAME] == scanmap_to_bytes(report.scan)
+    build = Build.load(tmp_path / "build")
+    assert build.scan == report.scan
+    check_harness(report.scan, harness, [switch.name for switch in build.manifest.switches])
+
+
+def test_all_but_the_map_is_as_without_a_harness(grasp_set: GraspSet, harness: Harness, tmp_path: Path) -> None:
+    compile_build(grasp_set, tmp_path / "with", rounds=4, folds=0, harness=harness)
+    assert compile_build(grasp_set, tmp_path / "without", rounds=4, folds=0).scan is None
+    found, plain = _bytes(tmp_path / "with"), _bytes(tmp_path / "without")
+    assert {name: found[name] for name in ("tables.bin", "ensemble.bin")} == {
+        name: plain[name] for name in ("tables.bin", "ensemble.bin")
+    }
+    assert set(plain) == MEMBERS - {SCAN_NAME, REPORT_NAME}
+    described, bare = (json.loads(files["build.json"]) for files in (found, plain))
+    assert set(described) - set(bare) == {"scan_sha256"}
+    for document in (described, bare):
+        document.pop("checksum")
+    described.pop("scan_sha256")
+    assert described == bare
+
+
+def test_the_same_recordings_and_wiring_give_the_same_bytes(
+    grasp_set: GraspSet, harness: Harness, tmp_path: Path
+) -> None:
+    compile_build(grasp_set, tmp_path / "one", rounds=4, folds=0, harness=harness)
+    (bus,) = harness.buses
+    moved = replace_fields(harness, name="moved", buses=(replace_fields(bus, device="/dev/i2c-7"),))
+    compile_build(grasp_set, tmp_path / "two", rounds=4, folds=0, harness=moved)
+    assert _bytes(tmp_path / "one") == _bytes(tmp_path / "two")
+
+
+def test_compiling_again_without_a_harness_takes_the_map_away(
+    grasp_set: GraspSet, harness: Harness, tmp_path: Path
+) -> None:
+    compile_build(grasp_set, tmp_path / "build", rounds=2, folds=0, harness=harness)
+    compile_build(grasp_set, tmp_path / "build", rounds=2, folds=0)
+    assert SCAN_NAME not in _bytes(tmp_path / "build")
+
+
+def test_a_harness_that_lacks_a_kept_switch_makes_no_build(grasp_set: GraspSet, tmp_path: Path) -> None:
+    with pytest.raises(HarnessError, match="'bare' has no pin or key for s"):
+        compile_build(grasp_set, tmp_path / "build", rounds=2, folds=0, harness=Harness(name="bare"))
+    assert not (tmp_path / "build").exists()
+
+
+def test_a_build_of_joints_alone_reads_no_port(grasp_set: GraspSet, harness: Harness, tmp_path: Path) -> None:
+    report = compile_build(grasp_set, tmp_path / "build", rounds=2, inputs="joints", folds=0, harness=harness)
+    assert report.scan is not None
+    assert report.scan.ports == ()
+    found = verify(tmp_path / "build", grasp_set)
+    assert found.scan == ScanCheck(0, 0.0, 0)
+    assert found.holds
+
+
+def test_verification_scans_every_row_and_no_row_changes(grasp_set: GraspSet, harness: Harness, tmp_path: Path) -> None:
+    compile_build(grasp_set, tmp_path / "build", rounds=8, folds=0, harness=harness)
+    found = verify(tmp_path / "build", grasp_set)
+    assert found.scan is not None
+    assert found.scan.changed == 0
+    assert 1.0 <= found.scan.mean_read <= found.scan.ports == 2
+    assert found.holds
+
+
+def test_verification_of_a_build_for_no_harness_says_nothing_of_scans(grasp_set: GraspSet, tmp_path: Path) -> None:
+    compile_build(grasp_set, tmp_path / "build", rounds=2, folds=0)
+    assert verify(tmp_path / "build", grasp_set).scan is None
+
+
+def test_a_row_that_a_scan_would_call_otherwise_is_counted(
+    grasp_set: GraspSet, harness: Harness, tmp_path: Path
+) -> None:
+    report = compile_build(grasp_set, tmp_path / "build", rounds=8, folds=0, harness=harness)
+    build, scan = Build.load(tmp_path / "build"), report.scan
+    assert scan is not None
+    bits = grasp_set.switches[:, [switch.column for switch in build.manifest.switches]]
+    deployed = np.array(
+        [build.grasps.index(build.classify(*row)) for row in zip(bits, grasp_set.codes, strict=True)], np.intp
+    )
+    whole = check_scan(scan, build.tables, bits, grasp_set.codes, deployed)
+    assert whole.changed == 0
+    deployed[[3, 5]] = (deployed[[3, 5]] + 1) % 4
+    assert check_scan(scan, build.tables, bits, grasp_set.codes, deployed) == replace_fields(whole, changed=2)
+
+
+def test_verification_does_not_hold_where_a_row_changes(
+    grasp_set: GraspSet, harness: Harness, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compile_build(grasp_set, tmp_path / "build", rounds=2, folds=0, harness=harness)
+    monkeypatch.setattr("thenar.compiler.artifact.verify.check_scan", lambda *_: ScanCheck(2, 1.0, 1))
+    assert not verify(tmp_path / "build", grasp_set).holds
+
+
+def test_buses_without_chips_are_no_hindrance(grasp_set: GraspSet, harness: Harness, tmp_path: Path) -> None:
+    more = replace_fields(harness, buses=(*harness.buses, BusWiring(device="/dev/i2c-9")))
+    compile_build(grasp_set, tmp_path / "build", rounds=2, folds=0, harness=more)
+    assert Build.load(tmp_path / "build").scan is not None

@@ -7,8 +7,8 @@ import pytest
 from msgspec import structs
 
 from thenar.compiler import GraspSet, compile_build
-from thenar.compiler.artifact import firmware_trial
-from thenar.compiler.artifact.verify import verify_build
+from thenar.compiler.artifact import verify_firmware as trial
+from thenar.compiler.artifact.verify import verify
 from thenar.compiler.artifact.verify_firmware import Kind, verify_firmware
 from thenar.compiler.firmware import classifier
 from thenar.compiler.firmware.classifier import classifier_files
@@ -78,7 +78,7 @@ def test_one_wrong_entry_is_found_with_the_first_frame_that_shows_it(
         files["thenar_glove.c"] = files["thenar_glove.c"][: at.start()] + wrong + files["thenar_glove.c"][at.end() :]
         return files
 
-    monkeypatch.setattr(firmware_trial, "classifier_files", one_off)
+    monkeypatch.setattr(trial, "classifier_files", one_off)
     some = grasp_set.rows(np.flatnonzero(grasp_set.codes[:, -1] < 30)[:2])
     found = verify_firmware(build, some, ("host",))
     assert not found.holds
@@ -126,7 +126,7 @@ def test_names_that_are_mixed_up_are_found(
         grasps = manifest.grasps[1::-1] + manifest.grasps[2:]
         return made(name, structs.replace(manifest, grasps=grasps), *arguments, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(firmware_trial, "classifier_files", mixed_up)
+    monkeypatch.setattr(trial, "classifier_files", mixed_up)
     found = verify_firmware(build, grasp_set.rows(np.arange(2)), (kind,))
     assert not found.holds
     assert [(check.differing, check.misnamed) for check in found.checks[:2]] == [(0, 2), (0, 2)]
@@ -137,16 +137,16 @@ def test_what_does_not_hold_of_firmware_does_not_hold_of_the_build(
 ) -> None:
     tool("gcc")
     folder = compile_build(grasp_set, tmp_path / "build", rounds=10, folds=0).folder
-    whole = verify_build(folder, grasp_set)
-    assert whole.firmware is None
-    sound = verify_firmware(folder, grasp_set, ("host",))
-    assert whole.with_firmware(sound).holds
+    assert verify(folder, grasp_set).firmware is None
+    assert verify(folder, grasp_set, ("host",)).holds
     (folder / "firmware" / "thenar_glove.c").write_text("/* mine */\n")
     (folder / "firmware" / "thenar_glove_avr.S").unlink()
-    changed = verify_firmware(folder, grasp_set, ("host",))
+    whole = verify(folder, grasp_set, ("host",))
+    changed = whole.firmware
+    assert changed is not None
     assert changed.carried.outdated == ("firmware/thenar_glove.c", "firmware/thenar_glove_avr.S")
     assert not changed.holds
-    assert not whole.with_firmware(changed).holds
+    assert not whole.holds
 
 
 def test_a_build_of_before_carries_no_firmware_and_holds(grasp_set: GraspSet, tool: Tool, tmp_path: Path) -> None:

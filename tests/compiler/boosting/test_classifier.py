@@ -54,11 +54,11 @@ def test_a_missing_input_goes_its_own_way() -> None:
     assert classifier.predict(inputs).tolist() == labels.tolist()
 
 
-def test_staged_scores_end_where_scores_are() -> None:
+def test_staged_decisions_end_where_decisions_are() -> None:
     classifier = LogitBoostClassifier(rounds=7).fit(X, Y)
-    stages = list(classifier.staged_scores(X))
+    stages = list(classifier.staged_decision_function(X))
     assert len(stages) == classifier.n_rounds_ == 7
-    assert np.array_equal(stages[-1], classifier.scores(X))
+    assert np.array_equal(stages[-1], classifier.decision_function(X))
     assert len(classifier.losses_) == 8
 
 

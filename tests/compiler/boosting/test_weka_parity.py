@@ -115,7 +115,7 @@ def test_single_behaviours_agree_with_weka(weka_data: Path, name: str) -> None:
     kept = np.ones(len(arrays["X"]), dtype=bool)
     if "rows_with_missing_class" in arrays:
         kept[arrays["rows_with_missing_class"]] = False
-    stumps, history = boost(
+    stumps, _ = boost(
         arrays["X"][kept],
         arrays["y"][kept].astype(np.intp),
         int(arrays["J"]),
@@ -127,7 +127,7 @@ def test_single_behaviours_agree_with_weka(weka_data: Path, name: str) -> None:
     for inputs, answers in ((arrays["X"], arrays["P_train"]), (arrays["Xtest"], arrays["P_test"])):
         np.testing.assert_allclose(softmax(stumps.scores(inputs).T).T, answers, atol=1e-9)
     if options[:1] == ["-L"]:
-        assert history.stopped_early
+        assert stumps.stopped_early
         assert stumps.n_rounds == len(arrays["att"])
 
 

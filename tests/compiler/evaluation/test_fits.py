@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from thenar.compiler import LogitBoostClassifier
-from thenar.compiler.evaluation.compositions import inputs
-from thenar.compiler.evaluation.fits import Fit, Training, is_blind, predictions, run_fits
+from thenar.compiler.evaluation.fits import Fit, is_blind, predictions, run_fits
 from thenar.compiler.evaluation.folds import Fold, weka_folds
+from thenar.compiler.evaluation.plan import inputs
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.trainers.base import Training
 
 Make = Callable[..., GraspSet]
-QUICK = Training(rounds=5)
+QUICK = Training("logitboost", {"rounds": 5})
 
 
 @pytest.fixture
@@ -27,7 +28,7 @@ def test_a_fit_answers_as_the_classifier_does(fits: tuple[GraspSet, list[Fit]]) 
         part = X[:, fit.columns]
         classifier = LogitBoostClassifier(rounds=5, shrinkage=0.5)
         classifier.fit(part[fit.fold.train], grasps.labels[fit.fold.train])
-        found = predictions(X, grasps.labels, fit, Training(rounds=5, shrinkage=0.5))
+        found = predictions(X, grasps.labels, fit, Training("logitboost", {"rounds": 5, "shrinkage": 0.5}))
         assert np.array_equal(found, classifier.predict(part[fit.fold.test]))
 
 

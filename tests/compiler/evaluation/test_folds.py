@@ -1,3 +1,4 @@
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -5,8 +6,54 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.evaluation.errors import EvaluationError
-from thenar.compiler.evaluation.folds import weka_folds
+from thenar.compiler.evaluation.folds import EvaluationError, Fold, JavaRandom, block_folds, leave_one_out, weka_folds
+
+seeds = st.integers(-(2**63), 2**63 - 1)
+
+
+def test_seed_42_gives_the_well_known_first_numbers() -> None:
+    random = JavaRandom(42)
+    assert [random.next_int(10) for _ in range(10)] == [0, 3, 8, 4, 0, 5, 5, 8, 9, 3]
+
+
+def test_the_first_32_bits_of_seed_0_are_javas() -> None:
+    # new Random(0).nextInt() is -1155484576.
+    assert JavaRandom(0).next_bits(32) - (1 << 32) == -1155484576
+
+
+@given(seeds, st.integers(1, 2**31 - 1))
+def test_every_number_is_below_its_bound(seed: int, bound: int) -> None:
+    assert 0 <= JavaRandom(seed).next_int(bound) < bound
+
+
+@given(seeds, st.integers(0, 30))
+def test_a_power_of_two_takes_the_high_bits(seed: int, exponent: int) -> None:
+    assert JavaRandom(seed).next_int(1 << exponent) == JavaRandom(seed).next_bits(31) >> (31 - exponent)
+
+
+@given(seeds, st.integers(0, 50))
+def test_a_shuffle_keeps_every_item_and_is_repeatable(seed: int, size: int) -> None:
+    first, second = list(range(size)), list(range(size))
+    JavaRandom(seed).shuffle(first)
+    JavaRandom(seed).shuffle(second)
+    assert first == second
+    assert sorted(first) == list(range(size))
+
+
+def test_a_draw_from_the_incomplete_last_run_is_thrown_away() -> None:
+    # With this bound nearly half of all draws fall into the incomplete run; the accepted ones are the draws themselves.
+    bound = (1 << 30) + 1
+    random, raw = JavaRandom(7), JavaRandom(7)
+    drawn = [random.next_int(bound) for _ in range(50)]
+    accepted = [number for number in (raw.next_bits(31) for _ in range(400)) if number < bound]
+    assert drawn == accepted[:50]
+
+
+@pytest.mark.parametrize("bound", [0, -1, 2**31])
+def test_a_bound_that_java_refuses_is_refused(bound: int) -> None:
+    with pytest.raises(ValueError, match="bound"):
+        JavaRandom(1).next_int(bound)
+
 
 GOLDENS = ("bin3", "bin14nom", "dupfeat", "missing", "twoclass", "separable", "rare", "paper14")
 
@@ -64,3 +111,56 @@ def test_a_fold_of_a_part_speaks_of_the_rows_of_the_whole() -> None:
 def test_a_cut_that_leaves_nothing_is_refused_with_the_reason(n_rows: int, n_folds: int, reason: str) -> None:
     with pytest.raises(EvaluationError, match=reason):
         weka_folds([0] * n_rows, n_folds, 1)
+
+
+trial_numbers = st.lists(st.integers(-5, 30), min_size=2, max_size=60)
+
+
+def covers_once(folds: list[Fold], n: int) -> bool:
+    tested = np.sort(np.concatenate([fold.test for fold in folds]))
+    whole = all(np.array_equal(np.sort(np.concatenate([fold.train, fold.test])), np.arange(n)) for fold in folds)
+    return whole and np.array_equal(tested, np.arange(n))
+
+
+@given(st.lists(st.sampled_from("ABCDE"), min_size=2, max_size=40).filter(lambda names: len(set(names)) > 1))
+def test_each_fold_tests_exactly_one_group(names: list[str]) -> None:
+    groups = np.array(names)
+    folds = leave_one_out(groups, "subject")
+    assert [fold.name for fold in folds] == sorted(set(names))
+    assert covers_once(folds, len(names))
+    for fold in folds:
+        assert set(groups[fold.test]) == {fold.name}
+        assert fold.name not in groups[fold.train]
+
+
+@given(trial_numbers, st.data())
+def test_blocks_are_contiguous_in_trial_number_and_never_split_one(trials: list[int], data: st.DataObject) -> None:
+    numbers = np.array(trials)
+    distinct = len(np.unique(numbers))
+    if distinct < 2:
+        return
+    folds = block_folds(numbers, data.draw(st.integers(2, distinct)))
+    assert covers_once(folds, len(trials))
+    for earlier, later in itertools.pairwise(folds):
+        assert numbers[earlier.test].max() < numbers[later.test].min()
+
+
+def test_a_block_is_named_by_its_trials() -> None:
+    assert [fold.name for fold in block_folds(np.array([1, 2, 3, 1]), 2)] == ["trials 1-2", "trial 3"]
+
+
+def test_a_single_group_cannot_be_left_out() -> None:
+    with pytest.raises(
+        EvaluationError, match="leaving one object out needs two or more; all 3 rows are of object 'cup'"
+    ):
+        leave_one_out(np.array(["cup"] * 3), "object")
+
+
+def test_rows_of_one_trial_number_have_no_blocks() -> None:
+    with pytest.raises(EvaluationError, match="all 5 rows have trial number 7"):
+        block_folds(np.full(5, 7), 2)
+
+
+def test_fewer_trial_numbers_than_folds_are_refused() -> None:
+    with pytest.raises(EvaluationError, match="3 trial numbers cannot be cut into 4 folds"):
+        block_folds(np.array([1, 2, 3, 3, 3]), 4)

@@ -1,11 +1,11 @@
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from thenar.compiler.evaluation.errors import EvaluationError
-from thenar.compiler.evaluation.folds import weka_folds
-from thenar.compiler.evaluation.populations import Scheme, populations
+from thenar.compiler.evaluation.folds import EvaluationError, weka_folds
+from thenar.compiler.evaluation.populations import HONEST, PAPER, Scheme, concerns, populations
 from thenar.compiler.recordings.graspset import GraspSet
 
 Make = Callable[..., GraspSet]
@@ -59,3 +59,83 @@ def test_a_subject_who_cannot_be_cut_is_named(make_grasps: Make) -> None:
     few = grasps.rows([*np.flatnonzero(grasps.subjects == "A"), len(grasps) - 1])
     with pytest.raises(EvaluationError, match="subject B: 1 rows cannot be cut into 4 folds"):
         populations(few, "stratified", 4, 1, 1)
+
+
+def test_the_paper_lets_test_rows_choose_and_honesty_does_not(make_grasps: Make) -> None:
+    grasps = make_grasps()
+    everyone = np.arange(len(grasps))
+    for scheme in ("stratified", "object", "block"):
+        for part in populations(grasps, scheme, 4, 2, 1):
+            for fold in part.folds:
+                assert set(PAPER.may_choose(part, fold)) == set(part.rows)
+                assert set(HONEST.may_choose(part, fold)) == set(part.rows) - set(fold.test)
+                assert set(PAPER.may_choose_pooled(everyone, fold)) == set(everyone)
+                assert set(HONEST.may_choose_pooled(everyone, fold)) == set(everyone) - set(fold.test)
+
+
+def test_a_left_out_subject_has_no_say_in_an_honest_placement(make_grasps: Make) -> None:
+    grasps = make_grasps()
+    for part in populations(grasps, "subject", 4, 1, 1):
+        (fold,) = part.folds
+        assert part.name not in grasps.subjects[HONEST.may_choose(part, fold)]
+        assert part.name in grasps.subjects[PAPER.may_choose(part, fold)]
+
+
+def keep_some(grasps: GraspSet, grasp: str, n: int) -> GraspSet:
+    rows = np.flatnonzero(grasps.grasps == grasp)
+    return grasps.rows(np.setdiff1d(np.arange(len(grasps)), rows[n:]))
+
+
+def test_a_balanced_set_is_of_no_concern(make_grasps: Make) -> None:
+    grasps = make_grasps()
+    assert concerns(grasps, populations(grasps, "stratified", 4, 1, 1), "stratified", 4) == ()
+
+
+def test_a_grasp_type_with_fewer_rows_than_folds_is_named(make_grasps: Make) -> None:
+    grasps = keep_some(make_grasps(subjects="A"), "tip", 3)
+    (text,) = concerns(grasps, populations(grasps, "stratified", 4, 1, 1), "stratified", 4)
+    assert text.startswith("subject A has 3 row(s) of tip: fewer than the 4 folds")
+
+
+def test_as_many_rows_as_folds_are_enough(make_grasps: Make) -> None:
+    grasps = keep_some(make_grasps(subjects="A"), "tip", 4)
+    assert concerns(grasps, populations(grasps, "stratified", 4, 1, 1), "stratified", 4) == ()
+
+
+def test_a_single_row_can_never_be_recognised_and_that_is_said(make_grasps: Make) -> None:
+    grasps = keep_some(make_grasps(subjects="A"), "tip", 1)
+    texts = concerns(grasps, populations(grasps, "stratified", 4, 1, 1), "stratified", 4)
+    assert any(
+        text.startswith("1 row(s) of tip of subject A are tested by a fold that trains no such") for text in texts
+    )
+
+
+def test_an_object_of_its_own_grasp_type_is_noticed_when_objects_are_left_out(make_grasps: Make) -> None:
+    grasps = make_grasps(subjects="A")
+    own_object = np.where(grasps.grasps == "hook", "bag", grasps.objects)
+    grasps = GraspSet(
+        grasps.switches,
+        grasps.switch_names,
+        grasps.codes,
+        grasps.joints,
+        grasps.grasps,
+        grasps.taxonomy,
+        grasps.subjects,
+        own_object,
+        grasps.trials,
+    )
+    (text,) = concerns(grasps, populations(grasps, "object", 4, 1, 1), "object", 4)
+    assert text.startswith("12 row(s) of hook of subject A")
+
+
+def test_a_subject_of_one_grasp_type_is_named(make_grasps: Make) -> None:
+    grasps = make_grasps()
+    only = grasps.rows(np.flatnonzero((grasps.subjects == "B") | (grasps.grasps == "tip")))
+    (text,) = concerns(only, populations(only, "stratified", 4, 1, 1), "stratified", 4)
+    assert text == "subject A: every row is of tip, nothing is to be told apart"
+
+
+def test_rates_of_simulated_grasps_are_called_that(make_grasps: Make) -> None:
+    simulated = replace(make_grasps(), simulated="scene quick, seed 1")
+    (text,) = concerns(simulated, populations(simulated, "stratified", 4, 1, 1), "stratified", 4)
+    assert text.startswith("these grasps are simulated (scene quick, seed 1)")

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler.evaluation.rates import Rate
-from thenar.compiler.evaluation.study import Options, Study, evaluate
-from thenar.compiler.evaluation.tables import Table
+from thenar.compiler.evaluation.study import Options, Study, Table, evaluate
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import import_file
 

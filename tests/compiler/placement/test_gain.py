@@ -4,7 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from thenar.compiler.placement.gain import Counts, Node, best_position, compare_scores, entropy_bits, gain_bits
+from thenar.compiler.placement.exact import Counts
+from thenar.compiler.placement.gain import Node, best_position, compare_scores, entropy_bits, gain_bits
 from thenar.stability.reference.information import compare_gains
 
 tables = arrays(np.int64, st.tuples(st.integers(1, 5), st.integers(2, 4)), elements=st.integers(0, 30))

@@ -20,9 +20,10 @@ def names_of(count: int) -> list[str]:
     return [f"s{number}" for number in range(count)]
 
 
-def test_reading_a_port_costs_once() -> None:
+def test_a_port_that_is_read_anyway_costs_nothing_further() -> None:
     ports = PortCosts((0, 0, 1, 2), (10.0, 20.0, 40.0))
-    assert [ports.scan_us(kept) for kept in ((), (0,), (0, 1), (1, 3), (3, 2, 1, 0))] == [0.0, 10.0, 10.0, 50.0, 70.0]
+    assert (ports.marginal_costs(()) - 70_000).tolist() == [30_000, 30_000, 60_000, 120_000]
+    assert (ports.marginal_costs((1, 3)) - 70_000).tolist() == [0, 0, 60_000, 0]
 
 
 def test_a_port_is_shared_out_over_those_kept_on_it() -> None:

@@ -20,8 +20,7 @@ from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import own
 from thenar.compiler.report.content import ReportContent
-from thenar.compiler.report.guarantee import guarantee_of
-from thenar.compiler.tables.compare import compare
+from thenar.compiler.tables.compare import compare, worst_case
 from thenar.runtime.build import Build
 from thenar.runtime.harness.wiring import GloveWiring
 from thenar.runtime.scanning.propose import propose_harness
@@ -99,7 +98,8 @@ def _content(grasp_set: GraspSet, folder: Path, hand: HandShape | None) -> Repor
         hand=hand,
         scan=made.scan,
         harness=harness,
-        guarantee=guarantee_of(stumps, build.tables, comparison, build.grasps),
+        comparison=comparison,
+        worst=worst_case(stumps, build.tables, comparison, build.grasps, names),
     )
 
 

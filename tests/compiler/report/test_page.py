@@ -149,7 +149,7 @@ def test_a_frontier_of_other_recordings_is_called_so(whole: ReportContent, front
 
 def test_what_was_not_asked_for_is_said_with_the_command_that_makes_it(bare: ReportContent) -> None:
     little = replace(
-        bare, tree=None, confusion=None, study=None, hand=None, scan=None, harness=None, guarantee=None, frontier=None
+        bare, tree=None, confusion=None, study=None, hand=None, scan=None, harness=None, worst=None, frontier=None
     )
     text = Page(report_html(little)).text
     for command_line in ("thenar evaluate", "thenar frontier", "--glove glove.toml"):

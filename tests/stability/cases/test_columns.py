@@ -6,7 +6,8 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from thenar.compiler.placement.gain import Counts, best_position, compare_scores, gain_bits
+from thenar.compiler.placement.exact import Counts
+from thenar.compiler.placement.gain import best_position, compare_scores, gain_bits
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.placement.methods.filters import cmim, most_informative
 from thenar.stability.cases.columns import hard_columns, large_tables, small_tables, table_of

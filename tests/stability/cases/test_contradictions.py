@@ -42,9 +42,9 @@ def test_no_round_brings_the_loss_below_the_entropy_left(
 ) -> None:
     hard = noisy(classes, 50, percent / 100, seed)
     hard = replace(hard, X=hard.X[:, :3], n_switches=3)
-    _, history = boost(hard.X, hard.labels, classes, rounds=40, shrinkage=shrinkage)
+    _, losses = boost(hard.X, hard.labels, classes, rounds=40, shrinkage=shrinkage)
     least = float(entropy_left(hard))
-    assert min(history.losses) >= least - loss_rounding(classes, least)
+    assert min(losses) >= least - loss_rounding(classes, least)
 
 
 @given(st.lists(st.lists(COUNT, min_size=3, max_size=3), min_size=1, max_size=5))

@@ -140,7 +140,7 @@ def test_names_of_classes_are_only_names(hard: HardSet) -> None:
     names = np.array(["ab", "cd", "ef", "gh"])
     plain = LogitBoostClassifier(rounds=10).fit(hard.X, hard.labels)
     named = LogitBoostClassifier(rounds=10).fit(hard.X, names[hard.labels])
-    np.testing.assert_array_equal(plain.scores(hard.X), named.scores(hard.X))
+    np.testing.assert_array_equal(plain.decision_function(hard.X), named.decision_function(hard.X))
     np.testing.assert_array_equal(names[plain.predict(hard.X)], named.predict(hard.X))
 
 

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thenar.compiler.boosting import stumps
-from thenar.compiler.tables import balance, collapse, quantise
+from thenar.compiler.tables import collapse, quantise
+from thenar.compiler.tables import quantise as balance
 from thenar.runtime.tables import IntegerTables
 from thenar.stability.cases import scoretables
 from thenar.stability.inputs import hard_ensembles

@@ -84,18 +84,18 @@ def test_under_a_wider_clamp_it_can() -> None:
 def test_logitboost_itself_can_raise_the_loss_of_two_classes_of_many_and_60_digits_agree() -> None:
     X = [[0, 1], [1, 1], [2, 0], [2, 2], [3, 3], [4, 3], [4, 4], [5, 1], [5, 3], [5, 6], [6, 2], [7, 3]]
     labels = [1, 1, 1, 0, 1, 0, 0, 1, 1, 0, 1, 0]
-    _, history = boost(np.array(X), np.array(labels), 12, rounds=6)
+    _, losses = boost(np.array(X), np.array(labels), 12, rounds=6)
     truth, _ = ensembles.boost(X, labels, 12, 6)
-    assert max(np.diff(history.losses)) > 0.05
-    assert history.losses == pytest.approx([float(loss) for loss in truth], rel=1e-12)
+    assert max(np.diff(losses)) > 0.05
+    assert losses == pytest.approx([float(loss) for loss in truth], rel=1e-12)
 
 
 @given(hard_sets(st.integers(2, 6)))
 @settings(max_examples=25, deadline=None)
 def test_the_loss_that_is_told_is_that_of_the_scores(hard: HardSet) -> None:
-    stumps, history = boost(hard.X, hard.labels, hard.n_classes, rounds=10, weights=hard.weights)
+    stumps, losses = boost(hard.X, hard.labels, hard.n_classes, rounds=10, weights=hard.weights)
     weights = hard.scaled_weights.tolist()
-    for moment, told in zip(moments(hard, stumps), history.losses, strict=True):
+    for moment, told in zip(moments(hard, stumps), losses, strict=True):
         truth = mean_loss(moment.scores.T.tolist(), hard.labels.tolist(), weights)
         assert told == moment.loss
         assert distance(told, truth) <= loss_rounding(hard.n_classes, float(truth))
@@ -108,21 +108,21 @@ def test_the_loss_that_is_told_is_that_of_the_scores(hard: HardSet) -> None:
 @settings(max_examples=30, deadline=None)
 def test_a_tolerance_ends_training_with_the_first_round_that_changes_less(hard: HardSet, tolerance: float) -> None:
     _, without = boost(hard.X, hard.labels, hard.n_classes, rounds=60)
-    stumps, history = boost(hard.X, hard.labels, hard.n_classes, rounds=60, tolerance=tolerance)
-    changes = np.abs(np.diff(without.losses))
-    assert history.losses == without.losses[: stumps.n_rounds + 1]
+    stumps, losses = boost(hard.X, hard.labels, hard.n_classes, rounds=60, tolerance=tolerance)
+    changes = np.abs(np.diff(without))
+    assert losses == without[: stumps.n_rounds + 1]
     assert (changes[: stumps.n_rounds - 1] >= tolerance).all()
-    assert history.stopped_early == (changes[stumps.n_rounds - 1] < tolerance)
-    assert history.stopped_early or stumps.n_rounds == 60
+    assert stumps.stopped_early == (changes[stumps.n_rounds - 1] < tolerance)
+    assert stumps.stopped_early or stumps.n_rounds == 60
 
 
 def test_no_tolerance_and_a_tolerance_of_0_never_end_training_though_nothing_changes_any_more() -> None:
     hard = separable(3)
     for tolerance in (None, 0.0):
-        stumps, history = boost(hard.X, hard.labels, 3, rounds=200, tolerance=tolerance)
+        stumps, losses = boost(hard.X, hard.labels, 3, rounds=200, tolerance=tolerance)
         assert stumps.n_rounds == 200
-        assert not history.stopped_early
-        assert history.losses[-1] == history.losses[-2]
+        assert not stumps.stopped_early
+        assert losses[-1] == losses[-2]
 
 
 def test_the_largest_sum_is_that_of_all_frames_in_all_orders_of_adding() -> None:

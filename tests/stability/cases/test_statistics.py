@@ -3,8 +3,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from thenar.compiler.evaluation.folds import weka_folds
-from thenar.compiler.evaluation.groups import block_folds, leave_one_out
+from thenar.compiler.evaluation.folds import block_folds, leave_one_out, weka_folds
 from thenar.compiler.evaluation.rates import Average, Rate
 from thenar.compiler.evaluation.study import Options, evaluate
 from thenar.stability.cases.statistics import WILSON_BOUND

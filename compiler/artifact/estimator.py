@@ -1,0 +1,236 @@
+"""From scikit-learn and back to C: a fitted estimator becomes a build, a build becomes firmware."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from msgspec import structs
+from numpy.typing import NDArray
+from sklearn.base import clone
+
+from thenar.runtime.build import Build as LoadedBuild
+from thenar.runtime.manifest import Inputs, Options, Recognised, TableBits
+
+from ..boosting.classifier import LogitBoostClassifier
+from ..boosting.stumps import Stumps
+from ..evaluation.folds import weka_folds
+from ..firmware.board import Board
+from ..firmware.folder import write_folder
+from ..firmware.generate import Mode, Request, firmware_files, fit_of
+from ..firmware.library_names import LIBRARY_NAME
+from ..placement.placement import information_alone
+from ..recordings.graspset import GraspSet
+from ..samples import Columns, Samples
+from ..tables.collapse import Model, ScoreTables
+from .compile import Making, Wired
+from .documents import BuildReport, Documents, Progress
+from .ensemble import model_fault
+from .errors import CompileError
+from .staging import check_target
+from .training import Tested, Trained
+
+
+class Build(LoadedBuild):
+    """A build as `thenar.runtime.Build` loads it, that can be written as C besides.
+
+    Examples
+    --------
+    >>> from thenar.compiler import Build, GraspSet, compile_build
+    >>> report = compile_build(GraspSet.load("set.grasps"), "build", rounds=3, folds=0)
+    >>> sorted(path.name for path in Build.load("build").export_c("firmware", "host"))[:2]
+    ['Makefile', 'host.c']
+    """
+
+    __slots__ = ()
+
+    def export_c(
+        self,
+        folder: str | Path,
+        target: str = "avr328p",
+        *,
+        mode: Mode = "classify",
+        board: Board | None = None,
+        name: str = LIBRARY_NAME,
+        flash: int | None = None,
+        overwrite: bool = False,
+    ) -> tuple[Path, ...]:
+        """Write C99 that recognises as this build does, bit for bit, into `folder`, and return the files.
+
+        Parameters
+        ----------
+        folder : path
+            The folder to write.
+        target : str
+            A platform of `thenar firmware --target`.
+        mode : {"classify", "scan", "glove"}
+            The classifier alone, a board that scans, or a glove that recognises by itself.
+        board : Board, optional
+            How the microcontroller is wired, for the modes "scan" and "glove".
+        name : str
+            The beginning of every C name.
+        flash : int, optional
+            How many bytes of flash the classifier may take; None: half of the part's.
+        overwrite : bool
+            Whether files that are there may be replaced.
+
+        Raises
+        ------
+        FirmwareError
+            If the target cannot hold the build, or these do not go together.
+        """
+        request = Request(self, target, mode, name, board, flash)
+        fit = fit_of(request)
+        files = firmware_files(request, fit, fit.notes())
+        write_folder(files, Path(folder), overwrite=overwrite)
+        return tuple(Path(folder) / path for path in files)
+
+
+def compile(  # noqa: A001
+    estimator: Any,
+    grasp_set: GraspSet,
+    folder: str | Path,
+    *,
+    folds: int = 4,
+    seed: int = 1,
+    table_bits: TableBits = 16,
+    width: int = 16,
+    harness: Wired | None = None,
+    documents: Documents | None = None,
+    progress: Progress | None = None,
+) -> BuildReport:
+    """Write a fitted estimator as a build: `folder`, whole or not at all.
+
+    Parameters
+    ----------
+    estimator : LogitBoostClassifier or Pipeline
+        Fitted on X, y = `Samples.of(grasp_set).inputs`, `grasp_set.grasps`. The last step of a pipeline is the
+        classifier; those before it select columns. Any classifier will do that has `classes_` and its model as
+        `stumps_` (Stumps) or `tables_` (ScoreTables, of the switches first).
+    grasp_set : GraspSet
+        The recordings: their names and calibrations go into the build, their rows prove its integers.
+    folder : path
+        The folder to write: new, empty, or a build, which is replaced.
+    folds, seed : int
+        Of the cross-validation, of clones of the estimator, whose rate goes into the build; 0 folds: none.
+    table_bits, width : int
+        As in Options.
+    harness, documents
+        As in `compile_build`.
+    progress : callable, optional
+        Called with (done, total) after each fold.
+
+    Returns
+    -------
+    BuildReport
+        Where the build is, and what is known of it.
+
+    Raises
+    ------
+    CompileError
+        If the estimator was fitted on other columns or labels, changes them, or has no model that is a sum over them.
+
+    Examples
+    --------
+    >>> from sklearn.pipeline import make_pipeline
+    >>> from sklearn.feature_selection import VarianceThreshold
+    >>> from thenar.compiler import GraspSet, LogitBoostClassifier, Samples, compile
+    >>> grasp_set = GraspSet.load("set.grasps")
+    >>> recogniser = make_pipeline(VarianceThreshold(0.1), LogitBoostClassifier(rounds=5))
+    >>> recogniser = recogniser.fit(Samples.of(grasp_set).inputs, grasp_set.grasps)
+    >>> compile(recogniser, grasp_set, "build", folds=0).manifest.options.rounds
+    5
+    """
+    target = check_target(Path(folder))
+    samples = Samples.of(grasp_set)
+    columns = _columns(estimator, samples.inputs)
+    classifier = estimator[-1] if hasattr(estimator, "steps") else estimator
+    switches = tuple(column for column in columns if column < samples.n_switches)
+    joints = tuple(column - samples.n_switches for column in columns if column >= samples.n_switches)
+    samples = replace(_labelled(samples, grasp_set, classifier.classes_), codes=samples.codes[:, list(joints)])
+    model = _model(classifier, columns, samples.n_switches)
+    if fault := model_fault(model, len(switches), len(joints), samples.n_classes):
+        raise CompileError(f"the estimator has a model that {fault}: fit it on these recordings")
+    inputs: Inputs = "both" if switches and joints else "switches" if switches else "joints"
+    options = Options(inputs=inputs, folds=folds, seed=seed, table_bits=table_bits, width=width, placement="estimator")
+    options = _trained_by(classifier, options)
+    trained = Trained(switches, information_alone(samples, switches), None, model)
+    made = Making(grasp_set, samples, joints, options, trained, harness)
+    tested = _tested(estimator, grasp_set, samples, options, progress) if folds else None
+    return made.publish(target, tested, documents, progress)
+
+
+def _columns(estimator: Any, X: NDArray[np.uint16]) -> Columns:
+    """Return the columns of X that the classifier gets."""
+    fitted = getattr(estimator, "n_features_in_", None)
+    if fitted != X.shape[1]:
+        raise CompileError(
+            f"the estimator was fitted on {fitted or 'no'} columns, the recordings have {X.shape[1]} switches and "
+            "joints: fit it on Samples.of(grasp_set).inputs"
+        )
+    if not hasattr(estimator, "steps") or len(estimator.steps) == 1:
+        return tuple(range(X.shape[1]))
+    names = list(getattr(estimator, "feature_names_in_", [f"x{number}" for number in range(X.shape[1])]))
+    try:
+        found = [str(name).rpartition("__")[2] for name in estimator[:-1].get_feature_names_out(names)]
+        columns = tuple(names.index(name) for name in found)
+        same = np.array_equal(np.asarray(estimator[:-1].transform(X)), X[:, list(columns)])
+    except (AttributeError, ValueError) as reason:
+        raise CompileError(f"the steps before the classifier must select columns: {reason}") from None
+    if not same:
+        raise CompileError("the steps before the classifier must select columns, and leave their values as they are")
+    return columns
+
+
+def _labelled(samples: Samples, grasp_set: GraspSet, classes: NDArray[Any]) -> Samples:
+    """Return the samples with the classes of the estimator: names of grasp types, or their numbers in the taxonomy."""
+    types = grasp_set.taxonomy.types
+    numbered = classes.dtype.kind in "iu"
+    names = [types[number] if numbered and 0 <= number < len(types) else str(number) for number in classes.tolist()]
+    lacking = sorted(set(samples.grasps) - set(names))
+    if lacking:
+        raise CompileError(f"the estimator knows no {lacking[0]!r}: fit it with the names of all grasp types as labels")
+    labels = np.array([names.index(samples.grasps[label]) for label in samples.labels], dtype=np.intp)
+    return replace(samples, labels=labels, grasps=tuple(names))
+
+
+def _model(classifier: Any, columns: Columns, n_switches: int) -> Model:
+    """Return the classifier's model over [switches | joints]."""
+    order = sorted(range(len(columns)), key=lambda place: columns[place] >= n_switches)
+    tables, stumps = getattr(classifier, "tables_", None), getattr(classifier, "stumps_", None)
+    if isinstance(stumps, Stumps):
+        return replace(stumps, columns=np.argsort(order)[stumps.columns].astype(np.int32))
+    if not isinstance(tables, ScoreTables) or order != sorted(order):
+        raise CompileError(
+            f"{type(classifier).__name__} has no model that is a sum over switches, then joints: use a classifier with "
+            "stumps_ or tables_, such as LogitBoostClassifier"
+        )
+    return tables
+
+
+def _trained_by(classifier: Any, options: Options) -> Options:
+    if not isinstance(classifier, LogitBoostClassifier):
+        return structs.replace(options, trainer=type(classifier).__name__)
+    return structs.replace(
+        options,
+        rounds=classifier.rounds,
+        shrinkage=float(classifier.shrinkage),
+        tolerance=classifier.tolerance,
+        max_bins=classifier.max_bins,
+    )
+
+
+def _tested(
+    estimator: Any, grasp_set: GraspSet, samples: Samples, options: Options, progress: Progress | None
+) -> Tested:
+    """Return what comes of stratified folds, on each of which a clone of the estimator is fitted anew."""
+    X, classes = Samples.of(grasp_set).inputs, estimator.classes_
+    y, confusion = classes[samples.labels], np.zeros((len(classes),) * 2, dtype=np.intp)
+    for number, fold in enumerate(weka_folds(samples.labels, options.folds, options.seed), 1):
+        found = clone(estimator).fit(X[fold.train], y[fold.train]).predict(X[fold.test])
+        answers = (found[:, np.newaxis] == classes).argmax(axis=1)
+        np.add.at(confusion, (samples.labels[fold.test], answers), 1)
+        if progress is not None:
+            progress(number, options.folds)
+    correct = int(np.trace(confusion))
+    return Tested(Recognised("honest", options.folds, options.seed, correct, len(y)), confusion)

@@ -1,0 +1,176 @@
+"""Placement as scikit-learn's feature selection: in a Pipeline, in GridSearchCV, on a data frame."""
+
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator
+from sklearn.feature_selection import SelectorMixin
+from sklearn.utils import Tags
+from sklearn.utils.multiclass import check_classification_targets
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from ..samples import Samples
+from .inputs import check_bits
+from .methods.base import BEST, METHODS, PAPERS
+from .placement import choose
+from .ports import PortCosts
+
+
+class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
+    """Keep the switches that a placement method chooses.
+
+    Parameters
+    ----------
+    method : str, default="elimination"
+        A name in `thenar.compiler.placement.methods.base.METHODS`; `thenar place --help` lists them.
+    n_switches : int, default=20
+        How many switches to keep at most. Fewer are kept where fewer vary, or help. Ignored by methods that take the
+        paper's S.
+    min_samples : int, default=0
+        The paper's S: a node of the tree with fewer rows decides nothing. Ignored by methods that take a number of
+        switches.
+    ports : PortCosts or None, default=None
+        What reading each port costs, in microseconds, for methods that heed it; None: all switches cost the same.
+    binarize : float or None, default=0.0
+        A switch counts as closed where its input exceeds this number, as in scikit-learn's `BernoulliNB`. Of bits, the
+        default changes nothing. None refuses whatever is not a bit already.
+
+    Attributes
+    ----------
+    order_ : ndarray of int, shape (n_kept,)
+        The kept columns, in the order in which the method chose them; `get_support` and `transform` keep that of X.
+    gains_ : ndarray of float, shape (n_kept,)
+        The information on the class that each of `order_` brought, in bits: to the tree of ID3, alone in all others.
+    classes_ : ndarray, shape (n_classes,)
+        The labels, in ascending order.
+    n_features_in_ : int
+        The number of columns of X.
+    feature_names_in_ : ndarray of str, shape (n_features_in_,)
+        The names of the columns, where X is a data frame.
+
+    Raises
+    ------
+    ValueError
+        In `fit`, if X or y cannot be used; as MemberError if there is no such method, and as PlacementError if it
+        cannot choose here, or a number is negative.
+
+    See Also
+    --------
+    ID3Selector : The paper's method, with its tree.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thenar.compiler.placement.selectors import SwitchSelector
+    >>> y = np.arange(40) % 4
+    >>> X = np.column_stack([y & 1, y >> 1, y == 0, np.ones(40)])
+    >>> SwitchSelector(method="cmim", n_switches=2).fit(X, y).get_support()
+    array([ True,  True, False, False])
+    """
+
+    def __init__(
+        self,
+        method: str = BEST,
+        n_switches: int = 20,
+        min_samples: int = 0,
+        ports: PortCosts | None = None,
+        binarize: float | None = 0.0,
+    ) -> None:
+        self.method = method
+        self.n_switches = n_switches
+        self.min_samples = min_samples
+        self.ports = ports
+        self.binarize = binarize
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
+        """Choose the switches that tell the labels apart.
+
+        Parameters
+        ----------
+        X : array-like, shape (n_samples, n_features)
+            A column for each switch: bits, or numbers that `binarize` makes bits of.
+        y : array-like, shape (n_samples,)
+            The grasp type of each row.
+
+        Returns
+        -------
+        self
+        """
+        method = METHODS.named(self.method)
+        self._choose(X, y, method.name, self.n_switches if method.by_number else self.min_samples)
+        return self
+
+    def _choose(self, X: ArrayLike, y: ArrayLike, method: str, parameter: int) -> Any:
+        """Choose, set the attributes, and return the tree, if there is one."""
+        inputs, targets = validate_data(self, X, y)
+        check_classification_targets(targets)
+        if parameter < 0:
+            raise ValueError(f"{type(self).__name__} takes a number of switches or rows >= 0, not {parameter}")
+        bits = check_bits(inputs) if self.binarize is None else inputs > self.binarize
+        self.classes_, labels = np.unique(targets, return_inverse=True)
+        none = np.zeros((len(bits), 0), np.uint16)
+        chosen = choose(
+            Samples(bits, none, labels, tuple(map(str, self.classes_.tolist()))), method, float(parameter), self.ports
+        )
+        self.order_ = np.array(chosen.columns, dtype=np.intp)
+        self.gains_ = np.array(chosen.gains)
+        return chosen.tree
+
+    def _get_support_mask(self) -> NDArray[np.bool_]:
+        check_is_fitted(self)
+        mask = np.zeros(self.n_features_in_, np.bool_)
+        mask[self.order_] = True
+        return mask
+
+    def __sklearn_tags__(self) -> Tags:
+        """Tell scikit-learn that labels are needed."""
+        tags = super().__sklearn_tags__()
+        tags.target_tags.required = True
+        return tags
+
+
+class ID3Selector(SwitchSelector):
+    """Keep the switches that decide nodes of the paper's ID3 tree.
+
+    Parameters
+    ----------
+    min_samples : int, default=0
+        The paper's S: a node with fewer rows decides nothing, and fewer switches are kept; 0 does not prune.
+    binarize : float or None, default=0.0
+        A switch counts as closed where its input exceeds this number; None refuses whatever is not a bit already.
+        (`grow_id3` takes inputs of more than two values.)
+
+    Attributes
+    ----------
+    tree_ : Tree
+        The tree. Its classes are `classes_`' numbers; `tree_.text(names)` prints it.
+    order_, gains_, classes_, n_features_in_, feature_names_in_
+        As of `SwitchSelector`; the gains are what the switches brought to the tree, and add up.
+
+    See Also
+    --------
+    SwitchSelector : All methods, by a number of switches.
+
+    References
+    ----------
+    J. R. Quinlan, "Induction of decision trees", Machine Learning 1 (1986). Of equal gains, exactly compared, the
+    lowest column wins.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thenar.compiler.placement.selectors import ID3Selector
+    >>> y = np.arange(40) % 4
+    >>> X = np.column_stack([np.ones(40), y & 1, y >> 1, y == 0])
+    >>> ID3Selector(min_samples=13).fit(X, y).get_support()
+    array([False,  True,  True, False])
+    """
+
+    def __init__(self, min_samples: int = 0, binarize: float | None = 0.0) -> None:
+        super().__init__(PAPERS, min_samples=min_samples, binarize=binarize)
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
+        """Grow the tree of bits X (n_samples, n_features) and labels y (n_samples,), and keep what it asks for."""
+        self.tree_ = self._choose(X, y, PAPERS, self.min_samples)
+        return self

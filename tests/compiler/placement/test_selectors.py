@@ -1,0 +1,102 @@
+"""Selectors, as scikit-learn checks them and as its users join them to other estimators."""
+
+import doctest
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from sklearn.base import BaseEstimator
+from sklearn.model_selection import GridSearchCV
+from sklearn.naive_bayes import BernoulliNB
+from sklearn.pipeline import make_pipeline
+from sklearn.utils.estimator_checks import parametrize_with_checks
+
+from thenar.compiler import GraspSet, grow_id3
+from thenar.compiler.placement import selectors
+from thenar.compiler.placement.placement import place
+from thenar.compiler.placement.ports import PortCosts
+from thenar.compiler.placement.selectors import ID3Selector, SwitchSelector
+from thenar.drivers.members import MemberError
+
+Make = Callable[..., GraspSet]
+
+
+# Some checks take positive inputs only: all switches are closed then, and scikit-learn warns that none is kept.
+@pytest.mark.filterwarnings("ignore:No features were selected")
+@parametrize_with_checks([ID3Selector(), SwitchSelector("cmim"), SwitchSelector("elimination", n_switches=2)])
+def test_scikit_learn_s_checks_pass_without_exception(estimator: BaseEstimator, check: Any) -> None:
+    check(estimator)
+
+
+@pytest.fixture(scope="module")
+def data() -> tuple[Any, Any]:
+    random = np.random.default_rng(2)
+    labels = np.arange(120) % 4
+    bits = random.random((120, 9)) < 0.3
+    bits[:, 5], bits[:, 2] = labels & 1, (labels >> 1) ^ (random.random(120) < 0.05)
+    return bits, np.array(["cup", "key", "pen", "rod"])[labels]
+
+
+@pytest.mark.parametrize("name", ["id3", "elimination", "id3-cost", "rfe"])
+def test_a_selector_keeps_what_thenar_place_keeps(make_set: Make, name: str) -> None:
+    grasps = make_set(rows=60, switches=10)
+    selector = SwitchSelector(name, n_switches=4, min_samples=6).fit(grasps.switches, grasps.grasps)
+    placement = place(grasps, 6 if name == "id3" else 4, method=name)
+    assert selector.order_.tolist() == [kept.number for kept in placement.switches]
+    assert selector.get_support(indices=True).tolist() == sorted(selector.order_)
+
+
+def test_id3_keeps_its_tree_and_what_each_switch_brought(data: tuple[Any, Any]) -> None:
+    X, y = data
+    selector = ID3Selector(min_samples=50).fit(X, y)
+    tree = grow_id3(X, y, min_samples=50)
+    assert selector.tree_.nodes == tree.nodes
+    assert selector.classes_.tolist() == list(tree.classes)
+    assert selector.gains_.tolist() == list(tree.gains)
+    assert set(selector.get_support(indices=True)) == {2, 5}
+
+
+def test_ports_count_for_methods_that_heed_them() -> None:
+    y = np.repeat(np.arange(4), 6)
+    X = np.stack([np.isin(y, [0, 1]), np.isin(y, [0, 2]), np.isin(y, [0, 2])], axis=1)
+    X[0, 2] = False
+    ports = PortCosts((0, 1, 0), (40.0, 40.0))
+    assert SwitchSelector("id3-cost", 2, ports=ports).fit(X, y).order_.tolist() == [0, 2]
+    assert SwitchSelector("id3-cost", 2).fit(X, y).order_.tolist() == [0, 1]
+
+
+def test_a_search_over_a_pipeline_finds_how_many_are_enough(data: tuple[Any, Any]) -> None:
+    search = GridSearchCV(
+        make_pipeline(SwitchSelector("cmim"), BernoulliNB()), {"switchselector__n_switches": [1, 2]}, cv=3
+    ).fit(*data)
+    assert search.best_params_ == {"switchselector__n_switches": 2}
+    assert search.score(*data) > 0.9
+
+
+def test_a_data_frame_keeps_its_names(data: tuple[Any, Any]) -> None:
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame(data[0], columns=[f"s{number}" for number in range(9)])
+    kept = ID3Selector(min_samples=50).set_output(transform="pandas").fit_transform(frame, data[1])
+    assert list(kept.columns) == ["s2", "s5"]
+
+
+def test_numbers_become_bits_at_a_threshold_or_are_refused(data: tuple[Any, Any]) -> None:
+    X, y = data
+    pressure = np.where(X, 0.8, 0.1)
+    assert ID3Selector(binarize=0.5).fit(pressure, y).tree_ == ID3Selector().fit(X, y).tree_
+    with pytest.raises(ValueError, match=r"X holds 0\.[18] in row 0, column 0"):
+        ID3Selector(binarize=None).fit(pressure, y)
+
+
+def test_what_cannot_be_chosen_is_said(data: tuple[Any, Any]) -> None:
+    with pytest.raises(MemberError, match="there is no placement method 'best'"):
+        SwitchSelector("best").fit(*data)
+    with pytest.raises(ValueError, match="SwitchSelector takes a number of switches or rows >= 0, not -1"):
+        SwitchSelector("cmim", -1).fit(*data)
+    with pytest.raises(ValueError, match="2 switches, the set has 9"):
+        SwitchSelector("id3-cost", 3, ports=PortCosts((0, 0), (1.0,))).fit(*data)
+
+
+def test_the_examples_run() -> None:
+    assert doctest.testmod(selectors).failed == 0

@@ -1,0 +1,81 @@
+"""A trainer of somebody else's: on the command line, in a build, held against its bounds, and run."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from thenar.compiler.recordings.graspset import GraspSet, Joint
+from thenar.compiler.recordings.taxonomy import own
+
+pytestmark = pytest.mark.slow
+
+TYPES = ("cup", "pen", "plate")
+
+
+@pytest.fixture
+def recordings(tmp_path: Path) -> Path:
+    random, rows = np.random.default_rng(5), 60
+    labels = np.arange(rows) % len(TYPES)
+    closed = np.array([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 0]], bool)
+    grasp_set = GraspSet(
+        switches=closed[labels] ^ (random.random((rows, 4)) < 0.1),
+        switch_names=("a", "b", "c", "d"),
+        codes=np.clip(60 * labels[:, None] + random.normal(60, 15, (rows, 2)), 0, 255).astype(np.uint16),
+        joints=tuple(Joint(name, "deg", 0, 0.0, 255, 127.5) for name in ("thumb", "index")),
+        grasps=np.array(TYPES)[labels],
+        taxonomy=own(TYPES),
+        subjects=np.full(rows, "A"),
+        objects=np.full(rows, "thing"),
+        trials=np.arange(rows),
+    )
+    grasp_set.save(tmp_path / "set.grasps")
+    return tmp_path / "set.grasps"
+
+
+@pytest.fixture
+def installed(install: Callable[[str, str], Any]) -> Any:
+    return install("trainer.py", "thenar.trainers")
+
+
+def test_a_trainer_of_another_package_is_chosen_by_its_name_and_makes_a_build_that_holds(
+    installed: Any, recordings: Path, tmp_path: Path
+) -> None:
+    build = tmp_path / "build"
+    words = " ".join(installed.thenar("compile", "--help").split())
+    assert "--trainer [logitboost|naive-bayes]" in words
+    assert "(naive Bayes: inputs are independent within a grasp type)" in words
+    assert "--joint-bins INTEGER RANGE Into how many bins naive Bayes cuts a joint. [default: 8; x>=2]" in words
+
+    given = ("--trainer", "naive-bayes", "--joint-bins", "5", "--folds", "3")
+    installed.thenar("compile", str(recordings), "-o", str(build), *given)
+    document = json.loads((build / "build.json").read_bytes())
+    assert document["options"]["trainer"] == "naive-bayes"
+    assert document["options"]["settings"] == {"smoothing": 1.0, "joint_bins": 5.0}
+    training, honest = (rate["correct"] / rate["total"] for rate in document["rates"])
+    assert training >= honest > 0.8
+    assert "--trainer naive-bayes --smoothing 1 --joint-bins 5" in (build / "report.html").read_text()
+
+    found = json.loads(installed.thenar("verify", str(build), str(recordings), "--json"))
+    assert found["holds"]
+    assert found["collapse_difference"] == 0 < found["integer_difference"] <= found["integer_bound"]
+    replayed = installed.thenar("run", str(build), "--replay", str(recordings)).splitlines()
+    assert {line.get("grasp") for line in map(json.loads, replayed)} >= set(TYPES)
+
+
+def test_the_trainer_is_evaluated_as_the_papers_is(installed: Any, recordings: Path) -> None:
+    given = ("--trainer", "naive-bayes", "--tables", "compositions", "--protocol", "honest", "--repeats", "1")
+    study = json.loads(installed.thenar("evaluate", str(recordings), *given, "--json"))
+    assert study["options"]["trainer"] == "naive-bayes"
+    (table,) = study["tables"]
+    assert table["rows"][0]["average"]["mean"] > 0.8
+
+
+def test_a_setting_of_another_trainer_is_refused(installed: Any, recordings: Path, tmp_path: Path) -> None:
+    given = ("compile", str(recordings), "-o", str(tmp_path / "build"))
+    assert "--rounds is no setting" in installed.thenar(*given, "--trainer", "naive-bayes", "--rounds", "5", code=2)
+    assert "--smoothing is no setting" in installed.thenar(*given, "--smoothing", "2", code=2)
+    assert not (tmp_path / "build").exists()
