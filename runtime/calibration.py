@@ -75,7 +75,7 @@ class Joints:
     A record counts for two of its periods; one of a glove that is not plugged into its box holds no measurement.
     """
 
-    __slots__ = ("_codes", "_longest_us", "_wanted", "newest")
+    __slots__ = ("_coded", "_codes", "_last", "_longest_us", "_wanted", "newest")
 
     def __init__(
         self,
@@ -89,6 +89,8 @@ class Joints:
         Raises SettingError if the CyberGlove cannot serve the build.
         """
         self.newest = Newest[GloveFrame]()
+        self._coded: GloveFrame | None = None
+        self._last: list[int] | None = None
         self._wanted, self._longest_us = bool(joints), PERIODS * (period_us or 0)
         self._codes = None if period_us is None else CodeTables(joints, sensor_names, calibration)
 
@@ -99,12 +101,13 @@ class Joints:
         if self._codes is None:
             return None
         newest = self.newest
-        if frame is not None:
+        if frame is not None and frame is not newest.frame:
             newest.take(frame, now_us, self._longest_us)
         found = newest.frame
-        if found is None or now_us > newest.expires_us or not found.plugged:
-            return None
-        return self._codes.codes(found.sensors)
+        if found is not self._coded and found is not None:
+            self._last = self._codes.codes(found.sensors) if found.plugged else None
+            self._coded = found
+        return self._last if now_us <= newest.expires_us else None
 
 
 class AngleReader:

@@ -12,7 +12,7 @@ from typing import Protocol, Self
 
 from .build import Build
 from .calibration import AngleReader
-from .frames import SwitchFrame, now_us
+from .frames import GloveFrame, SwitchFrame
 from .harness.loading import load_harness
 from .harness.wiring import Harness
 from .harness.writing import harness_to_toml
@@ -23,7 +23,7 @@ from .live.system import System
 from .policy import Policy
 from .preshape.loading import load_preshapes
 from .preshape.selector import PreshapeSelector
-from .published import DeviceHealth, HealthReport
+from .published import DeviceHealth, HealthReport, JointAngles
 from .recording.session import Session
 from .recording.writer import Recorder
 from .sinks.base import Fanout, Sink, SinkReport, open_sink
@@ -131,6 +131,8 @@ class Glove:
             self.lacking, self._selector = table.check(loaded.grasps), PreshapeSelector(table)
         calibration = system.calibration
         self._angles = None if calibration is None else AngleReader(system.sensor_names, calibration)
+        self._measured: GloveFrame | None = None
+        self._newest_angles: JointAngles | None = None
         self._sinks, self._record, self._status = tuple(sinks), record, status
         self._health, self._due_us = Health(loaded), 0
         self._fanout = Fanout(())
@@ -165,7 +167,7 @@ class Glove:
         if self.stop.is_set():
             raise StopIteration
         taken = self.feed.take()
-        now = now_us()
+        now = taken.time_us
         moment = self._recognizer.step(now, time_ns() // 1000, taken.switches, taken.glove)
         grasp, measured = moment.grasp, taken.measured
         if self.recorder is not None:
@@ -177,8 +179,12 @@ class Glove:
             self.recorder.grasp(grasp)
         if self._selector is not None:
             moment.preshape = self._selector.update(grasp)
-        if self._angles is not None and measured is not None and measured.plugged:
-            moment.angles = self._angles.angles(measured.sensors)
+        if self._angles is not None:
+            if measured is not self._measured:
+                self._measured = measured
+                there = measured is not None and measured.plugged
+                self._newest_angles = self._angles.angles(measured.sensors) if measured and there else None
+            moment.angles = self._newest_angles
         self._fanout.publish(grasp, moment.preshape, moment.angles)
         self._health.update(grasp, taken.switches, taken.glove.time_us if taken.glove else None, moment.codes)
         if now >= self._due_us:
@@ -196,7 +202,7 @@ class Glove:
 
     def _look(self, now: int) -> None:
         self._due_us = now + _REPORT_US
-        self.health = self._health.report(now_us(), self.sources.health(), self.sources.overflowed)
+        self.health = self._health.report(now, self.sources.health(), self.sources.overflowed)
         if self._status:
             self._fanout.health(self.health)
         self.sources.raise_settings()

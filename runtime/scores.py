@@ -35,11 +35,14 @@ class Scorer:
     switch_rows, switch_means   s rows
     joint_means                 j rows
     joint_rows, thresholds      j lists: a row per bin, and the codes that part the bins
+    size, unpack                of a sum that began with `start`: its bytes, and what makes K scores of them, each 2^15
+                                too high
     """
 
     def __init__(self, tables: IntegerTables) -> None:
         self.tables = tables
-        self._lanes = Struct(f"<{tables.n_classes}H")
+        lanes = Struct(f"<{tables.n_classes}H")
+        self.size, self.unpack = lanes.size, lanes.unpack
         offsets = _packed(np.zeros((1, tables.n_classes), np.int16), 0)[0]
         self.start = _packed(tables.bias[np.newaxis], 0)[0]
         self.switch_rows = _packed(tables.switch_rows, offsets)
@@ -59,16 +62,13 @@ class Scorer:
         """The same of the mean rows."""
         return _sums(self.switch_means)
 
-    def unpacked(self, total: int) -> tuple[int, ...]:
-        """Return the K lanes of a sum that began with `start`: scores, each 2^15 too high."""
-        return self._lanes.unpack(total.to_bytes(self._lanes.size, "little"))
-
     def lanes(self, bits: ArrayLike, codes: ArrayLike) -> tuple[int, ...]:
         """Return the scores of one frame, each 2^15 too high: K integers. Raises FrameError."""
         switches = _flags(bits, len(self.switch_rows), "switches")
         bins = map(bisect_left, self.thresholds, self._codes(codes))
         total = sum(compress(self.switch_rows, switches), self.start)
-        return self.unpacked(sum(map(getitem, self.joint_rows, bins), total))
+        total = sum(map(getitem, self.joint_rows, bins), total)
+        return self.unpack(total.to_bytes(self.size, "little"))
 
     def lanes_without(
         self, bits: ArrayLike, codes: ArrayLike, lost_switches: ArrayLike, lost_joints: ArrayLike
@@ -82,7 +82,7 @@ class Scorer:
         for joint, (code, lost) in enumerate(zip(joints, lost_codes, strict=True)):
             row = self.joint_rows[joint][bisect_left(self.thresholds[joint], code)]
             total += self.joint_means[joint] if lost else row
-        return self.unpacked(total)
+        return self.unpack(total.to_bytes(self.size, "little"))
 
     def _codes(self, codes: ArrayLike) -> list[int]:
         array = np.asarray(codes)
@@ -161,7 +161,7 @@ class LiveScores:
         if lost != self._lost:
             self._silent = _sum(lost, scorer.mean_sums)
             self._lost = lost
-        return scorer.unpacked(self._closed + self._silent + self._joints)
+        return scorer.unpack((self._closed + self._silent + self._joints).to_bytes(scorer.size, "little"))
 
 
 def softmax(scores: Sequence[int], number: int, scale: float) -> float:

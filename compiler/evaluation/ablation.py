@@ -103,7 +103,9 @@ def _correct(grasp_set: GraspSet, jobs: int, progress: Progress | None) -> dict[
         for name, kind in _KINDS.items()
     }
     everything = [fit for some in fits.values() for fit in some]
-    found = run_fits(inputs(grasp_set), grasp_set.labels, everything, Training("logitboost", {"rounds": ROUNDS}), jobs, progress)
+    found = run_fits(
+        inputs(grasp_set), grasp_set.labels, everything, Training("logitboost", {"rounds": ROUNDS}), jobs, progress
+    )
     correct = {name: np.zeros(len(grasp_set), dtype=np.bool_) for name in fits}
     for name, some in fits.items():
         for fit in some:

@@ -63,7 +63,7 @@ class Health:
     ) -> None:
         """Take what was published, and the frames that it came of; a frame that was seen before counts once.
 
-        glove_us is the time of the glove's frame, codes are its joints' (`LiveRecognizer.codes`), None while lost.
+        glove_us is the time of the glove's frame, codes are its joints' (`Moment.codes`), None while lost.
         """
         self._published[grasp.health] += 1
         if grasp.grasp != self._grasp:
@@ -71,7 +71,10 @@ class Health:
             self._grasp = grasp.grasp
         if switches is not None and switches.time_us > self._switches_us:
             self._switches_us = switches.time_us
-            self._take(switches)
+            read = self._all & ~(switches.lost | switches.unread)
+            self._switch_rate.frame(switches.time_us)
+            self._stuck.frame(switches.closed, read)
+            self._chattering.frame(switches.time_us, switches.closed, read)
         if glove_us is not None and glove_us > self._glove_us:
             self._glove_us = glove_us
             self._glove_rate.frame(glove_us)
@@ -96,12 +99,6 @@ class Health:
             overflowed=overflowed,
             devices=tuple(devices),
         )
-
-    def _take(self, frame: SwitchFrame) -> None:
-        read = self._all & ~(frame.lost | frame.unread)
-        self._switch_rate.frame(frame.time_us)
-        self._stuck.frame(frame.closed, read)
-        self._chattering.frame(frame.time_us, frame.closed, read)
 
     def _named(self, switches: Sequence[int]) -> tuple[str, ...]:
         return tuple(self._switch_names[number] for number in switches)
@@ -154,7 +151,11 @@ class Tally:
     def end(self) -> list[int]:
         """Return the counts, and begin again at 0."""
         planes, self._planes = self._planes, []
-        return [sum((plane >> bit & 1) << place for place, plane in enumerate(planes)) for bit in range(self._bits)]
+        counts = [0] * self._bits
+        for place, plane in enumerate(planes):
+            for bit in range(self._bits):
+                counts[bit] += (plane >> bit & 1) << place
+        return counts
 
 
 class Chattering:
@@ -239,21 +240,17 @@ class Missed:
         self._enough = classes / 2
         self._grasps = [0] * len(shares)
         self._types = [0] * len(shares)
-        self._seen: Mask = 0
-
-    def see(self, switches: Mask) -> None:
-        """Note that it was seen of `switches`, in the grasp that is held now."""
-        self._seen |= switches
+        self.seen: Mask = 0
 
     def end_grasp(self, number: int, read: Mask) -> None:
         """Count a grasp of type `number` that is over; `read` are the switches that were read during it."""
         for switch in range(len(self._grasps)):
-            if self._seen >> switch & 1:
+            if self.seen >> switch & 1:
                 self._grasps[switch] = self._types[switch] = 0
             elif read >> switch & 1:
                 self._grasps[switch] += 1
                 self._types[switch] |= 1 << number
-        self._seen = 0
+        self.seen = 0
 
     def suspects(self) -> list[int]:
         """Return the switches of which it should have been seen by now."""
@@ -276,8 +273,8 @@ class StuckSwitches:
     def frame(self, closed: Mask, read: Mask) -> None:
         """Take a frame in which the switches `read` were read."""
         self._read |= read
-        self._on.see(closed & read)
-        self._off.see(~closed & read)
+        self._on.seen |= closed & read
+        self._off.seen |= ~closed & read
 
     def end_grasp(self, number: int | None) -> None:
         """End a grasp of type `number`; None: it was none, and what was seen meanwhile counts for the next."""

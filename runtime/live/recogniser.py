@@ -91,7 +91,7 @@ class LiveRecognizer:
         The same frame may be handed over again: it grows no younger. Raises FrameError for a frame of another glove.
         """
         newest = self._switches
-        if switches is not None and self._reads_switches:
+        if switches is not None and switches is not newest.frame and self._reads_switches:
             newest.take(switches, now_us, self._longest_us)
         frame = newest.frame if now_us <= newest.expires_us else None
         # Ports that were left unread are certain only with the joints by which their scan ended; and a frame that was
@@ -197,10 +197,10 @@ class MissingInputs:
 
     def _work_out(self, lost: Mask, joints_lost: bool) -> Missing:
         numbers = [number for number in range(len(self._switches)) if lost >> number & 1]
-        weight = sum(self._switches[number] for number in numbers) + self._joints * joints_lost
+        weight = sum(map(self._switches.__getitem__, numbers)) + self._joints * joints_lost
         nothing_left = lost == self._all and (joints_lost or not self._joint_names)
         share = 1.0 if nothing_left else weight / max(self._total, 1)
-        names = tuple(self._switch_names[number] for number in numbers) + self._joint_names * joints_lost
+        names = (*map(self._switch_names.__getitem__, numbers), *self._joint_names * joints_lost)
         return Missing(names, share, nothing_left or share > self._max_lost)
 
 

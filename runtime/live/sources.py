@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from threading import Condition, Event, Thread
 from types import TracebackType
 from typing import Generic, Protocol, Self, TypeVar
@@ -137,8 +138,9 @@ class Keeper(Generic[T]):
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """The newest frames, all that arrived since the last time, in order, and the glove's record if it still counts."""
+    """The newest frames at `time_us`; all that arrived since the last time; the glove's record if it still counts."""
 
+    time_us: int
     switches: SwitchFrame | None
     glove: GloveFrame | None
     arrived: tuple[SwitchFrame | GloveFrame, ...]
@@ -184,11 +186,6 @@ class Arrivals:
             self._wait_for_taking(frame)
             self._condition.notify_all()
 
-    def fresh_for_us(self, now_us: int) -> int | None:
-        """Return after how many microseconds the first of the fresh frames is too old; None: none is fresh."""
-        with self._condition:
-            return self._fresh_for_us(now_us)
-
     def take(self, patience_us: Callable[[], int] | None = None, at_most_us: int = _LONGEST_WAIT_US) -> Taken:
         """Return the newest frames, and all that arrived since the last call.
 
@@ -197,24 +194,28 @@ class Arrivals:
         lost from then on, whether or not another one speaks.
         """
         with self._condition:
-            if patience_us is not None and not self._waiting:
-                left_us = self._fresh_for_us(now_us())
-                self._condition.wait(min(patience_us() if left_us is None else left_us, at_most_us) / 1e6)
             now = now_us()
-            if now > self._joined_until_us and self.switches is not None:
-                switches = self._joined(now)
-                if switches is not None and switches != self.switches:
-                    self.switches = switches
-                    self._wait_for_taking(switches)
+            if now > self._joined_until_us:
+                self._lose(now)
+            if patience_us is not None and not self._waiting:
+                left_us = self.fresh_for_us(now)
+                self._condition.wait(min(patience_us() if left_us is None else left_us, at_most_us) / 1e6)
+                now = now_us()
+                if now > self._joined_until_us:
+                    self._lose(now)
             arrived = tuple(self._waiting)
             self._waiting.clear()
             glove = self.glove
-            return Taken(self.switches, glove.frame, arrived, glove.frame if now <= glove.expires_us else None)
+            return Taken(now, self.switches, glove.frame, arrived, glove.frame if now <= glove.expires_us else None)
 
-    def _fresh_for_us(self, now_us: int) -> int | None:
-        expiries = [newest.expires_us for _, newest in self._parts]
-        expiries.append(self.glove.expires_us)
-        return min([us + 1 - now_us for us in expiries if us >= now_us], default=None)
+    def fresh_for_us(self, now_us: int) -> int | None:
+        """Return after how many microseconds the first of the fresh frames is too old; None: none is fresh. `take` asks
+        for it under the condition.
+        """
+        switches_us, glove_us = self._joined_until_us, self.glove.expires_us
+        if switches_us < now_us:
+            return glove_us + 1 - now_us if glove_us >= now_us else None
+        return (switches_us if glove_us < now_us else min(switches_us, glove_us)) + 1 - now_us
 
     def _joined(self, now_us: int) -> SwitchFrame | None:
         """Return the newest of all parts as one frame, None before the first came.
@@ -223,7 +224,7 @@ class Arrivals:
         frame, expired or not: it never falls when a part does. It stays so until the first of the fresh frames expires.
         """
         fresh: list[SwitchFrame] = []
-        time_us, silent, until_us = -1, self._nobodys, now_us
+        time_us, silent, until_us = -1, self._nobodys, -1
         for owned, newest in self._parts:
             frame = newest.frame
             if frame is not None and frame.time_us > time_us:
@@ -246,6 +247,13 @@ class Arrivals:
                 glove = frame.glove
         return SwitchFrame(time_us, closed, lost | silent, unread, glove)
 
+    def _lose(self, now_us: int) -> None:
+        """Join the parts anew, of which one may have fallen silent: that is news once."""
+        switches = self._joined(now_us)
+        if switches is not None and switches != self.switches:
+            self.switches = switches
+            self._wait_for_taking(switches)
+
     def _wait_for_taking(self, frame: SwitchFrame | GloveFrame) -> None:
         self.overflowed += len(self._waiting) == _MOST_WAITING
         self._waiting.append(frame)
@@ -257,6 +265,9 @@ class Sources:
     switch_names  the switches wanted, in the order of the frames' bits: a build's kept switches
     scan          which ports of the I2C expanders to read, in which order
     early         what ends scans early where one device reads all switches, given the joints' codes; None: nothing does
+
+    take(at_most_us) returns the newest frames, and all that arrived since the last call. It waits for something as long
+    as the newest frames stay fresh, and for a period where none is, but no longer than at_most_us, if that is given.
     """
 
     def __init__(
@@ -274,15 +285,10 @@ class Sources:
         alone = [reader for reader in self._readers if reader.owned]
         if early is not None and len(alone) == 1:
             alone[0].end_early(*early, self._arrivals.glove)
+        self.take: Callable[..., Taken] = partial(self._arrivals.take, self._patience_us)
         self._keepers = [
             Keeper[SwitchFrame | GloveFrame](source.name, source, self._taking(source)) for source in self._devices
         ]
-
-    def take(self, at_most_us: int = _LONGEST_WAIT_US) -> Taken:
-        """Return the newest frames, and all that arrived since the last call; wait for something as long as the newest
-        frames stay fresh, and a period where nothing is left, but no longer than at_most_us.
-        """
-        return self._arrivals.take(self._patience_us, at_most_us)
 
     def _patience_us(self) -> int:
         return min(filter(None, (self.switch_period_us, self.glove_period_us)), default=_PATIENCE_US)

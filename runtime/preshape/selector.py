@@ -93,13 +93,10 @@ class PreshapeSelector:
         if grasp.grasp == UNKNOWN or grasp.health == "unknown":
             self._called = None
             return None
-        wanted = self._table.find(grasp.grasp)
-        self._call(wanted if grasp.probability >= self._min_probability else None, grasp.time_us)
+        wanted = self._table.chosen.get(grasp.grasp)
+        called = wanted if grasp.probability >= self._min_probability else None
+        if called is not self._called:
+            self._called, self._since_us = called, grasp.time_us
+        if called is not None and grasp.time_us - self._since_us >= self._settle_us:
+            self._held = called
         return None if wanted is None else self._held
-
-    def _call(self, wanted: Preshape | None, time_us: int) -> None:
-        """Note what this frame calls for, and change to it once it was called for long enough."""
-        if wanted is not self._called:
-            self._called, self._since_us = wanted, time_us
-        if wanted is not None and time_us - self._since_us >= self._settle_us:
-            self._held = wanted

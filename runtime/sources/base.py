@@ -9,7 +9,7 @@ from thenar.drivers.debounce import Debouncer
 from thenar.drivers.members import Members
 
 from ..calibration import Joints
-from ..frames import PERIODS, GloveFrame, Mask, Newest, SwitchFrame
+from ..frames import GloveFrame, Mask, Newest, SwitchFrame
 from ..harness.wiring import Debounce, Harness
 from ..published import Count
 from ..scanning.decided import EarlyExit
@@ -33,16 +33,14 @@ class Source(ABC):
         The switches that it reads, as bits of the frames; 0 for a source of joints.
     period_us : int
         How often a frame should come. It may change with `open`.
+    longest_us : int
+        For how long a frame counts, from the time at which it was read: two periods, PERIODS * period_us, as a rule.
     """
 
     name: str
     period_us: int
+    longest_us: int
     owned: Mask = 0
-
-    @property
-    def longest_us(self) -> int:
-        """For how long a frame counts, from the time at which it was read."""
-        return PERIODS * self.period_us
 
     @abstractmethod
     def open(self) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from thenar.drivers.cyberglove import CyberGlove
 from thenar.drivers.cyberglove_protocol import shortest_us
 
-from ..frames import GloveFrame
+from ..frames import PERIODS, GloveFrame
 from ..harness.wiring import GloveWiring, Harness
 from ..published import Count
 from ..scanning.scanmap import ScanMap
@@ -22,6 +22,7 @@ class GloveDevice(Source):
         self.name = f"cyberglove at {wiring.port}"
         self.sensors = sensors_of(wiring)
         self.period_us = glove_period_us(wiring)
+        self.longest_us = PERIODS * self.period_us
         self._unplugged, self._unplugged_records = False, 0
         self.driver = CyberGlove(
             wiring.port,

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead, Scan
 
 from ..calibration import Joints
-from ..frames import GloveFrame, Mask, Newest, Rewired, SwitchFrame, now_us
+from ..frames import PERIODS, GloveFrame, Mask, Newest, Rewired, SwitchFrame, now_us
 from ..harness.wiring import Debounce, Harness
 from ..published import Count
 from ..scanning.decided import EarlyExit
@@ -45,6 +45,7 @@ class I2cDevice(Source):
         ports = [port for port in scan.ports if port.bus == number]
         self.name = f"i2c at {wiring.device}"
         self.period_us = _bus_period_us(scan, harness)
+        self.longest_us = PERIODS * self.period_us
         self._ports = [_PortSwitches(port, harness.debounce) for port in ports]
         self.owned: Mask = sum(port.switches.targets for port in self._ports)
         chips = sorted({port.chip for port in ports})

@@ -30,14 +30,9 @@ class ScannerDevice(Source):
         self._switches = Rewired((key, number[name]) for key, name in enumerate(wiring.switches) if name in number)
         self._known = Rewired((key, number[name]) for key, name in enumerate(wiring.switches) if name in number)
         self.owned = self._switches.targets
-        self.period_us = STATE_US
+        self.period_us, self.longest_us = STATE_US, PERIODS * STATE_US
         self._usual_us, self._time_us = _usual_trip_us(wiring), 0
         self._debounce, self._debouncer, self._pauses = debounce, debouncer_of(debounce), Pauses(pause_us(debounce))
-
-    @property
-    def longest_us(self) -> int:
-        """For how long a frame counts: it may be older than two periods by the round trip of a good line, no more."""
-        return PERIODS * self.period_us + min(self.driver.trip_us, self._usual_us)
 
     def open(self) -> None:
         """Open the board, and see to it that it is not silent for long while all is well."""
@@ -59,7 +54,10 @@ class ScannerDevice(Source):
             if over := self._pauses.over(reading.time_us, known):
                 self._debouncer.forget(over)
             closed = self._debouncer.update(reading.time_us, closed, known) & known
-        self._time_us = max(self._time_us, reading.time_us - self.driver.trip_us)
+        trip_us = self.driver.trip_us
+        # A frame may be older than two periods by the round trip of a good line, no more.
+        self.longest_us = PERIODS * self.period_us + min(trip_us, self._usual_us)
+        self._time_us = max(self._time_us, reading.time_us - trip_us)
         return SwitchFrame(self._time_us, closed, self.owned & ~known)
 
     def counts(self) -> tuple[Count, ...]:

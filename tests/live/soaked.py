@@ -19,7 +19,6 @@ from statistics import quantiles
 import msgspec
 import numpy as np
 
-import thenar.runtime.glove
 import thenar.runtime.live.sources
 from thenar.runtime import Build, Glove
 from thenar.runtime.frames import GloveFrame, SwitchFrame
@@ -87,8 +86,7 @@ class Feed:
 def soak(build: Build, harness: Harness, rows: Path, folder: Path, frames: int, cpu_s: float) -> None:
     """Print a sample a window, until there were so many frames or so much CPU was used."""
     clock = Clock()
-    for module in (thenar.runtime.live.sources, thenar.runtime.glove):
-        module.now_us = clock  # type: ignore[attr-defined]
+    thenar.runtime.live.sources.now_us = clock
     feed = Feed(rows, build.tables.n_switches, clock)
     glove = Glove(
         build,

@@ -147,17 +147,23 @@ def test_a_silent_bus_does_not_take_a_living_glove_down_with_it(make_build: Make
 def test_what_is_fresh_is_so_until_it_expires(monkeypatch: pytest.MonkeyPatch) -> None:
     arrivals, clock = Arrivals(2, [0b01, 0b10]), [1000]
     monkeypatch.setattr(module, "now_us", lambda: clock[0])
-    assert arrivals.fresh_for_us(0) is None
+
+    def fresh_for_us(now: int) -> int | None:
+        clock[0] = now
+        arrivals.take()
+        return arrivals.fresh_for_us(now)
+
+    assert fresh_for_us(1000) is None
     arrivals.put_switches(0, SwitchFrame(1000, 0), 800)
-    assert arrivals.fresh_for_us(1100) == 701
+    assert fresh_for_us(1100) == 701
     clock[0] = 1090
     arrivals.put_switches(1, SwitchFrame(1050, 0), 200)
-    assert arrivals.fresh_for_us(1100) == 151
+    assert fresh_for_us(1100) == 151
     arrivals.put_glove(GloveFrame(1090, b"abc"), 100)
-    assert arrivals.fresh_for_us(1100) == 91
-    assert arrivals.fresh_for_us(1250) == 1
-    assert arrivals.fresh_for_us(1251) == 550
-    assert arrivals.fresh_for_us(1801) is None
+    assert fresh_for_us(1100) == 91
+    assert fresh_for_us(1250) == 1
+    assert fresh_for_us(1251) == 550
+    assert fresh_for_us(1801) is None
 
 
 def test_the_gloves_record_is_a_measurement_until_it_expires(monkeypatch: pytest.MonkeyPatch) -> None:
