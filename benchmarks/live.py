@@ -2,10 +2,11 @@
 
     python benchmarks/live.py [--seconds N]
 
-Four tables: microseconds of CPU a frame against 150; frames a second on emulated devices against the wire's own rate;
-the kept switches' scan beside that of all 160; the peak of a `thenar run` against 80 MiB. Emulated buses need umockdev
-(Debian packages umockdev, gir1.2-umockdev-1.0, python3-gi). Emulated devices and readers work on the same cores as the
-run, so a machine that has other things to do, or but one core, shows worse numbers than a glove would.
+Four tables, and the way of a frame: microseconds of CPU a frame against 150; frames a second on emulated devices
+against the wire's own rate; the kept switches' scan beside that of all 160; which files a frame passes from the bytes
+on the wire to a published grasp, and the calls for a grasp; the peak of a `thenar run` against 80 MiB. Emulated buses
+need umockdev (Debian packages umockdev, gir1.2-umockdev-1.0, python3-gi). Emulated devices and readers work on the same
+cores as the run, so a machine that has other things to do, or but one core, shows worse numbers than a glove would.
 """
 
 import argparse
@@ -35,6 +36,7 @@ from liveplay import (
 )
 from liverates import Found, of_board, of_bus, of_glove
 from livescans import compared, wired
+from liveway import way
 from rich.console import Console
 from rich.table import Table
 
@@ -44,7 +46,7 @@ from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.live.system import System
 from thenar.simulator.playing.bench import Bench
 
-MOST_US, LEAST_SHARE, MOST_MIB = 150, 0.9, 80
+MOST_US, LEAST_SHARE, MOST_MIB, MOST_FILES = 150, 0.9, 80, 20
 FRAMES, TURNS = 500, 8
 # A clock at which the wire takes so long that what emulates it does not matter.
 SLOW_HZ = 10_000
@@ -197,6 +199,10 @@ def main() -> None:
         console.print(loop_costs(scenes, folder), "")
         console.print(rates(scenes[0], options.seconds, folder), "")
         console.print(scans(scenes[0]), "")
+        passed = way(scenes[0])
+        calls = ", ".join(f"{calls:.0f} in {thread}" for thread, calls in sorted(passed.calls.items()))
+        console.print(f"A frame passes {len(passed.files)} files (at most {MOST_FILES}); calls a grasp: {calls}")
+        console.print("\n".join(passed.files), "")
         console.print(
             f"Peak of `thenar run`: {peak_mib(scenes[0], folder, options.seconds):.0f} MiB (at most {MOST_MIB})"
         )

@@ -81,6 +81,7 @@ class LiveRecognizer:
         self._switches = Newest[SwitchFrame]()
         self._joints = Joints(build.manifest.joints, sensor_names, calibration, glove_period_us)
         self._scores = LiveScores(build.scorer)
+        self._scored: Sequence[int] | None = None
         self._missing = MissingInputs(build, self._policy.max_lost)
         self._decider, self._lead = _decider(build, self._policy), self._policy.lead_steps(tables.scale)
         self._number = 0
@@ -97,7 +98,9 @@ class LiveRecognizer:
         # Ports that were left unread are certain only with the joints by which their scan ended; and a frame that was
         # handed over once stays the newest, so every scan that can end early brings the joints' frame along.
         codes = self._joints.codes(now_us, glove if frame is None or frame.glove is None else frame.glove)
-        self._scores.joints(codes)
+        if codes is not self._scored:
+            self._scores.joints(codes)
+            self._scored = codes
         standing, lost = self._standing(frame)
         missing = self._missing.of(lost, codes is None)
         seen_us = max(newest.time_us, self._joints.newest.time_us)

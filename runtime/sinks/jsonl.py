@@ -82,24 +82,19 @@ class Outlet:
 
     def send(self, line: bytes) -> bool:
         """Send `line` if the reader keeps up; return whether it went out or began to. Raises OSError if it is gone."""
-        if self._rest and not self._push(self._rest):
-            return False
-        self._push(line)
+        for data in (self._rest, line):
+            self._rest = data
+            try:
+                while self._rest:
+                    taken = self._write(self._rest)
+                    self.written += taken
+                    self._rest = self._rest[taken:]
+            except BlockingIOError:
+                if data is not line:
+                    return False
         # Nothing of this line went out: it is lost, and the next one starts afresh.
-        if len(self._rest) == len(line):
+        if line and len(self._rest) == len(line):
             self._rest = b""
-            return False
-        return True
-
-    def _push(self, data: bytes) -> bool:
-        """Write what can be written of `data` now; keep the rest."""
-        self._rest = data
-        try:
-            while self._rest:
-                taken = self._write(self._rest)
-                self.written += taken
-                self._rest = self._rest[taken:]
-        except BlockingIOError:
             return False
         return True
 

@@ -86,7 +86,7 @@ class Feed:
 def soak(build: Build, harness: Harness, rows: Path, folder: Path, frames: int, cpu_s: float) -> None:
     """Print a sample a window, until there were so many frames or so much CPU was used."""
     clock = Clock()
-    thenar.runtime.live.sources.now_us = clock
+    vars(thenar.runtime.live.sources)["now_us"] = clock
     feed = Feed(rows, build.tables.n_switches, clock)
     glove = Glove(
         build,
