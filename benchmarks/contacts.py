@@ -7,10 +7,9 @@ import numpy as np
 
 from thenar.simulator.contact.model import Contact, ContactModel, load_of
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.ledger import Ledger
 from thenar.simulator.planning.postures import Postures
-from thenar.simulator.running.pipeline import Pipeline, compile_pipeline
-from thenar.simulator.running.session import sessions
+from thenar.simulator.running.pipeline import Ledger, Pipeline, compile_pipeline
+from thenar.simulator.running.simulation import sessions
 from thenar.simulator.scenes.scene import Scene
 
 

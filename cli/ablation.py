@@ -5,8 +5,8 @@ from collections.abc import Callable
 import msgspec
 
 from thenar.compiler.evaluation.ablation import FOLDS, ROUNDS, Ablation, Made, ablated
+from thenar.simulator.running.explain import best_us
 from thenar.simulator.running.pipeline import DEFAULT_CONTACT
-from thenar.simulator.running.sampling import best_us
 from thenar.simulator.running.simulation import simulate
 from thenar.simulator.scenes.scene import Scene
 

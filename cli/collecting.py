@@ -9,7 +9,7 @@ from typing import Protocol
 
 import click
 
-from thenar.compiler.recordings.names import check_names
+from thenar.compiler.recordings.errors import check_names
 from thenar.compiler.recordings.taxonomy import Taxonomy
 from thenar.drivers.calibration import GloveCalibration
 from thenar.drivers.errors import SettingError

@@ -96,9 +96,9 @@ def command(
     from thenar.compiler.placement.ports import ports_of_whole_glove
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.harness.loading import load_harness
+    from thenar.simulator.handmaps.handmap import hand_map
 
     from .from_frontier import picked
-    from .hand import hand_shape
 
     _check_proposal(propose, chip, glove, overwrite=overwrite)
     _check_point(context, from_frontier, point)
@@ -108,7 +108,7 @@ def command(
     options = asked_settings(context, asked) | asked
     given = None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
-    hand = hand_shape() if report else None
+    hand = hand_map() if report else None
     if hand is not None and hand_length is not None and hand.fitted(grasp_set.switch_names) is None:
         raise click.UsageError(
             "--hand-length: the switches of these recordings are not those of murakami160, and where they lie is not "

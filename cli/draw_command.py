@@ -10,7 +10,7 @@ from .lines import echo
 
 if TYPE_CHECKING:
     from thenar.compiler.recordings.graspset import GraspSet
-    from thenar.simulator.handmaps.handpanels import Picture
+    from thenar.simulator.handmaps.draw import Picture
 
 
 def _titled_paths(_context: click.Context, _option: click.Parameter, given: tuple[str, ...]) -> list[tuple[str, Path]]:
@@ -74,7 +74,7 @@ def command(
         _write(_without_grasps(numbers, kept), output)
         return
     from thenar.compiler.recordings.graspset import GraspSet
-    from thenar.simulator.handmaps.handpanels import contacts
+    from thenar.simulator.handmaps.draw import contacts
 
     grasp_set = GraspSet.load(grasps)
     _write(_placements(grasp_set, prune) if choose else contacts(grasp_set, per_grasp), output)
@@ -96,7 +96,7 @@ def _check_options(
 
 
 def _without_grasps(numbers: bool, kept: list[tuple[str, Path]]) -> "Picture":
-    from thenar.simulator.handmaps import handpanels
+    from thenar.simulator.handmaps import draw as handpanels
 
     from .kept_files import kept_names
 
@@ -108,8 +108,8 @@ def _without_grasps(numbers: bool, kept: list[tuple[str, Path]]) -> "Picture":
 def _placements(grasp_set: "GraspSet", prune: int) -> "Picture":
     """Return a hand for each subject and one for all rows pooled, or one hand if there is but one subject."""
     from thenar.compiler.placement.placement import place_by_subject
+    from thenar.simulator.handmaps.draw import kept
     from thenar.simulator.handmaps.handmap import hand_map
-    from thenar.simulator.handmaps.handpanels import kept
 
     hand_map().numbers_of(grasp_set.switch_names)  # a foreign set is refused before a tree is grown
     with progress("growing a tree of each hand") as report:

@@ -19,10 +19,8 @@ from .lines import echo
 if TYPE_CHECKING:
     import subprocess
 
-    from thenar.simulator.playing.bench import Bench
-    from thenar.simulator.playing.cable import Cable
-    from thenar.simulator.playing.performance import Performance
-    from thenar.simulator.playing.player import Log
+    from thenar.simulator.playing.bench import Bench, Cable
+    from thenar.simulator.playing.performance import Log, Performance
 
     CableOf = Callable[[int], Cable | None]
 
@@ -129,13 +127,13 @@ def _performance(source: str, subject: str | None, period_ms: float | None) -> t
         if subject is not None:
             raise click.UsageError("--subject picks one of a scene's subjects: a recording has its own")
         if path.suffix == ".mcap":
-            from thenar.simulator.playing.recorded import of_recording
+            from thenar.simulator.playing.performance import of_recording
 
             return of_recording(path, given_us or _FRAME_US, warning), _no_cable
         from thenar.compiler.recordings.graspset import GraspSet
 
         return performance.of_set(GraspSet.load(path), given_us or _FRAME_US), _no_cable
-    from thenar.simulator.playing.cable import cable_of
+    from thenar.simulator.playing.bench import cable_of
     from thenar.simulator.scenes.decode import load_scene
 
     scene = load_scene(source)
@@ -208,7 +206,7 @@ def _beside(
 
 
 def _play(bench: "Bench", performance: "Performance", note: "Log", stop: Event, *, repeat: bool) -> None:
-    from thenar.simulator.playing.player import Player
+    from thenar.simulator.playing.performance import Player
 
     player = Player(performance, bench.show, note)
     while player.play(stop) and repeat:

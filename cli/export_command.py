@@ -32,8 +32,7 @@ def command(grasps: Path, output: Path, codes: bool, meta: bool, columns: Path |
         thenar export set.grasps -o table.csv --columns columns.toml
         thenar export set.grasps -o table.arff
     """
-    from thenar.compiler.recordings.columns_of import columns_of
-    from thenar.compiler.recordings.export import export
+    from thenar.compiler.recordings.export import columns_of, export
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.files import write_atomically
 

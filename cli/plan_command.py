@@ -8,7 +8,7 @@ import click
 from .common import json_flag, keep_apart, out, output_file, print_json, progress
 
 if TYPE_CHECKING:
-    from thenar.simulator.planning.plan_scene import Planned
+    from thenar.simulator.planning.plan import Planned
 
 
 @click.command("plan")
@@ -28,7 +28,7 @@ def command(scene: str, output: Path, anew: bool, jobs: int | None, as_json: boo
     Example:
         thenar plan scene.toml -o postures.json
     """
-    from thenar.simulator.planning.plan_scene import plan_scene
+    from thenar.simulator.planning.plan import plan_scene
     from thenar.simulator.scenes.decode import load_scene, own_file
 
     keep_apart(own_file(scene), output)

@@ -88,7 +88,7 @@ def _check_modes(scene: str | None, given: tuple[object, ...], *, keep_unsettled
 
 def _load(name: str, repetitions: int | None, seed: int | None, subjects: tuple[str, ...]) -> "Scene":
     """Return the scene, changed as asked for. Raises SceneError if it is none, or has no such subject."""
-    from thenar.compiler.recordings.names import nearest
+    from thenar.runtime.names import nearest
     from thenar.simulator.errors import SceneError
     from thenar.simulator.scenes.decode import load_scene
 

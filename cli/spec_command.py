@@ -8,7 +8,7 @@ import click
 from .common import any_path, existing_file, existing_folder, json_flag, out, print_json
 
 if TYPE_CHECKING:
-    from thenar.compiler.glove.ends import BoardPins
+    from thenar.compiler.glove.layout import BoardPins
     from thenar.compiler.hand import HandShape
     from thenar.runtime.build import Build
     from thenar.runtime.harness.wiring import Harness
@@ -38,9 +38,8 @@ def command(
         thenar spec build/
         thenar spec build/ --hand-length 182 --glove glove.toml -o spec/
     """
-    from thenar.compiler.glove.files import files_of
-    from thenar.compiler.glove.folder import check_output, write_spec
-    from thenar.compiler.glove.glove_spec import glove_spec
+    from thenar.compiler.glove.files import check_output, files_of, write_spec
+    from thenar.compiler.glove.spec import glove_spec
     from thenar.runtime.build import Build
 
     from .spec_tables import print_spec
@@ -64,9 +63,9 @@ def command(
 
 
 def _hand(manifest: "Manifest", length_mm: float | None) -> "HandShape | None":
-    from .hand import hand_of
+    from thenar.simulator.handmaps.handmap import hand_map
 
-    hand = hand_of([switch.name for switch in manifest.switches], length_mm)
+    hand = hand_map().fitted([switch.name for switch in manifest.switches], length_mm)
     if hand is None and length_mm is not None:
         raise click.UsageError(
             "--hand-length: the switches of this build are not those of murakami160, and where they lie is not known"
@@ -95,7 +94,7 @@ def _board_pins(path: Path, manifest: "Manifest") -> "BoardPins":
     """Return how the board in a `board.toml` reaches its keys."""
     from thenar.compiler.firmware.board_keys import check_switches, key_names
     from thenar.compiler.firmware.board_loading import load_board
-    from thenar.compiler.glove.ends import BoardPins
+    from thenar.compiler.glove.layout import BoardPins
     from thenar.runtime.harness.wiring import BusWiring
 
     board = load_board(path)

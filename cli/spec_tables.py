@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING
 from .common import out
 
 if TYPE_CHECKING:
-    from thenar.compiler.glove.glove_spec import Summary
+    from thenar.compiler.glove.spec import SpecSummary
 
 
-def print_spec(spec: "Summary") -> None:
+def print_spec(spec: "SpecSummary") -> None:
     """Print what `spec.json` holds, for people."""
-    from thenar.compiler.glove.reading import expectations
+    from thenar.compiler.glove.lists import expectations
 
     console = out()
     hand = "" if spec.hand_length_mm is None else f", for a right hand of {spec.hand_length_mm:g} mm"
@@ -25,7 +25,7 @@ def print_spec(spec: "Summary") -> None:
         console.print(sentence)
 
 
-def _print_switches(spec: "Summary") -> None:
+def _print_switches(spec: "SpecSummary") -> None:
     from rich.table import Table
 
     pins = {
@@ -41,7 +41,7 @@ def _print_switches(spec: "Summary") -> None:
         out().print(f"{reader.ref}: {reader.place}, {len(reader.switches)} switches")
 
 
-def _print_wires(spec: "Summary") -> None:
+def _print_wires(spec: "SpecSummary") -> None:
     from rich.table import Table
 
     table = Table("bundle", "connector", "signals", "returns", "wire, m", title="Bundles")
@@ -54,7 +54,7 @@ def _print_wires(spec: "Summary") -> None:
     out().print(table)
 
 
-def _print_materials(spec: "Summary") -> None:
+def _print_materials(spec: "SpecSummary") -> None:
     from rich.table import Table
 
     table = Table("quantity", "what", "part number", "note", title="Materials")

@@ -18,8 +18,8 @@ _NEEDED_FOR_A_PAGE = ("jinja2", "matplotlib")
 
 def _known(_: click.Context, __: click.Parameter, cases: tuple[str, ...]) -> tuple[str, ...]:
     """Return the cases asked for in the order of the catalogue, each once; all of them where none is named."""
-    from thenar.compiler.recordings.names import nearest
-    from thenar.stability.catalogue import NAMES
+    from thenar.runtime.names import nearest
+    from thenar.stability.report import NAMES
 
     for case in cases:
         if case not in NAMES:
@@ -66,9 +66,8 @@ def command(
 
 
 def _run(cases: tuple[str, ...], *, full: bool, jobs: int, output: Path | None, as_json: bool) -> int:
-    from thenar.stability.catalogue import NAMES
-    from thenar.stability.report import Report, run
-    from thenar.stability.weka.beside import beside_weka
+    from thenar.stability.report import NAMES, Report, run
+    from thenar.stability.weka import beside_weka
 
     with progress("hard cases") as report:
         found = run(cases, full=full, jobs=jobs, progress=report)
@@ -98,7 +97,7 @@ def _write(result: "Report", jobs: int, path: Path) -> None:
 
 
 def _list(cases: tuple[str, ...], *, as_json: bool) -> None:
-    from thenar.stability.catalogue import load
+    from thenar.stability.report import load
 
     from .stability_tables import Listed, print_list
 

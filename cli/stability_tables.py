@@ -7,9 +7,19 @@ from rich.console import Console, JustifyMethod
 from rich.table import Table
 from rich.text import Text
 
-from thenar.stability.report import CaseReport, Check, Report
-from thenar.stability.weka.beside import Beside, NotRun
-from thenar.stability.wording import besides, bound_of, failures, figure, legend, summary, verdict
+from thenar.stability.report import (
+    CaseReport,
+    Check,
+    Report,
+    besides,
+    bound_of,
+    failures,
+    figure,
+    legend,
+    summary,
+    verdict,
+)
+from thenar.stability.weka import Beside, NotRun
 
 from .common import out
 

@@ -137,15 +137,16 @@ def sincos(x: Floats) -> tuple[Floats, Floats]:
     quarter = np.rint(x * _TWO_OVER_PI)
     rest = ((x - quarter * _HALF_PI_HIGH) - quarter * _HALF_PI_MIDDLE) - quarter * _HALF_PI_LOW
     square = rest * rest
-    sine = rest + rest * square * _series(square, _SIN_TERMS)
-    cosine = (1.0 - 0.5 * square) + square * square * _series(square, _COS_TERMS)
+    sine = rest + rest * square * polynomial(square, _SIN_TERMS)
+    cosine = (1.0 - 0.5 * square) + square * square * polynomial(square, _COS_TERMS)
     turn = quarter.astype(np.int64)
     swapped = (turn & 1).astype(bool)
     first, second = np.where(swapped, cosine, sine), np.where(swapped, sine, cosine)
     return np.where(turn & 2, -first, first), np.where((turn + 1) & 2, -second, second)
 
 
-def _series(x: Floats, terms: tuple[float, ...]) -> Floats:
+def polynomial(x: Floats, terms: tuple[float, ...]) -> Floats:
+    """Return the sum of terms[k] x^k, any shape, from the last term on."""
     total = np.full_like(x, terms[-1])
     for term in terms[-2::-1]:
         total *= x

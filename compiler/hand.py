@@ -1,7 +1,7 @@
 """A hand laid flat on paper, with its switches: what pictures, reports and specs know of a glove.
 
-The places come from whoever knows the glove (the command line takes them from the simulator's hand map), so that
-nothing here depends on how hands are simulated.
+The places come from whoever knows the glove (simulator/handmaps), so that nothing here depends on how hands are
+simulated.
 """
 
 from collections.abc import Sequence
@@ -10,7 +10,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.drivers.errors import ThenarError
+from thenar.runtime.names import nearest
+
 Floats = NDArray[np.float64]
+
+
+class MapError(ThenarError, ValueError):
+    """A switch or a set cannot be drawn on the hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -20,10 +27,12 @@ class HandShape:
     names, places (s, 2)  the switches, and where their middles lie; radius_mm of the circle that stands for one
     parts (s,)            index of each switch's part in part_names: the digits from the thumb on, then the palm
     sides (s,)            -1 on the unfolded left side of its digit, 1 on the right one, 0 elsewhere
-    outline (k, 2)        the hand from cuff to cuff; strips: outlines of the unfolded sides; creases: open lines
-    labels (digits, 2)    where a digit's name is written
+    outline (k, 2)        the hand from cuff to cuff; digits: that of each digit; creases: open lines
+    strips                outlines of the unfolded sides, left and right of the thumb, then of the index, ...
+    labels (digits, 2)    where a digit's name is written, above its tip
     """
 
+    glove: str
     length_mm: float
     names: tuple[str, ...]
     places: Floats
@@ -32,6 +41,7 @@ class HandShape:
     parts: NDArray[np.intp]
     sides: NDArray[np.intp]
     outline: Floats
+    digits: tuple[Floats, ...]
     strips: tuple[Floats, ...]
     creases: tuple[Floats, ...]
     labels: Floats
@@ -50,6 +60,7 @@ class HandShape:
             length_mm=length_mm,
             places=self.places * factor,
             outline=self.outline * factor,
+            digits=tuple(digit * factor for digit in self.digits),
             strips=tuple(strip * factor for strip in self.strips),
             creases=tuple(crease * factor for crease in self.creases),
             labels=self.labels * factor,
@@ -60,6 +71,9 @@ class HandShape:
         return set(names) <= set(self.names)
 
     def numbers_of(self, names: Sequence[str]) -> NDArray[np.intp]:
-        """Return the numbers of the switches called `names`, all of which the hand `knows`."""
+        """Return the numbers of the switches called `names`. Raises MapError naming the first strange one."""
         number = {name: number for number, name in enumerate(self.names)}
+        strange = next((name for name in names if name not in number), None)
+        if strange is not None:
+            raise MapError(f"{strange!r} is no switch of the glove {self.glove}{nearest(strange, self.names)}")
         return np.array([number[name] for name in names], dtype=np.intp)

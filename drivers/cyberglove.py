@@ -13,9 +13,9 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from time import monotonic, monotonic_ns
-from types import TracebackType
 from typing import Literal, Self
 
+from .closing import Closing
 from .cyberglove_protocol import (
     FASTEST,
     INFORMATION,
@@ -277,95 +277,10 @@ _LONGEST_BACKLOG = 1 << 18
 Timed = tuple[int, Record]
 
 
-class Records:
-    """Reads records from `line`, streamed, or polled as often as wanted. `counts` goes on where it is."""
-
-    def __init__(self, line: SerialLine, info: GloveInfo, wanted: Wanted, counts: RecordCounts) -> None:
-        self._line, self._info, self._counts = line, info, counts
-        self._poll, self._period_s = wanted.poll, told_us(wanted.words) / 1e6
-        periods_s = _SILENT_PERIODS * info.period_us / 1e6
-        self._silent_s, self._noisy_s = max(_SILENT_S, periods_s), max(_NOISY_S, periods_s)
-        self._last_us = 0
-        self.start()
-
-    def start(self) -> None:
-        """Begin, or begin again after the box was asked for something else."""
-        self._decoder = RecordDecoder(self._info.sensors, self._counts, self._info.status)
-        self._ready: deque[Timed] = deque()
-        self._heard_at = self._quiet_from = self._due = self._poll_at = monotonic()
-        self._asked = False
-        if not self._poll:
-            self._line.write(STREAM)
-
-    def read(self, timeout_s: float) -> Timed | None:
-        """Return the oldest record not yet returned and when it was in, in microseconds of the monotonic clock.
-
-        Of records that come in together each is a period older than the next, and a polled one was in before it was to
-        be asked for again: what stood in a buffer while the host was held up is not taken for new.
-
-        None if none is in by the timeout. Raises DeviceError when the line is gone, or no byte came for half a second,
-        or no record for a second (or for four periods, where these are longer).
-        """
-        end = monotonic() + timeout_s
-        while not self._ready:
-            self._ask()
-            now = monotonic()
-            self._receive(min(end, self._given_up_at, self._next_poll()) - now)
-            if not self._ready and now >= end:
-                return None
-        return self._ready.popleft()
-
-    def _ask(self) -> None:
-        now = monotonic()
-        if not self._poll or now < self._poll_at:
-            return
-        self._line.write(POLL)
-        if not self._asked:
-            self._asked, self._heard_at, self._quiet_from = True, now, now
-        self._poll_at = now + _POLLED_S
-        self._due = max(self._due + self._period_s, now)
-
-    def _next_poll(self) -> float:
-        return self._poll_at if self._poll else float("inf")
-
-    @property
-    def _given_up_at(self) -> float:
-        """When the glove is taken for dead if nothing more comes."""
-        return min(self._heard_at + self._silent_s, self._quiet_from + self._noisy_s)
-
-    def _receive(self, seconds: float) -> None:
-        data = self._waiting(seconds)
-        records = self._decoder.feed(data)
-        now_us = monotonic_ns() // 1000
-        if data:
-            self._heard_at = now_us / 1e6
-        if records:
-            newest_us = min(now_us, round((self._quiet_from + _POLLED_S) * 1e6)) if self._poll else now_us
-            for behind, record in zip(reversed(range(len(records))), records, strict=True):
-                self._last_us = max(self._last_us, newest_us - behind * self._info.period_us)
-                self._ready.append((self._last_us, record))
-            self._quiet_from, self._asked, self._poll_at = now_us / 1e6, False, self._due
-        elif now_us / 1e6 > self._given_up_at and self._is_expected():
-            silent = now_us / 1e6 - self._heard_at > self._silent_s
-            said = f"no byte for {self._silent_s:g}" if silent else f"no record for {self._noisy_s:g}"
-            raise DeviceError(f"{self._line.url}: the CyberGlove has sent {said} s: check its power and the cable")
-
-    def _waiting(self, seconds: float) -> bytes:
-        """Return what has come in, a backlog up to its end; its last record is then the newest there is."""
-        data = self._line.read(max(0.0, seconds))
-        if len(data) >= _BACKLOG:
-            while len(data) < _LONGEST_BACKLOG and (more := self._line.read(0.0)):
-                data += more
-        return data
-
-    def _is_expected(self) -> bool:
-        return self._asked or not self._poll
-
-
 Mode = Literal["stream", "poll"]
 
 
-class CyberGlove:
+class CyberGlove(Closing):
     """A glove at `url`: a device, socket://HOST:PORT or rfc2217://HOST:PORT.
 
     baud     bits a second; None tries the rates that a box can be set to
@@ -392,7 +307,7 @@ class CyberGlove:
         self._rates = BAUD_RATES if baud is None else (baud,)
         self._wanted = Wanted(period_words(rate_hz), poll=mode == "poll", sensors=sensors, status=status)
         self._line: SerialLine | None = None
-        self._records: Records | None = None
+        self._last_us = 0
 
     def open(self) -> GloveInfo:
         """Open the line, stop what streams on it, learn what glove it is, set it up, and begin.
@@ -402,21 +317,40 @@ class CyberGlove:
         self.close()
         line = find_line(self.url, self._rates)
         try:
-            info = set_up(line, self._wanted)
-            self._records = Records(line, info, self._wanted, self.counts)
+            info = self._info = set_up(line, self._wanted)
+            for note in info.notes:
+                _LOG.info("%s: %s", self.url, note)
+            periods_s = _SILENT_PERIODS * info.period_us / 1e6
+            self._silent_s, self._noisy_s = max(_SILENT_S, periods_s), max(_NOISY_S, periods_s)
+            self._start(line)
         except BaseException:
             line.close()
             raise
-        self._line = line
+        self._line, self._last_us = line, 0
         return info
 
     def read(self, timeout_s: float) -> Timed | None:
         """Return the oldest record not yet returned, as (time_us, Record); None if none is in by the timeout.
 
-        time_us is when its last byte was in, in microseconds of the monotonic clock. A record with the fault
-        "unplugged" holds no measurement. Raises DeviceError when the line is gone, or no record comes any more.
+        time_us is when its last byte was in, in microseconds of the monotonic clock. Of records that come in together
+        each is a period older than the next, and a polled one was in before it was to be asked for again: what stood in
+        a buffer while the host was held up is not taken for new. A record with the fault "unplugged" holds no
+        measurement.
+
+        Raises DeviceError when the line is gone, or no byte came for half a second, or no record for a second (or for
+        four periods, where these are longer).
         """
-        return self._opened()[1].read(timeout_s)
+        line, end = self._opened(), monotonic() + timeout_s
+        while not self._ready:
+            now = monotonic()
+            until = min(end, self._given_up_at)
+            if self._wanted.poll:
+                self._poll(line, now)
+                until = min(end, self._given_up_at, self._poll_at)
+            self._receive(line, until - now)
+            if not self._ready and now >= end:
+                return None
+        return self._ready.popleft()
 
     def light(self, on: bool) -> None:
         """Switch the light at the wrist. A stream pauses for it. Raises DeviceError as `ask` does."""
@@ -435,7 +369,7 @@ class CyberGlove:
 
     def close(self) -> None:
         """Stop the stream, where that is still possible, and close the line."""
-        line, self._line, self._records = self._line, None, None
+        line, self._line = self._line, None
         if line is not None:
             with suppress(DeviceError):
                 line.write(STOP)
@@ -445,19 +379,67 @@ class CyberGlove:
         self.open()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self.close()
-
     def _ask(self, command: Command) -> bytes:
-        line, records = self._opened()
+        line = self._opened()
         dialogue = Dialogue(line)
         dialogue.hush()
         try:
             return dialogue.ask(command)
         finally:
-            records.start()
+            self._start(line)
 
-    def _opened(self) -> tuple[SerialLine, Records]:
-        if self._line is None or self._records is None:
+    def _opened(self) -> SerialLine:
+        if self._line is None:
             raise DeviceError(f"{self.url}: the CyberGlove is not open: open() it first")
-        return self._line, self._records
+        return self._line
+
+    def _start(self, line: SerialLine) -> None:
+        """Begin, or begin again after the box was asked for something else."""
+        self._decoder = RecordDecoder(self._info.sensors, self.counts, self._info.status)
+        self._ready: deque[Timed] = deque()
+        self._heard_at = self._quiet_from = self._due = self._poll_at = monotonic()
+        self._expected = not self._wanted.poll
+        if self._expected:
+            line.write(STREAM)
+
+    def _poll(self, line: SerialLine, now: float) -> None:
+        """Ask for a record when one is due, or when the last one is taken for lost."""
+        if now < self._poll_at:
+            return
+        line.write(POLL)
+        if not self._expected:
+            self._expected, self._heard_at, self._quiet_from = True, now, now
+        self._poll_at = now + _POLLED_S
+        self._due = max(self._due + told_us(self._wanted.words) / 1e6, now)
+
+    @property
+    def _given_up_at(self) -> float:
+        """When the glove is taken for dead if nothing more comes."""
+        return min(self._heard_at + self._silent_s, self._quiet_from + self._noisy_s)
+
+    def _receive(self, line: SerialLine, seconds: float) -> None:
+        data = _waiting(line, seconds)
+        records = self._decoder.feed(data)
+        now_us = monotonic_ns() // 1000
+        if data:
+            self._heard_at = now_us / 1e6
+        if records:
+            polled = self._wanted.poll
+            newest_us = min(now_us, round((self._quiet_from + _POLLED_S) * 1e6)) if polled else now_us
+            for behind, record in zip(reversed(range(len(records))), records, strict=True):
+                self._last_us = max(self._last_us, newest_us - behind * self._info.period_us)
+                self._ready.append((self._last_us, record))
+            self._quiet_from, self._expected, self._poll_at = now_us / 1e6, not polled, self._due
+        elif now_us / 1e6 > self._given_up_at and self._expected:
+            silent = now_us / 1e6 - self._heard_at > self._silent_s
+            said = f"no byte for {self._silent_s:g}" if silent else f"no record for {self._noisy_s:g}"
+            raise DeviceError(f"{self.url}: the CyberGlove has sent {said} s: check its power and the cable")
+
+
+def _waiting(line: SerialLine, seconds: float) -> bytes:
+    """Return what has come in, a backlog up to its end; its last record is then the newest there is."""
+    data = line.read(max(0.0, seconds))
+    if len(data) >= _BACKLOG:
+        while len(data) < _LONGEST_BACKLOG and (more := line.read(0.0)):
+            data += more
+    return data

@@ -22,6 +22,7 @@ NUL; 'e', 's' and 'g' are sensor values as well, and only the two bytes too many
 byte is always 1. Time stamps, which may hold zeros, are left switched off.
 """
 
+import logging
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -30,6 +31,8 @@ from typing import Literal
 
 from .errors import SettingError
 from .serial_line import BITS_A_BYTE, Pieces
+
+_LOG = logging.getLogger(__name__)
 
 _FINGER_SLOTS = ("mpj", "pij", "dij")
 # In slot order; a mask's bit is the slot's place, the lowest bit of the first byte first. "" is never sent.
@@ -288,23 +291,23 @@ class RecordDecoder:
 
     def feed(self, chunk: bytes) -> list[Record]:
         """Return the records that `chunk` completes, oldest first."""
-        found = (self._record(piece) for piece in self._pieces.feed(chunk) if piece)
-        return [record for record in found if record is not None]
+        pieces = self._pieces.feed(chunk)
+        return [record for piece in pieces if piece and (record := self._record(piece)) is not None]
 
     def _record(self, piece: bytes) -> Record | None:
         start, ending = piece[:1], piece[self._body :]
         if start not in (POLL, STREAM):
             self.counts.wrong_start += 1
+            _LOG.debug("%d bytes that begin with no G or S were skipped", len(piece))
             return None
         fault = _FAULTS.get(ending)
         if len(piece) < self._body or (ending and fault is None):
             self.counts.wrong_length += 1
+            _LOG.debug("a record of %d bytes was skipped: %d are right", len(piece), self._body)
             return None
-        self._count(fault)
+        self.counts.records += 1
+        if fault is not None:
+            self.counts.too_fast += fault == "too fast"
+            self.counts.unplugged += fault == "unplugged"
         status = piece[self._body - 1] if self.status else None
         return Record(piece[1 : self.sensors + 1], start == STREAM, fault, status)
-
-    def _count(self, fault: RecordFault | None) -> None:
-        self.counts.records += 1
-        self.counts.too_fast += fault == "too fast"
-        self.counts.unplugged += fault == "unplugged"

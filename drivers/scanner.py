@@ -4,9 +4,9 @@ import logging
 from collections import deque
 from dataclasses import asdict, dataclass
 from time import monotonic, monotonic_ns
-from types import TracebackType
 from typing import NamedTuple, Self
 
+from .closing import Closing
 from .errors import DeviceError
 from .scanner_protocol import (
     DEGRADED,
@@ -90,7 +90,7 @@ _GREETING_S = 0.3
 _ASK_AGAIN_S = 0.1
 
 
-class Scanner:
+class Scanner(Closing):
     """A scanner board at `url`: a device, socket://HOST:PORT or rfc2217://HOST:PORT; boards with USB ignore `baud`.
 
     `open`, then `read` again and again; both raise DeviceError when the board is gone or is not what it was, after
@@ -122,9 +122,6 @@ class Scanner:
     def __enter__(self) -> Self:
         self.open()
         return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self.close()
 
     def open(self) -> Hello:
         """Find the board. Raises DeviceError if none answers within three seconds, or one that speaks otherwise."""
@@ -164,7 +161,8 @@ class Scanner:
         reading = self._next()
         while reading is None:
             left = end - monotonic()
-            self._ask_for_state()
+            if not self._keys.trusted:
+                self._ask_for_state()
             self._receive(max(0.0, min(left, _ASK_AGAIN_S)))
             reading = self._next()
             if left <= 0:
@@ -202,7 +200,8 @@ class Scanner:
         data = self._opened().read(timeout_s)
         came_us = monotonic_ns() // 1000
         self._received_bytes += len(data)
-        self._waiting.extend((came_us, received) for received in self._decoder.received(data))
+        for received in self._decoder.received(data):
+            self._waiting.append((came_us, received))
 
     def _tell(self, setting: SetRate | SetDebounce) -> None:
         self._send(setting)
@@ -276,6 +275,7 @@ class Scanner:
                 self._misfits += 1
                 self._keys.misread()
         else:
+            _LOG.info("%s: bytes that are no frame were skipped", self.url)
             self._keys.damaged()
         return None
 
@@ -285,9 +285,9 @@ class Scanner:
         self.hello = hello
 
     def _ask_for_state(self) -> None:
-        """Ask for a full bitmap if there is none to be trusted, and again if none came."""
+        """Ask for a full bitmap, and again if none came."""
         now = monotonic()
-        if not self._keys.trusted and now >= self._ask_at:
+        if now >= self._ask_at:
             _LOG.info("%s: what the board said of its keys cannot be trusted: all of them are asked for", self.url)
             self._ask_at = now + _ASK_AGAIN_S
             self._asked += 1

@@ -125,8 +125,8 @@ class Fixed:
             raise SettingError(f"no frame can carry {self}: {reason}") from reason
 
     @classmethod
-    def read(cls, payload: bytes) -> Self:
-        """Return the message. Raises MessageError unless the payload has its exact length."""
+    def read(cls, payload: bytes, keys: int = 0) -> Self:
+        """Return the message of a board of so many keys. Raises MessageError where the payload has another length."""
         if len(payload) != cls.LAYOUT.size:
             raise MessageError(f"a {cls.__name__} carries {cls.LAYOUT.size} bytes, not {len(payload)}")
         return cls(*cls.LAYOUT.unpack(payload))
@@ -214,7 +214,7 @@ class Hello(Fixed):
         return min((period for period in (self.state_us, self.heartbeat_us) if period), default=0)
 
     @classmethod
-    def read(cls, payload: bytes) -> Self:
+    def read(cls, payload: bytes, keys: int = 0) -> Self:
         """Return the message. Raises MessageError where length, protocol or number of keys are none of ours."""
         if payload and payload[0] != PROTOCOL:
             raise MessageError(
@@ -226,23 +226,30 @@ class Hello(Fixed):
         return hello
 
 
+class _Bitmap:
+    """A message, a dataclass that holds a set of keys and how many keys there are."""
+
+    __slots__ = ()
+    KIND: ClassVar[int]
+
+    def payload(self) -> bytes:
+        """Return what the frame carries. Raises OverflowError where the set holds a key that there is not."""
+        return to_bitmap(*astuple(self))  # type: ignore[call-overload]
+
+    @classmethod
+    def read(cls, payload: bytes, keys: int) -> Self:
+        """Return the message of a board of so many keys. Raises MessageError."""
+        return cls(from_bitmap(payload, keys), keys)  # type: ignore[call-arg]
+
+
 @dataclass(frozen=True, slots=True)
-class State:
+class State(_Bitmap):
     """All keys as they were scanned just before it was sent."""
 
     KIND: ClassVar[int] = STATE
 
     closed: int
     keys: int
-
-    def payload(self) -> bytes:
-        """Return what the frame carries. Raises OverflowError where a key is closed that there is not."""
-        return to_bitmap(self.closed, self.keys)
-
-    @classmethod
-    def read(cls, payload: bytes, keys: int) -> Self:
-        """Return the message of a board of so many keys. Raises MessageError."""
-        return cls(from_bitmap(payload, keys), keys)
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,6 +284,14 @@ class Event(Fixed):
     time_us: int
     key: int
     edge: int
+
+    @classmethod
+    def read(cls, payload: bytes, keys: int = 0) -> Self:
+        """Return the message of a board of so many keys. Raises MessageError."""
+        event = super(Event, cls).read(payload)
+        if event.key >= keys or event.edge > 1:
+            raise MessageError(f"an EVENT of key {event.key}, edge {event.edge}, from a board of {keys} keys")
+        return event
 
 
 @dataclass(frozen=True, slots=True)
@@ -317,22 +332,13 @@ class Grasp(Fixed):
 
 
 @dataclass(frozen=True, slots=True)
-class Lost:
+class Lost(_Bitmap):
     """The keys that cannot be read now: sent when they change, and right before every HEARTBEAT while there are any."""
 
     KIND: ClassVar[int] = 0x07
 
     lost: int
     keys: int
-
-    def payload(self) -> bytes:
-        """Return what the frame carries. Raises OverflowError where a key is lost that there is not."""
-        return to_bitmap(self.lost, self.keys)
-
-    @classmethod
-    def read(cls, payload: bytes, keys: int) -> Self:
-        """Return the message of a board of so many keys. Raises MessageError."""
-        return cls(from_bitmap(payload, keys), keys)
 
 
 @dataclass(frozen=True, slots=True)
@@ -378,6 +384,9 @@ class Ping(Fixed):
 
 FromBoard = Hello | State | Heartbeat | Event | Faults | Grasp | Lost
 ToBoard = SetRate | SetDebounce | GetState | Ping
+_FROM_BOARD: dict[int, type[FromBoard]] = {
+    kind.KIND: kind for kind in (Hello, State, Heartbeat, Event, Faults, Grasp, Lost)
+}
 _TO_BOARD: dict[int, type[ToBoard]] = {kind.KIND: kind for kind in (SetRate, SetDebounce, GetState, Ping)}
 
 
@@ -388,25 +397,10 @@ def frame(message: FromBoard | ToBoard, sequence: int) -> Frame:
 
 def from_board(received: Frame, keys: int) -> FromBoard:
     """Return what a board of so many keys says. Raises MessageError."""
-    match received.kind:
-        case Hello.KIND:
-            return Hello.read(received.payload)
-        case State.KIND:
-            return State.read(received.payload, keys)
-        case Heartbeat.KIND:
-            return Heartbeat.read(received.payload, keys)
-        case Faults.KIND:
-            return Faults.read(received.payload)
-        case Grasp.KIND:
-            return Grasp.read(received.payload)
-        case Lost.KIND:
-            return Lost.read(received.payload, keys)
-        case Event.KIND:
-            event = Event.read(received.payload)
-            if event.key >= keys or event.edge > 1:
-                raise MessageError(f"an EVENT of key {event.key}, edge {event.edge}, from a board of {keys} keys")
-            return event
-    raise MessageError(f"no message of a scanner board has kind 0x{received.kind:02X}")
+    kind = _FROM_BOARD.get(received.kind)
+    if kind is None:
+        raise MessageError(f"no message of a scanner board has kind 0x{received.kind:02X}")
+    return kind.read(received.payload, keys)
 
 
 def to_board(received: Frame) -> ToBoard:

@@ -28,7 +28,7 @@ class BoardKeys:
     """The keys of a board, as its HELLO gives them, which was the frame numbered `sequence`.
 
     They are unknown until a HEARTBEAT comes, with the frame before it: that is a LOST if there are keys that the board
-    cannot read.
+    cannot read. `trusted` says whether nothing is missing of what the board told of them.
     """
 
     def __init__(self, rows: int = 0, columns: int = 0, flags: int = 0, sequence: int = 0) -> None:
@@ -44,11 +44,6 @@ class BoardKeys:
         self.restarted()
 
     @property
-    def trusted(self) -> bool:
-        """Whether nothing is missing of what the board told of its keys."""
-        return self._has_bitmap and self._has_lost
-
-    @property
     def known(self) -> Mask:
         """The keys of which it can be said whether they are closed."""
         if not self.trusted:
@@ -60,11 +55,11 @@ class BoardKeys:
 
     def restarted(self) -> None:
         """Note that the board begins anew: nothing of what it told before holds."""
-        self._has_bitmap = self._has_lost = False
+        self._has_bitmap = self._has_lost = self.trusted = False
 
     def damaged(self) -> None:
         """Note that something came in which was no frame: it may have been an EVENT. A LOST would leave a gap."""
-        self._has_bitmap = False
+        self._has_bitmap = self.trusted = False
 
     def misread(self) -> None:
         """Note that the last frame could not be read: it may have been anything."""
@@ -93,6 +88,7 @@ class BoardKeys:
             case Event() if self._has_bitmap:
                 bit = 1 << message.key
                 self.closed = self.closed | bit if message.edge else self.closed & ~bit
+        self.trusted = self._has_bitmap and self._has_lost
 
     def _not_lost(self) -> None:
         """Take a HEARTBEAT that follows another frame than a LOST to say that all keys can be read."""

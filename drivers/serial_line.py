@@ -8,9 +8,9 @@ import errno
 import os
 import select
 from time import monotonic
-from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
+from .closing import Closing
 from .errors import DeviceError, SettingError
 from .names import shortened
 from .ports import check_node, port_fault
@@ -54,7 +54,7 @@ class Pieces:
         return [piece[: self._keep] for piece in pieces]
 
 
-class SerialLine:
+class SerialLine(Closing):
     """An open serial line. Closing it twice does no harm; a context manager closes it at its end.
 
     One thread may read while another writes.
@@ -74,15 +74,10 @@ class SerialLine:
         self._sliced = not _has_descriptor(self._port)
         if self._sliced:
             self._port.timeout = _SLICE_S
-        self._node = None if self._sliced else _node(self._port.fileno())
-        self._look_at = 0.0
+        self._descriptor = -1 if self._sliced else self._port.fileno()
+        self._node = None if self._sliced else _node(self._descriptor)
+        self._look_at = 0.0 if self._node else float("inf")
         _lower_latency(self._port)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self.close()
 
     def read(self, timeout_s: float) -> bytes:
         """Return what has come in, after waiting for something until the timeout: b"" if nothing came.
@@ -90,7 +85,8 @@ class SerialLine:
         Raises DeviceError when the line is gone, as soon as that shows, or when its name has come to lead to another
         port: the one that is open is then no longer the one that was meant.
         """
-        self._look()
+        if monotonic() >= self._look_at:
+            self._look()
         try:
             return self._in_slices(timeout_s) if self._sliced else self._when_ready(timeout_s)
         except (OSError, TypeError, ValueError) as reason:  # the latter two: closed meanwhile by another thread
@@ -112,22 +108,20 @@ class SerialLine:
 
     def close(self) -> None:
         """Close the line; what was written is given to the system already."""
+        self._descriptor = -1  # nobody reads what another file of the same number holds
         self._port.close()
 
     def _look(self) -> None:
-        now = monotonic()
-        if self._node is None or now < self._look_at:
-            return
-        self._look_at = now + _LOOK_S
+        self._look_at = monotonic() + _LOOK_S
         if _node(self.url) not in (None, self._node):
             raise DeviceError(f"{self.url}: it has come to be another port than the one that was opened")
 
     def _when_ready(self, timeout_s: float) -> bytes:
-        ready, _, _ = select.select([self._port.fileno()], [], [], max(0.0, timeout_s))
+        ready, _, _ = select.select([self._descriptor], [], [], max(0.0, timeout_s))
         if not ready:
             return b""
         try:
-            data = os.read(self._port.fileno(), _CHUNK)  # pySerial would wait once more, in ten calls
+            data = os.read(self._descriptor, _CHUNK)  # pySerial would wait once more, in ten calls
         except BlockingIOError:
             return b""
         if not data:

@@ -1,19 +1,57 @@
-"""The catalogue run on all cores, and what came of it: a line a check, whatever else goes wrong."""
+"""The catalogue of hard cases run on all cores, what came of it, and how terminal and page word it."""
 
+import math
 import traceback
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor
 from functools import partial
+from importlib import import_module
 from pathlib import Path
+from typing import Protocol, cast
 
 import msgspec
 
 from thenar.compiler.workers import in_workers
 
-from .catalogue import load
 from .finding import Case, Finding
-from .weka.beside import Beside, NotRun
+from .weka import Beside, Differences, NotRun
+
+NAMES = (
+    "elementary",
+    "information",
+    "targets",
+    "stumpfits",
+    "scoretables",
+    "invariances",
+    "separable",
+    "degenerate",
+    "columns",
+    "codes",
+    "contradictions",
+    "weights",
+    "quantisation",
+    "missing",
+    "contact",
+    "statistics",
+    "platform",
+)
+
+
+class CaseModule(Protocol):
+    """A module of `cases`."""
+
+    CASE: Case
+
+    @staticmethod
+    def findings(full: bool) -> Iterator[Finding]:
+        """Run the case, quickly or in full, and yield what it finds, in an order that does not vary."""
+
+
+def load(name: str) -> CaseModule:
+    """Return the module of case `name`, one of NAMES."""
+    return cast("CaseModule", import_module(f".cases.{name}", __package__))
+
 
 Progress = Callable[[int, int], None]
 
@@ -89,3 +127,116 @@ def _told(fault: Exception) -> str:
     """Return what was raised and where: "ZeroDivisionError in separable.py, line 40: division by zero"."""
     place = traceback.extract_tb(fault.__traceback__)[-1]
     return f"{type(fault).__name__} in {Path(place.filename).name}, line {place.lineno}: {fault}"
+
+
+# What units mean, in the order of the legend. All others count what is wrong, or speak for themselves.
+_MEANINGS = (
+    ("ulp", "the distance from the true number to the next double"),
+    ("x 2^-53", "times 2^-53 of the number, or of what is named: by so much one rounding can be off"),
+    ("x rounding", "times the most that rounding can do to that very number, added up for each input"),
+    ("x growth", "the same, with what later rounds make of the roundings of earlier ones"),
+    ("of the bound", "as a share of a bound that is worked out for each input"),
+    ("steps", "whole numbers: those of the integer tables, or a joint's codes"),
+)
+
+
+def figure(number: float) -> str:
+    """Return a number for people: whole ones below a million whole, others to three digits."""
+    whole = math.isfinite(number) and number == round(number) and abs(number) < 1e6
+    return f"{round(number):,}" if whole else f"{number:.3g}"
+
+
+def error_of(finding: Finding) -> str:
+    """Return the worst error with its unit."""
+    return f"{figure(finding.error)} {finding.unit}"
+
+
+def bound_of(finding: Finding) -> str:
+    """Return the most that the error may be."""
+    return f"{figure(finding.bound)} {finding.unit}"
+
+
+def verdict(check: Check) -> str:
+    """Return the verdict as a word or two."""
+    if check.holds:
+        return "holds"
+    return "FAILS" if check.finding.tried else "NOT TRIED"
+
+
+def summary(report: Report) -> str:
+    """Return the sum of it all in a line."""
+    checks = [check for case in report.cases for check in case.checks]
+    tried = sum(check.finding.tried for check in checks)
+    looked = f"{_count(len(report.cases), 'case')} {'in full' if report.full else 'quickly'}, "
+    looked += f"{_count(len(checks), 'check')} on {_count(tried, 'input')}"
+    if report.holds:
+        return f"{looked}: all hold"
+    bad = ", ".join(case.name for case in report.cases if not case.holds)
+    return f"{looked}: NOT all hold, see {bad}"
+
+
+def failures(report: Report) -> tuple[str, ...]:
+    """Return a sentence for all that fails: the case, what was looked at, by how much it fails, and where worst."""
+    return tuple(f"{case.name}: {said}" for case in report.cases for said in _failures(case))
+
+
+def _failures(case: CaseReport) -> Iterator[str]:
+    for check in case.checks:
+        if not check.holds:
+            yield _fault(check.finding)
+    if case.failure is not None:
+        yield case.failure
+    elif not case.checks:
+        yield "it finds nothing"
+
+
+def _fault(finding: Finding) -> str:
+    if not finding.tried:
+        return f"{finding.check}: nothing was tried"
+    often = f", beyond it {finding.beyond:,} times" if finding.beyond > 1 else ""
+    where = f"; worst: {finding.worst}" if finding.worst else ""
+    return f"{finding.check}: {error_of(finding)} against a bound of {bound_of(finding)}{often}{where}"
+
+
+def legend(report: Report) -> tuple[tuple[str, str], ...]:
+    """Return the units that occur and do not speak for themselves, each with what it means."""
+    units = {check.finding.unit for case in report.cases for check in case.checks}
+    occurring = (
+        (unit, meaning)
+        for unit, meaning in _MEANINGS
+        if any(each == unit or each.startswith(f"{unit} of ") for each in units)
+    )
+    return tuple(occurring)
+
+
+def besides(beside: Beside | NotRun) -> tuple[str, ...]:
+    """Return what came of running Weka beside thenar, a sentence a line."""
+    if isinstance(beside, NotRun):
+        return (f"not run: {beside.why}",)
+    changed = f"in the end {_count(beside.weka_changed, 'row')} of {beside.held_out} change class"
+    return (
+        f"Weka {beside.weka} and thenar, {beside.rounds} rounds on {beside.rows} rows of {beside.classes} classes that "
+        f"stumps learn by heart; how far apart the probabilities are that they give to {beside.held_out} other rows:",
+        f"{_apart(beside.weka_itself, 'Weka and itself, under the two exp() settings of the JVM')}; {changed}",
+        _apart(beside.ours_processor, "thenar and Weka under the exp() of the processor, the default"),
+        _apart(beside.ours_java, "thenar and Weka under the exp() written in Java"),
+        f"thenar and itself, trained on the rows in {beside.shuffles} other orders: "
+        + (f"at most {figure(beside.our_shuffled)}" if beside.our_shuffled else "the same bits"),
+    )
+
+
+def _apart(differences: Differences, who: str) -> str:
+    parts = differences.parts
+    if parts is None:
+        return f"{who}: at most {figure(max(differences.largest, default=0.0))}, in all rounds"
+    most = figure(_most(differences, parts))
+    return f"{who}: at most {most} until they part in round {parts}, then by up to {figure(max(differences.largest))}"
+
+
+def _most(differences: Differences, until: int) -> float:
+    """Return the largest difference before round `until`."""
+    return max(differences.largest[: until - 1], default=0.0)
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number:,} {noun}" if number == 1 else f"{number:,} {noun}s"

@@ -12,8 +12,7 @@ from thenar.simulator.body.shapes import Box, Cylinder, Sphere
 from thenar.simulator.pipeline.effect import EFFECTS
 from thenar.simulator.scenes import shipped
 from thenar.simulator.scenes.decode import _File, load_scene
-from thenar.simulator.scenes.population import SURVEYS, Population
-from thenar.simulator.scenes.scene import Glove, Recording, SceneObject, Subject
+from thenar.simulator.scenes.scene import SURVEYS, Glove, Population, Recording, SceneObject, Subject
 
 NAMES = tuple(EFFECTS)
 

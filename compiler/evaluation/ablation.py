@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ..recordings.graspset import GraspSet
 from ..trainers.base import Training
-from .plan import COMPOSITIONS, inputs
 from .fits import Fit, Progress, run_fits
+from .plan import COMPOSITIONS, inputs
 from .populations import populations
 from .rates import Rate
 

@@ -1,7 +1,21 @@
-"""Components and nets: what a netlist and a bill of materials list."""
+"""The circuit of a glove, components and nets, and what to buy for it.
 
-from collections.abc import Iterable, Iterator, Sequence
+Switches, the connectors of their bundles, scanner boards and diodes; and the expanders with what they need: supply,
+address, reset, the pull-ups of each bus, muxes, and the host's plugs.
+"""
+
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+
+from msgspec import Struct
+
+from thenar.drivers.i2c import tca9548a
+from thenar.drivers.i2c.chips.base import GROUND as GROUND_PINS
+from thenar.drivers.i2c.chips.base import RESET, Package
+from thenar.drivers.i2c.chips.base import SUPPLY as SUPPLY_PINS
+from thenar.runtime.harness.wiring import Harness, MuxChannel
+
+from .layout import GROUND, SUPPLY, End, PlacedSwitch, Unit, Wire, net_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +48,7 @@ class Component:
 
 
 @dataclass(frozen=True, slots=True)
-class Node:
+class Terminal:
     """A pin of a component."""
 
     ref: str
@@ -46,7 +60,7 @@ class Circuit:
     """Components in the order in which they were put in, nets by name; built up piece by piece, then only read."""
 
     components: list[Component] = field(default_factory=list)
-    nets: dict[str, list[Node]] = field(default_factory=dict)
+    nets: dict[str, list[Terminal]] = field(default_factory=dict)
 
     def put(self, ref: str, kind: Kind, *, on_board: bool = True, name: str = "") -> Component:
         """Add a component called `ref`."""
@@ -60,7 +74,7 @@ class Circuit:
 
     def join(self, net: str, ref: str, pin: str) -> None:
         """Connect a pin to a net. A pin is on one net at most."""
-        self.nets.setdefault(net, []).append(Node(ref, pin))
+        self.nets.setdefault(net, []).append(Terminal(ref, pin))
 
     def between(self, letter: str, kind: Kind, first: str, second: str) -> str:
         """Add a component of two pins, the first pin on net `first`; return its designator."""
@@ -93,9 +107,266 @@ def capacitor(value: str, note: str = "") -> Kind:
     return Kind(value, "Device", "C", footprint, two_pins(), note=note)
 
 
-def grouped(components: Iterable[Component]) -> Iterator[tuple[Kind, list[str]]]:
-    """Yield every sort of component with the designators of all that are of it, in their first one's order."""
+_DECOUPLING = capacitor("100n", "one close to each supply pin")
+_BULK = capacitor("10u", "where the host's plug comes in")
+_RESET_PULL = resistor("10k", "holds RESET high")
+_HOST = ("VCC", "GND", "SDA", "SCL")
+_TYPES = {"SDA": "bidirectional", "SCL": "input", "INT": "open_collector", "NC": "no_connect", RESET: "input"}
+
+
+def _add_expanders(circuit: Circuit, units: Sequence[Unit], ends: Sequence[End], harness: Harness) -> None:
+    """Put in the expanders `units` and the muxes that they are behind, each bus with its plug and pull-ups."""
+    if not units:
+        return
+    for unit in units:
+        _add_expander(circuit, unit, [end for end in ends if end.unit == unit])
+    for bus in dict.fromkeys(unit.bus for unit in units):
+        mine = [unit.wiring.mux for unit in units if unit.bus == bus and unit.wiring is not None]
+        channels = sorted({(mux.address, mux.channel) for mux in mine if mux is not None})
+        clock_hz = harness.buses[bus].clock_hz
+        _add_muxes(circuit, bus, channels, clock_hz)
+        _add_plug(circuit, bus, clock_hz)
+
+
+def _add_expander(circuit: Circuit, unit: Unit, ends: Sequence[End]) -> None:
+    wiring = unit.wiring
+    if wiring is None:
+        return
+    chip, package = wiring.chip, wiring.chip.package
+    circuit.put(unit.ref, _kind(package, chip.pins), name=unit.place)
+    _add_power(circuit, unit.ref, package, wiring.address - chip.addresses[0])
+    sda, scl = _wires(unit.bus, wiring.mux)
+    circuit.join(sda, unit.ref, package.number("SDA"))
+    circuit.join(scl, unit.ref, package.number("SCL"))
+    if not chip.pulls_up:
+        used = {end.pin for end in ends}
+        for pin in chip.pins:
+            if pin not in used:  # An input that floats draws current; these are never outputs.
+                circuit.join(GROUND, unit.ref, package.number(pin))
+
+
+def _add_power(circuit: Circuit, ref: str, package: Package, above: int) -> None:
+    """Connect supply, ground, reset and address of a chip, so far above its lowest one."""
+    for number, name in enumerate(package.pins, start=1):
+        if name in GROUND_PINS:
+            circuit.join(GROUND, ref, str(number))
+        if name in SUPPLY_PINS:
+            circuit.join(SUPPLY, ref, str(number))
+            circuit.between("C", _DECOUPLING, SUPPLY, GROUND)
+    for name, high in package.selects(above):
+        circuit.join(SUPPLY if high else GROUND, ref, package.number(name))
+    if RESET in package.pins:
+        circuit.join(f"{ref}_{RESET}", ref, package.number(RESET))
+        circuit.between("R", _RESET_PULL, SUPPLY, f"{ref}_{RESET}")
+
+
+def _add_muxes(circuit: Circuit, bus: int, channels: Sequence[tuple[int, int]], clock_hz: int) -> None:
+    for address in dict.fromkeys(address for address, _ in channels):
+        ref = circuit.next("U", _kind(tca9548a.PACKAGE, ()))
+        _add_power(circuit, ref, tca9548a.PACKAGE, address - tca9548a.ADDRESSES[0])
+        for wire, pin in zip(_wires(bus, None), ("SDA", "SCL"), strict=True):
+            circuit.join(wire, ref, tca9548a.PACKAGE.number(pin))
+        for channel in (channel for at, channel in channels if at == address):
+            pair = _wires(bus, MuxChannel(address=address, channel=channel))
+            for wire, pin in zip(pair, (f"SD{channel}", f"SC{channel}"), strict=True):
+                circuit.join(wire, ref, tca9548a.PACKAGE.number(pin))
+                circuit.between("R", _pull_up(clock_hz), SUPPLY, wire)
+
+
+def _add_plug(circuit: Circuit, bus: int, clock_hz: int) -> None:
+    sda, scl = _wires(bus, None)
+    ref = circuit.next("J", header(len(_HOST)))
+    for number, net in enumerate((SUPPLY, GROUND, sda, scl), start=1):
+        circuit.join(net, ref, str(number))
+    circuit.between("C", _BULK, SUPPLY, GROUND)
+    for wire in (sda, scl):
+        circuit.between("R", _pull_up(clock_hz), SUPPLY, wire)
+
+
+def _wires(bus: int, mux: MuxChannel | None) -> tuple[str, str]:
+    """Return the nets of a bus, or of a channel behind it."""
+    where = f"{bus}" if mux is None else f"{bus}_{mux.address:02X}_{mux.channel}"
+    return f"SDA{where}", f"SCL{where}"
+
+
+def _pull_up(clock_hz: int) -> Kind:
+    """Return a pull-up of the bus that rises 150 pF and more in the time that its speed allows (UM10204)."""
+    note = "leave it out where the host has its own"
+    if clock_hz <= 100_000:
+        return resistor("4k7", note)
+    if clock_hz <= 400_000:
+        return resistor("2k2", note)
+    return resistor("1k", f"{note}; for {clock_hz} Hz, with short wires only: measure the rise time")
+
+
+def _kind(package: Package, inputs: Sequence[str]) -> Kind:
+    def type_of(name: str) -> str:
+        if name in (*SUPPLY_PINS, *GROUND_PINS):
+            return "power_in"
+        return "bidirectional" if name in inputs or name[:2] in ("SD", "SC") else _TYPES.get(name, "input")
+
+    pins = tuple((str(number), name, type_of(name)) for number, name in enumerate(package.pins, start=1))
+    return Kind(
+        package.part,
+        "Interface_Expansion",
+        package.symbol,
+        package.footprint,
+        pins,
+        part=package.part,
+        maker=package.maker,
+        sure=package.sure,
+        note=package.note,
+    )
+
+
+_SWITCH = Kind(
+    "EVQPLDA15",
+    "Switch",
+    "SW_Push",
+    "Button_Switch_SMD:SW_SPST_Panasonic_EVQPL_3PL_5PL_PT_A15",
+    two_pins(("1", "2")),
+    part="EVQPLDA15",
+    maker="Panasonic",
+    note="light touch switch, 4.9 x 4.9 x 1.5 mm; that its operating force is 1.0 N is not confirmed by a data sheet",
+)
+_DIODE = Kind(
+    "Schottky, 30 V",
+    "Device",
+    "D_Schottky",
+    "Diode_SMD:D_SOD-323_HandSoldering",
+    (("1", "K", "passive"), ("2", "A", "passive")),
+    note="such as a BAT54 of this package; at 5 V a 1N4148 will do",
+)
+# What wins against a chip's own pull-ups of 40 uA and more, and what pulls an input that has nothing of its own.
+_PULL_DOWN = resistor("4k7", "pulls an input down, against the chip's own pull-up")
+_PULL_UP = resistor("10k", "pulls up an input of a chip that has no pull-ups")
+
+
+def glove_circuit(
+    switches: Sequence[PlacedSwitch], ends: Sequence[End], wires: Sequence[Wire], harness: Harness
+) -> Circuit:
+    """Return the circuit in which switch n of the build is SWn and reaches its `end` through its bundle's connector."""
+    circuit = Circuit()
+    for switch in switches:
+        circuit.put(f"SW{switch.number}", _SWITCH, on_board=False, name=switch.name)
+    _add_connectors(circuit, wires)
+    units = _units(ends)
+    for unit in units:
+        if unit.wiring is None:
+            _add_board(circuit, [end for end in ends if end.unit == unit])
+    for end in ends:
+        _add_signal(circuit, end, switches[end.switch])
+    _add_expanders(circuit, [unit for unit in units if unit.wiring is not None], ends, harness)
+    return circuit
+
+
+def _add_connectors(circuit: Circuit, wires: Sequence[Wire]) -> None:
+    bundles: dict[tuple[str, str], list[Wire]] = {}
+    for wire in wires:
+        bundles.setdefault((wire.connector, wire.bundle), []).append(wire)
+    for (ref, bundle), group in bundles.items():
+        circuit.put(ref, header(len(group)), name=f"{bundle} bundle")
+        for wire in group:
+            circuit.join(wire.net, ref, str(wire.pin))
+
+
+def _add_board(circuit: Circuit, ends: Sequence[End]) -> None:
+    """Put in a scanner board: a pin for every pin of its own that a kept switch needs, and one for ground."""
+    signals = {end.pad: end.pin for end in ends}
+    nets = dict.fromkeys([*(end.other for end in ends), GROUND])
+    named = {**signals, **{str(number): net for number, net in enumerate(nets, start=len(signals) + 1)}}
+    pins = tuple((pad, name, "bidirectional") for pad, name in named.items())
+    unit = ends[0].unit
+    circuit.put(unit.ref, Kind("scanner board", "thenar", f"board_{unit.ref}", "", pins), on_board=False)
+    for number, net in enumerate(nets, start=len(signals) + 1):
+        circuit.join(net, unit.ref, str(number))
+    if unit.diodes:
+        for pad, name in signals.items():
+            circuit.join(f"{unit.ref}_{name}", unit.ref, pad)
+
+
+def _add_signal(circuit: Circuit, end: End, switch: PlacedSwitch) -> None:
+    net = net_of(end, switch)
+    circuit.join(net, f"SW{switch.number}", "1")
+    circuit.join(end.other, f"SW{switch.number}", "2")
+    if end.unit.diodes:
+        circuit.between("D", _DIODE, net, f"{end.unit.ref}_{end.pin}")
+        return
+    if Terminal(end.unit.ref, end.pad) not in circuit.nets[net]:
+        circuit.join(net, end.unit.ref, end.pad)
+    _add_pull(circuit, end, net)
+
+
+def _add_pull(circuit: Circuit, end: End, net: str) -> None:
+    wiring = end.unit.wiring
+    if wiring is None:
+        return
+    if end.other == SUPPLY:
+        circuit.between("R", _PULL_DOWN, net, GROUND)
+    elif not wiring.chip.pulls_up:
+        circuit.between("R", _PULL_UP, net, SUPPLY)
+
+
+def _units(ends: Sequence[End]) -> list[Unit]:
+    """Return what reads switches: the boards, then the expanders, by their numbers."""
+    return sorted({end.unit.ref: end.unit for end in ends}.values(), key=lambda unit: (unit.ref[0], int(unit.ref[1:])))
+
+
+_ESTIMATE = "an estimate: straight ways and a quarter more, and 40 mm for the ends"
+_STRANDED = "stranded wire, AWG 30 or thinner, flexible"
+
+
+class BillLine(Struct, frozen=True):
+    """A line of the bill: `part` is an orderable part number of `maker`, empty unless it is known.
+
+    sure is False where part or footprint is not confirmed twice: compare with the data sheet before ordering.
+    quantity counts pieces, or metres where `unit` is "m".
+    """
+
+    quantity: float
+    unit: str
+    what: str
+    part: str
+    maker: str
+    footprint: str
+    designators: tuple[str, ...]
+    sure: bool
+    note: str
+
+
+def bill_of(circuit: Circuit, wires: Sequence[Wire]) -> tuple[BillLine, ...]:
+    """Return the bill of a glove's circuit and of the wires in it."""
     groups: dict[Kind, list[str]] = {}
-    for component in components:
+    for component in circuit.components:
         groups.setdefault(component.kind, []).append(component.ref)
-    yield from groups.items()
+    return (*(_pieces(kind, refs) for kind, refs in groups.items()), *_wire_lines(wires))
+
+
+def _pieces(kind: Kind, refs: Sequence[str]) -> BillLine:
+    what = {"Device": f"{_named(kind)} {kind.value}", "Connector_Generic": f"header or holes, {kind.value}"}
+    return BillLine(
+        quantity=len(refs),
+        unit="pcs",
+        what=what.get(kind.library, kind.value),
+        part=kind.part,
+        maker=kind.maker,
+        footprint=kind.footprint,
+        designators=tuple(refs),
+        sure=kind.sure,
+        note=kind.note,
+    )
+
+
+def _named(kind: Kind) -> str:
+    return {"R": "resistor", "C": "ceramic capacitor"}.get(kind.symbol, "diode")
+
+
+def _wire_lines(wires: Sequence[Wire]) -> Iterator[BillLine]:
+    colours: dict[str, list[Wire]] = {}
+    for wire in wires:
+        colours.setdefault(wire.colour.partition(",")[0], []).append(wire)
+    for colour, group in colours.items():
+        lengths = [wire.length_mm for wire in group if wire.length_mm is not None]
+        refs = tuple(dict.fromkeys(wire.connector for wire in group))
+        if lengths:
+            yield BillLine(sum(lengths) / 1000, "m", f"{_STRANDED}, {colour}", "", "", "", refs, True, _ESTIMATE)

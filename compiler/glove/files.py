@@ -1,6 +1,7 @@
-"""The files of a spec: what a person needs to cut, sew, solder and run the reduced glove."""
+"""The files of a spec: what a person needs to cut, sew, solder and run the reduced glove; and their folder."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import msgspec
 
@@ -10,13 +11,12 @@ from thenar.runtime.manifest import Manifest
 from thenar.runtime.scanning.scanmap import ScanMap
 
 from ..hand import HandShape
-from .dxf import dxf_of
-from .ends import BoardPins
-from .glove_spec import GloveSpec, glove_spec
-from .lists import materials_csv, switches_csv, wiring_csv
+from ..publication import check_folder, entries, publish_folder
+from .drawings import dxf_of, svg_of
+from .layout import BoardPins
+from .lists import materials_csv, readme_of, switches_csv, wiring_csv
 from .netlist import netlist_of
-from .reading import readme_of
-from .svg import svg_of
+from .spec import GloveSpec, SpecError, glove_spec
 
 # All that a spec may hold.
 NAMES = frozenset(
@@ -56,3 +56,24 @@ def files_of(spec: GloveSpec) -> Mapping[str, bytes]:
     if spec.pattern is None:
         return files
     return {**files, "cutting.dxf": dxf_of(spec.pattern), "cutting.svg": svg_of(spec.pattern)}
+
+
+_MARK = "spec.json"
+
+
+def check_output(folder: Path) -> None:
+    """Raise SpecError unless a spec may be put there: a new or empty folder, or one that holds a spec."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    check_folder(folder, users_files, SpecError)
+
+
+def write_spec(files: Mapping[str, bytes], folder: Path) -> None:
+    """Write the files of a spec as `folder`, in place of an older spec. Raises SpecError as `check_output` does."""
+    publish_folder(files, folder, users_files, SpecError)
+
+
+def users_files(folder: Path) -> list[str]:
+    """Return the user's entries of the folder of a spec. Raises SpecError if it holds no spec."""
+    if any(folder.iterdir()) and not (folder / _MARK).is_file():
+        raise SpecError(f"{folder} is there already and is no spec: name another folder")
+    return [path for path in entries(folder) if path not in NAMES]

@@ -13,12 +13,11 @@ from typing import Literal
 
 import msgspec
 
-from thenar.runtime.names import LONGEST_NAME
+from thenar.runtime.names import LONGEST_NAME, nearest, shortened
 from thenar.runtime.toml_source import read_source
 from thenar.runtime.toml_struct import convert
 
 from .errors import ColumnsError
-from .names import nearest, shortened
 
 DEFAULT_GRID = 0.5
 # A name whose every letter is escaped is three times as long.

@@ -1,8 +1,15 @@
-"""What can be wrong with recordings on their way in or out."""
+"""What can be wrong with recordings: errors, the limits of a file that is read, and what names must be.
 
-from thenar.runtime.errors import ThenarError
+Within the limits, reading a file of n bytes takes at most 200 MB + 20 n of memory.
+"""
 
-__all__ = ["ColumnsError", "RecordingError", "TableError"]
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.drivers.errors import ThenarError
+from thenar.runtime.names import LONGEST_NAME, SHOWN, fault, list_names, shortened
 
 
 class RecordingError(ThenarError, ValueError):
@@ -15,3 +22,53 @@ class TableError(ThenarError, ValueError):
 
 class ColumnsError(ThenarError, ValueError):
     """A columns.toml cannot be read, or does not fit its table."""
+
+
+LARGEST = 1_000_000_000  # bytes of a table, also when it is unpacked
+# Bytes that a packed table may unpack to: a constant, and a number for each byte of its file.
+UNPACKED = 6_000_000
+UNPACKED_EACH = 1
+LONGEST_LINE = 16_000_000  # characters
+ROWS = 1_000_000
+COLUMNS = 100_000
+TYPES = 100_000  # grasp types, and values that an ARFF lists
+# Bytes that the names of grasp types, subjects or objects may take as an array, at four a character: a constant,
+# and a number for each byte of their file.
+NAMES = 10_000_000
+NAMES_EACH = 2
+
+
+def unpacked(size: int) -> int:
+    """Return how many bytes a packed table in a file of `size` bytes may unpack to."""
+    return min(LARGEST, UNPACKED + UNPACKED_EACH * size)
+
+
+def check_names(what: str, names: Iterable[str]) -> None:
+    """Raise RecordingError unless `names` are distinct, and good by the one rule for names, `fault`."""
+    seen: set[str] = set()
+    for name in names:
+        if reason := fault(name):
+            raise RecordingError(f"{what} {shortened(repr(name))} {reason}")
+        if name in seen:
+            raise RecordingError(f"{what} {shortened(repr(name))} occurs twice")
+        seen.add(name)
+
+
+def check_simulated(text: str) -> None:
+    """Raise RecordingError unless `text`, which says what simulated a set and contains its name, is good or empty."""
+    if text and (reason := fault(text, 2 * LONGEST_NAME)):
+        raise RecordingError(f"simulated {shortened(repr(text))} {reason}")
+
+
+def check_room(rows: int, longest: int, size: int) -> None:
+    """Raise RecordingError where names of `longest` characters at most, one a row, need too much memory.
+
+    An array of text gives every row the room of the longest. `size` is how many bytes their file has.
+    """
+    if 4 * rows * longest > NAMES + NAMES_EACH * size:
+        raise RecordingError(f"a name of {longest} characters is too long in a table of {rows} rows: shorten it")
+
+
+def list_rows(rows: NDArray[np.int64]) -> str:
+    """Return "row 3" or "rows 3, 4, 5, 6, 7 and 7 more"."""
+    return f"row{'s' if len(rows) > 1 else ''} {list_names(rows[:SHOWN].astype(str).tolist(), len(rows))}"

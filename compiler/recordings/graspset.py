@@ -25,9 +25,7 @@ from thenar.runtime.nesting import check_json
 from thenar.runtime.sealed import seal, unseal
 
 from .arrays import AnyArray, pack, unpack
-from .errors import RecordingError
-from .limits import LARGEST
-from .names import check_names, check_room, check_simulated
+from .errors import LARGEST, RecordingError, check_names, check_room, check_simulated
 from .taxonomy import Taxonomy
 
 CODES = 65536

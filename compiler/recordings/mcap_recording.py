@@ -13,18 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.frames import GloveFrame, SwitchFrame
-from thenar.runtime.names import shortened
+from thenar.runtime.names import SHOWN, shortened
 from thenar.runtime.recording.messages import switch_matrix
 from thenar.runtime.recording.reader import Reader, check_made
 from thenar.runtime.recording.session import Collection, Label, Session
 
-from .coding import CodingCost, code_joint
 from .columns import Calibration, JointColumns
-from .errors import TableError
-from .findings import Finding, find_oddities
+from .errors import TableError, list_rows
 from .graspset import GraspSet, Joint
-from .importer import ImportReport, report_of
-from .names import SHOWN, list_rows
+from .importer import CodingCost, ImportReport, code_joint, report_of
+from .summary import Finding, find_oddities
 from .taxonomy import Taxonomy
 
 WRIST = ("wrist_pitch", "wrist_yaw")

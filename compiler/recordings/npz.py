@@ -8,12 +8,10 @@ from typing import BinaryIO
 import numpy as np
 
 from thenar.runtime.files import open_file
+from thenar.runtime.names import shortened
 
-from .arrays import UNREADABLE, AnyArray
-from .errors import TableError
-from .limits import COLUMNS, LARGEST, ROWS, unpacked
-from .names import shortened
-from .npy import Head, read_head
+from .arrays import UNREADABLE, AnyArray, Head, read_head
+from .errors import COLUMNS, LARGEST, ROWS, TableError, unpacked
 
 # Bytes of the directory at the end of the zip.
 _LARGEST_DIRECTORY = 20_000_000

@@ -11,8 +11,7 @@ from pathlib import Path
 from thenar.runtime.recording.session import Task
 from thenar.runtime.toml_source import Source, read_source
 
-from .errors import ColumnsError, RecordingError
-from .names import check_names
+from .errors import ColumnsError, RecordingError, check_names
 from .taxonomy import Taxonomy, own, published
 
 # What a grasp type is collected with where no object is named.

@@ -22,11 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.files import open_file
+from thenar.runtime.names import list_names, shortened
 
 from .arrays import AnyArray
-from .errors import RecordingError, TableError
-from .limits import COLUMNS, LARGEST, LONGEST_LINE, ROWS, unpacked
-from .names import check_names, list_names, shortened
+from .errors import COLUMNS, LARGEST, LONGEST_LINE, ROWS, RecordingError, TableError, check_names, unpacked
 from .npz import read_arrays
 from .spreadsheet import text_of
 

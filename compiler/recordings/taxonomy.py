@@ -12,8 +12,7 @@ from unicodedata import decimal
 
 from thenar.runtime.names import LONGEST_SHOWN, MOST_COMPARED, shortened
 
-from .errors import RecordingError
-from .names import check_names
+from .errors import RecordingError, check_names
 
 # Kamakura et al. 1980, Patterns of static prehension in normal hands, Am. J. Occup. Ther. 34(7):437-445, with the usual
 # abbreviations.

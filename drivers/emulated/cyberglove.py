@@ -9,9 +9,8 @@ What a bad cable does is the line's business (`PtyLine.damage`, `.unplug`, `.sen
 from collections import deque
 from threading import Condition, Thread
 from time import monotonic
-from types import TracebackType
-from typing import Self
 
+from ..closing import Closing
 from ..cyberglove_protocol import TICKS_HZ, digitising_us, shortest_us, told_us
 from .cyberglove_box import Action, CyberGloveBox, Doubts, GloveState
 from .serial_line import PtyLine
@@ -19,7 +18,7 @@ from .serial_line import PtyLine
 _RESTART_S = 1.75  # from the vendor's manual, as ViSTA quotes it
 
 
-class EmulatedCyberGlove:
+class EmulatedCyberGlove(Closing):
     """A glove of 18 or 22 sensors on `line`, in a thread of its own.
 
     text       what ?i shall say
@@ -85,12 +84,6 @@ class EmulatedCyberGlove:
             self._closing = True
             self._changed.notify()
         self._thread.join()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self.close()
 
     def _receive(self, data: bytes) -> None:
         with self._changed:

@@ -14,9 +14,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryFile
 from threading import Lock
-from types import TracebackType
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
+from ..closing import Closing
 from ..errors import DeviceError, SettingError
 from ..i2c.chips import CHIPS, Device
 
@@ -75,7 +75,7 @@ class WireCounters:
         return sum(place.count for place in self.traffic)
 
 
-class EmulatedI2c:
+class EmulatedI2c(Closing):
     """The buses of a glove, served by a process of its own. Chips are numbered as they stand in their bus.
 
     A client sees them if it runs with `environment`. Pins start high. Raises DeviceError, naming what to install, where
@@ -185,14 +185,6 @@ class EmulatedI2c:
             self._errors.close()
             if self._root is not None:  # a server that was killed has left it
                 shutil.rmtree(self._root, ignore_errors=True)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _fault(self, bus: int, name: str, *arguments: Any) -> None:
         self._tell(["fault", bus, name, arguments])

@@ -3,9 +3,8 @@
 from collections import deque
 from threading import Condition, Thread
 from time import monotonic_ns
-from types import TracebackType
-from typing import Self
 
+from ..closing import Closing
 from ..scanner_protocol import (
     PROTOCOL,
     WITHOUT_DIODES,
@@ -216,7 +215,7 @@ def _after(last: int, period: int, now: int) -> int:
     return last + ((now - last) // period + 1) * period
 
 
-class EmulatedScanner:
+class EmulatedScanner(Closing):
     """A board of so many directly wired keys at the far end of `line`; or any other, as `board`.
 
     It runs from here to close(), as if the line gave it no power. Keys are read at the board's scans: a change that is
@@ -236,12 +235,6 @@ class EmulatedScanner:
         line.receive = self._receive
         self._thread = Thread(target=self._run, name=f"scanner {line.link}", daemon=True)
         self._thread.start()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self.close()
 
     def set(self, closed: Mask) -> None:
         """Close exactly these keys: bit k is key k."""

@@ -11,9 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 from threading import Lock, Thread, current_thread
 from time import monotonic
-from types import TracebackType
-from typing import Self
 
+from ..closing import Closing
 from ..errors import DeviceError
 from ..serial_line import BITS_A_BYTE
 
@@ -189,7 +188,7 @@ class PtyWire:
 _MOST_WAITING = 4096
 
 
-class PtyLine:
+class PtyLine(Closing):
     """A serial line whose near end is the port `link`.
 
     link   where the port shall stand: a symbolic link to the pty, made whole at once, removed on close
@@ -261,14 +260,6 @@ class PtyLine:
     def close(self) -> None:
         """Remove the port for good."""
         self.unplug()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _plug(self) -> PtyWire:
         try:

@@ -2,34 +2,14 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from enum import Enum
 from time import monotonic
-from types import TracebackType
-from typing import Self
 
+from ..closing import Closing
 from ..errors import DeviceError, SettingError
 from .chips import Chip, Reading
 from .keeper import ChipState, Keeper, PlacedChip, Route
-from .node import MOST_MESSAGES, REFUSED, Node, Query, Run
+from .node import MOST_MESSAGES, REFUSED, Node, Query, Run, Way
 from .tca9548a import ADDRESSES, CHANNELS
-
-
-class Way(Enum):
-    """From the best to what always works.
-
-    i2c-gpio takes any batch; designware (Raspberry Pi 5, many PCs) one address a transfer, else EINVAL; bcm2835
-    (Raspberry Pi 0 to 4) one read a transfer, else EOPNOTSUPP; adapters without I2C_RDWR do SMBus only.
-    """
-
-    CHANNEL = "all ports that no mux is switched between, in one transfer"
-    CHIP = "all ports of a chip in one transfer"
-    PORT = "a transfer for every port"
-    SMBUS = "an SMBus transfer for every port"
-
-    def lower(self) -> "Way":
-        """Return the next that asks less of the adapter; of the last, itself."""
-        ways = list(Way)
-        return ways[min(ways.index(self) + 1, len(ways) - 1)]
 
 
 @dataclass(eq=False, slots=True)
@@ -76,23 +56,15 @@ def _fits(port: Port, gathered: Sequence[Port], way: Way) -> bool:
     return sum(other.query.messages for other in gathered) + port.query.messages <= MOST_MESSAGES
 
 
-class Batching:
-    """The way of a bus: all scans share what one of them has found out."""
-
-    def __init__(self, way: Way) -> None:
-        self.way = way
-
-
 class Scan:
     """Ports in a fixed order, read by as few transfers as the adapter allows."""
 
-    def __init__(self, node: Node, keeper: Keeper, batching: Batching, ports: Sequence[Port]) -> None:
+    def __init__(self, node: Node, keeper: Keeper, ports: Sequence[Port]) -> None:
         self._node = node
         self._keeper = keeper
-        self._batching = batching
         self._ports = ports
         self._revision = -1
-        self._way = batching.way
+        self._way = node.way
         self._groups: list[tuple[Group, Run]] = []
 
     def read(self) -> list[int | None]:
@@ -103,7 +75,7 @@ class Scan:
         keeper = self._keeper
         if monotonic() >= keeper.due:
             self._attend()
-        if self._revision != keeper.revision or self._way is not self._batching.way:
+        if self._revision != keeper.revision or self._way is not self._node.way:
             self._plan()
         answers: list[int | None] = [None] * len(self._ports)
         for group, run in self._groups:
@@ -133,21 +105,16 @@ class Scan:
 
     def _plan(self) -> None:
         self._need_open()
-        self._revision, self._way = self._keeper.revision, self._batching.way
+        self._revision, self._way = self._keeper.revision, self._node.way
         groups = cut(self._ports, self._way)
         self._groups = [(group, self._node.prepare([port.query for _, port in group.ports])) for group in groups]
 
     def _one_by_one(self, group: Group, error: OSError) -> list[bytes | None]:
         """Read the ports of a transfer that failed each by itself; where batches are refused, ask less from now on."""
-        if error.errno in REFUSED and self._way is self._batching.way:  # else it was lowered since `_plan`
-            self._lower(len(group.ports) > 1)
+        if error.errno in REFUSED and self._way is self._node.way:  # else it was lowered since `_plan`
+            self._node.way = self._way.lower() if len(group.ports) > 1 else Way.SMBUS
         self._keeper.routes.forget()
         return [self._alone(port) for _, port in group.ports]
-
-    def _lower(self, batch: bool) -> None:
-        way = self._batching.way.lower() if batch else Way.SMBUS
-        self._batching.way = way
-        self._node.plain_i2c = way is not Way.SMBUS
 
     def _alone(self, port: Port) -> bytes | None:
         if not port.member.present:
@@ -192,7 +159,7 @@ class PortRead:
     reading: Reading
 
 
-class I2cBus:
+class I2cBus(Closing):
     """The chips on one device node. To be used by one thread at a time.
 
     Raises SettingError for two chips that would answer at one address, or a mux that cannot be.
@@ -210,7 +177,6 @@ class I2cBus:
         self._members = tuple(PlacedChip(device, at.chip, at.address, at.used, _route(at)) for at in chips)
         self._node = Node(device)
         self._keeper = Keeper(self._node, self._members, check_every_s)
-        self._batching = Batching(Way.CHANNEL)
 
     def open(self) -> None:
         """Set up every chip and find out what the adapter can batch. A chip that is missing is absent, and no error.
@@ -218,16 +184,15 @@ class I2cBus:
         Raises DeviceError if the device node cannot be used. May be called again after one, and at any time.
         """
         self._keeper.begin()
-        self._batching.way = Way.CHANNEL if self._node.plain_i2c else Way.SMBUS
         # Registers, not ports, each twice: what batches of two chips and of two reads of one chip come to.
         control = [_control(member) for member in self._members]
-        trial = Scan(self._node, self._keeper, self._batching, [port for port in control for _ in range(2)])
+        trial = Scan(self._node, self._keeper, [port for port in control for _ in range(2)])
         for _ in Way:
             trial.read()
 
     def prepare(self, ports: Sequence[PortRead]) -> Scan:
         """Return what reads these ports, in this order, as often as it is asked."""
-        return Scan(self._node, self._keeper, self._batching, [self._port(port) for port in ports])
+        return Scan(self._node, self._keeper, [self._port(port) for port in ports])
 
     @property
     def chips(self) -> tuple[ChipState, ...]:
@@ -237,7 +202,7 @@ class I2cBus:
     @property
     def way(self) -> str:
         """How reads are batched, in words."""
-        return self._batching.way.value
+        return self._node.way.value
 
     @property
     def trouble(self) -> str:
@@ -253,14 +218,6 @@ class I2cBus:
         """Close the device node."""
         self._node.close()
         self._keeper.revision += 1
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _port(self, port: PortRead) -> Port:
         member = self._members[port.chip]

@@ -204,7 +204,7 @@ class Keeper:
         """Open the node and set up every chip."""
         self._renew()
         self.routes = self._unknown_routes()
-        self._node.plain_i2c = self._node.offers_i2c
+        self._node.find_way()
         self.trouble = ""
         for member in self._members:
             member.present = False

@@ -4,6 +4,7 @@ import errno
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from enum import Enum
 from fcntl import ioctl
 from typing import TYPE_CHECKING
 
@@ -57,6 +58,24 @@ NOBODY = 0x7F
 Run = Callable[[], list[bytes]]
 
 
+class Way(Enum):
+    """From the best to what always works.
+
+    i2c-gpio takes any batch; designware (Raspberry Pi 5, many PCs) one address a transfer, else EINVAL; bcm2835
+    (Raspberry Pi 0 to 4) one read a transfer, else EOPNOTSUPP; adapters without I2C_RDWR do SMBus only.
+    """
+
+    CHANNEL = "all ports that no mux is switched between, in one transfer"
+    CHIP = "all ports of a chip in one transfer"
+    PORT = "a transfer for every port"
+    SMBUS = "an SMBus transfer for every port"
+
+    def lower(self) -> "Way":
+        """Return the next that asks less of the adapter; of the last, itself."""
+        ways = list(Way)
+        return ways[min(ways.index(self) + 1, len(ways) - 1)]
+
+
 @dataclass(frozen=True, slots=True)
 class Query:
     """A command to write, where there is one, and how many bytes to read then, without a STOP in between."""
@@ -74,7 +93,7 @@ class Query:
 class Node:
     """The open node. Errors of transfers are OSErrors as the adapter gives them; `transfers` counts the ioctl calls.
 
-    plain_i2c says whether I2C messages are used, or SMBus transfers in their place.
+    way is how its adapter takes them, as far as that is known.
     One thread at a time: the buffers of prepared transfers are used again and again.
     """
 
@@ -84,13 +103,8 @@ class Node:
             raise SettingError(f"{shortened(repr(device))} {fault}")
         self.device = device
         self.transfers = 0
-        self.plain_i2c = True
+        self.way = Way.CHANNEL
         self._bus: SMBus | None = None
-
-    @property
-    def offers_i2c(self) -> bool:
-        """Whether the adapter says that it takes I2C messages."""
-        return self._bus is not None and bool(self._bus.funcs & _FUNC_I2C)
 
     @property
     def is_open(self) -> bool:
@@ -110,6 +124,10 @@ class Node:
             bus.close()
             raise DeviceError(f"{self.device} cannot be opened: {_cause(error)}") from None
 
+    def find_way(self) -> None:
+        """Begin with the best way that the open adapter may have."""
+        self.way = Way.CHANNEL if self._bus is not None and self._bus.funcs & _FUNC_I2C else Way.SMBUS
+
     def close(self) -> None:
         """Close the node; there are no transfers until it is opened again."""
         if self._bus is not None:
@@ -126,7 +144,7 @@ class Node:
         """Write bytes in one transfer."""
         bus = self._ready()
         self.transfers += 1
-        if self.plain_i2c:
+        if self.way is not Way.SMBUS:
             from smbus2 import i2c_msg
 
             bus.i2c_rdwr(i2c_msg.write(address, data))
@@ -142,7 +160,7 @@ class Node:
     def prepare(self, queries: Sequence[Query]) -> Run:
         """Return what does all queries in one transfer and returns their answers; SMBus takes one query alone."""
         bus = self._ready()
-        if not self.plain_i2c:
+        if self.way is Way.SMBUS:
             (query,) = queries
             return lambda: [self._by_smbus(bus, query)]
         from smbus2.smbus2 import I2C_RDWR, i2c_rdwr_ioctl_data

@@ -14,8 +14,7 @@ from thenar.compiler.recordings.graspset import Joint
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 
 from ..streams import Draw, Draws, Site
-from .anthropometry import FAN_DEG
-from .hand import DOF
+from .hand import DOF, FAN_DEG
 
 Floats = NDArray[np.float64]
 Bytes = NDArray[np.uint8]

@@ -1,4 +1,6 @@
-"""A right hand of 20 degrees of freedom and 20 capsules: how its parts lie for given joint angles, many at a time.
+"""The hand: how long its parts are, what its joints turn on, and how they lie for given joint angles.
+
+Frames are (d, 3, 3, n): axes as columns, d digits, n hands.
 
 Axes: x distal, y radial, z dorsal, from the middle of the wrist, millimetres; the palm looks to -z. Every digit is a
 chain of four joints and three segments. A segment's own axes: x along it, z dorsal of it; its pad looks to -z.
@@ -10,6 +12,7 @@ Arrays of many hands carry them LAST, so that each operation runs along them, on
 comes out the same in any company: (..., n).
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,10 +21,150 @@ from numpy.typing import NDArray
 
 from thenar.compiler.elementary import add_up, sincos
 
-from .anthropometry import DIGITS, Size
-from .axes import ABDUCTORS, BETWEEN, REST, about_y, about_z, frame, thumb_times
-
 Floats = NDArray[np.float64]
+
+DIGITS = ("thumb", "index", "middle", "ring", "little")
+
+# Lengths over hand length (Buchholz, Armstrong, Goldstein 1992, Ergonomics 35:261-273): a digit a row; the thumb's
+# metacarpal, proximal and distal; the fingers' proximal, middle and distal phalanx.
+SEGMENTS = np.array(
+    [
+        [0.251, 0.196, 0.158],
+        [0.245, 0.143, 0.097],
+        [0.266, 0.170, 0.108],
+        [0.244, 0.165, 0.107],
+        [0.204, 0.117, 0.093],
+    ]
+)
+# Where the first joint of each digit lies: distal of the wrist (over hand length) and radial of the middle finger's ray
+# (over hand breadth), the same source as commonly quoted; and dorsal (over hand breadth), which makes the palm's
+# transverse arch: ours.
+BASES = np.array(
+    [
+        [0.073, 0.196, -0.140],
+        [0.447, 0.251, -0.010],
+        [0.446, 0.000, 0.020],
+        [0.421, -0.206, -0.010],
+        [0.390, -0.402, -0.070],
+    ]
+)
+# Radii of the three segments of each digit over hand breadth: fingers 16 to 20 mm thick on a hand 85 mm broad. Ours,
+# rounded from surveys of finger breadth and depth.
+RADII = np.array(
+    [
+        [0.160, 0.120, 0.108],
+        [0.108, 0.097, 0.085],
+        [0.110, 0.099, 0.087],
+        [0.104, 0.093, 0.082],
+        [0.092, 0.083, 0.074],
+    ]
+)
+# The fingers fan out by these angles (degrees, radial positive) when no one abducts them: ours.
+FAN_DEG = np.array([0.0, 3.0, 0.0, -4.0, -9.0])
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """The two measures that everything else of a hand follows from."""
+
+    length_mm: float
+    breadth_mm: float
+
+    def segments_mm(self) -> Floats:
+        """Return the lengths (5 digits, 3 segments)."""
+        return SEGMENTS * self.length_mm
+
+    def bases_mm(self) -> Floats:
+        """Return the first joints (5 digits, xyz): distal, radial and dorsal of the wrist's middle."""
+        return BASES * [self.length_mm, self.breadth_mm, self.breadth_mm]
+
+    def radii_mm(self) -> Floats:
+        """Return the thickness (5 digits, 3 segments)."""
+        return RADII * self.breadth_mm
+
+
+# The thumb at rest points distal, 30 degrees to the radial side and 10 to the palm; its nail looks radial and dorsal.
+_THUMB_RADIAL_DEG, _THUMB_PALMAR_DEG, _THUMB_ROLL_DEG = 30.0, 10.0, 50.0
+# Its first joint turns on axes that lean on the metacarpal, so that abduction and flexion also pronate it (opposition).
+_ABDUCTION_LEAN_DEG, _FLEXION_LEAN_DEG = 40.0, 25.0
+
+
+def _times(a: Floats, b: Floats) -> Floats:
+    """Return the matrix products (d, 3, 3, n), summed in one fixed order."""
+    return a[:, :, 0, None] * b[:, None, 0] + a[:, :, 1, None] * b[:, None, 1] + a[:, :, 2, None] * b[:, None, 2]
+
+
+def thumb_times(frames: Floats, matrix: Floats) -> Floats:
+    """Return the frames (5, 3, 3, n) with the thumb's, the first, turned by a constant (3, 3)."""
+    turned = frames.copy()
+    turned[:1] = _times(frames[:1], matrix[None, ..., None])
+    return turned
+
+
+def about_z(frames: Floats, sine: Floats, cosine: Floats) -> Floats:
+    """Return frames (d, 3, 3, n) turned about their own z."""
+    turned = frames.copy()
+    x, y, s, c = frames[:, :, 0], frames[:, :, 1], sine[:, None], cosine[:, None]
+    np.add(c * x, s * y, out=turned[:, :, 0])
+    np.subtract(c * y, s * x, out=turned[:, :, 1])
+    return turned
+
+
+def about_y(frames: Floats, sine: Floats, cosine: Floats) -> Floats:
+    """Return frames (d, 3, 3, n) turned about their own y."""
+    turned = frames.copy()
+    x, z, s, c = frames[:, :, 0], frames[:, :, 2], sine[:, None], cosine[:, None]
+    np.subtract(c * x, s * z, out=turned[:, :, 0])
+    np.add(s * x, c * z, out=turned[:, :, 2])
+    return turned
+
+
+def frame(x: Floats, dorsal: Floats) -> Floats:
+    """Return axes as columns: x as given, y and z square to it, z as near `dorsal` as can be."""
+    y = _cross(dorsal, x)
+    y = y / np.sqrt(add_up(y * y))
+    return np.stack([x, y, _cross(x, y)], axis=1)
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def _product(a: Floats, b: Floats) -> Floats:
+    return _times(a[None, ..., None], b[None, ..., None])[0, ..., 0]
+
+
+def _unit(degrees: float) -> tuple[float, float]:
+    sine, cosine = sincos(np.array([degrees * np.pi / 180.0]))
+    return float(sine[0]), float(cosine[0])
+
+
+def _thumb() -> tuple[Floats, Floats, Floats]:
+    """Return frames whose z is the abduction axis, whose y is the flexion axis, and of the metacarpal at rest."""
+    (sr, cr), (sp, cp), (so, co) = map(_unit, (_THUMB_RADIAL_DEG, _THUMB_PALMAR_DEG, _THUMB_ROLL_DEG))
+    along = np.array([cr * cp, sr * cp, -sp])
+    rest = frame(along, np.array([-sr * so, cr * so, co]))
+    (sa, ca), (sf, cf) = _unit(_ABDUCTION_LEAN_DEG), _unit(_FLEXION_LEAN_DEG)
+    abduction = ca * rest[:, 2] - sa * rest[:, 0]
+    flexion = cf * rest[:, 1] - sf * rest[:, 0]
+    y = rest[:, 1]
+    abductor = np.stack([_cross(y, abduction), y, abduction], axis=1)
+    z = rest[:, 2]
+    return abductor, np.stack([_cross(flexion, z), flexion, z], axis=1), rest
+
+
+def _fingers() -> Iterator[Floats]:
+    for fan in FAN_DEG[1:]:
+        sine, cosine = _unit(float(fan))
+        yield np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+
+
+# R = abductor * Rz(abduction) * between * Ry(flexion) * rest; the last two turn the thumb alone.
+_ABDUCTOR, _FLEXOR, _AT_REST = _thumb()
+ABDUCTORS = np.stack([_ABDUCTOR, *_fingers()])
+BETWEEN, REST = _product(_ABDUCTOR.T, _FLEXOR), _product(_FLEXOR.T, _AT_REST)
+
+
 Indices = NDArray[np.intp]
 
 _JOINTS = (("cmc_abduction", "cmc_flexion", "mcp", "ip"),) + (("abduction", "mcp", "pip", "dip"),) * 4

@@ -17,11 +17,8 @@ from numpy.typing import NDArray
 from ..body.condition import Thing
 from ..body.hand import CAPSULES, DOF, LIMITS_DEG, Hand, Skeleton
 from ..body.layout import Patch, Switches
-from ..body.pose import Pose
-from ..body.shapes import Box, Cylinder, Shape, Sphere
-from .grip import GRAVITY, STIFFNESS, torques
-from .model import Contact, Load
-from .split import split
+from ..body.shapes import Box, Cylinder, Pose, Shape, Sphere
+from .model import GRAVITY, STIFFNESS, Contact, Load, split, torques
 
 Floats = NDArray[np.float64]
 
@@ -212,7 +209,7 @@ _SPEED, _LEVER, _UNBALANCED_N, _UNBALANCED_SHARE = 0.1, 0.03, 0.1, 0.02
 
 
 @dataclass(frozen=True, slots=True)
-class Rest:
+class Settled:
     """One repetition at rest: angles (20,) in radians, pose (6,), capsules_n (20,), what nothing balances, and whether
     MuJoCo warned of nothing and joints and object stand still.
     """
@@ -242,8 +239,8 @@ class MujocoContact:
         hand, shape = condition.hand, condition.thing.shape
         angles = np.radians(load.posture_deg.T)
         moments = load.grip_n * torques(condition, hand.skeleton(angles), Pose.of(load.pose.T))
-        bench = Bench(hand, condition.thing, condition.held.down, self.dynamics)
-        rests = [bench.rest(*told) for told in zip(angles.T, load.pose, moments.T, strict=True)]
+        pair = Pair(hand, condition.thing, condition.held.down, self.dynamics)
+        rests = [pair.rest(*told) for told in zip(angles.T, load.pose, moments.T, strict=True)]
         angles = np.array([rest.angles for rest in rests])
         pose = np.array([rest.pose for rest in rests])
         capsules_n = np.array([rest.capsules_n for rest in rests])
@@ -263,8 +260,8 @@ class MujocoContact:
         )
 
 
-class Bench:
-    """A hand and an object on MuJoCo's bench, used again for every repetition."""
+class Pair:
+    """A hand and an object in MuJoCo, used again for every repetition."""
 
     def __init__(self, hand: Hand, thing: Thing, down: Floats, dynamics: Dynamics) -> None:
         self._dynamics = dynamics
@@ -275,7 +272,7 @@ class Bench:
         names = [self._model.geom(number).name for number in range(self._model.ngeom)]
         self._capsules = np.array([CAPSULES.index(name) if name != OBJECT else -1 for name in names])
 
-    def rest(self, angles: Floats, pose: Floats, moments: Floats) -> Rest:
+    def rest(self, angles: Floats, pose: Floats, moments: Floats) -> Settled:
         """Return how the hand rests that is told angles (20,) in radians round an object at pose (6,), and whose
         muscles turn its joints by moments (20,) in N mm. Nothing of the grasp before is left in the data.
         """
@@ -288,17 +285,17 @@ class Bench:
         mujoco.mj_step(model, data, self._dynamics.steps)
         mujoco.mj_forward(model, data)
         if data.warning.number.any() or not np.isfinite(data.qacc).all():
-            return Rest(angles, pose, np.zeros(len(CAPSULES)), np.inf, np.inf, settled=False)
+            return Settled(angles, pose, np.zeros(len(CAPSULES)), np.inf, np.inf, settled=False)
         return self._read()
 
-    def _read(self) -> Rest:
+    def _read(self) -> Settled:
         data = self._data
         capsules_n, force, moment = self._contacts()
         force = force + self._weight + data.qfrc_spring[_SLIDES]
         turn = data.xmat[-1].reshape(3, 3)
         moment = moment + np.add.reduce(turn.T * data.qfrc_spring[_BALL][:, None], axis=0)
         residual_n, residual_nmm = _length(force), _length(moment) / N_MM
-        return Rest(
+        return Settled(
             angles=data.qpos[:JOINTS].copy(),
             pose=_pose(data.qpos),
             capsules_n=capsules_n,

@@ -10,10 +10,9 @@ from thenar.compiler.elementary import log
 
 from ..body.layout import murakami160
 from ..errors import SceneError
-from ..pipeline import ports
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step
-from ..pipeline.frames import drawn_rows
+from ..pipeline.effect import Effect, EffectParameters, Setting, Step, drawn_rows
+from ..pipeline.parts import port_count, port_of
 from ..streams import Draw
 
 
@@ -37,7 +36,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 
 
 def _check_scan(parameters: Parameters, setting: Setting) -> None:
-    there = ports.count(len(murakami160()))
+    there = port_count(len(murakami160()))
     scan_us = there * (parameters.us_per_port + parameters.jitter_us)
     if scan_us > setting.period_us:
         raise SceneError(
@@ -48,7 +47,7 @@ def _check_scan(parameters: Parameters, setting: Setting) -> None:
 
 def _steady(parameters: Parameters) -> Step:
     def step(batch: Batch, draw: Draw) -> None:
-        batch.delay_us = (ports.of(batch.on_us.shape[1]) + 1) * parameters.us_per_port
+        batch.delay_us = (port_of(batch.on_us.shape[1]) + 1) * parameters.us_per_port
 
     return step
 
@@ -56,9 +55,9 @@ def _steady(parameters: Parameters) -> Step:
 def _jittered(parameters: Parameters, rows: NDArray[np.intp]) -> Step:
     def step(batch: Batch, draw: Draw) -> None:
         switches = batch.on_us.shape[1]
-        chances = draw.per_repetition(len(rows), ports.count(switches)).uniform()[:, rows]
+        chances = draw.per_repetition(len(rows), port_count(switches)).uniform()[:, rows]
         longer = np.rint(-parameters.jitter_us * log(chances)).astype(np.int64)
-        batch.delay_us = np.cumsum(parameters.us_per_port + longer, axis=2)[:, :, ports.of(switches)]
+        batch.delay_us = np.cumsum(parameters.us_per_port + longer, axis=2)[:, :, port_of(switches)]
 
     return step
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from ..body.hand import CAPSULES, Hand
 from ..body.layout import Switches, murakami160
-from ..body.pose import rotation_vector
-from ..contact.model import Contact, ContactModel, Load
-from ..contact.quasistatic import USUAL, Case, Pace, Rest, Skin, close
-from ..contact.split import split
+from ..body.shapes import rotation_vector
+from ..contact.balance import USUAL, Case, Pace, Skin
+from ..contact.model import Contact, ContactModel, Load, split
+from ..contact.settle import Rest, close
 from ..pipeline.effect import Effect, EffectParameters, Setting
 
 _Positive = Annotated[float, msgspec.Meta(gt=0.0, le=1000.0)]

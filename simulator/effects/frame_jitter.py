@@ -6,8 +6,7 @@ import numpy as np
 from msgspec import Meta
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step
-from ..pipeline.frames import drawn_rows
+from ..pipeline.effect import Effect, EffectParameters, Setting, Step, drawn_rows
 from ..streams import Draw
 
 

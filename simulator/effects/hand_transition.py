@@ -15,8 +15,7 @@ from ..body.cyberglove import sensors_deg
 from ..body.hand import DOF, LIMITS_DEG
 from ..errors import SceneError
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step
-from ..pipeline.frames import frame_times
+from ..pipeline.effect import Effect, EffectParameters, Setting, Step, frame_times
 from ..streams import Draw
 
 Floats = NDArray[np.float64]

@@ -10,8 +10,7 @@ from msgspec import Meta
 
 from ..body.cyberglove import SENSORS
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step
-from ..pipeline.frames import drawn_rows
+from ..pipeline.effect import Effect, EffectParameters, Setting, Step, drawn_rows
 from ..streams import Draw
 
 _Degrees = Annotated[float, Meta(ge=0.0, le=45.0)]

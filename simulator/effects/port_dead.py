@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from ..body.layout import murakami160
 from ..errors import SceneError
-from ..pipeline import ports
 from ..pipeline.batch import Batch
 from ..pipeline.effect import Effect, EffectParameters, Setting, Step
-from ..pipeline.stuck import drawn
+from ..pipeline.parts import drawn, port_count, port_of
 from ..streams import Draw
 
 Bits = NDArray[np.bool_]
@@ -36,7 +35,7 @@ class Parameters(EffectParameters, frozen=True):
 def prepare(parameters: Parameters, setting: Setting) -> Step:
     """Return the step that opens every switch of the dead ports. Raises SceneError where there are no such ports."""
     switches = len(murakami160())
-    dead, port = _chooser(parameters, ports.count(switches)), ports.of(switches)
+    dead, port = _chooser(parameters, port_count(switches)), port_of(switches)
 
     def step(batch: Batch, draw: Draw) -> None:
         batch.bits = batch.bits & ~dead(draw)[port]

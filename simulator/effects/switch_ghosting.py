@@ -8,9 +8,9 @@ its own row was read: what changes from one row to the next (bus.latency) is not
 import numpy as np
 from numpy.typing import NDArray
 
-from ..pipeline import ports
 from ..pipeline.batch import Batch
 from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.parts import PORT, port_count, port_of
 from ..streams import Draw
 
 Bits = NDArray[np.bool_]
@@ -32,7 +32,7 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 def joined(bits: Bits) -> Bits:
     """Return what a matrix reads (..., s) whose closed switches are bits (..., s)."""
     switches = bits.shape[-1]
-    rows, columns = ports.of(switches), np.arange(switches) % ports.SIZE
+    rows, columns = port_of(switches), np.arange(switches) % PORT
     wires = _columns(bits)
     for row in range(len(wires)):
         # Rows that share a column with this one become one net with it. Rows that touch fall into one net at the latest
@@ -45,7 +45,7 @@ def joined(bits: Bits) -> Bits:
 
 def _columns(bits: Bits) -> NDArray[np.uint16]:
     """Return for each row (rows, ...) the columns it is joined to, one bit each."""
-    rows = ports.count(bits.shape[-1])
+    rows = port_count(bits.shape[-1])
     packed = np.zeros((*bits.shape[:-1], rows * 2), dtype=np.uint8)
     bytes_ = np.packbits(bits, axis=-1, bitorder="little")
     packed[..., : bytes_.shape[-1]] = bytes_

@@ -2,7 +2,7 @@
 
 from ..pipeline.batch import Batch
 from ..pipeline.effect import Effect, Setting, Step
-from ..pipeline.stuck import StuckParameters, chooser
+from ..pipeline.parts import StuckParameters, chooser
 from ..streams import Draw
 
 

@@ -8,8 +8,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from ..pipeline.batch import Batch
-from ..pipeline.effect import Effect, EffectParameters, Setting, Step
-from ..pipeline.frames import drawn_rows
+from ..pipeline.effect import Effect, EffectParameters, Setting, Step, drawn_rows
 from ..streams import Draw
 
 Bytes = NDArray[np.uint8]

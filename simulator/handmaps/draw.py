@@ -5,19 +5,215 @@ colour-blind. In an SVG each circle says on hovering what it is.
 """
 
 import re
+from collections.abc import Sequence
+from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from thenar.compiler.hand import HandShape, MapError
 from thenar.compiler.pictures import painting, rendered
+from thenar.compiler.recordings.graspset import GraspSet
 
-from .handpaint import LINE, SIDE, bounds, colour, paint, paint_dot
-from .handpanels import Dot, Picture
+from ..body.hand import DIGITS
+from .handmap import PARTS, RADIUS_MM, Floats, hand_map
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, slots=True)
+class Dot:
+    """A switch as drawn: hollow, or of a shade from 0 to 1; `mark` is written into it, `hint` is said on hovering.
+
+    absent: not in the set, a mere point.
+    """
+
+    hint: str
+    shade: float | None = None
+    mark: str = ""
+    absent: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """One hand: its title, a line under it, and a Dot for every switch of the map."""
+
+    title: str
+    note: str
+    dots: tuple[Dot, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """Hands side by side, what full and hollow dots mean ("" for none), and what shade 1 of the colour bar is worth.
+
+    full: what a full dot means when there is no colour bar, and the bar's title when there is one.
+    """
+
+    panels: tuple[Panel, ...]
+    full: str
+    hollow: str
+    bar_top: float | None = None
+    hollow_mark: str = ""  # what the key writes into its hollow dot
+
+
+def all_switches(numbered: bool) -> Picture:
+    """Return the glove with all its switches, with their numbers in the set (from 0) if `numbered`."""
+    glove = hand_map()
+    dots = tuple(Dot(f"{n} {name}", mark=str(n) if numbered else "") for n, name in enumerate(glove.names))
+    words = "switch and its number, from 0" if numbered else "switch"
+    return Picture(
+        (Panel("murakami160", _counts(glove, np.arange(len(dots)), "switches"), dots),),
+        "",
+        words,
+        hollow_mark="7" if numbered else "",
+    )
+
+
+def contacts(grasp_set: GraspSet, per_grasp: bool) -> Picture:
+    """Return how often each switch closed over all rows or, one hand each, in each grasp type that has rows.
+
+    All hands share one scale, up to the largest share. Raises MapError if the set has no rows, no switches, or a switch
+    that the glove does not have.
+    """
+    if not grasp_set.switch_names:
+        raise MapError("the set has no switches to draw: it holds joints only")
+    if not len(grasp_set):
+        raise MapError("a set without rows has no contacts to draw")
+    numbers = hand_map().numbers_of(grasp_set.switch_names)
+    groups = [np.arange(len(grasp_set))]
+    titles = ["all grasps"]
+    if per_grasp:
+        present = np.unique(grasp_set.labels)
+        groups = [np.flatnonzero(grasp_set.labels == label) for label in present]
+        titles = [_type_title(grasp_set, label) for label in present]
+    closed = [grasp_set.switches[rows].sum(axis=0) for rows in groups]
+    top = max(float((count / len(rows)).max()) for count, rows in zip(closed, groups, strict=True)) or 1.0
+    panels = (
+        _contact_panel(title, numbers, count, len(rows), top)
+        for title, count, rows in zip(titles, closed, groups, strict=True)
+    )
+    return Picture(tuple(panels), "share of grasps in which the switch closed", "never closed", top)
+
+
+def kept(placements: Sequence[tuple[str, Sequence[str]]]) -> Picture:
+    """Return the glove once for each (title, names of switches in the order in which they were chosen).
+
+    Raises MapError if a name is not a switch of the glove, or stands twice in one placement.
+    """
+    panels = tuple(_kept_panel(title, names) for title, names in placements)
+    return Picture(panels, "kept, in the order chosen", "left out")
+
+
+def _contact_panel(title: str, numbers: NDArray[np.intp], closed: NDArray[np.intp], rows: int, top: float) -> Panel:
+    glove = hand_map()
+    dots = [Dot(f"{name}: not in the set", absent=True) for name in glove.names]
+    for number, count in zip(numbers.tolist(), closed.tolist(), strict=True):
+        hint = f"{glove.names[number]}: closed in {count} of {rows} grasps ({count / rows:.1%})"
+        dots[number] = Dot(hint, count / rows / top if count else None)
+    return Panel(title, f"{rows} grasps, {float(closed.sum()) / rows:.1f} switches closed on average", tuple(dots))
+
+
+def _type_title(grasp_set: GraspSet, label: int) -> str:
+    name, full = grasp_set.taxonomy.types[label], grasp_set.taxonomy.full_names[label]
+    return name if name == full else f"{name}: {full}"
+
+
+def _kept_panel(title: str, names: Sequence[str]) -> Panel:
+    glove = hand_map()
+    numbers = glove.numbers_of(names)
+    twice = next((name for place, name in enumerate(names) if name in names[:place]), None)
+    if twice is not None:
+        raise MapError(f"{title}: switch {twice!r} is kept twice")
+    dots = [Dot(f"{name}: left out") for name in glove.names]
+    for place, number in enumerate(numbers.tolist(), 1):
+        dots[number] = Dot(f"{glove.names[number]}: kept, number {place}", 1.0, str(place))
+    return Panel(title, _counts(glove, numbers, f"of {len(dots)} kept"), tuple(dots))
+
+
+def _counts(glove: HandShape, numbers: NDArray[np.intp], what: str) -> str:
+    by_part = np.bincount(glove.parts[numbers], minlength=len(PARTS)).tolist()
+    return f"{len(numbers)} {what}: " + ", ".join(f"{part} {count}" for part, count in zip(PARTS, by_part, strict=True))
+
+
+SKIN, SIDE, LINE, CREASE, INK = "#f9f1e9", "#eee3d8", "#57493e", "#c9b09a", "#14304f"
+_COLOURS, _LIGHTEST = "magma_r", 0.07  # a switch that closed at all is no longer white
+_MARGIN_MM = 3.0
+_LONGEST_TITLE = 40
+_SPELT_OUT = 1.5  # printer's points per mm of the map from which on digits are named in full
+
+
+def bounds() -> tuple[float, float, float, float]:
+    """Return left, right, bottom and top of a hand with all that is drawn of it, mm."""
+    glove = hand_map()
+    points = np.concatenate([glove.outline, *glove.strips, glove.labels])
+    (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
+    # The names of the digits reach out beyond their places.
+    return left - 2 * _MARGIN_MM, right + 3 * _MARGIN_MM, bottom - _MARGIN_MM, top + 2 * _MARGIN_MM
+
+
+def colour(dot: Dot, graded: bool) -> str:
+    """Return the colour that fills a dot: white when hollow, of the scale when `graded`, else ink."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    if dot.shade is None:
+        return "white"
+    return to_hex(colormaps[_COLOURS](_LIGHTEST + (1.0 - _LIGHTEST) * dot.shade)) if graded else INK
+
+
+def paint(axes: "Axes", panel: Panel, number: int, points: float, graded: bool) -> None:
+    """Draw hand `number` of a page, at `points` of a printer (1/72 inch) per mm; dots' ids are dot-NUMBER-SWITCH."""
+    left, right, bottom, top = bounds()
+    axes.set(xlim=(left, right), ylim=(bottom, top))
+    axes.axis("off")
+    _paint_skin(axes, points)
+    for switch, (dot, place) in enumerate(zip(panel.dots, hand_map().places, strict=True)):
+        paint_dot(axes, dot, place, RADIUS_MM, points, graded, f"{number}-{switch}")
+    title = panel.title if len(panel.title) <= _LONGEST_TITLE else f"{panel.title[: _LONGEST_TITLE - 1]}…"
+    middle = (left + right) / 2
+    axes.text(middle, top, panel.note, fontsize=min(8.0, 4.5 * points), color=LINE, ha="center", va="bottom")
+    large = min(12.0, 6.8 * points)
+    axes.annotate(
+        title, (middle, top), (0, 1.2 * large), textcoords="offset points", fontsize=large, weight="bold", ha="center"
+    )
+
+
+def paint_dot(
+    axes: "Axes", dot: Dot, place: Floats, radius: float, points: float, graded: bool, identity: str = ""
+) -> None:
+    """Draw one switch at `place` (2,); `radius` in units of the axes, of `points` each."""
+    from matplotlib.patches import Circle
+
+    x, y = place.tolist()
+    circle = Circle((x, y), 0.25 * radius if dot.absent else radius, facecolor=colour(dot, graded), clip_on=False)
+    circle.set(edgecolor=LINE, linewidth=0.16 * points * radius / RADIUS_MM, zorder=3)
+    circle.set_gid(f"dot-{identity}" if identity else None)
+    axes.add_patch(circle)
+    if not dot.mark:
+        return
+    ink = "white" if dot.shade is not None else INK
+    size = 2.0 * radius * points * (0.49 if len(dot.mark) > 2 else 0.62)
+    text = axes.text(x, y, dot.mark, fontsize=size, color=ink, ha="center", va="center_baseline", zorder=4)
+    text.set_gid(f"mark-{identity}" if identity else None)
+
+
+def _paint_skin(axes: "Axes", points: float) -> None:
+    glove, thin = hand_map(), 0.16 * points
+    axes.fill(*glove.outline.T, facecolor=SKIN, edgecolor=LINE, linewidth=2.4 * thin, joinstyle="round")
+    for outline in glove.strips:
+        axes.fill(*outline.T, facecolor=SIDE, edgecolor=LINE, linewidth=thin, joinstyle="round")
+    for crease in glove.creases:
+        axes.plot(*crease.T, color=CREASE, linewidth=2.0 * thin, solid_capstyle="round")
+    for digit, (x, y) in zip(DIGITS, glove.labels.tolist(), strict=True):
+        name = digit if points >= _SPELT_OUT else digit[0].upper()
+        size = min(9.0, max(5.0, 4.2 * points))
+        axes.text(x, y, name, fontsize=size, color=LINE, ha="center", va="center")
+
 
 _POINTS = 72.0  # of a printer, an inch
 _KEY_INCHES, _TITLE_INCHES = 0.66, 0.42

@@ -1,5 +1,9 @@
 """Where the 160 switches of `murakami160` lie on the hand laid flat, all from the layout's own data.
 
+Paper axes: x to the right, which is the thumb's side of one's own right palm, y up to the fingertips; millimetres of a
+hand of middling size. Lengths and proportions are those of `hand.py`. A draughtsman's are: digits spread, and a palm
+broadened until the unfolded sides find room between the fingers, and fingers a little slimmer than they are thick.
+
 On a digit, `along` is kept and `around` is bent flat. Switches on the sides go to the strips beside the digit. The ball
 of the thumb is turned to the viewer as a whole. On the palm, capsules are spread as their knuckles are.
 """
@@ -11,13 +15,189 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.recordings.names import nearest
-from thenar.drivers.errors import ThenarError
+from thenar.compiler.elementary import sincos
+from thenar.compiler.hand import HandShape
 
-from ..body.anthropometry import DIGITS
+from ..body.hand import DIGITS, Hand, Size
 from ..body.layout import Switches, murakami160
-from .flathand import HAND, Floats, Ray, palm_at, rays
-from .handlines import creases, outlines
+
+Floats = NDArray[np.float64]
+Places = Floats | Sequence[float]
+
+HAND = Hand(Size(190.0, 88.0))
+
+# The first joints of little, ring, middle and index finger on paper; how far thumb to little finger lean to the right.
+_BASES_X = (-51.0, -26.5, 0.0, 27.0)
+_LEANS_DEG = (46.0, 8.5, -0.5, -10.0, -21.0)
+_SLIM = 0.92
+_STRIP_MM, _GAP_MM = 4.6, 0.9  # how broad a strip is, and how far from its digit
+_ARC = np.linspace(0.0, np.pi, 9)
+
+
+@dataclass(frozen=True, slots=True)
+class Ray:
+    """A digit on paper: from `base` (2,) straight along `ahead` (2,), a unit vector, to its tip at `end` mm.
+
+    joints (4,): where its segments begin and the last one ends; halves (3,): half its breadth at their `middles` (3,).
+    """
+
+    base: Floats
+    ahead: Floats
+    joints: Floats
+    middles: Floats
+    halves: Floats
+    end: float
+
+    def at(self, along: Places, across: Places) -> Floats:
+        """Return points (n, 2): `along` the digit from its base, `across` it to the right, mm."""
+        right = np.array([self.ahead[1], -self.ahead[0]])
+        places: Floats = self.base + np.multiply.outer(along, self.ahead) + np.multiply.outer(across, right)
+        return places
+
+    def half(self, along: Places) -> Floats:
+        """Return half the breadth (n,) at places along the digit; the rounding of its tip is not in it."""
+        return np.interp(along, self.middles, self.halves)
+
+    def beside(self, along: Places) -> Floats:
+        """Return how far from the digit's middle the middle of a strip lies (n,)."""
+        return self.half(along) + _GAP_MM + _STRIP_MM / 2
+
+    def strip(self, side: int, first: float, last: float) -> Floats:
+        """Return the outline (k, 2) of the unfolded side from `first` to `last`; `side`: -1 left, 1 right."""
+        along = np.linspace(first, last, 16)
+        bend = half_circle(_STRIP_MM / 2)
+        middle, reach = self.beside(along), _STRIP_MM / 2
+        over = self.at(last + bend[::-1, 1], side * (middle[-1] + bend[::-1, 0]))
+        under = self.at(first - bend[:, 1], side * (middle[0] + bend[:, 0]))
+        edges = self.at(along, side * (middle - reach)), self.at(along[::-1], side * (middle + reach)[::-1])
+        return np.concatenate([edges[0], over, edges[1], under])
+
+
+def half_circle(radius: float) -> Floats:
+    """Return points (k, 2) of a half circle over the middle of its diameter, from (radius, 0) to (-radius, 0)."""
+    sine, cosine = sincos(_ARC)
+    return np.stack([radius * cosine, radius * sine], axis=1)
+
+
+@lru_cache(maxsize=1)
+def rays() -> tuple[Ray, ...]:
+    """Return the five digits, thumb first."""
+    return tuple(map(_ray, range(5)))
+
+
+def _ray(digit: int) -> Ray:
+    segments = slice(3 * digit, 3 * digit + 3)
+    lengths, radii = HAND.lengths[segments], HAND.radii[segments]
+    joints = np.array([0.0, *np.cumsum(lengths)])
+    sine, cosine = sincos(np.array([_LEANS_DEG[digit] * np.pi / 180.0]))
+    distal, radial, _ = HAND.size.bases_mm()[digit]
+    # The flesh of the tip, bent flat, reaches a little further than the bone.
+    end = float(joints[2] + 0.62 * lengths[2] + 1.3 * radii[2])
+    ahead = np.array([float(sine[0]), float(cosine[0])])
+    return Ray(
+        palm_at(np.array([[distal, radial]]))[0], ahead, joints, (joints[1:] + joints[:-1]) / 2, _SLIM * radii, end
+    )
+
+
+def palm_at(places: Floats) -> Floats:
+    """Return where on paper points of the palm (n, 2), distal and radial of the wrist's middle in mm, lie: (n, 2)."""
+    distal, radial = places.T
+    bases = HAND.size.bases_mm()[:0:-1, 1]
+    slopes = np.diff(_BASES_X) / np.diff(bases)
+    beyond = np.minimum(radial - bases[0], 0.0) * slopes[0] + np.maximum(radial - bases[-1], 0.0) * slopes[-1]
+    return np.stack([np.interp(radial, bases, _BASES_X) + beyond, distal], axis=1)
+
+
+# Points that the lines of the palm go through (x, y), drawn to fit the digits of `flathand`.
+_ULNAR_EDGE = ((-36.5, -13.0), (-38.0, -2.0), (-47.0, 13.0), (-56.0, 33.0), (-60.5, 55.0), (-61.0, 68.0))
+_RADIAL_EDGE = ((37.5, 82.0), (39.0, 70.0), (43.5, 60.0))
+_WRIST = ((37.5, -4.0), (36.5, -13.0))
+_PALM_CREASES = (
+    ((39.0, 67.0), (27.0, 67.0), (16.0, 61.0), (7.0, 48.0), (2.5, 31.0), (3.0, 14.0), (6.5, 3.0)),
+    ((39.0, 67.0), (24.0, 71.5), (4.0, 68.5), (-18.0, 60.0), (-37.0, 47.5)),
+    ((-60.0, 60.5), (-42.0, 61.0), (-22.0, 68.5), (-4.0, 75.5), (8.0, 78.5), (13.5, 84.5)),
+    ((-36.5, -4.0), (-17.0, -6.5), (10.0, -6.5), (36.0, -3.5)),
+)
+_ROOT = 0.22  # where a finger leaves the palm, over its first segment
+_CURVED = 12  # steps of a curve between two of its points
+
+
+@lru_cache(maxsize=1)
+def outlines() -> tuple[Floats, tuple[Floats, ...]]:
+    """Return the outline of the hand (k, 2) from cuff to cuff, and that of each digit, thumb first.
+
+    A digit's outline is the piece of the hand's that goes round it; straight across its root it is closed.
+    """
+    thumb, index, middle, ring, little = rays()
+    pieces = [np.array(_ULNAR_EDGE), _round(little)]
+    for left, right in ((little, ring), (ring, middle), (middle, index)):
+        pieces += [_web(left, right), _round(right)]
+    pieces += [np.array(_RADIAL_EDGE), _round_thumb(thumb), _ball(thumb)]
+    ends = np.cumsum(list(map(len, pieces)))
+    outline = smooth(np.concatenate(pieces))
+    digits = [outline[_CURVED * ends[n - 1] : _CURVED * (ends[n] - 1) + 1] for n in (9, 7, 5, 3, 1)]
+    return outline, tuple(digits)
+
+
+@lru_cache(maxsize=1)
+def creases() -> tuple[Floats, ...]:
+    """Return the lines of the skin, each (k, 2): across the digits at their joints, and the palm's and the wrist's."""
+    thumb, *fingers = rays()
+    lines = [_crease(finger, float(joint)) for finger in fingers for joint in finger.joints[1:3]]
+    lines += [_crease(finger, _ROOT * 0.45 * float(finger.joints[1])) for finger in fingers]
+    lines += [_crease(thumb, float(joint)) for joint in thumb.joints[1:3]]
+    return (*lines, *map(smooth, _PALM_CREASES))
+
+
+def smooth(points: Floats | Sequence[Sequence[float]]) -> Floats:
+    """Return a soft curve (m, 2) through `points` (k, 2): the cubic of Catmull and Rom."""
+    p = np.asarray(points, dtype=np.float64)
+    p = np.concatenate([[2 * p[0] - p[1]], p, [2 * p[-1] - p[-2]]])
+    before, here, there, after = (p[n : len(p) - 3 + n, None] for n in range(4))
+    t = (np.arange(_CURVED) / _CURVED)[:, None]
+    bend = 2 * before - 5 * here + 4 * there - after
+    curve = here + t / 2 * (there - before + t * (bend + t * (3 * (here - there) + after - before)))
+    return np.concatenate([curve.reshape(-1, 2), p[-2:-1]])
+
+
+def _round(finger: Ray) -> Floats:
+    """Return points round a finger: up its left side, over its tip, down its right side."""
+    knuckle, last = (float(joint) for joint in finger.joints[1:3])
+    return _sides(finger, [_ROOT * knuckle, 0.6 * knuckle, knuckle, (knuckle + last) / 2, last])
+
+
+def _round_thumb(thumb: Ray) -> Floats:
+    knuckle, last = (float(joint) for joint in thumb.joints[1:3])
+    return _sides(thumb, [knuckle + 6.0, (knuckle + last) / 2 + 2.0, last])
+
+
+def _sides(ray: Ray, stations: Sequence[float]) -> Floats:
+    breadth = float(ray.halves[2])
+    tall = 1.15 * breadth
+    stations = [*stations, (stations[-1] + ray.end - tall) / 2]
+    half = ray.half(stations)
+    bend = half_circle(1.0)
+    tip = ray.at(ray.end - tall + tall * bend[:, 1], -breadth * bend[:, 0])
+    return np.concatenate([ray.at(stations, -half), tip, ray.at(stations[::-1], half[::-1])])
+
+
+def _web(left: Ray, right: Ray) -> Floats:
+    """Return the bottom (1, 2) of the fork between two fingers."""
+    low = 0.35 * _ROOT
+    return (left.at(low * left.joints[1:2], left.halves[:1]) + right.at(low * right.joints[1:2], -right.halves[:1])) / 2
+
+
+def _ball(thumb: Ray) -> Floats:
+    """Return points down the ball of the thumb and the wrist."""
+    length, half = thumb.joints[1], thumb.halves[0]
+    edge = thumb.at(np.array([0.8, 0.45, 0.18]) * length, np.array([1.02, 1.14, 1.22]) * half)
+    return np.concatenate([edge, _WRIST])
+
+
+def _crease(ray: Ray, along: float) -> Floats:
+    reach = 0.92 * float(ray.half([along])[0])
+    return smooth(ray.at([along + 0.8, along, along - 0.3, along, along + 0.8], np.linspace(-reach, reach, 5)))
+
 
 RADIUS_MM = 1.8  # of a switch on paper: no two overlap
 PARTS = (*DIGITS, "palm")
@@ -28,42 +208,9 @@ _LABEL_MM = 5.0  # from a fingertip to the middle of its name
 _PALM_SPREAD = 1.2  # how much further than on the hand a switch of the palm lies from its capsule's axis
 
 
-class MapError(ThenarError, ValueError):
-    """A switch or a set cannot be drawn on the hand."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class HandMap:
-    """A right hand, palm up, thumb right, on paper; mm.
-
-    names, places (s, 2)   the switches, in the layout's order, and where they lie
-    parts, sides (s,)      index of each in PARTS; -1 on the strip left of its digit, 1 on the right one, 0 elsewhere
-    outline (k, 2)         the hand from cuff to cuff; digits: that of each, (k, 2); labels (5, 2): above their tips
-    strips, creases        outlines of the unfolded sides, left and right of the thumb, then of the index ...; lines
-    """
-
-    names: tuple[str, ...]
-    places: Floats
-    parts: NDArray[np.intp]
-    sides: NDArray[np.intp]
-    outline: Floats
-    digits: tuple[Floats, ...]
-    labels: Floats
-    strips: tuple[Floats, ...]
-    creases: tuple[Floats, ...]
-
-    def numbers_of(self, names: Sequence[str]) -> NDArray[np.intp]:
-        """Return the layout's numbers of switches called `names`. Raises MapError naming the first strange one."""
-        number = {name: number for number, name in enumerate(self.names)}
-        strange = next((name for name in names if name not in number), None)
-        if strange is not None:
-            raise MapError(f"{strange!r} is no switch of the glove murakami160{nearest(strange, self.names)}")
-        return np.array([number[name] for name in names], dtype=np.intp)
-
-
 @lru_cache(maxsize=1)
-def hand_map() -> HandMap:
-    """Return the map of `murakami160`."""
+def hand_map() -> HandShape:
+    """Return the glove `murakami160` laid flat."""
     switches = Switches(HAND, murakami160())
     around = np.array([patch.around_deg for patch in switches.layout])
     sides = np.where(np.abs(around) > _SIDE_DEG, np.sign(around), 0.0).astype(np.intp)
@@ -79,7 +226,22 @@ def hand_map() -> HandMap:
     )
     names = tuple(patch.name for patch in switches.layout)
     labels = np.stack([ray.at([ray.end + _LABEL_MM], [0.0])[0] for ray in rays()])
-    return HandMap(names, places, parts, sides, *outlines(), labels, strips, creases())
+    outline, digits = outlines()
+    return HandShape(
+        glove="murakami160",
+        length_mm=HAND.size.length_mm,
+        names=names,
+        places=places,
+        radius_mm=RADIUS_MM,
+        part_names=PARTS,
+        parts=parts,
+        sides=sides,
+        outline=outline,
+        digits=digits,
+        strips=strips,
+        creases=creases(),
+        labels=labels,
+    )
 
 
 def _along(switches: Switches) -> Floats:

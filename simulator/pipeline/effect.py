@@ -1,4 +1,4 @@
-"""What an effect is: one record of one way to change a batch, in one module of `thenar.simulator.effects`.
+"""What an effect is: one record of one way to change a batch; and in which order effects and the glove's own steps act.
 
 Such a module holds three things:
 
@@ -11,17 +11,26 @@ model again has `together(parameters, setting, contact) -> Together`.
 
 `Effect.name` is the key of the scene: [effects.joint.noise] is "joint.noise", in the module effects/joint_noise.py.
 Other packages add effects by entry points in the group `thenar.effects`.
+
+Stage by stage. Within a stage, an effect acts after the glove's own step that makes what it touches, and before the one
+that reads what it alters; after those that `Effect.after` and the scene's `after` name; and else by its rank.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import heapq
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from graphlib import CycleError, TopologicalSorter
 from typing import Any, Literal
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from thenar.drivers.members import Members
+from thenar.runtime.names import nearest
 
 from ..contact.model import ContactModel
+from ..errors import SceneError
 from ..streams import Draw
 from .batch import Batch
 
@@ -97,3 +106,123 @@ class Setting:
 
 
 EFFECTS = Members("effect", Effect, "thenar.simulator.effects", "thenar.effects")
+
+
+Integers = NDArray[np.int64]
+
+# So many frames are simulated at a time: with all that is worked out of them, each takes two to five kilobytes.
+_MOST = 50_000
+
+
+def frame_times(setting: Setting) -> Integers:
+    """Return when the frames (F,) of a repetition begin, in microseconds from first contact.
+
+    They are counted from the one at hold_us, whose row is read out: so it is always among them. Where nothing lives in
+    time it is the only one.
+    """
+    if not setting.timed:
+        return np.array([setting.hold_us], dtype=np.int64)
+    after = setting.release_us // setting.period_us
+    return setting.hold_us + setting.period_us * np.arange(-hold_frame(setting), after + 1, dtype=np.int64)
+
+
+def hold_frame(setting: Setting) -> int:
+    """Return the number of the frame at hold_us."""
+    return (setting.hold_us - setting.first_us) // setting.period_us if setting.timed else 0
+
+
+def at_a_time(setting: Setting, repetitions: int) -> int:
+    """Return how many repetitions are simulated at a time where `repetitions` would be if they had one frame each.
+
+    Fewer where each has so many frames that they would fill the memory, but at least one.
+    """
+    return max(min(repetitions, _MOST // len(frame_times(setting))), 1)
+
+
+def drawn_rows(setting: Setting) -> NDArray[np.intp]:
+    """Return which row of the random numbers of a repetition each frame (F,) takes.
+
+    The frame at hold_us takes the first, so that its numbers are the same whether or not there are others.
+    """
+    count = len(frame_times(setting))
+    return (np.arange(count, dtype=np.intp) - hold_frame(setting)) % count
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A step that wants its place: `own` steps keep the order they have, `parameters` are what the scene sets."""
+
+    effect: Effect
+    own: bool
+    parameters: EffectParameters = field(default_factory=EffectParameters)
+
+
+def in_order(places: Sequence[Place]) -> list[Place]:
+    """Return the steps in the order in which they act.
+
+    Raises SceneError where two conflict, where an `after` names an effect that is not there, or where some wait for one
+    another in a circle.
+    """
+    _check_conflicts(places)
+    _check_after(places)
+    return [place for stage in STAGES for place in _sorted([p for p in places if p.effect.stage == stage])]
+
+
+def _check_conflicts(places: Sequence[Place]) -> None:
+    names = {place.effect.name for place in places}
+    for place in places:
+        for other in place.effect.conflicts:
+            if other in names:
+                raise SceneError(f"effects {place.effect.name!r} and {other!r} exclude each other: list one of the two")
+
+
+def _check_after(places: Sequence[Place]) -> None:
+    stages = {place.effect.name: STAGES.index(place.effect.stage) for place in places}
+    listed = [place.effect.name for place in places if not place.own]
+    for place in places:
+        name, stage = place.effect.name, place.effect.stage
+        for other in place.parameters.after:
+            if other not in listed:
+                raise SceneError(
+                    f"effects.{name}.after: the scene lists no effect {other!r}{nearest(other, listed)}: "
+                    "list it too, or leave it out here"
+                )
+        for other in (*place.parameters.after, *place.effect.after):
+            if stages.get(other, 0) > STAGES.index(stage):
+                raise SceneError(
+                    f"effects.{name}.after: a circle: {name} -> {other} -> {name}: {other!r} belongs to the stage "
+                    f"{STAGES[stages[other]]!r}, which comes after {stage!r}, where {name!r} acts"
+                )
+
+
+def _sorted(places: list[Place]) -> Iterator[Place]:
+    by_name = {place.effect.name: place for place in places}
+    sorter = TopologicalSorter({name: _waits_for(place, places) for name, place in by_name.items()})
+    try:
+        sorter.prepare()
+    except CycleError as reason:
+        raise SceneError(f"effects act after each other in a circle: {' -> '.join(reason.args[1])}") from None
+    ready: list[tuple[tuple[int, int], str]] = []
+    while sorter.is_active():
+        for name in sorter.get_ready():
+            heapq.heappush(ready, (by_name[name].effect.rank, name))
+        _, name = heapq.heappop(ready)
+        yield by_name[name]
+        sorter.done(name)
+
+
+def _waits_for(place: Place, places: list[Place]) -> set[str]:
+    """Return the names of those of one stage that act before `place`."""
+    named = {*place.parameters.after, *place.effect.after} & {other.effect.name for other in places}
+    return named | {other.effect.name for other in places if other is not place and _precedes(other, place, places)}
+
+
+def _precedes(first: Place, second: Place, places: list[Place]) -> bool:
+    one, two = first.effect, second.effect
+    if first.own and second.own:
+        return places.index(first) < places.index(second)
+    if first.own:
+        return bool({*two.reads, *two.writes} & {*one.writes})
+    if second.own:
+        return bool({*one.writes} & {*two.reads}) and not {*one.writes} & {*two.writes}
+    return False

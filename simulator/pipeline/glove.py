@@ -8,8 +8,7 @@ import numpy as np
 from ..body.cyberglove import Calibration, sensors_deg
 from ..streams import Draw
 from .batch import NEVER, Batch
-from .effect import Effect, EffectParameters, Setting, Step
-from .frames import frame_times
+from .effect import Effect, EffectParameters, Setting, Step, frame_times
 
 
 def _recall(parameters: EffectParameters, setting: Setting) -> Step:

@@ -20,11 +20,10 @@ from thenar.runtime.files import read_file, write_atomically
 from thenar.runtime.names import shortened
 from thenar.runtime.nesting import check_json
 
-from ..body.anthropometry import Size
 from ..body.condition import Held, Pad, Thing
-from ..body.hand import Hand
+from ..body.hand import Hand, Size
 from ..body.shapes import Shape
-from ..contact.grip import GRAVITY
+from ..contact.model import GRAVITY
 from ..errors import SceneError
 from ..scenes.scene import Scene
 

@@ -13,12 +13,11 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.recordings.names import nearest
+from thenar.runtime.names import nearest
 from thenar.runtime.toml_source import Place, Source, read_source
 from thenar.runtime.toml_struct import as_table, check_finite, convert
 
-from ..body.anthropometry import DIGITS, Size
-from ..body.hand import CAPSULES, LIMITS_DEG, Hand
+from ..body.hand import CAPSULES, DIGITS, LIMITS_DEG, Hand, Size
 from ..errors import SceneError
 
 Floats = NDArray[np.float64]

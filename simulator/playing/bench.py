@@ -1,22 +1,60 @@
-"""The devices of a harness, emulated: what they are connected to, and where a client finds them."""
+"""The devices of a harness, emulated: what they are connected to, where a client finds them, what their wires do."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 import msgspec
+import numpy as np
 
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, EmulatedI2c
 from thenar.drivers.emulated.scanner import EmulatedScanner
 from thenar.drivers.emulated.serial_line import PtyLine
-from thenar.runtime.harness.wiring import BusWiring, Harness
+from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
 from thenar.runtime.sources.cyberglove import sensors_of
 
-from .cable import Cable
-from .levels import levels_of
+from ..effects import wire_damaged_bytes, wire_lost_bytes
+from ..scenes.scene import Scene
+
+_ALL_HIGH = (1 << 24) - 1
+
+
+def levels_of(chip: ChipWiring, closed: Sequence[bool], numbers: Mapping[str, int]) -> int:
+    """Return the levels of a chip's pins, bit p for pin p: open pins are pulled to where no switch is closed.
+
+    numbers are the places in `closed` of the switches by name; a switch that is not among them is open.
+    """
+    shut = sum(1 << pin for pin, name in chip.numbered_pins.items() if name in numbers and closed[numbers[name]])
+    return shut if chip.closed == "high" else _ALL_HIGH & ~shut
+
+
+Cable = Callable[[bytes], bytes]
+
+
+def cable_of(scene: Scene, line: int) -> Cable | None:
+    """Return what the cable of line number `line` does to a message on its way out; None where the scene lists nothing.
+
+    The draws of every line are its own, and the same for the same seed.
+    """
+    rates = {listed.name: listed.parameters for listed in scene.effects}
+    lost, damaged = rates.get(wire_lost_bytes.MEMBER.name), rates.get(wire_damaged_bytes.MEMBER.name)
+    if lost is None and damaged is None:
+        return None
+    random = np.random.Generator(np.random.Philox(key=[scene.seed, line]))
+
+    def cable(message: bytes) -> bytes:
+        data = np.frombuffer(message, dtype=np.uint8)
+        if isinstance(damaged, wire_damaged_bytes.Parameters):
+            data = wire_damaged_bytes.damaged(data, random.random(len(data)), damaged.rate)
+        if isinstance(lost, wire_lost_bytes.Parameters):
+            data = data[wire_lost_bytes.arrives(random.random(len(data)), lost.rate)]
+        return data.tobytes()
+
+    return cable
+
 
 _USUAL_BAUD = 115_200
 

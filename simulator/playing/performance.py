@@ -1,6 +1,11 @@
-"""What an emulated glove plays: the frames of a scene or of a set of grasps, as the devices would send them."""
+"""What an emulated glove plays of a scene, a set of grasps or a recording, and the playing of it."""
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
+from threading import Event
+from time import monotonic_ns
+from typing import Protocol
 
 import msgspec
 import numpy as np
@@ -8,6 +13,11 @@ from numpy.typing import NDArray
 
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
+from thenar.runtime.frames import GloveFrame, SwitchFrame
+from thenar.runtime.published import UNKNOWN, LiveGrasp
+from thenar.runtime.recording.messages import switch_matrix
+from thenar.runtime.recording.reader import Reader, check_made
+from thenar.runtime.recording.session import Label
 
 from ..body.cyberglove import SENSORS, USED, Calibration
 from ..errors import SceneError
@@ -130,3 +140,90 @@ def _in_points(calibration: Calibration, subject: str) -> GloveCalibration:
         unit="deg",
         subject=subject,
     )
+
+
+# The switches, the sensors, and the grasp type of one moment.
+Moment = tuple[int, bytes, str]
+
+
+def of_recording(path: Path, period_us: int, warn: Callable[[str], None] = lambda _: None) -> Performance:
+    """Return the newest frames of a recording every `period_us`, with the grasp type recognised, or collected, by then.
+
+    Where there was no CyberGlove its sensors rest. `warn` takes a sentence on each fault of the file. Raises McapError
+    if it is no recording, SceneError if it holds no frames.
+    """
+    reader = Reader(path)
+    calibration = reader.session.calibration or typical()
+    rows = list(_ticks(reader, resting(calibration).tobytes(), period_us))
+    for fault in reader.faults():
+        warn(fault.message)
+    if not rows:
+        raise SceneError(f"{path.name}: holds no frame of a glove")
+    names = reader.session.switches
+    assert reader.end is not None
+    width = len(names) + len(rows[0][1]) + 4 * max(len(grasp) for _, _, grasp in rows)
+    check_made(f"{path.name}: what it plays", len(rows) * width, reader.end.size)
+    return Performance(
+        switches=switch_matrix([closed for closed, _, _ in rows], len(names)),
+        switch_names=names,
+        sensors=np.frombuffer(b"".join(sensors for _, sensors, _ in rows), np.uint8).reshape(len(rows), -1),
+        grasps=np.array([grasp for _, _, grasp in rows]),
+        period_us=period_us,
+        calibration=calibration,
+    )
+
+
+def _ticks(reader: Reader, rest: bytes, period_us: int) -> Iterator[Moment]:
+    """Yield a moment every `period_us`, from when all devices that the recording names have been read."""
+    closed: int | None = 0 if not reader.session.switches else None
+    sensors: bytes | None = rest if not reader.session.sensors else None
+    grasp, due_us = UNKNOWN, None
+    for entry in reader:
+        if isinstance(entry, SwitchFrame):
+            closed = entry.closed
+        elif isinstance(entry, GloveFrame):
+            sensors = entry.sensors
+        elif isinstance(entry, LiveGrasp | Label):
+            grasp = entry.grasp
+        else:
+            continue
+        if closed is None or sensors is None:
+            continue
+        if due_us is None:
+            due_us = entry.time_us
+        if entry.time_us >= due_us:
+            yield closed, sensors, grasp
+            due_us += period_us
+
+
+Show = Callable[[list[bool], bytes], None]
+
+
+class Log(Protocol):
+    """Who is told of every frame when it is shown: its number, its grasp type, the monotonic clock in microseconds."""
+
+    def __call__(self, row: int, grasp: str, time_us: int) -> None:
+        """Take note."""
+
+
+@dataclass(frozen=True, slots=True)
+class Player:
+    """Shows the frames of `performance` one after the other, each `period_us` after the one before, whatever showing
+    them takes: lateness does not add up.
+    """
+
+    performance: Performance
+    show: Show
+    log: Log
+
+    def play(self, stop: Event) -> bool:
+        """Play all frames once. Returns False if `stop` was set before the last one had its time."""
+        performance = self.performance
+        start_us = monotonic_ns() // 1000
+        for row in range(len(performance)):
+            now_us = monotonic_ns() // 1000
+            if stop.wait(max(start_us + row * performance.period_us - now_us, 0) / 1e6):
+                return False
+            self.show(performance.switches[row].tolist(), performance.sensors[row].tobytes())
+            self.log(row, str(performance.grasps[row]), monotonic_ns() // 1000)
+        return not stop.wait(performance.period_us / 1e6)

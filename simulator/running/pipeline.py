@@ -1,25 +1,91 @@
-"""The pipeline: what a scene calls for, compiled once into one list of steps, and nothing else.
+"""The pipeline: what a scene calls for, compiled once into one list of steps, and what each step costs.
+
+Of effects that the scene does not list nothing is prepared; no step asks whether it is enabled.
 
 Of effects that the scene does not list nothing is prepared; no step asks whether it is enabled.
 """
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from time import perf_counter_ns
+from typing import Self
 
 import msgspec
 
-from thenar.compiler.recordings.names import nearest
+from thenar.runtime.names import nearest
 
 from ..contact.model import ContactModel
 from ..errors import SceneError
 from ..pipeline.batch import Batch
-from ..pipeline.effect import EFFECTS, Effect, Setting, Step, Together
+from ..pipeline.effect import EFFECTS, Effect, Place, Setting, Step, Together, in_order
 from ..pipeline.glove import STEPS
-from ..pipeline.ledger import Ledger
-from ..pipeline.ordering import Place, in_order
 from ..scenes.scene import Scene
 from ..streams import Draw, Draws, Site
+
+
+@dataclass(slots=True)
+class Cost:
+    """What one step has done so far.
+
+    own          True for a step that every scene has, False for an effect that the scene lists
+    calls        batches
+    grasps       repetitions in them
+    draws        random numbers
+    nanoseconds  wall time
+    counters     what the step itself counts: solver steps, bytes sent, ...
+    """
+
+    own: bool
+    calls: int = 0
+    grasps: int = 0
+    draws: int = 0
+    nanoseconds: int = 0
+    counters: Counter[str] = field(default_factory=Counter)
+
+    def add(self, other: Self) -> None:
+        """Add what another worker's entry of the same step says."""
+        self.calls += other.calls
+        self.grasps += other.grasps
+        self.draws += other.draws
+        self.nanoseconds += other.nanoseconds
+        self.counters.update(other.counters)
+
+
+@dataclass(slots=True)
+class Ledger:
+    """The entries by the name of the step, in the order in which the steps first ran."""
+
+    entries: dict[str, Cost] = field(default_factory=dict)
+
+    def enter(self, name: str, own: bool, calls: int, grasps: int, nanoseconds: int, draws: Draws) -> None:
+        """Enter `calls` calls of step `name`, a batch each, together `grasps` repetitions.
+
+        What `draws` holds under that name are random numbers; under any other name, what the step counted.
+        """
+        counters = draws.counts.copy()
+        drawn = counters.pop(name, 0)
+        self._add(name, Cost(own, calls, grasps, drawn, nanoseconds, counters))
+
+    def merge(self, other: Self) -> None:
+        """Add another worker's ledger."""
+        for name, entry in other.entries.items():
+            self._add(name, entry)
+
+    @property
+    def nanoseconds(self) -> int:
+        """The time of all steps together."""
+        return sum(entry.nanoseconds for entry in self.entries.values())
+
+    def shares(self) -> Iterator[tuple[str, float]]:
+        """Yield every step with its share of the time, 0 to 1."""
+        total = self.nanoseconds
+        for name, entry in self.entries.items():
+            yield name, entry.nanoseconds / total if total else 0.0
+
+    def _add(self, name: str, entry: Cost) -> None:
+        self.entries.setdefault(name, Cost(entry.own)).add(entry)
+
 
 # What closes the hand on its object where the scene names no other: every scene needs one.
 DEFAULT_CONTACT = "contact.quasistatic"

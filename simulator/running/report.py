@@ -1,17 +1,158 @@
-"""The report of a simulation: what came out for every grasp type, and what every step cost."""
+"""What is kept of a simulation: rows that become a set of grasps, and a report of what came out and what it cost."""
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from ..pipeline.ledger import Ledger
-from .notes import Notes, Unsettled
-from .rows import Rows
+from thenar.compiler.recordings.graspset import GraspSet, Joint
+from thenar.compiler.recordings.taxonomy import Taxonomy
+
+from ..body.condition import Condition
+from ..pipeline.batch import SLID_OUT_MM, Batch, Bits
+from .pipeline import Ledger
+
+
+class Unsettled(msgspec.Struct, frozen=True):
+    """A repetition that cannot be trusted, and why."""
+
+    subject: str
+    grasp: str
+    object: str
+    repetition: int
+    trial: int
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Notes:
+    """Of the repetitions of one grasp type in a batch: which did not settle, and of the others the largest force and
+    moment on the object that nothing balances, the force between switches in all, and the frames that did not arrive.
+    """
+
+    grasp: str
+    repetitions: int
+    unsettled: tuple[Unsettled, ...]
+    residual_n: float
+    residual_nmm: float
+    between_n: float
+    lost_frames: int
+
+
+def notes_of(batch: Batch) -> Notes:
+    """Return the notes on a batch that went through the pipeline."""
+    settled = batch.settled
+    return Notes(
+        grasp=batch.condition.grasp,
+        repetitions=len(batch),
+        unsettled=tuple(_unsettled(batch, int(row)) for row in np.flatnonzero(~settled)),
+        residual_n=float(batch.residual_n[settled].max(initial=0.0)),
+        residual_nmm=float(batch.residual_nmm[settled].max(initial=0.0)),
+        between_n=math.fsum(batch.between_n[settled].tolist()),
+        lost_frames=0 if batch.lost is None else int(np.count_nonzero(batch.lost[settled])),
+    )
+
+
+def _unsettled(batch: Batch, row: int) -> Unsettled:
+    condition = batch.condition
+    return Unsettled(
+        subject=condition.subject,
+        grasp=condition.grasp,
+        object=condition.thing.name,
+        repetition=int(batch.repetitions[row]),
+        trial=int(batch.trials[row]),
+        why=_why(batch, row),
+    )
+
+
+def _why(batch: Batch, row: int) -> str:
+    if batch.lost is not None and batch.lost[row].all():
+        return "no frame arrived whole"
+    slid = batch.slid_mm()[row]
+    if slid > SLID_OUT_MM:
+        return f"the object slid {slid:.0f} mm, out of the hand"
+    force, moment = batch.residual_n[row], batch.residual_nmm[row]
+    return f"the hand did not come to rest; left on the object: {force:.3g} N, {moment:.3g} N mm"
+
 
 Places = NDArray[np.intp]
+Codes = NDArray[np.uint16]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rows:
+    """m rows, s switches.
+
+    bits      (m, ceil(s / 8)) uint8   eight switches to the byte, the first in the highest bit
+    codes     (m, 16) uint16           the joints
+    condition (m,) uint32              number of the condition
+    trial     (m,) uint32              place in the subject's session
+    read_out  (m,) bool                the row of its repetition that is read while the object is held
+    """
+
+    bits: NDArray[np.uint8]
+    codes: Codes
+    condition: NDArray[np.uint32]
+    trial: NDArray[np.uint32]
+    read_out: Bits
+
+    def __len__(self) -> int:
+        return len(self.bits)
+
+    def pick(self, index: Places) -> "Rows":
+        """Return the rows that `index` picks, in its order."""
+        picked = (self.condition[index], self.trial[index], self.read_out[index])
+        return Rows(self.bits[index], self.codes[index], *picked)
+
+
+def rows_of(batch: Batch, kept: Places, number: int, codes: Codes, held: int, *, every_frame: bool) -> Rows:
+    """Return the rows of the repetitions `kept` (k,) of a batch of condition `number`; codes (n, F, 16).
+
+    One row a repetition, that of frame number `held`, or one a frame.
+    """
+    frames = np.arange(batch.bits.shape[1]) if every_frame else np.array([held])
+    each = (np.repeat(kept, len(frames)), np.tile(frames, len(kept)))
+    m = len(each[0])
+    return Rows(
+        bits=np.packbits(batch.bits[each], axis=1),
+        codes=codes[each],
+        condition=np.full(m, number, dtype=np.uint32),
+        trial=batch.trials[each[0]].astype(np.uint32),
+        read_out=each[1] == held,
+    )
+
+
+def joined(blocks: Sequence[Rows], subject: Places) -> Rows:
+    """Return all rows by subject, trial and frame, however they were cut into blocks and in whichever order these came.
+
+    subject (c,) is the place of each condition's subject in the scene; the frames of a repetition are in one block, in
+    order.
+    """
+    whole = Rows(*(np.concatenate([getattr(block, field.name) for block in blocks]) for field in fields(Rows)))
+    return whole.pick(np.lexsort((whole.trial, subject[whole.condition])))
+
+
+def grasp_set(
+    rows: Rows,
+    conditions: Sequence[Condition],
+    switches: tuple[str, ...],
+    joints: tuple[Joint, ...],
+    taxonomy: Taxonomy,
+    simulated: str,
+) -> GraspSet:
+    """Return the set of grasps that `rows` of these conditions make; `simulated` says what made them."""
+    bits = np.unpackbits(rows.bits, axis=1, count=len(switches)).view(np.bool_)
+    bits.setflags(write=False)  # so that it is not copied
+    grasps, subjects, objects = (
+        np.array(names, dtype=np.str_)[rows.condition]
+        for names in zip(*((each.grasp, each.subject, each.thing.name) for each in conditions), strict=True)
+    )
+    trials = rows.trial.astype(np.int64)
+    read = (bits, switches, rows.codes, joints)
+    return GraspSet(*read, grasps, taxonomy, subjects, objects, trials, simulated)
 
 
 class GraspReport(msgspec.Struct, frozen=True):

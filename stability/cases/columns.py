@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.compiler.boosting.boost import boost
-from thenar.compiler.placement.exact import Counts
 from thenar.compiler.placement.gain import best_position, compare_scores
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.placement.tree import Tree
 
 from ..finding import Case, Finding, Worst
-from ..inputs.hard_counts import node_of
+from ..inputs.hard_data import Counts, node_of
 from ..inputs.small_sets import parity
 from ..reference.information import compare_gains
 

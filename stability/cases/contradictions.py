@@ -14,11 +14,10 @@ from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import winners
 
 from ..checks.class_rounds import see_round
-from ..checks.counted import entropy_left, idle_loss, resting_error
-from ..checks.rounds import loss_rounding, moments, rise_rounding
+from ..checks.rounds import entropy_left, idle_loss, loss_rounding, moments, resting_error, rise_rounding
 from ..finding import Case, Finding, Worst
 from ..inputs.hard_data import HardSet, contradictory, imbalanced, noisy, repeated
-from ..reference.logistic import mean_loss
+from ..reference.boosting import mean_loss
 from ..reference.numbers import distance
 
 CASE = Case(

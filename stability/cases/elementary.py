@@ -11,8 +11,9 @@ from thenar.compiler.elementary import add_exactly, add_up, exp, log, sincos, so
 
 from ..checks.roundings import ROUNDING, loss_error, part_of, share_error
 from ..finding import Case, Finding, Worst
-from ..inputs.hard_scores import hard_scores
-from ..reference import linear, logistic
+from ..inputs.hard_data import hard_scores
+from ..reference import boosting as logistic
+from ..reference import numbers as linear
 from ..reference.numbers import precisely, ulps
 
 CASE = Case(

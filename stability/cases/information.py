@@ -12,7 +12,7 @@ from thenar.compiler.placement.gain import best_position, compare_scores, entrop
 
 from ..checks.roundings import ROUNDING, part_of
 from ..finding import Case, Finding, Worst
-from ..inputs.hard_counts import BitSet, Counts, bit_set, close_pairs, equal_pairs, hand_made, node_of, random_table
+from ..inputs.hard_data import BitSet, Counts, bit_set, close_pairs, equal_pairs, hand_made, node_of, random_table
 from ..reference import information as truth
 from ..reference.numbers import precisely
 

@@ -6,19 +6,251 @@ order when they are renumbered, and three times the rows lie on another grid: th
 ties goes to the lowest number, so that renumbered columns may part two trainings, but on stumps that explain as much.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from thenar.compiler.boosting.boost import boost
+from thenar.compiler.boosting.stumps import TIE, Stumps
 from thenar.compiler.placement.id3 import grow_id3
+from thenar.compiler.placement.tree import Tree
+from thenar.compiler.tables.collapse import HIGHEST_CODE, ScoreTables, collapse
+from thenar.compiler.tables.quantise import quantise
+from thenar.runtime.tables import IntegerTables
 
-from ..checks.counted import counted
-from ..checks.learnt import Learnt, learn, numbers
-from ..checks.partings import SAME, Partings
+from ..checks.class_rounds import ClassRound, Step, branches, class_rounds, grown, step_of
+from ..checks.rounds import counted
 from ..finding import Case, Finding, Worst
-from ..inputs import changes
-from ..inputs.changes import Change
-from ..inputs.hard_data import HardSet, contradictory, intervals, noisy, separable, words
+from ..inputs.hard_data import Floats, HardSet, contradictory, intervals, noisy, separable, words
+from ..reference.numbers import precisely
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Change:
+    """A set that says the same as another.
+
+    inputs[i] is the column that was number i, classes[k] the number that class k has now, and the rows of the other set
+    are those of this one at `rows`.
+    """
+
+    name: str
+    hard: HardSet
+    inputs: tuple[int, ...]
+    classes: tuple[int, ...]
+
+
+def _same(name: str, hard: HardSet, changed: HardSet) -> Change:
+    return Change(name, changed, tuple(range(hard.X.shape[1])), tuple(range(hard.n_classes)))
+
+
+def unweighted(hard: HardSet) -> HardSet:
+    """Return the set with every row as good as any other."""
+    return replace(hard, weights=None)
+
+
+def rows_in_another_order(hard: HardSet, rng: np.random.Generator) -> Change:
+    """Shuffle the rows."""
+    return _same("rows in another order", hard, with_rows(hard, rng.permutation(len(hard.labels))))
+
+
+def rows_several_times(hard: HardSet, times: int) -> Change:
+    """Write the whole set several times over."""
+    return _same(f"the set {times} times", hard, with_rows(hard, np.tile(np.arange(len(hard.labels)), times)))
+
+
+def with_rows(hard: HardSet, rows: NDArray[np.intp]) -> HardSet:
+    """Return the set of rows of these numbers."""
+    weights = None if hard.weights is None else hard.weights[rows]
+    return replace(hard, X=hard.X[rows], labels=hard.labels[rows], weights=weights)
+
+
+def constant_columns(hard: HardSet) -> Change:
+    """Put an open switch before all, and a silent joint behind."""
+    n, d = hard.X.shape
+    X = np.column_stack([np.zeros(n, np.int64), hard.X, np.full(n, 77)])
+    changed = replace(hard, X=X, n_switches=hard.n_switches + 1)
+    return Change("a constant switch and joint more", changed, tuple(range(1, d + 1)), tuple(range(hard.n_classes)))
+
+
+def copied_columns(hard: HardSet) -> Change:
+    """Put every column behind the others once more, as a joint: equal columns tie, and the lowest number wins."""
+    return _same("columns twice", hard, replace(hard, X=np.column_stack([hard.X, hard.X])))
+
+
+def codes_recoded(hard: HardSet, rng: np.random.Generator) -> Change:
+    """Replace the codes of every joint by others in the same order, 0 and the largest among them."""
+    X = hard.X.copy()
+    for column in range(hard.n_switches, X.shape[1]):
+        values, ranks = np.unique(X[:, column], return_inverse=True)
+        codes = np.sort(rng.choice(HIGHEST_CODE + 1, len(values), replace=False))
+        codes[[0, -1]] = 0, HIGHEST_CODE
+        X[:, column] = codes[ranks] if len(values) > 1 else X[:, column]
+    return _same("codes recoded in order", hard, replace(hard, X=X))
+
+
+def weights_scaled(hard: HardSet, power: int) -> Change:
+    """Multiply all weights by a power of two."""
+    weights = np.ones(len(hard.labels)) if hard.weights is None else hard.weights
+    return _same(f"weights times 2^{power}", hard, replace(hard, weights=np.ldexp(weights, power)))
+
+
+def classes_permuted(hard: HardSet, rng: np.random.Generator) -> Change:
+    """Number the classes in another order; two classes swap."""
+    classes = rng.permutation(hard.n_classes) if hard.n_classes > 2 else np.array([1, 0])
+    changed = replace(hard, labels=classes[hard.labels].astype(np.intp))
+    return Change("classes numbered otherwise", changed, tuple(range(hard.X.shape[1])), tuple(classes.tolist()))
+
+
+def columns_reversed(hard: HardSet) -> Change:
+    """Number the switches from the last to the first, and the joints."""
+    switches = np.arange(hard.n_switches)[::-1]
+    joints = np.arange(hard.n_switches, hard.X.shape[1])[::-1]
+    order = np.concatenate([switches, joints])
+    changed = replace(hard, X=hard.X[:, order])
+    inputs = tuple(np.argsort(order).tolist())
+    return Change("columns in reverse", changed, inputs, tuple(range(hard.n_classes)))
+
+
+ROUNDS = 30
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Learnt:
+    """What `learn` returns."""
+
+    tree: Tree
+    stumps: Stumps
+    losses: tuple[float, ...]
+    tables: ScoreTables
+    integers: IntegerTables
+
+
+def learn(hard: HardSet, rounds: int = ROUNDS) -> Learnt:
+    """Learn from `hard` all that there is to learn. ID3 knows no weights."""
+    stumps, falling = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds, weights=hard.weights)
+    tables = collapse(stumps, hard.n_switches)
+    integers = quantise(tables, hard.bits, hard.codes)
+    return Learnt(grow_id3(hard.X, hard.labels), stumps, falling, tables, integers)
+
+
+def numbers(learnt: Learnt, inputs: Sequence[int], classes: Sequence[int]) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield name and array of everything learnt but thresholds, of `inputs` and `classes` as if they were numbered so.
+
+    A stump or node of any other input has number -1.
+    """
+    place = {column: number for number, column in enumerate(inputs)}
+    tables, integers, order = learnt.tables, learnt.integers, list(classes)
+    n_switches = len(tables.switch_rows)
+    switches = [column for column in inputs if column < n_switches]
+    joints = [column - n_switches for column in inputs if column >= n_switches]
+    columns = np.vectorize(lambda column: place.get(column, -1), otypes=[np.intp])(learnt.stumps.columns)
+    yield "columns", columns[:, order]
+    yield "answers", learnt.stumps.values[:, order]
+    yield "losses", np.array(learnt.losses)
+    yield "tree", np.array([place.get(-1 if node.input is None else node.input, -1) for node in learnt.tree.nodes])
+    yield "counts", _counts(learnt.tree, order)
+    yield "bias", tables.bias[order]
+    yield "switch rows", tables.switch_rows[switches][:, order]
+    yield "joint rows", _stacked([tables.joint_rows[joint][:, order] for joint in joints], tables.bias)
+    yield "scale", np.array(integers.scale)
+    yield "integer bias", integers.bias[order]
+    yield "integer switch rows", integers.switch_rows[switches][:, order]
+    yield "integer joint rows", _stacked([integers.joint_rows[joint][:, order] for joint in joints], integers.bias)
+    yield "integer means", np.concatenate([integers.switch_means[switches], integers.joint_means[joints]])[:, order]
+
+
+def _counts(tree: Tree, order: list[int]) -> NDArray[np.int64]:
+    """Return the rows by class at every node; a tree numbers only the classes that have rows."""
+    counts = np.zeros((len(tree.nodes), len(order)), np.int64)
+    counts[:, np.array(tree.classes, np.intp)] = [node.counts for node in tree.nodes]
+    return counts[:, order]
+
+
+def _stacked(rows: list[NDArray[Any]], like: NDArray[Any]) -> NDArray[Any]:
+    return np.concatenate([np.zeros((0, like.size), like.dtype), *rows])
+
+
+Z_MAX = 3.0
+SAME = "what is learnt from the set as it was"
+
+
+class Partings:
+    """Gathers how far the scores of two trainings are apart, and which rows they give to different classes, as long as
+    their stumps are the same; and where these first are not, by how much the stumps differ in what they explain.
+
+    Once they have parted on a tie nothing more is claimed: stumps that explain as much are not the same stumps.
+    """
+
+    def __init__(self) -> None:
+        self._apart = Worst("scores, renumbered or repeated, while stumps agree", SAME, 1.0, "x growth")
+        self._answers = Worst("winners, but for ties, while stumps agree", SAME, 0.0, "rows")
+        self._parted = Worst("what two stumps explain, where they first differ", "60 digits", 1.0, "x rounding")
+
+    def findings(self) -> Iterator[Finding]:
+        """Yield what was found."""
+        return (worst.finding() for worst in (self._apart, self._answers, self._parted))
+
+    def see(self, hard: HardSet, change: Change, rounds: int) -> None:
+        """Train on both sets, weights left out, and follow the rounds to the end or to where they part."""
+        one, other = (boost(of.X, of.labels, of.n_classes, rounds=rounds)[0] for of in (hard, change.hard))
+        other = renumbered(other, change)
+        steps: list[Step] = []
+        F = np.zeros((len(hard.X), hard.n_classes))
+        for number, both in enumerate(zip(one.staged_scores(hard.X), other.staged_scores(hard.X), strict=True)):
+            at = f"{hard.name}, {change.name}, round {number + 1}"
+            given = class_rounds(F.tolist(), hard.labels.tolist(), Z_MAX)
+            if self._see_stumps(hard, given, [one.first(number + 1), other.first(number + 1)], change, at):
+                return
+            steps.append(_step(hard, one, number, given, float(np.abs(both).max())))
+            self._apart.see(float((np.abs(both[0] - both[1]).ravel() / (2 * grown(steps))).max()), at)
+            self._answers.see(_answered_otherwise(*both), at, len(hard.X))
+            F = both[0]
+
+    def _see_stumps(
+        self, hard: HardSet, given: Sequence[ClassRound], trainings: Sequence[Stumps], change: Change, at: str
+    ) -> bool:
+        """Return whether the last stumps differ; then see by how much they do in what they explain."""
+        places = [list(zip(of.columns[-1].tolist(), of.thresholds[-1].tolist(), strict=True)) for of in trainings]
+        for k, (first, second) in enumerate(zip(*places, strict=True)):
+            if first != second:
+                self._parted.see(_doubt(hard, given[k], (first, second), len(change.hard.labels)), at)
+        return places[0] != places[1]
+
+
+def renumbered(other: Stumps, change: Change) -> Stumps:
+    """Return the ensemble of a changed set in the numbers of inputs and classes of the set itself."""
+    place = np.full(other.n_inputs, -1, np.int32)
+    place[list(change.inputs)] = np.arange(len(change.inputs))
+    order = list(change.classes)
+    columns = place[other.columns[:, order]]
+    return Stumps(len(change.inputs), columns, other.thresholds[:, order], other.values[:, order], other.shrinkage)
+
+
+def _step(hard: HardSet, stumps: Stumps, number: int, given: Sequence[ClassRound], largest: float) -> Step:
+    places = zip(stumps.columns[number].tolist(), stumps.thresholds[number].tolist(), strict=True)
+    parts = [branches(hard.X[:, column], threshold) for column, threshold in places]
+    return step_of(given, parts, hard.labels.tolist(), stumps.shrinkage, Z_MAX, largest)
+
+
+@precisely()
+def _doubt(hard: HardSet, given: ClassRound, places: Sequence[tuple[int, float]], rows: int) -> float:
+    """Return by how much two stumps differ in what they explain, as a share of what makes them equal to training.
+
+    `rows` are those of the larger set, with whose number grows what its grid rounds away.
+    """
+    one, other = (given.explained(hard.X, *place) for place in places)
+    return float(abs(one - other) / given.doubt(Z_MAX, rows / len(given.weights)))
+
+
+def _answered_otherwise(one: Floats, other: Floats) -> int:
+    """Return how many rows of scores (n, K) have another winner, and not because two scores are tied in either."""
+    rows, first, second = np.arange(len(one)), one.argmax(axis=1), other.argmax(axis=1)
+    leads = one[rows, first] - one[rows, second], other[rows, second] - other[rows, first]
+    return int(np.count_nonzero(np.minimum(*leads) > TIE))
+
 
 CASE = Case(
     title="Scale-free facts",
@@ -26,12 +258,12 @@ CASE = Case(
 )
 
 _EXACT: dict[str, Callable[[HardSet, np.random.Generator], Change]] = {
-    "rows in another order": changes.rows_in_another_order,
-    "a constant switch and a constant joint more": lambda hard, _: changes.constant_columns(hard),
-    "codes recoded in order": changes.codes_recoded,
-    "weights times 2^-1000 or 2^900": lambda hard, rng: changes.weights_scaled(hard, int(rng.choice([-1000, 900]))),
-    "every column twice": lambda hard, _: changes.copied_columns(hard),
-    "two classes swapped": changes.classes_permuted,
+    "rows in another order": rows_in_another_order,
+    "a constant switch and a constant joint more": lambda hard, _: constant_columns(hard),
+    "codes recoded in order": codes_recoded,
+    "weights times 2^-1000 or 2^900": lambda hard, rng: weights_scaled(hard, int(rng.choice([-1000, 900]))),
+    "every column twice": lambda hard, _: copied_columns(hard),
+    "two classes swapped": classes_permuted,
 }
 
 
@@ -66,7 +298,7 @@ def _exact(sets: list[HardSet]) -> Iterator[Finding]:
         rng = np.random.default_rng(1)
         worst = Worst(f"{name}: all that is learnt", SAME, 0.0, "arrays")
         for hard, learnt in zip(sets, before, strict=True):
-            if change_of is not changes.classes_permuted or hard.n_classes == 2:
+            if change_of is not classes_permuted or hard.n_classes == 2:
                 _see_exact(learnt, change_of(hard, rng), worst)
         yield worst.finding()
 
@@ -85,11 +317,11 @@ def _tree(sets: list[HardSet]) -> Iterator[Finding]:
     rows = Worst("ID3: columns renumbered", "the most frequent class of each frame", 0.0, "rows")
     for hard in sets:
         inputs = _asked(hard)
-        for change in (changes.classes_permuted(hard, rng), changes.rows_several_times(hard, 3)):
+        for change in (classes_permuted(hard, rng), rows_several_times(hard, 3)):
             trees.see(float(_asked(change.hard) != inputs), f"{hard.name}, {change.name}")
-        change = changes.columns_reversed(hard)
+        change = columns_reversed(hard)
         answers = grow_id3(change.hard.X, change.hard.labels).predict(change.hard.X).tolist()
-        most = counted(changes.unweighted(hard))
+        most = counted(unweighted(hard))
         for frame, answer in zip(hard.X.tolist(), answers, strict=True):
             own = most[tuple(frame)]
             rows.see(float(answer != own.index(max(own))), hard.name)
@@ -104,9 +336,9 @@ def _asked(hard: HardSet) -> list[tuple[int | None, tuple[int, ...]]]:
 def _near(sets: list[HardSet], rounds: int) -> Iterator[Finding]:
     """What moves by rounding: how far, why trainings part if they do, and that rows get the same class until then."""
     rng, partings = np.random.default_rng(3), Partings()
-    for hard in map(changes.unweighted, sets):
-        partings.see(hard, changes.classes_permuted(hard, rng), rounds)
-        partings.see(hard, changes.rows_several_times(hard, 2), rounds)
-        partings.see(hard, changes.rows_several_times(hard, 3), rounds)
-        partings.see(hard, changes.columns_reversed(hard), rounds)
+    for hard in map(unweighted, sets):
+        partings.see(hard, classes_permuted(hard, rng), rounds)
+        partings.see(hard, rows_several_times(hard, 2), rounds)
+        partings.see(hard, rows_several_times(hard, 3), rounds)
+        partings.see(hard, columns_reversed(hard), rounds)
     yield from partings.findings()

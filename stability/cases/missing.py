@@ -1,21 +1,143 @@
 """Ports that do not answer and joints that fall silent; mean rows stand in for them."""
 
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from itertools import product
+from typing import NamedTuple, TypeVar
 
 import numpy as np
+from mpmath import mpf
 from numpy.typing import NDArray
 
 from thenar.compiler.tables.collapse import HIGHEST_CODE
+from thenar.compiler.tables.furthest import furthest
+from thenar.runtime.build import Build
 from thenar.runtime.scores import LANE_OFFSET
+from thenar.runtime.tables import IntegerTables
 
-from ..checks.exact_means import ExactMeans
-from ..checks.lost_inputs import Loss, changes, every_loss, worst_frames
-from ..checks.ties import first_best
+from ..checks.integer_sums import first_best
 from ..finding import Case, Finding, Worst
 from ..inputs.hard_tables import Bits, Codes
-from ..inputs.small_build import SmallBuild, small_build, small_set
+from ..inputs.small_sets import SmallBuild, small_build, small_set
 from ..reference.numbers import precisely
+from ..reference.tables import mean_row, mean_switch, table_scores
+
+
+class Loss(NamedTuple):
+    """Masks of kept switches (s,) and joints (j,) that cannot be read, and in words what is silent."""
+
+    switches: Bits
+    joints: Bits
+    name: str
+
+    @property
+    def inputs(self) -> Bits:
+        """Switches, then joints."""
+        return np.concatenate([self.switches, self.joints])
+
+
+def every_loss(build: Build, width: int) -> Iterator[Loss]:
+    """Yield every subset of ports, `width` switches each in the order of their columns, and joints.
+
+    On the last port there is no kept switch.
+    """
+    ports = np.array([switch.column // width for switch in build.manifest.switches])
+    n_ports, n_joints = int(ports.max()) + 2, build.tables.n_joints
+    for silent in product((False, True), repeat=n_ports + n_joints):
+        masks = np.array(silent)
+        name = f"silent of {n_ports} ports {np.flatnonzero(masks[:n_ports])}, joints {np.flatnonzero(masks[n_ports:])}"
+        yield Loss(masks[:n_ports][ports], masks[n_ports:], name)
+
+
+def changes(tables: IntegerTables, sign: int) -> list[NDArray[np.int64]]:
+    """Return per input, times `sign`, what its mean adds to a score beyond what each value adds, (values, K) steps."""
+    pairs = [
+        (np.stack([0 * row, row]), mean) for row, mean in zip(tables.switch_rows, tables.switch_means, strict=True)
+    ]
+    pairs += zip(tables.joint_rows, tables.joint_means, strict=True)
+    return [sign * (mean.astype(np.int64) - rows) for rows, mean in pairs]
+
+
+def worst_frames(tables: IntegerTables) -> Iterator[tuple[Bits, Codes]]:
+    """Yield the frames in which a loss changes a score most, and those whose sums get furthest from zero.
+
+    Inputs know nothing of each other, so the first are, for a class and a direction, the same whatever is lost. Codes
+    are the lowest, then the highest, of their bins.
+    """
+    for sign in (1, -1):
+        most = [change.argmax(axis=0) for change in changes(tables, sign)]
+        for grasp in range(tables.n_classes):
+            picked = [int(of_input[grasp]) for of_input in most]
+            bits, bins = np.array(picked[: tables.n_switches], bool), picked[tables.n_switches :]
+            ends = [(0, *(steps.astype(int) + 1), *steps, HIGHEST_CODE) for steps in tables.thresholds]
+            for end in (0, 1):
+                codes = [of[b + end * len(of) // 2] for of, b in zip(ends, bins, strict=True)]
+                yield bits, np.array(codes, np.uint16)
+    for missing in (True, False):
+        found = furthest(tables, missing=missing)
+        yield found.bits, found.codes
+
+
+_T = TypeVar("_T")
+
+
+class ExactMeans:
+    """The score tables of a build and the means of its recordings, in steps."""
+
+    @precisely()
+    def __init__(self, small: SmallBuild) -> None:
+        tables, scale = small.tables, small.build.tables.scale
+        self._bias = _scaled(tables.bias.tolist(), scale)
+        self._switches = [_scaled(row, scale) for row in tables.switch_rows.tolist()]
+        self._thresholds = [steps.tolist() for steps in tables.thresholds]
+        self._joints = [[_scaled(row, scale) for row in rows.tolist()] for rows in tables.joint_rows]
+        pairs = zip(self._switches, small.bits.T.tolist(), strict=True)
+        self._switch_means = [mean_switch(row, bits) for row, bits in pairs]
+        joints = zip(self._thresholds, self._joints, small.codes.T.tolist(), strict=True)
+        self._joint_means = [mean_row(steps, rows, codes) for steps, rows, codes in joints]
+
+    def scores(self, bits: Sequence[bool], codes: Sequence[int], loss: Loss) -> list[mpf]:
+        """Return the scores (K,) of a frame that lost some inputs: tables in which these have nothing but a mean."""
+        switches, joints = loss.switches.tolist(), loss.joints.tolist()
+        return table_scores(
+            self._bias,
+            _swapped(self._switches, self._switch_means, switches),
+            _swapped(self._thresholds, [[] for _ in joints], joints),
+            _swapped(self._joints, [[mean] for mean in self._joint_means], joints),
+            [lost or bit for lost, bit in zip(switches, bits, strict=True)],
+            codes,
+        )
+
+    @precisely()
+    def most(self, loss: Loss) -> list[mpf]:
+        """Return the most (K,) that the loss can change each score, up or down.
+
+        What is lost adds its mean instead of one of its rows, whatever the other inputs say; so that is, for each
+        direction, the sum over lost inputs of the most that one can change.
+        """
+        lost = [rows for rows, is_lost in zip(self.changes(), loss.inputs, strict=True) if is_lost]
+        return [
+            max(sum(max(sign * row[k] for row in rows) for rows in lost) for sign in (1, -1))
+            for k in range(len(self._bias))
+        ]
+
+    @precisely()
+    def changes(self) -> list[list[list[mpf]]]:
+        """Return per input, for each of its values, what its mean adds to the scores (K,) beyond what that adds."""
+        means = [*self._switch_means, *self._joint_means]
+        inputs = [*([[mpf(0)] * len(row), row] for row in self._switches), *self._joints]
+        return [
+            [[a - b for a, b in zip(mean, row, strict=True)] for row in rows]
+            for mean, rows in zip(means, inputs, strict=True)
+        ]
+
+
+def _scaled(row: Sequence[float], scale: float) -> list[mpf]:
+    return [mpf(value) * scale for value in row]
+
+
+def _swapped(all_: Sequence[_T], others: Sequence[_T], which: Sequence[bool]) -> list[_T]:
+    return [other if swap else one for one, other, swap in zip(all_, others, which, strict=True)]
+
 
 CASE = Case(
     title="Missing ports and silent joints",

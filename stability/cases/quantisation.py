@@ -1,21 +1,160 @@
 """From scores to integers of 4 to 16 bits, in the worst frame there is."""
 
-from collections.abc import Iterator
-from itertools import permutations
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import permutations, product
 
+import numpy as np
+from mpmath import mpf
+
+from thenar.compiler.tables.collapse import ScoreTables
 from thenar.compiler.tables.compare import float_slack
+from thenar.compiler.tables.furthest import furthest
+from thenar.compiler.tables.quantise import balance
 from thenar.compiler.tables.worstcase import Rounding
-from thenar.runtime.tables import MAX_SWITCHES
+from thenar.runtime.errors import BuildError
+from thenar.runtime.scores import LANE_OFFSET, Scorer
+from thenar.runtime.tables import LIMIT, MAX_CLASSES, MAX_SWITCHES, IntegerTables, tables_from_bytes, tables_to_bytes
 
-from ..checks.exact_frames import BothWays, lost
-from ..checks.integer_sums import furthest_sums, largest
-from ..checks.scales import finest_scales
-from ..checks.sum_edges import edges
-from ..checks.ties import first_best, ties
+from ..checks.integer_sums import first_best, furthest_sums, largest, largest_sum, ties
 from ..finding import Case, Finding, Worst
-from ..inputs.hard_tables import Quantised, dominated, drawn, every_frame, half_a_step_off, quantised, sized
-from ..inputs.small_build import small_build, small_set
+from ..inputs.hard_tables import Quantised, dominated, drawn, every_frame, half_a_step_off, quantised, rows_of, sized
+from ..inputs.small_sets import small_build, small_set
 from ..reference.numbers import precisely, ratio
+from ..reference.tables import steps, table_scores
+
+
+class BothWays:
+    """Tables and their integers, arranged for one frame after another."""
+
+    def __init__(self, tables: ScoreTables, integers: IntegerTables) -> None:
+        self._scorer, self._scale = Scorer(integers), integers.scale
+        self._rows = (
+            tables.bias.tolist(),
+            tables.switch_rows.tolist(),
+            [thresholds.tolist() for thresholds in tables.thresholds],
+            [rows.tolist() for rows in tables.joint_rows],
+        )
+
+    @precisely()
+    def run(self, bits: Sequence[bool], codes: Sequence[int]) -> tuple[list[mpf], list[int]]:
+        """Return the frame's scores (K,) in steps: exact ones, and those that run."""
+        exact = [score * self._scale for score in table_scores(*self._rows, bits, codes)]
+        return exact, [lane - LANE_OFFSET for lane in self._scorer.lanes(bits, codes)]
+
+
+@precisely()
+def lost(exact: Sequence[mpf], deployed: Sequence[int], leader: int, rival: int) -> mpf:
+    """Return how many steps of the lead of class `leader` over `rival` are gone."""
+    return (exact[leader] - exact[rival]) - (deployed[leader] - deployed[rival])
+
+
+# What can add the last step to a sum, and in which array it stands.
+LAST = (
+    ("the bias", "bias"),
+    ("a closed switch", "switch_rows"),
+    ("a missing switch", "switch_means"),
+    ("a bin", "joint_rows"),
+    ("a missing joint", "joint_means"),
+)
+
+
+def edges(full: bool) -> Iterator[Finding]:
+    """Hold tables whose sums reach 32767 and those that reach one more, the one too far by whatever can add it."""
+    right = Worst("sums of exactly +-32767", "accepted, and added up without a spill", 0, "tables")
+    wrong = Worst("sums of 32768", "refused, in memory and as a file", 0, "tables")
+    for sign, classes, (name, arrays) in product((1, -1), (2, 3, MAX_CLASSES if full else 33), LAST):
+        tables = edge_tables(classes, sign, arrays)
+        at = f"{classes} classes, {'+' if sign > 0 else '-'} by {name}"
+        right.see(float(not _is_right(tables, sign)), at)
+        wrong.see(float(not _is_refused(tables, arrays, sign)), at)
+    yield right.finding()
+    yield wrong.finding()
+
+
+def edge_tables(classes: int, sign: int, last: str) -> IntegerTables:
+    """Return tables of one switch and one joint in which class 1 gets to 32767 steps by what stands in `last`.
+
+    Its neighbours get as far the other way, so that a spill into the next lane would show.
+    """
+    arrays = {name: np.zeros((1, classes), np.int16) for _, name in LAST}
+    towards = np.full(classes, -sign)
+    towards[1] = sign
+    arrays["bias"][0] = towards * (LIMIT - 1)
+    arrays[last][0] += towards.astype(np.int16)
+    return IntegerTables(
+        bias=arrays["bias"][0],
+        switch_rows=arrays["switch_rows"],
+        thresholds=(np.array([100], np.uint16),),
+        joint_rows=(np.vstack([arrays["joint_rows"], 0 * towards]).astype(np.int16),),
+        switch_means=arrays["switch_means"],
+        joint_means=arrays["joint_means"],
+        scale=1.0,
+    )
+
+
+def _is_right(tables: IntegerTables, sign: int) -> bool:
+    read = tables_from_bytes(tables_to_bytes(tables))
+    found = furthest(read)
+    lanes = Scorer(read).lanes_without(found.bits, found.codes, found.lost_switches, found.lost_joints)
+    expected = [LANE_OFFSET + (LIMIT if k == 1 else -LIMIT) * sign for k in range(tables.n_classes)]
+    return read.bound == LIMIT and list(lanes) == expected
+
+
+def _is_refused(tables: IntegerTables, last: str, sign: int) -> bool:
+    row = tables.joint_rows[0] if last == "joint_rows" else getattr(tables, last)
+    if last == "bias" and sign > 0:
+        row = tables.switch_rows  # 32768 is no int16: the step too many comes from elsewhere
+    row[..., 1].flat[0] += sign
+    altered = tables_to_bytes(tables)
+    return _refuses(lambda: replace(tables)) and _refuses(lambda: tables_from_bytes(altered))
+
+
+def _refuses(make: Callable[[], IntegerTables]) -> bool:
+    try:
+        make()
+    except BuildError:
+        return True
+    return False
+
+
+# Products of a row and the scale are doubles: relative 2^-53 off, so the scale at which one passes half a step is off
+# by as much, one unit in its last place at the most; and the next double is another.
+_BOUND = 2
+
+
+def finest_scales(seeds: range) -> Finding:
+    """Compare the compiler's scale with the finest, for classes alike and for one that dominates by up to 10^12."""
+    worst = Worst("scale, one class up to 10^12 times the others", "bisection in exact arithmetic", _BOUND, "ulp")
+    for seed in seeds:
+        for width, factor in ((4, 1.0), (16, 1.0), (8, 1e3), (16, 1e-3), (16, 1e6), (16, 1e12)):
+            tables = dominated(seed, 3, 4, (5, 3), factor)
+            worst.see(_error(tables, width), f"draw {seed}, {width} bits, times {factor:g}")
+        worst.see(_error(drawn(seed, 2, 1, ()), 16), f"draw {seed}, 2 classes, 1 switch")
+    return worst.finding()
+
+
+def _error(tables: ScoreTables, width: int) -> float:
+    got, limit = quantised("", tables, width).integers.scale, 2 ** (width - 1) - 1
+    finest = _finest(balance(tables), limit)
+    return abs(got - finest) / math.ulp(finest)
+
+
+def _finest(tables: ScoreTables, limit: int) -> float:
+    """Return the largest double at which rows, rounded half to even from exact products, cannot add up beyond limit."""
+    inputs = rows_of(tables)
+    fits, too_fine = 0.0, 1.0
+    while _furthest(inputs, too_fine) <= limit:
+        fits, too_fine = too_fine, 2 * too_fine
+    while (middle := (fits + too_fine) / 2) not in (fits, too_fine):
+        fits, too_fine = (middle, too_fine) if _furthest(inputs, middle) <= limit else (fits, middle)
+    return fits
+
+
+def _furthest(inputs: list[list[list[float]]], scale: float) -> float:
+    return largest_sum([[[steps(value, scale) for value in row] for row in rows] for rows in inputs])
+
 
 CASE = Case(
     title="Integers of 4 to 16 bits",

@@ -26,7 +26,7 @@ from ..checks.rounds import Moment, loss_rounding, moments, rise_rounding
 from ..finding import Case, Finding, Worst
 from ..inputs.hard_data import HardSet, intervals, separable, words
 from ..inputs.hard_tables import rows_of
-from ..reference.logistic import mean_loss
+from ..reference.boosting import mean_loss
 from ..reference.numbers import distance
 from ..reference.tables import table_scores
 

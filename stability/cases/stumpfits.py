@@ -1,27 +1,213 @@
 """The best stump of a round, its thresholds and answers; and whole trainings, round by round."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 from mpmath import mpf
+from numpy.typing import NDArray
 
 from thenar.compiler.boosting.binning import bin_columns, midpoints
+from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumpfit import FittedStumps, Targets, fit_stumps
+from thenar.compiler.boosting.stumps import Stumps
 
-from ..checks.class_rounds import ClassRound, branches
-from ..checks.trainings import trainings
+from ..checks.class_rounds import ClassRound, Step, branches, choice_error, class_rounds, grown, see_stump, step_of
 from ..finding import Case, Finding, Worst
-from ..inputs.hard_stumps import Problem, neighbours, problems, tied
-from ..reference import stumps as truth
+from ..reference import boosting as truth
+from ..reference.boosting import Round, boost_rounds
 from ..reference.numbers import precisely
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One class's round: inputs X (n, d), weights w (n,) and weighted responses w z (n,), and what is hard about it."""
+
+    name: str
+    X: Floats
+    weights: Floats
+    responses: Floats
+
+
+def problems(rng: np.random.Generator, n: int, z_max: float) -> Iterator[Problem]:
+    """Yield n problems of every kind, 5 to 80 rows of 2 to 6 columns each."""
+    for _ in range(n):
+        for kind in (_ordinary, _decades, _settled, _clamped, _one_heavy, _light_branch, _subnormal):
+            rows = int(rng.integers(5, 80))
+            X = columns(rng, rows)[:, : int(rng.integers(2, 7))]
+            weights, ratios = kind(rng, rows, z_max)
+            yield Problem(kind.__name__.strip("_").replace("_", " "), X, weights, weights * ratios)
+
+
+def neighbours(rng: np.random.Generator, n: int) -> Iterator[list[float]]:
+    """Yield ascending values: next to nothing, the largest, doubles next to each other, 16-bit codes."""
+    largest, least = float(np.finfo(np.float64).max), 5e-324
+    yield from ([0.0, least, 2 * least, 3 * least], [-least, least], [-largest, largest])
+    yield [float(np.nextafter(largest, 0)), largest]
+    for _ in range(n):
+        one = np.ldexp(rng.uniform(0.5, 1), rng.integers(-1073, 1022))
+        yield (one + np.spacing(one) * np.arange(4)).tolist()
+        yield np.unique(rng.integers(0, 1 << 16, 9)).astype(np.float64).tolist()
+
+
+def columns(rng: np.random.Generator, n: int) -> Floats:
+    """Return inputs (n, 6), n >= 2: codes, a switch and its opposite, numbers one double apart, one that is missing."""
+    codes, switch = rng.integers(0, 256, n).astype(np.float64), rng.integers(0, 2, n).astype(np.float64)
+    codes[:2] = 0, 255
+    close = 1.0 + np.spacing(1.0) * rng.integers(0, 3, n)
+    lacking = np.where(rng.random(n) < 0.2, np.nan, codes)
+    return np.column_stack([codes, switch, close, 1.0 - switch, lacking, np.arange(n)])
+
+
+def tied(rng: np.random.Generator, z_max: float) -> Problem:
+    """Return a problem in which the first row has exactly what the next two have together, in columns of all orders."""
+    weights, ratios = rng.random(40), np.full(40, -1.7)
+    weights[1:3] = weights[0] / 2
+    ratios[:3] = rng.choice([1.9, z_max])
+    responses = weights * ratios
+    responses[1:3] = responses[0] / 2
+    one, two = np.arange(40) == 0, np.isin(np.arange(40), (1, 2))
+    either = 1.0 + one - two  # one at 2, two at 0: the first split takes two off, the second one
+    inputs = [one, two, 1.0 - one, either, 2.0 - either, rng.integers(0, 2, 40)]
+    order = rng.permutation(len(inputs))
+    return Problem(f"columns in order {order.tolist()}", np.column_stack(inputs)[:, order], weights, responses)
+
+
+def _ratios(rng: np.random.Generator, n: int, z_max: float) -> Floats:
+    return rng.choice([-1.0, 1.0], n) * rng.uniform(1.0, z_max, n)
+
+
+def _ordinary(rng: np.random.Generator, n: int, z_max: float) -> tuple[Floats, Floats]:
+    return rng.random(n), _ratios(rng, n, z_max)
+
+
+def _decades(rng: np.random.Generator, n: int, z_max: float) -> tuple[Floats, Floats]:
+    return np.power(10.0, rng.uniform(-300, 0, n)), _ratios(rng, n, z_max)
+
+
+def _settled(rng: np.random.Generator, n: int, z_max: float) -> tuple[Floats, Floats]:
+    return np.ldexp(1.0, -rng.integers(30, 53, n)), rng.choice([-1.0, 1.0], n)
+
+
+def _clamped(rng: np.random.Generator, n: int, z_max: float) -> tuple[Floats, Floats]:
+    return np.full(n, 1 / z_max), rng.choice([-z_max, z_max], n)
+
+
+def _one_heavy(rng: np.random.Generator, n: int, z_max: float) -> tuple[Floats, Floats]:
+    return np.where(np.arange(n) == n // 2, 1.0, rng.random(n) * 2.0**-52), _ratios(rng, n, z_max)
+
+
+def _light_branch(rng: np.random.Generator, n: int, z_max: float) -> tuple[Floats, Floats]:
+    """Most rows of some 2^-38 of the weight, where a branch is next to being taken for empty, and of opposite sign."""
+    light = np.arange(n) >= 3
+    return np.where(light, 2.0**-38 * rng.uniform(0.25, 4, n) / n, 1.0), np.where(light, -z_max, 1.0)
+
+
+def _subnormal(rng: np.random.Generator, n: int, z_max: float) -> tuple[Floats, Floats]:
+    return np.ldexp(rng.integers(0, 1000, n).astype(np.float64), -1074), rng.choice([-1.0, 1.0, z_max], n)
+
+
+REFERENCE = "60 digits"
+
+
+@dataclass(frozen=True, slots=True)
+class Training:
+    """A small training set, X (n, d) and labels (n,), and its options."""
+
+    name: str
+    X: Floats
+    labels: NDArray[np.intp]
+    classes: int
+    shrinkage: float
+    z_max: float
+
+    def boosted(self, rounds: int) -> Stumps:
+        """Return our ensemble."""
+        return boost(self.X, self.labels, self.classes, rounds=rounds, shrinkage=self.shrinkage, z_max=self.z_max)[0]
+
+    def boosted_precisely(self, rounds: int) -> list[Round]:
+        """Return the reference's rounds."""
+        X, labels = self.X.tolist(), self.labels.tolist()
+        return boost_rounds(X, labels, self.classes, rounds, self.shrinkage, self.z_max)
+
+
+def trainings(full: bool) -> Iterator[Finding]:
+    """Yield errors of rounds given the scores before them, and of scores after all rounds."""
+    rng, rounds = np.random.default_rng(5), 40 if full else 8
+    stumps = Worst("stumps of whole trainings", REFERENCE, 1.0, "x rounding")
+    answers = Worst("answers of a round, from its scores", REFERENCE, 1.0, "x rounding")
+    scores = Worst("scores after all rounds, from the start", REFERENCE, 1.0, "x growth")
+    for training in _sets(rng, 36 if full else 20):
+        ours = training.boosted(rounds)
+        stages = [np.zeros((len(training.X), training.classes)), *ours.staged_scores(training.X)]
+        for number, F in enumerate(stages[:-1]):
+            at = f"{training.name}, round {number + 1}"
+            for given in class_rounds(F.tolist(), training.labels.tolist(), training.z_max):
+                see_stump(given, training.X, ours, number, training.z_max, at, stumps, answers)
+        _see_scores(training, stages, scores)
+    yield from (stumps.finding(), answers.finding(), scores.finding())
+
+
+def _see_scores(training: Training, stages: Sequence[Floats], scores: Worst) -> None:
+    """Hold the scores of our training against those of the reference's, as long as no choice in it is in doubt."""
+    rounds = training.boosted_precisely(len(stages) - 1)
+    F = [[mpf(0)] * training.classes for _ in training.labels]
+    labels, steps, truth = training.labels.tolist(), list[Step](), F
+    for each, ours in zip(rounds, stages[1:], strict=True):
+        given = class_rounds(truth, labels, training.z_max)
+        if _in_doubt(training, each, given):
+            break
+        parts = [branches(training.X[:, splits[0][1]], splits[0][2]) for splits in each.splits]
+        largest = float(np.abs(ours).max())
+        steps.append(step_of(given, parts, labels, training.shrinkage, training.z_max, largest))
+        truth = each.scores
+    if not steps:
+        return
+    reached = stages[len(steps)]
+    with precisely():
+        errors = [
+            abs(mpf(a) - b)
+            for row, true in zip(reached.tolist(), truth, strict=True)
+            for a, b in zip(row, true, strict=True)
+        ]
+    ratios = np.array([float(error) for error in errors]) / grown(steps)
+    scores.see(float(ratios.max()), f"{training.name}, {len(steps)} rounds, off by {float(max(errors)):.2g}")
+
+
+def _in_doubt(training: Training, each: Round, given: Sequence[ClassRound]) -> bool:
+    """Whether rounding may part equal from unequal stumps, or take a branch for empty or not."""
+    for splits, lead, of in zip(each.splits, each.leads(), given, strict=True):
+        best, column, lower, _ = splits[0]
+        light = [of.branch(rows).is_light for rows in branches(training.X[:, column], lower) if rows]
+        if any(light) or lead * best <= 2 * choice_error(of.weights, of.responses, training.z_max):
+            return True
+    return False
+
+
+def _sets(rng: np.random.Generator, n: int) -> Iterator[Training]:
+    """Yield sets of switches, codes and numbers that may be missing: noisy, separable, and of random labels."""
+    for name, classes, noise, shrinkage, z_max in (
+        ("noisy", 3, 0.2, 1.0, 3.0),
+        ("separable", 4, 0.0, 1.0, 3.0),
+        ("random labels", 2, 1.0, 1.0, 3.0),
+        ("shrunk", 3, 0.1, 0.3, 2.0),
+        ("hardly clamped", 3, 0.1, 1.0, 100.0),
+    ):
+        labels = np.arange(n) % classes
+        switches = rng.random((classes, 3))[labels] + noise * rng.normal(0, 1, (n, 3)) > 0.5
+        codes = 20 * labels + rng.integers(0, 20, n) + (200 * noise * rng.random(n)).astype(np.int64)
+        lacking = np.where(rng.random(n) < 0.3, np.nan, rng.integers(0, 5, n))
+        yield Training(name, np.column_stack([switches, codes, lacking]), labels, classes, shrinkage, z_max)
+
 
 CASE = Case(
     title="Stump fits",
     danger="a branch answers with what rounding left of its weight, and ties between columns go where rounding likes",
 )
-REFERENCE = "60 digits"
 Z_MAX = 3.0
 
 

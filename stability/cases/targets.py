@@ -13,8 +13,8 @@ from thenar.compiler.elementary import softmax
 
 from ..checks.roundings import ROUNDING, SMALLEST, share_error
 from ..finding import Case, Finding, Worst
-from ..inputs.hard_scores import hard_scores
-from ..reference import logistic
+from ..inputs.hard_data import hard_scores
+from ..reference import boosting as logistic
 from ..reference.numbers import precisely
 
 CASE = Case(

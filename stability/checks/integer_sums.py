@@ -1,4 +1,4 @@
-"""Sums of int16 rows: how far they get, and whether the largest tables add up right."""
+"""Sums of int16 rows: how far they get, whether the largest tables add up right, and which of equal scores wins."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.compiler.tables.furthest import furthest
+from thenar.runtime.build import Build
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Proof, Source, Switch
 from thenar.runtime.scores import LANE_OFFSET, Scorer
 from thenar.runtime.tables import (
     LIMIT,
@@ -20,7 +22,31 @@ from thenar.runtime.tables import (
 )
 
 from ..finding import Finding, Worst
-from ..inputs.hard_tables import whole_numbers
+from ..inputs.hard_tables import every_frame, whole_numbers
+
+_NO_DIGEST = "0" * 64
+
+
+def bare_build(tables: IntegerTables) -> Build:
+    """Return a build of `tables` whose grasp types, switches and joints are named by their numbers."""
+    n_inputs = tables.n_switches + tables.n_joints
+    return Build(
+        Manifest(
+            schema=SCHEMA,
+            checksum="",
+            thenar="",
+            tables_sha256=_NO_DIGEST,
+            ensemble_sha256=_NO_DIGEST,
+            source=Source(_NO_DIGEST, 0, "none", tables.n_switches),
+            options=Options(0, 1, "both", 1.0, 0, 1),
+            grasps=tuple(str(number) for number in range(tables.n_classes)),
+            switches=tuple(Switch(number, str(number), 0.0) for number in range(tables.n_switches)),
+            joints=tuple(Calibration(number, str(number), "deg", 0, 0.0, 1, 1.0) for number in range(tables.n_joints)),
+            proof=Proof(16, tables.scale, tables.bound, (n_inputs + 1) / 2, n_inputs + 1, 0, 0),
+            rates=(),
+        ),
+        tables,
+    )
 
 
 def largest_sum(inputs: Iterable[Sequence[Sequence[float]]]) -> float:
@@ -107,3 +133,30 @@ def _every_sum(tables: IntegerTables) -> int:
 
 def _listed(*arrays: NDArray[np.int16]) -> Iterator[tuple[list[int], ...]]:
     return zip(*(array.tolist() for array in arrays), strict=True)
+
+
+def ties(full: bool) -> Finding:
+    """Of equal scores the first must win, as it does where C keeps the best so far and takes only what is greater."""
+    worst = Worst("equal best scores", "the first of them", 0, "frames")
+    for seed in range(30 if full else 3):
+        tables = whole_numbers(seed, 5, 4, (3, 3), 1)
+        build = bare_build(tables)
+        for frame in every_frame(tables):
+            bits, codes = np.array(frame.bits), np.array(frame.codes, np.uint16)
+            scores = build.scores(bits, codes).tolist()
+            best = first_best(scores)
+            if scores.count(scores[best]) < 2:
+                continue
+            found = build.recognise(bits, codes)
+            right = build.classify(bits, codes) == found.grasp == str(best) and found.margin == 0
+            worst.see(float(not right), f"draw {seed}: {frame}")
+    return worst.finding()
+
+
+def first_best(scores: Sequence[int]) -> int:
+    """Return which score is greatest, of equal ones the first; written as C would have it."""
+    best = 0
+    for k in range(1, len(scores)):
+        if scores[k] > scores[best]:
+            best = k
+    return best

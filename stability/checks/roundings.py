@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import mpmath
 from mpmath import mpf
 
-from ..reference.logistic import loss
+from ..reference.boosting import loss
 from ..reference.numbers import precisely
 
 ROUNDING = 2.0**-53  # the largest relative error of one rounding

@@ -10,15 +10,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.simulator.body.anthropometry import Size
 from thenar.simulator.body.condition import Condition, Held, Pad, Thing
-from thenar.simulator.body.hand import Hand
+from thenar.simulator.body.hand import Hand, Size
 from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
+from thenar.simulator.contact.balance import Case
 from thenar.simulator.contact.model import Load
-from thenar.simulator.contact.quasistatic import Case
 from thenar.simulator.planning.postures import Postures
 from thenar.simulator.scenes.decode import load_scene
-from thenar.simulator.scenes.population import SURVEYS
+from thenar.simulator.scenes.scene import SURVEYS
 
 Floats = NDArray[np.float64]
 

@@ -11,17 +11,14 @@ from numpy.typing import NDArray
 
 from thenar.simulator.body.hand import CAPSULES
 from thenar.simulator.body.layout import Switches, murakami160
-from thenar.simulator.body.pose import rotation, rotation_vector
-from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
-from thenar.simulator.contact.split import split
+from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere, rotation, rotation_vector
+from thenar.simulator.contact.model import split
 
 from ..checks.roundings import ROUNDING
 from ..finding import Finding, Worst
-from ..reference.linear import turn
-from ..reference.numbers import precisely
+from ..reference.numbers import precisely, turn
 from .grasps import HAND
-from .posed import surface
-from .vectors import length, matrix, plus
+from .posed import length, matrix, plus, surface
 
 Floats = NDArray[np.float64]
 

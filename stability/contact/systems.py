@@ -9,16 +9,12 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from thenar.simulator.contact.quasistatic import Skin
-from thenar.simulator.contact.quasistatic.balance import Balance
-from thenar.simulator.contact.quasistatic.case import command
-from thenar.simulator.contact.quasistatic.linear import solve_arrow
-from thenar.simulator.contact.quasistatic.newton import stiffness
+from thenar.simulator.contact.balance import Balance, Skin, command
+from thenar.simulator.contact.settle import solve_arrow, stiffness
 
 from ..checks.roundings import ROUNDING
 from ..finding import Finding, Worst
-from ..reference.linear import solve
-from ..reference.numbers import precisely
+from ..reference.numbers import precisely, solve
 from .grasps import case_of, hard
 
 Floats = NDArray[np.float64]

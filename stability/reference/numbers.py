@@ -1,7 +1,7 @@
-"""Doubles as exact numbers of 60 digits, and how far another double is from the truth in units of its last place."""
+"""Doubles as exact numbers of 60 digits, how far another double is from the truth, and linear equations and turns."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
 
@@ -44,3 +44,33 @@ def ulps(got: float, truth: mpf) -> float:
 def distance(got: float, truth: mpf) -> float:
     """Return |got - truth|, as a double."""
     return float(abs(mpf(float(got)) - truth))
+
+
+Vector = Sequence[float]
+
+
+# Of one number, in radians.
+sin, cos = precisely()(mpmath.sin), precisely()(mpmath.cos)
+
+
+@precisely()
+def solve(matrix: Sequence[Vector], right: Vector) -> list[mpf]:
+    """Return x with matrix (n, n) x = right (n,), by elimination, as many digits short of 60 as its condition has.
+
+    Raises ZeroDivisionError where nothing is left of a column.
+    """
+    return list(mpmath.lu_solve(mpmath.matrix([*map(list, matrix)]), mpmath.matrix([*right])))
+
+
+@precisely()
+def turn(axis: Vector, angle: float) -> list[list[mpf]]:
+    """Return the rotation (3, 3) by `angle` radians about `axis`, of any length (Rodrigues).
+
+    R = cos a I + sin a [u]x + (1 - cos a) u u^T, u the unit vector along the axis.
+    """
+    x, y, z = (mpf(part) for part in axis)
+    length = mpmath.sqrt(x**2 + y**2 + z**2)
+    u = [x / length, y / length, z / length]
+    c, s = mpmath.cos(mpf(angle)), mpmath.sin(mpf(angle))
+    crossed = [[0, -u[2], u[1]], [u[2], 0, -u[0]], [-u[1], u[0], 0]]
+    return [[c * (i == j) + s * crossed[i][j] + (1 - c) * u[i] * u[j] for j in range(3)] for i in range(3)]

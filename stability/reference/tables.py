@@ -11,7 +11,7 @@ from fractions import Fraction
 import mpmath
 from mpmath import mpf
 
-from .ensembles import answer, step
+from .boosting import answer, step
 from .numbers import precisely
 
 HIGHEST_CODE = 65535

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thenar.cli.hand import hand_of
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.glove.files import spec_files
 from thenar.compiler.recordings.taxonomy import own
@@ -16,6 +15,7 @@ from thenar.runtime import Build
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.scanning.propose import propose_harness
+from thenar.simulator.handmaps.handmap import hand_map
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
 NAMES = ("thumb_distal_5", "palm_heel_6", "index_distal_3", "little_distal_8")
@@ -63,7 +63,7 @@ def test_a_spec_is_printed_and_written(thenar: Thenar, hand_build: Path, tmp_pat
     assert all(name in told for name in names)
     assert "us on the wire, in 1 transaction." in told
     written = {path.name: path.read_bytes() for path in folder.iterdir()}
-    assert written == spec_files(manifest, hand=hand_of(names))
+    assert written == spec_files(manifest, hand=hand_map().fitted(names))
     assert load_harness(folder / "glove.toml").switches == tuple(names)
 
 

@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from thenar.cli import run
-from thenar.stability import cases, catalogue
-from thenar.stability.catalogue import NAMES
+from thenar.stability import cases
+from thenar.stability import report as catalogue
+from thenar.stability.report import NAMES
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
 
@@ -161,7 +162,7 @@ def test_ctrl_c_exits_with_130_and_leaves_nothing(folder: Path, tmp_path: Path) 
     endless = CASE.format(name="endless", error=0.5) + f"    open({str(ready)!r}, 'w').close()\n    while True: pass\n"
     (folder / "endless.py").write_text(endless)
     program = (
-        "import sys; from thenar.stability import cases, catalogue; from thenar.cli import run; "
+        "import sys; from thenar.stability import cases, report as catalogue; from thenar.cli import run; "
         f"cases.__path__ = [{str(folder)!r}]; catalogue.NAMES = ('endless',); sys.exit(run(sys.argv[1:]))"
     )
     command = [sys.executable, "-c", program, "stability", "--jobs", "1", "-o", str(tmp_path / "page.html")]

@@ -23,7 +23,7 @@ from thenar.compiler.firmware import folder as firmware
 from thenar.compiler.frontier import preparing
 from thenar.compiler.frontier.points import FrontierError
 from thenar.compiler.frontier.storing.store import HEADER, Store
-from thenar.compiler.glove import folder as spec
+from thenar.compiler.glove import files as spec
 
 Content = Mapping[str, str]
 TRACED = {function.__code__ for function in (publication.publish_folder, publication._put, publication.exchanged)}

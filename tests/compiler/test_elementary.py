@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from thenar.compiler.elementary import _log_of_one_and, add_up, exp, log, sincos, softmax_and_loss
-from thenar.stability.reference import logistic
+from thenar.stability.reference import boosting as logistic
 from thenar.stability.reference.numbers import exact, precisely, ulps
 
 

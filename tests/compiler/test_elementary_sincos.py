@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from thenar.compiler.elementary import sincos
-from thenar.stability.reference import linear
+from thenar.stability.reference import numbers as linear
 from thenar.stability.reference.numbers import ulps
 
 FURTHEST = 1000.0

@@ -28,15 +28,13 @@ from thenar.runtime.recording.session import Collection
 from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.timing import scan_us
-from thenar.simulator.body.anthropometry import Size
 from thenar.simulator.body.condition import Thing
-from thenar.simulator.body.hand import Hand
+from thenar.simulator.body.hand import Hand, Size
 from thenar.simulator.planning.postures import Postures
 from thenar.simulator.running.pipeline import compile_pipeline
-from thenar.simulator.running.session import conditions_of
+from thenar.simulator.running.simulation import conditions_of
 from thenar.simulator.scenes import shipped
-from thenar.simulator.scenes.catalogue import load_catalogue
-from thenar.simulator.scenes.decode import load_scene
+from thenar.simulator.scenes.decode import load_catalogue, load_scene
 
 
 @cache

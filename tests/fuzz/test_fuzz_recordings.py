@@ -40,7 +40,7 @@ from thenar.runtime.recording.layout import MAGIC
 from thenar.runtime.recording.session import Collection, Label, Session, Task
 from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.sinks.jsonl import encode
-from thenar.simulator.playing.recorded import of_recording
+from thenar.simulator.playing.performance import of_recording
 
 TYPES = ("cup", "pen", "rod")
 SENSORS = tuple(f"j{number}" for number in range(18))

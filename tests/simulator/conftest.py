@@ -5,9 +5,8 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 import pytest
 
-from thenar.simulator.body.anthropometry import Size
 from thenar.simulator.body.condition import Condition, Held, Pad, Thing
-from thenar.simulator.body.hand import Hand
+from thenar.simulator.body.hand import Hand, Size
 from thenar.simulator.body.shapes import Cylinder
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import EFFECTS, EffectParameters, Setting

@@ -16,8 +16,7 @@ import pytest
 
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import EFFECTS
-from thenar.simulator.pipeline.ledger import Ledger
-from thenar.simulator.running.pipeline import compile_pipeline
+from thenar.simulator.running.pipeline import Ledger, compile_pipeline
 from thenar.simulator.scenes.scene import Scene
 
 NAMES = tuple(EFFECTS)

@@ -6,8 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.deviates import Numbers
-from thenar.simulator.streams import Draw, Draws, Site
+from thenar.simulator.streams import Draw, Draws, Numbers, Site
 from thenar.stability.reference.intervals import normal_quantile
 from thenar.stability.reference.numbers import distance
 

@@ -6,8 +6,7 @@ import msgspec
 import pytest
 
 from thenar.stability import cases
-from thenar.stability.catalogue import NAMES, load
-from thenar.stability.report import CaseReport, run_case
+from thenar.stability.report import NAMES, CaseReport, load, run_case
 
 
 def test_every_case_in_the_folder_is_in_the_catalogue_once() -> None:

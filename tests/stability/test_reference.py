@@ -14,7 +14,21 @@ from hypothesis import strategies as st
 from mpmath import mpf
 from scipy import special, stats
 
-from thenar.stability.reference.ensembles import boost, boost_rounds, scores, step
+from thenar.stability.reference.boosting import (
+    best_splits,
+    boost,
+    boost_rounds,
+    branch_values,
+    exp,
+    explained,
+    log,
+    loss,
+    mean_loss,
+    scores,
+    softmax,
+    step,
+    target,
+)
 from thenar.stability.reference.information import (
     compare_gains,
     conditional_gain_bits,
@@ -24,10 +38,7 @@ from thenar.stability.reference.information import (
     sign_of_log_sum,
 )
 from thenar.stability.reference.intervals import normal_quantile, student, student_quantile, wilson
-from thenar.stability.reference.linear import cos, sin, solve, turn
-from thenar.stability.reference.logistic import exp, log, loss, mean_loss, softmax, target
-from thenar.stability.reference.numbers import DIGITS, distance, exact, precisely, ulps
-from thenar.stability.reference.stumps import best_splits, branch_values, explained
+from thenar.stability.reference.numbers import DIGITS, cos, distance, exact, precisely, sin, solve, turn, ulps
 from thenar.stability.reference.tables import balanced, mean_row, mean_switch, score_tables, steps, table_scores
 
 HAIR = mpf(10) ** (8 - DIGITS)  # a few roundings of 60 digits

@@ -11,8 +11,7 @@ import pytest
 
 from thenar.stability import cases, report
 from thenar.stability.finding import Case, Finding, Worst
-from thenar.stability.report import CaseReport, Check, Report, run, run_case
-from thenar.stability.wording import failures, figure, legend
+from thenar.stability.report import CaseReport, Check, Report, failures, figure, legend, run, run_case
 
 SOUND = """
 from thenar.stability.finding import Case, Finding

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import pytest
 
-from thenar.cli.hand import hand_of
 from thenar.compiler.hand import HandShape
 from thenar.runtime.manifest import Calibration, Manifest, Options, Proof, Recognised, Source, Switch
 from thenar.simulator.handmaps.handmap import hand_map
@@ -91,7 +90,7 @@ def read_netlist() -> Callable[[bytes], Netlist]:
 
 @pytest.fixture(scope="session")
 def hand() -> HandShape:
-    shape = hand_of(hand_map().names)
+    shape = hand_map().fitted(hand_map().names)
     assert shape is not None
     return shape
 

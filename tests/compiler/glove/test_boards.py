@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from thenar.compiler.glove.ends import BoardPins
 from thenar.compiler.glove.files import spec_files
+from thenar.compiler.glove.layout import BoardPins
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, ScannerWiring
 from thenar.runtime.manifest import Manifest

@@ -10,7 +10,7 @@ import msgspec
 import pytest
 
 from thenar.compiler.glove.files import NAMES, spec_files
-from thenar.compiler.glove.glove_spec import Summary
+from thenar.compiler.glove.spec import SpecSummary
 from thenar.compiler.hand import HandShape
 from thenar.runtime.manifest import Manifest
 
@@ -20,11 +20,11 @@ ALWAYS = {"README.txt", "bom.csv", "glove.net", "glove.toml", "spec.json", "swit
 DIGEST = """
 import hashlib, sys
 import msgspec
-from thenar.cli.hand import hand_of
+from thenar.simulator.handmaps.handmap import hand_map
 from thenar.compiler.glove.files import spec_files
 from thenar.runtime.manifest import Manifest
 manifest = msgspec.json.decode(sys.stdin.buffer.read(), type=Manifest)
-files = spec_files(manifest, hand=hand_of([switch.name for switch in manifest.switches]))
+files = spec_files(manifest, hand=hand_map().fitted([switch.name for switch in manifest.switches]))
 print(sorted((name, hashlib.sha256(data).hexdigest()) for name, data in files.items()))
 """
 
@@ -55,7 +55,7 @@ def test_the_same_build_gives_the_same_bytes_in_any_process(manifest_of: Manifes
 
 def test_lists_summary_and_netlist_agree(manifest_of: Manifests, hand: HandShape) -> None:
     files = spec_files(manifest_of(hand.names[:40]), hand=hand)
-    summary = msgspec.json.decode(files["spec.json"], type=Summary)
+    summary = msgspec.json.decode(files["spec.json"], type=SpecSummary)
     switches, wires = rows(files["switches.csv"]), rows(files["wiring.csv"])
     assert [row["name"] for row in switches] == list(hand.names[:40])
     assert len(wires) == len(summary.wires)

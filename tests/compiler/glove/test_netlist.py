@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thenar.compiler.glove.files import spec_files
-from thenar.compiler.glove.glove_spec import glove_spec
+from thenar.compiler.glove.spec import glove_spec
 from thenar.compiler.hand import HandShape
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.harness.loading import load_harness, parse_harness

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from thenar.compiler.recordings.errors import TableError
+from thenar.compiler.recordings.errors import TableError, unpacked
 from thenar.compiler.recordings.graspset import GraspSet
-from thenar.compiler.recordings.limits import unpacked
 from thenar.compiler.recordings.table import read_table
 from thenar.compiler.recordings.taxonomy import FEIX_33
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 
 from thenar.compiler.recordings.columns import Columns, read_columns, select
-from thenar.compiler.recordings.columns_of import columns_of, heads_of
+from thenar.compiler.recordings.export import columns_of, heads_of
 from thenar.compiler.recordings.graspset import GraspSet
 
 

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from thenar.compiler.recordings.columns_of import columns_of
 from thenar.compiler.recordings.errors import TableError
-from thenar.compiler.recordings.export import export, to_arff, to_csv
+from thenar.compiler.recordings.export import columns_of, export, to_arff, to_csv
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import import_file
 from thenar.compiler.recordings.taxonomy import own

@@ -4,7 +4,8 @@ import hypothesis.strategies as st
 import numpy as np
 from hypothesis import given, settings
 
-from thenar.compiler.recordings.findings import (
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.recordings.summary import (
     Finding,
     constant_columns,
     disagreeing,
@@ -12,7 +13,6 @@ from thenar.compiler.recordings.findings import (
     find_oddities,
     frame_numbers,
 )
-from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.taxonomy import own
 
 

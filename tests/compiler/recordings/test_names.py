@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from thenar.compiler.recordings.errors import RecordingError
-from thenar.compiler.recordings.names import check_names, list_rows
+from thenar.compiler.recordings.errors import RecordingError, check_names, list_rows
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
+from thenar.compiler.recordings.cells import Readings, read_cells
 from thenar.compiler.recordings.columns import Columns, JointColumns, select
 from thenar.compiler.recordings.errors import TableError
-from thenar.compiler.recordings.findings import Finding
-from thenar.compiler.recordings.reading import Readings, read_cells
+from thenar.compiler.recordings.summary import Finding
 from thenar.compiler.recordings.table import Column, Table
 
 GOOD = {

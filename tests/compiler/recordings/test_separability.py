@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 
 from thenar.compiler.recordings.graspset import GraspSet, Joint
-from thenar.compiler.recordings.separability import NEIGHBOUR_ROWS, separabilities
+from thenar.compiler.recordings.summary import NEIGHBOUR_ROWS, separabilities
 from thenar.compiler.recordings.taxonomy import own
 
 

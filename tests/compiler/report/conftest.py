@@ -9,7 +9,6 @@ import msgspec
 import numpy as np
 import pytest
 
-from thenar.cli.hand import hand_of
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.artifact.ensemble import ensemble_from_bytes
 from thenar.compiler.evaluation.study import Options as Asked
@@ -38,7 +37,7 @@ NASTY = (
 
 @pytest.fixture(scope="session")
 def hand() -> HandShape:
-    shape = hand_of(hand_map().names)
+    shape = hand_map().fitted(hand_map().names)
     assert shape is not None
     return shape
 

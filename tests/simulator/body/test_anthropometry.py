@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.body.anthropometry import BASES, DIGITS, RADII, SEGMENTS, Size
+from thenar.simulator.body.hand import BASES, DIGITS, RADII, SEGMENTS, Size
 
 SIZES = st.builds(Size, length_mm=st.floats(150.0, 230.0), breadth_mm=st.floats(65.0, 105.0))
 # Buchholz, Armstrong and Goldstein 1992, Table 2: segments over hand length, proximal to distal.

@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from thenar.simulator.body.anthropometry import FAN_DEG
 from thenar.simulator.body.cyberglove import (
     GAINS,
     SENSORS,
@@ -17,7 +16,7 @@ from thenar.simulator.body.cyberglove import (
     raw_joints,
     sensors_deg,
 )
-from thenar.simulator.body.hand import DOF, LIMITS_DEG
+from thenar.simulator.body.hand import DOF, FAN_DEG, LIMITS_DEG
 
 GAIN_SPREAD, ZERO_SPREAD = 0.12, 8.0
 SUBJECTS = [f"subject {number}" for number in range(40)]

@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from thenar.simulator.body.anthropometry import Size
-from thenar.simulator.body.hand import CAPSULES, DOF, LIMITS_DEG, Hand
+from thenar.simulator.body.hand import CAPSULES, DOF, LIMITS_DEG, Hand, Size
 
 HAND = Hand(Size(185.0, 83.0))
 SIZES = st.builds(Size, length_mm=st.floats(150.0, 230.0), breadth_mm=st.floats(65.0, 105.0))

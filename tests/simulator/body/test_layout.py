@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.body.anthropometry import Size
-from thenar.simulator.body.hand import CAPSULES, DOF, Hand
+from thenar.simulator.body.hand import CAPSULES, DOF, Hand, Size
 from thenar.simulator.body.layout import STANDS_OUT_MM, Switches, murakami160
 
 LAYOUT = murakami160()

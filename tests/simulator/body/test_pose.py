@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from thenar.simulator.body.pose import Pose, rotation, rotation_vector
-from thenar.simulator.body.shapes import Box, Sphere
+from thenar.simulator.body.shapes import Box, Pose, Sphere, rotation, rotation_vector
 
 AXES = arrays(np.float64, 3, elements=st.floats(-1.0, 1.0)).filter(lambda v: np.linalg.norm(v) > 0.1)
 # Everything from nothing to half a turn, and closely by both.

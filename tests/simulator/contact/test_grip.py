@@ -8,12 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from thenar.simulator.body.anthropometry import Size
 from thenar.simulator.body.condition import Condition, Held, Pad, Thing
-from thenar.simulator.body.hand import DOF, LIMITS_DEG, Hand
-from thenar.simulator.body.pose import Pose
-from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
-from thenar.simulator.contact.grip import STIFFNESS, torques
+from thenar.simulator.body.hand import DOF, LIMITS_DEG, Hand, Size
+from thenar.simulator.body.shapes import Box, Cylinder, Pose, Shape, Sphere
+from thenar.simulator.contact.model import STIFFNESS, torques
 
 HAND = Hand(Size(185.0, 83.0))
 POSE = np.array([90.0, 5.0, -40.0, 0.2, -0.1, 0.7])

@@ -6,10 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from thenar.simulator.body.anthropometry import Size
-from thenar.simulator.body.hand import CAPSULES, Hand
+from thenar.simulator.body.hand import CAPSULES, Hand, Size
 from thenar.simulator.body.layout import Switches, murakami160
-from thenar.simulator.contact.split import split
+from thenar.simulator.contact.model import split
 
 SWITCHES = Switches(Hand(Size(185.0, 83.0)), murakami160())
 N_SWITCHES = len(SWITCHES.capsules)

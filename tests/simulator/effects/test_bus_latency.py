@@ -5,7 +5,7 @@ import pytest
 
 from thenar.simulator.effects.bus_latency import Parameters, prepare
 from thenar.simulator.errors import SceneError
-from thenar.simulator.pipeline.frames import frame_times, hold_frame
+from thenar.simulator.pipeline.effect import frame_times, hold_frame
 
 
 @pytest.fixture

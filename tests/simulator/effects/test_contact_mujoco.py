@@ -15,14 +15,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from thenar.simulator.body.anthropometry import Size
 from thenar.simulator.body.condition import Condition, Held, Pad, Thing
-from thenar.simulator.body.hand import CAPSULES, DOF, LIMITS_DEG, Hand
+from thenar.simulator.body.hand import CAPSULES, DOF, LIMITS_DEG, Hand, Size
 from thenar.simulator.body.layout import murakami160
-from thenar.simulator.body.pose import Pose
-from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
-from thenar.simulator.contact.grip import GRAVITY, STIFFNESS, torques
-from thenar.simulator.contact.model import Contact, Load
+from thenar.simulator.body.shapes import Box, Cylinder, Pose, Shape, Sphere
+from thenar.simulator.contact.model import GRAVITY, STIFFNESS, Contact, Load, torques
 from thenar.simulator.contact.mujoco import Dynamics, MujocoContact, build
 from thenar.simulator.effects.contact_mujoco import Parameters, model
 from thenar.simulator.pipeline.effect import Setting

@@ -9,13 +9,13 @@ import pytest
 
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.layout import murakami160
-from thenar.simulator.body.pose import Pose
+from thenar.simulator.body.shapes import Pose
 from thenar.simulator.contact.model import Contact, ContactModel, Load
 from thenar.simulator.effects.contact_quasistatic import MEMBER, Parameters, model
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import Setting
 from thenar.simulator.planning.postures import Postures
-from thenar.simulator.running.session import sessions
+from thenar.simulator.running.simulation import sessions
 from thenar.simulator.scenes.decode import load_scene
 
 FIELDS = ("posture_deg", "pose", "forces_n", "capsules_n", "between_n", "settled", "residual_n", "residual_nmm")

@@ -6,8 +6,7 @@ import pytest
 
 from thenar.simulator.effects.frame_jitter import Parameters, prepare
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import Setting
-from thenar.simulator.pipeline.frames import frame_times, hold_frame
+from thenar.simulator.pipeline.effect import Setting, frame_times, hold_frame
 
 MakeBatch = Callable[..., Batch]
 

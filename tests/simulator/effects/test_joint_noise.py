@@ -7,8 +7,7 @@ import pytest
 
 from thenar.simulator.effects.joint_noise import MEMBER, Parameters, prepare
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.effect import Setting
-from thenar.simulator.pipeline.frames import frame_times, hold_frame
+from thenar.simulator.pipeline.effect import Setting, frame_times, hold_frame
 from thenar.simulator.streams import Draw
 
 Noise = Callable[..., np.ndarray]

@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from thenar.simulator.effects import port_dead, switch_stuck_closed, switch_stuck_open
 from thenar.simulator.effects.switch_ghosting import Parameters, joined, prepare
-from thenar.simulator.pipeline.ledger import Ledger
-from thenar.simulator.running.pipeline import compile_pipeline
+from thenar.simulator.running.pipeline import Ledger, compile_pipeline
 from thenar.simulator.scenes.scene import Glove
 
 

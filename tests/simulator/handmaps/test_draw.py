@@ -5,13 +5,12 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from thenar.compiler.hand import MapError
 from thenar.compiler.pictures import PictureError, painting
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.taxonomy import KAMAKURA_14, own
-from thenar.simulator.handmaps.draw import draw
-from thenar.simulator.handmaps.handmap import MapError, hand_map
-from thenar.simulator.handmaps.handpaint import colour
-from thenar.simulator.handmaps.handpanels import Dot, Panel, Picture, all_switches, contacts, kept
+from thenar.simulator.handmaps.draw import Dot, Panel, Picture, all_switches, colour, contacts, draw, kept
+from thenar.simulator.handmaps.handmap import hand_map
 
 NAMES = hand_map().names
 SVG = "{http://www.w3.org/2000/svg}"

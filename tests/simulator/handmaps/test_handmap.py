@@ -4,18 +4,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from thenar.compiler.hand import HandShape, MapError
 from thenar.drivers.errors import ThenarError
 from thenar.simulator.body.layout import Switches, murakami160
-from thenar.simulator.handmaps.flathand import HAND, rays
-from thenar.simulator.handmaps.handlines import smooth
-from thenar.simulator.handmaps.handmap import PARTS, RADIUS_MM, HandMap, MapError, hand_map
+from thenar.simulator.handmaps.handmap import HAND, PARTS, RADIUS_MM, hand_map, rays, smooth
 
 Floats = NDArray[np.float64]
 DIGITS = range(5)
 
 
 @pytest.fixture(scope="module")
-def glove() -> HandMap:
+def glove() -> HandShape:
     return hand_map()
 
 
@@ -47,7 +46,7 @@ def on_the_hand() -> Floats:
     return Switches(HAND, murakami160()).tops(HAND.skeleton(np.zeros((20, 1))))[:, :, 0]
 
 
-def test_every_switch_of_the_layout_has_one_place_in_its_order(glove: HandMap) -> None:
+def test_every_switch_of_the_layout_has_one_place_in_its_order(glove: HandShape) -> None:
     assert glove.names == tuple(patch.name for patch in murakami160())
     assert glove.places.shape == (160, 2)
     assert np.isfinite(glove.places).all()
@@ -55,12 +54,12 @@ def test_every_switch_of_the_layout_has_one_place_in_its_order(glove: HandMap) -
     assert [PARTS[part] for part in glove.parts] == [name.split("_")[0] for name in glove.names]
 
 
-def test_no_two_switches_overlap(glove: HandMap) -> None:
+def test_no_two_switches_overlap(glove: HandShape) -> None:
     assert distances(glove.places).min() > 2 * RADIUS_MM
 
 
 @pytest.mark.parametrize("digit", DIGITS)
-def test_the_whole_circle_of_a_pad_lies_inside_its_digit_or_the_palm_below_it(glove: HandMap, digit: int) -> None:
+def test_the_whole_circle_of_a_pad_lies_inside_its_digit_or_the_palm_below_it(glove: HandShape, digit: int) -> None:
     mine = np.flatnonzero((glove.parts == digit) & (glove.sides == 0))
     assert len(mine) == [20, 16, 16, 16, 16][digit]
     ray = rays()[digit]
@@ -73,7 +72,7 @@ def test_the_whole_circle_of_a_pad_lies_inside_its_digit_or_the_palm_below_it(gl
 
 @pytest.mark.parametrize("digit", DIGITS)
 @pytest.mark.parametrize("side", [-1, 1])
-def test_the_whole_circle_of_a_side_lies_on_its_strip_outside_the_skin(glove: HandMap, digit: int, side: int) -> None:
+def test_the_whole_circle_of_a_side_lies_on_its_strip_outside_the_skin(glove: HandShape, digit: int, side: int) -> None:
     mine = glove.places[(glove.parts == digit) & (glove.sides == side)]
     assert len(mine) == (5 if digit else {-1: 2, 1: 4}[side])
     strip = glove.strips[2 * digit + (side + 1) // 2]
@@ -83,19 +82,19 @@ def test_the_whole_circle_of_a_side_lies_on_its_strip_outside_the_skin(glove: Ha
     assert not inside(strip, glove.outline).any()
 
 
-def test_no_strip_covers_another(glove: HandMap) -> None:
+def test_no_strip_covers_another(glove: HandShape) -> None:
     for number, strip in enumerate(glove.strips):
         for other in glove.strips[:number] + glove.strips[number + 1 :]:
             assert not inside(strip, other).any()
 
 
-def test_the_palms_switches_lie_in_the_palm(glove: HandMap) -> None:
+def test_the_palms_switches_lie_in_the_palm(glove: HandShape) -> None:
     palm = glove.places[glove.parts == 5]
     assert inside(np.concatenate(list(map(rim, palm))), glove.outline).all()
     assert not any(inside(palm, digit).any() for digit in glove.digits)
 
 
-def test_it_is_a_right_hand_seen_from_its_palm(glove: HandMap) -> None:
+def test_it_is_a_right_hand_seen_from_its_palm(glove: HandShape) -> None:
     thumb, index, middle, ring, little = (glove.places[glove.parts == digit].mean(axis=0) for digit in DIGITS)
     assert little[0] < ring[0] < middle[0] < index[0] < thumb[0]
     assert thumb[1] < little[1] < middle[1]
@@ -106,7 +105,7 @@ def test_it_is_a_right_hand_seen_from_its_palm(glove: HandMap) -> None:
 
 @pytest.mark.parametrize("finger", PARTS[1:5])
 @pytest.mark.parametrize("segment", ["proximal", "middle", "distal"])
-def test_radial_sides_lie_on_the_thumbs_side_of_their_finger(glove: HandMap, finger: str, segment: str) -> None:
+def test_radial_sides_lie_on_the_thumbs_side_of_their_finger(glove: HandShape, finger: str, segment: str) -> None:
     mine = np.array([name.startswith(f"{finger}_{segment}_") for name in glove.names])
     radial, left_to_right = on_the_hand()[:, 1], glove.places[:, 0]
     left, right = mine & (glove.sides == -1), mine & (glove.sides == 1)
@@ -115,7 +114,7 @@ def test_radial_sides_lie_on_the_thumbs_side_of_their_finger(glove: HandMap, fin
 
 
 @pytest.mark.parametrize("digit", DIGITS)
-def test_around_a_digit_is_left_to_right_on_paper(glove: HandMap, digit: int) -> None:
+def test_around_a_digit_is_left_to_right_on_paper(glove: HandShape, digit: int) -> None:
     ray = rays()[digit]
     across = (glove.places - ray.base) @ [ray.ahead[1], -ray.ahead[0]]
     for capsule in range(3 * digit, 3 * digit + 3):
@@ -127,19 +126,19 @@ def test_around_a_digit_is_left_to_right_on_paper(glove: HandMap, digit: int) ->
         assert np.corrcoef(np.array([murakami160()[n].around_deg for n in pads]), across[pads])[0, 1] > 0.99
 
 
-def test_what_is_near_on_the_hand_is_near_on_paper(glove: HandMap) -> None:
+def test_what_is_near_on_the_hand_is_near_on_paper(glove: HandShape) -> None:
     hand, paper = distances(on_the_hand()), distances(glove.places)
     assert np.corrcoef(hand, paper)[0, 1] > 0.9
 
 
 @pytest.mark.parametrize("part", range(6))
-def test_neighbours_within_a_part_stay_neighbours(glove: HandMap, part: int) -> None:
+def test_neighbours_within_a_part_stay_neighbours(glove: HandShape, part: int) -> None:
     mine = (glove.parts == part) & (glove.sides == 0)
     hand, paper = distances(on_the_hand()[mine]), distances(glove.places[mine])
     assert np.corrcoef(hand, paper)[0, 1] > 0.9
 
 
-def test_segments_follow_each_other_up_a_finger(glove: HandMap) -> None:
+def test_segments_follow_each_other_up_a_finger(glove: HandShape) -> None:
     for digit, ray in zip(PARTS[:5], rays(), strict=True):
         numbers = [number for number, name in enumerate(glove.names) if name.startswith(f"{digit}_")]
         along = (glove.places[numbers] - ray.base) @ ray.ahead
@@ -148,7 +147,7 @@ def test_segments_follow_each_other_up_a_finger(glove: HandMap) -> None:
         assert all(low.max() < high.min() for low, high in pairwise(order))
 
 
-def test_labels_stand_outside_the_hand(glove: HandMap) -> None:
+def test_labels_stand_outside_the_hand(glove: HandShape) -> None:
     assert not inside(glove.labels, glove.outline).any()
 
 
@@ -161,12 +160,12 @@ def test_a_soft_curve_goes_through_its_points_and_a_straight_one_stays_straight(
     assert (np.diff(line[:, 0]) > 0).all()
 
 
-def test_names_are_found_in_any_order(glove: HandMap) -> None:
+def test_names_are_found_in_any_order(glove: HandShape) -> None:
     assert glove.numbers_of(["palm_heel_6", "thumb_metacarpal_1"]).tolist() == [159, 0]
     assert glove.numbers_of([]).tolist() == []
 
 
-def test_the_first_strange_name_is_told_with_the_nearest(glove: HandMap) -> None:
+def test_the_first_strange_name_is_told_with_the_nearest(glove: HandShape) -> None:
     with pytest.raises(
         MapError, match=r"'index_distl_1' is no switch of the glove murakami160 \(did you mean 'index_d"
     ):

@@ -6,8 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.pipeline.effect import Setting
-from thenar.simulator.pipeline.frames import at_a_time, drawn_rows, frame_times, hold_frame
+from thenar.simulator.pipeline.effect import Setting, at_a_time, drawn_rows, frame_times, hold_frame
 
 PERIODS = st.integers(1_000, 30_000)
 TIMES = st.integers(0, 200_000)

@@ -11,8 +11,7 @@ from hypothesis.extra.numpy import arrays
 from thenar.simulator.body.cyberglove import Calibration, sensors_deg
 from thenar.simulator.pipeline import glove
 from thenar.simulator.pipeline.batch import NEVER, Batch
-from thenar.simulator.pipeline.effect import Setting
-from thenar.simulator.pipeline.frames import frame_times
+from thenar.simulator.pipeline.effect import Setting, frame_times
 from thenar.simulator.streams import Draw
 
 BatchMaker = Callable[..., Batch]

@@ -9,12 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from thenar.simulator.body.anthropometry import Size
-from thenar.simulator.body.hand import Hand
-from thenar.simulator.body.pose import Pose
-from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
-from thenar.simulator.planning.misfit import Misfit, object_start, shares, wrenches
-from thenar.simulator.planning.plan_scene import shipped_prehensions
+from thenar.simulator.body.hand import Hand, Size
+from thenar.simulator.body.shapes import Box, Cylinder, Pose, Shape, Sphere
+from thenar.simulator.planning.plan import shipped_prehensions
+from thenar.simulator.planning.planner import Misfit, object_start, shares, wrenches
 from thenar.simulator.planning.prehension import Prehension
 
 HAND = Hand(Size(188.0, 84.0))

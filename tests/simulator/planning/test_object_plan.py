@@ -8,11 +8,9 @@ import pytest
 
 from thenar.simulator.body.condition import Held, Thing
 from thenar.simulator.body.hand import LIMITS_DEG, Hand
-from thenar.simulator.body.pose import Pose
-from thenar.simulator.body.shapes import Shape, Sphere
+from thenar.simulator.body.shapes import Pose, Shape, Sphere
 from thenar.simulator.errors import PlanError
-from thenar.simulator.planning.object_plan import Planned, Work, average_hand, entry_of, plan_object
-from thenar.simulator.planning.plan_scene import shipped_prehensions
+from thenar.simulator.planning.plan import Planned, Work, average_hand, entry_of, plan_object, shipped_prehensions
 from thenar.simulator.planning.planner import Plan
 from thenar.simulator.planning.postures import Entry, Postures
 from thenar.simulator.planning.prehension import pad_sphere

@@ -10,13 +10,10 @@ from scipy.optimize import least_squares
 
 from thenar.simulator.body.condition import Thing
 from thenar.simulator.body.hand import LIMITS_DEG
-from thenar.simulator.body.pose import rotation
-from thenar.simulator.body.shapes import Shape, Sphere
+from thenar.simulator.body.shapes import Shape, Sphere, rotation
 from thenar.simulator.errors import PlanError, SceneError
-from thenar.simulator.planning.misfit import Misfit
-from thenar.simulator.planning.object_plan import Work, average_hand, plan_object
-from thenar.simulator.planning.plan_scene import plan_scene, shipped_prehensions
-from thenar.simulator.planning.planner import _start_near
+from thenar.simulator.planning.plan import Work, average_hand, plan_object, plan_scene, shipped_prehensions
+from thenar.simulator.planning.planner import Misfit, _start_near
 from thenar.simulator.planning.postures import Entry, Postures
 from thenar.simulator.scenes.decode import load_scene
 from thenar.simulator.scenes.scene import Scene, SceneObject, Subject

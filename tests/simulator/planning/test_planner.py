@@ -4,12 +4,11 @@ import msgspec
 import numpy as np
 import pytest
 
-from thenar.simulator.body.anthropometry import Size
 from thenar.simulator.body.condition import Thing
-from thenar.simulator.body.hand import LIMITS_DEG, Hand
+from thenar.simulator.body.hand import LIMITS_DEG, Hand, Size
 from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
 from thenar.simulator.errors import PlanError
-from thenar.simulator.planning.plan_scene import shipped_prehensions
+from thenar.simulator.planning.plan import shipped_prehensions
 from thenar.simulator.planning.planner import BORNE, TOLERANCE_MM, Plan, measure, plan
 from thenar.simulator.planning.prehension import pad_sphere
 

@@ -11,11 +11,10 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from thenar.simulator.body.anthropometry import Size
 from thenar.simulator.body.condition import Held, Thing
-from thenar.simulator.body.hand import Hand
-from thenar.simulator.body.pose import rotation
-from thenar.simulator.contact.grip import GRAVITY
+from thenar.simulator.body.hand import Hand, Size
+from thenar.simulator.body.shapes import rotation
+from thenar.simulator.contact.model import GRAVITY
 from thenar.simulator.errors import SceneError
 from thenar.simulator.planning.postures import FRICTION, Entry, Postures
 from thenar.simulator.scenes.scene import Scene

@@ -8,10 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.recordings.taxonomy import published
-from thenar.simulator.body.anthropometry import Size
-from thenar.simulator.body.hand import CAPSULES, LIMITS_DEG, Hand
+from thenar.simulator.body.hand import CAPSULES, LIMITS_DEG, Hand, Size
 from thenar.simulator.errors import SceneError
-from thenar.simulator.planning.plan_scene import shipped_prehensions
+from thenar.simulator.planning.plan import shipped_prehensions
 from thenar.simulator.planning.prehension import load_prehensions, pad_side, pad_sphere
 
 HAND = Hand(Size(188.0, 84.0))

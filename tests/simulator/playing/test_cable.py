@@ -2,7 +2,7 @@ import msgspec
 import pytest
 
 from thenar.simulator import load_scene
-from thenar.simulator.playing.cable import cable_of
+from thenar.simulator.playing.bench import cable_of
 from thenar.simulator.scenes.scene import Scene
 
 MESSAGE = bytes(range(256)) * 400

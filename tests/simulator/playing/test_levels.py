@@ -2,7 +2,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.runtime.harness.wiring import ChipWiring
-from thenar.simulator.playing.levels import levels_of
+from thenar.simulator.playing.bench import levels_of
 
 NAMES = ("a", "b", "c")
 

@@ -4,8 +4,7 @@ from threading import Event
 import numpy as np
 
 from thenar.drivers.calibration import GloveCalibration
-from thenar.simulator.playing.performance import Performance
-from thenar.simulator.playing.player import Player
+from thenar.simulator.playing.performance import Performance, Player
 
 
 def performance(frames: int, period_us: int) -> Performance:

@@ -9,8 +9,7 @@ from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.session import Label, Session
 from thenar.runtime.recording.writer import Recorder
 from thenar.simulator.errors import SceneError
-from thenar.simulator.playing.performance import resting, typical
-from thenar.simulator.playing.recorded import of_recording
+from thenar.simulator.playing.performance import of_recording, resting, typical
 
 NAMES = ("a", "b", "c")
 

@@ -11,8 +11,7 @@ from thenar.simulator.body.condition import Condition
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import EFFECTS, STAGES
-from thenar.simulator.pipeline.ledger import Ledger
-from thenar.simulator.running.pipeline import compile_pipeline
+from thenar.simulator.running.pipeline import Ledger, compile_pipeline
 from thenar.simulator.scenes.scene import Scene
 
 NAMES = tuple(EFFECTS)

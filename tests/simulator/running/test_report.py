@@ -3,10 +3,8 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from thenar.simulator.pipeline.ledger import Ledger
-from thenar.simulator.running.notes import Notes, Unsettled
-from thenar.simulator.running.report import Count, GraspReport, grasp_reports, step_reports
-from thenar.simulator.running.rows import Rows
+from thenar.simulator.running.pipeline import Ledger
+from thenar.simulator.running.report import Count, GraspReport, Notes, Rows, Unsettled, grasp_reports, step_reports
 from thenar.simulator.streams import Draws
 
 ONE = Unsettled("A", "Tip", "pin", 3, 17, "the hand did not come to rest")

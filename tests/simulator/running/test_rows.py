@@ -12,7 +12,7 @@ from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.cyberglove import common_joints
 from thenar.simulator.body.layout import murakami160
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.running.rows import Codes, Rows, grasp_set, joined, rows_of
+from thenar.simulator.running.report import Codes, Rows, grasp_set, joined, rows_of
 
 SWITCHES = tuple(patch.name for patch in murakami160())
 FRAMES, HELD = 4, 2

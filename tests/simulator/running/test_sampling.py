@@ -2,7 +2,7 @@ import msgspec
 import pytest
 
 from thenar.simulator.errors import SceneError
-from thenar.simulator.running.sampling import best_us, middle_session, sample
+from thenar.simulator.running.explain import best_us, middle_session, sample
 from thenar.simulator.scenes.decode import load_scene
 
 QUICK = load_scene("quick")

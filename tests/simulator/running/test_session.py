@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from thenar.simulator.errors import SceneError
 from thenar.simulator.planning.postures import Postures
-from thenar.simulator.running.session import Session, sessions
+from thenar.simulator.running.simulation import Session, sessions
 from thenar.simulator.scenes.decode import load_scene
 from thenar.simulator.scenes.scene import Scene
 from thenar.simulator.streams import Draw, Draws, Site

@@ -11,13 +11,11 @@ from thenar.simulator import load_scene, simulate
 from thenar.simulator.effects.contact_quasistatic import Parameters
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.effect import EFFECTS
-from thenar.simulator.pipeline.ledger import Ledger
 from thenar.simulator.planning.postures import Postures
 from thenar.simulator.running.explain import explain
-from thenar.simulator.running.pipeline import compile_pipeline
+from thenar.simulator.running.pipeline import Ledger, compile_pipeline
 from thenar.simulator.running.report import Report
-from thenar.simulator.running.session import sessions
-from thenar.simulator.running.simulation import Simulated
+from thenar.simulator.running.simulation import Simulated, sessions
 from thenar.simulator.scenes.scene import Listed, Scene
 
 

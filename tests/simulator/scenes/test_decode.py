@@ -5,10 +5,8 @@ import pytest
 
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.effect import EFFECTS
-from thenar.simulator.scenes.catalogue import load_catalogue
-from thenar.simulator.scenes.decode import load_scene
-from thenar.simulator.scenes.population import Population, draw_subjects
-from thenar.simulator.scenes.scene import Glove, Recording, Scene, Subject
+from thenar.simulator.scenes.decode import load_catalogue, load_scene
+from thenar.simulator.scenes.scene import Glove, Population, Recording, Scene, Subject, draw_subjects
 
 NAMES = tuple(EFFECTS)
 

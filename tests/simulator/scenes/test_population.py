@@ -3,8 +3,15 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from thenar.simulator.scenes.population import CORRELATION, SURVEYS, Population, Spread, draw_subjects
-from thenar.simulator.scenes.scene import HAND_BREADTHS_MM, HAND_LENGTHS_MM
+from thenar.simulator.scenes.scene import (
+    CORRELATION,
+    HAND_BREADTHS_MM,
+    HAND_LENGTHS_MM,
+    SURVEYS,
+    Population,
+    Spread,
+    draw_subjects,
+)
 
 
 @pytest.mark.parametrize("survey", ["ansur2", "aist2012"])

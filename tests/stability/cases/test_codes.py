@@ -13,15 +13,13 @@ from thenar.cli import run
 from thenar.compiler.boosting.binning import midpoints
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import winners
-from thenar.compiler.recordings.coding import code_joint
 from thenar.compiler.recordings.columns import JointColumns
 from thenar.compiler.recordings.errors import RecordingError, TableError
-from thenar.compiler.recordings.importer import import_file
+from thenar.compiler.recordings.importer import code_joint, import_file
 from thenar.compiler.tables.collapse import HIGHEST_CODE, collapse
 from thenar.compiler.tables.quantise import quantise
 from thenar.runtime.scores import Scorer
-from thenar.stability.cases.codes import EVERY_CODE, hard_codes
-from thenar.stability.inputs.hard_cells import HARD_DOUBLES, NO_BITS, NO_CODES, NO_NUMBERS
+from thenar.stability.cases.codes import EVERY_CODE, HARD_DOUBLES, NO_BITS, NO_CODES, NO_NUMBERS, hard_codes
 
 finite = st.floats(allow_nan=False, allow_infinity=False) | st.sampled_from(HARD_DOUBLES)
 near_the_ends = st.integers(0, HIGHEST_CODE) | st.sampled_from([0, 1, HIGHEST_CODE - 1, HIGHEST_CODE])

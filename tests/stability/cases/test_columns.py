@@ -11,7 +11,7 @@ from thenar.compiler.placement.gain import best_position, compare_scores, gain_b
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.placement.methods.filters import cmim, most_informative
 from thenar.stability.cases.columns import hard_columns, large_tables, small_tables, table_of
-from thenar.stability.inputs.hard_counts import node_of
+from thenar.stability.inputs.hard_data import node_of
 from thenar.stability.inputs.small_sets import parity
 from thenar.stability.reference.information import compare_gains
 

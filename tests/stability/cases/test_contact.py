@@ -13,19 +13,17 @@ from mpmath import mpf
 
 from thenar.simulator.body.hand import CAPSULES
 from thenar.simulator.body.layout import Switches, murakami160
-from thenar.simulator.body.pose import rotation
-from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
-from thenar.simulator.contact.quasistatic import Case, Rest, close
-from thenar.simulator.contact.split import split
+from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere, rotation
+from thenar.simulator.contact.balance import Case
+from thenar.simulator.contact.model import split
+from thenar.simulator.contact.settle import Rest, close
 from thenar.simulator.effects.contact_quasistatic import Parameters
-from thenar.stability.contact.balance import left_of
 from thenar.stability.contact.grasps import HAND, Grasp, case_of, hard, held, planned
 from thenar.stability.contact.halving import kept, shipped
-from thenar.stability.contact.posed import centres, digits, surface
+from thenar.stability.contact.posed import centres, digits, left_of, length, surface
 from thenar.stability.contact.rest import SKIN, is_honest, models
 from thenar.stability.contact.surfaces import MOST_SWITCHES
 from thenar.stability.contact.systems import errors, near_singular
-from thenar.stability.contact.vectors import length
 from thenar.stability.finding import Worst
 from thenar.stability.reference.numbers import exact, precisely
 
@@ -141,7 +139,7 @@ def test_both_models_are_tried_where_mujoco_is_there() -> None:
 WITHOUT_MUJOCO = """
 import sys
 sys.modules["mujoco"] = None
-from thenar.stability.catalogue import load
+from thenar.stability.report import load
 found = list(load("contact").findings(False))
 print(len(found) > 10, *[finding for finding in found if "mujoco" in finding.check or not finding.holds])
 """

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from scipy.stats import entropy
 
 from thenar.compiler.boosting.boost import boost
-from thenar.stability.checks.counted import counted, entropy_left, resting_error
-from thenar.stability.checks.rounds import loss_rounding, moments
+from thenar.stability.checks.rounds import counted, entropy_left, loss_rounding, moments, resting_error
 from thenar.stability.inputs.hard_data import contradictory, imbalanced, noisy, repeated
 
 COUNT = st.integers(1, 9) | st.integers(1, 10**7)

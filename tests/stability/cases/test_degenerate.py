@@ -16,7 +16,7 @@ from thenar.cli import run
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import winners
 from thenar.stability.cases import degenerate
-from thenar.stability.inputs.lopsided import lopsided
+from thenar.stability.cases.statistics import lopsided
 from thenar.stability.inputs.small_sets import parity
 
 SETS = {

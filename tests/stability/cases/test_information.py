@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays
 from thenar.compiler.placement import gain
 from thenar.compiler.placement.cooccurrence import Cooccurrence
 from thenar.stability.cases import information
-from thenar.stability.inputs.hard_counts import bit_set
+from thenar.stability.inputs.hard_data import bit_set
 
 COUNTS = st.integers(0, 30) | st.integers(0, 10**9) | st.sampled_from([10**9 - 1, 10**9])
 TABLES = arrays(np.int64, st.tuples(st.integers(1, 6), st.integers(2, 4)), elements=COUNTS).filter(np.any)

@@ -11,11 +11,9 @@ from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.classifier import LogitBoostClassifier
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.placement.tree import Tree
-from thenar.stability.checks.counted import counted
-from thenar.stability.checks.learnt import learn, numbers
-from thenar.stability.checks.partings import Partings, renumbered
-from thenar.stability.inputs import changes
-from thenar.stability.inputs.changes import Change
+from thenar.stability.cases import invariances as changes
+from thenar.stability.cases.invariances import Change, Partings, learn, numbers, renumbered
+from thenar.stability.checks.rounds import counted
 from thenar.stability.inputs.hard_data import HardSet, intervals
 
 Change_ = Callable[[HardSet, np.random.Generator], Change]

@@ -11,12 +11,11 @@ from thenar.runtime.build import Build, Recognition
 from thenar.runtime.scores import Scorer
 from thenar.runtime.tables import IntegerTables
 from thenar.stability.cases import missing
-from thenar.stability.checks.exact_means import ExactMeans
-from thenar.stability.checks.lost_inputs import changes, every_loss
+from thenar.stability.cases.missing import ExactMeans, changes, every_loss
+from thenar.stability.checks.integer_sums import bare_build
 from thenar.stability.finding import Finding
-from thenar.stability.inputs.bare_build import bare_build
 from thenar.stability.inputs.hard_tables import every_frame, whole_numbers
-from thenar.stability.inputs.small_build import SmallBuild, small_build, small_set
+from thenar.stability.inputs.small_sets import SmallBuild, small_build, small_set
 
 Spoil = Callable[[IntegerTables], IntegerTables]
 

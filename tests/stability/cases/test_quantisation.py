@@ -14,9 +14,8 @@ from thenar.compiler.tables.compare import float_slack
 from thenar.compiler.tables.worstcase import Rounding
 from thenar.runtime.scores import LANE_OFFSET, Scorer
 from thenar.runtime.tables import IntegerTables
-from thenar.stability.checks.exact_frames import BothWays, lost
-from thenar.stability.checks.sum_edges import LAST, edge_tables
-from thenar.stability.checks.ties import first_best
+from thenar.stability.cases.quantisation import LAST, BothWays, edge_tables, lost
+from thenar.stability.checks.integer_sums import first_best
 from thenar.stability.inputs.hard_tables import (
     Quantised,
     dominated,

@@ -12,7 +12,7 @@ from thenar.compiler.tables import collapse, quantise
 from thenar.compiler.tables import quantise as balance
 from thenar.runtime.tables import IntegerTables
 from thenar.stability.cases import scoretables
-from thenar.stability.inputs import hard_ensembles
+from thenar.stability.cases import scoretables as hard_ensembles
 
 SEEDS = st.integers(0, 2**32)
 

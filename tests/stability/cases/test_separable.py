@@ -14,8 +14,8 @@ from thenar.stability.checks.integer_sums import largest_sum
 from thenar.stability.checks.rounds import loss_rounding, moments, rise_rounding
 from thenar.stability.inputs.hard_data import HardSet, intervals, separable, words
 from thenar.stability.inputs.hard_tables import rows_of
-from thenar.stability.reference import ensembles
-from thenar.stability.reference.logistic import mean_loss
+from thenar.stability.reference import boosting as ensembles
+from thenar.stability.reference.boosting import mean_loss
 from thenar.stability.reference.numbers import distance
 
 

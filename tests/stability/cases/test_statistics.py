@@ -6,8 +6,7 @@ from hypothesis import strategies as st
 from thenar.compiler.evaluation.folds import block_folds, leave_one_out, weka_folds
 from thenar.compiler.evaluation.rates import Average, Rate
 from thenar.compiler.evaluation.study import Options, evaluate
-from thenar.stability.cases.statistics import WILSON_BOUND
-from thenar.stability.inputs.lopsided import lopsided
+from thenar.stability.cases.statistics import WILSON_BOUND, lopsided
 from thenar.stability.inputs.small_sets import make_set
 from thenar.stability.reference.intervals import wilson
 from thenar.stability.reference.numbers import distance

@@ -12,8 +12,8 @@ from hypothesis.extra.numpy import arrays
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumpfit import FittedStumps, Targets, fit_stumps
 from thenar.stability.cases import stumpfits
-from thenar.stability.checks import trainings
-from thenar.stability.inputs.hard_stumps import Problem
+from thenar.stability.cases import stumpfits as trainings
+from thenar.stability.cases.stumpfits import Problem
 
 CELLS = st.sampled_from([0.0, 1.0, 1.0 + 2.0**-52, 5.0, -3.0, np.nan])
 WEIGHTS = st.floats(0.0, 1.0) | st.floats(1e-300, 1e-290) | st.sampled_from([0.0, 5e-324, 2.0**-52, 2.0**-38, 1.0])

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import centred
+from thenar.stability.cases.weights import drift, true_sums, worst_share
 from thenar.stability.checks.class_rounds import see_round
-from thenar.stability.checks.drift import drift, true_sums, worst_share
 from thenar.stability.checks.rounds import mean_score, moments
 from thenar.stability.finding import Worst
 from thenar.stability.inputs.hard_data import contradictory, noisy, separable

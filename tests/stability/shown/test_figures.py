@@ -6,10 +6,19 @@ import xml.etree.ElementTree as ET
 import pytest
 
 from thenar.compiler.pictures import painting
-from thenar.stability.shown.axes import BLUE, FONT, curve, exponents, sheet
-from thenar.stability.shown.figures import Measured, figures, measure
-from thenar.stability.shown.pictures import draw_ranges, draw_widths
-from thenar.stability.weka.beside import NotRun
+from thenar.stability.shown.figures import (
+    BLUE,
+    FONT,
+    Measured,
+    curve,
+    draw_ranges,
+    draw_widths,
+    exponents,
+    figures,
+    measure,
+    sheet,
+)
+from thenar.stability.weka import NotRun
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,9 @@ import pytest
 
 from thenar.stability.finding import Case, Finding
 from thenar.stability.report import CaseReport, Check, Report
-from thenar.stability.shown.page import Figure, page
-from thenar.stability.shown.pictures import draw_beside
-from thenar.stability.weka.beside import Beside, Differences, NotRun
+from thenar.stability.shown.figures import draw_beside
+from thenar.stability.shown.page import Picture, page
+from thenar.stability.weka import Beside, Differences, NotRun
 
 VOID = {"meta", "br", "hr", "img", "link"}
 NAMESPACES = {"http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"}
@@ -32,7 +32,7 @@ APART = Differences((1e-16, 0.0, 1.0), 3)
 BESIDE = Beside(
     "3.6.14", 3, 2, 4, 8, 8, 1, APART, APART, Differences((1e-15, 1e-14, 1e-13), None), 2, 193.7, 3.0, 10, 0.0
 )
-FIGURES = tuple(Figure(name, f"Picture {name}.", "How to read <it>.", draw_beside(BESIDE)) for name in ("one", "two"))
+FIGURES = tuple(Picture(name, f"Picture {name}.", "How to read <it>.", draw_beside(BESIDE)) for name in ("one", "two"))
 
 
 class Reader(HTMLParser):
@@ -144,6 +144,6 @@ def test_a_picture_says_what_it_is_to_those_who_cannot_see_it(text: str) -> None
 
 
 def test_the_same_results_give_the_same_bytes_without_a_date(text: str) -> None:
-    again = tuple(Figure(each.name, each.title, each.caption, draw_beside(BESIDE)) for each in FIGURES)
+    again = tuple(Picture(each.name, each.title, each.caption, draw_beside(BESIDE)) for each in FIGURES)
     assert page(REPORT, again) == text
     assert not re.search(r"20\d\d-\d\d|20\d\d", re.sub(r"<svg.*?</svg>", "", text, flags=re.S))

@@ -3,7 +3,7 @@
 import pytest
 
 from thenar.stability.inputs.hard_data import separable
-from thenar.stability.shown.ranges import ranges_of
+from thenar.stability.shown.figures import ranges_of
 
 
 def test_ranges_are_those_of_every_round() -> None:

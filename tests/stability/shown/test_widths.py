@@ -2,7 +2,7 @@ from itertools import pairwise
 
 import pytest
 
-from thenar.stability.shown.widths import Width, widths
+from thenar.stability.shown.figures import Width, widths
 
 
 @pytest.fixture(scope="module")

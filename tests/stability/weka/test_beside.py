@@ -9,18 +9,22 @@ import numpy as np
 import pytest
 
 from thenar.compiler.elementary import softmax
-from thenar.stability.weka import program as module
-from thenar.stability.weka.beside import (
+from thenar.stability import weka as module
+from thenar.stability.weka import (
     CLASSES,
+    EXP_IN_JAVA,
+    EXP_OF_THE_PROCESSOR,
     PARTED,
     ROUNDS,
     ROWS_A_CLASS,
     Beside,
     NotRun,
+    Weka,
+    WekaError,
     beside_weka,
+    read_stumps,
     separable_set,
 )
-from thenar.stability.weka.program import EXP_IN_JAVA, EXP_OF_THE_PROCESSOR, Weka, WekaError, read_stumps
 
 PRINTED = """\
 Iteration 1

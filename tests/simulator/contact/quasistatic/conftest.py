@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from thenar.simulator.body.condition import Condition
-from thenar.simulator.contact.quasistatic import Case, Skin
+from thenar.simulator.contact.balance import Case, Skin
 from thenar.simulator.planning.postures import Postures
-from thenar.simulator.running.session import sessions
+from thenar.simulator.running.simulation import sessions
 from thenar.simulator.scenes.decode import load_scene
 
 SCENES = ("kamakura", "cutkosky")

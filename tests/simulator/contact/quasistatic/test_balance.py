@@ -8,11 +8,18 @@ import pytest
 
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.hand import LIMITS_DEG
-from thenar.simulator.body.pose import Pose
-from thenar.simulator.contact.grip import STIFFNESS
-from thenar.simulator.contact.quasistatic.balance import HOLD_N_PER_MM, HOLD_NMM_PER_RAD, LIMIT_NMM_PER_RAD, Balance
-from thenar.simulator.contact.quasistatic.case import Case, Skin, command
-from thenar.simulator.contact.quasistatic.pace import Pace
+from thenar.simulator.body.shapes import Pose
+from thenar.simulator.contact.balance import (
+    HOLD_N_PER_MM,
+    HOLD_NMM_PER_RAD,
+    LIMIT_NMM_PER_RAD,
+    Balance,
+    Case,
+    Pace,
+    Skin,
+    command,
+)
+from thenar.simulator.contact.model import STIFFNESS
 
 GRASPS = ("PoS", "PoH", "CMF", "PMF", "PE")
 

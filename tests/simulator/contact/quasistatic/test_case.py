@@ -8,10 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.simulator.body.condition import Condition
-from thenar.simulator.body.pose import Pose
-from thenar.simulator.contact.grip import torques
-from thenar.simulator.contact.quasistatic.case import Case, Skin, command
-from thenar.simulator.contact.quasistatic.vectors import turned
+from thenar.simulator.body.shapes import Pose
+from thenar.simulator.contact.balance import Case, Skin, command, turned
+from thenar.simulator.contact.model import torques
 
 SKINS = st.builds(
     Skin,

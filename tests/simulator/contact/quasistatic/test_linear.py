@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.contact.quasistatic.linear import backward, cholesky, forward, solve_arrow
+from thenar.simulator.contact.settle import backward, cholesky, forward, solve_arrow
 
 SEEDS = st.integers(0, 10_000)
 SCALES = st.floats(-3.0, 4.0).map(lambda power: 10.0**power)

@@ -14,13 +14,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from thenar.simulator.body.anthropometry import Size
 from thenar.simulator.body.condition import Condition, Held, Pad, Thing
-from thenar.simulator.body.hand import LIMITS_DEG, Hand
+from thenar.simulator.body.hand import LIMITS_DEG, Hand, Size
 from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
-from thenar.simulator.contact.quasistatic.balance import Balance
-from thenar.simulator.contact.quasistatic.case import Case, Skin, command
-from thenar.simulator.contact.quasistatic.newton import newton_step, stiffness
+from thenar.simulator.contact.balance import Balance, Case, Skin, command
+from thenar.simulator.contact.settle import newton_step, stiffness
 
 HAND = Hand(Size(185.0, 83.0))
 HARD = Skin(press_n_per_mm=3.0, soft_mm=1e-4, drag_n_per_mm=1.5, friction=2.0)

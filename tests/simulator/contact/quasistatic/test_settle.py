@@ -8,9 +8,9 @@ import pytest
 
 from thenar.simulator.body.condition import Condition
 from thenar.simulator.body.shapes import Sphere
-from thenar.simulator.contact.grip import GRAVITY
-from thenar.simulator.contact.quasistatic import USUAL, Case, Pace, Rest, Skin, close
-from thenar.simulator.contact.quasistatic.balance import HOLD_N_PER_MM
+from thenar.simulator.contact.balance import HOLD_N_PER_MM, USUAL, Case, Pace, Skin
+from thenar.simulator.contact.model import GRAVITY
+from thenar.simulator.contact.settle import Rest, close
 
 MOST_STEPS = 40
 Cases = Callable[..., Case]

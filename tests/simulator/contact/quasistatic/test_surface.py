@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.simulator.body.pose import Pose
-from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
-from thenar.simulator.contact.quasistatic.surface import surfaces
+from thenar.simulator.body.shapes import Box, Cylinder, Pose, Shape, Sphere
+from thenar.simulator.contact.balance import surfaces
 
 SHAPES: tuple[Shape, ...] = (Sphere(60.0), Cylinder(30.0, 120.0), Box(80.0, 20.0, 40.0))
 GIVEN = st.lists(st.tuples(st.sampled_from(SHAPES), st.integers(1, 3)), min_size=1, max_size=5)

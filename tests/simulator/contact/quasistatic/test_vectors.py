@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from thenar.simulator.body.pose import rotation
-from thenar.simulator.contact.quasistatic.vectors import contract, cross, dot, length, turn, turned, wrench
+from thenar.simulator.body.shapes import rotation
+from thenar.simulator.contact.balance import contract, cross, dot, length, turn, turned, wrench
 
 NUMBERS = st.floats(-100.0, 100.0)
 MANY = arrays(np.float64, (4, 3, 5), elements=NUMBERS)

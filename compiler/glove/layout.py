@@ -1,0 +1,261 @@
+"""Where the kept switches lie on the hand, at which pin or key their wires end, and the bundles that lead there."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil, hypot
+
+import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
+
+from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
+
+from ..hand import HandShape
+
+# Of the switch EVQPLDA15: its body, and the disc that the hand's skin meets (Murakami et al. on their glove).
+BODY_MM = 4.9
+CONTACT_MM = 3.2
+_SIDES = {-1: "left side", 0: "palm side", 1: "right side"}
+
+
+class PlacedSwitch(Struct, frozen=True):
+    """A switch of the reduced glove: number n is SWn everywhere.
+
+    part is the digit, or "palm"; side, where on it, left and right as drawn: the palm up, the thumb right. x_mm counts
+    to the thumb's side and y_mm to the fingertips on the flat pattern, from the middle of the wrist's crease. All None
+    where nobody knows where the glove's switches lie.
+    """
+
+    number: int
+    name: str
+    part: str | None = None
+    side: str | None = None
+    x_mm: float | None = None
+    y_mm: float | None = None
+
+
+def place_switches(names: Sequence[str], hand: HandShape | None) -> tuple[PlacedSwitch, ...]:
+    """Return the switches called `names`, all of which `hand`, if given, knows; millimetres with one decimal."""
+    if hand is None:
+        return tuple(PlacedSwitch(number, name) for number, name in enumerate(names, start=1))
+    return tuple(
+        PlacedSwitch(
+            number=number,
+            name=name,
+            part=hand.part_names[hand.parts[mine]],
+            side=_SIDES[int(hand.sides[mine])],
+            x_mm=round(float(hand.places[mine, 0]), 1),
+            y_mm=round(float(hand.places[mine, 1]), 1),
+        )
+        for number, (name, mine) in enumerate(zip(names, hand.numbers_of(names), strict=True), start=1)
+    )
+
+
+def crowded(switches: Sequence[PlacedSwitch]) -> list[tuple[int, int, float]]:
+    """Return pairs of switches whose middles are nearer than a switch's body is broad, and how near, mm."""
+    places = np.array([(each.x_mm, each.y_mm) for each in switches if each.x_mm is not None]).reshape(-1, 2)
+    apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
+    first, second = np.nonzero(np.triu(apart < BODY_MM, k=1))
+    return [(int(a) + 1, int(b) + 1, round(float(apart[a, b]), 2)) for a, b in zip(first, second, strict=True)]
+
+
+GROUND, SUPPLY = "GND", "VCC"
+
+
+@dataclass(frozen=True, slots=True)
+class BoardPins:
+    """How a scanner board reaches its keys, as its `board.toml` says: key k is read at the pin signals[k].
+
+    lows[k] is the pin that is driven low to read it, the row of a matrix; "" where the switch goes to ground. With
+    `diodes` there is one to every switch, its cathode towards the row. A board that reads its keys from expanders has
+    their `bus` instead.
+    """
+
+    signals: tuple[str, ...] = ()
+    lows: tuple[str, ...] = ()
+    diodes: bool = False
+    bus: BusWiring | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """What reads switches: an expander at buses[bus].chips[chip] of a harness, or, without `wiring`, a scanner board.
+
+    ref is its designator in the netlist; place, how messages and tables call it.
+    """
+
+    ref: str
+    place: str
+    bus: int = 0
+    wiring: ChipWiring | None = None
+    diodes: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """Where a switch, by its number in the build, ends: pin is a name, pad the number that the netlist gives it.
+
+    other is the net of its other contact: ground, supply, or a row of the board's matrix.
+    """
+
+    switch: int
+    unit: Unit
+    pin: str
+    pad: str
+    other: str
+
+
+def as_soldered(harness: Harness, boards: Sequence[BoardPins | None]) -> Harness:
+    """Return the harness with the buses of its boards as its own, and without the keys that are read through them."""
+    behind = {number: board.bus for number, board in enumerate(boards) if board is not None and board.bus is not None}
+    scanners = tuple(
+        replace(scanner, switches=()) if number in behind else scanner
+        for number, scanner in enumerate(harness.scanners)
+    )
+    return replace(harness, scanners=scanners, buses=(*harness.buses, *behind.values()))
+
+
+def ends_of(harness: Harness, names: Sequence[str], boards: Sequence[BoardPins | None] = ()) -> tuple[End, ...]:
+    """Return the ends of the switches called `names`, in their order; each is wired once in the harness.
+
+    boards[n] says what is known of the pins of scanner n; nothing, where it is None or left out.
+    """
+    numbers = {name: number for number, name in enumerate(names)}
+    found = [*_of_chips(harness, numbers), *_of_boards(harness, numbers, boards)]
+    return tuple(sorted(found, key=lambda end: end.switch))
+
+
+def _of_chips(harness: Harness, numbers: Mapping[str, int]) -> Iterator[End]:
+    used = 0
+    for bus, wiring in enumerate(harness.buses):
+        for chip in wiring.chips:
+            kept = {pin: name for pin, name in chip.pins.items() if name in numbers}
+            if not kept:
+                continue
+            used += 1
+            unit = Unit(f"U{used}", chip.place, bus, chip)
+            other = GROUND if chip.closed == "low" else SUPPLY
+            package = chip.chip.package
+            yield from (End(numbers[name], unit, pin, package.number(pin), other) for pin, name in kept.items())
+
+
+def _of_boards(harness: Harness, numbers: Mapping[str, int], boards: Sequence[BoardPins | None]) -> Iterator[End]:
+    for number, scanner in enumerate(harness.scanners):
+        pins = boards[number] if number < len(boards) else None
+        kept = [(key, numbers[name]) for key, name in enumerate(scanner.switches) if name in numbers]
+        ref = f"A{number + 1}"
+        unit = Unit(ref, f"scanner board at {scanner.port}", diodes=pins is not None and pins.diodes)
+        signals = [f"key {key}" if pins is None else pins.signals[key] for key, _ in kept]
+        pads = {name: str(pad) for pad, name in enumerate(dict.fromkeys(signals), start=1)}
+        for (key, switch), signal in zip(kept, signals, strict=True):
+            low = "" if pins is None else pins.lows[key]
+            yield End(switch, unit, signal, pads[signal], f"{ref}_{low}" if low else GROUND)
+
+
+# The resistor colour code from 1 to 9; black is the return's.
+COLOURS = ("brown", "red", "orange", "yellow", "green", "blue", "violet", "grey", "white")
+_RETURN = "black"
+# Estimates: a wire's way is so much longer than straight, and so much of it is needed at its ends and at each switch.
+_DETOUR, _ENDS_MM, _SPLICE_MM, _STEP_MM = 1.25, 40.0, 10.0, 5
+_LONGEST_HEADER = 40
+
+Place = tuple[float, float]
+
+
+class Wire(Struct, frozen=True):
+    """A wire from switches to the wrist: through pin `pin` of connector `connector` to `net`.
+
+    switches are the numbers of those on it: one where it carries a signal, all that share it where it is a return.
+    unit and input say which pin or key reads it, and are empty for a return. length_mm is an estimate, None where
+    nobody knows the places.
+    """
+
+    bundle: str
+    connector: str
+    pin: int
+    colour: str
+    net: str
+    switches: tuple[int, ...]
+    unit: str
+    input: str
+    length_mm: int | None
+
+
+def wires_of(switches: Sequence[PlacedSwitch], ends: Sequence[End], hand: HandShape | None) -> tuple[Wire, ...]:
+    """Return all wires, bundle by bundle: the signals in the switches' order, then the returns chip by chip.
+
+    A bundle holds a digit's wires; one unit's, where the places are not known.
+    """
+    home = None if hand is None else wrist_of(hand)
+    bundles: dict[str, list[End]] = {}
+    for end in ends:
+        bundles.setdefault(switches[end.switch].part or end.unit.ref, []).append(end)
+    order = list(bundles) if hand is None else [part for part in hand.part_names if part in bundles]
+    made: list[Wire] = []
+    connectors = 0
+    for bundle in order:
+        wires = [*_signals(bundle, bundles[bundle], switches, home), *_returns(bundle, bundles[bundle], switches, home)]
+        for start in range(0, len(wires), _LONGEST_HEADER):
+            connectors += 1
+            made += _connected(wires[start : start + _LONGEST_HEADER], f"J{connectors}")
+    return tuple(made)
+
+
+def wrist_of(hand: HandShape) -> Place:
+    """Return where the chips sit: in the middle of the glove's cuff."""
+    x, y = (hand.outline[0] + hand.outline[-1]) / 2
+    return float(x), float(y)
+
+
+def marked(colour: str, times: int) -> str:
+    """Return a colour's name for its second, third ... use in a bundle."""
+    return colour if not times else f"{colour}, {times} mark{'s' if times > 1 else ''}"
+
+
+def net_of(end: End, switch: PlacedSwitch) -> str:
+    """Return the net of a switch's contact 1: its own, or its column's in a matrix without diodes.
+
+    The stroke keeps it apart from GND and VCC, whatever a switch is called.
+    """
+    shared = end.unit.wiring is None and end.other != GROUND and not end.unit.diodes
+    return f"{end.unit.ref}_{end.pin}" if shared else f"/{switch.name}"
+
+
+def _connected(wires: Sequence[Wire], connector: str) -> Iterator[Wire]:
+    return (replace(wire, connector=connector, pin=pin) for pin, wire in enumerate(wires, start=1))
+
+
+def _signals(bundle: str, ends: Sequence[End], switches: Sequence[PlacedSwitch], home: Place | None) -> Iterator[Wire]:
+    for number, end in enumerate(ends):
+        switch = switches[end.switch]
+        yield Wire(
+            bundle=bundle,
+            connector="",
+            pin=0,
+            colour=marked(COLOURS[number % len(COLOURS)], number // len(COLOURS)),
+            net=net_of(end, switch),
+            switches=(switch.number,),
+            unit=end.unit.ref,
+            input=end.pin,
+            length_mm=_length([switch], home),
+        )
+
+
+def _returns(bundle: str, ends: Sequence[End], switches: Sequence[PlacedSwitch], home: Place | None) -> Iterator[Wire]:
+    shared: dict[tuple[str, str], list[PlacedSwitch]] = {}
+    for end in ends:
+        shared.setdefault((end.unit.ref, end.other), []).append(switches[end.switch])
+    for number, ((_, net), group) in enumerate(shared.items()):
+        colour = marked(_RETURN, number)
+        numbers = tuple(switch.number for switch in group)
+        yield Wire(bundle, "", 0, colour, net, numbers, "", "", _length(group, home))
+
+
+def _length(group: Sequence[PlacedSwitch], home: Place | None) -> int | None:
+    """Return the estimated length of a wire from the wrist through all of `group`, the nearest first; mm."""
+    if home is None:
+        return None
+    stops = [(switch.x_mm or 0.0, switch.y_mm or 0.0) for switch in group]
+    stops.sort(key=lambda stop: (hypot(stop[0] - home[0], stop[1] - home[1]), stop))
+    way = sum(hypot(b[0] - a[0], b[1] - a[1]) for a, b in zip([home, *stops], stops, strict=False))
+    return _STEP_MM * ceil((_DETOUR * way + _ENDS_MM + _SPLICE_MM * (len(stops) - 1)) / _STEP_MM)

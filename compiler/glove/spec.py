@@ -1,0 +1,202 @@
+"""All that a spec says of a reduced glove, decided once: files and tables only write it down."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from thenar.drivers.errors import ThenarError
+from thenar.runtime.errors import HarnessError
+from thenar.runtime.harness.wiring import GloveWiring, Harness
+from thenar.runtime.manifest import Manifest, Recognised
+from thenar.runtime.names import list_names
+from thenar.runtime.scanning.plan import check_harness
+from thenar.runtime.scanning.ports import whole_scan
+from thenar.runtime.scanning.propose import propose_harness
+from thenar.runtime.scanning.scanmap import ScanMap
+from thenar.runtime.scanning.timing import glove_us, scan_us, scanner_us
+
+from ..hand import HandShape
+from .circuit import BillLine, Circuit, bill_of, glove_circuit
+from .layout import (
+    BODY_MM,
+    BoardPins,
+    End,
+    PlacedSwitch,
+    Wire,
+    as_soldered,
+    crowded,
+    ends_of,
+    place_switches,
+    wires_of,
+)
+from .pattern import Pattern, pattern_of
+
+
+class SpecError(ThenarError, ValueError):
+    """There is no glove to describe, or not with this wiring."""
+
+
+_SENSORS = 18
+
+
+class Expected(Struct, frozen=True):
+    """Times by the wire's arithmetic, microseconds: what the computer adds to every transaction is not in them.
+
+    scan_us      of all kept switches on expanders, in `transactions` transactions, selections of muxes included
+    full_us      of all switches that are wired to expanders, kept or not
+    boards_us    of a full bitmap of each scanner board
+    glove_us     between records of the CyberGlove; None where the build looks at no joint
+    rates        the recognition that was measured when the build was compiled
+    """
+
+    transactions: int
+    scan_us: float
+    full_us: float
+    boards_us: tuple[float, ...]
+    glove_us: float | None
+    rates: tuple[Recognised, ...]
+
+
+def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> Expected:
+    """Return what to expect of a build's switches in a harness, read whole by `scan`."""
+    time = scan_us(scan, harness)
+    glove = harness.cyberglove if manifest.joints else None
+    return Expected(
+        transactions=len(scan.ports) + time.selects,
+        scan_us=time.us,
+        full_us=time.full_us,
+        boards_us=tuple(
+            scanner_us(board) for board, pairs in zip(harness.scanners, scan.scanners, strict=True) if pairs
+        ),
+        glove_us=None if glove is None else glove_us(glove, glove.sensors or _SENSORS),
+        rates=manifest.rates,
+    )
+
+
+_GLOVE_PORT = "/dev/ttyUSB0"
+
+
+class SwitchReader(Struct, frozen=True):
+    """What reads switches, by its designator: an expander or a board, and the numbers of the switches on its pins."""
+
+    ref: str
+    place: str
+    pins: tuple[str, ...]
+    switches: tuple[int, ...]
+
+
+class SpecSummary(Struct, frozen=True):
+    """A spec as values: what `spec.json` holds. `remarks` are sentences for whoever builds the glove."""
+
+    glove: str
+    proposed: bool
+    hand_length_mm: float | None
+    print_on: str
+    switches: tuple[PlacedSwitch, ...]
+    readers: tuple[SwitchReader, ...]
+    wires: tuple[Wire, ...]
+    materials: tuple[BillLine, ...]
+    expected: Expected
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GloveSpec:
+    """A reduced glove: its summary, and what is drawn, connected and loaded. No pattern: nobody knows the places."""
+
+    summary: SpecSummary
+    harness: Harness
+    scan: ScanMap
+    circuit: Circuit
+    pattern: Pattern | None
+
+
+def glove_spec(
+    manifest: Manifest,
+    scan: ScanMap | None = None,
+    harness: Harness | None = None,
+    hand: HandShape | None = None,
+    boards: Sequence[BoardPins | None] = (),
+) -> GloveSpec:
+    """Return the spec of a build's glove, wired as `harness` says; without one, as one is proposed for it.
+
+    scan is the build's scan map, where it has one; hand, the hand that knows its switches. boards[n], where given, says
+    what its keys are wired to. Raises SpecError if the build keeps no switch, or has a scan map and no
+    harness is given; HarnessError if the harness lacks a kept switch, or is not the scan map's.
+    """
+    names = [switch.name for switch in manifest.switches]
+    if not names:
+        raise SpecError("the build keeps no switch, so there is no glove to build: compile it with --inputs both")
+    wired = _harness(manifest, scan, harness, names)
+    read = whole_scan(wired, names) if scan is None else scan
+    known = hand if hand is not None and hand.knows(names) else None
+    switches = place_switches(names, known)
+    soldered = as_soldered(wired, boards)
+    ends = ends_of(soldered, names, boards)
+    wires = wires_of(switches, ends, known)
+    circuit = glove_circuit(switches, ends, wires, soldered)
+    title = f"{wired.name}: {len(names)} switches, right hand of {known.length_mm:g} mm" if known else ""
+    pattern = None if known is None else pattern_of(switches, known, title)
+    summary = SpecSummary(
+        glove=wired.name,
+        proposed=harness is None,
+        hand_length_mm=None if known is None else known.length_mm,
+        print_on="" if pattern is None else pattern.page.hint,
+        switches=switches,
+        readers=_readers(ends),
+        wires=wires,
+        materials=bill_of(circuit, wires),
+        expected=expected_of(manifest, read, wired),
+        remarks=tuple(_remarks(switches)),
+    )
+    return GloveSpec(summary, wired, read, circuit, pattern)
+
+
+def _harness(manifest: Manifest, scan: ScanMap | None, harness: Harness | None, names: Sequence[str]) -> Harness:
+    if harness is None:
+        if scan is not None:
+            raise SpecError("the build was compiled for a wiring of its own: name its glove.toml with --glove")
+        glove = GloveWiring(port=_GLOVE_PORT) if manifest.joints else None
+        return propose_harness(names, cyberglove=glove)
+    if scan is not None:
+        check_harness(scan, harness, names)
+    wired = set(harness.switches)
+    if lacking := [name for name in names if name not in wired]:
+        raise HarnessError(
+            f"harness {harness.name!r} has no pin or key for {list_names(lacking)}, which the build keeps: "
+            "add what is missing to its file"
+        )
+    return _portable(harness)
+
+
+def _portable(harness: Harness) -> Harness:
+    """Return the harness with the name alone of its calibration: the file belongs beside the spec's glove.toml."""
+    glove = harness.cyberglove
+    if glove is None or glove.calibration is None:
+        return harness
+    name = glove.calibration.replace("\\", "/").rsplit("/", 1)[-1]
+    return replace(harness, cyberglove=replace(glove, calibration=name or None))
+
+
+def _readers(ends: Sequence[End]) -> tuple[SwitchReader, ...]:
+    groups: dict[str, list[End]] = {}
+    for end in ends:
+        groups.setdefault(end.unit.ref, []).append(end)
+    return tuple(
+        SwitchReader(ref, group[0].unit.place, tuple(end.pin for end in group), tuple(end.switch + 1 for end in group))
+        for ref, group in sorted(groups.items(), key=lambda item: (item[0][0], int(item[0][1:])))
+    )
+
+
+def _remarks(switches: Sequence[PlacedSwitch]) -> list[str]:
+    remarks = [
+        f"SW{first} and SW{second} are {apart} mm apart and their bodies {BODY_MM} mm broad: move one of them aside"
+        for first, second, apart in crowded(switches)
+    ]
+    if switches[0].x_mm is None:
+        remarks.append(
+            "nobody knows where this glove's switches lie: there is no pattern to cut, and lengths of wire are left out"
+        )
+    return remarks

@@ -1,0 +1,335 @@
+"""Hand and object at one guess of rest: what hands are told, where their skin touches, and all forces.
+
+Unknown are 20 joint angles and the object's 6 degrees of freedom. Every joint is a spring about its commanded angle,
+with the torque that presses the pads (model.py). Skin is a set of spheres, each a spring where it sinks into the
+object, with friction that sticks: a second spring, sideways, from the point of skin to the point of the object that
+first touched; it is let go beyond the Coulomb limit (settle.py says when, and how far beyond it skin may be at rest).
+The object bears its weight and what the skin does to it; a soft spring to where it was put keeps what nothing else
+holds, and whatever that spring carries is reported as the residual.
+
+Each digit meets the others only through the object, so the Newton system is eliminated digit by digit (4 x 4), then the
+object (6 x 6). All sums run in one fixed order: a repetition comes out the same in any company, on any machine.
+
+Arrays: 5 digits, 7 spheres of skin a digit, 15 of the palm, 50 in all, n repetitions last.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.compiler.elementary import add_up
+
+from ..body.condition import Condition
+from ..body.hand import LIMITS_DEG, Hand
+from ..body.shapes import Cylinder, Pose, Shape
+from .model import GRAVITY, STIFFNESS, torques
+
+Floats = NDArray[np.float64]
+
+
+def dot(a: Floats, b: Floats) -> Floats:
+    """Return (m, n) of (m, 3, n) and (m, 3, n)."""
+    return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
+
+
+def cross(a: Floats, b: Floats) -> Floats:
+    """Return (m, 3, n) of (m, 3, n) and (m, 3, n)."""
+    crossed = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    np.subtract(a[:, 1] * b[:, 2], a[:, 2] * b[:, 1], out=crossed[:, 0])
+    np.subtract(a[:, 2] * b[:, 0], a[:, 0] * b[:, 2], out=crossed[:, 1])
+    np.subtract(a[:, 0] * b[:, 1], a[:, 1] * b[:, 0], out=crossed[:, 2])
+    return crossed
+
+
+def length(vectors: Floats) -> Floats:
+    """Return (n,) of (3, n)."""
+    return np.sqrt(add_up(vectors * vectors))
+
+
+def turn(now: Floats, then: Floats) -> Floats:
+    """Return the small turn (3, n) from rotations `then` to `now` (3, 3, n), in hand axes."""
+    columns = cross(then.swapaxes(0, 1), now.swapaxes(0, 1))
+    return add_up(columns) * 0.5
+
+
+def turned(frames: Floats, vectors: Floats) -> Floats:
+    """Return vectors (m, 3, n), given in the axes of frames (m, 3, 3, n), in hand axes."""
+    x, y, z = vectors[:, 0, None], vectors[:, 1, None], vectors[:, 2, None]
+    return frames[:, :, 0] * x + frames[:, :, 1] * y + frames[:, :, 2] * z
+
+
+def wrench(levers: Floats, forces: Floats) -> Floats:
+    """Return force and moment (m, k, 6, n) of forces (m, k, 3, n) at levers (m, 3, n)."""
+    found = np.empty((*forces.shape[:2], 6, forces.shape[3]))
+    found[:, :, :3] = forces
+    x, y, z = levers[:, None, 0], levers[:, None, 1], levers[:, None, 2]
+    np.subtract(y * forces[:, :, 2], z * forces[:, :, 1], out=found[:, :, 3])
+    np.subtract(z * forces[:, :, 0], x * forces[:, :, 2], out=found[:, :, 4])
+    np.subtract(x * forces[:, :, 1], y * forces[:, :, 0], out=found[:, :, 5])
+    return found
+
+
+def contract(a: Floats, b: Floats) -> Floats:
+    """Return a b^T over xyz: (m, i, 3, n) and (m, j, 3, n) give (m, i, j, n)."""
+    product = a[:, :, None, 0] * b[:, None, :, 0]
+    product += a[:, :, None, 1] * b[:, None, :, 1]
+    product += a[:, :, None, 2] * b[:, None, :, 2]
+    return product
+
+
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True)
+class Surfaces:
+    """Shapes, and which of them is each repetition's object: `whose` (n,), rising."""
+
+    shapes: tuple[Shape, ...]
+    whose: Indices
+
+    def rows(self, index: Indices) -> "Surfaces":
+        """Return the surfaces of some repetitions, in order."""
+        return Surfaces(self.shapes, self.whose[index])
+
+    def at(self, pose: Pose, points: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return signed distances (m, n), outward normals (m, 3, n) and curvatures (m, n) at points (m, 3, n)."""
+        own = pose.inward(points)
+        distance, normal, curvature = np.empty((len(own), own.shape[2])), np.empty_like(own), np.empty_like(own[:, 0])
+        edges = np.searchsorted(self.whose, np.arange(len(self.shapes) + 1))
+        for shape, first, last in zip(self.shapes, edges[:-1], edges[1:], strict=True):
+            if first < last:
+                part = own[..., first:last]
+                distance[:, first:last], normal[..., first:last] = shape.distance(part)
+                curvature[:, first:last] = shape.curvature(part)
+        return distance, pose.outward(normal), curvature
+
+    def bars(self) -> Floats:
+        """Return 1 for repetitions (n,) whose object is straight along its own x, 0 for others."""
+        straight = np.array([isinstance(shape, Cylinder) for shape in self.shapes], dtype=np.float64)
+        return straight[self.whose]
+
+
+def surfaces(shapes: Sequence[Shape], counts: Sequence[int]) -> Surfaces:
+    """Return the surfaces of `counts` repetitions of each shape; neighbours of one shape are asked together."""
+    different: list[Shape] = []
+    whose: list[int] = []
+    for shape, count in zip(shapes, counts, strict=True):
+        if not different or different[-1] != shape:
+            different.append(shape)
+        whose += [len(different) - 1] * count
+    return Surfaces(tuple(different), np.array(whose, dtype=np.intp))
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """What the numbers that come out should hardly depend on: halved, it tells how much they do.
+
+    rest_n, rest_nmm  what may be left out of balance, on the object and on each joint
+    parts             how many parts every Newton step is taken in, each found anew; all counts of steps grow as much
+    """
+
+    rest_n: float = 0.05
+    rest_nmm: float = 3.0
+    parts: int = 1
+
+
+USUAL = Pace()
+
+
+@dataclass(frozen=True, slots=True)
+class Skin:
+    """How skin gives: newtons per mm that a sphere sinks in, per mm that it is dragged sideways, and friction.
+
+    The first `soft_mm` give twice as easily, as pulp does, so that forces begin without a kink.
+    """
+
+    press_n_per_mm: float
+    soft_mm: float
+    drag_n_per_mm: float
+    friction: float
+
+    def press(self, sunk: Floats) -> tuple[Floats, Floats]:
+        """Return force and stiffness of spheres that sink in by `sunk` mm, any shape."""
+        deep = np.maximum(sunk, 0.0)
+        soft = np.minimum(deep, self.soft_mm)
+        stiffness = self.press_n_per_mm * soft / self.soft_mm
+        return stiffness * (deep - soft / 2.0), stiffness
+
+    def drag(self, sunk: Floats) -> Floats:
+        """Return the stiffness sideways of spheres that sink in by `sunk` mm: it grows over the first `soft_mm` too."""
+        return self.drag_n_per_mm * np.minimum(np.maximum(sunk, 0.0), self.soft_mm) / self.soft_mm
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Case:
+    """Repetitions of one condition: joint angles (20, n) in radians, object poses (6, n), grip forces (n,)."""
+
+    condition: Condition
+    angles: Floats
+    numbers: Floats
+    grip_n: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Command:
+    """What n hands of one size were told.
+
+    torque  (20, n)  what presses the pads, N mm
+    weight  (3, n)   of the objects, N
+    skin_points, object_points (50, 3, n)  what stuck together, in the axes of capsule and object
+    """
+
+    hand: Hand
+    surfaces: Surfaces
+    angles: Floats
+    pose: Pose
+    torque: Floats
+    weight: Floats
+    skin_points: Floats
+    object_points: Floats
+
+    def rows(self, index: Indices) -> "Command":
+        """Return the command of some repetitions, in order."""
+        return Command(
+            self.hand,
+            self.surfaces.rows(index),
+            self.angles[:, index],
+            Pose(self.pose.position[:, index], self.pose.rotation[..., index]),
+            self.torque[:, index],
+            self.weight[:, index],
+            self.skin_points[..., index],
+            self.object_points[..., index],
+        )
+
+
+def command(cases: Sequence[Case]) -> Command:
+    """Return what all `cases`, of one hand, are told, one after the other."""
+    hand = cases[0].condition.hand
+    counts = [len(case.grip_n) for case in cases]
+    shapes = surfaces([case.condition.thing.shape for case in cases], counts)
+    angles = np.concatenate([case.angles for case in cases], axis=1)
+    pose = Pose.of(np.concatenate([case.numbers for case in cases], axis=1))
+    skeleton = hand.skeleton(angles)
+    centres = hand.spheres(skeleton)
+    touch = centres - hand.sphere_radii[:, None, None] * shapes.at(pose, centres)[1]
+    frames = skeleton.frames[hand.sphere_capsules]
+    relative = touch - skeleton.origins[hand.sphere_capsules]
+    own = np.stack([dot(frames[:, :, k], relative) for k in range(3)], axis=1)
+    torque = np.concatenate([_torque(case) for case in cases], axis=1)
+    weight = np.stack([_weight(case.condition) for case in cases], axis=1).repeat(counts, axis=1)
+    return Command(hand, shapes, angles, pose, torque, weight, own, pose.inward(touch))
+
+
+def _torque(case: Case) -> Floats:
+    skeleton = case.condition.hand.skeleton(case.angles)
+    return torques(case.condition, skeleton, Pose.of(case.numbers)) * case.grip_n
+
+
+def _weight(condition: Condition) -> Floats:
+    return condition.thing.mass_kg * GRAVITY * condition.held.down
+
+
+Bits = NDArray[np.bool_]
+
+DIGIT_SPHERES = 35
+LIMIT_NMM_PER_RAD = 20000.0  # of a joint beyond its range
+HOLD_N_PER_MM, HOLD_NMM_PER_RAD = 0.05, 100.0  # the soft spring on the object
+_LEVER_MM = 30.0  # what a moment is held against a force by
+_LOW, _HIGH = (LIMITS_DEG.T[side, :, None] * (np.pi / 180.0) for side in (0, 1))
+# Which joints (4) move each of a digit's spheres of skin (7): three on its first segment, two on each of the others.
+_REACH = np.array([[1, 1, 0, 0]] * 3 + [[1, 1, 1, 0]] * 2 + [[1, 1, 1, 1]] * 2, dtype=np.float64)
+
+
+class Balance:
+    """Forces at joint angles (20, n) and object poses.
+
+    normal (50, 3, n)     of the surface at each sphere of skin
+    sunk, presses, press_stiffness (50, n)   mm, N, N per mm
+    dragged (50, 3, n)    how far each is dragged sideways, mm
+    kept (50, n)          how much of that friction bears, 1 where it sticks
+    drag (50, n)          N per mm of `dragged`: less where it slips, so that no force exceeds `sticks` times Coulomb's
+    drags, forces (50, 3, n)   of friction, and in all, on each sphere of skin, N
+    bent (50, n)          how much less it resists sideways for the surface bends under it, N per mm
+    levers (50, 3, n)     where each touches, from the object's middle
+    jacobian (5, 7, 4, 3, n)   how the skin of the digits moves with their joints, mm per radian
+    on_object (6, n), on_joints (20, n)      what is not in balance, N and N mm
+    residual_n, residual_nmm (n,)            what skin and weight leave unbalanced on the object
+    """
+
+    def __init__(self, command: Command, skin: Skin, angles: Floats, pose: Pose, sticks: float = 1.0) -> None:
+        self.command, self.skin, self.angles, self.pose = command, skin, angles, pose
+        hand = command.hand
+        self.skeleton = hand.skeleton(angles)
+        centres = hand.spheres(self.skeleton)
+        distance, self.normal, curvature = command.surfaces.at(pose, centres)
+        self.sunk = hand.sphere_radii[:, None] - distance
+        self.presses, self.press_stiffness = skin.press(self.sunk)
+        self.levers = centres - np.minimum(distance, hand.sphere_radii[:, None])[:, None] * self.normal - pose.position
+        self.dragged = self._dragged()
+        drag = skin.drag(self.sunk)
+        self.kept = self._kept(drag)
+        self.drag = drag * np.minimum(sticks * self.kept, 1.0)
+        self.bent = np.minimum(self.presses * curvature, 0.9 * self.drag)
+        self.drags = -self.drag[:, None] * self.dragged
+        self.forces = self.presses[:, None] * self.normal + self.drags
+        self._on_object()
+        self._on_joints()
+
+    @cached_property
+    def of_skin(self) -> Floats:
+        """Where the points of skin are (50, 3, n) that touch first."""
+        capsules = self.command.hand.sphere_capsules
+        return self.skeleton.origins[capsules] + turned(self.skeleton.frames[capsules], self.command.skin_points)
+
+    def _dragged(self) -> Floats:
+        moved = self.of_skin - (self.pose.outward(self.command.object_points) + self.pose.position)
+        return moved - dot(moved, self.normal)[:, None] * self.normal
+
+    def _kept(self, drag: Floats) -> Floats:
+        far = np.sqrt(dot(self.dragged, self.dragged)) + 1e-9
+        most = self.skin.friction * self.presses / np.maximum(drag, 1e-9)
+        return np.where(self.presses > 0.0, np.minimum(most / far, 1.0), 0.0)
+
+    def slipped(self) -> Floats:
+        """Return what of the object sticks to the skin (50, 3, n) after slipping: a drag beyond friction is let go, and
+        all of it where skin is off the object.
+        """
+        return self.pose.inward(self.of_skin - self.kept[:, None] * self.dragged)
+
+    def _on_object(self) -> None:
+        loaded = self.command.weight - add_up(self.forces)
+        twisted = -add_up(cross(self.levers, self.forces))
+        self.residual_n, self.residual_nmm = length(loaded), length(twisted)
+        shift = self.pose.position - self.command.pose.position
+        angle = turn(self.pose.rotation, self.command.pose.rotation)
+        self.on_object = np.concatenate([loaded - HOLD_N_PER_MM * shift, twisted - HOLD_NMM_PER_RAD * angle])
+
+    def _on_joints(self) -> None:
+        n = self.angles.shape[1]
+        points = (self.levers[:DIGIT_SPHERES] + self.pose.position).reshape(5, 7, 1, 3, n)
+        levers = points - self.skeleton.centres[:, None]
+        axes = np.broadcast_to(self.skeleton.axes[:, None], levers.shape)
+        moved = cross(axes.reshape(-1, 3, n), levers.reshape(-1, 3, n)).reshape(5, 7, 4, 3, n)
+        self.jacobian = moved * _REACH[None, :, :, None, None]
+        work = self.jacobian * self.forces[:DIGIT_SPHERES].reshape(5, 7, 1, 3, n)
+        pushed = add_up((work[:, :, :, 0] + work[:, :, :, 1] + work[:, :, :, 2]).swapaxes(0, 1)).reshape(20, n)
+        over = np.maximum(self.angles - _HIGH, 0.0) + np.minimum(self.angles - _LOW, 0.0)
+        self.beyond = over != 0.0
+        spring = STIFFNESS[:, None] * (self.angles - self.command.angles) + LIMIT_NMM_PER_RAD * over
+        self.on_joints = self.command.torque - spring + pushed
+
+    @cached_property
+    def unrest(self) -> Floats:
+        """How far (n,) the forces are from balance: moments count over 30 mm."""
+        force, moment = length(self.on_object[:3]), length(self.on_object[3:])
+        joints: Floats = np.abs(self.on_joints).max(axis=0)
+        return np.maximum(np.maximum(force, moment / _LEVER_MM), joints / _LEVER_MM)
+
+    def at_rest(self, pace: Pace) -> Bits:
+        """Return which repetitions (n,) have come to rest; none that holds a NaN."""
+        force, moment = length(self.on_object[:3]), length(self.on_object[3:])
+        joints: Floats = np.abs(self.on_joints).max(axis=0)
+        return (force < pace.rest_n) & (moment < pace.rest_nmm) & (joints < pace.rest_nmm)

@@ -1,0 +1,243 @@
+"""Plans: an object for hands of all lengths, and all objects of a scene."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from importlib.resources import files
+from itertools import pairwise
+
+import numpy as np
+
+from thenar.compiler.workers import in_workers
+
+from ..body.condition import Held, Thing
+from ..body.hand import Hand, Size
+from ..errors import PlanError, SceneError
+from ..scenes.scene import Scene, SceneObject
+from .planner import TOLERANCE_MM, Floats, Plan, measure, plan
+from .postures import Entry, HeldAt, Postures
+from .prehension import Prehension, load_prehensions
+
+# Hands are planned every so many millimetres, as broad as hands are on average (AIST 2012: 83.3 of 183.4 mm).
+EVERY_MM = 15.0
+BREADTH = 0.455
+# What is planned for any object, if hands so small and so large can hold it, and where planning begins: who else is in
+# a scene then changes no one's postures.
+USUAL_LENGTHS_MM = (150.0, 225.0)
+START_MM = 195.0
+_BETTER = 0.99  # a cost over another's that is no mere rounding
+
+
+@dataclass(frozen=True, slots=True)
+class Planned:
+    """One object planned for one grasp type, and the worst over the hand lengths of what `Plan` measures; gap and depth
+    also halfway between two lengths.
+    """
+
+    entry: Entry
+    gap_mm: float
+    sunk_mm: float
+    imbalance: float
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """An object to plan, for hands from `shortest_mm` to `longest_mm` at least."""
+
+    grasp: str
+    prehension: Prehension
+    thing: Thing
+    shortest_mm: float
+    longest_mm: float
+
+    def at(self, length_mm: float, near: Plan | None = None) -> Plan:
+        """Return a plan for one hand length. Raises PlanError."""
+        return plan(average_hand(length_mm), self.grasp, self.prehension, self.thing, near.held if near else None)
+
+
+def average_hand(length_mm: float) -> Hand:
+    """Return the hand that is planned for a length."""
+    return Hand(Size(length_mm, BREADTH * length_mm))
+
+
+def plan_object(work: Work) -> Planned:
+    """Return an object's postures for hands of all lengths.
+
+    Raises PlanError where a length fails that is asked for; beyond these, the usual ones are planned until one fails.
+    """
+    plans = _outwards(work)
+    entry = entry_of(work, plans)
+    gap, sunk = _halfway(entry, work.thing)
+    if max(gap, sunk) > TOLERANCE_MM:
+        plans = _evened(work, plans)
+        entry = entry_of(work, plans)
+        gap, sunk = _halfway(entry, work.thing)
+    return Planned(
+        entry,
+        max(gap, *(one.gap_mm for one in plans.values())),
+        max(sunk, *(one.sunk_mm for one in plans.values())),
+        max(one.imbalance for one in plans.values()),
+    )
+
+
+def _outwards(work: Work) -> dict[float, Plan]:
+    """Return plans by hand length, in order: outwards from a middle length, each from the one before."""
+    first = min(max(START_MM, work.shortest_mm), work.longest_mm)
+    plans = {first: work.at(first)}
+    for step, needed, usual in (
+        (EVERY_MM, work.longest_mm, max(work.longest_mm, USUAL_LENGTHS_MM[1])),
+        (-EVERY_MM, work.shortest_mm, min(work.shortest_mm, USUAL_LENGTHS_MM[0])),
+    ):
+        for length in np.arange(first + step, usual + step / 2, step).tolist():
+            try:
+                plans[length] = work.at(length, plans[length - step])
+            except PlanError:
+                if (needed - length) * step >= 0.0:
+                    raise
+                break
+    return dict(sorted(plans.items()))
+
+
+def _evened(work: Work, plans: dict[float, Plan]) -> dict[float, Plan]:
+    """Return plans with those replaced that are worse than what follows from their neighbours.
+
+    Two lengths may hold an object differently, so that halfway a finger goes through it: one of them has got stuck.
+    """
+    found, lengths = dict(plans), list(plans)
+    for order in (lengths, lengths[::-1]):
+        for before, length in pairwise(order):
+            with suppress(PlanError):
+                again = work.at(length, found[before])
+                if again.cost < _BETTER * found[length].cost:
+                    found[length] = again
+    return found
+
+
+def _halfway(entry: Entry, thing: Thing) -> tuple[float, float]:
+    """Return the worst gap and depth in mm of hands halfway between two planned lengths."""
+    postures = Postures("", (entry,))
+    lengths = [held.length_mm for held in entry.held]
+    hands = [average_hand((low + high) / 2) for low, high in pairwise(lengths)]
+    measured = [measure(hand, postures.held(hand, entry.grasp, thing), entry.shape) for hand in hands]
+    return max((gap for gap, _ in measured), default=-math.inf), max((sunk for _, sunk in measured), default=-math.inf)
+
+
+def entry_of(work: Work, plans: dict[float, Plan]) -> Entry:
+    """Return plans by hand length, in order, as data: rounded, and each turn as near the one before as can be."""
+    held: list[HeldAt] = []
+    for length, one in plans.items():
+        pose = one.held.pose.copy()
+        if held:
+            pose[3:] = _nearest_turn(pose[3:], np.array(held[-1].pose[3:]))
+        held.append(_held_at(length, one.held, pose))
+    first = next(iter(plans.values())).held
+    spheres = tuple(pad.sphere for pad in first.pads)
+    down = tuple(round(float(x), 6) for x in first.down)
+    return Entry(
+        work.grasp, work.thing.name, work.thing.shape, first.grip_n, (down[0], down[1], down[2]), spheres, tuple(held)
+    )
+
+
+def _held_at(length: float, held: Held, pose: Floats) -> HeldAt:
+    return HeldAt(
+        length,
+        tuple(round(float(angle), 2) for angle in held.posture_deg),
+        (*(round(float(x), 2) for x in pose[:3]), *(round(float(x), 5) for x in pose[3:])),
+        tuple(round(pad.share, 4) for pad in held.pads),
+    )
+
+
+def _nearest_turn(vector: Floats, before: Floats) -> Floats:
+    """Return the rotation vector of the same rotation that is nearest to `before`: a turn is also one the other way."""
+    angle = float(np.linalg.norm(vector))
+    if angle == 0.0:
+        return vector
+    others = [vector * (1.0 + turns * 2.0 * math.pi / angle) for turns in (-1, 0, 1)]
+    return min(others, key=lambda other: float(np.linalg.norm(other - before)))
+
+
+__all__ = ["Planned", "plan_scene", "shipped_prehensions"]
+
+Progress = Callable[[int, int], None]
+
+
+def plan_scene(
+    scene: Scene, jobs: int = -1, progress: Progress | None = None, *, anew: bool = False
+) -> tuple[Postures, list[Planned]]:
+    """Return the postures of a scene, and what of them was planned now: what had none, or all of it `anew`.
+
+    The scene's objects come in their order, before what else was known; neither depends on `jobs`. Raises SceneError
+    where the taxonomy has no table of prehensions, PlanError where a hand of the scene cannot hold an object.
+    """
+    known = _known(scene, anew)
+    works = list(_works(scene, known))
+    answers: dict[int, Planned | PlanError] = {}
+    for number, answer in in_workers(_answer, enumerate(works), jobs):
+        answers[number] = answer
+        if progress is not None:
+            progress(len(answers), len(works))
+    planned = _successes([answers[number] for number in range(len(works))], works)
+    found = Postures(scene.taxonomy, (*known.entries, *(one.entry for one in planned)))
+    own = [found.entry(item.grasp, item.thing()) for item in scene.objects]
+    return Postures(scene.taxonomy, (*filter(None, own), *found.entries)), planned
+
+
+def shipped_prehensions(taxonomy: str) -> dict[str, Prehension]:
+    """Return the table of a taxonomy's grasp types. Raises SceneError if there is none."""
+    table = files(__package__) / "data" / f"{taxonomy}.toml"
+    if not table.is_file():
+        raise SceneError(
+            f"there is no table of how the grasp types of {taxonomy!r} hold things: nothing can be planned"
+        )
+    return load_prehensions(table)
+
+
+def _known(scene: Scene, anew: bool) -> Postures:
+    """Return what needs no planning. The scene may name the file that is only to be written."""
+    if anew:
+        return Postures(scene.taxonomy, ())
+    if scene.postures is not None and not scene.postures.exists():
+        return Postures.shipped(scene.taxonomy)
+    return Postures.of(scene)
+
+
+def _works(scene: Scene, known: Postures) -> Iterator[Work]:
+    """Yield what lacks postures for the scene's hands, once each."""
+    hands = [subject.hand_length_mm for subject in scene.subjects]
+    shortest, longest = EVERY_MM * math.floor(min(hands) / EVERY_MM), EVERY_MM * math.ceil(max(hands) / EVERY_MM)
+    lacking: dict[object, SceneObject] = {}
+    for item in scene.objects:
+        if not _covered(item, known, hands):
+            lacking.setdefault((item.grasp, item.shape), item)
+    prehensions = shipped_prehensions(scene.taxonomy) if lacking else {}
+    for item in lacking.values():
+        if item.grasp not in prehensions:
+            raise SceneError(
+                f"{scene.taxonomy} has no table of how grasp type {item.grasp!r} holds things: "
+                f"{item.name!r} cannot be planned"
+            )
+        yield Work(item.grasp, prehensions[item.grasp], item.thing(), shortest, longest)
+
+
+def _covered(item: SceneObject, known: Postures, hands_mm: Sequence[float]) -> bool:
+    entry = known.entry(item.grasp, item.thing())
+    return entry is not None and entry.covers(min(hands_mm)) and entry.covers(max(hands_mm))
+
+
+def _successes(answers: Sequence[Planned | PlanError], works: Sequence[Work]) -> list[Planned]:
+    """Return the answers. Raises the first PlanError among them, in the scene's order, and names the other objects."""
+    failed = [(answer, work) for answer, work in zip(answers, works, strict=True) if isinstance(answer, PlanError)]
+    if failed:
+        others = ", ".join(f"{work.thing.name!r} ({work.grasp})" for _, work in failed[1:])
+        raise PlanError(f"{failed[0][0]}; nor can these be held: {others}" if others else str(failed[0][0]))
+    return [answer for answer in answers if isinstance(answer, Planned)]
+
+
+def _answer(task: tuple[int, Work]) -> tuple[int, Planned | PlanError]:
+    # Which worker is first must not decide which object an error names: failures are answers, too.
+    number, work = task
+    try:
+        return number, plan_object(work)
+    except PlanError as reason:
+        return number, reason

@@ -1,0 +1,220 @@
+"""Weka 3.6, run as a program beside thenar on the same separable set, under the JVM's two exp().
+
+Weka is not part of thenar and nothing of it is: where java or its jar are missing, this part is not run and says so.
+"""
+
+import re
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.compiler.boosting.boost import boost
+from thenar.compiler.boosting.stumps import Stumps, winners
+from thenar.compiler.elementary import softmax
+from thenar.drivers.errors import ThenarError
+
+JAR = Path("/usr/share/java/weka.jar")  # where Debian's package puts it
+
+# The JVM has two exp(): the processor's own, which is its choice, and the portable one, which this makes it take.
+EXP_OF_THE_PROCESSOR: tuple[str, ...] = ()
+EXP_IN_JAVA = ("-XX:+UnlockDiagnosticVMOptions", "-XX:-UseLibmIntrinsic")
+
+_LONGEST_S = 120.0
+_BRANCHES = tuple(re.compile(rf"^x(\d+) {branch} : (\S+)$", re.M) for branch in (r"<= (\S+)", r"> (\S+)", "is missing"))
+
+
+class WekaError(ThenarError, RuntimeError):
+    """Weka could not be run, or what it printed is not a model of what it was given."""
+
+
+@dataclass(frozen=True, slots=True)
+class Weka:
+    """An installed Weka."""
+
+    java: str
+    jar: Path
+
+    @staticmethod
+    def installed() -> "Weka":
+        """Return the one that is installed. Raises WekaError if there is none."""
+        java = shutil.which("java")
+        if java is None or not JAR.is_file():
+            raise WekaError("java or Weka is not installed")
+        return Weka(java, JAR)
+
+    def version(self) -> str:
+        """Return the version, such as "3.6.14"."""
+        return self._run("weka.core.Version").partition("\n")[0].strip()
+
+    def boost(
+        self, X: NDArray[np.int64], labels: NDArray[np.intp], n_classes: int, rounds: int, options: tuple[str, ...]
+    ) -> Stumps:
+        """Train Weka's LogitBoost on X (n, d) whole numbers and labels (n,) under JVM `options`; return its stumps.
+
+        They are at full precision: Java prints a double so that it reads back as itself. Raises WekaError.
+        """
+        with TemporaryDirectory(prefix="thenar-weka-") as folder:
+            table = Path(folder) / "set.arff"
+            table.write_text(_arff(X, labels, n_classes))
+            arguments = ("-I", str(rounds), "-no-cv", "-v", "-t", str(table))
+            printed = self._run("weka.classifiers.meta.LogitBoost", *arguments, options=options)
+        return read_stumps(printed, rounds, n_classes, X.shape[1])
+
+    def _run(self, *arguments: str, options: tuple[str, ...] = ()) -> str:
+        command = [self.java, *options, "-cp", str(self.jar), *arguments]
+        try:
+            return subprocess.run(command, check=True, capture_output=True, text=True, timeout=_LONGEST_S).stdout
+        except subprocess.CalledProcessError as reason:
+            said = (reason.stderr or reason.stdout).strip().partition("\n")[0]
+            raise WekaError(f"java ended with code {reason.returncode}: {said}") from reason
+        except subprocess.TimeoutExpired as reason:
+            raise WekaError(f"Weka was not done after {_LONGEST_S:g} s") from reason
+
+
+def read_stumps(printed: str, rounds: int, n_classes: int, n_inputs: int) -> Stumps:
+    """Return the stumps of a model that Weka printed, columns named x0, x1, ... Raises WekaError if it is another."""
+    left, right, missing = (pattern.findall(printed) for pattern in _BRANCHES)
+    if not len(left) == len(right) == len(missing) == rounds * n_classes:
+        raise WekaError(f"Weka printed {len(left)} stumps, not {rounds} rounds of {n_classes}")
+    shape = rounds, n_classes
+    columns = np.array([int(column) for column, _, _ in left], dtype=np.int32).reshape(shape)
+    if columns.max() >= n_inputs:
+        raise WekaError(f"Weka split column {columns.max()} of {n_inputs}")
+    values = np.array([[float(line[-1]) for line in lines] for lines in (left, right, missing)])
+    thresholds = np.array([float(threshold) for _, threshold, _ in left]).reshape(shape)
+    return Stumps(n_inputs, columns, thresholds, values.T.reshape(*shape, 3), shrinkage=1.0)
+
+
+def _arff(X: NDArray[np.int64], labels: NDArray[np.intp], n_classes: int) -> str:
+    classes = ",".join(f"c{number}" for number in range(n_classes))
+    lines = ["@relation separable", *(f"@attribute x{column} numeric" for column in range(X.shape[1]))]
+    lines += [f"@attribute class {{{classes}}}", "@data"]
+    lines += [",".join([*map(str, row), f"c{label}"]) for row, label in zip(X.tolist(), labels.tolist(), strict=True)]
+    return "\n".join([*lines, ""])
+
+
+Floats = NDArray[np.float64]
+
+# Distributions further apart than this have parted: what docs/weka-parity.md calls agreement.
+PARTED = 1e-9
+
+ROUNDS = 100
+CLASSES, ROWS_A_CLASS, SWITCHES, JOINTS = 10, 8, 16, 3
+_SEED = 6
+_FLIPPED = 0.12  # of the switches
+_SHUFFLES = 10
+
+
+class Differences(msgspec.Struct, frozen=True):
+    """The largest difference between two answers' held-out distributions, after each round; None: they never part."""
+
+    largest: tuple[float, ...]
+    parts: int | None
+
+
+class Beside(msgspec.Struct, frozen=True, tag="run"):
+    """What came of running Weka and thenar side by side."""
+
+    weka: str  # its version
+    rounds: int
+    classes: int
+    inputs: int
+    rows: int
+    held_out: int
+    learned: int | None  # the round from which on thenar has all training rows right
+    weka_itself: Differences  # Weka under the JVM's one exp() and the other
+    ours_processor: Differences  # thenar and Weka under the processor's exp()
+    ours_java: Differences
+    weka_changed: int  # held-out rows whose class in Weka hangs on the choice of exp()
+    weka_value: float  # the largest branch value of Weka's stumps under either
+    our_value: float
+    shuffles: int  # orders of the rows in which thenar was trained again
+    our_shuffled: float  # the largest difference between its held-out distributions then
+
+
+class NotRun(msgspec.Struct, frozen=True, tag="not run"):
+    """Why there is nothing to compare."""
+
+    why: str
+
+
+def beside_weka() -> Beside | NotRun:
+    """Return what came of it, or why nothing did."""
+    try:
+        return _compare(Weka.installed())
+    except WekaError as reason:
+        return NotRun(str(reason))
+
+
+def separable_set() -> tuple[NDArray[np.int64], NDArray[np.intp]]:
+    """Return X (n, d) of 0/1 switches and joint codes, and labels (n,): twice ROWS_A_CLASS of each class in turn.
+
+    Each class has its own pattern of switches, of which a few flip in each row, and its own posture of the joints,
+    which sways a little. The first half of the rows is trained on; stumps learn it by heart. The seed is one that shows
+    in full what other draws show in part.
+    """
+    random = np.random.default_rng(_SEED)
+    patterns = random.integers(0, 2, (CLASSES, SWITCHES))
+    postures = random.integers(40, 200, (CLASSES, JOINTS))
+    labels = np.arange(2 * CLASSES * ROWS_A_CLASS) % CLASSES
+    switches = patterns[labels] ^ (random.random((len(labels), SWITCHES)) < _FLIPPED)
+    joints = postures[labels] + random.integers(-15, 16, (len(labels), JOINTS))
+    return np.hstack([switches, joints]), labels
+
+
+def _compare(weka: Weka) -> Beside:
+    X, labels = separable_set()
+    half = len(labels) // 2
+    training, held_out = (X[:half], labels[:half]), X[half:]
+    processor, java = (
+        weka.boost(*training, CLASSES, ROUNDS, options) for options in (EXP_OF_THE_PROCESSOR, EXP_IN_JAVA)
+    )
+    ours, _ = boost(*training, CLASSES, rounds=ROUNDS)
+    answers = {name: _staged(stumps, held_out) for name, stumps in (("p", processor), ("j", java), ("o", ours))}
+    return Beside(
+        weka=weka.version(),
+        rounds=ROUNDS,
+        classes=CLASSES,
+        inputs=X.shape[1],
+        rows=half,
+        held_out=len(held_out),
+        learned=_learned(ours, *training),
+        weka_itself=_differences(answers["p"], answers["j"]),
+        ours_processor=_differences(answers["o"], answers["p"]),
+        ours_java=_differences(answers["o"], answers["j"]),
+        weka_changed=int(np.count_nonzero(winners(processor.scores(held_out)) != winners(java.scores(held_out)))),
+        weka_value=float(max(np.abs(processor.values).max(), np.abs(java.values).max())),
+        our_value=float(np.abs(ours.values).max()),
+        shuffles=_SHUFFLES,
+        our_shuffled=_shuffled(answers["o"], *training, held_out),
+    )
+
+
+def _staged(stumps: Stumps, X: NDArray[np.int64]) -> Floats:
+    """Return the distributions (M, K, n) after each round."""
+    return np.array([softmax(np.ascontiguousarray(scores.T)) for scores in stumps.staged_scores(X)])
+
+
+def _differences(one: Floats, other: Floats) -> Differences:
+    largest = np.abs(one - other).max(axis=(1, 2))
+    apart = np.flatnonzero(largest > PARTED)
+    return Differences(tuple(largest.tolist()), int(apart[0]) + 1 if apart.size else None)
+
+
+def _learned(stumps: Stumps, X: NDArray[np.int64], labels: NDArray[np.intp]) -> int | None:
+    wrong = [bool((winners(scores) != labels).any()) for scores in stumps.staged_scores(X)]
+    last = max((round_ for round_, is_wrong in enumerate(wrong, 1) if is_wrong), default=0)
+    return last + 1 if last < len(wrong) else None
+
+
+def _shuffled(answer: Floats, X: NDArray[np.int64], labels: NDArray[np.intp], held_out: NDArray[np.int64]) -> float:
+    random = np.random.default_rng(_SEED)
+    orders = (random.permutation(len(labels)) for _ in range(_SHUFFLES))
+    again = (_staged(boost(X[order], labels[order], CLASSES, rounds=ROUNDS)[0], held_out) for order in orders)
+    return max(float(np.abs(answer - other).max()) for other in again)

@@ -1,1 +1,0 @@
-"""Weka 3.6 as a program, and thenar beside it."""

@@ -1,0 +1,108 @@
+"""What a spec decides: wiring, expectations, remarks; and what cannot be described."""
+
+from collections.abc import Callable
+
+import pytest
+from msgspec.structs import replace
+
+from thenar.compiler.glove.layout import BODY_MM
+from thenar.compiler.glove.spec import SpecError, glove_spec
+from thenar.compiler.hand import HandShape
+from thenar.drivers.i2c.chips import CHIPS
+from thenar.runtime.errors import HarnessError
+from thenar.runtime.harness.wiring import GloveWiring, Harness, ScannerWiring
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.scanning.ports import whole_scan
+from thenar.runtime.scanning.propose import propose_harness
+from thenar.runtime.scanning.timing import scan_us
+
+Manifests = Callable[..., Manifest]
+
+
+def test_without_a_harness_one_is_proposed_with_a_cyberglove_for_joints(manifest_of: Manifests) -> None:
+    names = ["a", "b"]
+    with_joints, without = (glove_spec(manifest_of(names, joints=joints)) for joints in (True, False))
+    assert with_joints.summary.proposed
+    assert without.harness == propose_harness(names)
+    assert with_joints.harness.cyberglove == GloveWiring(port="/dev/ttyUSB0")
+    assert with_joints.summary.expected.glove_us is not None
+    assert without.summary.expected.glove_us is None
+
+
+def test_the_scan_takes_what_the_wire_takes(manifest_of: Manifests) -> None:
+    names = [f"s{number}" for number in range(20)]
+    harness = propose_harness([*names, "spare"], "pca9555")
+    expected = glove_spec(manifest_of(names), None, harness).summary.expected
+    time = scan_us(whole_scan(harness, names), harness)
+    assert (expected.transactions, expected.scan_us, expected.full_us) == (2, time.us, time.full_us)
+    assert expected.scan_us == pytest.approx(121.3 + 98.8, abs=0.1)
+    assert expected.rates == manifest_of(names).rates
+
+
+def test_a_boards_bitmap_takes_its_time_on_the_line(manifest_of: Manifests) -> None:
+    idle = ScannerWiring(port="/dev/ttyACM1", switches=("x",))
+    board = ScannerWiring(port="/dev/ttyACM0", switches=("a",), baud=1_000_000)
+    expected = glove_spec(manifest_of(["a"]), None, Harness(name="h", scanners=(idle, board))).summary.expected
+    assert expected.transactions == 0
+    assert len(expected.boards_us) == 1
+    assert 70 <= expected.boards_us[0] <= 120
+
+
+def test_a_build_without_switches_has_no_glove(manifest_of: Manifests) -> None:
+    with pytest.raises(SpecError, match="keeps no switch"):
+        glove_spec(manifest_of([]))
+
+
+def test_a_scan_map_needs_its_own_harness(manifest_of: Manifests) -> None:
+    harness = propose_harness(["a", "b"])
+    scan = whole_scan(harness, ["a"])
+    assert glove_spec(manifest_of(["a"]), scan, harness).scan is scan
+    with pytest.raises(SpecError, match="compiled for a wiring of its own"):
+        glove_spec(manifest_of(["a"]), scan)
+    with pytest.raises(HarnessError, match="another wiring"):
+        glove_spec(manifest_of(["a"]), scan, propose_harness(["b", "a"]))
+
+
+def test_a_harness_without_a_kept_switch_is_refused(manifest_of: Manifests) -> None:
+    with pytest.raises(HarnessError, match="no pin or key for b, which"):
+        glove_spec(manifest_of(["a", "b"]), None, propose_harness(["a"]))
+
+
+@pytest.mark.parametrize("path", ["/home/anna/anna.toml", "anna.toml", "C:\\gloves\\anna.toml"])
+def test_the_calibrations_folder_stays_out_of_the_spec(manifest_of: Manifests, path: str) -> None:
+    glove = GloveWiring(port="/dev/ttyUSB0", calibration=path)
+    harness = replace(propose_harness(["a"]), cyberglove=glove)
+    written = glove_spec(manifest_of(["a"]), None, harness).harness
+    assert written == replace(harness, cyberglove=replace(glove, calibration="anna.toml"))
+    assert written.fingerprint == harness.fingerprint
+
+
+def test_switches_closer_than_their_bodies_are_told(manifest_of: Manifests, hand: HandShape) -> None:
+    names = ["index_distal_2", "index_distal_4", "palm_heel_6"]
+    assert glove_spec(manifest_of(names), hand=hand).summary.remarks == ()
+    small = glove_spec(manifest_of(names), hand=hand.scaled(150.0)).summary.remarks
+    assert len(small) == 1
+    assert small[0].startswith("SW1 and SW2 are 3.")
+    assert small[0].endswith(f"their bodies {BODY_MM} mm broad: move one of them aside")
+
+
+def test_a_strange_glove_is_described_without_places(manifest_of: Manifests, hand: HandShape) -> None:
+    summary = glove_spec(manifest_of(["index_distal_2", "mine"]), hand=hand).summary
+    assert summary.hand_length_mm is None
+    assert {(s.part, s.side, s.x_mm, s.y_mm) for s in summary.switches} == {(None, None, None, None)}
+    assert summary.remarks[-1].startswith("nobody knows where this glove's switches lie")
+
+
+@pytest.mark.parametrize("kind", sorted(CHIPS))
+def test_the_bill_counts_what_the_circuit_holds(manifest_of: Manifests, hand: HandShape, kind: str) -> None:
+    names = hand.names[:30]
+    spec = glove_spec(manifest_of(names), None, propose_harness(names, kind), hand)
+    pieces = [line for line in spec.summary.materials if line.unit == "pcs"]
+    assert sorted(ref for line in pieces for ref in line.designators) == sorted(c.ref for c in spec.circuit.components)
+    assert all(line.quantity == len(line.designators) for line in pieces)
+    (switches,) = [line for line in pieces if line.part == "EVQPLDA15"]
+    assert (switches.quantity, switches.maker) == (30, "Panasonic")
+    chips = [line for line in pieces if line.designators[0] == "U1"]
+    assert [line.quantity for line in chips] == [len(spec.summary.readers)]
+    wire = sum(line.quantity for line in spec.summary.materials if line.unit == "m")
+    assert wire * 1000 == pytest.approx(sum(each.length_mm or 0 for each in spec.summary.wires))
