@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from thenar.runtime.toml_source import Source, read_source
+from thenar.runtime.toml_source import TomlText, read_source
 from thenar.runtime.toml_struct import check_finite, convert
 
 from .board import Board
@@ -17,10 +17,10 @@ def load_board(path: str | Path) -> Board:
 
 def parse_board(text: str, name: str = "board.toml") -> Board:
     """Return the board that `text`, which messages call `name`, is. Raises FirmwareError as `load_board` does."""
-    return _board_of(Source(name, text, FirmwareError))
+    return _board_of(TomlText(name, text, FirmwareError))
 
 
-def _board_of(source: Source) -> Board:
+def _board_of(source: TomlText) -> Board:
     tables = source.tables()
     check_finite(source, (), tables)
     board = convert(source, (), tables, Board)

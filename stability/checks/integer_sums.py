@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from thenar.compiler.tables.furthest import furthest
 from thenar.runtime.build import Build
-from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Proof, Source, Switch
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Switch
 from thenar.runtime.scores import LANE_OFFSET, Scorer
 from thenar.runtime.tables import (
     LIMIT,
@@ -37,7 +37,7 @@ def bare_build(tables: IntegerTables) -> Build:
             thenar="",
             tables_sha256=_NO_DIGEST,
             ensemble_sha256=_NO_DIGEST,
-            source=Source(_NO_DIGEST, 0, "none", tables.n_switches),
+            source=Origin(_NO_DIGEST, 0, "none", tables.n_switches),
             options=Options(0, 1, "both", 1.0, 0, 1),
             grasps=tuple(str(number) for number in range(tables.n_classes)),
             switches=tuple(Switch(number, str(number), 0.0) for number in range(tables.n_switches)),

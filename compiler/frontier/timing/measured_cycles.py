@@ -4,7 +4,7 @@ import hashlib
 from dataclasses import dataclass
 from importlib.metadata import version
 
-from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Proof, Source, Switch
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Switch
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from ...firmware.choose import Option
@@ -60,7 +60,7 @@ def nameless(tables: IntegerTables) -> Manifest:
         thenar=version("thenar"),
         tables_sha256=digest,
         ensemble_sha256=digest,
-        source=Source(digest, 0, "own", tables.n_switches),
+        source=Origin(digest, 0, "own", tables.n_switches),
         options=Options(0, 1, "both", 1.0, 0, 0),
         grasps=tuple(f"type {number}" for number in range(tables.n_classes)),
         switches=tuple(Switch(number, f"s{number}", 0.0) for number in range(tables.n_switches)),

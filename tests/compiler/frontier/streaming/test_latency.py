@@ -18,7 +18,7 @@ from thenar.drivers.errors import SettingError, ThenarError
 from thenar.runtime.build import Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.live.recogniser import LiveRecognizer
-from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Proof, Recognised, Source, Switch
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Recognised, Switch
 from thenar.runtime.published import UNKNOWN
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
@@ -71,7 +71,7 @@ def make_build(tables: IntegerTables) -> Build:
         thenar="0.1.0",
         tables_sha256=hashlib.sha256(tables_to_bytes(tables)).hexdigest(),
         ensemble_sha256="0" * 64,
-        source=Source("1" * 64, 10, "own", 20),
+        source=Origin("1" * 64, 10, "own", 20),
         options=Options(0, 100, "both", 1.0, 4, 1),
         grasps=tuple(f"grasp {number}" for number in range(CLASSES)),
         switches=tuple(Switch(column, f"s{column}", 0.5) for column in KEPT),
