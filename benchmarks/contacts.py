@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from thenar.simulator.contact.model import Contact, ContactModel, load_of
+from thenar.simulator.contact.model import Contact, ContactModel
 from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.planning.postures import Postures
 from thenar.simulator.running.pipeline import Ledger, Pipeline, compile_pipeline
@@ -16,7 +16,7 @@ from thenar.simulator.scenes.scene import Scene
 def solved(model: ContactModel, batches: Sequence[Batch]) -> tuple[list[Contact], float]:
     """Return what a model makes of batches, solved together, and its processor time in seconds."""
     start = time.process_time()
-    contacts = model.solve([load_of(batch) for batch in batches])
+    contacts = model.solve([batch.load() for batch in batches])
     seconds = time.process_time() - start
     return contacts, seconds
 

@@ -34,17 +34,17 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from thenar.compiler.firmware.avr_costs import worst_frame
 from thenar.compiler.firmware.choose import choose
 from thenar.compiler.firmware.errors import FirmwareError
 from thenar.compiler.firmware.layout import Layout
-from thenar.compiler.firmware.targets import target_of
-from thenar.compiler.firmware.worst import worst_frame
+from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.tables import IntegerTables
 
 # Trees and leaves of the forests tried: the one that recognises best among those that fit the part is the peer.
 FORESTS = ((10, 40), (10, 80), (15, 60), (20, 30), (20, 40), (20, 60), (30, 30), (30, 40), (40, 20), (60, 14))
-AVR, LARGER = target_of("atmega328p"), target_of("atmega2560")
-CORES = (target_of("cortex-m0plus"), target_of("cortex-m4"))
+AVR, LARGER = TARGETS["avr328p"], TARGETS["avr2560"]
+CORES = (TARGETS["cortex-m0plus"], TARGETS["cortex-m4"])
 # Rows in which two switches change; rows that the slowest peer answers.
 CHANGES, PEER_ROWS = 500, 20
 CONSOLE = Console(width=160)

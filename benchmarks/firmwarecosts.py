@@ -8,15 +8,13 @@ import numpy as np
 from firmwarepeers import Peer
 from numpy.typing import NDArray
 
-from thenar.compiler.firmware.avr_harness import AVR_COMPILER, harness
-from thenar.compiler.firmware.avr_runner import run as run_avr
 from thenar.compiler.firmware.classifier import classifier_files
-from thenar.compiler.firmware.cortex_runner import run as run_cortex
 from thenar.compiler.firmware.errors import FirmwareError
 from thenar.compiler.firmware.layout import Layout
+from thenar.compiler.firmware.simavr import harness
 from thenar.compiler.firmware.targets import Target
-from thenar.compiler.firmware.tools import call, find, workshop
-from thenar.compiler.frontier.timing.measured_cycles import nameless
+from thenar.compiler.firmware.tools import AVR_COMPILER, call, find, workshop
+from thenar.compiler.firmware.words import numbered
 
 # As thenar's Makefiles compile: what is not called is not linked.
 _HOW = ("-Os", "-std=gnu99", "-w", "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections")
@@ -79,13 +77,13 @@ def of_ours(layout: Layout, target: Target, frames: Frames, expected: Scores, *,
     """Return what thenar's classifier takes for frames whose scores (n, K) are known; with `changes`, update()'s cost
     for every frame but the first, which has nothing to start from.
     """
-    files = classifier_files("glove", nameless(layout.tables), layout, avr=True)
+    files = classifier_files("glove", numbered(layout.tables), layout, avr=True)
     called = ("classify", "update") if changes else ("classify",)
     body = " ".join(f"thenar_glove_{function}();" for function in called)
     program = {**files, "main.c": f'#include "thenar_glove.h"\nint main(void) {{ for (;;) {{ {body} }} }}\n'}
     with workshop(program) as folder:
         flash, ram = _linked(folder, program, target.part)
-    answers = run_avr(files, "glove", layout, target, frames, incremental=changes)
+    answers = target.run(files, "glove", layout, frames, incremental=changes)
     assert answers.cost is not None
     assert answers.stack is not None
     wrong = (answers.scores != expected).any(axis=1) | (answers.classes != expected.argmax(axis=1))
@@ -115,8 +113,8 @@ def of_peer(peer: Peer, target: Target) -> Cost:
 
 def instructions(layout: Layout, core: Target, frames: Frames, expected: Scores) -> int:
     """Return the most instructions that a frame takes on a Cortex-M. Raises FirmwareError if any score is wrong."""
-    files = classifier_files("glove", nameless(layout.tables), layout, avr=False)
-    answers = run_cortex(files, "glove", layout, core, frames)
+    files = classifier_files("glove", numbered(layout.tables), layout, avr=False)
+    answers = core.run(files, "glove", layout, frames)
     if answers.cost is None or (answers.scores != expected).any():
         raise FirmwareError(f"{core.part} gives other scores than Python")
     return int(answers.cost.max())

@@ -1,8 +1,9 @@
 """What the sub-commands share: paths, the `--json` flag, consoles, and a progress bar for work longer than a second."""
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,6 +48,18 @@ class _PictureFile(_OutputFile):
         if path.suffix.lower() not in (".png", ".svg"):
             self.fail(f"{path.name}: a picture ends in .png or .svg", param, ctx)
         return path
+
+
+class Listed(click.Choice[str]):
+    """One of the names of a registry, which is read when it is first needed and not when a command is defined."""
+
+    def __init__(self, names: Callable[[], Iterable[str]]) -> None:
+        self._names, self.case_sensitive = names, True
+
+    @cached_property
+    def choices(self) -> tuple[str, ...]:  # type: ignore[override]
+        """The names."""
+        return tuple(self._names())
 
 
 existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)

@@ -93,12 +93,11 @@ def command(
     """
     from thenar.compiler.artifact.compile import compile_build
     from thenar.compiler.artifact.documents import Documents
+    from thenar.compiler.frontier.picked import picked
     from thenar.compiler.placement.ports import ports_of_whole_glove
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.harness.loading import load_harness
     from thenar.simulator.handmaps.handmap import hand_map
-
-    from .from_frontier import picked
 
     _check_proposal(propose, chip, glove, overwrite=overwrite)
     _check_point(context, from_frontier, point)

@@ -32,17 +32,13 @@ def command(grasps: Path, output: Path, codes: bool, meta: bool, columns: Path |
         thenar export set.grasps -o table.csv --columns columns.toml
         thenar export set.grasps -o table.arff
     """
-    from thenar.compiler.recordings.export import columns_of, export
+    from thenar.compiler.recordings.export import export
     from thenar.compiler.recordings.graspset import GraspSet
-    from thenar.runtime.files import write_atomically
 
     keep_apart(grasps, output, columns)
     grasp_set = GraspSet.load(grasps)
     with progress(f"exporting {grasps.name}"):
-        export(grasp_set, output, codes, meta)
-    if columns is not None:
-        arff = output.suffix.lower() == ".arff"
-        write_atomically(columns, columns_of(grasp_set, codes, meta or not arff).encode())
+        export(grasp_set, output, codes, meta, columns)
     if as_json:
         print_json(Exported(str(output), None if columns is None else str(columns), len(grasp_set)))
     else:

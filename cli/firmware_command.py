@@ -1,30 +1,51 @@
 """`thenar firmware`: a build as C99 for a microcontroller."""
 
 import shlex
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
+from rich.table import Table
 
-from .common import any_path, existing_file, existing_folder, json_flag, out, print_json, progress
+from .common import Listed, any_path, existing_file, existing_folder, json_flag, out, print_json, progress
 
 if TYPE_CHECKING:
-    from thenar.compiler.firmware.generate import Mode, Request
-    from thenar.compiler.firmware.library import Fit
+    from thenar.compiler.firmware.choose import Fit
     from thenar.compiler.firmware.measuring import Measured
-
-# Spelled out so that --help imports nothing; tests hold them against the compiler's own.
-PLATFORMS = ("avr328p", "avr2560", "cortex-m0plus", "cortex-m4", "host", "arduino")
-MODES = ("classify", "scan", "glove")
+    from thenar.compiler.firmware.targets import Target
+    from thenar.compiler.firmware.targets.base import Mode
 
 
-@click.command("firmware")
+def _targets() -> Iterable[str]:
+    from thenar.compiler.firmware.targets import TARGETS
+
+    return TARGETS
+
+
+def _modes() -> Iterable[str]:
+    from thenar.compiler.firmware.targets import TARGETS
+
+    return dict.fromkeys(mode for target in TARGETS.values() for mode in target.modes)
+
+
+class _Command(click.Command):
+    """The command; its help ends with what each target is."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        from thenar.compiler.firmware.targets import TARGETS
+
+        with formatter.section("Targets"):
+            formatter.write_dl([(name, target.help) for name, target in TARGETS.items()])
+
+
+@click.command("firmware", cls=_Command)
 @click.argument("build", metavar="BUILD", type=existing_folder)
-@click.option("--target", type=click.Choice(PLATFORMS), required=True, help="What the firmware is for.")
+@click.option("--target", type=Listed(_targets), required=True, help="What the firmware is for.")
 @click.option("-o", "--output", metavar="DIR", type=any_path, help="Folder to write the firmware into.")
 @click.option(
     "--mode",
-    type=click.Choice(MODES),
+    type=Listed(_modes),
     default="classify",
     show_default=True,
     help="A library that classifies frames; a board that scans switches; or one that also recognises.",
@@ -84,38 +105,46 @@ def command(
     """
     from thenar.compiler.firmware.board_loading import load_board
     from thenar.compiler.firmware.folder import write_folder
-    from thenar.compiler.firmware.generate import Request, firmware_files, fit_of
+    from thenar.compiler.firmware.generate import Firmware
+    from thenar.compiler.firmware.measuring import measure as measured_of
     from thenar.compiler.firmware.one_hand import for_one_hand
+    from thenar.compiler.firmware.targets import TARGETS
     from thenar.runtime.build import Build
     from thenar.runtime.calibration import load_calibration
 
-    _check(target, mode, writes=output is not None, counts=measure or frontier, calibrated=calibration is not None)
+    _check(
+        TARGETS[target], mode, writes=output is not None, counts=measure or frontier, calibrated=calibration is not None
+    )
     loaded = Build.load(build)
     if calibration is not None:
         loaded = for_one_hand(loaded, load_calibration(calibration))
     wiring = None if board is None else load_board(board)
-    request = Request(loaded, target, mode, name, wiring, flash_limit)
+    firmware = Firmware(loaded.tables, loaded.manifest, target, mode, name, wiring, flash_limit)
     with progress("choosing a layout"):
-        fit = fit_of(request)
-    measured = _measured(request, fit) if measure else None
-    files = firmware_files(request, fit, fit.notes() if measured is None else fit.notes(measured.note))
+        fit = firmware.fit
+    measured = None
+    if measure:
+        with progress(f"measuring on {fit.target.part}"):
+            measured = measured_of(firmware.library(), fit)
+    files = firmware.files(None if measured is None else fit.notes(measured.note))
     if output is not None:
         write_folder(files, output, overwrite=overwrite)
     if as_json:
-        print_json(_told(fit, measured, sorted(files)))
+        print_json(_document(fit, measured, sorted(files)))
     else:
         if mode != "scan":
             _print(fit, measured, frontier=frontier, updates=mode == "glove")
         if output is not None:
-            out().print(f"{output}: firmware for {target}; {_next_step(target, output)}", soft_wrap=True)
+            next_step = TARGETS[target].next_step.format(folder=shlex.quote(str(output)))
+            out().print(f"{output}: firmware for {target}; {next_step}", soft_wrap=True)
     return 0 if measured is None or measured.holds else 1
 
 
-def _check(target: str, mode: "Mode", *, writes: bool, counts: bool, calibrated: bool) -> None:
+def _check(target: "Target", mode: "Mode", *, writes: bool, counts: bool, calibrated: bool) -> None:
     """Raise UsageError where options do not go together; `counts` is --measure or --frontier."""
     if mode == "scan" and counts:
         raise click.UsageError("A board that only scans holds no classifier to --measure or to see the --frontier of.")
-    if target == "host" and counts:
+    if not target.own_layout and not target.any_part and counts:
         raise click.UsageError("On this machine nothing is counted: --measure and --frontier are for microcontrollers.")
     if not writes and not counts:
         raise click.UsageError("Name a folder to write with -o, or look first, with --frontier or --measure.")
@@ -123,29 +152,12 @@ def _check(target: str, mode: "Mode", *, writes: bool, counts: bool, calibrated:
         raise click.UsageError("--calibration is for --mode glove: no other reads a CyberGlove.")
 
 
-def _measured(request: "Request", fit: "Fit") -> "Measured":
-    from thenar.compiler.firmware.generate import library
-    from thenar.compiler.firmware.measuring import measure
-
-    with progress(f"measuring on {fit.target.part}"):
-        return measure(library(request, fit), request.name, fit, request.build.grasps)
-
-
-def _next_step(target: str, folder: Path) -> str:
-    if target == "arduino":
-        return "put it into `libraries` of your sketchbook, or into `lib` of a PlatformIO project"
-    make = f"make -C {shlex.quote(str(folder))}"
-    return f"`{make}` compiles it" if target.startswith("avr") else f"`{make} check` compiles and tests it"
-
-
 def _print(fit: "Fit", measured: "Measured | None", *, frontier: bool, updates: bool) -> None:
-    from .firmware_tables import frontier_table
-
     console = out()
     if frontier:
-        console.print(frontier_table(fit))
+        console.print(_frontier_table(fit))
     console.print(f"layout {fit.words}", soft_wrap=True)
-    if fit.target.kind != "host":
+    if fit.target.own_layout:
         console.print(f"expected: {_expected(fit, updates)}", soft_wrap=True)
     if measured is not None:
         console.print(measured.note, soft_wrap=True)
@@ -156,13 +168,57 @@ def _print(fit: "Fit", measured: "Measured | None", *, frontier: bool, updates: 
 def _expected(fit: "Fit", updates: bool) -> str:
     cost = fit.choice.cost
     less = "" if updates else f" ({cost.flash_classify} where nothing calls update())"
-    times = f"{cost.cycles} {fit.unit} a frame ({cost.update_cycles} by update())"
-    return f"{fit.bound} {times}, {cost.flash} bytes of flash{less}, {cost.ram} of RAM"
+    times = f"{cost.cycles} {fit.target.unit} a frame ({cost.update_cycles} by update())"
+    return f"{fit.target.bound} {times}, {cost.flash} bytes of flash{less}, {cost.ram} of RAM"
 
 
-def _told(fit: "Fit", measured: "Measured | None", files: list[str]) -> object:
-    from .firmware_tables import Told, cost_told, layouts
+def _layouts(fit: "Fit") -> list[dict[str, Any]]:
+    """Return the frontier that a layout was chosen from, fastest first: `time` of a frame, bytes, and how many switches
+    share a `lookup` at most.
+    """
+    return [
+        {
+            "entry_bits": layout.entry_bits,
+            "lookup": max(map(len, layout.groups), default=0),
+            "bins": layout.bins if layout.joints else "",
+            "adding": layout.adding if fit.target.avr else "",
+            "time": cost.cycles,
+            "flash": cost.flash,
+            "ram": cost.ram,
+            "chosen": layout is fit.choice.layout,
+        }
+        for layout, cost in fit.choice.frontier
+    ]
 
-    counted = fit.target.kind != "host"
-    cost, frontier = (cost_told(fit), layouts(fit)) if counted else (None, [])
-    return Told(fit.target.part, fit.words, cost, frontier, measured, files)
+
+def _frontier_table(fit: "Fit") -> Table:
+    """Return the frontier as a table, the chosen layout marked."""
+    table = Table(title=f"Layouts for {fit.target.part}, {fit.target.bound}")
+    for heading in ("", "bits", "switches a look-up", "codes", "rows added", fit.target.unit, "flash", "RAM"):
+        table.add_column(heading, justify="left" if heading in ("", "codes", "rows added") else "right")
+    for row in _layouts(fit):
+        mark, lookup = "*" if row["chosen"] else "", str(row["lookup"] or "")
+        numbers = (str(row[key]) for key in ("time", "flash", "ram"))
+        table.add_row(mark, str(row["entry_bits"]), lookup, row["bins"], row["adding"], *numbers)
+    return table
+
+
+def _document(fit: "Fit", measured: "Measured | None", files: list[str]) -> dict[str, object]:
+    """Return all that --json tells; on this machine nothing is counted, and there is no cost."""
+    counted, cost = fit.target.own_layout, fit.choice.cost
+    costs = {
+        "time": cost.cycles,
+        "unit": fit.target.unit,
+        "flash": cost.flash,
+        "flash_classify": cost.flash_classify,
+        "ram": cost.ram,
+        "bound": fit.target.avr,
+    }
+    return {
+        "part": fit.target.part,
+        "layout": fit.words,
+        "cost": costs if counted else None,
+        "frontier": _layouts(fit) if counted else [],
+        "measured": measured,
+        "files": files,
+    }

@@ -5,20 +5,32 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from thenar.compiler.frontier.targets import TARGETS
-
-from .common import any_path, err, existing_file, existing_folder, json_flag, out, print_json, progress
+from .common import Listed, any_path, err, existing_file, existing_folder, json_flag, out, print_json, progress
 from .methods import WithMethods, method_names
 
 if TYPE_CHECKING:
-    from thenar.compiler.frontier.points import Frontier
+    from rich.table import Table
+    from rich.text import Text
+
+    from thenar.compiler.frontier.points import Check, Frontier, Point
+
+
+_SEARCHED = ("rounds", "repeats", "finalists", "max_bins", "seed")
+_WORDS = ("inputs", "placement", "rounds, bits", "wiring", "scan", "decision")
+_NUMBERS = ("rate %", "left out %", "frame", "latency, 99 %", "flash", "RAM")
+
+
+def _timed() -> tuple[str, ...]:
+    from thenar.compiler.firmware.targets import timed
+
+    return timed()
 
 
 @click.command("frontier", cls=WithMethods)
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option("-o", "--output", type=any_path, required=True, help="Folder for tables, pictures and the store.")
 @click.option("--glove", type=existing_file, help="A glove.toml: try its wiring as well, and choose by its ports.")
-@click.option("--target", type=click.Choice(TARGETS), default="host", show_default=True, help="What classifies.")
+@click.option("--target", type=Listed(_timed), default="host", show_default=True, help="What classifies.")
 @click.option("--budget-us", type=click.FloatRange(min=0, min_open=True), help="Pick the best within so long a frame.")
 @click.option("--rate", type=click.FloatRange(0, 1, min_open=True), help="Pick the fastest that recognises this share.")
 @click.option("--build", type=existing_folder, help="A build of yours: mark it on the pictures.")
@@ -43,7 +55,18 @@ if TYPE_CHECKING:
     "--dask", "cluster", metavar="ADDRESS", help="Work on the cluster of this Dask scheduler, such as tcp://host:8786."
 )
 @json_flag
-def command(budget_us: float | None, rate: float | None, as_json: bool, **asked: Any) -> int:
+def command(
+    recordings: Path,
+    output: Path,
+    glove: Path | None,
+    stream: Path | None,
+    budget_us: float | None,
+    rate: float | None,
+    methods: tuple[str, ...] | None,
+    rivals: tuple[str, ...] | None,
+    as_json: bool,
+    **asked: Any,
+) -> int:
     """Show what accuracy costs in time: which switches, joints, rounds, tables, wirings and decisions are worth it.
 
     Every placement is screened by an honest cross-validation; those near the front are looked at closely, priced for
@@ -55,31 +78,120 @@ def command(budget_us: float | None, rate: float | None, as_json: bool, **asked:
         thenar frontier set.grasps -o frontier/ --budget-us 1500
         thenar compile set.grasps -o build/ --from frontier/frontier.json --point 7
     """
-    from thenar.compiler.frontier.preparing import Request, run_frontier
-    from thenar.compiler.frontier.study import Wanted
+    from thenar.compiler.frontier.find import Wanted, find_frontier
+    from thenar.compiler.frontier.search import Search
+    from thenar.compiler.placement.methods.base import usual
+    from thenar.compiler.recordings.graspset import GraspSet
+    from thenar.runtime.harness.loading import load_harness
 
     if budget_us is not None and rate is not None:
         raise click.UsageError("--budget-us and --rate each pick a point: give one of them.")
-    request = Request(wanted=Wanted(budget_us, rate), **asked)
+    wanted, harness = Wanted(budget_us, rate), None if glove is None else load_harness(glove)
+    search = Search(
+        methods=methods or usual(ours=True, wired=harness is not None),
+        rivals=usual(ours=False) if rivals is None else rivals,
+        **{name: asked.pop(name) for name in _SEARCHED},
+    )
     with progress("frontier") as report:
-        found = run_frontier(request, report)
+        found = find_frontier(
+            GraspSet.load(recordings),
+            output,
+            source=recordings.name,
+            harness=harness,
+            search=search,
+            wanted=wanted,
+            stream=None if stream is None else GraspSet.load(stream),
+            report=report,
+            **asked,
+        )
     if as_json:
         print_json(found)
     else:
-        _print(found, request.output)
-    if request.wanted.words and found.picked is None:
-        err().print(f"no point suits: {request.wanted.words} is beyond this frontier")
+        _print(found, output)
+    if wanted.words and found.picked is None:
+        err().print(f"no point suits: {wanted.words} is beyond this frontier")
         return 1
     return 0
 
 
 def _print(found: "Frontier", output: Path) -> None:
-    from thenar.compiler.frontier.drawing.words import featured
-
-    from .frontier_tables import print_frontier
+    from thenar.compiler.frontier.words import featured
 
     print_frontier(found)
     best = featured(found)
     if best is not None:
         made = f"thenar compile {found.source} -o build/ --from {output / 'frontier.json'} --point {best.number}"
         out().print(f"next: {made}", soft_wrap=True)
+
+
+def print_frontier(frontier: "Frontier") -> None:
+    """Print the points, the picked one bold; then checks, what was left out, and what the picture says."""
+    from rich.text import Text
+
+    from thenar.compiler.frontier.words import summary
+
+    console = out()
+    console.print(_grid(frontier))
+    console.print(
+        Text("rates with 95 % intervals; left out: each subject from the others; flash and RAM in bytes", "dim")
+    )
+    for check in frontier.checks:
+        console.print(Text(_check(check)))
+    for missing in frontier.skipped:
+        console.print(Text(missing, "yellow"))
+    console.print()
+    console.print(Text(summary(frontier), "bold"))
+
+
+def _grid(frontier: "Frontier") -> "Table":
+    from rich.table import Table
+    from rich.text import Text
+
+    grid = Table(title=Text(_title(frontier)))
+    for head in ("point", "switches"):
+        grid.add_column(head, justify="right")
+    for head in _WORDS:
+        grid.add_column(head)
+    for head in _NUMBERS:
+        grid.add_column(head, justify="right")
+    for point in frontier.points:
+        grid.add_row(*_cells(point), style="bold" if point.number == frontier.picked else None)
+    return grid
+
+
+def _title(frontier: "Frontier") -> str:
+    wanted = f"; {frontier.wanted}: point {frontier.picked}" if frontier.picked is not None else ""
+    return f"The best of {frontier.combinations:,} combinations, {frontier.source} on {frontier.target}{wanted}"
+
+
+def _cells(point: "Point") -> "tuple[Text, ...]":
+    from rich.text import Text
+
+    from thenar.compiler.frontier.words import way_of, wiring_of
+    from thenar.compiler.text import duration, interval
+
+    setting = point.setting
+    texts = (
+        str(point.number),
+        str(len(point.switches)),
+        setting.inputs,
+        way_of(setting),
+        f"{setting.rounds}, {setting.width}",
+        wiring_of(setting),
+        setting.scan if setting.clock_hz else "",
+        setting.decision,
+        interval(point.rate),
+        interval(point.left_out) if point.left_out is not None else "",
+        f"{duration(point.frame.us)} {point.frame.how}",
+        f"{duration(point.latency.mean_us)}, {duration(point.latency.p99_us)}",
+        f"{point.flash:,}",
+        f"{point.ram:,}",
+    )
+    return tuple(map(Text, texts))
+
+
+def _check(check: "Check") -> str:
+    return (
+        f"{check.what}, {check.how}: {check.n} times held against its model, "
+        f"off by {check.mean_error:.1%} in the mean, {check.worst_error:.1%} at worst"
+    )

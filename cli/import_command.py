@@ -9,7 +9,6 @@ from .common import existing_file, json_flag, keep_apart, out, output_file, prin
 from .lines import echo
 
 if TYPE_CHECKING:
-    from thenar.compiler.recordings.graspset import GraspSet
     from thenar.compiler.recordings.importer import ImportReport
 
 
@@ -34,28 +33,15 @@ def command(tables: tuple[Path, ...], output: Path, columns: Path | None, as_jso
     if output.suffix != ".grasps":
         raise click.BadParameter(f"{output.name}: a set of grasps ends in .grasps", param_hint="--output")
     keep_apart(*tables, columns, output)
+    from thenar.compiler.recordings.mcap_recording import import_files
+
     with progress(f"importing {', '.join(table.name for table in tables)}"):
-        grasp_set, report = _imported(tables, columns)
+        grasp_set, report = import_files(tables, columns)
     grasp_set.save(output)
     if as_json:
         print_json(report)
     else:
         _print(report, output)
-
-
-def _imported(tables: tuple[Path, ...], columns: Path | None) -> "tuple[GraspSet, ImportReport]":
-    from thenar.compiler.recordings.importer import import_file
-    from thenar.compiler.recordings.mcap_recording import import_recordings
-
-    if all(table.suffix.lower() == ".mcap" for table in tables):
-        if columns is not None:
-            raise click.UsageError("a recording says itself what its columns are: leave --columns out")
-        return import_recordings(tables)
-    if len(tables) > 1:
-        raise click.UsageError("several recordings (.mcap) can be imported together, but only one table")
-    if columns is None:
-        raise click.UsageError(f"{tables[0].name} is a table: say what its columns are with --columns")
-    return import_file(tables[0], columns)
 
 
 def _print(report: "ImportReport", output: Path) -> None:

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-import msgspec
 
 from .common import json_flag, keep_apart, output_file, print_json, progress
 from .lines import echo
@@ -58,9 +57,9 @@ def command(
     if scene is None:
         _list(as_json=as_json)
         return
-    from thenar.simulator.scenes.decode import own_file
+    from thenar.simulator.scenes.decode import load_scene, own_file
 
-    loaded = _load(scene, repetitions, seed, subjects)
+    loaded = load_scene(scene).varied(repetitions, seed, subjects)
     with _located(scene):
         if output is not None:
             keep_apart(own_file(scene), loaded.postures, output)
@@ -84,25 +83,6 @@ def _check_modes(scene: str | None, given: tuple[object, ...], *, keep_unsettled
         )
     if keep_unsettled and asked != ["--output"]:
         raise click.UsageError("--keep-unsettled is about the set that --output writes")
-
-
-def _load(name: str, repetitions: int | None, seed: int | None, subjects: tuple[str, ...]) -> "Scene":
-    """Return the scene, changed as asked for. Raises SceneError if it is none, or has no such subject."""
-    from thenar.runtime.names import nearest
-    from thenar.simulator.errors import SceneError
-    from thenar.simulator.scenes.decode import load_scene
-
-    scene = load_scene(name)
-    known = {subject.name: subject for subject in scene.subjects}
-    for subject in subjects:
-        if subject not in known:
-            raise SceneError(f"scene {scene.name} has no subject {subject!r}{nearest(subject, list(known))}")
-    return msgspec.structs.replace(
-        scene,
-        repetitions=scene.repetitions if repetitions is None else repetitions,
-        seed=scene.seed if seed is None else seed,
-        subjects=tuple(known[subject] for subject in known if not subjects or subject in subjects),
-    )
 
 
 @contextmanager
@@ -144,7 +124,7 @@ def _explain(scene: "Scene", jobs: int, *, as_json: bool) -> None:
 
 
 def _ablate(scene: "Scene", jobs: int, *, as_json: bool) -> None:
-    from .ablation import ablate
+    from thenar.simulator.running.ablation import ablate
 
     with progress(f"removing the effects of {scene.name}") as report:
         ablation = ablate(scene, jobs, report)
@@ -156,17 +136,10 @@ def _ablate(scene: "Scene", jobs: int, *, as_json: bool) -> None:
     print_ablation(ablation)
 
 
-class _Shipped(msgspec.Struct, frozen=True):
-    """A shipped scene: its name, and the first comment in its file."""
-
-    name: str
-    what: str
-
-
 def _list(*, as_json: bool) -> None:
-    from thenar.simulator.scenes import shipped
+    from thenar.simulator.scenes.decode import shipped_scenes
 
-    found = [_Shipped(name, file.read_text().partition("\n")[0].removeprefix("# ")) for name, file in shipped().items()]
+    found = shipped_scenes()
     if as_json:
         print_json(found)
         return

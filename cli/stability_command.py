@@ -97,12 +97,12 @@ def _write(result: "Report", jobs: int, path: Path) -> None:
 
 
 def _list(cases: tuple[str, ...], *, as_json: bool) -> None:
-    from thenar.stability.report import load
+    from thenar.stability.report import listed
 
-    from .stability_tables import Listed, print_list
-
-    found = [Listed(name, load(name).CASE.title, load(name).CASE.danger) for name in cases]
+    found = listed(cases)
     if as_json:
         print_json(found)
     else:
+        from .stability_tables import print_list
+
         print_list(found)

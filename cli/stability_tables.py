@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-import msgspec
 from rich.console import Console, JustifyMethod
 from rich.table import Table
 from rich.text import Text
@@ -10,6 +9,7 @@ from rich.text import Text
 from thenar.stability.report import (
     CaseReport,
     Check,
+    Listed,
     Report,
     besides,
     bound_of,
@@ -28,14 +28,6 @@ _NUMBERS = ("tried", "worst error")
 _CHECK, _REFERENCE = 0, 1  # the columns of words, which take what the others leave
 _NARROWEST = 8
 _GAP = 2
-
-
-class Listed(msgspec.Struct, frozen=True):
-    """A case of the catalogue."""
-
-    name: str
-    title: str
-    danger: str
 
 
 def print_list(cases: Sequence[Listed]) -> None:

@@ -7,6 +7,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from thenar.drivers.errors import ThenarError
+    from thenar.runtime.manifest import Options
+
     from .artifact.compile import compile_build
     from .artifact.documents import BuildReport, Documents
     from .artifact.errors import CompileError
@@ -14,15 +17,22 @@ if TYPE_CHECKING:
     from .artifact.verify import Verification, verify
     from .boosting.boost import BoostingError
     from .boosting.classifier import LogitBoostClassifier
+    from .evaluation.folds import EvaluationError
     from .evaluation.study import Study, evaluate
+    from .frontier.find import find_frontier
+    from .frontier.points import Frontier
+    from .frontier.search import Search
     from .placement.id3 import grow_id3
     from .placement.methods.base import METHODS
+    from .placement.selectors import ID3Selector, SwitchSelector
     from .recordings.graspset import GraspSet, Joint
     from .samples import Samples
     from .tables.collapse import ScoreTables
     from .trainers.base import TRAINERS, Setting, Trainer
 
 _HOMES = {
+    "thenar.drivers.errors": ("ThenarError",),
+    "thenar.runtime.manifest": ("Options",),
     ".artifact.compile": ("compile_build",),
     ".artifact.documents": ("BuildReport", "Documents"),
     ".artifact.errors": ("CompileError",),
@@ -30,9 +40,14 @@ _HOMES = {
     ".artifact.verify": ("Verification", "verify"),
     ".boosting.boost": ("BoostingError",),
     ".boosting.classifier": ("LogitBoostClassifier",),
+    ".evaluation.folds": ("EvaluationError",),
     ".evaluation.study": ("Study", "evaluate"),
+    ".frontier.find": ("find_frontier",),
+    ".frontier.points": ("Frontier",),
+    ".frontier.search": ("Search",),
     ".placement.id3": ("grow_id3",),
     ".placement.methods.base": ("METHODS",),
+    ".placement.selectors": ("ID3Selector", "SwitchSelector"),
     ".recordings.graspset": ("GraspSet", "Joint"),
     ".samples": ("Samples",),
     ".tables.collapse": ("ScoreTables",),
@@ -48,18 +63,26 @@ __all__ = [
     "BuildReport",
     "CompileError",
     "Documents",
+    "EvaluationError",
+    "Frontier",
     "GraspSet",
+    "ID3Selector",
     "Joint",
     "LogitBoostClassifier",
+    "Options",
     "Samples",
     "ScoreTables",
+    "Search",
     "Setting",
     "Study",
+    "SwitchSelector",
+    "ThenarError",
     "Trainer",
     "Verification",
     "compile",
     "compile_build",
     "evaluate",
+    "find_frontier",
     "grow_id3",
     "verify",
 ]

@@ -23,8 +23,11 @@ class PictureError(ThenarError, ValueError):
 
 
 @contextmanager
-def painting(font_size: float) -> Iterator[None]:
-    """Set matplotlib up for what is made and rendered inside. Raises PictureError if it is not installed."""
+def painting(font_size: float, *, letters: bool = False) -> Iterator[None]:
+    """Set matplotlib up for what is made and rendered inside. Raises PictureError if it is not installed.
+
+    With `letters`, text in SVG is text, in the font that the reader has, and not outlines.
+    """
     mpl = _matplotlib()
     with mpl.rc_context(), warnings.catch_warnings():
         mpl.rcdefaults()
@@ -37,6 +40,8 @@ def painting(font_size: float) -> Iterator[None]:
                 "text.parse_math": False,  # a dollar in a name is a dollar
             }
         )
+        if letters:
+            mpl.rcParams.update({"svg.fonttype": "none", "font.sans-serif": ["DejaVu Sans", "Verdana", "sans-serif"]})
         # A letter that the font lacks is drawn as a box; the rest of the picture is still worth having.
         warnings.filterwarnings("ignore", r"Glyph \d+ .* missing from font")
         yield

@@ -37,6 +37,13 @@ class Samples:
     ------
     SamplesError
         If the arrays do not fit together, or there are no rows.
+
+    Examples
+    --------
+    >>> from thenar.compiler import GraspSet, Samples
+    >>> samples = Samples.of(GraspSet.load("set.grasps"))
+    >>> samples.inputs.shape == (len(samples.labels), samples.n_switches + samples.codes.shape[1])
+    True
     """
 
     switches: NDArray[np.bool_]

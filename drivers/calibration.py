@@ -27,6 +27,12 @@ from .names import fault, shortened
 
 Raw = Annotated[int, msgspec.Meta(ge=1, le=255)]
 Name = Annotated[str, msgspec.Meta(min_length=1)]
+# Further than this a sensor does not wander in a hand held still, in counts.
+STEADY = 8
+# Real gloves move 50 to 140 counts from flat hand to fist; what moves less than this was not moved.
+LEAST_TRAVEL = 10
+_ENDS = (1, 255)
+_FINGERS = ("index", "middle", "ring", "little")
 
 
 class SensorCalibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -75,15 +81,6 @@ class GloveCalibration(
     def to_toml(self) -> str:
         """Return the calibration as the text of its file; numbers keep every digit."""
         return msgspec.toml.encode(self).decode("utf-8")
-
-
-# Further than this a sensor does not wander in a hand held still, in counts.
-STEADY = 8
-# Real gloves move 50 to 140 counts from flat hand to fist; what moves less than this was not moved.
-LEAST_TRAVEL = 10
-_ENDS = (1, 255)
-
-_FINGERS = ("index", "middle", "ring", "little")
 
 
 @dataclass(frozen=True, slots=True)

@@ -54,6 +54,24 @@ _STOPPED = STOP + b"\0"
 _LONGEST_S = 1.0
 _LONGEST = 4096  # bytes among which an answer is looked for; the information text has some hundreds
 _TRIES = 3
+# The rates that the box can be set to without a change inside it, the usual first.
+BAUD_RATES = (115_200, 38_400, 19_200, 9_600)
+# After it is switched on, a box says for a while that it is not ready.
+_READY_S = 1.0
+_NAMES = {18: SENSORS_18, 22: SENSORS_22}
+# When a poll is taken for lost: a record takes 27 ms at 9600 baud, an FTDI adapter adds 16.
+_POLLED_S = 0.2
+# When a glove is taken for dead of which no byte comes: soon, for it must be read again within a second of its return.
+_SILENT_S = 0.5
+# And when bytes come, but no record.
+_NOISY_S = 1.0
+_SILENT_PERIODS = 4
+# More than any line brings between two readings: what stood in buffers while the host was held up. It is read up to its
+# end, so far as that comes, before it is given times.
+_BACKLOG = 2048
+_LONGEST_BACKLOG = 1 << 18
+Timed = tuple[int, Record]
+Mode = Literal["stream", "poll"]
 
 
 class Dialogue:
@@ -100,14 +118,6 @@ def _complaint(command: Command, answer: Answer | None, baud: int) -> str:
     if answer is not None:
         return f"the CyberGlove answers {command.name} with an error: {answer.error}"
     return f"no CyberGlove answers {command.name} at {baud} baud: check its power, the cable and the baud rate"
-
-
-# The rates that the box can be set to without a change inside it, the usual first.
-BAUD_RATES = (115_200, 38_400, 19_200, 9_600)
-
-# After it is switched on, a box says for a while that it is not ready.
-_READY_S = 1.0
-_NAMES = {18: SENSORS_18, 22: SENSORS_22}
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,24 +270,6 @@ def _optional(dialogue: Dialogue, command: Command) -> bytes | None:
     except DeviceError:
         dialogue.hush()
         return None
-
-
-# When a poll is taken for lost: a record takes 27 ms at 9600 baud, an FTDI adapter adds 16.
-_POLLED_S = 0.2
-# When a glove is taken for dead of which no byte comes: soon, for it must be read again within a second of its return.
-_SILENT_S = 0.5
-# And when bytes come, but no record.
-_NOISY_S = 1.0
-_SILENT_PERIODS = 4
-# More than any line brings between two readings: what stood in buffers while the host was held up. It is read up to its
-# end, so far as that comes, before it is given times.
-_BACKLOG = 2048
-_LONGEST_BACKLOG = 1 << 18
-
-Timed = tuple[int, Record]
-
-
-Mode = Literal["stream", "poll"]
 
 
 class CyberGlove(Closing):

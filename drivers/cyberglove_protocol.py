@@ -51,6 +51,38 @@ _SLOTS = (
 
 MASK_18 = bytes.fromhex("3F BB 7B")
 MASK_22 = bytes.fromhex("7F FF 7F")
+STOP = b"\x03"  # Ctrl-C
+RESTART = b"\x12"  # Ctrl-R
+POLL, STREAM = b"G", b"S"  # also what their records begin with
+# What ?G says when all is well: bit 0 initialised, bit 1 glove connected (two of seven sources swap the bits).
+READY = 3
+_TEXT_END = b"\r\n\0"
+_ERRORS = {
+    b"?": "unknown command",
+    b"n": "wrong number of values, or a wrong value",
+    b"y": "the external synchronisation comes too fast",
+    b"g": "no glove is plugged in",
+    b"s": "sampling too fast",
+}
+# Bytes in the answer to ?X, by X; after X as a setting. docs/cyberglove.md says what each letter means.
+ANSWERED: Mapping[str, int] = (
+    dict.fromkeys("BDFGJLNQRSUWY", 1) | dict.fromkeys("KMP", 3) | dict.fromkeys("TV", 4) | {"A": 6}
+)
+SET: Mapping[str, int] = dict.fromkeys("BDFJLNQUWY", 1) | {"M": 3, "T": 4}
+TICKS_HZ = 115_200
+DIGITISED_US = 250.0
+FILTERED_US = 125.6
+_WORD = 0xFFFF
+Words = tuple[int, int]
+FASTEST: Words = (0, 0)
+SENSORS = 18
+# A record's length on the wire is its sensors plus these; the status byte is one more.
+OVERHEAD = 2
+# Bits of the status byte: a glove is plugged into the box; the wrist's switch; the wrist's light; always 1.
+PLUGGED, SWITCH, LIGHT, ALWAYS = 0x01, 0x02, 0x04, 0x80
+RecordFault = Literal["too fast", "unplugged"]
+_FAULTS: dict[bytes, RecordFault] = {b"es": "too fast", b"eg": "unplugged"}
+_ENDINGS: dict[RecordFault | None, bytes] = {None: b"", **{fault: ending for ending, fault in _FAULTS.items()}}
 
 
 def masked_sensors(mask: bytes) -> tuple[str, ...]:
@@ -62,29 +94,6 @@ def masked_sensors(mask: bytes) -> tuple[str, ...]:
 # The order on the wire. The 18-sensor glove has no sensors on the outermost finger joints; the wrist's are always last.
 SENSORS_18 = masked_sensors(MASK_18)
 SENSORS_22 = masked_sensors(MASK_22)
-
-
-STOP = b"\x03"  # Ctrl-C
-RESTART = b"\x12"  # Ctrl-R
-POLL, STREAM = b"G", b"S"  # also what their records begin with
-
-# What ?G says when all is well: bit 0 initialised, bit 1 glove connected (two of seven sources swap the bits).
-READY = 3
-
-_TEXT_END = b"\r\n\0"
-_ERRORS = {
-    b"?": "unknown command",
-    b"n": "wrong number of values, or a wrong value",
-    b"y": "the external synchronisation comes too fast",
-    b"g": "no glove is plugged in",
-    b"s": "sampling too fast",
-}
-
-# Bytes in the answer to ?X, by X; after X as a setting. docs/cyberglove.md says what each letter means.
-ANSWERED: Mapping[str, int] = (
-    dict.fromkeys("BDFGJLNQRSUWY", 1) | dict.fromkeys("KMP", 3) | dict.fromkeys("TV", 4) | {"A": 6}
-)
-SET: Mapping[str, int] = dict.fromkeys("BDFJLNQUWY", 1) | {"M": 3, "T": 4}
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,15 +186,6 @@ def _may_grow(command: Command, size: int) -> bool:
     return command.values is not None and size <= len(command.echo) + command.values
 
 
-TICKS_HZ = 115_200
-DIGITISED_US = 250.0
-FILTERED_US = 125.6
-_WORD = 0xFFFF
-
-Words = tuple[int, int]
-FASTEST: Words = (0, 0)
-
-
 def period_words(rate_hz: float | None) -> Words:
     """Return the two words that ask for the rate nearest to `rate_hz`; without one, for the fastest.
 
@@ -218,18 +218,6 @@ def shortest_us(sensors: int, baud: int, *, status: bool = False, filtered: bool
 def sending_us(size: int, baud: int) -> float:
     """Return how long `size` bytes take on the line, in microseconds: 8 data bits, a start bit, a stop bit."""
     return size * BITS_A_BYTE * 1e6 / baud
-
-
-SENSORS = 18
-# A record's length on the wire is its sensors plus these; the status byte is one more.
-OVERHEAD = 2
-
-# Bits of the status byte: a glove is plugged into the box; the wrist's switch; the wrist's light; always 1.
-PLUGGED, SWITCH, LIGHT, ALWAYS = 0x01, 0x02, 0x04, 0x80
-
-RecordFault = Literal["too fast", "unplugged"]
-_FAULTS: dict[bytes, RecordFault] = {b"es": "too fast", b"eg": "unplugged"}
-_ENDINGS: dict[RecordFault | None, bytes] = {None: b"", **{fault: ending for ending, fault in _FAULTS.items()}}
 
 
 @dataclass(frozen=True, slots=True)

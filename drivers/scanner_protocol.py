@@ -33,6 +33,16 @@ STATE = 0x02
 MAX_PAYLOAD = 250
 OVERHEAD = 6
 _SHORTEST = 4
+PROTOCOL = 1
+# What a HEARTBEAT carries besides its bitmap, and so how many keys a board can have.
+_TIME = Struct("<I")
+MOST_KEYS = 8 * (MAX_PAYLOAD - _TIME.size)
+# Flag of HELLO: keys stand in a matrix without diodes, where three closed corners of a rectangle close the fourth.
+WITHOUT_DIODES = 0x01
+# What GRASP says where no grasp type was recognised.
+NO_GRASP = 255
+# Flags of GRASP: an input was missing; the scan ended as soon as the rest of the switches could not matter.
+DEGRADED, EARLY = 0x01, 0x02
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,22 +155,6 @@ def from_bitmap(payload: bytes, keys: int) -> int:
     if bits >> keys:
         raise MessageError(f"a bitmap holds key {bits.bit_length() - 1} of a board of {keys} keys")
     return bits
-
-
-PROTOCOL = 1
-# What a HEARTBEAT carries besides its bitmap, and so how many keys a board can have.
-_TIME = Struct("<I")
-MOST_KEYS = 8 * (MAX_PAYLOAD - _TIME.size)
-
-WITHOUT_DIODES = 0x01
-"""Flag of HELLO: keys stand in a matrix without diodes, where three closed corners of a rectangle close the fourth."""
-
-
-NO_GRASP = 255
-"""What GRASP says where no grasp type was recognised."""
-
-DEGRADED, EARLY = 0x01, 0x02
-"""Flags of GRASP: an input was missing; the scan ended as soon as the rest of the switches could not matter."""
 
 
 @dataclass(frozen=True, slots=True)

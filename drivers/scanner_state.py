@@ -5,6 +5,15 @@ from time import monotonic_ns
 
 from .scanner_protocol import WITHOUT_DIODES, Event, FromBoard, Heartbeat, Hello, Lost, Mask, Ping, State
 
+_MODULUS = 1 << 32
+# A ceramic resonator is wrong by up to 0.5 %: so much the offset may grow between two frames, 1/128 of what has passed.
+_DRIFT_SHIFT = 7
+# How often a PING bounds the delay that all messages share; between two of them clocks drift apart by 2 ms at most.
+_PING_US = 250_000
+# At most this many PINGs are under way: an answer that takes longer than they do says nothing.
+_UNDER_WAY = 64
+_TOKENS = 0xFFFF
+
 
 def ambiguous(closed: Mask, rows: int, columns: int) -> Mask:
     """Return the keys, bits row * columns + column, that read closed but may be ghosts of others.
@@ -96,11 +105,6 @@ class BoardKeys:
             self.lost, self._has_lost = 0, True
 
 
-_MODULUS = 1 << 32
-# A ceramic resonator is wrong by up to 0.5 %: so much the offset may grow between two frames, 1/128 of what has passed.
-_DRIFT_SHIFT = 7
-
-
 class BoardClock:
     """Finds the offset between the clocks as the smallest delay seen, forgotten no faster than clocks drift apart.
 
@@ -146,13 +150,6 @@ class BoardClock:
             self._least = asked if self._least is None or self._guessed else max(self._least, asked)
             self._guessed = False
         return self._board + self._offset
-
-
-# How often a PING bounds the delay that all messages share; between two of them clocks drift apart by 2 ms at most.
-_PING_US = 250_000
-# At most this many PINGs are under way: an answer that takes longer than they do says nothing.
-_UNDER_WAY = 64
-_TOKENS = 0xFFFF
 
 
 class BoardTimes:

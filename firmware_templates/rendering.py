@@ -1,12 +1,17 @@
 """A template of C and values in, text out."""
 
 from functools import lru_cache
+from importlib.metadata import version
+from typing import TYPE_CHECKING
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 
 @lru_cache(maxsize=1)
-def _environment() -> Environment:
+def _environment() -> "Environment":
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
     return Environment(
         loader=PackageLoader(__package__, "."),
         undefined=StrictUndefined,
@@ -20,6 +25,8 @@ def _environment() -> Environment:
 def render(template: str, **values: object) -> str:
     """Return the text of the template `template`, a path below this package that ends in ".j2".
 
-    Raises jinja2's UndefinedError where the template asks for a value that is not given.
+    A template may say where its text is from: `origin`. Raises jinja2's UndefinedError where it asks for a value that
+    is not given.
     """
-    return _environment().get_template(template).render(**values)
+    origin = f"thenar {version('thenar')}, template {template}."
+    return _environment().get_template(template).render(origin=origin, **values)

@@ -58,6 +58,19 @@ Progress = Callable[[int, int], None]
 _KILLED = "not finished: a worker process ended before its work was done, perhaps for want of memory"
 
 
+class Listed(msgspec.Struct, frozen=True):
+    """A case of the catalogue."""
+
+    name: str
+    title: str
+    danger: str
+
+
+def listed(names: Sequence[str]) -> list[Listed]:
+    """Return what the cases `names` are, and what could go wrong in each."""
+    return [Listed(name, *msgspec.structs.astuple(load(name).CASE)) for name in names]
+
+
 class Check(msgspec.Struct, frozen=True):
     """A finding and the verdict on it."""
 

@@ -16,10 +16,13 @@ from ..boosting.classifier import LogitBoostClassifier
 from ..boosting.stumps import Stumps
 from ..evaluation.folds import weka_folds
 from ..firmware.board import Board
+from ..firmware.classifier import LIBRARY_NAME
 from ..firmware.folder import write_folder
-from ..firmware.generate import Mode, Request, firmware_files, fit_of
-from ..firmware.library_names import LIBRARY_NAME
+from ..firmware.generate import Firmware
+from ..firmware.targets.base import Mode
+from ..placement.methods.base import METHODS, PAPERS
 from ..placement.placement import information_alone
+from ..placement.selectors import SwitchSelector
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
 from ..tables.collapse import Model, ScoreTables
@@ -39,7 +42,7 @@ class Build(LoadedBuild):
     >>> from thenar.compiler import Build, GraspSet, compile_build
     >>> report = compile_build(GraspSet.load("set.grasps"), "build", rounds=3, folds=0)
     >>> sorted(path.name for path in Build.load("build").export_c("firmware", "host"))[:2]
-    ['Makefile', 'host.c']
+    ['Makefile', 'check.c']
     """
 
     __slots__ = ()
@@ -62,7 +65,7 @@ class Build(LoadedBuild):
         folder : path
             The folder to write.
         target : str
-            A platform of `thenar firmware --target`.
+            What `thenar firmware --target` calls it: one of `thenar.compiler.firmware.targets.TARGETS`.
         mode : {"classify", "scan", "glove"}
             The classifier alone, a board that scans, or a glove that recognises by itself.
         board : Board, optional
@@ -76,12 +79,12 @@ class Build(LoadedBuild):
 
         Raises
         ------
+        MemberError
+            If there is no such target.
         FirmwareError
             If the target cannot hold the build, or these do not go together.
         """
-        request = Request(self, target, mode, name, board, flash)
-        fit = fit_of(request)
-        files = firmware_files(request, fit, fit.notes())
+        files = Firmware(self.tables, self.manifest, target, mode, name, board, flash).files()
         write_folder(files, Path(folder), overwrite=overwrite)
         return tuple(Path(folder) / path for path in files)
 
@@ -153,8 +156,8 @@ def compile(  # noqa: A001
         raise CompileError(f"the estimator has a model that {fault}: fit it on these recordings")
     inputs: Inputs = "both" if switches and joints else "switches" if switches else "joints"
     options = Options(inputs=inputs, folds=folds, seed=seed, table_bits=table_bits, width=width, placement="estimator")
-    options = _trained_by(classifier, options)
-    trained = Trained(switches, information_alone(samples, switches), None, model)
+    options, gains = _placed_by(estimator, _trained_by(classifier, options))
+    trained = Trained(switches, gains or information_alone(samples, switches), None, model)
     made = Making(grasp_set, samples, joints, options, trained, harness)
     tested = _tested(estimator, grasp_set, samples, options, progress) if folds else None
     return made.publish(target, tested, documents, progress)
@@ -206,6 +209,21 @@ def _model(classifier: Any, columns: Columns, n_switches: int) -> Model:
             "stumps_ or tables_, such as LogitBoostClassifier"
         )
     return tables
+
+
+def _placed_by(estimator: Any, options: Options) -> tuple[Options, tuple[float, ...]]:
+    """Return the options with the method of the one SwitchSelector of a pipeline, if it has one; and what each switch,
+    in the order of the columns, brought to the tree of ID3.
+    """
+    steps = [step for _, step in getattr(estimator, "steps", ())]
+    steps += [part for step in steps for part in getattr(step, "named_transformers_", {}).values()]
+    selectors = [step for step in steps if isinstance(step, SwitchSelector)]
+    if len(selectors) != 1:
+        return options, ()
+    selector, method = selectors[0], METHODS.named(selectors[0].method)
+    parameter = {"keep": selector.n_switches} if method.by_number else {"prune": selector.min_samples}
+    gains = tuple(selector.gains_[np.argsort(selector.order_)].tolist()) if method.name == PAPERS else ()
+    return structs.replace(options, placement=method.name, **parameter), gains
 
 
 def _trained_by(classifier: Any, options: Options) -> Options:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME
 
-from ..firmware.library_names import FIRMWARE_NAME, LIBRARY_FILES
+from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES
 from ..glove.files import NAMES, users_files
 from ..publication import check_folder, publish_folder, sweep
 from .documents import REPORT_NAME, SPEC_FOLDER

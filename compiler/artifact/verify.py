@@ -21,7 +21,7 @@ from .documents import Progress
 from .ensemble import MAX_BYTES, ensemble_from_bytes, model_fault
 from .errors import CompileError
 from .select import select_inputs
-from .verify_firmware import FirmwareVerification, Kind, verify_firmware
+from .verify_firmware import FirmwareVerification, verify_firmware
 
 
 class ChangedRow(Struct, frozen=True):
@@ -75,7 +75,7 @@ class Verification(Struct, frozen=True, kw_only=True):
 def verify(
     folder: str | Path,
     grasp_set: GraspSet,
-    firmware: Sequence[Kind] = (),
+    firmware: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> Verification:
     """Compare a build's model, float tables and integer tables on every row of recordings, and beyond them.

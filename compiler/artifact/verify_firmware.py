@@ -17,24 +17,18 @@ from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.tables import IntegerTables
 
 from ..firmware.answers import Answers
-from ..firmware.choose import choose
-from ..firmware.classifier import classifier_files
+from ..firmware.choose import Fit, fit_for, smallest_fit
+from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES, LIBRARY_NAME, Library, classifier_files
 from ..firmware.errors import FirmwareError
 from ..firmware.folder import LARGEST
-from ..firmware.host_runner import run as run_on_host
-from ..firmware.library import Fit, library_files, smallest_fit
-from ..firmware.library_names import FIRMWARE_NAME, LIBRARY_FILES, LIBRARY_NAME
 from ..firmware.probes import Probes, extreme_frames, joined, random_frames
-from ..firmware.running import run, toolchain_missing
 from ..firmware.targets import TARGETS
+from ..firmware.targets import kinds as every_kind
 from ..recordings.graspset import GraspSet
 from .select import select_inputs
 
-Kind = Literal["host", "avr", "cortex-m"]
-KINDS: tuple[Kind, ...] = ("host", "avr", "cortex-m")
 RANDOM_FRAMES = 10_000
 _SEED = 1
-_CORES = ("cortex-m0plus", "cortex-m4")
 Answer = Literal["classify", "update"]
 ANSWERS: tuple[Answer, ...] = ("classify", "update")
 
@@ -50,7 +44,7 @@ def made_firmware(manifest: Manifest, tables: IntegerTables) -> tuple[dict[str, 
     """Return path in the build -> text of its firmware, and a sentence that says what for, or why there is none."""
     try:
         fit = smallest_fit(tables)
-        made = library_files(manifest, fit)
+        made = Library(LIBRARY_NAME, manifest, fit.choice.layout, fit.target.avr, fit.notes()).files
     except FirmwareError as reason:
         return {}, f"no firmware: {reason}"
     return {f"{FIRMWARE_NAME}/{name}": text for name, text in made.items()}, f"firmware {fit.words}"
@@ -141,11 +135,9 @@ class FirmwareTrial:
 
     def _run(self, fit: Fit, *, incremental: bool) -> Answers:
         layout, target = fit.choice.layout, fit.target
-        files = classifier_files(LIBRARY_NAME, self._build.manifest, layout, avr=target.kind == "avr")
+        files = classifier_files(LIBRARY_NAME, self._build.manifest, layout, avr=target.avr)
         frames = layout.frame_bytes(self._frames.bits, self._frames.codes)
-        if target.kind == "host":
-            return run_on_host(files, LIBRARY_NAME, layout, target, frames, incremental=incremental, sanitize=True)
-        return run(files, LIBRARY_NAME, layout, target, frames, incremental=incremental)
+        return target.run(files, LIBRARY_NAME, layout, frames, incremental=incremental)
 
     def _difference(self, frame: int, answers: Answers) -> Difference:
         build, bits, codes = self._build, self._frames.bits[frame], self._frames.codes[frame]
@@ -190,21 +182,23 @@ class FirmwareVerification(Struct, frozen=True, kw_only=True):
 def verify_firmware(
     folder: str | Path,
     grasp_set: GraspSet,
-    kinds: Sequence[Kind],
+    kinds: Sequence[str],
     progress: Callable[[int, int], None] | None = None,
 ) -> FirmwareVerification:
     """Hold the classifiers that gcc makes for `kinds` against Python: every row, extreme frames, 10,000 random ones.
 
     "host" runs with the address and undefined behaviour sanitizers, "avr" is the smallest AVR that the classifier fits,
     "cortex-m" both cores. Each is run from nothing for every frame, and once more from the changes between frames, on
-    "host" and "cortex-m" with every switch set by set_switch() and every name asked for. Of a
-    build that no AVR holds, host runs the layout of the larger core. Raises FirmwareError where a tool is missing or a
-    part cannot hold the build, else as `verify` does.
+    "host" and "cortex-m" with every switch set by set_switch() and every name asked for. Of a build that no AVR holds,
+    host runs the layout of the larger core. Raises FirmwareError where a tool is missing, a kind is none of
+    `firmware.targets.kinds()`, or a part cannot hold the build, else as `verify` does.
     """
+    if unknown := [kind for kind in kinds if kind not in every_kind()]:
+        raise FirmwareError(f"nothing runs firmware for {unknown[0]!r}: choose among {', '.join(every_kind())}")
     build = Build.load(folder)
-    fits = [fit for kind in KINDS if kind in kinds for fit in _fits(build.tables, kind)]
+    fits = [fit for kind in every_kind() if kind in kinds for fit in _fits(build.tables, kind)]
     for fit in fits:
-        if lack := toolchain_missing(fit.target):
+        if lack := fit.target.missing():
             raise FirmwareError(f"firmware for {fit.target.part} cannot be tried here: {lack}")
     bits, codes = select_inputs(grasp_set, build.manifest)
     extreme, random = extreme_frames(build.tables), random_frames(build.tables, RANDOM_FRAMES, _SEED)
@@ -224,12 +218,9 @@ def verify_firmware(
     )
 
 
-def _fits(tables: IntegerTables, kind: Kind) -> list[Fit]:
-    """Return the parts to try, each with its layout. Of a build that no AVR holds, host takes a larger part's."""
-    match kind:
-        case "host":
-            return [Fit(TARGETS["host"], smallest_fit(tables).choice)]
-        case "avr":
-            return [smallest_fit(tables, avr=True)]
-        case "cortex-m":
-            return [Fit(TARGETS[core], choose(tables, TARGETS[core])) for core in _CORES]
+def _fits(tables: IntegerTables, kind: str) -> list[Fit]:
+    """Return the parts of a kind to try, each with its layout: of parts that are alike, the smallest that will do."""
+    targets = [target for target in TARGETS.values() if target.kind == kind]
+    if all(target.alike for target in targets):
+        return [smallest_fit(tables, kind=kind)]
+    return [fit_for(target, tables) for target in targets]

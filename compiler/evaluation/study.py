@@ -1,9 +1,9 @@
 """An evaluation: the paper's tables for the user's own recordings, from fits that are each done once."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from statistics import fmean
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ..limits import check_memory, check_types
 from ..placement.methods.base import METHODS
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
+from ..text import counted, interval
 from ..trainers.base import Training, changed
 from .fits import Fit, Labels, Progress, is_blind, run_fits
 from .folds import EvaluationError
@@ -22,6 +23,13 @@ from .rates import Average, Rate
 
 Predictions = Mapping[Fit, Labels]
 Confusion = tuple[tuple[int, ...], ...]
+
+_TITLES: dict[TableName, str] = {
+    "compositions": "Compositions of inputs (the paper's Tables II and V)",
+    "generality": "One subject's placement (row) on another's data (column), selected switches (Tables III and VI)",
+    "pruning": "Placement of all subjects pooled, pruned by S, selected switches (Tables IV and VII)",
+    "baselines": "ID3 beside other placements of as many switches, selected switches",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +45,10 @@ class Spread:
         """Return the spread of one or more values."""
         listed = list(values)
         return cls(min(listed), fmean(listed), max(listed))
+
+    def __str__(self) -> str:
+        """Return "33", or "31 to 35"."""
+        return f"{self.least:g}" if self.least == self.most else f"{self.least:g} to {self.most:g}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +66,11 @@ class Cell:
     no_inputs: int
     draws: Spread | None
     confusion: Confusion | None
+
+    def __str__(self) -> str:
+        """Return rate and interval in percent, starred where fits had no inputs; the draws' spread on a second line."""
+        draws = "" if self.draws is None else f"\nfrom {100 * self.draws.least:.1f} to {100 * self.draws.most:.1f}"
+        return f"{interval(self.rate)}{'*' if self.no_inputs else ''}{draws}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +92,17 @@ class Table:
     protocol: ProtocolName
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
+
+    @property
+    def title(self) -> str:
+        """What the table shows."""
+        return f"{_TITLES[self.name]}: {self.protocol} protocol"
+
+    @property
+    def note(self) -> str:
+        """What a star means, in a sentence; "" where there is none."""
+        starred = any(cell.no_inputs for row in self.rows for cell in row.cells)
+        return "* In some folds no input varied: there, the most frequent grasp type is answered." if starred else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,16 +216,62 @@ class Study:
     left_out: tuple[LeftOut, ...]
     tables: tuple[Table, ...]
 
+    def __str__(self) -> str:
+        """Return how many rows there are, and how they were cut."""
+        options, repeats = self.options, counted(self.options.repeats, "repeat")
+        cut = {
+            "stratified": f"{options.folds} stratified folds, {repeats} from seed {options.seed}",
+            "subject": "one subject left out at a time (the column), all others trained on",
+            "object": "one object left out at a time",
+            "block": f"{options.folds} blocks of trials",
+        }[options.scheme]
+        grasps = counted(len(self.grasps), "grasp type")
+        return f"{self.rows:,} rows, {grasps}; {cut}; {options.rounds} rounds; rates in % with 95 % intervals"
+
 
 def evaluate(
-    grasp_set: GraspSet, options: Options | None = None, jobs: int = -1, progress: Progress | None = None
+    grasp_set: GraspSet,
+    options: Options | None = None,
+    jobs: int = -1,
+    progress: Progress | None = None,
+    **changes: Any,
 ) -> Study:
-    """Return the tables that `options` ask for and the set has the inputs for.
+    """Cross-validate: return the paper's tables that `options` ask for and the set has the inputs for.
 
-    The result is the same for any number of `jobs` (worker processes; -1: all cores).
-    Raises EvaluationError if the set cannot be cut as asked, MemberError for a rival that is no method.
+    Parameters
+    ----------
+    grasp_set : GraspSet
+        The recordings.
+    options : Options, optional
+        What to evaluate, and how.
+    jobs : int
+        Worker processes; -1: all cores. The result is the same for any number of them.
+    progress : callable, optional
+        Called with (done, total) after each classifier.
+    **changes
+        Single options, such as `folds=5`, instead of those in `options`.
+
+    Returns
+    -------
+    Study
+        The tables, of rates in 0..1 with 95 % intervals, and what to beware of.
+
+    Raises
+    ------
+    EvaluationError
+        If the set cannot be cut as asked.
+    MemberError, TrainerError
+        For a rival that is no method, or a trainer that is not there or takes no such setting.
+
+    Examples
+    --------
+    >>> from thenar.compiler import GraspSet, evaluate
+    >>> tables = {"tables": ("compositions",), "protocols": ("honest",)}
+    >>> study = evaluate(GraspSet.load("set.grasps"), jobs=1, folds=2, repeats=1, rounds=2, **tables)
+    >>> 0 <= study.tables[0].rows[0].average.mean <= 1
+    True
     """
-    options = options or Options()
+    options = replace(options or Options(), **changes)
     for name in options.rivals:
         if not METHODS.named(name).by_number:
             raise EvaluationError(f"{name} takes S: a rival is a method that takes a number of switches")

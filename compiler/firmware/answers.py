@@ -6,10 +6,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.firmware_templates.rendering import render
+
+from .costs import Unit
 from .errors import FirmwareError
 from .layout import Layout
 
-Unit = Literal["cycles", "instructions", ""]
 Frames = NDArray[np.uint8]
 
 
@@ -29,15 +31,15 @@ class Answers:
     stack: int | None = None
     names: tuple[str, ...] | None = None
 
-
-def frame_size(layout: Layout) -> int:
-    """Return F, the bytes of a frame as `Layout.frame_bytes` makes them."""
-    return len(layout.groups) + layout.padding + len(layout.joints) * layout.code_bits // 8
+    @property
+    def most(self) -> int:
+        """What the slowest answer took, where it was counted."""
+        return 0 if self.cost is None else int(self.cost.max())
 
 
 def check_frames(frames: Frames, layout: Layout) -> None:
     """Raise FirmwareError unless `frames` is uint8 (n, F)."""
-    size = frame_size(layout)
+    size = layout.frame_size
     if frames.dtype != np.uint8 or frames.ndim != 2 or frames.shape[1] != size:
         raise FirmwareError(f"frames are {frames.dtype} {frames.shape}, this layout takes uint8 (n, {size})")
 
@@ -63,3 +65,24 @@ def answers_from(printed: bytes, frames: Frames, layout: Layout) -> Answers:
         raise FirmwareError(f"the program printed {len(printed)} bytes for {len(frames)} frames of {2 * size} bytes")
     words = np.frombuffer(printed, "<u2").astype(np.uint16).reshape(len(frames), size)
     return Answers(words[:, :-1].view(np.int16), words[:, -1])
+
+
+def record_files(
+    name: str, layout: Layout, machine: Literal["host", "cortex"], answer: Literal["classify", "update"]
+) -> dict[str, str]:
+    """Return the files, name -> text, of the program that answers frames with the function `answer` of `name`.
+
+    For classify() it writes the groups' bytes into the input; for update() it calls set_switch() for every switch.
+    """
+    record = render(
+        "checking/record.h.j2",
+        name=name,
+        classes=len(layout.start),
+        sizes=[len(numbers) for numbers in layout.groups],
+        by_switch=answer == "update",
+        padding=layout.padding,
+        joints=len(layout.joints),
+        code_bytes=layout.code_bits // 8,
+        frame_bytes=layout.frame_size,
+    )
+    return {"record.h": record, "main.c": render(f"checking/{machine}_main.c.j2", name=name, answer=answer)}

@@ -6,18 +6,131 @@ cycle, a code of 16 bits below a joint's bins another, and a search for a code's
 C: its cycles are those of avr-gcc 5.4 with -Os.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .assembly import calls_are_near
-from .avr_instructions import Code, code, together
-from .joint_layout import JointLayout
-from .layout import Layout
-from .parts import parts_of
-from .searching import Search
-from .targets import Target
+from .costs import NAME_BYTES, Cost
+from .layout import JointLayout, Layout
+
+# AVR Instruction Set Manual, DS40002198, table 5-1: cores AVRe (ATmega328P) and AVRe+ (ATmega2560), whose program
+# counter of three bytes makes calls and returns a cycle longer. A conditional branch is one that is not taken.
+_ONE = "adc add and brcc breq brge brlo brne clr cp cpc cpi cpse eor ldi mov movw sbc sbci sub subi tst"
+_TWO = "ld lds mul pop push rjmp st sts taken"
+_CYCLES = dict.fromkeys(_ONE.split(), 1) | dict.fromkeys(_TWO.split(), 2) | {"lpm": 3, "jmp": 3, "skip": 3}
+_CALLS = {"rcall": 3, "call": 4, "ret": 4}
+_WORDS = {"lds": 2, "sts": 2, "call": 2, "jmp": 2, "taken": 0, "skip": 0}
+
+
+@dataclass(frozen=True, slots=True)
+class Code:
+    """Instructions in sequence: how often a call or return is among them, the cycles of all others, and their bytes."""
+
+    cycles: int = 0
+    calls: int = 0
+    size: int = 0
+
+    def __add__(self, other: Self) -> "Code":
+        return Code(self.cycles + other.cycles, self.calls + other.calls, self.size + other.size)
+
+    def __mul__(self, times: int) -> "Code":
+        return Code(times * self.cycles, times * self.calls, times * self.size)
+
+    def takes(self, counter_bytes: int) -> int:
+        """Return the cycles where the program counter has that many bytes, 2 or 3."""
+        return self.cycles + self.calls * (counter_bytes - 2)
+
+
+@cache
+def code(text: str) -> Code:
+    """Return the instructions whose mnemonics `text` holds; "taken" is a branch that is, "skip" one over a `jmp`, each
+    of which takes no room, standing for what is in the text of the other path.
+    """
+    words = text.split()
+    return Code(
+        cycles=sum(_CALLS[word] if word in _CALLS else _CYCLES[word] for word in words),
+        calls=sum(word in _CALLS for word in words),
+        size=2 * sum(_WORDS.get(word, 1) for word in words),
+    )
+
+
+def together(pieces: Iterable[Code]) -> Code:
+    """Return all pieces in sequence."""
+    return sum(pieces, Code())
+
+
+# The search for a code's row, as avr-gcc 5.4 makes it of find() and below(). Another compiler may make something else
+# of it: where cycles matter, there are layouts without a search.
+# classify() calls find() and jumps on; find() saves four registers, and calls below() for each joint.
+_CLASSIFY, _FIND = code("call jmp"), code("push push push push ldi ldi ldi ldi pop pop pop pop ret")
+_JOINT = {8: code("movw ld ldi ldi ldi call st"), 16: code("movw ld ld ldi ldi ldi call st")}
+_BELOW = {
+    8: code("movw ldi movw add adc and taken ret"),
+    16: code("push push movw ldi movw add adc and taken pop pop ret"),
+}
+_STEP = {
+    8: code("and breq mov mov movw add adc subi sbci lpm cp").cycles,
+    16: code("and breq mov mov movw add adc add adc subi sbci lpm lpm cp cpc").cycles,
+}
+_RIGHT, _LEFT = code("brcc ldi add add subi sub rjmp movw add adc").cycles, code("taken mov rjmp").cycles
+_BYTES, _BYTES_EACH = 160, 20  # of code, rounded up
+
+
+class Search:
+    """The search in the thresholds of `joints`, for codes of 8 or 16 bits on an AVR of `counter_bytes`, 2 or 3, in its
+    program counter.
+    """
+
+    __slots__ = ("_code_bits", "_counter", "_joints")
+
+    def __init__(self, joints: Sequence[JointLayout], code_bits: int, counter_bytes: int) -> None:
+        self._joints, self._code_bits, self._counter = joints, code_bits, counter_bytes
+
+    @property
+    def fixed_cycles(self) -> int:
+        """Cycles of finding all rows, without the steps of the searches."""
+        each = _JOINT[self._code_bits] + _BELOW[self._code_bits]
+        return (_CLASSIFY + _FIND + each * len(self._joints)).takes(self._counter)
+
+    @property
+    def most_cycles(self) -> int:
+        """The most cycles of all steps of all searches."""
+        return sum(int(_steps(len(joint.thresholds), self._code_bits).max()) for joint in self._joints)
+
+    def cycles(self, joint: JointLayout, codes: NDArray[np.uint16]) -> NDArray[np.int64]:
+        """Return the cycles of the steps for each of the joint's codes (n,)."""
+        return _steps(len(joint.thresholds), self._code_bits)[joint.bin_of(codes)]
+
+    @property
+    def flash(self) -> int:
+        """Bytes of thresholds and code, at most."""
+        thresholds = sum(len(joint.thresholds) for joint in self._joints)
+        return thresholds * self._code_bits // 8 + _BYTES + _BYTES_EACH * len(self._joints)
+
+    @property
+    def stack(self) -> int:
+        """Bytes of stack: the return addresses of classify(), find() and below(), and the registers that they save."""
+        return 3 * self._counter + 4 + (2 if self._code_bits == 16 else 0)
+
+
+@lru_cache(maxsize=1024)
+def _steps(n_thresholds: int, code_bits: int) -> NDArray[np.int64]:
+    """Return the cycles of all steps for a code above 0, 1, ... n of the thresholds: (n + 1,)."""
+    cycles = np.zeros(n_thresholds + 1, np.int64)
+    for below in range(n_thresholds + 1):
+        found, count = 0, n_thresholds
+        while count:
+            half = count // 2
+            right = found + half < below
+            cycles[below] += _STEP[code_bits] + (_RIGHT if right else _LEFT)
+            found, count = (found + half + 1, count - half - 1) if right else (found, half)
+    return cycles
+
 
 # Pairs of registers that a function need not keep, and those that can be loaded with a constant; as in assembly.py.
 _FREE_PAIRS, _IMMEDIATE_PAIRS = 5, 7
@@ -30,19 +143,32 @@ _SET_SWITCH, _GRASP, _PAGE = 80, 40, 256
 _CLAMPED = Code(1)
 
 
+Frame = tuple[NDArray[np.bool_], NDArray[np.uint16]]
+
+_DRAWN, _CLIMBED, _ROUNDS = 4096, 8, 20
+
+
 class AvrCosts:
-    """The costs of a layout on an AVR of `counter_bytes`, 2 or 3, in its program counter."""
+    """The costs of a layout on an AVR of so many bytes of flash, of which depends how wide its program counter is."""
 
     __slots__ = ("_counter", "_layout", "_parts", "_search", "_steps", "_width")
 
-    def __init__(self, layout: Layout, target: Target) -> None:
-        parts = parts_of(layout.tables.n_classes)
+    def __init__(self, layout: Layout, flash: int) -> None:
+        parts = layout.parts
         self._layout, self._parts, self._width = layout, len(parts.firsts), parts.width
-        self._counter = 3 if target.flash > 128 << 10 else 2
+        self._counter = 3 if flash > 128 << 10 else 2
         joints = [joint for joint in layout.joints if not joint.constant]
         searched = layout.bins == "search" and joints
         self._search = Search(joints, layout.code_bits, self._counter) if searched else None
         self._steps = [code("")] * len(layout.groups) + [self._row_number(joint) for joint in joints]
+
+    @property
+    def cost(self) -> Cost:
+        """What the classifier takes at most, a few bytes more of flash and RAM."""
+        names = NAME_BYTES * (self._layout.tables.n_classes + 1)
+        flash = self.flash + names
+        update = self._update.size  # in a section of its own
+        return Cost(self.most_cycles, self.most_update_cycles, flash, flash - update, self.ram)
 
     @property
     def fixed_cycles(self) -> int:
@@ -122,21 +248,11 @@ class AvrCosts:
         return tables + assembly.size + searching + _GRASP + (_SET_SWITCH if layout.groups else 0)
 
     @property
-    def update_flash(self) -> int:
-        """Bytes of `flash` that are update()'s alone, which stands in a section of its own."""
-        return self._update.size
-
-    @property
     def ram(self) -> int:
         """Bytes of variables and of the deepest stack, return address included."""
         found = len(self._steps) - len(self._layout.groups) if self._search else 0
         scores = 2 * self._layout.tables.n_classes
-        return self._frame_bytes + scores + len(self._steps) + found + self._stack
-
-    @property
-    def _frame_bytes(self) -> int:
-        layout = self._layout
-        return len(layout.groups) + layout.padding + layout.tables.n_joints * layout.code_bits // 8
+        return self._layout.frame_size + scores + len(self._steps) + found + self._stack
 
     @property
     def _stack(self) -> int:
@@ -238,3 +354,60 @@ class AvrCosts:
         """Return the check that tables lie within reach of lpm, where there is flash beyond it."""
         tables = 2 if self._layout.bins != "search" and len(self._steps) > len(self._layout.groups) else 1
         return code(text) * tables if self._counter == 3 else Code()
+
+
+def worst_frame(layout: Layout) -> Frame:
+    """Return bits (s,) and codes (j,) of a frame than which none was found to take longer on an AVR; the same one every
+    time.
+
+    All frames take the same instructions but where a class is better than all before it, a code of 16 bits lies below
+    its bins, or a code is searched for. So the worst frame is the one that adds up most of these, alike on all parts.
+    It is sought by a climb from random frames, one input at a time, and proved the worst where it reaches the bound.
+    """
+    costs = AvrCosts(layout, 0)
+    random = np.random.default_rng(0)
+    choices = [_codes(layout, number) for number in range(layout.tables.n_joints)]
+    bits = random.random((_DRAWN, layout.tables.n_switches)) < 0.5
+    codes = np.empty((_DRAWN, len(choices)), np.uint16)
+    for column, some in zip(codes.T, choices, strict=True):
+        column[:] = random.choice(some, _DRAWN)
+    order = np.argsort(-costs.varying_cycles(bits, codes), kind="stable")[:_CLIMBED]
+    climbed = [_climb(costs, (bits[row], codes[row]), choices) for row in order]
+    return max(climbed, key=lambda frame: _cycles(costs, frame))
+
+
+def _codes(layout: Layout, number: int) -> NDArray[np.uint16]:
+    """Return codes of a joint that differ in row or time: the least of each bin and, below all bins, zero."""
+    steps = layout.joints[number].thresholds.astype(np.int64) + 1
+    return np.concatenate([[0], steps[steps < 1 << layout.code_bits]]).astype(np.uint16)
+
+
+def _climb(costs: AvrCosts, frame: Frame, choices: list[NDArray[np.uint16]]) -> Frame:
+    """Return what the frame becomes by taking, again and again, the best of those that differ in one input."""
+    for _ in range(_ROUNDS):
+        bits, codes = _neighbours(frame, choices)
+        cycles = costs.varying_cycles(bits, codes)
+        best = int(cycles.argmax())
+        if cycles[best] <= cycles[0]:
+            break
+        frame = bits[best], codes[best]
+    return frame
+
+
+def _neighbours(frame: Frame, choices: list[NDArray[np.uint16]]) -> tuple[NDArray[np.bool_], NDArray[np.uint16]]:
+    """Return the frame itself, then all that differ from it in one input: bits (n, s) and codes (n, j)."""
+    bits, codes = frame
+    n = 1 + len(bits) + sum(map(len, choices))
+    all_bits, all_codes = np.tile(bits, (n, 1)), np.tile(codes, (n, 1))
+    flipped = np.arange(len(bits))
+    all_bits[1 + flipped, flipped] ^= True
+    at = 1 + len(bits)
+    for joint, some in enumerate(choices):
+        all_codes[at : at + len(some), joint] = some
+        at += len(some)
+    return all_bits, all_codes
+
+
+def _cycles(costs: AvrCosts, frame: Frame) -> int:
+    bits, codes = frame
+    return int(costs.varying_cycles(bits[np.newaxis], codes[np.newaxis])[0])

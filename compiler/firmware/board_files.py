@@ -1,21 +1,146 @@
 """The firmware of a board but for its classifier and its protocol: from the clock to main() and the Makefile."""
 
-from collections.abc import Sequence
-from typing import Literal
+from collections.abc import Collection, Sequence
+from math import ceil
 
-from thenar.runtime.manifest import Manifest
+from thenar.runtime.harness.wiring import BusWiring, Harness
+from thenar.runtime.scanning.plan import plan_scan
+from thenar.runtime.scanning.scanmap import Port
+from thenar.runtime.tables import IntegerTables
 
-from .board import Board
-from .board_inputs import expanders_file, matrix_file, pins_file
-from .board_joints import joints_file
-from .board_keys import check_switches, glove_toml, key_names
-from .board_modules import clock_files, twi_files, uart_files
-from .board_scan import exits_early, readings
-from .board_text import pair, text, wrapped
+from .board import Board, check_switches, glove_toml, key_names, rows_and_columns
+from .board_inputs import expanders_file, joints_file, matrix_file, pair, pins_file, text, wrapped
 from .errors import FirmwareError
 from .layout import Layout
+from .protocol import BoardConfig
+from .targets.avr import best_setting
+from .targets.base import Mode
+from .words import Names
 
-Mode = Literal["scan", "glove"]
+_TIMER_US, _TIMER_DIVIDER = 20_000, 8  # the timer begins anew so often, and counts such a part of the clock
+_BITS_A_BYTE = 9
+_LONGEST_TRANSFER, _PATIENCE = 20, 4  # bytes, of which no transaction has so many; how often its time it may take
+_RECOVERY_US = 5
+
+
+def clock_files(board: Board) -> dict[str, str]:
+    """Return name -> text of the clock of microseconds."""
+    counts = board.clock_hz // _TIMER_DIVIDER * _TIMER_US // 1_000_000
+    return pair(
+        "thenar_clock",
+        clock_hz=board.clock_hz,
+        counts=counts,
+        us_a_count=(_TIMER_US << 16) // counts,
+        longest_masked_us=_TIMER_US // 2,
+    )
+
+
+def uart_files(board: Board, number: int, baud: int, *, receive_bytes: int, send_bytes: int) -> dict[str, str]:
+    """Return name -> text of UART `number` with rings of these sizes, powers of two up to 256.
+
+    Raises FirmwareError if it cannot make the rate.
+    """
+    setting = best_setting(baud, board.clock_hz)
+    if setting is None:
+        raise FirmwareError(f"a UART at {board.clock_hz} Hz cannot make {baud} baud: take a higher rate")
+    values = {
+        "uart": number,
+        "rxd": board.microcontroller.uarts[number][0],
+        "baud": baud,
+        "error": f"{setting.error:+.1%}",
+        "vector": "USART" if len(board.microcontroller.uarts) == 1 else f"USART{number}",
+        "ubrr": setting.ubrr,
+        "double": setting.double,
+        "receive_bytes": receive_bytes,
+        "send_bytes": send_bytes,
+    }
+    return {f"thenar_uart{number}.{end}": text(f"thenar_uart.{end}", **values) for end in "hc"}
+
+
+def twi_files(board: Board) -> dict[str, str]:
+    """Return name -> text of the master of the I2C bus, whose SCL is never faster than the board says."""
+    (sda, scl), wanted_hz = board.microcontroller.twi, board.bus.clock_hz
+    twbr = max(0, ceil((board.clock_hz - 16 * wanted_hz) / (2 * wanted_hz)))
+    scl_hz = board.clock_hz // (16 + 2 * twbr)
+    return pair(
+        "thenar_twi",
+        scl_hz=scl_hz,
+        timeout_us=_PATIENCE * _LONGEST_TRANSFER * _BITS_A_BYTE * 1_000_000 // scl_hz,
+        recovery_cycles=ceil(_RECOVERY_US * board.clock_hz / 1_000_000),
+        sda=sda,
+        scl=scl,
+        twbr=twbr,
+    )
+
+
+# Cycles of the firmware as libsimavr counts them, rounded up: of a scan whatever it reads, of a key that is read, of a
+# byte on the bus beside its SCL periods, of a reading; and of an answer, of a look-up for it, of a class of a look-up.
+_SCAN, _KEY, _BUS_BYTE, _READING = 3000, 60, 110, 600
+_ANSWER, _LOOKUP, _CLASS = 600, 40, 10
+
+
+def readings(board: Board, switches: Sequence[str], tables: IntegerTables) -> tuple[Port, ...]:
+    """Return which readings of the board's chips show a build's `switches`, in the order in which they are made.
+
+    Of each chip the fewest; what can change the scores of `tables` most per microsecond comes first. There are none
+    without chips. Raises FirmwareError if the board lacks a switch.
+    """
+    check_switches(board, switches)
+    return plan_scan(switches, tables, harness_of(board)).ports if board.chips else ()
+
+
+def harness_of(board: Board) -> Harness:
+    """Return the board's chips as a harness of one bus."""
+    return Harness(name="board", buses=(BusWiring(device="bus", clock_hz=board.bus.clock_hz, chips=board.chips),))
+
+
+def switches_of(ports: Sequence[Port]) -> list[list[int]]:
+    """Return the numbers of the build's switches that each reading shows: the ports of an early exit."""
+    return [[switch for _, switch in port.switches] for port in ports]
+
+
+def exits_early(board: Board, ports: Sequence[Port]) -> bool:
+    """Return whether a scan of the readings `ports` may end before the last: of one there is nothing to leave out."""
+    return board.early_exit and len(ports) > 1
+
+
+def shortest_scan_us(board: Board, switches: Sequence[str], tables: IntegerTables, *, recognises: bool) -> int:
+    """Return how many microseconds a scan takes at most, with all that is done once a scan, rounded up to 50."""
+    ports = readings(board, switches, tables)
+    rows, columns = rows_and_columns(board, switches)
+    cycles = _SCAN + _KEY * rows * columns
+    seconds = 0.0
+    if board.matrix is not None:
+        seconds += rows * board.matrix.settle_us / 1e6
+    for port in ports:
+        reading = next(each for each in board.chips[port.chip].chip.readings if each.name == port.reading)
+        seconds += reading.scl_periods / board.bus.clock_hz
+        cycles += _READING + _BUS_BYTE * reading.wire_bytes
+    if recognises:
+        lookups = tables.n_switches // 2 + tables.n_joints
+        answers = len(ports) if exits_early(board, ports) else 1
+        cycles += answers * (_ANSWER + lookups * (_LOOKUP + _CLASS * tables.n_classes))
+    return 50 * ceil((seconds + cycles / board.clock_hz) * 1e6 / 50)
+
+
+def config_of(board: Board, switches: Sequence[str], tables: IntegerTables, *, recognises: bool = False) -> BoardConfig:
+    """Return what the protocol's C is configured with. Raises FirmwareError if the board lacks a switch, has too many
+    keys, or is to scan faster than it can.
+    """
+    rows, columns = rows_and_columns(board, switches)
+    return BoardConfig(
+        rows=rows,
+        columns=columns,
+        diodes=board.matrix is None or board.matrix.diodes,
+        board=board.board,
+        scan_us=board.scan_us,
+        state_us=board.state_us,
+        heartbeat_us=board.heartbeat_us,
+        press_us=board.debounce.press_us,
+        release_us=board.debounce.release_us,
+        fastest_us=shortest_scan_us(board, switches, tables, recognises=recognises),
+    )
+
 
 _MOST_GRASPS = 255  # a grasp is a byte on the line, and 255 says that there is none
 _WHOLE_US = 50_000  # between whole scans of a board that sends no heartbeats
@@ -23,31 +148,31 @@ _NO_SWITCH, _NO_SWITCH_OF_MANY = 0xFF, 0xFFFF
 _NUMBERS_A_LINE = 14
 
 
-def board_files(name: str, manifest: Manifest, layout: Layout, board: Board, mode: Mode) -> dict[str, str]:
+def board_files(name: str, names: Names, layout: Layout, board: Board, mode: Mode) -> dict[str, str]:
     """Return file name -> text of a board's firmware but the classifier's and the protocol's files and the Makefile.
 
     name  of the build, as its classifier's files are called; a name that words.check_name allows
     mode  "scan", or "glove", which also recognises
 
-    `board_scan.config_of` and `switches_of` say what the protocol's files are to be made with. Raises FirmwareError if
+    `config_of` and `switches_of` say what the protocol's files are to be made with. Raises FirmwareError if
     the board lacks a switch or, for a glove, a joint; if there are more than 255 grasp types to tell of; or if a scan
     takes longer than scan_us.
     """
-    switches = tuple(switch.name for switch in manifest.switches)
+    switches = tuple(switch.name for switch in names.switches)
     check_switches(board, switches)
-    if mode == "glove" and len(manifest.grasps) > _MOST_GRASPS:
-        raise FirmwareError(f"{len(manifest.grasps)} grasp types: a board can tell {_MOST_GRASPS} apart")
+    if mode == "glove" and len(names.grasps) > _MOST_GRASPS:
+        raise FirmwareError(f"{len(names.grasps)} grasp types: a board can tell {_MOST_GRASPS} apart")
     ports = readings(board, switches, layout.tables)
     files = clock_files(board) | uart_files(board, 0, board.baud, receive_bytes=128, send_bytes=256)
     files |= _inputs(board, switches, layout)
     files |= pair("thenar_reset") | pair("thenar_due")
-    joints = _joints(name, manifest, layout, board) if mode == "glove" else {}
+    joints = _joints(name, names, layout, board) if mode == "glove" else {}
     files |= joints
     if mode == "glove":
-        files["main.c"] = _glove_main(name, manifest, board, bool(joints), exits_early(board, ports))
+        files["main.c"] = _glove_main(name, names, board, bool(joints), exits_early(board, ports))
     else:
         files["main.c"] = text("scan_main.c", about=_about_scanner(board), chips=len(ports))
-    files["glove.toml"] = glove_toml(name, board, manifest)
+    files["glove.toml"] = glove_toml(name, board, names)
     return files
 
 
@@ -61,8 +186,8 @@ def _inputs(board: Board, switches: Sequence[str], layout: Layout) -> dict[str, 
     return files | twi_files(board) | {"thenar_expanders.c": expanders_file(board, ports, switches)}
 
 
-def _joints(identifier: str, manifest: Manifest, layout: Layout, board: Board) -> dict[str, str]:
-    files = joints_file(identifier, board, manifest.joints, layout.code_bits)
+def _joints(identifier: str, names: Names, layout: Layout, board: Board) -> dict[str, str]:
+    files = joints_file(identifier, board, names.joints, layout.code_bits)
     if not files:
         return {}
     what = "a CyberGlove on a UART" if board.cyberglove is not None else "voltages on the part's converter"
@@ -74,8 +199,8 @@ def _joints(identifier: str, manifest: Manifest, layout: Layout, board: Board) -
     return files
 
 
-def _glove_main(identifier: str, manifest: Manifest, board: Board, joints: bool, early_exit: bool) -> str:
-    switches = tuple(switch.name for switch in manifest.switches)
+def _glove_main(identifier: str, names: Names, board: Board, joints: bool, early_exit: bool) -> str:
+    switches = tuple(switch.name for switch in names.switches)
     few, narrow = len(switches) < _NO_SWITCH, len(switches) <= _NO_SWITCH + 1
     no_switch = _NO_SWITCH if few else _NO_SWITCH_OF_MANY
     return text(
@@ -122,3 +247,20 @@ def _about_glove(board: Board) -> str:
     reads = f"A glove that recognises by itself. It reads {_inputs_in_words(board)}"
     tells = "tells the host of them and of the grasp type (protocol 1 of thenar's scanner board)"
     return wrapped(f"{reads}, and {tells}.", 3)
+
+
+def board_makefile(name: str, board: Board, mode: Mode, files: Collection[str]) -> str:
+    """Return the Makefile of the firmware of the build `name` whose other files are called `files`."""
+    does = "scans the switches" if mode == "scan" else "scans the switches and recognises"
+    sources = sorted(file for file in files if file.endswith((".c", ".S")))
+    return text(
+        "Makefile",
+        title=f"Firmware that {does}, for an {board.part} at {board.clock_hz} Hz.",
+        program=f"thenar_{name}_{mode}",
+        objects=[source.rpartition(".")[0] + ".o" for source in sources],
+        headers=sorted(file for file in files if file.endswith(".h")),
+        part=board.part,
+        brown_out=board.microcontroller.brown_out,
+        avrdude_part=board.microcontroller.avrdude,
+        programmer=board.microcontroller.programmer,
+    )

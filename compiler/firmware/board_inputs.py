@@ -1,16 +1,38 @@
 """The files that read a board's switches: pins, a matrix, or port expanders."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from itertools import accumulate, pairwise
+from math import ceil
+from textwrap import fill
 
-from thenar.drivers.i2c.chips import Write
+from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22, period_words, shortest_us, told_us
+from thenar.drivers.i2c.chips import Reading, Write
+from thenar.firmware_templates.rendering import render
 from thenar.runtime.harness.wiring import ChipWiring
+from thenar.runtime.manifest import Calibration
+from thenar.runtime.names import list_names, nearest
 from thenar.runtime.scanning.scanmap import Port
 
-from .board import Board, Matrix
-from .board_text import text, wrapped
+from .board import Board, GloveUart, Matrix
 from .errors import FirmwareError
 from .words import comment
+
+
+def text(file: str, /, **values: object) -> str:
+    """Return the text of `file`, a template of firmware_templates/avr without its ".j2"."""
+    return render(f"avr/{file}.j2", **values)
+
+
+def pair(file: str, /, **values: object) -> dict[str, str]:
+    """Return name -> text of the header and the source called `file`."""
+    return {f"{file}.{end}": text(f"{file}.{end}", **values) for end in "hc"}
+
+
+def wrapped(words: str, indent: int) -> str:
+    """Return what is to stand in a comment of C after `indent` columns, broken into lines of at most 120 of them."""
+    blanks = " " * indent
+    return fill(words, 117, initial_indent=blanks, subsequent_indent=blanks, break_on_hyphens=False).lstrip()
+
 
 _NO_KEY = 0xFF
 _WHOLE_PORT = 0xFF
@@ -18,79 +40,25 @@ _LINE = {8: ("uint8_t", "0x%02Xu"), 16: ("uint16_t", "UINT16_C(0x%04X)"), 32: ("
 _CHARGE_US = 100  # the wires of switches on pins have risen long before
 
 
-@dataclass(frozen=True, slots=True)
-class PortPins:
-    """Which pins of a port are used: its letter, and what clears or sets their bits in a register, in C's words."""
-
-    letter: str
-    cleared: str
-    raised: str
+Row = dict[str, object]  # of a template's table
 
 
-@dataclass(frozen=True, slots=True)
-class PinKey:
-    """A key on a pin: number and name, and its place in a bitmap in C's words."""
-
-    pin: str
-    title: str
-    byte: int
-    mask: str
-
-
-@dataclass(frozen=True, slots=True)
-class WriteRow:
-    """A chip's register as a row of C."""
-
-    written: int
-    bytes: str
-    expected: int
-    answer: str
-
-
-@dataclass(frozen=True, slots=True)
-class ChipRows:
-    """A chip, the rows that set it up, and the numbers of the first and the last of them."""
-
-    place: str
-    address: int
-    writes: tuple[WriteRow, ...]
-    first: int
-    last: int
-
-
-@dataclass(frozen=True, slots=True)
-class PortRow:
-    """A reading of a chip as a row of C, and whose switches it shows."""
-
-    title: str
-    chip: int
-    command: int
-    length: int
-    high: str
-    closed_low: str
-    keys: tuple[str, ...]
-
-
-def by_port(pins: Iterable[str]) -> list[PortPins]:
-    """Return the pins ("PD2") port by port."""
+def by_port(pins: Iterable[str]) -> list[Row]:
+    """Return, port by port, what clears and what sets the bits of these pins ("PD2") in a register, in C's words."""
     masks: dict[str, int] = {}
     for pin in pins:
         masks[pin[1]] = masks.get(pin[1], 0) | 1 << int(pin[2])
-    return [_port_pins(letter, mask) for letter, mask in sorted(masks.items())]
-
-
-def _port_pins(letter: str, mask: int) -> PortPins:
     # avr-gcc 5.4 warns of a conversion where no bit of a register is kept.
-    if mask == _WHOLE_PORT:
-        return PortPins(letter, "= 0x00u", f"= 0x{mask:02X}u")
-    return PortPins(letter, f"&= (uint8_t)~0x{mask:02X}u", f"|= 0x{mask:02X}u")
+    cleared = {mask: f"&= (uint8_t)~0x{mask:02X}u" for mask in masks.values()} | {_WHOLE_PORT: "= 0x00u"}
+    raised = {mask: f"|= 0x{mask:02X}u" for mask in masks.values()} | {_WHOLE_PORT: f"= 0x{_WHOLE_PORT:02X}u"}
+    return [{"letter": port, "cleared": cleared[mask], "raised": raised[mask]} for port, mask in sorted(masks.items())]
 
 
 def pins_file(board: Board, switches: Sequence[str]) -> str:
     """Return thenar_pins.c: key k is switch k, on its pin."""
     pins = [board.pins[name] for name in switches]
     keys = [
-        PinKey(pin, wrapped(f"{key}: {comment(name)}", 58), key // 8, f"0x{1 << key % 8:02X}")
+        {"pin": pin, "title": wrapped(f"{key}: {comment(name)}", 58), "byte": key // 8, "mask": f"0x{1 << key % 8:02X}"}
         for key, (name, pin) in enumerate(zip(switches, pins, strict=True))
     ]
     return text(
@@ -132,18 +100,25 @@ def matrix_file(board: Board, matrix: Matrix) -> str:
 def expanders_file(board: Board, ports: Sequence[Port], switches: Sequence[str]) -> str:
     """Return thenar_expanders.c: the chips that hold a switch of the build, and these readings of them, in order."""
     used = sorted({port.chip for port in ports})
-    chips: list[ChipRows] = []
-    for number in used:
-        chips.append(_chip_rows(board.chips[number], chips[-1].last + 1 if chips else 0))
-    rows = [_port_row(port, board.chips[port.chip], used.index(port.chip), switches) for port in ports]
-    writes = [write for chip in chips for write in chip.writes]
+    wired = [board.chips[number] for number in used]
+    writes = [chip.chip.setup(frozenset(chip.numbered_pins)) for chip in wired]
+    ends = list(accumulate(map(len, writes), initial=0))
     return text(
         "thenar_expanders.c",
-        chips=chips,
-        ports=rows,
-        most_written=max(write.written for write in writes),
-        most_read=max(write.expected for write in writes),
-        most_ports=max(row.length for row in rows),
+        chips=[
+            {
+                "place": chip.place,
+                "address": chip.address,
+                "first": first,
+                "last": end - 1,
+                "writes": map(_write_row, each),
+            }
+            for chip, each, (first, end) in zip(wired, writes, pairwise(ends), strict=True)
+        ],
+        ports=[_port_row(port, board.chips[port.chip], used.index(port.chip), switches) for port in ports],
+        most_written=max(len(write.data) for each in writes for write in each),
+        most_read=max(len(write.expect) for each in writes for write in each),
+        most_ports=max(_reading(port, board.chips[port.chip]).length for port in ports),
     )
 
 
@@ -152,31 +127,123 @@ def needs_jtag_off(board: Board, pins: Iterable[str]) -> bool:
     return bool(set(pins) & set(board.microcontroller.jtag))
 
 
-def _chip_rows(wired: ChipWiring, first: int) -> ChipRows:
-    writes = tuple(_write_row(write) for write in wired.chip.setup(frozenset(wired.numbered_pins)))
-    return ChipRows(wired.place, wired.address, writes, first, first + len(writes) - 1)
+def _write_row(write: Write) -> Row:
+    answer = _hexed(write.expect or b"\0")
+    return {"written": len(write.data), "bytes": _hexed(write.data), "expected": len(write.expect), "answer": answer}
 
 
-def _write_row(write: Write) -> WriteRow:
-    return WriteRow(len(write.data), _hexed(write.data), len(write.expect), _hexed(write.expect or b"\0"))
+def _reading(port: Port, wired: ChipWiring) -> Reading:
+    return next(each for each in wired.chip.readings if each.name == port.reading)
 
 
-def _port_row(port: Port, wired: ChipWiring, number: int, switches: Sequence[str]) -> PortRow:
-    reading = next(each for each in wired.chip.readings if each.name == port.reading)
+def _port_row(port: Port, wired: ChipWiring, number: int, switches: Sequence[str]) -> Row:
+    reading = _reading(port, wired)
     keys = [_NO_KEY] * (8 * reading.length)
     for bit, switch in port.switches:
         keys[bit] = switch
     names = ", ".join(comment(switches[switch]) for _, switch in port.switches)
-    return PortRow(
-        title=wrapped(f"{wired.place}, {'port' if reading.length == 1 else 'ports'} {reading.name}: {names}", 7),
-        chip=number,
-        command=reading.command[0],
-        length=reading.length,
-        high=_hexed(reading.high.to_bytes(reading.length, "little")),
-        closed_low="0u" if port.closed_high else "0xFFu",
-        keys=tuple(_hexed(bytes(keys[first : first + 8])) for first in range(0, len(keys), 8)),
-    )
+    return {
+        "title": wrapped(f"{wired.place}, {'port' if reading.length == 1 else 'ports'} {reading.name}: {names}", 7),
+        "chip": number,
+        "command": reading.command[0],
+        "length": reading.length,
+        "high": _hexed(reading.high.to_bytes(reading.length, "little")),
+        "closed_low": "0u" if port.closed_high else "0xFFu",
+        "lines": [_hexed(bytes(keys[first : first + 8])) for first in range(0, len(keys), 8)],
+    }
 
 
 def _hexed(data: bytes) -> str:
     return ", ".join(f"0x{byte:02X}u" for byte in data)
+
+
+# The converter is exact to its last bit up to this clock; a conversion takes 13 of its cycles.
+_CONVERTER_HZ, _CONVERSION_CYCLES = 200_000, 13
+_BYTES = range(1, 256)
+
+
+def joints_file(name: str, board: Board, joints: Sequence[Calibration], code_bits: int) -> dict[str, str]:
+    """Return name -> text of the file that reads a build's joints, in its order; nothing for a build without joints.
+
+    Raises FirmwareError if the board measures no joints, lacks one of the build's, or measures it in other codes.
+    """
+    if not joints:
+        return {}
+    if code_bits != 8:
+        raise FirmwareError(
+            "the build tells codes above 254 apart, which are more than a CyberGlove's bytes or the upper 8 bits of a "
+            "converter: compile recordings of such bytes"
+        )
+    if board.cyberglove is not None:
+        return {"thenar_cyberglove.c": _glove_file(name, board.cyberglove, joints)}
+    if board.analog:
+        return {"thenar_adc.c": _adc_file(name, board, joints)}
+    raise FirmwareError(
+        f"the build needs {len(joints)} joints, and the board measures none: add [cyberglove] or [analog] to its "
+        "board.toml, or compile the build with --inputs switches"
+    )
+
+
+def _adc_file(name: str, board: Board, joints: Sequence[Calibration]) -> str:
+    lacking = [joint.name for joint in joints if joint.name not in board.analog]
+    if lacking:
+        raise FirmwareError(f"[analog] of the board has no channel for {list_names(lacking)}, which the build needs")
+    channels = [board.analog[joint.name] for joint in joints]
+    rows = [
+        {"name": comment(joint.name), "channel": channel, "number": _number(channel)}
+        for joint, channel in zip(joints, channels, strict=True)
+    ]
+    # The data sheet's ADPS: the clock divided by 2 to the power of 1 to 7.
+    prescaler = next(power for power in range(1, 8) if board.clock_hz >> power <= _CONVERTER_HZ)
+    return text(
+        "thenar_adc.c",
+        name=name,
+        joints=rows,
+        wide=len(board.microcontroller.analog) > 8,
+        jtag=needs_jtag_off(board, (board.microcontroller.analog[channel] for channel in channels)),
+        disabled=_disabled(board, channels),
+        prescaler=prescaler,
+        conversion_us=ceil(_CONVERSION_CYCLES * 2**prescaler * 1e6 / board.clock_hz),
+    )
+
+
+def _number(channel: str) -> int:
+    return int(channel.removeprefix("ADC"))
+
+
+def _disabled(board: Board, channels: Sequence[str]) -> list[Row]:
+    """Return the digital inputs to switch off: DIDR0 is for channels 0 to 7, DIDR2 for 8 to 15, each bit a pin."""
+    masks = {0: 0, 2: 0}
+    for number in (_number(channel) for channel in channels if board.microcontroller.analog[channel]):
+        masks[0 if number < 8 else 2] |= 1 << number % 8
+    return [{"number": number, "mask": f"0x{mask:02X}"} for number, mask in masks.items() if mask]
+
+
+def _glove_file(name: str, glove: GloveUart, joints: Sequence[Calibration]) -> str:
+    sensors = glove.joints or (SENSORS_18 if glove.sensors == len(SENSORS_18) else SENSORS_22)
+    words = period_words(glove.rate_hz)
+    period_us = max(told_us(words), shortest_us(glove.sensors, glove.baud, filtered=True))
+    return text(
+        "thenar_cyberglove.c",
+        name=name,
+        uart=glove.uart,
+        sensors=glove.sensors,
+        joints=[{"name": comment(joint.name), "place": 1 + _place(joint, sensors)} for joint in joints],
+        lost_us=2 * ceil(period_us),
+        period=", ".join(f"0x{byte:02X}u" for word in words for byte in word.to_bytes(2, "big")),
+        period_meaning=f"every {told_us(words):.0f} us" if glove.rate_hz else "as fast as it can",
+    )
+
+
+def _place(joint: Calibration, sensors: Sequence[str]) -> int:
+    if joint.name not in sensors:
+        raise FirmwareError(
+            f"the build needs joint {joint.name!r}, and the CyberGlove has no sensor of that name"
+            f"{nearest(joint.name, sensors)}; name its sensors as the build does: `joints` of [cyberglove]"
+        )
+    if joint.code_a not in _BYTES or joint.code_b not in _BYTES or joint.code_a == joint.code_b:
+        raise FirmwareError(
+            f"joint {joint.name!r} of the build is coded in {joint.unit!r}, not in a CyberGlove's bytes: compile "
+            "recordings of its bytes, for the firmware has no calibration"
+        )
+    return list(sensors).index(joint.name)

@@ -1,24 +1,22 @@
 """The layout that suits a target: the fastest that fits its flash, and what there was to choose from."""
 
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
+from textwrap import wrap
 from typing import get_args
 
 from thenar.runtime.tables import IntegerTables
 
-from .costs import Cost, cost_of
+from .costs import Cost
 from .errors import FirmwareError
 from .layout import LARGEST_GROUP, SMALLEST_GROUP, Adding, Bins, Layout, arrange
-from .targets import Target
-
-__all__ = ["Choice", "Option", "choose", "features", "flash_shares", "frontier"]
+from .targets import TARGETS, Target
 
 Option = tuple[Layout, Cost]
 
-# `lpm` reaches the first 64 KiB of an AVR's flash, and the tables share them with whatever else is constant.
-_MOST_LPM = 48 << 10
-_UNIT = {"avr": "cycles", "cortex-m": "instructions", "host": "instructions"}
+_NOTE_WIDTH = 114
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,10 +71,9 @@ def frontier(options: Iterable[Option]) -> tuple[Option, ...]:
 
 def flash_shares(target: Target) -> tuple[int, int]:
     """Return the bytes of flash that a classifier may take where nobody says how many: half of it, so that scanning and
-    sending have room; or three quarters, if less will not do. On an AVR at most 48 KiB.
+    sending have room; or three quarters, if less will not do; never more than the target's `most_flash`.
     """
-    most = _MOST_LPM if target.kind == "avr" else target.flash
-    return min(target.flash // 2, most), min(target.flash * 3 // 4, most)
+    return min(target.flash // 2, target.most_flash), min(target.flash * 3 // 4, target.most_flash)
 
 
 def _options(tables: IntegerTables, target: Target, entry_bits: int | None) -> Iterator[Option]:
@@ -93,7 +90,7 @@ def _options(tables: IntegerTables, target: Target, entry_bits: int | None) -> I
             refused = refused or reason
         else:
             found = True
-            yield layout, cost_of(layout, target)
+            yield layout, target.cost(layout)
     if not found and refused is not None:
         raise refused
 
@@ -104,7 +101,7 @@ def _bins(tables: IntegerTables) -> tuple[Bins, ...]:
 
 def _addings(target: Target) -> tuple[Adding, ...]:
     """Where a compiler makes the code, it decides how."""
-    return get_args(Adding) if target.kind == "avr" else ("called",)
+    return get_args(Adding) if target.avr else ("called",)
 
 
 def features(layout: Layout, target: Target) -> str:
@@ -120,14 +117,62 @@ def features(layout: Layout, target: Target) -> str:
                 "search": "codes searched among thresholds",
             }[layout.bins]
         )
-    if target.kind == "avr":
+    if target.avr:
         parts.append({"called": "rows added by one routine", "unrolled": "rows added in line"}[layout.adding])
     return ", ".join(parts)
 
 
 def _why(layout: Layout, cost: Cost, tried: int, allowed: int, target: Target) -> str:
-    bound = "at most" if target.counted else "about"
     return (
         f"{features(layout, target)}: the fastest of {tried} layouts in {allowed} bytes of flash, "
-        f"{bound} {cost.cycles} {_UNIT[target.kind]} ({cost.update_cycles} by update()) and {cost.flash} bytes"
+        f"{target.bound} {cost.cycles} {target.unit} ({cost.update_cycles} by update()) and {cost.flash} bytes"
     )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """A part, and the layout chosen for it."""
+
+    target: Target
+    choice: Choice
+
+    def notes(self, *more: str) -> tuple[str, ...]:
+        """Return lines for an opening comment: what was chosen and why, and what `more` there is to say."""
+        return tuple(line for note in (f"Layout {self.words}.", *more) for line in wrap(note, _NOTE_WIDTH))
+
+    @property
+    def words(self) -> str:
+        """What was chosen and why, in a sentence."""
+        if not self.target.own_layout:
+            what = features(self.choice.layout, self.target)
+            return f"for {self.target.title}: {what}, as on the smallest part that holds the build"
+        return f"for {self.target.part}: {self.choice.why}"
+
+
+def fit_for(target: Target, tables: IntegerTables, flash: int | None = None) -> Fit:
+    """Return the part that firmware for a target is for, and the layout chosen for it, in `flash` bytes where given.
+
+    Raises FirmwareError if no layout fits.
+    """
+    if target.own_layout:
+        return Fit(target, choose(tables, target, flash=flash))
+    fit = smallest_fit(tables, flash=flash)
+    return fit if target.any_part else Fit(target, fit.choice)
+
+
+def smallest_fit(tables: IntegerTables, *, kind: str = "", flash: int | None = None) -> Fit:
+    """Return the smallest part that holds the tables, of those that builds carry firmware for, or that are of `kind`;
+    in `flash` bytes where given, or in all that the part has if that is less.
+
+    Raises FirmwareError, with what kept them from the largest, if there is none.
+    """
+    candidates = [target for target in TARGETS.values() if (target.kind == kind if kind else target.carried)]
+    *smaller, largest = sorted(candidates, key=lambda target: target.flash)
+    for target in smaller:
+        with suppress(FirmwareError):
+            return _fit(tables, target, flash)
+    return _fit(tables, largest, flash)
+
+
+def _fit(tables: IntegerTables, target: Target, flash: int | None) -> Fit:
+    return Fit(target, choose(tables, target, flash=None if flash is None else min(flash, target.flash)))

@@ -9,6 +9,7 @@ change is plus or minus row 2^bit. With 8-bit entries every entry is what exceed
 0 to 255; the leasts are part of `start`.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -18,15 +19,94 @@ from numpy.typing import NDArray
 from thenar.runtime.tables import IntegerTables
 
 from .errors import FirmwareError
-from .joint_layout import Bins, JointLayout, check_joints, code_bits, joint_layout
 
-__all__ = ["SMALLEST_GROUP", "Adding", "Bins", "JointLayout", "Layout", "arrange"]
+MOST_ROWS = 256  # a bin is one byte
+MOST_BINS = 256  # and so is what is left of a code when the first of a joint's bins is taken from it
+
+Bins = Literal["direct", "trimmed", "search"]
+Rows = NDArray[np.integer]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointLayout:
+    """A joint's rows (m, K), as stored, and the bytes `bins` (n,) that say which row a code takes.
+
+    "direct": bins[code] for all 256 codes. "trimmed": bins[clamped code - first] from the first threshold, where codes
+    still take row 0, to one beyond the last, where they take the last row. "search": no bins; the row is the number of
+    thresholds (m - 1,) uint16 below the code.
+    """
+
+    first: int
+    bins: NDArray[np.uint8]
+    rows: Rows
+    thresholds: NDArray[np.uint16]
+
+    @property
+    def constant(self) -> bool:
+        """Whether all codes take the same row, which is then zero: it is part of the layout's start."""
+        return len(self.thresholds) == 0
+
+    def bin_of(self, codes: NDArray[np.uint16]) -> NDArray[np.int64]:
+        """Return the row (n,) of each code (n,), found in the way that the firmware finds it."""
+        if len(self.bins) == 0:
+            return np.searchsorted(self.thresholds, codes, side="left").astype(np.int64)
+        held = np.clip(codes.astype(np.int64), self.first, self.first + len(self.bins) - 1)
+        return self.bins[held - self.first].astype(np.int64)
+
+
+def joint_layout(thresholds: NDArray[np.uint16], rows: Rows, bins: Bins) -> JointLayout:
+    """Return the layout of a joint whose stored rows are `rows` (T + 1, K)."""
+    first, last = 0, 255
+    if bins == "trimmed":
+        first, last = (int(thresholds[0]), int(thresholds[-1]) + 1) if len(thresholds) else (0, 0)
+    codes = np.arange(first, last + 1) if bins != "search" else np.arange(0)
+    return JointLayout(first, np.searchsorted(thresholds, codes, side="left").astype(np.uint8), rows, thresholds)
+
+
+def code_bits(thresholds: Sequence[NDArray[np.uint16]]) -> int:
+    """Return the width of the codes, 8 where no joint's thresholds tell codes above 254 apart, else 16."""
+    return 16 if any(len(steps) and steps[-1] >= 255 for steps in thresholds) else 8
+
+
+def check_joints(thresholds: Sequence[NDArray[np.uint16]], bins: Bins) -> None:
+    """Raise FirmwareError if a joint's rows are more than a byte can number, or cannot be found by `bins`."""
+    if bins == "direct" and code_bits(thresholds) == 16:
+        raise FirmwareError('codes have 16 bits: their rows are found by "trimmed" or "search", not "direct"')
+    for number, steps in enumerate(thresholds):
+        if len(steps) + 1 > MOST_ROWS:
+            raise FirmwareError(
+                f"joint {number} has {len(steps) + 1} rows, firmware has at most {MOST_ROWS} a joint: "
+                "compile the build with fewer rounds or coarser codes"
+            )
+        if bins == "trimmed" and len(steps) and int(steps[-1]) - int(steps[0]) + 2 > MOST_BINS:
+            raise FirmwareError(
+                f"the thresholds of joint {number} are {steps[0]} to {steps[-1]}: "
+                f'more than {MOST_BINS - 2} codes apart, their rows are found by "search"'
+            )
+
 
 SMALLEST_GROUP, LARGEST_GROUP = 2, 6
 MOST_TABLE_ROWS = 65535  # their numbers are 16 bits wide
 
 Adding = Literal["called", "unrolled"]
-Rows = NDArray[np.integer]
+
+
+MOST_CLASSES = 14  # of a pass: an AVR has registers for fourteen sums of 16 bits
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """Every part has `width` classes; part p begins at class firsts[p]. The last two overlap where K is no multiple."""
+
+    width: int
+    firsts: tuple[int, ...]
+
+
+def parts_of(n_classes: int) -> Parts:
+    """Return the fewest parts of equal width, at most 14, that cover `n_classes`."""
+    count = -(-n_classes // MOST_CLASSES)
+    width = -(-n_classes // count)
+    return Parts(width, tuple(min(part * width, n_classes - width) for part in range(count)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,6 +135,16 @@ class Layout:
     def padding(self) -> int:
         """Bytes, 0 or 1, between the groups' bytes and the codes, so that codes of 16 bits lie at even offsets."""
         return len(self.groups) % 2 if self.code_bits == 16 else 0
+
+    @property
+    def frame_size(self) -> int:
+        """Bytes of a frame as `frame_bytes` makes them."""
+        return len(self.groups) + self.padding + len(self.joints) * self.code_bits // 8
+
+    @property
+    def parts(self) -> Parts:
+        """How the classes are divided among passes."""
+        return parts_of(self.tables.n_classes)
 
     @property
     def n_lookups(self) -> int:
@@ -186,3 +276,33 @@ def _entries(rows: NDArray[np.int64], entry_bits: int, what: str) -> Rows:
             f"{what} spans {rows.max()} steps, an 8-bit entry holds 255: compile the build with --table-bits 8"
         )
     return rows.astype(np.uint8)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lookup:
+    """One row added per frame.
+
+    `index` counts the look-ups, `number` the groups or, where `joint` is given, all joints; the rows begin at row
+    `first_row` of the table, and a joint's bins at byte `first_bin` of the bins, or its thresholds at that threshold.
+    """
+
+    index: int
+    number: int
+    first_row: int
+    rows: Rows
+    joint: JointLayout | None = None
+    first_bin: int = 0
+
+
+def lookups(layout: Layout) -> Iterator[Lookup]:
+    """Yield the groups of switches and then the joints that have thresholds."""
+    index = first_row = first_bin = 0
+    for number, rows in enumerate(layout.group_rows):
+        yield Lookup(index, number, first_row, rows)
+        index, first_row = index + 1, first_row + len(rows)
+    for number, joint in enumerate(layout.joints):
+        if joint.constant:
+            continue
+        yield Lookup(index, number, first_row, joint.rows, joint, first_bin)
+        index, first_row = index + 1, first_row + len(joint.rows)
+        first_bin += len(joint.thresholds) if layout.bins == "search" else len(joint.bins)

@@ -1,30 +1,22 @@
 """What a classifier takes on its part, compiled and run in a simulator of it, beside the bounds of the cost model."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .answers import Unit
-from .costs import NAME_BYTES
+from .answers import Answers
+from .avr_costs import worst_frame
+from .choose import Fit
+from .classifier import Library
+from .costs import NAME_BYTES, Unit
 from .errors import FirmwareError
 from .layout import Layout
-from .library import Fit
 from .probes import Probes, changing_frames, extreme_frames, joined, random_frames
-from .running import run, toolchain_missing
 from .targets import Target
-from .tools import STRICT, Tool, call, find, workshop
-from .worst import worst_frame
+from .tools import STRICT, call, find, workshop
 
 _RANDOM = 2000
-_COMPILERS: Mapping[str, Tool] = {
-    "avr": (("avr-gcc",), "gcc-avr"),
-    "cortex-m": (("arm-none-eabi-gcc",), "gcc-arm-none-eabi"),
-}
 # What stands in a section of its own can be left out where nothing calls it.
 _SECTIONS = "-ffunction-sections"
-_SIZES: Mapping[str, Tool] = {
-    "avr": (("avr-size",), "binutils-avr"),
-    "cortex-m": (("arm-none-eabi-size",), "binutils-arm-none-eabi"),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,29 +66,25 @@ class Measured:
         )
 
 
-def measure(files: Mapping[str, str], name: str, fit: Fit, grasps: Sequence[str]) -> Measured:
-    """Compile the classifier `name` of the types `grasps` in `files` (file name -> text), run the frames that
-    should take longest, and return what the slowest took.
+def measure(library: Library, fit: Fit) -> Measured:
+    """Compile a classifier, run the frames that should take longest, and return what the slowest took.
 
     Raises FirmwareError where a tool is missing, or for a part on which nobody counts.
     """
     target, layout, cost = fit.target, fit.choice.layout, fit.choice.cost
-    if target.kind == "host":
+    if not target.own_layout:
         raise FirmwareError("on no microcontroller that is simulated here the classifier fits: nothing can be measured")
-    if lack := toolchain_missing(target):
+    if lack := target.missing():
         raise FirmwareError(f"firmware for {target.part} cannot be measured here: {lack}")
-    tried = _frames(layout, target)
-    answers = run(files, name, layout, target, layout.frame_bytes(tried.bits, tried.codes))
-    changing = joined(changing_frames(layout.tables), tried)
-    updated = run(files, name, layout, target, layout.frame_bytes(changing.bits, changing.codes), incremental=True)
-    if answers.cost is None or updated.cost is None:
-        raise FirmwareError(f"nothing was counted on {target.part}")
-    flash, flash_classify, ram = _size(files, name, target)
-    long_names = _more_for_names(grasps)
+    tried = joined(slow_frames(layout), random_frames(layout.tables, _RANDOM, seed=1))
+    answers = run_counted(library, target, tried)
+    updated = run_counted(library, target, joined(changing_frames(layout.tables), tried), incremental=True)
+    flash, flash_classify, ram = _size(library, target)
+    long_names = _more_for_names(library.names.grasps)
     return Measured(
         part=target.part,
-        time=int(answers.cost.max()),
-        update_time=int(updated.cost.max()),
+        time=answers.most,
+        update_time=updated.most,
         unit=answers.unit,
         stack=None if answers.stack is None or updated.stack is None else max(answers.stack, updated.stack),
         flash=flash,
@@ -107,15 +95,23 @@ def measure(files: Mapping[str, str], name: str, fit: Fit, grasps: Sequence[str]
         most_flash=cost.flash + long_names,
         most_flash_classify=cost.flash_classify + long_names,
         most_ram=cost.ram,
-        rough=target.kind != "avr",
+        rough=not target.avr,
     )
 
 
-def _frames(layout: Layout, target: Target) -> Probes:
-    """Return the frame that takes longest by the model, extreme ones and random ones, should the model be wrong."""
-    bits, codes = worst_frame(layout, target if target.kind == "avr" else None)
-    worst = Probes(bits.reshape(1, -1), codes.reshape(1, -1))
-    return joined(worst, extreme_frames(layout.tables), random_frames(layout.tables, _RANDOM, seed=1))
+def slow_frames(layout: Layout) -> Probes:
+    """Return the frame that takes longest by the model, and extreme ones, should the model be wrong."""
+    bits, codes = worst_frame(layout)
+    return joined(Probes(bits.reshape(1, -1), codes.reshape(1, -1)), extreme_frames(layout.tables))
+
+
+def run_counted(library: Library, target: Target, frames: Probes, *, incremental: bool = False) -> Answers:
+    """Return what a classifier answers on a target that counts what answers take; raises FirmwareError elsewhere."""
+    sent = library.layout.frame_bytes(frames.bits, frames.codes)
+    answers = target.run(library.files, library.name, library.layout, sent, incremental=incremental)
+    if answers.cost is None:
+        raise FirmwareError(f"nothing was counted on {target.part}")
+    return answers
 
 
 def _more_for_names(grasps: Sequence[str]) -> int:
@@ -124,19 +120,21 @@ def _more_for_names(grasps: Sequence[str]) -> int:
     return max(0, longest - NAME_BYTES) * (len(grasps) + 1)
 
 
-def _size(files: Mapping[str, str], name: str, target: Target) -> tuple[int, int, int]:
+def _size(library: Library, target: Target) -> tuple[int, int, int]:
     """Return the bytes of flash of the compiled files, of flash without update(), and of RAM."""
-    machine = f"-mmcu={target.part}" if target.kind == "avr" else f"-mcpu={target.part}"
-    options = ["-Os"] if target.kind == "avr" else ["-mthumb", "-O2", "-ffreestanding"]
-    sources = sorted(path for path in files if path.endswith((".c", ".S")))
-    kept = [f"-Wl,-u,thenar_{name}_{function}" for function in ("classify", "set_switch", "grasp")]
-    with workshop(files) as folder:
-        compiler = find(_COMPILERS[target.kind])
-        call([compiler, *STRICT, machine, *options, _SECTIONS, "-c", *sources], folder)
+    if target.compiler is None or target.size is None:
+        raise FirmwareError(
+            f"the target {target.name} names no compiler and no program `size`: nothing can be measured"
+        )
+    sources = sorted(path for path in library.files if path.endswith((".c", ".S")))
+    kept = [f"-Wl,-u,thenar_{library.name}_{function}" for function in ("classify", "set_switch", "grasp")]
+    with workshop(library.files) as folder:
+        compiling = [find(target.compiler), *target.flags]
+        call([*compiling, *STRICT, _SECTIONS, "-c", *sources], folder)
         # Variables that are common have no place, and no size for `size`, until they are linked.
-        linked = [compiler, machine, "-r", "-nostdlib", "-Wl,-d", *(path.rsplit(".", 1)[0] + ".o" for path in sources)]
+        linked = [*compiling, "-r", "-nostdlib", "-Wl,-d", *(path.rsplit(".", 1)[0] + ".o" for path in sources)]
         call([*linked, "-o", "whole.elf"], folder)
-        call([*linked, *kept, f"-Wl,--gc-sections,-e,thenar_{name}_classify", "-o", "classify.elf"], folder)
-        told = call([find(_SIZES[target.kind]), "whole.elf", "classify.elf"], folder).decode().splitlines()[1:]
+        call([*linked, *kept, f"-Wl,--gc-sections,-e,thenar_{library.name}_classify", "-o", "classify.elf"], folder)
+        told = call([find(target.size), "whole.elf", "classify.elf"], folder).decode().splitlines()[1:]
     (text, data, bss), (less_text, less_data, _) = (map(int, line.split()[:3]) for line in told)
     return text + data, less_text + less_data, data + bss

@@ -1,13 +1,55 @@
-"""A build whose joints are coded in any way, as the same build for the bytes that one hand's CyberGlove sends."""
+"""A build whose joints are coded in any way, as the same build for the bytes that one hand's CyberGlove sends.
 
-from msgspec.structs import replace
+Recordings of several hands share one scale of codes; the runtime turns a hand's bytes into codes by its calibration,
+and then codes into bins. Firmware does both at once: the bin of a byte is the bin of its code, so every answer stays
+what it was, and thresholds that no byte parts fall away.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from msgspec import structs
+from numpy.typing import NDArray
 
 from thenar.drivers.calibration import GloveCalibration
 from thenar.runtime.build import Build
 from thenar.runtime.calibration import codes_of_bytes
 from thenar.runtime.manifest import Calibration
+from thenar.runtime.tables import IntegerTables
 
-from .on_bytes import on_bytes
+from .errors import FirmwareError
+
+BYTES = 256
+
+
+def on_bytes(tables: IntegerTables, codes: Sequence[Sequence[int]]) -> IntegerTables:
+    """Return tables whose joint codes are bytes: those of byte b are what `tables` gives for codes[joint][b].
+
+    codes holds, for each joint, the code of each of the 256 bytes (runtime.calibration.codes_of_bytes). Raises
+    FirmwareError where they are not that many.
+    """
+    if [len(joint) for joint in codes] != [BYTES] * tables.n_joints:
+        raise FirmwareError(f"codes of {BYTES} bytes are needed for each of {tables.n_joints} joints")
+    pairs = [
+        _joint(thresholds, rows, np.asarray(joint, np.uint16))
+        for thresholds, rows, joint in zip(tables.thresholds, tables.joint_rows, codes, strict=True)
+    ]
+    return replace(
+        tables,
+        thresholds=tuple(thresholds for thresholds, _ in pairs),
+        joint_rows=tuple(rows for _, rows in pairs),
+    )
+
+
+def _joint(
+    thresholds: NDArray[np.uint16], rows: NDArray[np.int16], codes: NDArray[np.uint16]
+) -> tuple[NDArray[np.uint16], NDArray[np.int16]]:
+    """Return thresholds and rows of one joint: a threshold after each byte whose successor falls into another bin."""
+    bins = np.searchsorted(thresholds, codes)
+    last = np.flatnonzero(bins[1:] != bins[:-1])
+    return last.astype(np.uint16), rows[bins[np.concatenate([last, [BYTES - 1]])]]
+
 
 _FIRST, _LAST = 1, 255  # what a CyberGlove can send
 
@@ -20,4 +62,4 @@ def for_one_hand(build: Build, calibration: GloveCalibration) -> Build:
     joints = build.manifest.joints
     tables = on_bytes(build.tables, [codes_of_bytes(joint, calibration) for joint in joints])
     raw = tuple(Calibration(joint.column, joint.name, "raw", _FIRST, 1.0, _LAST, 255.0) for joint in joints)
-    return Build(replace(build.manifest, joints=raw), tables)
+    return Build(structs.replace(build.manifest, joints=raw), tables)

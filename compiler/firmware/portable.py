@@ -11,16 +11,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .layout import Layout
-from .lookups import Lookup, lookups
-from .parts import Parts
+from .layout import Layout, Lookup, Parts, lookups
 
 _STARTS_PER_LINE = 4
 
 
-def portable_values(name: str, layout: Layout, parts: Parts) -> dict[str, object]:
+def portable_values(name: str, layout: Layout) -> dict[str, object]:
     """Return what the templates of the portable C ask for."""
-    narrow = layout.entry_bits == 8
+    narrow, parts = layout.entry_bits == 8, layout.parts
     lanes = _lanes(parts.width, narrow)
     starts, open_sums = (_start_lines(_in_parts(scores, parts), lanes) for scores in (layout.start, layout.all_open))
     n_lanes = max(lane for lane, _ in lanes) + 1

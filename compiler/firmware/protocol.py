@@ -7,7 +7,6 @@ byte for byte, given the same scans, times and received bytes.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from textwrap import wrap
 
 from thenar.firmware_templates.rendering import render
@@ -81,17 +80,12 @@ _RANGES = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class HurdleRow:
-    """By how many steps `leader` must be ahead of every class, in lines of C."""
-
-    leader: str
-    steps: list[str]
-
-
 def protocol_files(config: BoardConfig) -> dict[str, str]:
     """Return name -> text of the C of a board: configuration, frames, debouncing and protocol."""
-    return {"thenar_config.h": _text("thenar_config.h", config=config), **{name: _text(name) for name in _PORTABLE}}
+    return {
+        "thenar_config.h": render("board/thenar_config.h.j2", config=config),
+        **{name: render(f"board/{name}.j2") for name in _PORTABLE},
+    }
 
 
 def decided_files(
@@ -125,24 +119,20 @@ def decided_files(
         ],
         "tables": [_hurdles(scorer, early.unread(port), names) for port in range(len(ports) - 1)],
     }
-    return {f"thenar_{name}_decided.{end}": _text(f"thenar_NAME_decided.{end}", **values) for end in "hc"}
+    return {f"thenar_{name}_decided.{end}": render(f"board/thenar_NAME_decided.{end}.j2", **values) for end in "hc"}
 
 
-def _hurdles(scorer: Scorer, unread: int, grasps: Sequence[str]) -> list[HurdleRow]:
-    rows = []
+def _hurdles(scorer: Scorer, unread: int, grasps: Sequence[str]) -> list[dict[str, object]]:
+    """Return by how many steps each leader must be ahead of every class, in lines of C."""
+    rows: list[dict[str, object]] = []
     for leader, grasp in enumerate(grasps):
         steps = [
             0 if rival == leader else min(most + (rival < leader), _NEVER)
             for rival, most in enumerate(scorer.reach(leader, unread))
         ]
-        rows.append(HurdleRow(grasp, wrap(", ".join(map(str, steps)), _WIDTH)))
+        rows.append({"leader": grasp, "steps": wrap(", ".join(map(str, steps)), _WIDTH)})
     return rows
 
 
 def _listed(port: Sequence[int]) -> str:
     return ("switches " if len(port) > 1 else "switch ") + ", ".join(map(str, port)) if port else "no switch"
-
-
-def _text(file: str, /, **values: object) -> str:
-    template = f"board/{file}.j2"
-    return render(template, origin=f"thenar {version('thenar')}, template {template}.", **values)

@@ -2,7 +2,6 @@
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
 from textwrap import wrap
 
 import numpy as np
@@ -17,16 +16,6 @@ from .words import string
 DRAWN = 16  # frames beside the two extreme ones
 CHECKS = DRAWN + 2
 _WIDTH = 120
-
-
-@dataclass(frozen=True, slots=True)
-class _Check:
-    """What a frame is, the lines of its members' initialisers, and of its answer's."""
-
-    what: str
-    members: tuple[list[str], ...]
-    grasp: int
-    scores: list[str]
 
 
 def check_header(name: str, layout: Layout, grasps: Sequence[str]) -> str:
@@ -58,10 +47,17 @@ def _drawn(rows: int, columns: int) -> NDArray[np.uint16]:
     return np.frombuffer(stream, "<u2").astype(np.uint16).reshape(rows, columns)
 
 
-def _check(what: str, closed: NDArray[np.uint8], codes: NDArray[np.uint16], scores: NDArray[np.int64]) -> _Check:
+def _check(
+    what: str, closed: NDArray[np.uint8], codes: NDArray[np.uint16], scores: NDArray[np.int64]
+) -> dict[str, object]:
+    """Return what a frame is, the lines of its members' initialisers, and of its answer's."""
     members = ([f"{byte:#04x}" for byte in closed.tolist()], [str(code) for code in codes.tolist()])
-    lines = tuple(_wrapped(words, 12) for words in members if words)
-    return _Check(what, lines, int(scores.argmax()), _wrapped([str(score) for score in scores.tolist()], 12))
+    return {
+        "what": what,
+        "members": [_wrapped(words, 12) for words in members if words],
+        "grasp": int(scores.argmax()),
+        "scores": _wrapped([str(score) for score in scores.tolist()], 12),
+    }
 
 
 def _wrapped(words: list[str], indent: int) -> list[str]:

@@ -17,6 +17,7 @@ STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-pedantic"
 # The first of the programs that is installed is the one used; the packages are Debian's.
 Tool = tuple[tuple[str, ...], str]
 HOST_COMPILER: Tool = (("gcc", "clang"), "gcc")
+AVR_COMPILER: Tool = (("avr-gcc",), "gcc-avr avr-libc")
 ARM_COMPILER: Tool = (("arm-none-eabi-gcc",), "gcc-arm-none-eabi")
 ARM_EMULATOR: Tool = (("qemu-system-arm",), "qemu-system-arm")
 

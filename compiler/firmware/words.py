@@ -1,10 +1,68 @@
 """Words of a build as words of C: names, comments and string literals, whatever characters they are made of."""
 
+import hashlib
 import re
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Protocol
+
+from thenar.runtime.manifest import Calibration, Switch
+from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from .errors import FirmwareError
 
 _LONGEST_NAME = 32
+
+
+class Names(Protocol):
+    """What firmware says of a build besides its tables. A Manifest is one, and `numbered(tables)`."""
+
+    @property
+    def grasps(self) -> tuple[str, ...]:
+        """The K grasp types."""
+        ...
+
+    @property
+    def switches(self) -> tuple[Switch, ...]:
+        """The switches in the order of the tables."""
+        ...
+
+    @property
+    def joints(self) -> tuple[Calibration, ...]:
+        """The joints in the order of the tables, and what their codes mean."""
+        ...
+
+    @property
+    def tables_sha256(self) -> str:
+        """The digest of the tables that all was made from."""
+        ...
+
+    @property
+    def thenar(self) -> str:
+        """The version of thenar that made them."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Numbered:
+    """Names of nothing but numbers, for tables that belong to no build: see `numbered`."""
+
+    grasps: tuple[str, ...]
+    switches: tuple[Switch, ...]
+    joints: tuple[Calibration, ...]
+    tables_sha256: str
+    thenar: str
+
+
+def numbered(tables: IntegerTables) -> Numbered:
+    """Return names for tables alone: "type 0", "s0", "j0" and so on."""
+    return Numbered(
+        grasps=tuple(f"type {number}" for number in range(tables.n_classes)),
+        switches=tuple(Switch(number, f"s{number}", 0.0) for number in range(tables.n_switches)),
+        joints=tuple(Calibration(number, f"j{number}", "raw", 0, 0.0, 1, 1.0) for number in range(tables.n_joints)),
+        tables_sha256=hashlib.sha256(tables_to_bytes(tables)).hexdigest(),
+        thenar=version("thenar"),
+    )
 
 
 def check_name(name: str) -> None:

@@ -1,20 +1,23 @@
-"""From finalists to points: every way to build each of them, and those that are on a front."""
+"""From finalists to points: every way to build each of them, how each decides, and those that are on a front."""
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
-from .candidates import Choice
-from .closeup import Close
-from .pareto import front
-from .points import Rate, Scan, Time
-from .pricing import PricedTables, Tabled, Wired
+from .finalists import Close
+from .latency import POLICIES
+from .points import DecisionKind, Latency, Point, Scan, Setting, Time, front
+from .price import PricedTables, Wired
 from .timing.classify_times import Classified
 from .timing.scan_times import transfer_us
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Design:
-    """A finalist built in one way: these tables in this layout, their switches read so (None: it reads none)."""
+    """A finalist built in one way: these tables in this layout, their switches read so (None: it reads none).
+
+    joints    how many are read
+    measured  what classifying takes, simulated or timed; None: it is as the model has it
+    """
 
     close: Close
     tables: PricedTables
@@ -22,31 +25,17 @@ class Design:
     wired: Wired | None
     scan_kind: Scan
     joints: int
+    measured: Time | None = None
 
     @property
-    def choice(self) -> Choice:
-        """What is read, and how its switches were chosen."""
-        return self.close.screened.choice
-
-    @property
-    def tabled(self) -> Tabled:
-        """The rounds and the shape of the tables."""
-        return self.tables.tabled
-
-    @property
-    def rate(self) -> Rate:
+    def rate(self) -> float:
         """What these tables recognise."""
-        return self.close.rates[self.tabled]
+        return self.close.rates[self.tables.tabled].mean
 
     @property
     def n_switches(self) -> int:
         """How many switches are read."""
         return len(self.close.screened.columns)
-
-    @property
-    def compile_s(self) -> float:
-        """How long choosing the switches, training and the tables took."""
-        return self.close.choosing_s + self.tables.seconds
 
     @property
     def scan(self) -> Time:
@@ -63,26 +52,31 @@ class Design:
 
     @property
     def classify(self) -> Time:
-        """Classifying, as the model has it."""
-        return Time(self.classified.us * self.looks, self.classified.how)
-
-    @property
-    def looks(self) -> float:
-        """How often a frame is classified, the mean over frames as the time of its scan is: a scan that may end early
-        looks at the scores after every port that it reads.
+        """Classifying, as often as it is done: a scan that may end early looks at the scores after every port that it
+        reads, the mean over frames as the time of its scan is.
         """
-        return self.wired.scan.early_ports if self.scan_kind == "early" and self.wired is not None else 1.0
+        once = self.measured or Time(self.classified.us, self.classified.how)
+        looks = self.wired.scan.early_ports if self.scan_kind == "early" and self.wired is not None else 1.0
+        return Time(once.us * looks, once.how)
 
     @property
-    def frame_us(self) -> float:
-        """Reading everything, on lines of their own, and classifying, as the model has it."""
-        return max(self.scan.us, self.transfer.us) + self.classify.us
+    def frame(self) -> Time:
+        """Reading everything, on lines of their own, and classifying."""
+        return Time(max(self.scan.us, self.transfer.us) + self.classify.us, self.classify.how)
+
+    @property
+    def decisions(self) -> tuple[DecisionKind, ...]:
+        """The decisions that its scans serve."""
+        return tuple(POLICIES) if self.scan_kind == "full" else ("single",)
+
+
+Latencies = Mapping[tuple[Design, DecisionKind], Latency]
 
 
 def designs(close: Close, joints: int) -> Iterator[Design]:
     """Yield every way to build a finalist; `joints` it has in all."""
     read = joints if close.screened.choice.joints else 0
-    for tables in close.priced.tables:
+    for tables in close.priced:
         for classified in tables.classified:
             if not close.screened.columns:
                 yield Design(close, tables, classified, None, "full", read)
@@ -93,20 +87,105 @@ def designs(close: Close, joints: int) -> Iterator[Design]:
                     yield Design(close, tables, classified, wired, kind, read)
 
 
-def best_designs(
-    all_designs: Sequence[Design], frame_us: Callable[[Design], float]
-) -> tuple[list[Design], list[Design]]:
+def best_designs(several: Sequence[Design]) -> tuple[list[Design], list[Design]]:
     """Return the designs on the front of rate against frame time, and those on that against the number of switches.
 
     Of designs that are equal there, the one of fewer chips, fewer ports, less reading and less flash.
     """
-    cheapest = sorted(all_designs, key=_effort)
-    by_time = front(cheapest, frame_us, lambda design: design.rate.mean)
-    cheapest.sort(key=frame_us)
-    by_switches = front(cheapest, lambda design: design.n_switches, lambda design: design.rate.mean)
-    return by_time, by_switches
+    times = {design: design.frame.us for design in several}
+    cheapest = sorted(several, key=_effort)
+    by_time = front(cheapest, times.__getitem__, lambda design: design.rate)
+    cheapest.sort(key=times.__getitem__)
+    return by_time, front(cheapest, lambda design: design.n_switches, lambda design: design.rate)
 
 
 def _effort(design: Design) -> tuple[float, ...]:
     parts = (design.wired.scan.chips, design.wired.scan.ports) if design.wired else (0, 0)
-    return (*parts, design.scan.us, design.classified.flash, design.tabled.rounds)
+    return (*parts, design.scan.us, design.classified.flash, design.tables.tabled.rounds)
+
+
+def with_whole_scans(kept: Sequence[Design]) -> list[Design]:
+    """Return the designs, each once, and those whose scans may end early with whole scans as well: other decisions
+    than on single frames need these.
+    """
+    found = {_identity(design): design for design in kept}
+    for design in kept:
+        whole = replace(design, scan_kind="full")
+        found.setdefault(_identity(whole), whole)
+    return list(found.values())
+
+
+def _identity(design: Design) -> tuple[object, ...]:
+    wired = design.wired and (design.wired.wiring, design.wired.clock_hz)
+    return id(design.close), design.tables.tabled, design.classified, wired, design.scan_kind
+
+
+def points_of(
+    several: Sequence[Design], latencies: Latencies, names: Sequence[str], max_bins: int | None
+) -> tuple[Point, ...]:
+    """Return those that are on a front, numbered from the fastest frame on.
+
+    names  of all switches of the set
+    """
+    fronts = _fronts(several, latencies)
+    ordered = sorted(several, key=lambda design: (design.frame.us, design.n_switches))
+    found = [(design, kind) for design in ordered for kind in design.decisions if fronts[design, kind]]
+    return tuple(
+        _point(number, design, kind, latencies[design, kind], fronts[design, kind], names, max_bins)
+        for number, (design, kind) in enumerate(found, 1)
+    )
+
+
+def _fronts(several: Sequence[Design], latencies: Latencies) -> dict[tuple[Design, DecisionKind], tuple[str, ...]]:
+    found: dict[tuple[Design, DecisionKind], tuple[str, ...]] = dict.fromkeys(latencies, ())
+    for name, best in zip(("frame", "switches"), best_designs(several), strict=True):
+        for design in best:
+            found[design, "single"] += (name,)
+    for kind in POLICIES:
+        waits = {design: latencies[design, kind].mean_us for design in several if kind in design.decisions}
+        for design in front(list(waits), waits.__getitem__, lambda design: design.rate):
+            found[design, kind] += ("latency",)
+    return found
+
+
+def _point(
+    number: int,
+    design: Design,
+    kind: DecisionKind,
+    latency: Latency,
+    fronts: tuple[str, ...],
+    names: Sequence[str],
+    max_bins: int | None,
+) -> Point:
+    wired, tabled, close = design.wired, design.tables.tabled, design.close
+    choice = close.screened.choice
+    return Point(
+        number=number,
+        setting=Setting(
+            way=choice.way,
+            inputs=choice.inputs,
+            rounds=tabled.rounds,
+            width=tabled.shape.width,
+            layout=design.classified.layout,
+            scan=design.scan_kind,
+            decision=kind,
+            wiring="" if wired is None else wired.wiring,
+            clock_hz=0 if wired is None else wired.clock_hz,
+            table_bits=tabled.shape.table_bits,
+            max_bins=max_bins,
+        ),
+        switches=tuple(names[column] for column in close.screened.columns),
+        rate=close.rates[tabled],
+        left_out=None if close.left_out is None else close.left_out[tabled],
+        scan=design.scan,
+        transfer=design.transfer,
+        classify=design.classify,
+        frame=design.frame,
+        latency=latency,
+        flash=design.classified.flash,
+        ram=design.classified.ram,
+        ports=0 if wired is None else wired.scan.ports,
+        chips=0 if wired is None else wired.scan.chips,
+        compile_s=round(close.choosing_s + design.tables.seconds, 2),
+        fronts=fronts,
+    )

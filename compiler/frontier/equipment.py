@@ -1,16 +1,16 @@
 """What a glove may be built of: the target that classifies, and the wirings that its switches may hang on."""
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import msgspec
-
-from thenar.runtime.harness.wiring import Harness
-
-from .timing.beside_wire import Beside
+from .cache import Cache, stored
+from .timing.beside_wire import Beside, beside_wire
 from .timing.classify_times import ClassifyModel
+from .timing.python_times import PythonCost
 from .timing.wirings import Wiring
+
+# Expected seconds.
+_CALIBRATION_S = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,13 +25,14 @@ class Equipment:
         """Return the wirings that have a place for all of these switches; none where there are none to read."""
         return tuple(wiring for wiring in self.wirings if wiring.fits(names)) if names else ()
 
-    @property
-    def identity(self) -> tuple[str, ...]:
-        """What prices depend on besides the tables."""
-        named = (f"{wiring.name}@{wiring.clock_hz}:{_digest(wiring.harness)}" for wiring in self.wirings)
-        return (self.model.target, repr(self.beside), repr((self.model.python, self.model.factor)), *named)
+
+@stored(1, where="process")
+def calibrate(target: str) -> tuple[PythonCost | None, Beside]:
+    """Measure here what classifying takes in Python, where that is asked, and a transaction besides the wire."""
+    return ClassifyModel(target).python, beside_wire(target)
 
 
-def _digest(harness: Harness | None) -> str:
-    # All of it: a harness's own fingerprint leaves out clocks and bauds, on which times depend.
-    return "" if harness is None else hashlib.sha256(msgspec.json.encode(harness)).hexdigest()[:16]
+def equipment_for(target: str, wirings: tuple[Wiring, ...], cache: Cache) -> Equipment:
+    """Return what may be built for `target`, measured here once."""
+    ((python, beside),) = cache.ask("calibration", [calibrate.call(_CALIBRATION_S, target)])
+    return Equipment(ClassifyModel(target, python=python), wirings, beside)

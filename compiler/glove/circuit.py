@@ -17,6 +17,11 @@ from thenar.runtime.harness.wiring import Harness, MuxChannel
 
 from .layout import GROUND, SUPPLY, End, PlacedSwitch, Unit, Wire, net_of
 
+_HOST = ("VCC", "GND", "SDA", "SCL")
+_TYPES = {"SDA": "bidirectional", "SCL": "input", "INT": "open_collector", "NC": "no_connect", RESET: "input"}
+_ESTIMATE = "an estimate: straight ways and a quarter more, and 40 mm for the ends"
+_STRANDED = "stranded wire, AWG 30 or thinner, flexible"
+
 
 @dataclass(frozen=True, slots=True)
 class Kind:
@@ -110,8 +115,6 @@ def capacitor(value: str, note: str = "") -> Kind:
 _DECOUPLING = capacitor("100n", "one close to each supply pin")
 _BULK = capacitor("10u", "where the host's plug comes in")
 _RESET_PULL = resistor("10k", "holds RESET high")
-_HOST = ("VCC", "GND", "SDA", "SCL")
-_TYPES = {"SDA": "bidirectional", "SCL": "input", "INT": "open_collector", "NC": "no_connect", RESET: "input"}
 
 
 def _add_expanders(circuit: Circuit, units: Sequence[Unit], ends: Sequence[End], harness: Harness) -> None:
@@ -310,10 +313,6 @@ def _add_pull(circuit: Circuit, end: End, net: str) -> None:
 def _units(ends: Sequence[End]) -> list[Unit]:
     """Return what reads switches: the boards, then the expanders, by their numbers."""
     return sorted({end.unit.ref: end.unit for end in ends}.values(), key=lambda unit: (unit.ref[0], int(unit.ref[1:])))
-
-
-_ESTIMATE = "an estimate: straight ways and a quarter more, and 40 mm for the ends"
-_STRANDED = "stranded wire, AWG 30 or thinner, flexible"
 
 
 class BillLine(Struct, frozen=True):

@@ -24,6 +24,8 @@ _SVG_COLOURS = {
 _STROKE_MM = 0.2
 # The height of capitals in Helvetica and its kin, as a share of the size of the type.
 _CAPITALS = 0.72
+# AutoCAD's colour numbers: black or white, blue, grey, red.
+_DXF_COLOURS = {"outline": 7, "strips": 5, "creases": 8, "holes": 1, "names": 8, "scale": 7}
 
 
 def svg_of(pattern: Pattern) -> bytes:
@@ -76,10 +78,6 @@ def _add_text(group: ET.Element, text: Text, height_mm: float) -> None:
     if text.centred:
         attributes["text-anchor"] = "middle"
     ET.SubElement(group, "text", attributes).text = text.text
-
-
-# AutoCAD's colour numbers: black or white, blue, grey, red.
-_DXF_COLOURS = {"outline": 7, "strips": 5, "creases": 8, "holes": 1, "names": 8, "scale": 7}
 
 
 def dxf_of(pattern: Pattern) -> bytes:

@@ -25,6 +25,7 @@ NAMES = frozenset(
         *("cutting.dxf", "cutting.svg"),
     }
 )
+_MARK = "spec.json"
 
 
 def spec_files(
@@ -56,9 +57,6 @@ def files_of(spec: GloveSpec) -> Mapping[str, bytes]:
     if spec.pattern is None:
         return files
     return {**files, "cutting.dxf": dxf_of(spec.pattern), "cutting.svg": svg_of(spec.pattern)}
-
-
-_MARK = "spec.json"
 
 
 def check_output(folder: Path) -> None:

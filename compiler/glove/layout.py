@@ -16,6 +16,14 @@ from ..hand import HandShape
 BODY_MM = 4.9
 CONTACT_MM = 3.2
 _SIDES = {-1: "left side", 0: "palm side", 1: "right side"}
+GROUND, SUPPLY = "GND", "VCC"
+# The resistor colour code from 1 to 9; black is the return's.
+COLOURS = ("brown", "red", "orange", "yellow", "green", "blue", "violet", "grey", "white")
+_RETURN = "black"
+# Estimates: a wire's way is so much longer than straight, and so much of it is needed at its ends and at each switch.
+_DETOUR, _ENDS_MM, _SPLICE_MM, _STEP_MM = 1.25, 40.0, 10.0, 5
+_LONGEST_HEADER = 40
+Place = tuple[float, float]
 
 
 class PlacedSwitch(Struct, frozen=True):
@@ -57,9 +65,6 @@ def crowded(switches: Sequence[PlacedSwitch]) -> list[tuple[int, int, float]]:
     apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
     first, second = np.nonzero(np.triu(apart < BODY_MM, k=1))
     return [(int(a) + 1, int(b) + 1, round(float(apart[a, b]), 2)) for a, b in zip(first, second, strict=True)]
-
-
-GROUND, SUPPLY = "GND", "VCC"
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,16 +155,6 @@ def _of_boards(harness: Harness, numbers: Mapping[str, int], boards: Sequence[Bo
         for (key, switch), signal in zip(kept, signals, strict=True):
             low = "" if pins is None else pins.lows[key]
             yield End(switch, unit, signal, pads[signal], f"{ref}_{low}" if low else GROUND)
-
-
-# The resistor colour code from 1 to 9; black is the return's.
-COLOURS = ("brown", "red", "orange", "yellow", "green", "blue", "violet", "grey", "white")
-_RETURN = "black"
-# Estimates: a wire's way is so much longer than straight, and so much of it is needed at its ends and at each switch.
-_DETOUR, _ENDS_MM, _SPLICE_MM, _STEP_MM = 1.25, 40.0, 10.0, 5
-_LONGEST_HEADER = 40
-
-Place = tuple[float, float]
 
 
 class Wire(Struct, frozen=True):

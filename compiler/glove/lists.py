@@ -11,6 +11,7 @@ from .layout import CONTACT_MM
 from .spec import Expected, SpecSummary
 
 Row = Sequence[object]
+_WIDTH = 100
 
 
 def switches_csv(summary: SpecSummary) -> bytes:
@@ -64,9 +65,6 @@ def _csv(header: Sequence[str], rows: Iterable[Row]) -> bytes:
     writer.writerow(header)
     writer.writerows(map(cells, rows))
     return text.getvalue().encode()
-
-
-_WIDTH = 100
 
 
 def readme_of(summary: SpecSummary) -> str:

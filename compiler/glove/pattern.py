@@ -17,6 +17,12 @@ from .layout import CONTACT_MM, PlacedSwitch
 MARGIN_MM = 5.0
 _A4_MM = (210.0, 297.0)
 _SHEETS = (("A4", *_A4_MM), ("A3", 297.0, 420.0), ("A2", 420.0, 594.0), ("A1", 594.0, 841.0), ("A0", 841.0, 1189.0))
+Floats = NDArray[np.float64]
+LAYERS = ("outline", "strips", "creases", "holes", "names", "scale")
+SCALE_BAR_MM = 50.0
+_TITLE_MM, _TEXT_MM, _ROW_MM, _COLUMN_MM = 3.5, 2.0, 3.2, 48.0
+_BAR_ROOM_MM, _GAP_MM = 14.0, 4.0
+_TICK_MM = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,15 +55,6 @@ def page_for(width_mm: float, height_mm: float) -> Page:
 
 def _tiles(length_mm: float, sheet_mm: float) -> int:
     return int(-(-length_mm // (sheet_mm - 2 * MARGIN_MM)))
-
-
-Floats = NDArray[np.float64]
-LAYERS = ("outline", "strips", "creases", "holes", "names", "scale")
-SCALE_BAR_MM = 50.0
-
-_TITLE_MM, _TEXT_MM, _ROW_MM, _COLUMN_MM = 3.5, 2.0, 3.2, 48.0
-_BAR_ROOM_MM, _GAP_MM = 14.0, 4.0
-_TICK_MM = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -33,12 +33,12 @@ from .layout import (
 )
 from .pattern import Pattern, pattern_of
 
+_SENSORS = 18
+_GLOVE_PORT = "/dev/ttyUSB0"
+
 
 class SpecError(ThenarError, ValueError):
     """There is no glove to describe, or not with this wiring."""
-
-
-_SENSORS = 18
 
 
 class Expected(Struct, frozen=True):
@@ -73,9 +73,6 @@ def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> Expected
         glove_us=None if glove is None else glove_us(glove, glove.sensors or _SENSORS),
         rates=manifest.rates,
     )
-
-
-_GLOVE_PORT = "/dev/ttyUSB0"
 
 
 class SwitchReader(Struct, frozen=True):

@@ -22,7 +22,7 @@ from .exact import Counts, Floats, compare, error_bound, first_best, n_log_n
 
 
 @dataclass(frozen=True, slots=True)
-class Node:
+class NodeCounts:
     """The counts of one node: of K classes, and of its inputs' values but the first of each.
 
     totals  (K,) rows of each class
@@ -56,7 +56,7 @@ class Node:
         return np.concatenate([firsts, others], axis=2).transpose(1, 0, 2)
 
 
-def best_position(node: Node, columns: npt.NDArray[np.intp]) -> int | None:
+def best_position(node: NodeCounts, columns: npt.NDArray[np.intp]) -> int | None:
     """Return the position of the input of maximum gain, None if no input varies at the node.
 
     `columns` (n_columns,) are the inputs' numbers: of equal gains, the lowest number wins.
@@ -73,7 +73,7 @@ def best_position(node: Node, columns: npt.NDArray[np.intp]) -> int | None:
     return int(close[first_best(tables.reshape(len(close), -1), tables.sum(axis=1))])
 
 
-def best_per_cost(node: Node, costs: Counts) -> int | None:
+def best_per_cost(node: NodeCounts, costs: Counts) -> int | None:
     """Return the number of the switch of largest gain / cost at `node` of bits, None if none varies there.
 
     costs (d,), whole, > 0. Of equal switches the cheapest wins, then the lowest number.
@@ -95,7 +95,7 @@ def best_per_cost(node: Node, costs: Counts) -> int | None:
     return int(close[first_best(plus, minus, costs[close])])
 
 
-def _scores(node: Node) -> tuple[Floats, npt.NDArray[np.bool_]]:
+def _scores(node: NodeCounts) -> tuple[Floats, npt.NDArray[np.bool_]]:
     """Return each input's score and whether it has more than one value at the node."""
     first = node.first_values()
     first_sizes, cell_sizes = first.sum(axis=0), node.cells.sum(axis=0)
@@ -108,7 +108,7 @@ def _scores(node: Node) -> tuple[Floats, npt.NDArray[np.bool_]]:
     return scores, np.maximum(largest, first_sizes) < node.totals.sum()
 
 
-def _score_bound(node: Node) -> float:
+def _score_bound(node: NodeCounts) -> float:
     """Bound the error of a score: of K + 1 terms for each value, whose absolute values are 2 f(n) in sum, since the sum
     over v of f(n_v) is at most f(n). No input has more values than all cells leave to it.
     """

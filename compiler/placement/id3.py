@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from . import gain
 from .counts import Counter, Digits
 from .errors import PlacementError
 from .exact import Counts
+from .gain import NodeCounts, best_position, gain_bits
 from .inputs import check_labels, check_matrix
 from .tree import Node, Tree
 
@@ -28,13 +28,35 @@ class _Subset:
 def grow_id3(X: npt.ArrayLike | Digits, y: npt.ArrayLike, min_samples: int = 0) -> Tree:
     """Grow the paper's tree.
 
-    X (n, d) is bool or whole numbers >= 0, of any number of values an input, or `Digits` packed before; y (n,) are
-    labels that can be sorted. A node is terminal if its rows have one label, are fewer than `min_samples` (the paper's
-    S; 0 does not prune), or agree in every input; it then answers with the majority, of equal ones with the lowest
-    class. An input that is constant at a node is never chosen; of equal gains, exactly compared, the lowest number is.
-    If no input gains anything the rule stands: the lowest-numbered one that varies is chosen, and the node's gain is 0.
+    A node is terminal if its rows have one label, are fewer than `min_samples`, or agree in every input; it then
+    answers with the majority, of equal ones with the lowest class. An input that is constant at a node is never chosen;
+    of equal gains, exactly compared, the lowest number is. If no input gains anything the rule holds: the
+    lowest-numbered one that varies is chosen, and the node's gain is 0.
 
-    Raises PlacementError, with row and column, if X or y are not such data.
+    Parameters
+    ----------
+    X : array-like, shape (n, d)
+        Bool or whole numbers >= 0, of any number of values an input; or `Digits` packed before.
+    y : array-like, shape (n,)
+        Labels that can be sorted.
+    min_samples : int
+        The paper's S: nodes of fewer rows decide nothing; 0 does not prune.
+
+    Returns
+    -------
+    Tree
+        Its `inputs` are the columns that it looks at, in the order in which they come; `gains` are in bits.
+
+    Raises
+    ------
+    PlacementError
+        With row and column, if X or y are not such data.
+
+    Examples
+    --------
+    >>> from thenar.compiler import grow_id3
+    >>> grow_id3([[0, 0], [0, 1], [1, 0], [1, 1]], ["pen", "pen", "cup", "cup"]).inputs
+    (0,)
     """
     if min_samples < 0:
         raise PlacementError(f"min_samples is {min_samples}, a number of rows >= 0 is needed")
@@ -69,22 +91,22 @@ class _Growth:
         table = counted.table(position)
         present = np.flatnonzero(table.any(axis=0))
         values = tuple(self.digits.values[position][present].tolist())
-        node = Node(counts, int(self.digits.columns[position]), gain.gain_bits(table), values)
+        node = Node(counts, int(self.digits.columns[position]), gain_bits(table), values)
         return node, self._children(subset.rows, counted, position, table[:, present], present)
 
     def _goes_on(self, totals: Counts) -> bool:
         return int(np.count_nonzero(totals)) > 1 and int(totals.sum()) >= self.min_samples
 
-    def _split(self, subset: _Subset) -> tuple[gain.Node, int] | None:
+    def _split(self, subset: _Subset) -> tuple[NodeCounts, int] | None:
         if not len(self.digits.columns):
             return None
         cells = self.counter.count(subset.rows) if subset.cells is None else subset.cells
-        counted = gain.Node(subset.totals, cells, self.counter.starts)
-        position = gain.best_position(counted, self.digits.columns)
+        counted = NodeCounts(subset.totals, cells, self.counter.starts)
+        position = best_position(counted, self.digits.columns)
         return None if position is None else (counted, position)
 
     def _children(
-        self, rows: Rows, counted: gain.Node, position: int, tables: Counts, present: npt.NDArray[Any]
+        self, rows: Rows, counted: NodeCounts, position: int, tables: Counts, present: npt.NDArray[Any]
     ) -> list[_Subset]:
         codes = self.digits.codes(position, rows)
         parts = [rows[codes == code] for code in present]

@@ -23,7 +23,7 @@ class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
     Parameters
     ----------
     method : str, default="elimination"
-        A name in `thenar.compiler.placement.methods.base.METHODS`; `thenar place --help` lists them.
+        A name in `thenar.compiler.METHODS`; `thenar place --help` lists them.
     n_switches : int, default=20
         How many switches to keep at most. Fewer are kept where fewer vary, or help. Ignored by methods that take the
         paper's S.
@@ -62,7 +62,7 @@ class SwitchSelector(SelectorMixin, BaseEstimator):  # type: ignore[misc]
     Examples
     --------
     >>> import numpy as np
-    >>> from thenar.compiler.placement.selectors import SwitchSelector
+    >>> from thenar.compiler import SwitchSelector
     >>> y = np.arange(40) % 4
     >>> X = np.column_stack([y & 1, y >> 1, y == 0, np.ones(40)])
     >>> SwitchSelector(method="cmim", n_switches=2).fit(X, y).get_support()
@@ -160,7 +160,7 @@ class ID3Selector(SwitchSelector):
     Examples
     --------
     >>> import numpy as np
-    >>> from thenar.compiler.placement.selectors import ID3Selector
+    >>> from thenar.compiler import ID3Selector
     >>> y = np.arange(40) % 4
     >>> X = np.column_stack([np.ones(40), y & 1, y >> 1, y == 0])
     >>> ID3Selector(min_samples=13).fit(X, y).get_support()

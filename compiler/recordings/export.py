@@ -95,10 +95,13 @@ def _globs(names: Iterable[str]) -> str:
 _BARE = re.compile(r"[A-Za-z0-9_.+-]+")
 
 
-def export(grasp_set: GraspSet, path: Path, codes: bool = False, meta: bool = False) -> None:
+def export(
+    grasp_set: GraspSet, path: Path, codes: bool = False, meta: bool = False, columns: Path | None = None
+) -> None:
     """Write `grasp_set` as .csv, .csv.gz or .arff, whole or not at all; joints as values, or as `codes`.
 
-    An ARFF holds subject, object and trial only with `meta`. Raises TableError for any other suffix.
+    An ARFF holds subject, object and trial only with `meta`. To `columns` goes the columns.toml that imports the table
+    again. Raises TableError for any other suffix.
     """
     name = path.name.lower()
     if name.endswith(".arff"):
@@ -109,6 +112,8 @@ def export(grasp_set: GraspSet, path: Path, codes: bool = False, meta: bool = Fa
         write_atomically(path, gzip.compress(to_csv(grasp_set, codes).encode(), mtime=0))
     else:
         raise TableError(f"{path.name}: an exported table ends in .csv, .csv.gz or .arff")
+    if columns is not None:
+        write_atomically(columns, columns_of(grasp_set, codes, meta or not name.endswith(".arff")).encode())
 
 
 def to_csv(grasp_set: GraspSet, codes: bool = False) -> str:

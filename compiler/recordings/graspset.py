@@ -35,11 +35,30 @@ LARGEST_VALUE = 1e300
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """One joint of the glove: its name, and what its integer codes mean in `unit`, by two points of a straight line.
+    """One joint of the glove: its name, and what its integer codes mean, by two points of a straight line.
 
-    Codes are what is trained on and recognised; values are for people. Raises RecordingError if the two points are no
-    line, or if neighbouring codes would be closer than a billionth of the largest value; values lie within +-1e300, and
-    steps are above 1e-300.
+    Codes are what is trained on and recognised; values are for people.
+
+    Parameters
+    ----------
+    name, unit : str
+        Of the joint, and of its values, such as "deg".
+    code_a, code_b : int
+        Two different codes of 0 to 65535.
+    value_a, value_b : float
+        Their values, within +-1e300.
+
+    Raises
+    ------
+    RecordingError
+        If the two points are no line, or if neighbouring codes would be closer than a billionth of the largest value.
+
+    Examples
+    --------
+    >>> from thenar.compiler import Joint
+    >>> thumb = Joint("thumb", "deg", 0, -20.0, 200, 80.0)
+    >>> float(thumb.value(40)), float(thumb.code(0.1))
+    (0.0, 40.0)
     """
 
     name: str
@@ -80,16 +99,59 @@ class Joint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GraspSet:
-    """n recorded grasps; arrays are checked, and cannot be written to.
+    """n recorded grasps of s switches and j joints; arrays are checked, and cannot be written to.
 
-    switches  (n, s) bool      switch_names  s names
-    codes     (n, j) uint16    joints        j Joints, the codes' names and calibration
-    grasps    (n,) str         taxonomy      holds every one of them
-    subjects, objects (n,) str, trials (n,) int64: who, what with, and the number of the repetition
-    labels    (n,) intp        index of each grasp in taxonomy.types
-    simulated                  what simulated them; empty: they were recorded
+    Parameters
+    ----------
+    switches : (n, s) array of bool
+        Which switches were closed.
+    switch_names : tuple of str
+        The switches' names.
+    codes : (n, j) array of uint16
+        The joints' integer codes.
+    joints : tuple of Joint
+        The codes' names, and what they mean in degrees or another unit.
+    grasps : (n,) array of str
+        The grasp type of each row; the taxonomy holds every one of them.
+    taxonomy : Taxonomy
+        The grasp types that there may be, in their order.
+    subjects, objects : (n,) arrays of str
+        Who grasped, and what.
+    trials : (n,) array of int64
+        The number of the repetition.
+    simulated : str, optional
+        What simulated them; empty: they were recorded.
 
-    Raises RecordingError naming the array and the row that does not fit.
+    Attributes
+    ----------
+    labels : (n,) array of intp
+        The place of each grasp in `taxonomy.types`.
+
+    Raises
+    ------
+    RecordingError
+        The message names the array and the row that does not fit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thenar.compiler.recordings.graspset import GraspSet
+    >>> from thenar.compiler.recordings.taxonomy import own
+    >>> grasp_set = GraspSet(
+    ...     switches=np.array([[True, False], [False, True]]),
+    ...     switch_names=("thumb", "index"),
+    ...     codes=np.zeros((2, 0), np.uint16),
+    ...     joints=(),
+    ...     grasps=np.array(["pinch", "hook"]),
+    ...     taxonomy=own(["pinch", "hook"]),
+    ...     subjects=np.array(["A", "A"]),
+    ...     objects=np.array(["pin", "bag"]),
+    ...     trials=np.array([1, 2]),
+    ... )
+    >>> grasp_set
+    GraspSet: 2 grasps of 2 types (own), 2 switches, 0 joints, 1 subjects, 2 objects
+    >>> grasp_set.rows(grasp_set.grasps == "hook").switches
+    array([[False,  True]])
     """
 
     switches: NDArray[np.bool_]
@@ -145,6 +207,13 @@ class GraspSet:
 
     def __len__(self) -> int:
         return len(self.grasps)
+
+    def __repr__(self) -> str:
+        types, subjects, objects = (len(np.unique(each)) for each in (self.grasps, self.subjects, self.objects))
+        what = f"{len(self)} grasps of {types} types ({shortened(self.taxonomy.name)})"
+        read = f"{len(self.switch_names)} switches, {len(self.joints)} joints"
+        who = f"{read}, {subjects} subjects, {objects} objects"
+        return f"GraspSet: {what}, {who}" + (f"\nsimulated: {shortened(self.simulated)}" if self.simulated else "")
 
     @property
     def joint_names(self) -> tuple[str, ...]:

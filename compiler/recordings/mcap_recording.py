@@ -19,9 +19,9 @@ from thenar.runtime.recording.reader import Reader, check_made
 from thenar.runtime.recording.session import Collection, Label, Session
 
 from .columns import Calibration, JointColumns
-from .errors import TableError, list_rows
+from .errors import ColumnsError, TableError, list_rows
 from .graspset import GraspSet, Joint
-from .importer import CodingCost, ImportReport, code_joint, report_of
+from .importer import CodingCost, ImportReport, code_joint, import_file, report_of
 from .summary import Finding, find_oddities
 from .taxonomy import Taxonomy
 
@@ -53,6 +53,22 @@ class _Part:
     session: Session
     collection: Collection
     grasps: tuple[_Grasp, ...]
+
+
+def import_files(paths: Sequence[Path], columns: Path | None = None) -> tuple[GraspSet, ImportReport]:
+    """Import one table as the columns.toml in file `columns` says, or recordings, which say themselves what they hold.
+
+    Raises TableError, ColumnsError, RecordingError or McapError, naming file, rows and columns; OSError as it comes.
+    """
+    if all(path.suffix.lower() == ".mcap" for path in paths):
+        if columns is not None:
+            raise ColumnsError(f"a recording says itself what its columns are: leave {columns.name} out")
+        return import_recordings(paths)
+    if len(paths) > 1:
+        raise TableError("several recordings (.mcap) can be imported together, but only one table")
+    if columns is None:
+        raise ColumnsError(f"{paths[0].name} is a table: say what its columns are with a columns.toml (--columns)")
+    return import_file(paths[0], columns)
 
 
 def import_recordings(paths: Sequence[Path]) -> tuple[GraspSet, ImportReport]:

@@ -232,7 +232,6 @@ def read_table(path: Path, delimiter: str = ",") -> Table:
                 table = _read_csv(path.name, lines, delimiter)
         else:
             raise TableError(f"{path.name}: a table ends in .csv, .csv.gz, .arff, .arff.gz or .npz")
-        check_names("column", table.columns)
     except RecordingError as reason:
         raise TableError(f"{path.name}: {reason}") from reason
     if not len(table.rows):
@@ -278,6 +277,7 @@ def _read_npz(path: Path) -> Table:
     lengths = {len(column) for column in columns.values()}
     if len(lengths) > 1:
         raise TableError(f"{path.name}: its arrays have {list_names(list(map(str, sorted(lengths))))} rows, no table")
+    check_names("column", columns)
     return Table(path.name, columns, np.arange(1, lengths.pop() + 1))
 
 
@@ -309,6 +309,7 @@ def read_arff(what: str, text: Iterable[str]) -> Table:
             if count > ROWS:
                 raise TableError(f"{what} has more than {ROWS} rows, the most that are read of a table")
             cells.append(_values(f"{what} row {count}", data, len(kinds)))
+    check_names("column", kinds)
     columns = dict(zip(kinds, cells.columns(), strict=True))
     for name, values in kinds.items():
         for number, cell in enumerate(columns[name] if values else (), start=1):

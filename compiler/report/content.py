@@ -1,10 +1,11 @@
-"""All that a report tells of, gathered by whoever compiled the build."""
+"""What a report is made of, and the table that its sections share."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.errors import ThenarError
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.scanning.scanmap import ScanMap
@@ -15,7 +16,10 @@ from ..frontier.points import Frontier
 from ..hand import HandShape
 from ..placement.tree import Tree
 from ..tables.compare import Comparison, WorstCase
-from .errors import ReportError
+
+
+class ReportError(ThenarError, ValueError):
+    """The parts of a report do not belong together."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,3 +77,20 @@ class ReportContent:
     def switch_names(self) -> tuple[str, ...]:
         """Names of the kept switches, in the order in which they were chosen."""
         return tuple(switch.name for switch in self.manifest.switches)
+
+
+@dataclass(frozen=True, slots=True)
+class PlainTable:
+    """A table of texts: every row is as long as `columns`.
+
+    words  columns of words; the others hold numbers, to the right
+    head   the column that heads the rows
+    note   a sentence below the table
+    """
+
+    caption: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    words: tuple[int, ...] = (0,)
+    head: int = 0
+    note: str = ""

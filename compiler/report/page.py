@@ -1,60 +1,52 @@
 """`report_html`: one HTML file that needs no other, no network and no date."""
 
+import base64
+import hashlib
+from collections.abc import Iterable
 from functools import lru_cache
 
+import msgspec
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from ..text import counted
-from .confusion_view import ConfusionView, confusion_view, study_confusions
+from ..text import sentence
+from . import results, sections
 from .content import ReportContent
-from .embedding import embed
-from .frontier_charts import frontier_charts
-from .frontier_view import frontier_view
-from .guarantee_view import guarantee_view
-from .hand_picture import HandPicture, hand_picture
-from .overview import honest_rate, overview
-from .placement_view import placement_view
-from .provenance import provenance
-from .scan_view import ScanView, scan_view
-from .study_view import study_view
-from .tree_chart import tree_chart
-from .tree_view import TreeView, tree_view
+from .frontier import Detail, frontier_view
+from .hand import HandPicture, hand_picture
+from .tree import TreeView, tree_view
 
 
 def report_html(content: ReportContent) -> bytes:
-    """Return the report in UTF-8; the same content gives the same bytes. Raises ReportError without Plotly."""
-    environment = _environment()
-    manifest, frontier = content.manifest, content.frontier
-    tree = _tree(content)
-    charts = () if frontier is None else frontier_charts(frontier)
-    shown = (
-        None if frontier is None else frontier_view(frontier, manifest.source.fingerprint, content.hand, content.point)
-    )
-    tree_charts = () if tree is None else (tree_chart(tree),)
+    """Return the report in UTF-8; the same content gives the same bytes.
+
+    The page's policy allows its one script by SHA-256, and no request at all: whatever a name holds stays text.
+    Raises PictureError where a frontier's charts cannot be drawn without matplotlib.
+    """
+    environment, manifest, frontier = _environment(), content.manifest, None
+    if content.frontier is not None:
+        frontier = frontier_view(content.frontier, manifest.source.fingerprint, content.hand, content.point)
+    script = _file(environment, "report.js")
     page = environment.get_template("report.html.j2").render(
-        overview=overview(content),
+        content=content,
+        manifest=manifest,
+        sections=sections,
+        results=results,
         hand=_hand(content),
-        placement=placement_view(manifest, content.tree, content.hand),
-        tree=tree,
-        tree_charts=tree_charts,
-        study=None if content.study is None else study_view(content.study),
-        no_study=content.no_study,
-        confusions=_confusions(content),
-        frontier=shown,
-        charts=charts,
-        guarantee=guarantee_view(content),
-        scan=_scan(content),
-        provenance=provenance(manifest, content.scan is not None),
+        tree=_tree(content),
+        confusions=tuple(results.confusions(content)),
+        frontier=frontier,
         style=_file(environment, "report.css"),
-        embedded=embed(_file(environment, "report.js"), (*tree_charts, *charts), shown),
+        script=script,
+        script_sha256=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
+        points=_json(() if frontier is None else frontier.details),
     )
     return page.encode()
 
 
 @lru_cache(maxsize=1)
 def _environment() -> Environment:
-    return Environment(
+    environment = Environment(
         loader=PackageLoader(__package__, "templates"),
         undefined=StrictUndefined,
         autoescape=True,
@@ -62,12 +54,23 @@ def _environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
+    environment.filters["sentence"] = sentence
+    return environment
 
 
 def _file(environment: Environment, name: str) -> Markup:
-    """Return a file beside the templates, as it is."""
+    """Return a file of the templates' folder, as it is."""
     assert environment.loader is not None
     return Markup(environment.loader.get_source(environment, name)[0])
+
+
+def _json(details: Iterable[Detail]) -> Markup:
+    """Return number -> detail for the script, between tags."""
+    text = msgspec.json.encode({str(detail.number): detail for detail in details}).decode()
+    # Whatever a name holds: no tag begins or ends here, and no entity is one.
+    for letter in "<>&":
+        text = text.replace(letter, f"\\u{ord(letter):04x}")
+    return Markup(text)
 
 
 def _tree(content: ReportContent) -> TreeView | None:
@@ -88,18 +91,3 @@ def _hand(content: ReportContent) -> HandPicture | None:
         "numbered in the order in which they were chosen. The table beside it says which they are."
     )
     return hand_picture(content.hand, content.switch_names, "kept-hand", "Kept switches on the hand", summary)
-
-
-def _confusions(content: ReportContent) -> tuple[ConfusionView, ...]:
-    own = []
-    if content.confusion is not None:
-        rate = honest_rate(content)
-        folds = "honest folds" if rate is None else counted(rate.folds, "honest fold")
-        own.append(confusion_view(f"This build's own recipe, {folds}", content.manifest.grasps, content.confusion))
-    return (*own, *(() if content.study is None else study_confusions(content.study)))
-
-
-def _scan(content: ReportContent) -> ScanView | None:
-    if content.scan is None or content.harness is None:
-        return None
-    return scan_view(content.scan, content.harness, content.switch_names, len(content.manifest.joints))

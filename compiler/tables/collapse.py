@@ -27,8 +27,25 @@ Floats = NDArray[np.float64]
 class ScoreTables:
     """F_k = bias_k + sum over switches s of bits_s * switch_rows[s, k] + sum over joints a of joint_rows[a][bin_a, k].
 
-    bias (K,), switch_rows (s, K), thresholds: j arrays (T_a,) uint16, strictly increasing, joint_rows: j arrays
-    (T_a + 1, K); bin_a is the number of thresholds below the code, so code <= t goes left of t.
+    Parameters
+    ----------
+    bias : ndarray of float, shape (K,)
+        The scores with every switch open, before any joint.
+    switch_rows : ndarray of float, shape (s, K)
+        What a closed switch adds.
+    thresholds : tuple of j ndarrays of uint16, shape (T_a,)
+        Strictly increasing; bin_a is the number of thresholds below the code, so code <= t goes left of t.
+    joint_rows : tuple of j ndarrays of float, shape (T_a + 1, K)
+        What a joint adds in each bin.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thenar.compiler import ScoreTables
+    >>> bins = (np.array([100], np.uint16),)
+    >>> tables = ScoreTables(np.zeros(2), np.array([[0.0, 1.0]]), bins, (np.array([[0.5, 0.0], [0.0, 0.5]]),))
+    >>> tables.scores(np.array([[True], [False]]), np.array([[100], [101]])).tolist()
+    [[0.5, 1.0], [0.0, 0.5]]
     """
 
     bias: Floats

@@ -39,6 +39,12 @@ class Setting:
         Without a value; None is a value of its own.
     least : int or float, optional
         The least value that makes sense.
+
+    Examples
+    --------
+    >>> from thenar.compiler import TRAINERS
+    >>> [setting.name for setting in TRAINERS["logitboost"].settings]
+    ['rounds', 'shrinkage', 'tolerance', 'max_bins']
     """
 
     name: str

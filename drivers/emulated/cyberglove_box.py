@@ -25,6 +25,10 @@ MASKS = {18: MASK_18, 22: MASK_22}
 VERSIONS = bytes([2, 4, 0, 1])  # firmware and information format: any will do
 _SWITCHES = "DFJLQUWY"  # settings that are 0 or 1
 _NOT_READY = 1
+_REINITIALISE = b"\x09"  # Ctrl-I
+_TEXT_END = b"\r\n\0"
+_LONGEST_TEXT = 64
+_ALL_ACTUATORS = 255
 
 
 class GloveState:
@@ -131,12 +135,6 @@ def _stamp(ticks: int) -> bytes:
     counter = (ticks & 0xFFFFFFFF).to_bytes(4, "little")
     zeros = sum((byte == 0) << place for place, byte in enumerate(counter))
     return bytes([zeros]) + counter.replace(b"\0", b"\1")
-
-
-_REINITIALISE = b"\x09"  # Ctrl-I
-_TEXT_END = b"\r\n\0"
-_LONGEST_TEXT = 64
-_ALL_ACTUATORS = 255
 
 
 class Action(Enum):

@@ -30,6 +30,11 @@ from ..scanner_protocol import (
 )
 from .serial_line import PtyLine
 
+_CLOCK = (1 << 32) - 1
+_FASTEST_US = 100
+_MOST_MARGIN = 0xFFFF
+_FAULTS_EVERY_US = 1_000_000
+
 
 def read_without_diodes(closed: Mask, rows: int, columns: int) -> Mask:
     """Return which keys, bits row * columns + column, read closed when those in `closed` are.
@@ -47,12 +52,6 @@ def read_without_diodes(closed: Mask, rows: int, columns: int) -> Mask:
             held |= others
         wires.append((members, held))
     return sum(held << row * columns for members, held in wires for row in members)
-
-
-_CLOCK = (1 << 32) - 1
-_FASTEST_US = 100
-_MOST_MARGIN = 0xFFFF
-_FAULTS_EVERY_US = 1_000_000
 
 
 class ScannerBoard:

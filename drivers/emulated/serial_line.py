@@ -16,6 +16,10 @@ from ..closing import Closing
 from ..errors import DeviceError
 from ..serial_line import BITS_A_BYTE
 
+_CHUNK_S = 0.002  # longer messages arrive in pieces, as they do from a real adapter
+_HEARD = 256
+_MOST_WAITING = 4096
+
 
 class Outgoing:
     """Messages on their way out, each from the moment it was queued or the line became free, whichever is later.
@@ -91,10 +95,6 @@ class Outgoing:
         self._from = max(queued_at, self._free_at)
         self._free_at = self._from + len(self._rest) * self.byte_s
         return True
-
-
-_CHUNK_S = 0.002  # longer messages arrive in pieces, as they do from a real adapter
-_HEARD = 256
 
 
 class PtyWire:
@@ -183,9 +183,6 @@ class PtyWire:
         sending = None if self._blocked else self._outgoing.next_at(chunk)
         times = [sending, self._incoming[0] if self._incoming else None]
         return min((time for time in times if time is not None), default=None)
-
-
-_MOST_WAITING = 4096
 
 
 class PtyLine(Closing):

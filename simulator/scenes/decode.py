@@ -135,6 +135,18 @@ class _SceneFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     postures: str | None = None
 
 
+class Shipped(msgspec.Struct, frozen=True):
+    """A shipped scene: its name, and the first comment in its file."""
+
+    name: str
+    what: str
+
+
+def shipped_scenes() -> list[Shipped]:
+    """Return the scenes that are shipped."""
+    return [Shipped(name, file.read_text().partition("\n")[0].removeprefix("# ")) for name, file in shipped().items()]
+
+
 def load_scene(name_or_path: str | Path) -> Scene:
     """Return the scene that is shipped under a name, or lies in a TOML file: what has a suffix or a folder is a file.
 

@@ -7,7 +7,7 @@ A scene comes from a TOML file (decode.py) or is put together here; lengths are 
 Every subject has draws of their own, so that raising the count leaves the first ones as they were.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import floor, sqrt
 from pathlib import Path
@@ -16,9 +16,12 @@ from typing import Annotated, Literal, NamedTuple
 import msgspec
 import numpy as np
 
+from thenar.runtime.names import nearest
+
 from ..body.condition import Thing
 from ..body.hand import Hand, Size
 from ..body.shapes import Shape
+from ..errors import SceneError
 from ..pipeline.effect import Effect, EffectParameters, Setting
 from ..streams import Draw, Draws, Site
 
@@ -109,6 +112,22 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     glove: Glove = Glove()
     effects: tuple[Listed, ...]
     postures: Path | None = None
+
+    def varied(self, repetitions: int | None = None, seed: int | None = None, subjects: Sequence[str] = ()) -> "Scene":
+        """Return the scene with other repetitions, another seed, or only the `subjects` of these names.
+
+        Raises SceneError if it has no such subject.
+        """
+        known = {subject.name: subject for subject in self.subjects}
+        for subject in subjects:
+            if subject not in known:
+                raise SceneError(f"scene {self.name} has no subject {subject!r}{nearest(subject, list(known))}")
+        return msgspec.structs.replace(
+            self,
+            repetitions=self.repetitions if repetitions is None else repetitions,
+            seed=self.seed if seed is None else seed,
+            subjects=tuple(known[name] for name in known if not subjects or name in subjects),
+        )
 
     def setting(self, effects: Iterable[Effect]) -> Setting:
         """Return what `effects`, those of this scene, must know of it."""

@@ -51,7 +51,10 @@ def build(*, large: bool) -> Built:
     return Built(
         python=platform.python_version(),
         numpy=np.__version__,
-        kernels=tuple(f"{blas['architecture']} x{blas['num_threads']}" for blas in threadpool_info()),
+        # Whoever loads scikit-learn has OpenMP's threads too, which have no kernels.
+        kernels=tuple(
+            f"{blas['architecture']} x{blas['num_threads']}" for blas in threadpool_info() if blas["user_api"] == "blas"
+        ),
         simd=tuple(simd),
         files=files,
         plain=_digest(_plain()),

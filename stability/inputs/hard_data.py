@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.placement.gain import Node
+from thenar.compiler.placement.gain import NodeCounts
 from thenar.compiler.tables.collapse import HIGHEST_CODE
 
 Floats = NDArray[np.float64]
@@ -135,11 +135,11 @@ def random_table(rng: np.random.Generator) -> Counts:
     return counts
 
 
-def node_of(*tables: Counts) -> Node:
+def node_of(*tables: Counts) -> NodeCounts:
     """Return the node at which inputs have these tables (K, values), each of the same classes."""
     cells = np.concatenate([table[:, 1:] for table in tables], axis=1)
     starts = np.cumsum([0] + [table.shape[1] - 1 for table in tables])[:-1]
-    return Node(tables[0].sum(axis=1), cells, starts)
+    return NodeCounts(tables[0].sum(axis=1), cells, starts)
 
 
 def hand_made() -> Iterator[Counts]:

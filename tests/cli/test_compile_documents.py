@@ -9,11 +9,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from thenar.compiler import GraspSet
-from thenar.compiler.recordings.taxonomy import own
 from thenar.simulator.handmaps.handmap import hand_map
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
@@ -61,24 +59,6 @@ def test_no_report_leaves_out_the_report_and_the_spec(thenar: Thenar, gloved_fil
     assert made == ["build.json", "ensemble.bin", "firmware", "tables.bin"]
 
 
-def test_documents_come_and_go_with_the_builds_they_are_of(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
-    build = tmp_path / "build"
-    for flags, there in (((), True), (("--no-report",), False), (("--inputs", "joints"), False)):
-        done(thenar("compile", gloved_file, "-o", build, *QUICK, *flags))
-        assert (build / "spec").exists() == there
-    assert "This build reads no switches." in told(build)
-
-
-def test_the_same_recordings_give_the_same_documents(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
-    seen = []
-    for name in ("a", "b"):
-        done(thenar("compile", gloved_file, "-o", tmp_path / name, "--rounds", 3, "--folds", 2))
-        files = (tmp_path / name).rglob("*")
-        seen.append({path.relative_to(tmp_path / name): path.read_bytes() for path in files if path.is_file()})
-    assert seen[0] == seen[1]
-    assert {"report.html", "spec/glove.toml", "spec/cutting.svg"} <= set(map(Path.as_posix, seen[0]))
-
-
 @pytest.mark.parametrize("length", [None, 150])
 def test_the_spec_in_a_build_is_what_spec_writes_of_it(
     thenar: Thenar, gloved_file: Path, tmp_path: Path, length: int | None
@@ -112,32 +92,6 @@ def test_a_hand_length_needs_switches_whose_places_are_known(thenar: Thenar, set
     given = ("compile", set_file, "-o", tmp_path / "build", *QUICK, "--hand-length", 180)
     assert "where they lie is not known" in refused(thenar(*given))
     assert not (tmp_path / "build").exists()
-
-
-def test_switches_of_nobody_knows_which_glove_have_a_spec_without_a_pattern(
-    thenar: Thenar, set_file: Path, tmp_path: Path
-) -> None:
-    done(thenar("compile", set_file, "-o", tmp_path / "build", *QUICK))
-    assert "Where these switches lie on the hand is not known" in told(tmp_path / "build")
-    assert not list((tmp_path / "build" / "spec").glob("cutting.*"))
-
-
-def test_the_report_has_the_papers_tables_of_the_builds_own_folds(
-    thenar: Thenar, gloved_file: Path, tmp_path: Path
-) -> None:
-    done(thenar("compile", gloved_file, "-o", tmp_path / "build", "--rounds", 3, "--folds", 3, "--seed", 5))
-    words = told(tmp_path / "build")
-    assert "Angle + Sel-Co" in words
-    assert "3 stratified folds, 1 repeat from seed 5; 3 rounds" in words
-    assert "This build's own recipe, 3 honest folds" in words
-
-
-def test_without_folds_the_report_says_what_it_lacks(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
-    done(thenar("compile", gloved_file, "-o", tmp_path / "build", *QUICK))
-    words = told(tmp_path / "build")
-    assert "The build was compiled without folds. thenar evaluate SET.grasps prints them." in words
-    assert "It was not measured: the build was compiled without folds." in words
-    assert "what to expect of new grasps was not measured" in words
 
 
 def test_a_method_that_takes_a_number_keeps_it(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
@@ -188,30 +142,3 @@ def test_the_commands_of_a_report_make_the_build_again(thenar: Thenar, gloved_fi
     for path in build.rglob("*"):
         if path.is_file():
             assert path.read_bytes() == (again / path.relative_to(build)).read_bytes(), path.name
-
-
-@pytest.mark.parametrize(("types", "switches", "joints"), [(2, 1, 0), (2, 0, 1), (33, 12, 2), (33, 6, 0)])
-def test_sets_at_the_edges_have_a_report(
-    thenar: Thenar, tmp_path: Path, types: int, switches: int, joints: int, small_set: GraspSet
-) -> None:
-    labels, random = np.arange(types * 6) % types, np.random.default_rng(3)
-    names = tuple(f"</td><b>type {number} & 握り \u200d" for number in range(types))
-    edge = replace(
-        small_set,
-        switches=(labels[:, None] >> np.arange(switches) & 1).astype(bool),
-        switch_names=tuple(f"palm <{number}>" for number in range(switches)),
-        codes=(4 * labels[:, None] + random.integers(0, 3, (len(labels), joints))).astype(np.uint16),
-        joints=small_set.joints[:joints],
-        grasps=np.array(names)[labels],
-        taxonomy=own(list(names)),
-        subjects=np.full(len(labels), "<i>A"),
-        objects=np.full(len(labels), "thing"),
-        trials=np.arange(len(labels)),
-    )
-    edge.save(tmp_path / "edge.grasps")
-    done(thenar("compile", tmp_path / "edge.grasps", "-o", tmp_path / "build", "--rounds", 2, "--folds", 2))
-    page = (tmp_path / "build" / "report.html").read_text()
-    assert "<b>type" not in page
-    assert "<i>A" not in page
-    assert f"This build recognises {types} grasp types" in told(tmp_path / "build")
-    assert (tmp_path / "build" / "spec").exists() == bool(switches)

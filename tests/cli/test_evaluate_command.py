@@ -52,10 +52,10 @@ def test_the_papers_tables_are_printed_with_both_protocols_explained(
         "Tables II and V): paper protocol",
         "Tables III and VI): honest protocol",
         "Tables IV and VII): paper protocol",
-        "ID3 beside other placements of as many switches, Sel-Co: honest protocol",
+        "ID3 beside other placements of as many switches, selected switches: honest protocol",
         "Angle + NoSel-Co",
         "placement of subject [b]Bob",
-        "48 rows, 3 grasp types; 4 stratified folds, 1 repeat(s) from seed 1",
+        "48 rows, 3 grasp types; 4 stratified folds, 1 repeat from seed 1",
     ):
         assert text in printed
     assert not complaints

@@ -174,7 +174,7 @@ def test_the_extras_in_hints_are_those_of_the_project() -> None:
     [
         ("compile {set} -o {new}", "", "compiler"),
         ("compile {set} -o {new} --no-report", "", "compiler"),
-        ("verify {build} {set}", "", "compiler"),
+        ("verify {build} {set} --firmware host", "", "compiler"),
         ("firmware {build} --target host -o {new}", "", "compiler"),
         ("frontier {set} -o {new}", "", "compiler"),
         ("evaluate {set}", "", "compiler"),
@@ -182,7 +182,7 @@ def test_the_extras_in_hints_are_those_of_the_project() -> None:
         ("place {set} --draw {new}.svg", "", "compiler"),
         ("simulate quick -o {new}.grasps", "", "compiler"),
         ("stability", "", "stability"),
-        ("stability -o {new}.html", "mpmath sklearn scipy joblib matplotlib threadpoolctl plotly ezdxf", "stability"),
+        ("stability -o {new}.html", "mpmath sklearn scipy joblib matplotlib threadpoolctl ezdxf", "stability"),
     ],
 )
 def test_what_is_not_installed_is_named_with_the_extra_that_brings_it(

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from thenar.cli.frontier_tables import print_frontier
+from thenar.cli.frontier_command import print_frontier
 
 
 def _printed(frontier: Any, capsys: pytest.CaptureFixture[str]) -> list[str]:

@@ -160,8 +160,8 @@ def test_a_damaged_recording_is_one_sentence_with_file_and_byte(
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("a.mcap", "--columns", "columns.toml"), "leave --columns out"),
-        (("table.csv",), "table.csv is a table: say what its columns are with --columns"),
+        (("a.mcap", "--columns", "columns.toml"), "leave columns.toml out"),
+        (("table.csv",), "table.csv is a table: say what its columns are with a columns.toml (--columns)"),
         (("table.csv", "a.mcap", "--columns", "columns.toml"), "only one table"),
         (("a.mcap", "a.mcap"), "a.mcap is named twice"),
         ((), "Missing argument 'TABLE'"),

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace as replace_fields
 
-from thenar.cli.verify_firmware import print_firmware, verdict
+from thenar.cli.verify_command import print_firmware, verdict
 from thenar.compiler.artifact.verify_firmware import Carried, Difference, FirmwareVerification, TargetCheck
 from thenar.runtime.manifest import manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.tables import tables_from_bytes, tables_to_bytes

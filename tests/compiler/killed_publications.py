@@ -20,9 +20,9 @@ from typing import Any, NamedTuple
 from thenar.compiler import publication
 from thenar.compiler.artifact import staging
 from thenar.compiler.firmware import folder as firmware
-from thenar.compiler.frontier import preparing
+from thenar.compiler.frontier.cache import HEADER, Store
+from thenar.compiler.frontier.find import kept_entries
 from thenar.compiler.frontier.points import FrontierError
-from thenar.compiler.frontier.storing.store import HEADER, Store
 from thenar.compiler.glove import files as spec
 
 Content = Mapping[str, str]
@@ -57,10 +57,10 @@ def _encoded(files: Content) -> dict[str, bytes]:
 
 
 def _publish_frontier(files: Content, folder: Path) -> None:
-    publication.check_folder(folder, preparing._kept, FrontierError)
+    publication.check_folder(folder, kept_entries, FrontierError)
     folder.mkdir(exist_ok=True)
     with Store(folder / "store.jsonl", "scope"):
-        publication.publish_folder(_encoded(files), folder, preparing._kept, FrontierError)
+        publication.publish_folder(_encoded(files), folder, kept_entries, FrontierError)
 
 
 BUILD = {"build.json": "new", "ensemble.bin": "new", "spec/spec.json": "new"}

@@ -16,7 +16,7 @@ from thenar.compiler.boosting.stumpfit import Targets, _tie_bound
 from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.placement.cooccurrence import Cooccurrence
 from thenar.compiler.placement.exact import _log_sum, error_bound
-from thenar.compiler.placement.gain import Node, _score_bound
+from thenar.compiler.placement.gain import NodeCounts, _score_bound
 from thenar.compiler.tables.collapse import ScoreTables, collapse
 from thenar.compiler.tables.compare import COLLAPSE_TOLERANCE, compare, float_slack, rounding_error
 from thenar.compiler.tables.quantise import quantise
@@ -41,7 +41,7 @@ def test_a_sum_of_counts_times_their_logarithms_counts_its_terms_and_sixteen(n: 
 def test_a_score_of_gain_counts_a_term_a_class_and_value(n: int, classes: int, cells: list[int]) -> None:
     totals = np.bincount(np.arange(n) % classes, minlength=classes)
     starts = np.append(0, np.cumsum(cells))[:-1]
-    node = Node(totals, np.zeros((classes, sum(cells)), np.int64), starts)
+    node = NodeCounts(totals, np.zeros((classes, sum(cells)), np.int64), starts)
     # An input of all cells but one for each other input; and its first value, which has no cell.
     values = sum(cells) - (len(cells) - 1) + 1
     terms, rows = (classes + 1) * values, max(n, 2)

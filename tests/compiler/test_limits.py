@@ -13,7 +13,7 @@ from thenar.compiler.artifact.errors import CompileError
 from thenar.compiler.boosting.boost import BoostingError, boost
 from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.evaluation.study import Options, evaluate
-from thenar.compiler.frontier.material import Material
+from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.points import FrontierError
 from thenar.compiler.limits import check_inputs, check_memory
 from thenar.compiler.placement.errors import PlacementError
@@ -35,7 +35,7 @@ def many_types(make_set: Make) -> GraspSet:
     ("work", "error"),
     [
         (lambda grasps, folder: compile_build(grasps, folder / "build"), SamplesError),
-        (lambda grasps, _: Material.of(grasps, None), FrontierError),
+        (lambda grasps, _: find_frontier(grasps), FrontierError),
         (lambda grasps, _: evaluate(grasps), EvaluationError),
         (lambda grasps, _: place(grasps), PlacementError),
         (lambda grasps, _: Samples.of(grasps), SamplesError),
@@ -80,7 +80,7 @@ def test_more_switches_than_a_build_holds_are_refused_before_a_frontier_and_wher
 ) -> None:
     wide = make_set(switches=5000)
     with pytest.raises(FrontierError, match="5000 switches, a build has at most 4096"):
-        Material.of(wide, None)
+        find_frontier(wide)
     with pytest.raises(CompileError, match="4097 switches, a build has at most 4096"):
         compile_build(wide, tmp_path / "build", placement="elimination", keep=4097, folds=0)
     assert compile_build(wide, tmp_path / "build", rounds=2, folds=0).manifest.source.switches == 5000
@@ -128,7 +128,7 @@ def test_all_switches_that_do_not_fit_into_memory_are_refused_before_placements_
     wide: GraspSet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("os.sysconf", {"SC_PHYS_PAGES": 2000, "SC_PAGE_SIZE": 4096}.__getitem__)
-    monkeypatch.setattr("thenar.compiler.evaluation.study.Placements", None)
+    monkeypatch.setattr("thenar.compiler.evaluation.study.Planner", None)
     with pytest.raises(
         EvaluationError, match=r"30 rows of 2 grasp types needs some 0\.0 GB of memory.*fewer rows or columns"
     ):

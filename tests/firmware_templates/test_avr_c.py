@@ -6,13 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thenar.compiler.firmware.board_files import Mode, board_files
+from thenar.compiler.firmware.board_files import board_files, board_makefile, config_of, readings, switches_of
 from thenar.compiler.firmware.board_loading import parse_board
-from thenar.compiler.firmware.board_makefile import board_makefile
-from thenar.compiler.firmware.board_scan import config_of, readings, switches_of
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.layout import arrange
 from thenar.compiler.firmware.protocol import decided_files, protocol_files
+from thenar.compiler.firmware.targets.base import Mode
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.manifest import Calibration, Manifest, Options, Origin, Proof, Switch
 from thenar.runtime.tables import IntegerTables

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from thenar.compiler.firmware.cortex_files import STACK, bare_files
+from thenar.compiler.firmware.targets.cortex_m import STACK, bare_files
 
 MACHINES = {"cortex-m0plus": "microbit", "cortex-m4": "mps2-an386"}
 RAM_FIRST = 0x20000000

@@ -12,7 +12,7 @@ from mutating import INTEGERS, TEXTS, altered, json_file
 
 from thenar.runtime.errors import McapError
 from thenar.runtime.recording.layout import MAGIC
-from thenar.runtime.recording.messages import decode_text, encode_text
+from thenar.runtime.recording.messages import decode_text, encode_bytes, encode_text
 
 _OPENING = Struct("<BQ")
 _LENGTH = Struct("<I")
@@ -22,7 +22,9 @@ _MESSAGE_OP, _CHUNK_OP, _METADATA_OP, _DATA_END_OP, _FOOTER_OP = 5, 6, 12, 15, 2
 _COMPRESSIONS = ("", "", "", "zstd", "lz4", "bz2", "\x1b[2J", "a" * 1000)
 
 
-class _Record(NamedTuple):
+class Record(NamedTuple):
+    """A record of an MCAP file."""
+
     opcode: int
     content: bytes
 
@@ -30,7 +32,7 @@ class _Record(NamedTuple):
 def mcap_file(data: bytes, random: Random) -> bytes:
     """Change a recording: what its records hold, their kinds and order; its bytes now and then."""
     try:
-        records = _records(data)
+        records = records_of(data)
     except error:
         return altered(data, random)
     if not records or random.random() < 0.1:
@@ -38,30 +40,30 @@ def mcap_file(data: bytes, random: Random) -> bytes:
     for _ in range(random.choice((1, 1, 1, 2, 4))):
         _change(records, random)
     sound = random.random() < 0.9
-    return _joined(records, sound) + (MAGIC if sound else b"")
+    return joined(records, sound)
 
 
-def _records(data: bytes) -> list[_Record]:
+def records_of(data: bytes) -> list[Record]:
     found, at = [], len(MAGIC)
     while at < len(data) - len(MAGIC):
         opcode, length = _OPENING.unpack_from(data, at)
         at += _OPENING.size
-        found.append(_Record(opcode, data[at : at + length]))
+        found.append(Record(opcode, data[at : at + length]))
         at += length
     return found
 
 
-def _joined(records: list[_Record], sound: bool) -> bytes:
-    """Return the records as a file; with `sound`, the checksum at the end of its data is that of its data."""
+def joined(records: list[Record], sound: bool = True) -> bytes:
+    """Return the records as a file; with `sound`, its end and the checksum of its data are right."""
     data = MAGIC
     for opcode, content in records:
         if opcode == _DATA_END_OP and sound:
             content = _LENGTH.pack(crc32(data))
         data += _OPENING.pack(opcode, len(content)) + content
-    return data
+    return data + (MAGIC if sound else b"")
 
 
-def _change(records: list[_Record], random: Random) -> None:
+def _change(records: list[Record], random: Random) -> None:
     at = random.randrange(len(records))
     record = records[at]
     match random.randrange(10):
@@ -83,7 +85,7 @@ def _change(records: list[_Record], random: Random) -> None:
             records[at] = record._replace(content=_content(record, random))
 
 
-def _content(record: _Record, random: Random) -> bytes:
+def _content(record: Record, random: Random) -> bytes:
     if record.opcode == _MESSAGE_OP and len(record.content) >= _MESSAGE.size:
         return _message(record.content, random)
     if record.opcode == _METADATA_OP:
@@ -107,8 +109,14 @@ def _message(content: bytes, random: Random) -> bytes:
             try:
                 data = encode_text(json_file(decode_text(data), random))
             except McapError:
-                data = altered(data, random)
+                data = random.choice((_states, altered))(data, random)
     return _MESSAGE.pack(channel, sequence, logged, published) + data
+
+
+def _states(data: bytes, random: Random) -> bytes:
+    """Return the bytes of a frame in which every device and switch says something else."""
+    length = random.choice((len(data) - 16, len(data) - 16, 0, 40))
+    return encode_bytes(bytes(random.randrange(random.choice((2, 8, 256))) for _ in range(max(length, 0))))
 
 
 def _metadata(content: bytes, random: Random) -> bytes:
@@ -134,8 +142,7 @@ def _metadata(content: bytes, random: Random) -> bytes:
             name = altered(name, random)
         case _:
             pair[1] = json_file(pair[1], random)
-    joined = b"".join(_packed(text) for pair in pairs for text in pair)
-    return _packed(name) + _packed(joined)
+    return _packed(name) + _packed(b"".join(_packed(text) for pair in pairs for text in pair))
 
 
 def _text(content: bytes, at: int) -> tuple[bytes, int]:
@@ -148,12 +155,13 @@ def _packed(text: bytes) -> bytes:
     return _LENGTH.pack(len(text)) + text
 
 
-def _chunk(records: list[_Record], random: Random) -> _Record:
+def _chunk(records: list[Record], random: Random) -> Record:
     """Return a chunk of these records, whose sizes, checksum and compression now and then are not what they say."""
     inside = b"".join(_OPENING.pack(opcode, len(content)) + content for opcode, content in records)
+    inside *= random.choice((1, 1, 1, 1, 3, 200))
     size = random.choice((len(inside), len(inside), len(inside), *INTEGERS)) % 2**64
     crc = random.choice((crc32(inside), crc32(inside), 0, 1))
     compression = random.choice(_COMPRESSIONS).encode()
     length = random.choice((len(inside), len(inside), len(inside), *INTEGERS)) % 2**64
     head = _CHUNK.pack(0, random.choice((0, 2**64 - 1)), size, crc)
-    return _Record(_CHUNK_OP, head + _packed(compression) + length.to_bytes(8, "little") + inside)
+    return Record(_CHUNK_OP, head + _packed(compression) + length.to_bytes(8, "little") + inside)

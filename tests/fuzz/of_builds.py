@@ -15,18 +15,17 @@ import numpy as np
 from material import GRASPS, SWITCHES, Format, build_files, grasp_set, harness, make_folder
 from mutating import Mutate, altered, json_file, npz_file, sealed
 
-from thenar.cli.from_frontier import picked
 from thenar.cli.kept_files import kept_names
 from thenar.compiler.artifact.verify import verify
 from thenar.compiler.firmware.folder import sums, write_folder
-from thenar.compiler.firmware.generate import Request, firmware_files, fit_of
+from thenar.compiler.firmware.generate import Firmware
 from thenar.compiler.frontier import points
-from thenar.compiler.frontier.drawing.table import csv_bytes
-from thenar.compiler.frontier.storing.store import HEADER, Store
+from thenar.compiler.frontier.cache import HEADER, Store
+from thenar.compiler.frontier.picked import picked
+from thenar.compiler.frontier.words import csv_bytes
 from thenar.compiler.glove.files import spec_files
 from thenar.compiler.placement.placement import place
-from thenar.compiler.report.frontier_charts import frontier_charts
-from thenar.compiler.report.frontier_view import frontier_view
+from thenar.compiler.report.frontier import frontier_view
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME, Build
 from thenar.runtime.frames import GloveFrame, SwitchFrame
@@ -107,8 +106,7 @@ def _spec(build: Build, _folder: Path) -> None:
 
 
 def _firmware(build: Build, _folder: Path) -> None:
-    request = Request(build, "host")
-    firmware_files(request, fit_of(request))
+    Firmware(build.tables, build.manifest, "host").files()
 
 
 def _member(name: str, mutate: Mutate, sealed_again: Callable[[bytes], bytes]) -> Format:
@@ -226,11 +224,6 @@ def _compile_from(data: bytes, folder: Path) -> None:
             wired(chosen.point.switches)
     csv_bytes(chosen.frontier)
     frontier_view(chosen.frontier, grasp_set().fingerprint(), None, chosen.point.number)
-    frontier_charts(chosen.frontier)
-
-
-class _Question(msgspec.Struct, frozen=True):
-    number: int
 
 
 class _Answer(msgspec.Struct, frozen=True):
@@ -246,7 +239,7 @@ def _store() -> bytes:
         path = Path(folder) / "store.jsonl"
         with Store(path, "scope") as store:
             for number in range(4):
-                store.put(_Question(number), _Answer(number / 4, GRASPS))
+                store.put(b"%d" % number, _Answer(number / 4, GRASPS))
         return path.read_bytes()
 
 
@@ -274,7 +267,7 @@ def _resume(data: bytes, folder: Path) -> None:
     path.write_bytes(data)
     with Store(path, "scope") as store:
         for number in range(4):
-            store.get(_Question(number), _Answer)
+            store.get(b"%d" % number, _Answer)
 
 
 def _placements() -> list[bytes]:

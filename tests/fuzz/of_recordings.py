@@ -23,6 +23,7 @@ from thenar.runtime.recording.guide import planned, read_journal
 from thenar.runtime.recording.layout import Tail, beginning, ending, session_record
 from thenar.runtime.recording.messages import encode_bytes, encode_text, glove_bytes, switch_bytes
 from thenar.runtime.recording.session import Collection, Label, Session, Task
+from thenar.simulator.playing.performance import of_recording
 
 _MESSAGE = Struct("<BQHIQQ")
 _CLOCK_NS = 1_700_000_000_000_000_000
@@ -113,7 +114,7 @@ def _use(data: bytes, folder: Path) -> None:
     path = folder / "anna.mcap"
     path.write_bytes(data)
     refusals = []
-    for step in (_imported, _resumed, _replayed):
+    for step in (_imported, _resumed, _replayed, _played):
         try:
             step(path)
         except (ThenarError, OSError) as refusal:
@@ -135,6 +136,10 @@ def _resumed(path: Path) -> None:
 def _replayed(path: Path) -> None:
     for _ in replayed(_build(), path):
         pass
+
+
+def _played(path: Path) -> None:
+    of_recording(path, 10_000)
 
 
 FORMATS = (Format("mcap", lambda: [_collected(), _recognised()], mcap_file, _use),)

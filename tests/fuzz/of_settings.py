@@ -9,8 +9,7 @@ from material import GLOVE_TOML, GRASPS, SENSORS, Format, build_files, harness, 
 from mutating import json_file, toml_file
 
 from thenar.compiler.firmware.board_loading import load_board
-from thenar.compiler.firmware.generate import Request, firmware_files, fit_of
-from thenar.compiler.firmware.library import Fit
+from thenar.compiler.firmware.generate import Firmware
 from thenar.compiler.glove.files import spec_files
 from thenar.compiler.placement.ports import ports_of_whole_glove
 from thenar.compiler.recordings.objects import collected
@@ -73,12 +72,6 @@ _BOARDS = (
     'pins = { P00 = "finger_3", P21 = "finger_4", P22 = "finger_5" }\n'
     f'[analog]\n{SENSORS[0]} = "ADC0"\n{SENSORS[1]} = "ADC1"\n{SENSORS[2]} = "ADC2"\n',
 )
-_PLATFORMS = {"atmega328p": "avr328p", "atmega2560": "avr2560"}
-
-
-@cache
-def _fit(platform: str) -> Fit:
-    return fit_of(Request(_build(), platform))
 
 
 def _board(data: bytes, folder: Path) -> None:
@@ -86,10 +79,9 @@ def _board(data: bytes, folder: Path) -> None:
     path = folder / "board.toml"
     path.write_bytes(data)
     board = load_board(path)
-    platform = _PLATFORMS[board.part]
+    platform = board.microcontroller.name
     for mode in ("scan", "glove"):
-        request = Request(_build(), platform, mode, board=board)
-        firmware_files(request, _fit(platform))
+        Firmware(_build().tables, _build().manifest, platform, mode, board=board).files()
 
 
 def _calibrations() -> list[bytes]:

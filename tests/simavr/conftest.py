@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from thenar.compiler.firmware.avr_harness import harness, missing
+from thenar.compiler.firmware.simavr import harness, missing
 
 Compile = Callable[..., Path]
 

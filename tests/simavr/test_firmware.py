@@ -13,7 +13,7 @@ import pytest
 import serial
 
 from thenar.compiler.firmware.board_loading import parse_board
-from thenar.compiler.firmware.generate import Request, firmware_files, fit_of
+from thenar.compiler.firmware.generate import Firmware
 from thenar.drivers import scanner_protocol
 from thenar.drivers.scanner_protocol import Faults, FromBoard, GetState, Heartbeat, Hello, Lost, Ping, frame, from_board
 from thenar.runtime.build import Build
@@ -101,8 +101,14 @@ def firmware(
     with ExitStack() as stack:
 
         def start(text: str, wiring: Sequence[str]) -> Running:
-            request = Request(small_build(), "avr328p", "scan", board=parse_board(f'part = "atmega328p"\n{text}'))
-            for name, content in firmware_files(request, fit_of(request)).items():
+            request = Firmware(
+                small_build().tables,
+                small_build().manifest,
+                "avr328p",
+                "scan",
+                board=parse_board(f'part = "atmega328p"\n{text}'),
+            )
+            for name, content in request.files().items():
                 (tmp_path / name).write_text(content)
             subprocess.run(["make", "-s", "-C", str(tmp_path)], check=True, timeout=120)
             lines = ["part atmega328p 16000000", f"uart 0 {BAUD} {tmp_path / 'port'}", *wiring]

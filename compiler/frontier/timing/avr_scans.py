@@ -4,21 +4,21 @@ import json
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
-from thenar.runtime.build import Build
 from thenar.runtime.harness.wiring import BusWiring
 from thenar.runtime.scanning.ports import ports_of
 
-from ...firmware.avr_harness import harness
 from ...firmware.board import Board, BoardBus
 from ...firmware.errors import FirmwareError
-from ...firmware.generate import Request, firmware_files, fit_of
+from ...firmware.generate import Firmware
+from ...firmware.simavr import harness
+from ...firmware.targets import TARGETS
 from ...firmware.tools import call, workshop
+from ...firmware.words import numbered
 from .beside_wire import beside_wire
-from .measured_cycles import Outcome, nameless
+from .measured_cycles import Outcome
 from .python_times import random_tables
 from .scan_times import scan_times
 from .wirings import Wiring, names_of
@@ -43,9 +43,9 @@ _STARTS = 2
 
 @dataclass(frozen=True, slots=True)
 class ScanTrial:
-    """So many switches on chips of one kind, read by an AVR of `platform` ("avr328p") at a clock of the bus."""
+    """So many switches on chips of one kind, read by an AVR, `target` ("avr328p"), at a clock of the bus."""
 
-    platform: str
+    target: str
     kind: str
     switches: int
     clock_hz: int
@@ -56,16 +56,16 @@ class ScanTrial:
         return Wiring(self.kind, self.clock_hz, muxes=False)
 
 
-def scan_trials(platform: str) -> tuple[ScanTrial, ...]:
+def scan_trials(target: str) -> tuple[ScanTrial, ...]:
     """Return trials of an AVR: few and many switches, on every kind of chip that it reads, at both clocks."""
-    return tuple(ScanTrial(platform, *trial) for trial in _TRIALS)
+    return tuple(ScanTrial(target, *trial) for trial in _TRIALS)
 
 
 def run_scan(trial: ScanTrial) -> Outcome:
     """Return what a whole scan takes as predicted, and as simulated, in microseconds. Raises FirmwareError."""
     nothing = np.zeros((1, trial.switches), bool), np.zeros((1, 0), np.uint16)
     tables = random_tables(trial.switches, 0, 2)
-    times = scan_times(names_of(trial.switches), tables, trial.wiring, *nothing, beside_wire(trial.platform))
+    times = scan_times(names_of(trial.switches), tables, trial.wiring, *nothing, beside_wire(trial.target))
     return Outcome(times.full_us, simulated_scan_us(trial))
 
 
@@ -76,9 +76,9 @@ def simulated_scan_us(trial: ScanTrial) -> float:
     numbers = {name: number for number, name in enumerate(glove.switches)}
     tables = random_tables(trial.switches, 0, 2)
     board = _board(trial, bus)
-    request = Request(Build(nameless(tables), tables), trial.platform, "scan", board=board)
+    firmware = Firmware(tables, numbered(tables), trial.target, "scan", board=board)
     slowed, always = f"THENAR_SCAN_US UINT32_C({board.scan_us})", "THENAR_SCAN_US UINT32_C(1)"
-    files = {name: text.replace(slowed, always) for name, text in firmware_files(request, fit_of(request)).items()}
+    files = {name: text.replace(slowed, always) for name, text in firmware.files().items()}
     with workshop(files) as folder:
         call(["make", "-s"], folder)
         cycles, starts = _watched(folder, board)
@@ -86,8 +86,7 @@ def simulated_scan_us(trial: ScanTrial) -> float:
 
 
 def _board(trial: ScanTrial, bus: BusWiring) -> Board:
-    part: Literal["atmega328p", "atmega2560"] = "atmega328p" if trial.platform == "avr328p" else "atmega2560"
-    return Board(part=part, scan_us=50_000, bus=BoardBus(clock_hz=bus.clock_hz), chips=bus.chips)
+    return Board(part=TARGETS[trial.target].part, scan_us=50_000, bus=BoardBus(clock_hz=bus.clock_hz), chips=bus.chips)
 
 
 def _watched(folder: Path, board: Board) -> tuple[int, int]:

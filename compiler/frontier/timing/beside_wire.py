@@ -11,8 +11,7 @@ from statistics import median
 
 from thenar.drivers.i2c.chips import Reading
 
-from ...firmware.generate import PLATFORMS
-from ...firmware.targets import target_of
+from ...firmware.targets import TARGETS
 
 # One transfer of a Raspberry Pi beside its wire. Doubtful: a kernel trace of a Pi 3 has 20 us from the call to the
 # adapter and 6 us back; others measured 300 us (Pi Zero) with an older library.
@@ -21,9 +20,9 @@ MODEL_FILE = Path("/proc/device-tree/model")
 _CALLS, _BATCHES = 200, 9
 # Cycles of thenar's scanning firmware while no switch changes, fitted to what libsimavr counts (`avr_scans`) of 1 to
 # 100 switches on chips of three kinds, within 5 %: of a scan, a key, a reading, and a byte of its answer. A change is
-# debounced and told of besides: compiler.firmware.board_scan has bounds.
+# debounced and told of besides: compiler.firmware.board_files has bounds.
 _SCAN, _KEY, _READING, _ANSWER_BYTE = 520, 40, 530, 560
-_BOARD = "atmega328p"
+_BOARD = "avr328p"
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,9 +48,9 @@ WIRE_ONLY = Beside("scans are those of the wire alone")
 
 def beside_wire(target: str) -> Beside:
     """Return what reading takes on `target` (a name of `frontier --target`) beside the wire."""
-    if target.startswith("avr"):
-        return firmware_beside(PLATFORMS[target] or "")
-    if target.startswith("cortex"):
+    if target in TARGETS and TARGETS[target].clock_hz is not None:
+        if "scan" in TARGETS[target].modes:
+            return firmware_beside(target)
         return Beside(f"scans on {target} are those of the wire alone: thenar has no scanning firmware for it")
     if target == "pi" and not on_a_pi():
         return Beside(
@@ -67,13 +66,13 @@ def beside_wire(target: str) -> Beside:
     )
 
 
-def firmware_beside(part: str) -> Beside:
+def firmware_beside(target: str) -> Beside:
     """Return what thenar's scanning firmware takes on an AVR at its usual clock, while no switch changes."""
-    clock_hz = target_of(part).clock_hz
-    assert clock_hz is not None
-    us = 1e6 / clock_hz
+    part = TARGETS[target]
+    assert part.clock_hz is not None
+    us = 1e6 / part.clock_hz
     return Beside(
-        f"scans on an {part} hold the cycles that thenar's firmware takes beside the wire while no switch changes",
+        f"scans on {part.named} hold the cycles that thenar's firmware takes beside the wire while no switch changes",
         call_us=_READING * us,
         byte_us=_ANSWER_BYTE * us,
         scan_us=_SCAN * us,

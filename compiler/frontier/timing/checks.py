@@ -11,7 +11,6 @@ import numpy as np
 
 from thenar.runtime.tables import IntegerTables
 
-from ...firmware.running import toolchain_missing
 from ...firmware.targets import Target
 from ...workers import in_workers
 from ..points import Check, How
@@ -44,9 +43,9 @@ def check(
     if model.part is None:
         return (_on_python(model, several, least),)
     outcomes = list(in_workers(run_trial, _trials(several, model.part, least), jobs))
-    what = "cycles of classify()" if model.part.counted else "instructions of classify()"
+    what = "cycles of classify()" if model.part.avr else "instructions of classify()"
     found = [_judged(f"{what} on {model.part.named}, slowest frame", "simulated", outcomes)] if outcomes else []
-    if model.part.counted:
+    if "scan" in model.part.modes:
         scans = list(in_workers(run_scan, scan_trials(model.target), jobs))
         found.append(_judged(f"time of a whole scan by the firmware of {model.part.named}", "simulated", scans))
     return tuple(found)
@@ -57,7 +56,7 @@ def unchecked(model: ClassifyModel) -> str | None:
     if model.part is None:
         other = "classify times on pi were not held against measured ones: this machine is no Raspberry Pi"
         return other if model.factor != 1.0 else None
-    if lack := toolchain_missing(model.part):
+    if lack := model.part.missing():
         return f"classify times on {model.target} were not held against a simulator: {lack}"
     return None
 

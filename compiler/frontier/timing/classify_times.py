@@ -1,22 +1,16 @@
 """What classifying a frame takes on a target, layout by layout, without compiling anything."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from ...firmware.choose import Option, choose, features, flash_shares
 from ...firmware.errors import FirmwareError
-from ...firmware.generate import PLATFORMS
-from ...firmware.targets import Target, target_of
+from ...firmware.targets import TARGETS, Target, timed
 from ..points import FrontierError, How
-from ..targets import TARGETS
 from .beside_wire import on_a_pi
 from .python_times import PythonCost, fit_here
 
-# Clocks of common boards with such a core: SAMD21 (Arduino Zero), nRF52840 (Arduino Nano 33 BLE).
-CORTEX_HZ: Mapping[str, int] = MappingProxyType({"cortex-m0plus": 48_000_000, "cortex-m4": 64_000_000})
 # How many times as long as here Python takes on a Raspberry Pi 4. Doubtful: a guess, and "here" is any machine.
 PI_FACTOR = 4.0
 
@@ -36,29 +30,34 @@ class Classified:
 
 
 class ClassifyModel:
-    """Predicts what classifying takes on `target`, one of TARGETS.
+    """Predicts what classifying takes on `target`, one of `timed()`.
 
-    AVR       cycles that classify() takes at most, counted instruction by instruction, at the part's usual clock
+    AVR       cycles that classify() takes at most, counted instruction by instruction, at `clock_hz`
     Cortex-M  instructions that classify() takes, about and at most, at `clock_hz` and one cycle each: no core of these
               is much faster, and loads, taken branches and slow flash take more cycles, so times are lower bounds
     host      wall time of the runtime's Scorer here, by a line through many tables that are timed when it is made
     pi        that times `factor`; as it is, where this machine is a Raspberry Pi
 
-    python is what `fit_here` returned, to be used again; factor and clock_hz are ignored elsewhere than said.
-    Raises FrontierError for another target.
+    python is what `fit_here` returned, to be used again; clock_hz is another clock than the part's usual one; factor is
+    ignored elsewhere than on pi. Raises FrontierError for another target.
     """
 
     def __init__(
         self, target: str, *, clock_hz: int | None = None, python: PythonCost | None = None, factor: float = PI_FACTOR
     ) -> None:
-        if target not in TARGETS:
-            raise FrontierError(f"there is no target {target!r}: choose one of {', '.join(TARGETS)}")
-        part = PLATFORMS.get(target)
+        if target not in timed():
+            raise FrontierError(f"there is no target {target!r}: choose one of {', '.join(timed())}")
+        part = TARGETS.get(target)
         self.target = target
-        self.part: Target | None = None if part is None else target_of(part)
-        self.clock_hz = None if self.part is None else self.part.clock_hz or clock_hz or CORTEX_HZ[target]
+        self.part: Target | None = None if part is None or part.clock_hz is None else part
+        self.clock_hz = None if self.part is None else clock_hz or self.part.clock_hz
         self.python = (python or fit_here()) if self.part is None else None
         self.factor = factor if target == "pi" and not on_a_pi() else 1.0
+
+    @property
+    def identity(self) -> tuple[object, ...]:
+        """What its predictions depend on besides the tables."""
+        return self.target, self.clock_hz, self.python, self.factor
 
     def options(self, tables: IntegerTables) -> tuple[Classified, ...]:
         """Return the layouts that fit the part than which none is both faster and smaller, the fastest first.
@@ -82,7 +81,7 @@ class ClassifyModel:
     @property
     def note(self) -> str:
         """What has to be said of its times, in a sentence; "" where nothing has."""
-        if self.part is not None and not self.part.counted and self.clock_hz is not None:
+        if self.part is not None and not self.part.avr and self.clock_hz is not None:
             return (
                 f"on {self.target} times are instructions, counted by qemu, at {self.clock_hz / 1e6:g} MHz and one "
                 "cycle each: a lower bound, for many instructions take more cycles"

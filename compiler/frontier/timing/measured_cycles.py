@@ -1,20 +1,12 @@
 """What a layout really takes of its part: compiled, and its slowest frames run in a simulator."""
 
-import hashlib
 from dataclasses import dataclass
-from importlib.metadata import version
-
-from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Switch
-from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from ...firmware.choose import Option
-from ...firmware.classifier import classifier_files
-from ...firmware.errors import FirmwareError
-from ...firmware.library_names import LIBRARY_NAME
-from ...firmware.probes import Probes, extreme_frames, joined
-from ...firmware.running import run
+from ...firmware.classifier import LIBRARY_NAME, Library
+from ...firmware.measuring import run_counted, slow_frames
 from ...firmware.targets import Target
-from ...firmware.worst import worst_frame
+from ...firmware.words import numbered
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,31 +32,6 @@ class Outcome:
 
 def run_trial(trial: Trial) -> Outcome:
     """Compile the layout and run the frame that should take longest, and extreme ones. Raises FirmwareError."""
-    (layout, cost), part = trial.option, trial.part
-    avr = part.kind == "avr"
-    bits, codes = worst_frame(layout, part if avr else None)
-    probes = joined(Probes(bits.reshape(1, -1), codes.reshape(1, -1)), extreme_frames(layout.tables))
-    files = classifier_files(LIBRARY_NAME, nameless(layout.tables), layout, avr=avr)
-    answers = run(files, LIBRARY_NAME, layout, part, layout.frame_bytes(probes.bits, probes.codes))
-    if answers.cost is None:
-        raise FirmwareError(f"nothing was counted on {part.part}")
-    return Outcome(cost.cycles, float(answers.cost.max()))
-
-
-def nameless(tables: IntegerTables) -> Manifest:
-    """Return a manifest for tables that belong to no build yet: what C calls their inputs has no bearing on time."""
-    digest = hashlib.sha256(tables_to_bytes(tables)).hexdigest()
-    return Manifest(
-        schema=SCHEMA,
-        checksum="",
-        thenar=version("thenar"),
-        tables_sha256=digest,
-        ensemble_sha256=digest,
-        source=Origin(digest, 0, "own", tables.n_switches),
-        options=Options(0, 1, "both", 1.0, 0, 0),
-        grasps=tuple(f"type {number}" for number in range(tables.n_classes)),
-        switches=tuple(Switch(number, f"s{number}", 0.0) for number in range(tables.n_switches)),
-        joints=tuple(Calibration(number, f"j{number}", "raw", 0, 0.0, 1, 1.0) for number in range(tables.n_joints)),
-        proof=Proof(16, tables.scale, tables.bound, 0.0, 0.0, 0, 0),
-        rates=(),
-    )
+    layout, cost = trial.option
+    library = Library(LIBRARY_NAME, numbered(layout.tables), layout, trial.part.avr)
+    return Outcome(cost.cycles, float(run_counted(library, trial.part, slow_frames(layout)).most))

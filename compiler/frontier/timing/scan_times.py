@@ -7,7 +7,7 @@ from math import fsum
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.drivers.cyberglove_protocol import OVERHEAD, sending_us, shortest_us
+from thenar.drivers.cyberglove_protocol import OVERHEAD, sending_us
 from thenar.runtime.harness.wiring import Harness, ScannerWiring
 from thenar.runtime.scanning.decided import Decided
 from thenar.runtime.scanning.plan import Costs, plan_scan
@@ -117,18 +117,6 @@ def transfer_us(joints: int) -> float:
     """Return what one record of a CyberGlove takes on its line at 115200 baud, with the status byte; 0 without joints.
 
     Up to 18 joints are a glove of 18 sensors, more one of 22. What the box takes to digitise the sensors before it
-    sends is not in it: see `record_period_us`.
+    sends is not in it: see `shortest_us` of its protocol.
     """
-    return sending_us(_sensors(joints) + OVERHEAD + 1, _BAUD) if joints else 0.0
-
-
-def record_period_us(joints: int) -> float:
-    """Return the shortest period of a CyberGlove's records, digitising included; 0 without joints.
-
-    Doubtful: that the box digitises before it sends, 250 us a sensor, stands in a single source.
-    """
-    return shortest_us(_sensors(joints), _BAUD, status=True) if joints else 0.0
-
-
-def _sensors(joints: int) -> int:
-    return _SENSORS[joints > _SENSORS[0]]
+    return sending_us(_SENSORS[joints > _SENSORS[0]] + OVERHEAD + 1, _BAUD) if joints else 0.0

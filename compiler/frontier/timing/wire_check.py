@@ -1,9 +1,15 @@
-"""The arithmetic of scan times beside real transactions: the driver on emulated buses, which count SCL periods."""
+"""The arithmetic of scan times beside real transactions: the driver on emulated buses, which count SCL periods.
+
+The driver runs in a process of its own, for umockdev shows its device nodes to no other: this very module. The first
+line on stdin is a harness as JSON; it answers when its buses are open and were scanned once, and scans each bus _SCANS
+times for every further line.
+"""
 
 import os
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from statistics import fmean
 
 import msgspec
@@ -11,17 +17,19 @@ from msgspec.structs import replace
 
 from thenar.drivers.emulated.i2c import EmulatedBus, EmulatedChip, EmulatedI2c, WireCounters
 from thenar.drivers.errors import DeviceError
-from thenar.runtime.harness.wiring import BusWiring, Harness
+from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead, Scan
+from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.scanning.timing import free_us, scan_us
+from thenar.runtime.scanning.timing import free_us, reading_of, scan_us
 
 from ..points import Check
-from .wire_client import Order, behind
 from .wirings import BOARD, names_of, wirings
 
 # Numbers of switches on new gloves; the most need muxes.
 _SIZES = (8, 20, 33, 66, 115)
 _SCANS = 2
+# Checks of the chips' registers are traffic that is no scan's.
+_NEVER_S = 3600.0
 
 
 def check_wire(given: Harness | None = None) -> tuple[tuple[Check, ...], str | None]:
@@ -69,9 +77,9 @@ def _predicted_us(bus: BusWiring) -> float:
 
 def _seen_us(buses: Sequence[BusWiring]) -> list[float]:
     """Return what a scan of each bus takes by the SCL periods and the transfers that the bus itself counts."""
-    order = Order(Harness(name="emulated", buses=tuple(buses)), _SCANS)
+    harness = Harness(name="emulated", buses=tuple(buses))
     with EmulatedI2c([_emulated(bus) for bus in buses]) as emulated, _client(emulated) as client:
-        _tell(client, msgspec.json.encode(order))
+        _tell(client, msgspec.json.encode(harness))
         before = [emulated.counters(number) for number in range(len(buses))]
         _tell(client, b"")
         after = [emulated.counters(number) for number in range(len(buses))]
@@ -85,13 +93,13 @@ def _between_us(before: WireCounters, after: WireCounters, clock_hz: int) -> flo
 
 
 def _emulated(bus: BusWiring) -> EmulatedBus:
-    chips = (EmulatedChip(chip.kind, chip.address, *behind(chip)) for chip in bus.chips)
+    chips = (EmulatedChip(chip.kind, chip.address, *_behind(chip)) for chip in bus.chips)
     return EmulatedBus(bus.device, bus.clock_hz, "bcm2835", tuple(chips), paced=False)
 
 
 def _client(emulated: EmulatedI2c) -> "subprocess.Popen[bytes]":
     # -P: the modules of the current folder are none of ours.
-    command = [sys.executable, "-P", "-m", f"{__package__}.wire_client"]
+    command = [sys.executable, "-P", "-m", f"{__package__}.wire_check"]
     seen = os.environ | emulated.environment
     return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=seen)
 
@@ -104,3 +112,39 @@ def _tell(client: "subprocess.Popen[bytes]", line: bytes) -> None:
     client.stdin.flush()
     if not client.stdout.readline():
         raise DeviceError("the emulated I2C buses could not be scanned: is another umockdev in the way?")
+
+
+def main() -> None:
+    """Do as the lines on stdin say, and answer each with an empty one."""
+    harness = msgspec.json.decode(sys.stdin.readline(), type=Harness)
+    with ExitStack() as stack:
+        scans = [_scan_of(harness, number, stack) for number in range(len(harness.buses))]
+        _read(scans, 1)
+        for _ in sys.stdin:
+            _read(scans, _SCANS)
+
+
+def _scan_of(harness: Harness, number: int, stack: ExitStack) -> Scan:
+    wiring = harness.buses[number]
+    chips = [ChipAt(chip.chip, chip.address, frozenset(chip.numbered_pins), *_behind(chip)) for chip in wiring.chips]
+    bus = stack.enter_context(I2cBus(wiring.device, chips, clock_hz=wiring.clock_hz, check_every_s=_NEVER_S))
+    bus.open()
+    ports = whole_scan(harness, harness.switches).ports
+    return bus.prepare([PortRead(port.chip, reading_of(port, harness)) for port in ports if port.bus == number])
+
+
+def _behind(chip: ChipWiring) -> tuple[int, int] | tuple[None, None]:
+    """Return the address of the mux and the channel that a chip is behind."""
+    return (None, None) if chip.mux is None else (chip.mux.address, chip.mux.channel)
+
+
+def _read(scans: list[Scan], times: int) -> None:
+    for scan in scans:
+        for _ in range(times):
+            if None in scan.read():
+                sys.exit("a chip of the emulated bus did not answer")
+    print(flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -11,6 +11,8 @@ from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import GloveWiring, Harness
 from thenar.runtime.scanning.propose import propose_board, propose_harness
 
+from ...firmware.targets import TARGETS
+
 AS_WIRED, BOARD = "as wired", "board"
 
 # Standard mode, Fast mode, Fast-mode Plus.
@@ -75,7 +77,7 @@ def wirings(given: Harness | None, target: str = "host") -> tuple[Wiring, ...]:
     An AVR reads its chips itself: without muxes, with registers, at 50 to 400 kHz, as board.toml has it. What is wired
     otherwise, a board of its own included, is none of its wirings.
     """
-    avr = target.startswith("avr")
+    avr = target in TARGETS and "scan" in TARGETS[target].modes
     found = [] if given is None or not given.switches or (avr and not _of_an_avr(given)) else [_as_wired(given)]
     for chip in CHIPS.values():
         if chip.tried and (chip.registers or not avr):

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...samples import Columns, Samples
 from ..counts import Counter, Digits
-from ..gain import Node, best_per_cost
+from ..gain import NodeCounts, best_per_cost
 from ..id3 import grow_id3
 from ..ports import PortCosts
 from ..pruning import entropy_brought, errors_spared, weakest_links
@@ -83,7 +83,7 @@ def cost_aware_order(samples: Samples, ports: PortCosts | None = None) -> Column
         totals = np.bincount(labels[rows], minlength=n_classes)
         if np.count_nonzero(totals) < 2:
             continue
-        column = best_per_cost(Node(totals, counter.count(rows), counter.starts), costs)
+        column = best_per_cost(NodeCounts(totals, counter.count(rows), counter.starts), costs)
         if column is None:
             continue
         if column not in found:

@@ -1,13 +1,16 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.artifact.ensemble import KIND, ensemble_from_bytes, ensemble_to_bytes
+from thenar.compiler.artifact.ensemble import KIND, TABLES, ensemble_from_bytes, ensemble_to_bytes
 from thenar.compiler.boosting.stumps import Stumps
-from thenar.compiler.recordings.arrays import pack
+from thenar.compiler.recordings.arrays import pack, unpack
+from thenar.compiler.tables.collapse import ScoreTables
 from thenar.drivers.errors import ThenarError
-from thenar.runtime.sealed import seal
+from thenar.runtime.sealed import seal, unseal
 
 HEADER = b'{"n_inputs":5,"shrinkage":0.5}'
 
@@ -25,10 +28,57 @@ def test_what_was_written_is_read_again_bit_for_bit() -> None:
     stumps = Stumps(5, **_arrays(), shrinkage=0.5)
     data = ensemble_to_bytes(stumps)
     read = ensemble_from_bytes(data)
+    assert isinstance(read, Stumps)
     assert (read.n_inputs, read.shrinkage) == (5, 0.5)
     for name, array in _arrays().items():
         assert np.array_equal(getattr(read, name), array)
     assert ensemble_to_bytes(read) == data
+
+
+def _tables() -> ScoreTables:
+    random = np.random.default_rng(1)
+    thresholds = (np.array([3, 70, 65535], np.uint16), np.array([], np.uint16))
+    rows = tuple(random.normal(size=(len(steps) + 1, 3)) for steps in thresholds)
+    return ScoreTables(random.normal(size=3), random.normal(size=(2, 3)), thresholds, rows)
+
+
+@pytest.mark.parametrize("joints", [2, 1, 0])
+def test_tables_are_read_again_bit_for_bit(joints: int) -> None:
+    tables = replace(_tables(), thresholds=_tables().thresholds[:joints], joint_rows=_tables().joint_rows[:joints])
+    data = ensemble_to_bytes(tables)
+    read = ensemble_from_bytes(data)
+    assert isinstance(read, ScoreTables)
+    for name in ("bias", "switch_rows"):
+        assert np.array_equal(getattr(read, name), getattr(tables, name))
+    for name in ("thresholds", "joint_rows"):
+        assert all(map(np.array_equal, getattr(read, name), getattr(tables, name)))
+    assert ensemble_to_bytes(read) == data
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"bins": np.array([5, 0])},
+        {"bins": np.array([2, 2])},
+        {"bins": np.array([4, -(2**63)])},
+        {"bins": np.array([2**62, 2**62, 2**62, 2**62, 5])},
+        {"bins": np.ones(1000, np.int64)},
+        {"bias": np.zeros(2)},
+        {"bias": np.zeros((3, 1))},
+        {"bias": np.full(3, np.nan)},
+        {"bias": np.zeros(1), "switch_rows": np.zeros((2, 1)), "joint_rows": np.zeros((5, 1))},
+        {"switch_rows": np.full((2, 3), 1e300)},
+        {"thresholds": np.array([3, 3, 70], np.uint16)},
+        {"thresholds": np.array([3, 70], np.uint16)},
+        {"joint_rows": np.zeros((5, 3), "<f4")},
+        {"more": np.zeros(1)},
+    ],
+)
+def test_tables_that_contradict_themselves_are_refused(change: dict[str, np.ndarray]) -> None:
+    _, payload = unseal(ensemble_to_bytes(_tables()), KIND, TABLES, "ensemble.bin")
+    header, arrays = unpack(payload)
+    with pytest.raises(ThenarError, match=r"ensemble\.bin is damaged"):
+        ensemble_from_bytes(seal(KIND, TABLES, pack(header, arrays | change)))
 
 
 @pytest.mark.parametrize(

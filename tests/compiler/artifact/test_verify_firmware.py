@@ -9,7 +9,7 @@ from msgspec import structs
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.artifact import verify_firmware as trial
 from thenar.compiler.artifact.verify import verify
-from thenar.compiler.artifact.verify_firmware import Kind, verify_firmware
+from thenar.compiler.artifact.verify_firmware import verify_firmware
 from thenar.compiler.firmware import classifier
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.errors import FirmwareError
@@ -21,7 +21,7 @@ from thenar.runtime.manifest import Manifest
 MakeSet = Callable[..., GraspSet]
 Tool = Callable[[str], str]
 
-TOOLS: dict[Kind, tuple[str, ...]] = {
+TOOLS: dict[str, tuple[str, ...]] = {
     "host": ("gcc",),
     "avr": ("avr-gcc", "make", "gcc"),
     "cortex-m": ("arm-none-eabi-gcc", "qemu-system-arm"),
@@ -36,7 +36,7 @@ def build(grasp_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> Path
 
 @pytest.mark.parametrize("kind", ["host", "avr", "cortex-m"])
 def test_every_score_and_type_of_every_frame_is_pythons(
-    build: Path, grasp_set: GraspSet, tool: Tool, kind: Kind
+    build: Path, grasp_set: GraspSet, tool: Tool, kind: str
 ) -> None:
     for name in TOOLS[kind]:
         tool(name)
@@ -55,11 +55,11 @@ def test_every_score_and_type_of_every_frame_is_pythons(
 @pytest.mark.parametrize("inputs", ["switches", "joints"])
 @pytest.mark.parametrize("kind", ["host", "avr"])
 def test_builds_without_joints_or_without_switches_are_pythons_too(
-    grasp_set: GraspSet, tool: Tool, tmp_path: Path, inputs: str, kind: Kind
+    grasp_set: GraspSet, tool: Tool, tmp_path: Path, inputs: str, kind: str
 ) -> None:
     for name in TOOLS[kind]:
         tool(name)
-    folder = compile_build(grasp_set, tmp_path / "build", rounds=5, folds=0, inputs=inputs).folder  # type: ignore[arg-type]
+    folder = compile_build(grasp_set, tmp_path / "build", rounds=5, folds=0, inputs=inputs).folder
     assert verify_firmware(folder, grasp_set, (kind,)).holds
 
 
@@ -98,7 +98,7 @@ def test_one_wrong_entry_is_found_with_the_first_frame_that_shows_it(
 
 @pytest.mark.parametrize("kind", ["host", "cortex-m"])
 def test_a_switch_put_into_the_wrong_bit_is_found(
-    build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch, kind: Kind
+    build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
     for name in TOOLS[kind]:
         tool(name)
@@ -116,7 +116,7 @@ def test_a_switch_put_into_the_wrong_bit_is_found(
 
 @pytest.mark.parametrize("kind", ["host", "cortex-m"])
 def test_names_that_are_mixed_up_are_found(
-    build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch, kind: Kind
+    build: Path, grasp_set: GraspSet, tool: Tool, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
     for name in TOOLS[kind]:
         tool(name)
@@ -161,7 +161,7 @@ def test_a_build_of_before_carries_no_firmware_and_holds(grasp_set: GraspSet, to
 
 @pytest.mark.parametrize("kind", ["host", "avr", "cortex-m"])
 def test_without_the_tools_it_says_what_to_install(
-    build: Path, grasp_set: GraspSet, monkeypatch: pytest.MonkeyPatch, kind: Kind
+    build: Path, grasp_set: GraspSet, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
     monkeypatch.setenv("PATH", "/nowhere")
     with pytest.raises(FirmwareError, match=f"firmware for {PARTS[kind][0]} cannot be tried here: .*apt-get install"):

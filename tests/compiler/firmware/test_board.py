@@ -5,12 +5,10 @@ from pathlib import Path
 import pytest
 from msgspec.structs import fields
 
-from thenar.compiler.firmware.baud import best_setting
-from thenar.compiler.firmware.board import Board, GloveUart
-from thenar.compiler.firmware.board_keys import check_switches, glove_toml, key_names, rows_and_columns
+from thenar.compiler.firmware.board import Board, GloveUart, check_switches, glove_toml, key_names, rows_and_columns
 from thenar.compiler.firmware.board_loading import load_board, parse_board
 from thenar.compiler.firmware.errors import FirmwareError
-from thenar.compiler.firmware.microcontrollers import PARTS
+from thenar.compiler.firmware.targets.avr import AVRS, best_setting
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.manifest import Manifest
@@ -107,9 +105,9 @@ def test_what_is_wrong_is_told_with_its_place_and_what_to_do(text: str, message:
     assert message in complaint(text)
 
 
-@pytest.mark.parametrize("name", PARTS)
+@pytest.mark.parametrize("name", AVRS)
 def test_no_pin_of_a_part_is_wasted_or_there_twice(name: str) -> None:
-    part = PARTS[name]
+    part = AVRS[name]
     assert len(set(part.pins)) == len(part.pins)
     special = {pin for pins in (*part.uarts, part.twi, part.jtag) for pin in pins} | set(part.analog.values()) - {""}
     assert special <= set(part.pins)

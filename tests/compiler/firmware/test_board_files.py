@@ -5,13 +5,19 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from thenar.compiler.firmware.board_files import Mode, board_files
-from thenar.compiler.firmware.board_keys import check_switches
+from thenar.compiler.firmware.board import check_switches
+from thenar.compiler.firmware.board_files import (
+    board_files,
+    board_makefile,
+    config_of,
+    readings,
+    shortest_scan_us,
+    switches_of,
+)
 from thenar.compiler.firmware.board_loading import parse_board
-from thenar.compiler.firmware.board_makefile import board_makefile
-from thenar.compiler.firmware.board_scan import config_of, readings, shortest_scan_us, switches_of
 from thenar.compiler.firmware.errors import FirmwareError
 from thenar.compiler.firmware.layout import arrange
+from thenar.compiler.firmware.targets.base import Mode
 from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.manifest import Manifest

@@ -7,14 +7,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from thenar.compiler.firmware.choose import Option, choose, flash_shares, frontier
-from thenar.compiler.firmware.costs import Cost, cost_of
+from thenar.compiler.firmware.costs import Cost
 from thenar.compiler.firmware.errors import FirmwareError
 from thenar.compiler.firmware.layout import arrange
 from thenar.compiler.firmware.targets import TARGETS, Target
 from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
-SMALL = TARGETS["atmega328p"]
+SMALL = TARGETS["avr328p"]
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +35,7 @@ def _scaled(target: Target, flash: int) -> Target:
 def test_what_is_chosen_is_the_fastest_that_fits_and_costs_what_it_says(tables: IntegerTables, part: str) -> None:
     target = TARGETS[part]
     found = choose(tables, target)
-    assert found.cost == cost_of(found.layout, target)
+    assert found.cost == target.cost(found.layout)
     assert found.layout.tables is tables
     fitting = [cost for _, cost in found.frontier if cost.flash <= flash_shares(target)[0]]
     assert found.cost == min(fitting, key=lambda cost: cost.cycles)
@@ -73,7 +73,7 @@ def test_less_flash_makes_it_slower_until_nothing_fits(tables: IntegerTables) ->
 def test_half_of_the_flash_is_taken_or_three_quarters_where_less_will_not_do(tables: IntegerTables) -> None:
     smallest = choose(tables, SMALL).frontier[-1][1].flash
     assert flash_shares(SMALL) == (16 << 10, 24 << 10)
-    assert flash_shares(TARGETS["atmega2560"]) == (48 << 10, 48 << 10)
+    assert flash_shares(TARGETS["avr2560"]) == (48 << 10, 48 << 10)
     assert choose(tables, _scaled(SMALL, 2 * smallest)).cost.flash == smallest
     tight = _scaled(SMALL, 2 * smallest - 2)
     assert smallest <= choose(tables, tight).cost.flash <= flash_shares(tight)[1]
@@ -99,7 +99,7 @@ def test_narrow_entries_are_chosen_where_the_tables_allow_them_and_they_are_allo
 @pytest.mark.parametrize("part", ["cortex-m0plus", "cortex-m4", "host"])
 def test_where_narrow_entries_are_slower_they_are_chosen_for_flash_alone(tables: IntegerTables, part: str) -> None:
     target = TARGETS[part]
-    wide, narrow = (cost_of(arrange(tables, entry_bits=bits), target) for bits in (16, 8))
+    wide, narrow = (target.cost(arrange(tables, entry_bits=bits)) for bits in (16, 8))
     assert wide.cycles < narrow.cycles
     assert wide.flash > narrow.flash
     found = choose(tables, target)

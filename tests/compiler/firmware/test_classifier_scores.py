@@ -8,12 +8,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from thenar.compiler.firmware import avr_harness, avr_runner, host_runner
+from thenar.compiler.firmware import simavr
 from thenar.compiler.firmware.answers import Answers
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.layout import Layout, arrange
 from thenar.compiler.firmware.probes import Probes, random_frames
 from thenar.compiler.firmware.targets import TARGETS
+from thenar.compiler.firmware.targets.host import MEMBER as HOST
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
 
@@ -115,14 +116,12 @@ def test_portable_c_scores_as_python_does(
     files = classifier_files("hand", describe(layout.tables), layout, avr=False)
     frames = probed(layout.tables, 200)
     held = layout.frame_bytes(frames.bits, frames.codes)
-    answers = host_runner.run(
-        files, "hand", layout, TARGETS["host"], held, incremental=incremental, compiler=name, sanitize=True
-    )
+    answers = HOST.run(files, "hand", layout, held, incremental=incremental, compiler=name, sanitize=True)
     same_as_python(answers, layout.tables, frames)
 
 
 @NAMED
-@pytest.mark.parametrize(("part", "adding"), [("atmega328p", "called"), ("atmega2560", "unrolled")])
+@pytest.mark.parametrize(("part", "adding"), [("avr328p", "called"), ("avr2560", "unrolled")])
 def test_assembly_scores_as_python_does(
     avr: None,
     arranged: Callable[[Case], Layout],
@@ -138,14 +137,14 @@ def test_assembly_scores_as_python_does(
     frames = probed(layout.tables, 40)
     held = layout.frame_bytes(frames.bits, frames.codes)
     for incremental in (False, True):
-        answers = avr_runner.run(files, "hand", layout, TARGETS[part], held, incremental=incremental)
+        answers = TARGETS[part].run(files, "hand", layout, held, incremental=incremental)
         same_as_python(answers, layout.tables, frames)
 
 
 @pytest.fixture
 def avr(tool: Tool) -> None:
     tool("avr-gcc")
-    if avr_harness.missing() is not None:
+    if simavr.missing() is not None:
         tool("libsimavr-dev")
 
 
@@ -159,7 +158,7 @@ def test_many_classes_are_added_up_in_many_parts(
     for avr in (False, True):
         files = classifier_files("hand", describe(layout.tables), layout, avr=avr)
         text = {name: text for name, text in files.items() if not name.endswith(".S")}
-        answers = host_runner.run(text, "hand", layout, TARGETS["host"], held, sanitize=True)
+        answers = HOST.run(text, "hand", layout, held, sanitize=True)
         same_as_python(answers, layout.tables, frames)
 
 
@@ -178,7 +177,7 @@ def test_tables_at_the_limit_of_16_bits_borrow_and_carry_as_they_should(
     files = classifier_files("hand", describe(tables), layout, avr=False)
     for incremental in (False, True):
         held = layout.frame_bytes(frames.bits, frames.codes)
-        answers = host_runner.run(files, "hand", layout, TARGETS["host"], held, incremental=incremental, sanitize=True)
+        answers = HOST.run(files, "hand", layout, held, incremental=incremental, sanitize=True)
         same_as_python(answers, tables, frames)
 
 
@@ -211,7 +210,7 @@ def test_any_tables_in_any_layout_score_as_python_does(
     frames = random_frames(tables, 60, seed=seed)
     files = classifier_files("hand", describe(tables), layout, avr=False)
     held = layout.frame_bytes(frames.bits, frames.codes)
-    same_as_python(host_runner.run(files, "hand", layout, TARGETS["host"], held, incremental=True), tables, frames)
+    same_as_python(HOST.run(files, "hand", layout, held, incremental=True), tables, frames)
 
 
 @pytest.mark.parametrize("entry_bits", [8, 16])
@@ -237,10 +236,10 @@ def test_every_code_finds_its_row_on_both(
     frames = Probes(np.zeros((codes, 2), bool), np.stack([every, every[::-1]], axis=1))
     held = layout.frame_bytes(frames.bits, frames.codes)
     files = [classifier_files("hand", describe(tables), layout, avr=avr) for avr in (False, True)]
-    same_as_python(host_runner.run(files[0], "hand", layout, TARGETS["host"], held, sanitize=True), tables, frames)
+    same_as_python(HOST.run(files[0], "hand", layout, held, sanitize=True), tables, frames)
     for incremental in (False, True):
-        part = TARGETS["atmega328p"]
-        answers = avr_runner.run(files[1], "hand", layout, part, held, incremental=incremental)
+        part = TARGETS["avr328p"]
+        answers = part.run(files[1], "hand", layout, held, incremental=incremental)
         same_as_python(answers, tables, frames)
 
 
@@ -276,5 +275,5 @@ def test_assembly_keeps_the_registers_that_c_keeps(
     watched = {**files, "thenar_hand_avr.S": unwatched, "watched.S": _watched(call_name)}
     frames = random_frames(layout.tables, 20, seed=1)
     held = layout.frame_bytes(frames.bits, frames.codes)
-    answers = avr_runner.run(watched, "hand", layout, TARGETS["atmega328p"], held, incremental=incremental)
+    answers = TARGETS["avr328p"].run(watched, "hand", layout, held, incremental=incremental)
     same_as_python(answers, layout.tables, frames)

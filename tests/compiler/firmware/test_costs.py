@@ -2,6 +2,7 @@ import re
 import subprocess
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -9,14 +10,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from thenar.compiler.firmware import avr_runner, cortex_runner
-from thenar.compiler.firmware.avr_costs import AvrCosts
+from thenar.compiler.firmware.avr_costs import AvrCosts, worst_frame
 from thenar.compiler.firmware.classifier import classifier_files
-from thenar.compiler.firmware.costs import Cost, cost_of
+from thenar.compiler.firmware.costs import Cost
 from thenar.compiler.firmware.layout import Adding, Bins, Layout, arrange
 from thenar.compiler.firmware.probes import changing_frames
 from thenar.compiler.firmware.targets import TARGETS
-from thenar.compiler.firmware.worst import worst_frame
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
 
@@ -24,7 +23,7 @@ MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
 Tool = Callable[[str], str]
 
-AVRS = ("atmega328p", "atmega2560")
+AVRS = ("avr328p", "avr2560")
 # Classes, switches, joints and highest threshold: one pass and several, no joint, no switch, codes of 16 bits, more
 # look-ups than rcall reaches across, members of the input beyond the reach of ldd.
 SHAPES = [
@@ -112,28 +111,28 @@ def test_the_model_says_to_the_cycle_what_every_frame_takes_and_the_bound_is_nea
 ) -> None:
     tool("avr-gcc")
     layout, target = _laid_out(make_tables, shape, bins, adding, entry_bits), TARGETS[part]
-    costs = AvrCosts(layout, target)
+    costs = AvrCosts(layout, target.flash)
     bits, codes = _frames(layout, 60)
-    worst = worst_frame(layout, target)
+    worst = worst_frame(layout)
     bits, codes = np.vstack([bits, worst[0]]), np.vstack([codes, worst[1]])
     files = classifier_files("hand", describe(layout.tables), layout, avr=True)
-    answers = avr_runner.run(files, "hand", layout, target, layout.frame_bytes(bits, codes))
+    answers = target.run(files, "hand", layout, layout.frame_bytes(bits, codes))
     assert answers.cost is not None
     assert answers.stack is not None
     expected = costs.fixed_cycles + costs.varying_cycles(bits, codes)
     # For two joints the compiler makes less of the search, as it does beyond the reach of `ldd`: the model is a bound.
     exact = bins != "search" or shape[2] == 3
     assert np.array_equal(answers.cost, expected) if exact else (answers.cost <= expected).all()
-    cost = cost_of(layout, target)
+    cost = target.cost(layout)
     assert answers.cost.max() == answers.cost[-1]
     assert answers.cost.max() <= cost.cycles <= 1.02 * answers.cost.max() + shape[0] + (0 if exact else 50)
     changing = layout.frame_bytes(*_all_changing(layout, bits, codes))
-    changed = avr_runner.run(files, "hand", layout, target, changing, incremental=True)
+    changed = target.run(files, "hand", layout, changing, incremental=True)
     assert changed.stack is not None
     assert changed.cost is not None
     # Few frames have every class better than the one before.
     assert changed.cost.max() <= cost.update_cycles <= 1.02 * changed.cost.max() + shape[0] + (0 if exact else 150)
-    _, _, variables = size(files, ["avr-gcc", f"-mmcu={part}", "-Os"])
+    _, _, variables = size(files, ["avr-gcc", *TARGETS[part].flags])
     assert 0 <= cost.ram - variables - max(answers.stack, changed.stack) <= 4
 
 
@@ -151,8 +150,8 @@ def test_an_avr_s_flash_is_what_the_model_allows_for_or_a_little_less(
     layout = _laid_out(make_tables, shape, bins, adding, entry_bits)
     files = classifier_files("hand", describe(layout.tables), layout, avr=True)
     for part in AVRS:
-        flash, updating, _ = size(files, ["avr-gcc", f"-mmcu={part}", "-Os"])
-        cost = cost_of(layout, TARGETS[part])
+        flash, updating, _ = size(files, ["avr-gcc", *TARGETS[part].flags])
+        cost = TARGETS[part].cost(layout)
         # Names have 15 bytes in the model, 7 or 8 here; code in C is rounded up, and so are pages of bins.
         allowed = 8 * (shape[0] + 1) + (700 if bins == "direct" else 500)
         assert flash <= cost.flash <= flash + allowed
@@ -182,12 +181,12 @@ def test_a_cortex_takes_no_more_than_the_model_and_not_much_less(
     tables = replace(tables, thresholds=tuple(steps + np.uint16(lowest) for steps in tables.thresholds))
     target = TARGETS[part]
     layout = arrange(tables, bins=bins, entry_bits=entry_bits)
-    files, cost = classifier_files("hand", describe(tables), layout, avr=False), cost_of(layout, target)
-    answers = cortex_runner.run(files, "hand", layout, target, layout.frame_bytes(*_frames(layout, 50)))
+    files, cost = classifier_files("hand", describe(tables), layout, avr=False), target.cost(layout)
+    answers = target.run(files, "hand", layout, layout.frame_bytes(*_frames(layout, 50)))
     assert answers.cost is not None
     assert answers.cost.max() <= cost.cycles <= 1.2 * answers.cost.max()
     changing = layout.frame_bytes(*_all_changing(layout, *_frames(layout, 50)))
-    changed = cortex_runner.run(files, "hand", layout, target, changing, incremental=True)
+    changed = target.run(files, "hand", layout, changing, incremental=True)
     assert changed.cost is not None
     assert changed.cost.max() <= cost.update_cycles <= 1.3 * changed.cost.max()
     flash, updating, variables = size(files, ["arm-none-eabi-gcc", f"-mcpu={part}", "-mthumb", "-O2", "-ffreestanding"])
@@ -209,19 +208,84 @@ def test_no_frame_takes_longer_than_the_bound_and_more_look_ups_never_cost_less(
 ) -> None:
     layout = _laid_out(make_tables, shape, bins, "called", entry_bits)
     for part in AVRS:
-        costs = AvrCosts(layout, TARGETS[part])
+        costs = AvrCosts(layout, TARGETS[part].flash)
         varying = costs.varying_cycles(*_frames(layout, 100))
         assert varying.min() >= 0
         assert costs.fixed_cycles + varying.max() <= costs.most_cycles
     smaller = arrange(layout.tables, group_size=2, bins=bins, entry_bits=entry_bits)
     for target in TARGETS.values():
-        assert cost_of(smaller, target).cycles >= cost_of(layout, target).cycles
+        assert target.cost(smaller).cycles >= target.cost(layout).cycles
 
 
 def test_eight_bits_take_five_cycles_an_entry_and_sixteen_eight(make_tables: MakeTables) -> None:
     tables = make_tables(1, classes=14, switches=20, joints=4, reach=5)
-    wide, narrow = (cost_of(arrange(tables, entry_bits=bits), TARGETS["atmega328p"]) for bits in (16, 8))
+    wide, narrow = (TARGETS["avr328p"].cost(arrange(tables, entry_bits=bits)) for bits in (16, 8))
     look_ups, clearing = 8, 8
     assert wide.cycles - narrow.cycles == look_ups * 14 * 3 - clearing
     assert wide.flash > narrow.flash
     assert isinstance(wide, Cost)
+
+
+SMALL = TARGETS["avr328p"]
+
+
+def _cycles(layout: Layout, bits: np.ndarray, codes: np.ndarray) -> int:
+    return int(AvrCosts(layout, SMALL.flash).varying_cycles(bits[np.newaxis], codes[np.newaxis])[0])
+
+
+def _longest(layout: Layout) -> int:
+    """Return the most cycles of all frames there are, one code for each bin."""
+    tables = layout.tables
+    steps = [[0, *(int(step) + 1 for step in thresholds)] for thresholds in tables.thresholds]
+    frames = list(product(*[[0, 1]] * tables.n_switches, *steps))
+    bits = np.array([frame[: tables.n_switches] for frame in frames], bool).reshape(len(frames), -1)
+    codes = np.array([frame[tables.n_switches :] for frame in frames], np.uint16).reshape(len(frames), -1)
+    return int(AvrCosts(layout, SMALL.flash).varying_cycles(bits, codes).max())
+
+
+@given(
+    seed=st.integers(0, 1000),
+    classes=st.integers(2, 8),
+    shape=st.sampled_from([(6, 0), (4, 2), (0, 3)]),
+    bins=st.sampled_from(["direct", "trimmed", "search"]),
+)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=40, deadline=None)
+def test_in_small_tables_no_frame_takes_longer(
+    make_tables: MakeTables, seed: int, classes: int, shape: tuple[int, int], bins: Bins
+) -> None:
+    switches, joints = shape
+    layout = arrange(make_tables(seed, classes=classes, switches=switches, joints=joints, bins=5), bins=bins)
+    assert _cycles(layout, *worst_frame(layout)) == _longest(layout)
+
+
+@pytest.mark.parametrize("bins", ["direct", "trimmed", "search"])
+def test_in_large_tables_it_takes_longer_than_any_of_many_frames_and_nearly_as_long_as_the_bound(
+    make_tables: MakeTables, bins: Bins
+) -> None:
+    layout = arrange(make_tables(1, classes=14, switches=33, joints=16, bins=25), bins=bins)
+    costs, random = AvrCosts(layout, SMALL.flash), np.random.default_rng(7)
+    worst = costs.fixed_cycles + _cycles(layout, *worst_frame(layout))
+    bits = random.random((20000, 33)) < 0.5
+    codes = random.integers(0, 256, (20000, 16)).astype(np.uint16)
+    assert worst > costs.fixed_cycles + costs.varying_cycles(bits, codes).max()
+    assert 0.99 * costs.most_cycles < worst <= costs.most_cycles
+
+
+def test_scores_that_rise_from_class_to_class_are_the_worst_there_are() -> None:
+    rows = np.array([[0, 4, -4, 9], [9, 0, 9, 0]], np.int16)
+    tables = IntegerTables(
+        np.array([0, 1, 7, 3], np.int16), rows, (), (), np.zeros((2, 4), np.int16), np.zeros((0, 4), np.int16), 1.0
+    )
+    layout = arrange(tables)
+    bits, codes = worst_frame(layout)
+    # 0 1 7 3; 0 5 3 12; 9 1 16 3; 9 5 12 12: better twice in the first two, once in the others.
+    assert _cycles(layout, bits, codes) == 2
+    assert not bits[1]
+    assert codes.shape == (0,)
+
+
+def test_the_same_layout_has_the_same_worst_frame(make_tables: MakeTables) -> None:
+    layout = arrange(make_tables(2, classes=9, switches=20, joints=4))
+    one, other = worst_frame(layout), worst_frame(layout)
+    assert np.array_equal(one[0], other[0])
+    assert np.array_equal(one[1], other[1])

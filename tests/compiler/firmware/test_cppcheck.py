@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from thenar.compiler.firmware.board_loading import parse_board
-from thenar.compiler.firmware.generate import Mode, Request, firmware_files, fit_of
+from thenar.compiler.firmware.generate import Firmware
 from thenar.compiler.firmware.one_hand import for_one_hand
+from thenar.compiler.firmware.targets.base import Mode
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import Manifest
@@ -73,8 +74,8 @@ def files_of(case: str, make_tables: MakeTables, describe: Describe) -> dict[str
     tables = make_tables(**shape)
     build = Build(describe(tables), tables)
     board = parse_board(f'part = "{PART[platform]}"\n{text}') if text else None
-    request = Request(for_one_hand(build, HAND) if mode == "glove" else build, platform, mode, board=board)
-    return firmware_files(request, fit_of(request))
+    build = for_one_hand(build, HAND) if mode == "glove" else build
+    return Firmware(build.tables, build.manifest, platform, mode, board=board).files()
 
 
 def looked_at(program: str, files: Mapping[str, str], folder: Path, options: tuple[str, ...]) -> set[Finding]:

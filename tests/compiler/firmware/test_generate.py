@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from thenar.cli import firmware_command
 from thenar.compiler.firmware.board import Board
 from thenar.compiler.firmware.board_loading import parse_board
 from thenar.compiler.firmware.errors import FirmwareError
 from thenar.compiler.firmware.folder import write_folder
-from thenar.compiler.firmware.generate import MODES, PLATFORMS, Mode, Request, firmware_files, fit_of
+from thenar.compiler.firmware.generate import Firmware
 from thenar.compiler.firmware.one_hand import for_one_hand
 from thenar.compiler.firmware.targets import TARGETS
+from thenar.compiler.firmware.targets.base import Mode
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import Manifest
@@ -45,7 +45,7 @@ BOARDS = {
         + CYBERGLOVE,
     ),
 }
-PLATFORM = {part: platform for platform, part in PLATFORMS.items() if part is not None}
+PLATFORM = {target.part: name for name, target in TARGETS.items()}
 COMPILERS = {"avr": "avr-gcc", "cortex": "arm-none-eabi-gcc", "host": "gcc"}
 
 
@@ -65,13 +65,13 @@ def of_board(build: Build, case: str) -> dict[str, str]:
     hand = GloveCalibration(sensors=tuple(SensorCalibration(f"j{n}", 40, 0.0, 200, 90.0) for n in range(3)))
     if mode == "glove":
         build = for_one_hand(build, hand)
-    request = Request(build, PLATFORM[board.part], mode, board=board)
-    return firmware_files(request, fit_of(request))
+    request = Firmware(build.tables, build.manifest, PLATFORM[board.part], mode, board=board)
+    return request.files()
 
 
 def classifier(build: Build, platform: str) -> dict[str, str]:
-    request = Request(build, platform)
-    return firmware_files(request, fit_of(request))
+    request = Firmware(build.tables, build.manifest, platform)
+    return request.files()
 
 
 def make(folder: Path, *arguments: str) -> str:
@@ -82,7 +82,7 @@ def make(folder: Path, *arguments: str) -> str:
     return done.stdout + done.stderr  # qemu's semihosting prints on the latter
 
 
-@pytest.mark.parametrize("platform", [name for name in PLATFORMS if name != "arduino"])
+@pytest.mark.parametrize("platform", [name for name in TARGETS if name != "arduino"])
 def test_the_folder_of_a_classifier_compiles_without_a_warning_and_tests_itself(
     build: Build, platform: str, tmp_path: Path, tool: Tool
 ) -> None:
@@ -107,7 +107,7 @@ def test_the_folder_of_a_board_compiles_without_a_warning(build: Build, case: st
     make(folder, "size")
 
 
-@pytest.mark.parametrize("platform", PLATFORMS)
+@pytest.mark.parametrize("platform", TARGETS)
 def test_the_same_request_gives_the_same_files_which_name_no_place_and_no_time(build: Build, platform: str) -> None:
     files = classifier(build, platform)
     assert files == classifier(build, platform)
@@ -116,13 +116,13 @@ def test_the_same_request_gives_the_same_files_which_name_no_place_and_no_time(b
         assert not re.search(r"20\d\d-\d\d-\d\d", text)
 
 
-@pytest.mark.parametrize("platform", PLATFORMS)
+@pytest.mark.parametrize("platform", TARGETS)
 def test_files_are_called_by_the_name_and_no_name_is_rewritten(build: Build, platform: str) -> None:
-    request = Request(build, platform, name="anne_2")
-    files = firmware_files(request, fit_of(request))
+    request = Firmware(build.tables, build.manifest, platform, name="anne_2")
+    files = request.files()
     assert any(path.endswith("thenar_anne_2.h") for path in files)
     with pytest.raises(FirmwareError, match="'Anne' cannot be the name"):
-        Request(build, platform, name="Anne")
+        Firmware(build.tables, build.manifest, platform, name="Anne")
 
 
 @pytest.mark.parametrize(("switches", "joints", "words"), [(9, 0, "9 switches"), (0, 3, "3 joints")])
@@ -136,41 +136,41 @@ def test_nobody_reads_of_inputs_that_there_are_none_of(
 
 
 def test_on_this_machine_the_layout_is_told_without_a_microcontrollers_cycles(build: Build) -> None:
-    fit = fit_of(Request(build, "host"))
+    fit = Firmware(build.tables, build.manifest, "host").fit
     assert fit.target.part == "host"
     assert fit.words.startswith("for this machine: ")
     assert not re.search("atmega|cycles|instructions", fit.words)
 
 
-@pytest.mark.parametrize("platform", [name for name, part in PLATFORMS.items() if part is not None])
+@pytest.mark.parametrize("platform", [name for name, target in TARGETS.items() if target.own_layout])
 def test_more_flash_than_the_part_has_is_refused(build: Build, platform: str) -> None:
-    part = TARGETS[str(PLATFORMS[platform])]
-    assert fit_of(Request(build, platform, flash=part.flash)).choice.cost.flash <= part.flash
+    part = TARGETS[platform]
+    assert Firmware(build.tables, build.manifest, platform, flash=part.flash).fit.choice.cost.flash <= part.flash
     with pytest.raises(FirmwareError, match=f"{part.part} has {part.flash} bytes$"):
-        fit_of(Request(build, platform, flash=part.flash + 1))
+        Firmware(build.tables, build.manifest, platform, flash=part.flash + 1).files()
 
 
 def test_where_any_part_will_do_none_is_chosen_for_flash_that_it_has_not(build: Build) -> None:
-    fit = fit_of(Request(build, "arduino", flash=1 << 20))
+    fit = Firmware(build.tables, build.manifest, "arduino", flash=1 << 20).fit
     assert (fit.target.part, fit.choice.cost.flash <= fit.target.flash) == ("atmega328p", True)
 
 
 def test_notes_stand_in_the_opening_of_the_header(build: Build) -> None:
-    request = Request(build, "avr328p")
-    files = firmware_files(request, fit_of(request), ("measured on a rainy day",))
+    request = Firmware(build.tables, build.manifest, "avr328p")
+    files = request.files(("measured on a rainy day",))
     assert "measured on a rainy day" in files["thenar_glove.h"].split("*/")[0]
 
 
 @pytest.mark.parametrize("platform", ["avr328p", "cortex-m4", "host", "arduino"])
 def test_less_flash_is_a_smaller_layout_and_too_little_is_refused(build: Build, platform: str) -> None:
-    whole = fit_of(Request(build, platform)).choice
+    whole = Firmware(build.tables, build.manifest, platform).fit.choice
     smallest = whole.frontier[-1][1].flash
     assert whole.cost.flash > smallest
-    assert fit_of(Request(build, platform, flash=smallest)).choice.cost.flash == smallest
+    assert Firmware(build.tables, build.manifest, platform, flash=smallest).fit.choice.cost.flash == smallest
     # Where any part will do, the largest is the last to refuse.
-    refused = f"takes {smallest} bytes of flash" if PLATFORMS[platform] else "bytes of flash"
+    refused = f"takes {smallest} bytes of flash" if TARGETS[platform].own_layout else "bytes of flash"
     with pytest.raises(FirmwareError, match=refused):
-        fit_of(Request(build, platform, flash=smallest - 1))
+        Firmware(build.tables, build.manifest, platform, flash=smallest - 1).files()
 
 
 @pytest.mark.parametrize(
@@ -188,12 +188,7 @@ def test_what_does_not_go_together_is_refused(
 ) -> None:
     wiring = None if board is None else board_of(board)[1]
     with pytest.raises(FirmwareError, match=message):
-        Request(build, platform, mode, board=wiring)
-
-
-def test_the_command_offers_what_can_be_made() -> None:
-    assert tuple(PLATFORMS) == firmware_command.PLATFORMS
-    assert firmware_command.MODES == MODES
+        Firmware(build.tables, build.manifest, platform, mode, board=wiring)
 
 
 @pytest.mark.slow
@@ -202,9 +197,9 @@ def test_a_build_too_large_for_an_uno_is_laid_out_for_what_holds_it(
 ) -> None:
     tables = make_tables(classes=40, switches=40, joints=12, bins=30)
     build = Build(describe(tables), tables)
-    assert fit_of(Request(build, "arduino")).target.part == "atmega2560"
+    assert Firmware(build.tables, build.manifest, "arduino").fit.target.part == "atmega2560"
     for classes, part in ((60, "cortex-m4"), (200, "host")):
         huge = make_tables(classes=classes, switches=60, joints=20, bins=60)
-        request = Request(Build(describe(huge), huge), "arduino")
-        assert fit_of(request).target.part == part
-        assert "src/thenar_glove_avr.S" not in firmware_files(request, fit_of(request))
+        request = Firmware(huge, describe(huge), "arduino")
+        assert request.fit.target.part == part
+        assert "src/thenar_glove_avr.S" not in request.files()

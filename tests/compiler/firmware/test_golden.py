@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from thenar.compiler.firmware.board_loading import parse_board
-from thenar.compiler.firmware.generate import Mode, Request, firmware_files, fit_of
+from thenar.compiler.firmware.generate import Firmware
+from thenar.compiler.firmware.targets.base import Mode
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Switch
 from thenar.runtime.tables import IntegerTables
@@ -94,10 +95,10 @@ def small_build() -> Build:
 
 
 def made(case: str) -> dict[str, str]:
-    platform, mode, board = CASES[case]
-    request = Request(small_build(), platform, mode, board=None if board is None else parse_board(board))
-    fit = fit_of(request)
-    return firmware_files(request, fit, fit.notes())
+    target, mode, board = CASES[case]
+    build = small_build()
+    wiring = None if board is None else parse_board(board)
+    return Firmware(build.tables, build.manifest, target, mode, board=wiring).files()
 
 
 def content(folder: Path) -> dict[str, str]:

@@ -6,9 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.firmware.errors import FirmwareError
-from thenar.compiler.firmware.layout import Bins, Layout, arrange
-from thenar.compiler.firmware.lookups import lookups
-from thenar.compiler.firmware.parts import parts_of
+from thenar.compiler.firmware.layout import Bins, Layout, arrange, lookups, parts_of
 from thenar.compiler.firmware.probes import Probes
 from thenar.runtime.tables import IntegerTables
 

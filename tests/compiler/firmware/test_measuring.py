@@ -4,12 +4,9 @@ from dataclasses import replace
 import pytest
 from msgspec import structs
 
-from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.errors import FirmwareError
-from thenar.compiler.firmware.generate import Request, fit_of, library
-from thenar.compiler.firmware.library import Fit
+from thenar.compiler.firmware.generate import Firmware
 from thenar.compiler.firmware.measuring import Measured, measure
-from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
@@ -29,9 +26,8 @@ def build(make_tables: MakeTables, describe: Describe) -> Build:
 
 
 def measured(build: Build, platform: str) -> Measured:
-    request = Request(build, platform)
-    fit = fit_of(request)
-    return measure(library(request, fit), "glove", fit, build.grasps)
+    firmware = Firmware(build.tables, build.manifest, platform)
+    return measure(firmware.library(), firmware.fit)
 
 
 @pytest.mark.parametrize("platform", ["avr328p", "avr2560"])
@@ -85,18 +81,19 @@ def test_the_bound_of_flash_grows_with_long_names(make_tables: MakeTables, descr
     tool("avr-gcc")
     tables = make_tables()
     build = Build(describe(tables), tables)
-    fit = fit_of(Request(build, "avr328p"))
-    long = tuple(f"a grasp with a name of quite some length, number {number}" for number in range(5))
-    files = classifier_files("glove", structs.replace(build.manifest, grasps=long), fit.choice.layout, avr=True)
-    assert measure(files, "glove", fit, long).holds
-    assert not measure(files, "glove", fit, build.grasps).holds
+    names = structs.replace(
+        build.manifest, grasps=tuple(f"a grasp with a name of quite some length, number {n}" for n in range(5))
+    )
+    firmware = Firmware(tables, names, "avr328p")
+    found = measure(firmware.library(), firmware.fit)
+    assert found.holds
+    assert found.flash > firmware.fit.choice.cost.flash
 
 
 def test_on_this_machine_nothing_is_counted(build: Build) -> None:
-    request = Request(build, "host")
-    fit = Fit(TARGETS["host"], fit_of(request).choice)
+    firmware = Firmware(build.tables, build.manifest, "host")
     with pytest.raises(FirmwareError, match="nothing can be measured"):
-        measure(library(request, fit), "glove", fit, build.grasps)
+        measure(firmware.library(), firmware.fit)
 
 
 def test_without_the_tools_it_says_what_to_install(build: Build, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,11 +9,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from thenar.compiler.firmware.arduino import arduino_files
-from thenar.compiler.firmware.classifier import classifier_files
-from thenar.compiler.firmware.host_files import host_files
+from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import arrange
 from thenar.compiler.firmware.protocol import decided_files
+from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.names import fault
 from thenar.runtime.tables import IntegerTables
@@ -65,24 +64,21 @@ def test_whatever_names_hold_the_c_compiles_without_a_warning(
         switches=tuple(replace(switch, name=name) for switch, name in zip(plain.switches, names[5:10], strict=True)),
         joints=tuple(replace(joint, name=name) for joint, name in zip(plain.joints, names[10:], strict=True)),
     )
-    files = classifier_files("hand", manifest, layout, avr=True, notes=names)
-    files |= host_files("hand", layout, manifest.grasps)
+    library = Library("hand", manifest, layout, avr=True, notes=tuple(names))
+    files = TARGETS["host"].files(library)
     files |= decided_files("hand", tables, manifest.grasps, [(0, 1), (2, 3, 4)])
-    arduino = arduino_files("hand", manifest, layout, avr=True)
+    arduino = TARGETS["arduino"].files(library)
+    plainly = TARGETS["arduino"].files(Library("hand", plain, layout, avr=True))
     for name, text in (files | arduino).items():
         assert text.isascii(), name
         assert all(line.isprintable() or name == "Makefile" for line in text.replace("\t", " ").splitlines()), name
-    assert len(arduino["README.md"].splitlines()) == len(
-        arduino_files("hand", plain, layout, avr=True)["README.md"].splitlines()
-    )
+    assert len(arduino["README.md"].splitlines()) == len(plainly["README.md"].splitlines())
     for name, text in files.items():
         (tmp_path / name).write_text(text)
     sources = sorted(name for name in files if name.endswith(".c"))
     done = subprocess.run([tool("gcc"), *STRICT, *sources], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     # The sketch needs Arduino's headers to compile: its comments are all that names may change.
-    sketches = [
-        made["examples/Recognise/Recognise.ino"] for made in (arduino, arduino_files("hand", plain, layout, avr=True))
-    ]
+    sketches = [made["examples/Recognise/Recognise.ino"] for made in (arduino, plainly)]
     uncommented = ["".join(piece.partition("*/")[2] for piece in f"*/{text}".split("/*")) for text in sketches]
     assert uncommented[0] == uncommented[1]

@@ -8,12 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thenar.compiler.firmware.classifier import classifier_files
-from thenar.compiler.firmware.cortex_files import cortex_files
-from thenar.compiler.firmware.host_files import host_files
+from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import Layout, arrange
 from thenar.compiler.firmware.probes import turns
-from thenar.compiler.firmware.self_test import CHECKS, self_test_frames
+from thenar.compiler.firmware.self_test import CHECKS, check_header, self_test_frames
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import Manifest
@@ -39,13 +37,10 @@ SHAPES = {
 
 
 def files_for(part: str, layout: Layout, manifest: Manifest) -> dict[str, str]:
-    own = classifier_files("hand", manifest, layout, avr=False)
-    grasps = manifest.grasps
-    around = (
-        host_files("hand", layout, grasps) if part == "host" else cortex_files("hand", layout, TARGETS[part], grasps)
-    )
-    assert not own.keys() & around.keys()
-    return own | around
+    library = Library("hand", manifest, layout, avr=False)
+    files = TARGETS[part].files(library)
+    assert {path: files[path] for path in library.files} == library.files
+    return files
 
 
 @pytest.fixture
@@ -161,8 +156,7 @@ def test_the_answers_in_the_check_are_those_of_the_build(make_tables: MakeTables
     tables = make_tables()
     layout = arrange(tables)
     frames, build = self_test_frames(layout), Build(describe(tables), tables)
-    grasps = build.grasps
     scores = [build.scores(bits, codes) for bits, codes in zip(frames.bits, frames.codes, strict=True)]
-    text = "".join(host_files("hand", layout, grasps)["thenar_hand_check.h"].split())
+    text = "".join(check_header("hand", layout, build.grasps).split())
     for each in scores:
         assert f"}},{each.argmax()},{{{','.join(str(score) for score in each)}}}," in text

@@ -4,16 +4,15 @@ from dataclasses import replace
 
 import pytest
 
-from thenar.compiler.frontier.built import Built, points_of, with_whole_scans
-from thenar.compiler.frontier.candidates import Choice, Screened
-from thenar.compiler.frontier.closeup import Close
-from thenar.compiler.frontier.designs import Design, best_designs, designs
+from thenar.compiler.frontier.designs import Design, best_designs, designs, points_of, with_whole_scans
+from thenar.compiler.frontier.finalists import Close
+from thenar.compiler.frontier.latency import POLICIES
 from thenar.compiler.frontier.points import Latency, Rate, Time, Way
-from thenar.compiler.frontier.pricing import Priced, PricedTables, Tabled, Wired
-from thenar.compiler.frontier.settings import Shape
+from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
+from thenar.compiler.frontier.screen import Screened
+from thenar.compiler.frontier.search import Candidate, Shape
 from thenar.compiler.frontier.timing.classify_times import Classified
 from thenar.compiler.frontier.timing.scan_times import ScanTimes
-from thenar.compiler.frontier.waiting import DECISIONS
 
 TABLED = Tabled(10, Shape(16))
 WAIT = Latency(1000.0, 2000.0, 0.0)
@@ -26,20 +25,20 @@ def close_of(switches: int = 20, rate: float = 0.9, early_us: float = 200.0, lay
     tables = PricedTables(TABLED, b"", (Classified("plain", layout_us, "model", 900, 30),), wired, 1.25)
     way = Way("id3", float(switches))
     screened = Screened(
-        Choice(way, "switches" if switches else "joints"), tuple(range(switches)), Rate(rate, rate, rate), 1.0
+        Candidate(way, "switches" if switches else "joints"), tuple(range(switches)), Rate(rate, rate, rate), 1.0
     )
-    return Close(screened, {}, {TABLED: Rate(rate, rate, rate)}, None, Priced((tables,)), 2.0)
+    return Close(screened, {}, {TABLED: Rate(rate, rate, rate)}, None, (tables,), 2.0)
 
 
-def built_of(design: Design, us: float | None = None) -> Built:
-    return Built(design, design.classify if us is None else Time(us, "simulated"))
+def simulated(design: Design, us: float) -> Design:
+    return replace(design, measured=Time(us, "simulated"))
 
 
 def test_a_scan_that_may_end_early_looks_at_the_scores_once_a_port_that_it_reads() -> None:
     whole, early = designs(close_of(), 0)
     assert (whole.scan_kind, whole.scan.us, whole.classify.us) == ("full", 500.0, 50.0)
     assert (early.scan_kind, early.scan.us, early.classify.us) == ("early", 200.0, 75.0)
-    assert early.frame_us == 275.0
+    assert early.frame.us == 275.0
 
 
 def test_where_no_frame_ends_a_scan_early_it_is_not_offered() -> None:
@@ -48,17 +47,19 @@ def test_where_no_frame_ends_a_scan_early_it_is_not_offered() -> None:
 
 def test_joints_alone_have_one_design_a_layout_and_wait_for_a_record() -> None:
     (design,) = designs(close_of(switches=0), 16)
-    assert (design.scan.us, design.wired, design.looks) == (0.0, None, 1.0)
-    assert design.frame_us == pytest.approx(21 * 10 / 115_200 * 1e6 + 50.0)
+    assert (design.scan.us, design.wired, design.classify.us) == (0.0, None, 50.0)
+    assert design.frame.us == pytest.approx(21 * 10 / 115_200 * 1e6 + 50.0)
 
 
 def test_compiling_is_choosing_training_and_making_the_tables() -> None:
-    assert next(designs(close_of(), 0)).compile_s == 3.25
+    design = next(designs(close_of(), 0))
+    (point, *_) = points_of([design], dict.fromkeys(((design, kind) for kind in POLICIES), WAIT), NAMES, None)
+    assert point.compile_s == 3.25
 
 
 def test_fronts_hold_the_quickest_and_the_smallest() -> None:
     big, small = close_of(30, 0.95, early_us=100.0), close_of(5, 0.9, early_us=400.0)
-    by_time, by_switches = best_designs([*designs(small, 0), *designs(big, 0)], lambda design: design.frame_us)
+    by_time, by_switches = best_designs([*designs(small, 0), *designs(big, 0)])
     assert [design.n_switches for design in by_time] == [30]
     assert [design.n_switches for design in by_switches] == [5, 30]
     assert by_switches[0].scan_kind == "early"
@@ -71,17 +72,17 @@ def test_a_design_that_ends_early_is_joined_by_the_one_of_whole_scans_once() -> 
 
 
 def test_dwell_and_tests_are_for_whole_scans() -> None:
-    whole, early = (built_of(design) for design in designs(close_of(), 0))
-    assert (whole.decisions, early.decisions) == (DECISIONS, ("single",))
+    whole, early = designs(close_of(), 0)
+    assert (whole.decisions, early.decisions) == (tuple(POLICIES), ("single",))
 
 
 def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
     one, other = next(designs(close_of(20, 0.9), 0)), next(designs(close_of(10, 0.8, layout_us=30.0), 0))
     # The model has the other one faster, the simulator the better one: so the other is beaten on time.
-    assert other.frame_us < one.frame_us
-    builts = [built_of(one, 20.0), built_of(other, 60.0)]
-    waits = {(built, kind): WAIT for built in builts for kind in built.decisions}
-    points = points_of(builts, waits, NAMES, None)
+    assert other.frame.us < one.frame.us
+    several = [simulated(one, 20.0), simulated(other, 60.0)]
+    waits = {(design, kind): WAIT for design in several for kind in design.decisions}
+    points = points_of(several, waits, NAMES, None)
     assert [point.frame.us for point in points] == sorted(point.frame.us for point in points)
     fronts = {(len(point.switches), point.setting.decision): point.fronts for point in points}
     assert fronts[20, "single"] == ("frame", "switches", "latency")
@@ -92,8 +93,8 @@ def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
 
 
 def test_a_decision_that_is_quicker_is_on_its_own_front() -> None:
-    one, other = (built_of(next(designs(close_of(n, rate), 0))) for n, rate in ((20, 0.9), (10, 0.8)))
-    waits = {(built, kind): WAIT for built in (one, other) for kind in built.decisions}
+    one, other = (next(designs(close_of(n, rate), 0)) for n, rate in ((20, 0.9), (10, 0.8)))
+    waits = {(design, kind): WAIT for design in (one, other) for kind in design.decisions}
     waits[other, "sequential"] = replace_latency(WAIT, 10.0)
     points = points_of([one, other], waits, NAMES, None)
     (found,) = (each for each in points if len(each.switches) == 10 and each.setting.decision == "sequential")
@@ -107,5 +108,4 @@ def replace_latency(latency: Latency, mean_us: float) -> Latency:
 
 def test_measured_times_of_early_scans_count_every_look() -> None:
     _, early = designs(close_of(), 0)
-    twice = replace(early, classified=Classified("plain", 100.0, "model", 900, 30))
-    assert twice.classify.us == 150.0
+    assert simulated(early, 100.0).classify == Time(150.0, "simulated")

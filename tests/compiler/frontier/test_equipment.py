@@ -1,16 +1,19 @@
 from msgspec.structs import replace
 
 from thenar.compiler.frontier.equipment import Equipment
+from thenar.compiler.frontier.price import price
 from thenar.compiler.frontier.timing.beside_wire import WIRE_ONLY, Beside
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel
 from thenar.compiler.frontier.timing.wirings import wirings
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.samples import Samples
 from thenar.runtime.scanning.propose import propose_board, propose_harness
 
 MODEL = ClassifyModel("cortex-m4")
 NAMES = ["s0", "s1", "s2"]
 
 
-def test_whatever_times_depend_on_is_part_of_the_identity() -> None:
+def test_whatever_times_depend_on_is_part_of_the_question(grasp_set: GraspSet) -> None:
     glove, board = propose_harness(NAMES), propose_board(NAMES)
     slower = replace(glove, buses=tuple(replace(bus, clock_hz=100_000) for bus in glove.buses))
     other = replace(board, scanners=tuple(replace(each, baud=9600) for each in board.scanners), buses=slower.buses)
@@ -21,7 +24,9 @@ def test_whatever_times_depend_on_is_part_of_the_identity() -> None:
         Equipment(MODEL, wirings(None), Beside("", call_us=1.0)),
         *(Equipment(MODEL, wirings(given), WIRE_ONLY) for given in (glove, slower, other, faster)),
     ]
-    assert len({each.identity for each in equipments}) == len(equipments)
+    names, rows = tuple(NAMES), Samples.of(grasp_set)
+    asked = {price.call(1.0, rows, names, (0, 1, 2), (), None, each, None).question({}) for each in equipments}
+    assert len(asked) == len(equipments)
 
 
 def test_without_switches_no_wiring_is_wanted_and_one_without_a_place_does_not_fit() -> None:

@@ -1,9 +1,12 @@
-from math import prod
+from fractions import Fraction
+from math import log, prod
 
+import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.placement.exact import sign_of_f_sum, sign_of_log_sum
+from thenar.compiler.placement.exact import compare, first_best, n_log_n, sign_of_f_sum, sign_of_log_sum
 from thenar.stability.reference import information
 
 multiples = st.dictionaries(st.integers(1, 60), st.integers(-8, 8), max_size=8)
@@ -47,3 +50,28 @@ def test_no_count_and_counts_of_one_add_nothing() -> None:
     assert sign_of_f_sum({0: 5, 1: -7}) == 0
     assert sign_of_f_sum({4: 1, 2: -4}) == 0
     assert sign_of_f_sum({4: 1, 2: -3}) == 1
+
+
+def test_zero_and_one_count_nothing_and_others_their_logarithm() -> None:
+    assert n_log_n(np.array([0, 1, 2, 10**9])) == pytest.approx([0.0, 0.0, 2 * log(2), 10**9 * log(10**9)])
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 12), st.integers(1, 6))
+def test_the_first_of_the_best_is_that_of_products_of_whole_numbers(seed: int, n: int, candidates: int) -> None:
+    random = np.random.default_rng(seed)
+    closed = np.sort(random.multinomial(n, [1 / 6] * 6, size=candidates).reshape(candidates, 3, 2), axis=2)
+    # Gains of two values and three classes: none is negative.
+    plus = np.column_stack([closed.reshape(candidates, -1), np.full(candidates, n)])
+    minus = np.column_stack([closed.sum(axis=1), closed.sum(axis=2)])
+    costs = np.sort(random.integers(1, 4, candidates))
+    values = [
+        Fraction(prod(m**m for m in more), prod(m**m for m in less))
+        for more, less in zip(plus.tolist(), minus.tolist(), strict=True)
+    ]
+    best = 0
+    for one in range(candidates):
+        if values[one] ** int(costs[best]) > values[best] ** int(costs[one]):
+            best = one
+    assert first_best(plus, minus, costs) == best
+    assert first_best(plus, minus) == values.index(max(values))
+    assert compare(plus[0], minus[0], plus[-1], minus[-1]) == (values[0] > values[-1]) - (values[0] < values[-1])

@@ -5,18 +5,18 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from thenar.compiler.placement.exact import Counts
-from thenar.compiler.placement.gain import Node, best_position, compare_scores, entropy_bits, gain_bits
+from thenar.compiler.placement.gain import NodeCounts, best_position, compare_scores, entropy_bits, gain_bits
 from thenar.stability.reference.information import compare_gains
 
 tables = arrays(np.int64, st.tuples(st.integers(1, 5), st.integers(2, 4)), elements=st.integers(0, 30))
 large_tables = arrays(np.int64, (3, 2), elements=st.integers(1, 10**9))
 
 
-def node_of(*inputs: Counts) -> Node:
+def node_of(*inputs: Counts) -> NodeCounts:
     """Return the node whose inputs have these tables."""
     cells = np.concatenate([table[:, 1:] for table in inputs], axis=1)
     starts = np.cumsum([0] + [table.shape[1] - 1 for table in inputs])[:-1]
-    return Node(inputs[0].sum(axis=1), cells, starts)
+    return NodeCounts(inputs[0].sum(axis=1), cells, starts)
 
 
 @given(tables.filter(np.any))
@@ -111,5 +111,5 @@ def test_inputs_of_the_same_cells_are_told_apart_by_the_rows_of_their_values(ord
     # b + d + 2 and b + d rows, or of b + d + 1 both, which says more, by less than a double can tell.
     b, d = 10**9, 7 * 10**8
     cells = np.array([[b, b], [d, d + 1]])[:, list(order)]
-    node = Node(np.array([2 * b + 1, 2 * d + 1]), cells, np.array([0, 1]))
+    node = NodeCounts(np.array([2 * b + 1, 2 * d + 1]), cells, np.array([0, 1]))
     assert best_position(node, np.array([0, 1])) == order.index(1)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler.placement.counts import Counter, Digits
-from thenar.compiler.placement.gain import Node, best_position, compare_scores, gain_bits
+from thenar.compiler.placement.gain import NodeCounts, best_position, compare_scores, gain_bits
 
 LARGEST = "paper14_bits"
 SETS = ("bin14", "bin16", "bin3", "dup", "multi", LARGEST, "rare")
@@ -28,12 +28,12 @@ class Walk:
         if "att" not in weka:
             self._leaf(weka, rows, totals)
             return
-        node = Node(totals, self.counter.count(rows), self.counter.starts)
+        node = NodeCounts(totals, self.counter.count(rows), self.counter.starts)
         self._decision(node, weka["att"])
         for value, child in enumerate(weka["sub"]):
             self.visit(child, rows[self.X[rows, weka["att"]] == value])
 
-    def _decision(self, node: Node, taken: int) -> None:
+    def _decision(self, node: NodeCounts, taken: int) -> None:
         columns = self.digits.columns
         position = best_position(node, columns)
         assert position is not None
@@ -51,7 +51,7 @@ class Walk:
             assert weka["leaf"] is None
             return
         assert weka["leaf"] == int(np.argmax(totals))
-        node = Node(totals, self.counter.count(rows), self.counter.starts)
+        node = NodeCounts(totals, self.counter.count(rows), self.counter.starts)
         position = best_position(node, self.digits.columns)
         # Weka stops below 1e-6 bits.
         assert position is None or gain_bits(node.table(position)) < 1e-6

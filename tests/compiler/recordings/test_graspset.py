@@ -1,3 +1,4 @@
+import doctest
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 
 from thenar.compiler import GraspSet
+from thenar.compiler.recordings import graspset
 from thenar.compiler.recordings.errors import RecordingError
 from thenar.compiler.recordings.graspset import Joint
 
@@ -145,3 +147,15 @@ def test_a_simulated_set_says_so_and_is_another_set_than_the_same_recorded(small
     assert GraspSet.load(tmp_path / "set.grasps").simulated == "scene quick, seed 1"
     assert simulated.rows([0]).simulated == simulated.simulated
     assert simulated.fingerprint() != small.fingerprint()
+
+
+def test_a_set_prints_in_two_lines_what_it_is(small: GraspSet) -> None:
+    assert repr(small).startswith(f"GraspSet: {len(small)} grasps of ")
+    simulated = replace(small, simulated="scene quick, seed 1" * 9)
+    lines = repr(simulated).splitlines()
+    assert len(lines) == 2
+    assert max(map(len, lines)) < 200
+
+
+def test_the_example_of_the_docstring_is_true() -> None:
+    assert doctest.testmod(graspset) == (0, 6)

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from thenar.compiler.artifact.compile import compile_build
-from thenar.compiler.artifact.ensemble import ensemble_from_bytes
 from thenar.compiler.evaluation.study import Options as Asked
 from thenar.compiler.evaluation.study import evaluate
 from thenar.compiler.frontier.points import Frontier
@@ -19,8 +18,7 @@ from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import own
 from thenar.compiler.report.content import ReportContent
-from thenar.compiler.tables.compare import compare, worst_case
-from thenar.runtime.build import Build
+from thenar.compiler.tables.compare import worst_case
 from thenar.runtime.harness.wiring import GloveWiring
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.simulator.handmaps.handmap import hand_map
@@ -78,27 +76,21 @@ def _content(grasp_set: GraspSet, folder: Path, hand: HandShape | None) -> Repor
     glove = GloveWiring(port="/dev/ttyUSB0") if grasp_set.joints else None
     harness = propose_harness(names, cyberglove=glove)
     made = compile_build(grasp_set, folder, prune=8, rounds=4, folds=2, harness=harness)
-    build = Build.load(folder)
-    stumps = ensemble_from_bytes((folder / "ensemble.bin").read_bytes())
-    bits = grasp_set.switches[:, list(tree.inputs)]
-    comparison = compare(stumps, build.tables, bits, grasp_set.codes)
-    confusion = np.zeros((len(build.grasps), len(build.grasps)), np.intp)
-    np.add.at(confusion, (grasp_set.labels, comparison.deployed), 1)
     asked = Asked(rounds=2, folds=2, repeats=1, prune=8, prune_list=(0, 8))
     return ReportContent(
         manifest=made.manifest,
-        tables=build.tables,
+        tables=made.tables,
         tables_bytes=made.tables_bytes,
-        rounds=stumps.n_rounds,
+        rounds=made.trained.rounds,
         firmware=made.firmware,
         tree=tree,
-        confusion=confusion,
+        confusion=made.confusion,
         study=evaluate(grasp_set, asked, jobs=1),
         hand=hand,
         scan=made.scan,
         harness=harness,
-        comparison=comparison,
-        worst=worst_case(stumps, build.tables, comparison, build.grasps, names),
+        comparison=made.comparison,
+        worst=worst_case(made.trained.model, made.tables, made.comparison, made.manifest.grasps, names),
     )
 
 

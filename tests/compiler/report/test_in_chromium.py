@@ -12,6 +12,7 @@ from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.remote.webelement import WebElement
 from selenium.webdriver.support.wait import WebDriverWait
 
 from thenar.compiler.frontier.points import Frontier
@@ -20,13 +21,6 @@ from thenar.compiler.report.page import report_html
 
 FLAGS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1300,1000")
 PATIENCE_S = 30
-
-# Where point N lies in a chart, in pixels from the chart's middle.
-PLACE = """
-    const [chart, number] = arguments, { xaxis, yaxis, meta } = chart._fullLayout, [x, y] = meta.places[number];
-    const box = chart.getBoundingClientRect();
-    return [xaxis._offset + xaxis.d2p(x) - box.width / 2, yaxis._offset + yaxis.d2p(y) - box.height / 2];
-"""
 
 pytestmark = pytest.mark.slow
 
@@ -69,14 +63,17 @@ class Reader:
     def said(self) -> str:
         return self.driver.find_element(By.ID, "picked-said").text
 
-    def point_at(self, chart: str, number: int) -> ActionChains:
-        """Return the movement of the mouse to a point of a chart."""
-        element = self.driver.find_element(By.ID, chart)
+    def marker(self, chart: str, number: int) -> WebElement:
+        """Return the marker of a point in a chart, where it can be seen."""
+        element = self.driver.find_element(By.CSS_SELECTOR, f"#{chart} .point[data-point='{number}']")
         self.script("arguments[0].scrollIntoView({block: 'center'})", element)
-        place = self.script(PLACE, element, str(number))
-        assert isinstance(place, list)
-        x, y = place
-        return ActionChains(self.driver).move_to_element_with_offset(element, round(x), round(y))
+        return element
+
+    def picked(self) -> set[str]:
+        """Return the numbers of the points whose markers and rows are picked, in the charts and in the table."""
+        numbers = self.script("return [...document.querySelectorAll('.picked')].map((one) => one.dataset.point)")
+        assert isinstance(numbers, list)
+        return set(numbers)
 
     def complaints(self) -> list[dict[str, Any]]:
         return self._log("browser")
@@ -119,27 +116,54 @@ def switches(frontier: Frontier, number: int) -> list[str]:
 
 
 def test_the_report_opens_with_all_its_charts_and_the_picked_point(opened: Reader, frontier: Frontier) -> None:
-    drawn = opened.driver.find_elements(By.CSS_SELECTOR, ".plot:has(.main-svg)")
-    assert [chart.get_attribute("id") for chart in drawn] == ["tree-chart", "by-frame", "by-switches", "by-latency"]
+    drawn = opened.driver.find_elements(By.CSS_SELECTOR, "figure:has(.scroll > svg)")
+    charts = ["tree-chart", "by-frontier", "by-switches", "by-latency"]
+    assert [chart.get_attribute("id") for chart in drawn] == charts
+    assert all(chart.find_element(By.TAG_NAME, "svg").size["height"] > 100 for chart in drawn)
     assert frontier.picked is not None
+    assert opened.picked() == {str(frontier.picked)}
     assert opened.kept_on_hand() == switches(frontier, frontier.picked)
 
 
-@pytest.mark.parametrize("chart", ["by-frame", "by-switches", "by-latency"])
+@pytest.mark.parametrize("chart", ["by-frontier", "by-switches", "by-latency"])
 def test_a_click_on_a_point_shows_its_switches_on_the_hand(opened: Reader, frontier: Frontier, chart: str) -> None:
-    opened.point_at(chart, 2).click().perform()
+    opened.marker(chart, 2).find_element(By.CSS_SELECTOR, ".target").click()
     opened.wait(lambda: opened.said().startswith("Point 2:"))
     assert opened.kept_on_hand() == switches(frontier, 2)
     checked = opened.driver.find_element(By.CSS_SELECTOR, "#points input:checked")
     assert checked.get_attribute("value") == "2"
+    assert opened.picked() == {"2"}
     command = opened.driver.find_element(By.ID, "picked-command").text
     assert command == "thenar compile kamakura.grasps -o build/ --from frontier/frontier.json --point 2"
 
 
-def test_the_mouse_over_a_point_tells_what_it_is(opened: Reader) -> None:
-    opened.point_at("by-frame", 2).perform()
-    selector = "#by-frame .hoverlayer .hovertext"
-    opened.wait(lambda: "Point 2" in " ".join(e.text for e in opened.driver.find_elements(By.CSS_SELECTOR, selector)))
+def test_the_mouse_over_a_point_tells_what_it_is_and_marks_its_row(opened: Reader) -> None:
+    marker = opened.marker("by-frontier", 2)
+    assert opened.script("return arguments[0].querySelector('title').textContent", marker).startswith("Point 2: 10 swi")  # type: ignore[attr-defined]
+    ActionChains(opened.driver).move_to_element(marker.find_element(By.CSS_SELECTOR, ".target")).perform()
+    opened.wait(lambda: opened.driver.find_elements(By.CSS_SELECTOR, "#points tr.near[data-point='2']"))
+    ActionChains(opened.driver).move_to_element(opened.driver.find_element(By.ID, "picked-heading")).perform()
+    opened.wait(lambda: not opened.driver.find_elements(By.CSS_SELECTOR, ".near"))
+
+
+def test_a_chart_can_be_made_larger(opened: Reader) -> None:
+    chart = opened.driver.find_element(By.ID, "by-frontier")
+    drawing, larger = chart.find_element(By.TAG_NAME, "svg"), chart.find_element(By.CLASS_NAME, "larger")
+    before = drawing.size["width"]
+    larger.click()
+    assert drawing.size["width"] > 1.8 * before
+    larger.click()
+    assert drawing.size["width"] == before
+
+
+def test_a_click_on_the_icicle_opens_the_list_at_the_node(opened: Reader) -> None:
+    links = opened.driver.find_elements(By.CSS_SELECTOR, ".icicle a")
+    number = len(links) - 1
+    opened.script("arguments[0].dispatchEvent(new MouseEvent('click', {bubbles: true, view: window}))", links[number])
+    item = opened.driver.find_element(By.CSS_SELECTOR, ".tree li:target")
+    opened.wait(item.is_displayed)
+    title = opened.script("return arguments[0].querySelector('title').textContent", links[number])
+    assert item.text.startswith(" ".join(str(title).split()))
 
 
 def test_arrow_keys_go_from_point_to_point(opened: Reader, frontier: Frontier) -> None:
@@ -149,10 +173,7 @@ def test_arrow_keys_go_from_point_to_point(opened: Reader, frontier: Frontier) -
     radio.send_keys(Keys.ARROW_DOWN)
     opened.wait(lambda: opened.said().startswith(f"Point {following}:"))
     assert opened.kept_on_hand() == switches(frontier, following)
-    ring = opened.script(
-        "const chart = document.getElementById('by-frame'); return chart.data[chart.layout.meta.ring].x[0]"
-    )
-    assert ring == pytest.approx(frontier.point(following).frame.us, abs=1e-3)
+    assert opened.picked() == {str(following)}
 
 
 def test_what_is_picked_is_told_in_words_and_numbers(opened: Reader, frontier: Frontier) -> None:
@@ -161,7 +182,7 @@ def test_what_is_picked_is_told_in_words_and_numbers(opened: Reader, frontier: F
     names = [item.text for item in opened.driver.find_elements(By.CSS_SELECTOR, "#picked-switches li")]
     assert names == switches(frontier, 10)
     facts = opened.driver.find_element(By.ID, "picked-facts").text
-    assert "board at 1,000,000 baud" in facts
+    assert "board 1 Mbaud" in facts
     assert "99.2 [98.9, 99.4]" in facts
     summary = opened.driver.find_element(By.ID, "picked-hand-summary").get_attribute("textContent")
     assert summary == opened.said()
@@ -171,8 +192,8 @@ def test_colours_follow_the_readers_system_in_page_hand_and_charts(opened: Reade
     look = (
         "return [getComputedStyle(document.body).backgroundColor,"
         " getComputedStyle(document.querySelector('#kept-hand .skin')).fill,"
-        " document.querySelector('#by-frame .trace.scatter .point').style.fill,"
-        " getComputedStyle(document.querySelector('#by-frame .xtick text')).fill]"
+        " getComputedStyle(document.querySelector('#by-frontier .point use')).fill,"
+        " getComputedStyle(document.querySelector('#by-frontier text')).fill]"
     )
     light = opened.script(look)
     assert isinstance(light, list)
@@ -186,21 +207,25 @@ def test_a_narrow_screen_need_not_be_scrolled_sideways(opened: Reader) -> None:
     metrics = {"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": True}
     opened.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
     try:
-        opened.wait(lambda: opened.script("return document.getElementById('by-frame')._fullLayout.width < 400"))
+        opened.wait(lambda: opened.script("return document.documentElement.clientWidth") == 400)
         assert opened.script("return document.documentElement.scrollWidth") == 400
     finally:
         opened.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
-def test_on_paper_the_report_is_light_and_afterwards_as_before(opened: Reader) -> None:
-    opened.scheme("dark")
-    opened.script(
-        "addEventListener('beforeprint', () => { window.printed = [document.documentElement.className,"
-        " document.getElementById('by-frame')._fullLayout.width] })"
-    )
-    assert base64.b64decode(opened.driver.print_page()).startswith(b"%PDF")
-    assert opened.script("return window.printed") == ["on-paper", 680]
-    opened.wait(lambda: opened.script("return document.documentElement.className") == "")
+def test_on_paper_the_report_is_light_and_charts_fit(opened: Reader) -> None:
+    features = [{"name": "prefers-color-scheme", "value": "dark"}]
+    opened.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print", "features": features})
+    try:
+        colours = opened.script(
+            "return [getComputedStyle(document.body).backgroundColor, getComputedStyle(document.documentElement)"
+            ".colorScheme, getComputedStyle(document.querySelector('#by-frontier .point use')).fill]"
+        )
+        assert colours == ["rgb(255, 255, 255)", "light", "rgb(0, 114, 178)"]
+        assert opened.script("return getComputedStyle(document.querySelector('#by-frontier svg')).minWidth") == "0px"
+        assert base64.b64decode(opened.driver.print_page()).startswith(b"%PDF")
+    finally:
+        opened.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": []})
 
 
 def test_the_first_stop_of_the_keyboard_leads_past_the_contents(opened: Reader) -> None:
@@ -211,7 +236,6 @@ def test_the_first_stop_of_the_keyboard_leads_past_the_contents(opened: Reader) 
 
 
 def test_a_screen_reader_finds_landmarks_and_names(opened: Reader) -> None:
-    opened.wait(lambda: opened.script("return !document.querySelector('.plot svg:not([aria-hidden])')"))
     nodes = opened.driver.execute_cdp_cmd("Accessibility.getFullAXTree", {})["nodes"]
     told = [(node["role"]["value"], node.get("name", {}).get("value", "")) for node in nodes if not node["ignored"]]
     roles = [role for role, _ in told]
@@ -236,7 +260,7 @@ def test_names_that_hold_scripts_run_nothing(
     assert [" ".join(name.split()) for name in switches(nasty.frontier, 1)] == [
         " ".join(name.split()) for name in names
     ]
-    charted = reader.driver.find_element(By.ID, "by-frame").text
+    charted = reader.driver.find_element(By.ID, "by-frontier").text
     assert "<img src=x onerror=" in charted
     assert reader.complaints() == []
     assert reader.requests() == [path.as_uri()]

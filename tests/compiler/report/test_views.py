@@ -1,35 +1,37 @@
 """What the sections are made of."""
 
+import re
+from dataclasses import replace
+from itertools import pairwise
+
 import msgspec
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from thenar.compiler.frontier.plots import PALETTE
 from thenar.compiler.frontier.points import Frontier
 from thenar.compiler.hand import HandShape
 from thenar.compiler.placement.id3 import grow_id3
-from thenar.compiler.report.charts import words
-from thenar.compiler.report.confusion_view import WIDEST, confusion_view
 from thenar.compiler.report.content import ReportContent
-from thenar.compiler.report.frontier_charts import frontier_charts
-from thenar.compiler.report.frontier_view import COLUMNS, frontier_view
-from thenar.compiler.report.hand_picture import hand_picture
-from thenar.compiler.report.placement_view import placement_view
-from thenar.compiler.report.scan_view import scan_view
-from thenar.compiler.report.tree_view import MOST_NODES, tree_view
+from thenar.compiler.report.frontier import frontier_view
+from thenar.compiler.report.hand import hand_picture
+from thenar.compiler.report.results import WIDEST, confusion_view
+from thenar.compiler.report.sections import kept_table, no_tree, placement_sentences, scan_sentences, scan_table
+from thenar.compiler.report.tree import MOST_NODES, tree_view
 from thenar.compiler.text import DASH
 
 
 @given(arrays(np.intp, (4, 4), elements=st.integers(0, 50)))
 def test_a_confusion_matrix_shows_every_count_and_shades_it_by_its_share_of_the_row(counts: np.ndarray) -> None:
     view = confusion_view("title", ("a", "b", "c", "d"), counts)
-    for number, (row, line) in enumerate(zip(view.rows, counts.tolist(), strict=True)):
-        assert [0 if cell.count == "·" else int(cell.count) for cell in row.cells] == line
-        assert row.total == str(sum(line))
-        for column, (cell, count) in enumerate(zip(row.cells, line, strict=True)):
+    for number, ((_, cells, total, _), line) in enumerate(zip(view.rows, counts.tolist(), strict=True)):
+        assert [0 if shown == "·" else int(shown) for shown, _ in cells] == line
+        assert total == str(sum(line))
+        for column, ((_, shade), count) in enumerate(zip(cells, line, strict=True)):
             kind = "hit" if column == number else "miss"
-            assert cell.shade == (f"{kind}{1 + 8 * count // sum(line)}" if count else "")
+            assert shade == (f"{kind}{1 + 8 * count // sum(line)}" if count else "")
 
 
 @given(arrays(np.intp, (4, 4), elements=st.integers(0, 50)))
@@ -57,6 +59,11 @@ def test_the_list_of_a_tree_closes_what_it_opens(seed: int, inputs: int, rows: i
         assert depth == tree.depths[node.number]
         depth += 1 if node.opens else -node.closes
     assert depth == 0
+    for level in range(view.levels):
+        nodes = [node for node in view.nodes if node.depth == level]
+        for node, following in pairwise(nodes):
+            assert node.x + node.width <= following.x + 0.02
+        assert all(node.x + node.width <= 1000.02 and node.width > 0 for node in nodes)
     assert len(view.nodes) + sum(node.below for node in view.nodes) == len(tree.nodes)
 
 
@@ -72,10 +79,10 @@ def test_a_large_tree_is_shown_as_far_as_one_can_see_and_says_so() -> None:
 def test_switches_stand_on_the_picture_where_they_lie_on_the_hand(hand: HandShape) -> None:
     kept = hand.names[5:2:-1]
     picture = hand_picture(hand, kept, "ident", "title", "summary")
-    assert [dot.name for dot in picture.dots] == list(hand.names)
-    places = np.array([[float(dot.x), -float(dot.y)] for dot in picture.dots])
+    assert [name for name, *_ in picture.dots] == list(hand.names)
+    places = np.array([[float(x), -float(y)] for _, x, y, _ in picture.dots])
     assert np.abs(places - hand.places).max() <= 0.05 + 1e-9
-    assert {dot.name: dot.order for dot in picture.dots if dot.order} == {kept[0]: "1", kept[1]: "2", kept[2]: "3"}
+    assert {name: order for name, _, _, order in picture.dots if order} == {kept[0]: "1", kept[1]: "2", kept[2]: "3"}
 
 
 def test_all_that_is_drawn_lies_in_the_view(hand: HandShape) -> None:
@@ -86,27 +93,27 @@ def test_all_that_is_drawn_lies_in_the_view(hand: HandShape) -> None:
 
 
 def test_the_share_of_all_switches_together_is_what_the_tree_tells(bare: ReportContent) -> None:
-    view = placement_view(bare.manifest, bare.tree, bare.hand)
-    assert view.together
-    assert view.sentences[0].startswith("The paper's ID3")
-    rows = view.switches
-    assert [row.name for row in rows] == list(bare.switch_names)
-    assert [row.order for row in rows] == list(range(1, len(rows) + 1))
-    shares = [float(row.share.split()[0]) for row in rows]
+    table = kept_table(bare)
+    assert table.columns[-1] == "Together"
+    assert placement_sentences(bare)[0].startswith("The paper's ID3")
+    orders, names, parts, *_, together = zip(*table.rows, strict=True)
+    assert list(names) == list(bare.switch_names)
+    assert list(map(int, orders)) == list(range(1, len(names) + 1))
+    shares = [float(share.split()[0]) for share in together]
     assert shares == sorted(shares)
     assert 0 < shares[0] <= shares[-1] <= 100
-    assert all(row.part in row.name for row in rows if row.part != "palm")
+    assert all(part in name for part, name in zip(parts, names, strict=True) if part != "palm")
 
 
 def test_a_placement_without_a_tree_names_its_method_and_shows_no_shares(bare: ReportContent) -> None:
-    replace = msgspec.structs.replace
-    options = replace(bare.manifest.options, placement="elimination", prune=0, keep=len(bare.manifest.switches))
-    view = placement_view(replace(bare.manifest, options=options), None, bare.hand)
-    assert not view.together
-    assert all(not row.share for row in view.switches)
-    assert view.no_tree == "No tree: the switches were chosen by elimination."
-    assert view.sentences[0].endswith("(--placement elimination).")
-    assert "together" not in view.sentences[1]
+    options = {"placement": "elimination", "prune": 0, "keep": len(bare.manifest.switches)}
+    chosen = msgspec.structs.replace(bare.manifest.options, **options)
+    content = replace(bare, manifest=msgspec.structs.replace(bare.manifest, options=chosen), tree=None)
+    assert "Together" not in kept_table(content).columns
+    assert no_tree(content.manifest) == "No tree: the switches were chosen by elimination."
+    how, bits = placement_sentences(content)
+    assert how.endswith("(--placement elimination).")
+    assert "together" not in bits
 
 
 def test_a_point_that_misses_every_grasp_has_no_latency_to_show(frontier: Frontier) -> None:
@@ -115,19 +122,22 @@ def test_a_point_that_misses_every_grasp_has_no_latency_to_show(frontier: Fronti
     points = (msgspec.structs.replace(first, latency=missing), *others)
     changed = msgspec.structs.replace(frontier, points=points, skipped=("no tools were there",))
     view = frontier_view(changed, frontier.fingerprint, None)
-    at = COLUMNS.index("Latency, µs")
-    assert view.rows[0].cells[at : at + 3] == (DASH, DASH, "100.0")
+    at = view.points.columns.index("Latency, µs")
+    assert view.points.rows[0][at : at + 3] == (DASH, DASH, "100.0")
     assert dict(view.details[0].facts)["Latency"] == DASH
-    assert DASH not in view.rows[1].cells[at : at + 3]
+    assert DASH not in view.points.rows[1][at : at + 3]
     assert "No tools were there." in view.notes
-    by_latency = msgspec.json.decode(frontier_charts(changed)[2].figure)
-    assert set(by_latency["layout"]["meta"]["places"]) == {str(point.number) for point in others}
+    by_frame, _, by_latency = view.charts
+    assert 'data-point="1"' in by_frame.drawing
+    assert 'data-point="1"' not in by_latency.drawing
 
 
 def test_the_point_that_the_build_is_comes_first(frontier: Frontier, hand: HandShape) -> None:
     for built in (frontier.points[0].number, frontier.points[-1].number):
         view = frontier_view(frontier, frontier.fingerprint, hand, built)
-        assert [row.number for row in view.rows if row.picked] == [built]
+        assert all(chart.drawing.count('class="point picked"') <= 1 for chart in view.charts)
+        marker = f'<g data-point="{built}" class="point picked">'
+        assert any(marker in chart.drawing for chart in view.charts)
         assert view.picked is not None
         assert view.picked.number == built
         assert f"This build is point {built}." in view.notes
@@ -136,10 +146,21 @@ def test_the_point_that_the_build_is_comes_first(frontier: Frontier, hand: HandS
 def test_every_kept_switch_is_read_in_one_transaction(bare: ReportContent) -> None:
     assert bare.scan is not None
     assert bare.harness is not None
-    view = scan_view(bare.scan, bare.harness, bare.switch_names, 2)
-    assert sorted(name for each in view.transactions for name in each.switches.split(", ")) == sorted(bare.switch_names)
-    assert any("CyberGlove" in sentence for sentence in view.sentences)
+    table = scan_table(bare)
+    assert table is not None
+    read = [name for row in table.rows for name in row[table.columns.index("Switches")].split(", ")]
+    assert sorted(read) == sorted(bare.switch_names)
+    assert any("CyberGlove" in sentence for sentence in scan_sentences(bare))
 
 
-def test_plotly_gets_no_tags_out_of_names() -> None:
-    assert words('<a href="x">b</a> & <br>') == '&lt;a href="x"&gt;b&lt;/a&gt; &amp; &lt;br&gt;'
+def test_a_picture_takes_the_pages_colours_and_ids_of_its_own(frontier: Frontier) -> None:
+    charts = frontier_view(frontier, frontier.fingerprint, None).charts
+    page = "".join(chart.drawing for chart in charts)
+    ids = re.findall(r' id="([^"]+)"', page)
+    assert ids
+    assert len(set(ids)) == len(ids)
+    assert set(re.findall(r'(?:href="|url\()#([^")]+)', page)) == set(ids)
+    assert set(re.findall(r"#[0-9a-f]{6}", page.replace("var(--", ""))) <= set(PALETTE.values())
+    assert not re.search(r"(?<!, )#[0-9a-f]{6}", page)
+    assert "<style" not in page
+    assert "metadata" not in page

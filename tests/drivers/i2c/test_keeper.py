@@ -2,10 +2,14 @@ import errno
 from collections.abc import Sequence
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from thenar.drivers.emulated.i2c_adapter import Adapter
+from thenar.drivers.emulated.i2c_wire import Message, Station, Wire
 from thenar.drivers.errors import DeviceError
 from thenar.drivers.i2c.chips import CHIPS
-from thenar.drivers.i2c.keeper import Keeper, PlacedChip
+from thenar.drivers.i2c.keeper import ImpostorError, Keeper, PlacedChip, read_back, set_up, whats_there
 from thenar.drivers.i2c.node import Node, Query, Run
 
 
@@ -40,3 +44,143 @@ def test_an_adapter_that_is_gone_is_noticed_whatever_it_says_of_its_chips(code: 
     node.gone = True
     with pytest.raises(DeviceError, match="cannot be opened"):
         keeper.attend()
+
+
+# Kinds that are told by their addresses or not at all: the same registers under two names.
+ALIKE = {"tca9555": "pca9555", "pcf8574a": "pcf8574"}
+PAIRS = [
+    (said, there)
+    for said in CHIPS
+    for there in CHIPS
+    if ALIKE.get(said, said) != ALIKE.get(there, there) and set(CHIPS[said].addresses) & set(CHIPS[there].addresses)
+]
+
+
+class WireNode(Node):
+    """A node whose transfers go to an emulated wire in this process."""
+
+    def __init__(self, kind: str, address: int) -> None:
+        super().__init__("/dev/i2c-7")
+        self.station = Station(CHIPS[kind].model, address)
+        self.adapter = Adapter(Wire([self.station], 100_000), "any")
+
+    def write(self, address: int, data: bytes) -> None:
+        self.adapter.rdwr([Message(address, data)])
+
+    def prepare(self, queries: Sequence[Query]) -> Run:
+        messages = []
+        for query in queries:
+            messages += [Message(query.address, query.command)] if query.command else []
+            messages.append(Message(query.address, None, query.length))
+        return lambda: [
+            answer for answer, message in zip(self.adapter.rdwr(messages), messages, strict=True) if not message.data
+        ]
+
+
+def address_of(*kinds: str) -> int:
+    return min(set.intersection(*(set(CHIPS[kind].addresses) for kind in kinds)))
+
+
+def node_with(kind: str, address: int, levels: int) -> WireNode:
+    node = WireNode(kind, address)
+    node.station.device.levels = levels & (1 << len(CHIPS[kind].pins)) - 1
+    return node
+
+
+def inputs(kind: str) -> frozenset[int]:
+    chip = CHIPS[kind]
+    return frozenset(pin for pin, name in enumerate(chip.pins) if name not in chip.not_inputs)
+
+
+levels = st.integers(0, (1 << 24) - 1)
+leftovers = st.lists(st.tuples(st.integers(0, 0x1A), st.integers(0, 255)), max_size=6)
+
+
+@pytest.mark.parametrize("kind", CHIPS)
+@given(levels=levels, leftovers=leftovers)
+def test_every_reading_gives_the_pins_whatever_the_chip_was_left_with(
+    kind: str, levels: int, leftovers: list[tuple[int, int]]
+) -> None:
+    chip, address = CHIPS[kind], address_of(kind)
+    node = node_with(kind, address, levels)
+    for register, value in leftovers:
+        node.station.device.poke(register, value)
+    set_up(node, chip, address, inputs(kind))
+    for reading in chip.readings:
+        answer = int.from_bytes(node.query(Query(address, reading.command, reading.length)), "little")
+        seen = {pin: answer >> bit & 1 for bit, pin in enumerate(reading.pins)}
+        assert all(seen[pin] == node.station.device.levels >> pin & 1 for pin in seen if pin in inputs(kind))
+
+
+@pytest.mark.parametrize(("said", "there"), PAIRS)
+@given(levels=levels)
+def test_a_chip_that_is_another_is_found_out_unless_all_its_pins_are_low(said: str, there: str, levels: int) -> None:
+    """Low pins read as driven low: where they all are, nobody could tell a chip without registers from others."""
+    address = address_of(said, there)
+    whole = (1 << len(CHIPS[there].pins)) - 1
+    pins = levels & whole
+    ports = [pins >> 8 * port & 0xFF for port in range(len(CHIPS[there].pins) // 8)]
+    if not CHIPS[said].registers and not all(port & 0xF9 for port in ports):
+        return
+    with pytest.raises(ImpostorError):
+        set_up(node_with(there, address, pins), CHIPS[said], address, inputs(said))
+
+
+@pytest.mark.parametrize("there", sorted(set(CHIPS) - set(ALIKE)))
+def test_what_is_there_instead_is_named_and_its_pins_are_left_inputs(there: str) -> None:
+    address = address_of(there, "tca6424a")  # all but a pcf8574a can be there
+    node = node_with(there, address, 0xA5A5A5)
+    assert whats_there(node, address) == f"something that behaves like a {there}"
+    reading = CHIPS[there].readings[-1]
+    if reading.high:  # pull-ups are for pins in use: the direction register tells
+        assert node.query(Query(address, b"\x00", 1)) == b"\xff"
+    else:
+        answer = node.query(Query(address, reading.command, reading.length))
+        assert int.from_bytes(answer, "little") == node.station.device.levels
+
+
+def test_what_is_nothing_known_is_called_so() -> None:
+    assert whats_there(WireNode("pcf8574", 0x21), 0x20) == "something unknown"
+
+
+def test_a_chip_left_in_bank_1_by_a_crash_is_brought_back_to_bank_0() -> None:
+    node = node_with("mcp23017", 0x20, 0x2A15)
+    node.station.device.poke(0x0A, 0xA0)  # BANK and SEQOP
+    node.station.device.poke(0x00, 0x00)
+    set_up(node, CHIPS["mcp23017"], 0x20, inputs("mcp23017"))
+    assert node.query(Query(0x20, b"\x12", 2)) == bytes((0x15, 0x2A))
+
+
+@pytest.mark.parametrize("kind", CHIPS)
+def test_a_reset_shows_in_what_is_watched_of_every_chip_that_a_reset_harms(kind: str) -> None:
+    chip, address = CHIPS[kind], address_of(kind)
+    node = node_with(kind, address, 0xFFFFFF)
+    set_up(node, chip, address, inputs(kind))
+    watch = chip.watched(inputs(kind))
+    if watch is None:
+        assert not chip.registers  # all pins high is both its reset and its set-up
+        return
+    assert watch.holds(read_back(node, chip, address, watch))
+    node.station.device.reset()
+    assert not watch.holds(read_back(node, chip, address, watch))
+
+
+def test_only_used_pins_of_an_mcp23017_are_pulled_up_and_the_two_that_are_no_inputs() -> None:
+    node = node_with("mcp23017", 0x20, 0xFFFF)
+    set_up(node, CHIPS["mcp23017"], 0x20, frozenset({0, 9}))
+    assert node.query(Query(0x20, b"\x0c", 2)) == bytes((0x81, 0x82))
+
+
+@pytest.mark.parametrize("kind", ["mcp23017", "mcp23008"])
+def test_lost_pull_ups_show_in_the_bits_that_stay_high(kind: str) -> None:
+    chip = CHIPS[kind]
+    node = node_with(kind, 0x20, 0xFFFF)
+    set_up(node, chip, 0x20, inputs(kind))
+    for reading in chip.readings:
+        query = Query(0x20, reading.command, reading.length)
+        assert int.from_bytes(node.query(query), "little") & reading.high == reading.high
+        assert {chip.pins[pin] for bit, pin in enumerate(reading.pins) if reading.high >> bit & 1} <= set(
+            chip.not_inputs
+        )
+    node.station.device.reset()
+    assert int.from_bytes(node.query(query), "little") & reading.high == 0

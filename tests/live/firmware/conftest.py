@@ -14,11 +14,10 @@ from typing import Any, Literal
 import msgspec
 import pytest
 
-from thenar.compiler.firmware.avr_harness import harness, missing
-from thenar.compiler.firmware.board import Board
-from thenar.compiler.firmware.board_keys import glove_toml
+from thenar.compiler.firmware import generate
+from thenar.compiler.firmware.board import Board, glove_toml
 from thenar.compiler.firmware.board_loading import parse_board
-from thenar.compiler.firmware.generate import Request, firmware_files, fit_of
+from thenar.compiler.firmware.simavr import harness, missing
 from thenar.runtime.build import Build
 from thenar.runtime.sinks.jsonl import Line
 
@@ -136,8 +135,10 @@ def flash(simulated: Any, stack: ExitStack, tmp_path: Path) -> Callable[..., Any
     def start(build: Build, board: Board, mode: Literal["scan", "glove"], switches: Sequence[str], *wiring: str) -> Any:
         folder = tmp_path / "firmware"
         folder.mkdir()
-        request = Request(build, "avr328p" if board.part == "atmega328p" else "avr2560", mode, board=board)
-        for name, content in firmware_files(request, fit_of(request)).items():
+        request = generate.Firmware(
+            build.tables, build.manifest, "avr328p" if board.part == "atmega328p" else "avr2560", mode, board=board
+        )
+        for name, content in request.files().items():
             (folder / name).write_text(content)
         subprocess.run(["make", "-s", "-C", str(folder)], check=True, timeout=120)
         lines = [*wiring_of(board, switches, tmp_path / "port"), *wiring]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from thenar.simulator import load_scene, simulate
+from thenar.simulator.effects import wire_lost_bytes
 from thenar.simulator.effects.contact_quasistatic import Parameters
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.effect import EFFECTS
@@ -200,7 +201,7 @@ def test_a_scene_in_which_nothing_settles_is_an_error() -> None:
 
 
 def test_a_scene_of_which_no_byte_arrives_says_so_and_blames_no_hand() -> None:
-    lossy = Listed("wire.lost_bytes", EFFECTS["wire.lost_bytes"].parameters(rate=0.999))
+    lossy = Listed("wire.lost_bytes", wire_lost_bytes.Parameters(rate=0.999))
     scene = msgspec.structs.replace(QUICK, effects=(*QUICK.effects, lossy))
     with pytest.raises(SceneError, match="of the first, no frame arrived whole"):
         simulate(scene, jobs=1)

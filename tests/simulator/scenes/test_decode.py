@@ -3,6 +3,7 @@ from pathlib import Path
 
 import pytest
 
+from thenar.simulator.effects import joint_noise
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.effect import EFFECTS
 from thenar.simulator.scenes.decode import load_catalogue, load_scene
@@ -80,7 +81,7 @@ def test_effects_come_in_the_order_of_the_registry_with_their_parameters(scene: 
     found = scene(LEAST + "[effects.joint.noise]\nsd_deg = 3\n[effects.hand.grip]\n[effects.joint.drift]\n").effects
     assert [name for name, _ in found] == ["hand.grip", "joint.noise", "joint.drift"]
     assert found[0].parameters == EFFECTS["hand.grip"].parameters()
-    assert found[1].parameters == EFFECTS["joint.noise"].parameters(sd_deg=3.0)
+    assert found[1].parameters == joint_noise.Parameters(sd_deg=3.0)
 
 
 @pytest.mark.parametrize(
@@ -92,7 +93,7 @@ def test_effects_come_in_the_order_of_the_registry_with_their_parameters(scene: 
     ],
 )
 def test_an_effect_may_be_spelled_in_every_way_of_toml(scene: Load, text: str) -> None:
-    assert scene(LEAST + text).effects == (("joint.noise", EFFECTS["joint.noise"].parameters(sd_deg=3.0)),)
+    assert scene(LEAST + text).effects == (("joint.noise", joint_noise.Parameters(sd_deg=3.0)),)
 
 
 def test_every_effect_may_be_listed_without_parameters(scene: Load) -> None:

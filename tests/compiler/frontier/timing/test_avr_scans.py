@@ -2,7 +2,7 @@ from collections.abc import Callable
 
 import pytest
 
-from thenar.compiler.firmware.avr_harness import missing
+from thenar.compiler.firmware.simavr import missing
 from thenar.compiler.frontier.timing.avr_scans import ScanTrial, run_scan, scan_trials
 
 

@@ -3,8 +3,8 @@ from dataclasses import asdict, replace
 
 import pytest
 
-from thenar.compiler.firmware.avr_harness import missing
-from thenar.compiler.firmware.targets import TARGETS as PARTS
+from thenar.compiler.firmware.simavr import missing
+from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.frontier.timing.avr_scans import scan_trials
 from thenar.compiler.frontier.timing.checks import LEAST, check, unchecked
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel, fitting
@@ -31,7 +31,7 @@ def qemu(tool: Callable[[str], str]) -> None:
 
 @pytest.mark.usefixtures("simavr")
 def test_cycles_of_an_avr_are_foretold_within_three_percent_and_never_too_few() -> None:
-    part = PARTS["atmega328p"]
+    part = TARGETS["avr328p"]
     for tables in TABLES[1:]:
         for option in fitting(tables, part)[:2]:
             outcome = run_trial(Trial(option, part))

@@ -5,10 +5,9 @@ import numpy as np
 import pytest
 
 from thenar.compiler.firmware.choose import choose, features, flash_shares
-from thenar.compiler.firmware.targets import TARGETS as PARTS
+from thenar.compiler.firmware.targets import TARGETS, timed
 from thenar.compiler.frontier.points import FrontierError
-from thenar.compiler.frontier.targets import TARGETS
-from thenar.compiler.frontier.timing.classify_times import CORTEX_HZ, ClassifyModel
+from thenar.compiler.frontier.timing.classify_times import ClassifyModel
 from thenar.compiler.frontier.timing.python_times import YARDSTICK, PythonCost, classify_us, fit_here, random_tables
 from thenar.runtime.tables import tables_to_bytes
 
@@ -16,9 +15,9 @@ PYTHON = PythonCost(1.0, 0.1, 0.2, 0.3, 0.01, 0.02, 10.0)
 TABLES = random_tables(33, 16, 14)
 
 
-@pytest.mark.parametrize(("target", "part"), [("avr328p", "atmega328p"), ("avr2560", "atmega2560")])
-def test_on_an_avr_the_options_are_the_layouts_worth_choosing_at_their_bounds_of_cycles(target: str, part: str) -> None:
-    avr, options = PARTS[part], ClassifyModel(target).options(TABLES)
+@pytest.mark.parametrize("target", ["avr328p", "avr2560"])
+def test_on_an_avr_the_options_are_the_layouts_worth_choosing_at_their_bounds_of_cycles(target: str) -> None:
+    avr, options = TARGETS[target], ClassifyModel(target).options(TABLES)
     best = [(layout, cost) for layout, cost in choose(TABLES, avr).frontier if cost.flash <= flash_shares(avr)[1]]
     assert [option.layout for option in options] == [features(layout, avr) for layout, _ in best]
     assert [option.us for option in options] == [cost.cycles / 16 for _, cost in best]
@@ -26,7 +25,7 @@ def test_on_an_avr_the_options_are_the_layouts_worth_choosing_at_their_bounds_of
     assert {option.how for option in options} == {"model"}
 
 
-@pytest.mark.parametrize("target", [target for target in TARGETS if target not in ("host", "pi")])
+@pytest.mark.parametrize("target", [target for target in timed() if target not in ("host", "pi")])
 def test_of_two_options_the_slower_is_smaller(target: str) -> None:
     options = ClassifyModel(target).options(TABLES)
     assert len(options) > 2
@@ -36,7 +35,7 @@ def test_of_two_options_the_slower_is_smaller(target: str) -> None:
 
 
 def test_layouts_that_leave_no_room_for_the_rest_of_the_firmware_are_no_options() -> None:
-    part, tables = PARTS["atmega328p"], random_tables(60, 22, 33)
+    part, tables = TARGETS["avr328p"], random_tables(60, 22, 33)
     most = flash_shares(part)[1]
     assert any(cost.flash > most for _, cost in choose(tables, part).frontier)
     assert all(option.flash <= most for option in ClassifyModel("avr328p").options(tables))
@@ -46,12 +45,14 @@ def test_tables_that_fit_in_no_layout_have_no_option() -> None:
     assert ClassifyModel("avr328p").options(random_tables(160, 22, 60)) == ()
 
 
-@pytest.mark.parametrize("target", list(CORTEX_HZ))
+@pytest.mark.parametrize("target", ["cortex-m0plus", "cortex-m4"])
 def test_instructions_take_a_cycle_each_at_a_clock_that_is_said(target: str) -> None:
     usual, slow = ClassifyModel(target), ClassifyModel(target, clock_hz=8_000_000)
-    fastest = choose(TABLES, PARTS[target]).frontier[0][1]
+    fastest = choose(TABLES, TARGETS[target]).frontier[0][1]
     assert slow.options(TABLES)[0].us == fastest.cycles / 8
-    assert usual.options(TABLES)[0].us == pytest.approx(fastest.cycles * 1e6 / CORTEX_HZ[target])
+    assert usual.options(TABLES)[0].us == pytest.approx(
+        fastest.cycles * 1e6 / {"cortex-m0plus": 48e6, "cortex-m4": 64e6}[target]
+    )
     assert "at 8 MHz" in slow.note
     assert "lower bound" in slow.note
 
@@ -71,7 +72,7 @@ def test_a_raspberry_pi_elsewhere_is_so_many_times_as_slow_and_that_is_said_to_b
 
 
 def test_models_go_to_other_processes() -> None:
-    for target in TARGETS:
+    for target in timed():
         model = ClassifyModel(target, python=PYTHON)
         assert pickle.loads(pickle.dumps(model)).options(TABLES) == model.options(TABLES)  # noqa: S301 - our own
 

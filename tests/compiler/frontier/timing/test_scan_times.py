@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.frontier.targets import TARGETS
+from thenar.compiler.firmware.targets import timed
 from thenar.compiler.frontier.timing.beside_wire import (
     Beside,
     beside_wire,
@@ -14,7 +14,7 @@ from thenar.compiler.frontier.timing.beside_wire import (
     measured_call_us,
 )
 from thenar.compiler.frontier.timing.python_times import random_tables
-from thenar.compiler.frontier.timing.scan_times import ScanTimes, record_period_us, scan_times, transfer_us
+from thenar.compiler.frontier.timing.scan_times import ScanTimes, scan_times, transfer_us
 from thenar.compiler.frontier.timing.wirings import BOARD, Wiring
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.scanning.decided import EarlyExit
@@ -83,7 +83,7 @@ def _selects(costs: Costs, read: int, port: int) -> bool:
 def test_on_an_avr_the_firmware_takes_its_time_for_scan_keys_readings_and_bytes() -> None:
     tables, wiring, names = random_tables(20, 0, 4), Wiring("mcp23017", 400_000), names_of(20)
     bare = scan_times(names, tables, wiring, *frames(20, 0))
-    there = scan_times(names, tables, wiring, *frames(20, 0), firmware_beside("atmega328p"))
+    there = scan_times(names, tables, wiring, *frames(20, 0), firmware_beside("avr328p"))
     cycles = 520 + 40 * 20 + 2 * 530 + (2 + 1) * 560
     assert there.full_us - bare.full_us == pytest.approx(cycles / 16)
     assert (bare.how, there.how) == ("wire", "model")
@@ -111,14 +111,13 @@ def test_a_switch_without_a_place_is_an_error() -> None:
 @pytest.mark.parametrize(("joints", "sensors"), [(1, 18), (16, 18), (18, 18), (19, 22), (22, 22)])
 def test_a_record_has_18_or_22_sensors_a_letter_a_status_and_an_end(joints: int, sensors: int) -> None:
     assert transfer_us(joints) == pytest.approx((sensors + 3) * 10 / 115_200 * 1e6)
-    assert record_period_us(joints) == pytest.approx(transfer_us(joints) + 250 * sensors)
 
 
 def test_without_joints_no_record_is_waited_for() -> None:
-    assert transfer_us(0) == record_period_us(0) == 0.0
+    assert transfer_us(0) == 0.0
 
 
-@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("target", timed())
 def test_every_target_says_what_its_scans_hold_beside_the_wire(target: str) -> None:
     beside = beside_wire(target)
     assert len(beside.what) > 20

@@ -1,0 +1,155 @@
+"""The compiled classifier on an AVR in libsimavr: every frame, its cycles, and the stack it takes.
+
+The programs that run AVR code are linked to libsimavr, which is under the GPL 3, and so are no part of the product:
+`verify` and the tests build them from the sources in a checkout of thenar, when they are first needed.
+"""
+
+import atexit
+import os
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
+
+import numpy as np
+
+from thenar.firmware_templates.rendering import render
+
+from .answers import Answers, Frames, check_frames
+from .errors import FirmwareError
+from .layout import Layout
+from .tools import AVR_COMPILER, HOST_COMPILER, STRICT, Tool, call, find, lacking, workshop
+
+_CLOCK_HZ = 16_000_000  # of the simulated time, in which nothing is counted
+_MAKE: Tool = (("make",), "make")
+
+
+def missing() -> str | None:
+    """Return what keeps AVR code from being run here, and what to install; None if nothing does."""
+    if gone := lacking(AVR_COMPILER, HOST_COMPILER, _MAKE):
+        return gone
+    try:
+        harness("simavr_classify")
+    except FirmwareError as error:
+        return str(error)
+    return None
+
+
+def harness(program: str) -> Path:
+    """Return the path of the harness's `program`, compiled at most once a process.
+
+    Its sources stand in the folder $THENAR_SIMAVR, else in tests/simavr of the checkout that this file belongs to.
+    Raises FirmwareError if they are not there or do not compile.
+    """
+    return _built(_sources(), program)
+
+
+def _sources() -> Path:
+    named = os.environ.get("THENAR_SIMAVR")
+    folder = Path(named) if named else Path(__file__).resolve().parents[2] / "tests" / "simavr"
+    if not (folder / "simavr_classify.c").is_file():
+        raise FirmwareError(
+            f"{folder} has no harness for simavr: set THENAR_SIMAVR to the folder tests/simavr of thenar's sources"
+        )
+    return folder
+
+
+@lru_cache
+def _shelf(_sources: Path) -> Path:
+    """Return a new folder for programs of these sources, which is removed when the process ends."""
+    folder = mkdtemp(prefix="thenar-simavr-")
+    atexit.register(rmtree, folder, ignore_errors=True)
+    return Path(folder)
+
+
+@lru_cache
+def _built(sources: Path, program: str) -> Path:
+    built = _shelf(sources) / program
+    if gone := lacking(HOST_COMPILER, _MAKE):
+        raise FirmwareError(gone)
+    try:
+        call(["make", "-C", str(sources), f"BUILD={built.parent}", str(built)], sources)
+    except FirmwareError as error:
+        if "sim_avr.h" in str(error) or "lsimavr" in str(error):
+            raise FirmwareError("libsimavr not found; Debian: apt-get install libsimavr-dev") from None
+        raise
+    return built
+
+
+def run(
+    files: Mapping[str, str],
+    name: str,
+    layout: Layout,
+    frames: Frames,
+    part: str,
+    flags: Sequence[str],
+    *,
+    incremental: bool = False,
+) -> Answers:
+    """Return what the classifier `name` in `files` (file name -> text, for AVR) answers to frames (n, F).
+
+    `cost` is the cycles from the first instruction of thenar_NAME_classify to the end of its return, without the call;
+    `stack` the most that any frame took, the return address included.
+
+    incremental  each answer comes from update(), the change since the frame before, instead of classify()
+
+    Raises FirmwareError if compiler or simulator are missing, or the files do not compile without any warning or do not
+    fit, or the program does not answer.
+    """
+    check_frames(frames, layout)
+    answer = "update" if incremental else "classify"
+    command = [find(AVR_COMPILER), *STRICT, *flags]
+    program = harness("simavr_classify")
+    main = {"main.c": render("checking/avr_main.c.j2", name=name, answer=answer)}
+    with workshop({**files, **main}) as folder:
+        sources = sorted(path for path in (*files, *main) if path.endswith((".c", ".S")))
+        call([*command, *sources, "-o", "classifier.elf"], folder)
+        found = _symbols(folder)
+        spans = (
+            _span(found, f"thenar_{name}_input", frames.shape[1]),
+            _span(found, f"thenar_{name}_scores", 2 * len(layout.start)),
+        )
+        places = (hex(_symbol(found, symbol)[0]) for symbol in (f"thenar_{name}_{answer}", "_end"))
+        printed = call(
+            [str(program), part, str(_CLOCK_HZ), "classifier.elf", *places, *spans], folder, frames.tobytes()
+        )
+    return _answers(printed, len(frames), layout)
+
+
+def _symbols(folder: Path) -> dict[str, tuple[int, int]]:
+    """Return address and size of the symbols of the compiled program, data from 0x800000 on."""
+    lines = call(["avr-nm", "--format=posix", "classifier.elf"], folder).decode().splitlines()
+    words = [line.split() for line in lines]
+    return {word[0]: (int(word[2], 16), int(word[3], 16) if len(word) > 3 else 0) for word in words}
+
+
+def _symbol(found: Mapping[str, tuple[int, int]], name: str) -> tuple[int, int]:
+    if name not in found:
+        raise FirmwareError(f"the compiled program has no {name}")
+    return found[name]
+
+
+def _span(found: Mapping[str, tuple[int, int]], name: str, size: int) -> str:
+    address, held = _symbol(found, name)
+    if held != size:
+        raise FirmwareError(f"{name} has {held} bytes in the compiled program, its layout says {size}")
+    return f"{address:#x}:{size}"
+
+
+def _answers(printed: bytes, frames: int, layout: Layout) -> Answers:
+    classes = len(layout.start)
+    record = np.dtype([("scores", "<i2", (classes,)), ("grasp", "<u2"), ("cycles", "<u4"), ("stack", "<u2")])
+    if len(printed) != frames * record.itemsize:
+        raise FirmwareError(f"the simulator gave {len(printed)} bytes for {frames} frames of {record.itemsize}")
+    records = np.frombuffer(printed, record)
+    # A class of one byte comes back in r24; what r25 holds then means nothing.
+    grasps = records["grasp"] if classes > 256 else records["grasp"] & 0xFF
+    stack = int(records["stack"].max()) if frames else None
+    return Answers(
+        records["scores"].astype(np.int16),
+        grasps.astype(np.uint16),
+        records["cycles"].astype(np.uint32),
+        "cycles",
+        stack,
+    )

@@ -1,0 +1,174 @@
+"""AVRs: the parts of Arduino's Uno and Mega, with the pins and the baud rates that firmware of a board needs."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, ClassVar
+
+from ..costs import Cost
+from ..tools import AVR_COMPILER
+from .base import Mode, Target
+
+if TYPE_CHECKING:
+    from ..answers import Answers, Frames
+    from ..classifier import Library
+    from ..layout import Layout
+
+_DIVIDERS = 4096
+_USUAL = (9600, 19_200, 38_400, 57_600, 76_800, 115_200, 230_400, 250_000, 500_000, 1_000_000, 2_000_000)
+_EXACT = 0.005
+
+
+@dataclass(frozen=True, kw_only=True)
+class Avr(Target):
+    """An AVR, for whose pins firmware of a board is written as well.
+
+    pins      usable as inputs and outputs, as the data sheet calls them; without crystal and reset
+    uarts     the (RXD, TXD) pins of every UART
+    twi       the SDA and SCL pins
+    analog    the channels of its converter by name, with the pin each shares; "" for a channel without a digital pin
+    jtag      pins that the JTAG interface holds until it is switched off
+    avrdude   what avrdude calls it, and `programmer` the boot loader of the usual boards with it
+    brown_out what its fuses should say of brown-out at its highest clock
+    """
+
+    avr: ClassVar[bool] = True
+    modes: ClassVar[tuple[Mode, ...]] = ("classify", "scan", "glove")
+
+    pins: tuple[str, ...]
+    uarts: tuple[tuple[str, str], ...]
+    twi: tuple[str, str]
+    analog: Mapping[str, str]
+    jtag: tuple[str, ...]
+    highest_hz: int
+    avrdude: str
+    programmer: str
+    brown_out: str = "4.3 V, extended fuse 0xFC; at 8 MHz or less 2.7 V, 0xFD"
+
+    def cost(self, layout: "Layout") -> Cost:
+        """Return the cost of the worst frame that one could think of, counted instruction by instruction."""
+        from ..avr_costs import AvrCosts
+
+        return AvrCosts(layout, self.flash).cost
+
+    def files(self, library: "Library") -> dict[str, str]:
+        """Return path -> text: the library, a Makefile (program, size, flash) and a main() to start from."""
+        from thenar.firmware_templates.rendering import render
+
+        name, layout = library.name, library.layout
+        values = {"name": name, "part": self.part, "programmer": self.programmer}
+        class_type = "uint8_t" if len(layout.start) <= 255 else "uint16_t"
+        return {
+            **library.files,
+            "Makefile": render("avr_library/Makefile.j2", **values),
+            "main.c": render("avr_library/main.c.j2", name=name, joints=len(layout.joints), class_type=class_type),
+        }
+
+    def missing(self) -> str | None:
+        """Return what is missing of avr-gcc and simavr."""
+        from ..simavr import missing
+
+        return missing()
+
+    def run(
+        self, files: Mapping[str, str], name: str, layout: "Layout", frames: "Frames", *, incremental: bool = False
+    ) -> "Answers":
+        """Return the answers to frames (n, F) in simavr, as the base says, with their cycles and their stack."""
+        from ..simavr import run
+
+        return run(files, name, layout, frames, self.part, self.flags, incremental=incremental)
+
+
+@dataclass(frozen=True, slots=True)
+class BaudSetting:
+    """What to write to UBRRn, whether to set U2Xn, and by how much the rate is then off, as a share."""
+
+    ubrr: int
+    double: bool
+    error: float
+
+
+def best_setting(baud: int, clock_hz: int) -> BaudSetting | None:
+    """Return the divider of the clock, times 16 or 8 (U2X), that is nearest to `baud`, None if there is none.
+
+    Of equally near ones it is the one without U2X, whose receiver samples twice as often and forgives more.
+    """
+    found = [setting for double in (False, True) if (setting := _setting(baud, clock_hz, double))]
+    return min(found, key=lambda setting: (abs(setting.error), setting.double), default=None)
+
+
+def near_rates(baud: int, clock_hz: int) -> tuple[int, ...]:
+    """Return the usual rates that are made within half a percent, the four nearest to `baud` in rising order."""
+    good = [rate for rate in _USUAL if (best := best_setting(rate, clock_hz)) and abs(best.error) < _EXACT]
+    return tuple(sorted(sorted(good, key=lambda rate: abs(rate - baud))[:4]))
+
+
+def _setting(baud: int, clock_hz: int, double: bool) -> BaudSetting | None:
+    step = 8 if double else 16
+    ubrr = max(round(clock_hz / (step * baud)) - 1, 0)
+    return BaudSetting(ubrr, double, clock_hz / (step * (ubrr + 1)) / baud - 1.0) if ubrr < _DIVIDERS else None
+
+
+def _pins(**ports: int) -> tuple[str, ...]:
+    return tuple(f"P{port}{bit}" for port, count in ports.items() for bit in range(count))
+
+
+def _channels(*ports: str) -> dict[str, str]:
+    return {f"ADC{8 * place + bit}": f"P{port}{bit}" for place, port in enumerate(ports) for bit in range(8)}
+
+
+# `lpm` reaches the first 64 KiB of the flash, and the tables share them with whatever else is constant. The clocks are
+# those of Arduino's boards.
+_avr = partial(
+    Avr,
+    help="a library with a Makefile, or all of a board's firmware",
+    next_step="`make -C {folder}` compiles it",
+    carried=True,
+    alike=True,
+    most_flash=48 << 10,
+    clock_hz=16_000_000,
+    kind="avr",
+    compiler=AVR_COMPILER,
+    size=(("avr-size",), "binutils-avr"),
+)
+
+# ATmega48A/PA/88A/PA/168A/PA/328/P, DS40002061: PB6 and PB7 carry the crystal, PC6 is RESET; ADC6 and ADC7 are pins of
+# their own, which only the packages with 32 leads have.
+_ATMEGA328P = _avr(
+    name="avr328p",
+    part="atmega328p",
+    rank=10,
+    flags=("-mmcu=atmega328p", "-Os"),
+    flash=32 << 10,
+    ram=2 << 10,
+    pins=_pins(B=6, C=6, D=8),
+    uarts=(("PD0", "PD1"),),
+    twi=("PC4", "PC5"),
+    analog=_channels("C") | {"ADC6": "", "ADC7": ""},
+    jtag=(),
+    highest_hz=20_000_000,
+    avrdude="m328p",
+    programmer="arduino",
+)
+
+# ATmega640/1280/1281/2560/2561, DS40002211: crystal and RESET have pins of their own.
+_ATMEGA2560 = _avr(
+    name="avr2560",
+    part="atmega2560",
+    rank=11,
+    flags=("-mmcu=atmega2560", "-Os"),
+    flash=256 << 10,
+    ram=8 << 10,
+    pins=_pins(A=8, B=8, C=8, D=8, E=8, F=8, G=6, H=8, J=8, K=8, L=8),
+    uarts=(("PE0", "PE1"), ("PD2", "PD3"), ("PH0", "PH1"), ("PJ0", "PJ1")),
+    twi=("PD1", "PD0"),
+    analog=_channels("F", "K"),
+    jtag=("PF4", "PF5", "PF6", "PF7"),
+    highest_hz=16_000_000,
+    avrdude="m2560",
+    programmer="wiring",
+)
+
+MEMBER = (_ATMEGA328P, _ATMEGA2560)
+AVRS: Mapping[str, Avr] = {part.part: part for part in MEMBER}
+"""The parts that firmware of a board is written for, by what board.toml calls them."""

@@ -1,0 +1,77 @@
+"""The target host, this machine: portable C, run with sanitizers by what gcc or clang makes of it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from ..tools import HOST_COMPILER, STRICT, call, find, lacking, workshop
+from .base import Target
+
+if TYPE_CHECKING:
+    from ..answers import Answers, Frames
+    from ..classifier import Library
+    from ..layout import Layout
+
+_SANITIZE = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Host(Target):
+    """A machine with an operating system and a C compiler."""
+
+    def files(self, library: "Library") -> dict[str, str]:
+        """Return path -> text: the library, a Makefile (library, self test, size) and the self test."""
+        from thenar.firmware_templates.rendering import render
+
+        from ..self_test import CHECKS, check_header
+
+        return {
+            **library.files,
+            "Makefile": render("host/Makefile.j2", name=library.name),
+            "check.c": render("host/check.c.j2", name=library.name, checks=CHECKS),
+            f"thenar_{library.name}_check.h": check_header(library.name, library.layout, library.names.grasps),
+        }
+
+    def missing(self) -> str | None:
+        """Return which compilers there might be."""
+        return lacking(HOST_COMPILER)
+
+    def run(
+        self,
+        files: Mapping[str, str],
+        name: str,
+        layout: "Layout",
+        frames: "Frames",
+        *,
+        incremental: bool = False,
+        compiler: str | None = None,
+        sanitize: bool = True,
+    ) -> "Answers":
+        """Return the answers to frames (n, F), as the base says; switches are set by set_switch() for update().
+
+        compiler  "gcc" or "clang"; without it, the first that is installed
+        sanitize  with the address and undefined behaviour sanitizers: a finding is an error
+        """
+        from ..answers import answers_from, check_frames, names_in, record_files
+
+        check_frames(frames, layout)
+        command = find(HOST_COMPILER if compiler is None else ((compiler,), compiler))
+        main = record_files(name, layout, "host", "update" if incremental else "classify")
+        with workshop({**files, **main}) as folder:
+            sources = sorted(path for path in (*files, *main) if path.endswith(".c"))
+            call([command, *STRICT, "-O2", *(_SANITIZE if sanitize else ()), *sources, "-o", "classifier"], folder)
+            names, printed = names_in(call([str(folder / "classifier")], folder, frames.tobytes()), layout)
+            return replace(answers_from(printed, frames, layout), names=names)
+
+
+MEMBER = Host(
+    name="host",
+    part="host",
+    title="this machine",
+    help="a library for this machine, with a Makefile and a self test",
+    next_step="`make -C {folder} check` compiles and tests it",
+    rank=0,
+    own_layout=False,
+    carried=True,
+    kind="host",
+)

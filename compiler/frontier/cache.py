@@ -1,0 +1,314 @@
+"""Answers found once: functions whose answers are kept, the file that keeps them, and the workers that find them."""
+
+import fcntl
+import os
+import platform
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import update_wrapper
+from hashlib import blake2b
+from inspect import signature
+from pathlib import Path
+from typing import Any, Generic, Literal, ParamSpec, Self, TypeVar, get_type_hints
+from zlib import crc32
+
+import msgspec
+import numpy as np
+
+from thenar.drivers.errors import ThenarError
+from thenar.runtime.files import is_special, read_file, sync_folder
+from thenar.runtime.recording.writer import AppendedFile
+
+from ..workers import in_workers
+
+# Bytes; a frontier of the largest set answers a few million questions.
+LARGEST = 1 << 30
+HEADER = b'{"thenar":"store of answers","schema":2}\n'
+# Its questions were asked in another form: none of its answers can be found again.
+OLD_HEADER = HEADER.replace(b"2}", b"1}")
+
+# Where a function runs: on the cluster, if there is one; in workers on this machine, whose tools it asks; in this very
+# process, because it measures this machine, whose name is then part of the question.
+Place = Literal["cluster", "machine", "process"]
+Report = Callable[[int, int], None]
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class StoreError(ThenarError, OSError):
+    """A store cannot be opened or written to, another run has it, or the file is none."""
+
+
+class Stored(Generic[P, R]):
+    """A function of a module whose answers a `Cache` keeps; see `stored`. Called itself, it answers anew."""
+
+    def __init__(self, function: Callable[P, R], version: int, where: Place, without: Sequence[str]) -> None:
+        update_wrapper(self, function)
+        self.function, self.version, self.where, self.without = function, version, where, without
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
+        """Return the answer, found now."""
+        return self.function(*args, **kwargs)
+
+    def __reduce__(self) -> str:
+        # Workers find it by its name, as they find any function.
+        return self.function.__qualname__
+
+    def call(self, cost: float, /, *args: P.args, **kwargs: P.kwargs) -> "Call[R]":
+        """Return a call to be asked; it is expected to take `cost` seconds of one core."""
+        return Call(self, args, kwargs, cost)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Call(Generic[R]):
+    """A stored function and what it is called with."""
+
+    work: Stored[..., R]
+    args: tuple[Any, ...]
+    kwargs: Mapping[str, Any]
+    cost: float
+
+    def __call__(self) -> R:
+        """Return the answer, found now."""
+        return self.work(*self.args, **self.kwargs)
+
+    def question(self, digests: dict[int, str]) -> bytes:
+        """Return all that the answer depends on besides the store's scope: the function's name, version and arguments.
+
+        digests  of arrays by their ids, while these live: each is digested once
+        """
+
+        def plain(value: Any) -> object:
+            if isinstance(value, np.ndarray):
+                return digests.get(id(value)) or digests.setdefault(id(value), _digest(value))
+            return value.identity  # of a class that says what it is; AttributeError for all others
+
+        bound = signature(self.work.function).bind(*self.args, **self.kwargs)
+        bound.apply_defaults()
+        arguments = {name: value for name, value in bound.arguments.items() if name not in self.work.without}
+        machine = platform.node() if self.work.where == "process" else ""
+        name = f"{self.work.function.__module__}.{self.work.function.__qualname__}"
+        asked = (name, self.work.version, machine, arguments)
+        return msgspec.json.encode(asked, enc_hook=plain, order="deterministic")
+
+
+def stored(
+    version: int, *, where: Place = "cluster", without: Sequence[str] = ()
+) -> Callable[[Callable[P, R]], Stored[P, R]]:
+    """Return a decorator of functions whose answers a `Cache` keeps.
+
+    Parameters
+    ----------
+    version : int
+        Raised where the function changes what it answers.
+    where : {"cluster", "machine", "process"}
+        Where it runs at most.
+    without : sequence of str
+        Names of arguments that change no answer.
+
+    Notes
+    -----
+    The function is one of a module, its answer a type that JSON carries without loss. Arguments are what msgspec can
+    encode, arrays, and objects with an `identity` that can be encoded.
+    """
+    return lambda function: Stored(function, version, where, without)
+
+
+class _Line(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One answer. `crc` is the CRC-32 of key and answer: what a loss of power leaves behind is not taken for one."""
+
+    key: str
+    crc: int
+    answer: msgspec.Raw
+
+
+class Store:
+    """The answers in file `path`, for one run at a time; used as a context manager, or closed.
+
+    scope  all that every answer rests on and no question says, such as the version of thenar. It is part of each
+           question's digest, so that one file may hold answers of several scopes, which never meet.
+
+    The file is a header and a line of JSON an answer. What `put` has returned from survives a kill, and a loss of power
+    takes at most the last second (see AppendedFile). A line that is torn or damaged counts as never written; what
+    follows the last good line is cut off on opening. A store of an older form is emptied, and is `renewed`. Raises
+    StoreError.
+    """
+
+    def __init__(self, path: Path, scope: str) -> None:
+        self.renewed = False
+        self._path = path
+        self._scope = scope.encode()
+        self._answers: dict[str, bytes] = {}
+        if is_special(path):
+            raise StoreError(f"{path} is a device or a pipe: name a file")
+        with _opened(path):
+            self._lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        try:
+            with _opened(path):
+                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                self._file = AppendedFile(path, self._read(read_file(path, LARGEST, StoreError)))
+            if self._file.size == 0:
+                self._append(HEADER)
+                sync_folder(path.parent)
+        except BaseException:
+            os.close(self._lock)
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __len__(self) -> int:
+        """Return the number of answers, of all scopes."""
+        return len(self._answers)
+
+    def close(self) -> None:
+        """Bring everything to the disk and let other runs have the file. May be called again."""
+        if self._lock >= 0:
+            self._file.close()
+            os.close(self._lock)
+            self._lock = -1
+
+    def get(self, question: bytes, kind: type[R]) -> R | None:
+        """Return the answer; None if there is none, or none that reads as `kind`: it is to be found again."""
+        data = self._answers.get(self._key(question))
+        if data is None:
+            return None
+        try:
+            return msgspec.json.decode(data, type=kind)
+        except (ValueError, RecursionError):
+            return None
+
+    def put(self, question: bytes, answer: object) -> None:
+        """Append the answer, which replaces an older one. Raises StoreError, for one if the disk is full."""
+        key, data = self._key(question), msgspec.json.encode(answer)
+        line = _Line(key, _crc(key, data), msgspec.Raw(data))
+        self._append(msgspec.json.encode(line) + b"\n")
+        self._answers[key] = data
+
+    def _key(self, question: bytes) -> str:
+        return blake2b(self._scope + b"\0" + question, digest_size=16).hexdigest()
+
+    def _read(self, data: bytes) -> int:
+        """Take the answers in `data`; return how many of its bytes are worth keeping."""
+        if HEADER.startswith(data):
+            return 0  # new, or killed while the header was written
+        self.renewed = data.startswith(OLD_HEADER)
+        if self.renewed:
+            return 0
+        if not data.startswith(HEADER):
+            raise StoreError(f"{self._path} is no store of answers, or a newer thenar's: name another file")
+        kept = at = len(HEADER)
+        for line in data[len(HEADER) :].splitlines(keepends=True):
+            at += len(line)
+            if line.endswith(b"\n") and self._take(line):
+                kept = at
+        return kept
+
+    def _take(self, line: bytes) -> bool:
+        try:
+            read = msgspec.json.decode(line, type=_Line)
+        except (ValueError, RecursionError):
+            return False
+        data = bytes(read.answer)
+        if read.crc != _crc(read.key, data):
+            return False
+        self._answers[read.key] = data
+        return True
+
+    def _append(self, data: bytes) -> None:
+        if not self._file.append(data):
+            raise StoreError(
+                f"{self._file.failure or f'{self._path} is closed'}; its {len(self)} answers are kept: free some space "
+                "and do the same again"
+            )
+
+
+class Cache:
+    """Answers from a store at once, the others found in workers and stored as they come; one progress over all stages.
+
+    report   called with what is done and to do, in expected seconds of one core. A stage that begins says what it
+             really has to do; answers that were stored are no effort, so that speed, and the time left, stay true.
+    jobs, cluster  as for in_workers. Answers do not depend on either.
+    """
+
+    def __init__(self, store: Store, report: Report, *, jobs: int = -1, cluster: str | None = None) -> None:
+        self.jobs = jobs
+        self._store, self._report, self._cluster = store, report, cluster
+        self._costs: dict[str, float] = {}
+        self._done = 0.0
+
+    def foresee(self, costs: Mapping[str, float]) -> None:
+        """Say what stages that have not begun will cost, as far as can be told."""
+        self._costs = {**costs, **self._costs}
+
+    def ask(self, stage: str, calls: Sequence[Call[R]]) -> list[R]:
+        """Return the answers in the order of `calls`, all of one function; equal calls are asked once.
+
+        The dearest calls begin first. Raises StoreError, whatever the function raises, and what in_workers raises: what
+        was found until then is stored.
+        """
+        if not calls:
+            self._begin(stage, 0.0)
+            return []
+        kind: type[R] = get_type_hints(calls[0].work.function)["return"]
+        digests: dict[int, str] = {}
+        questions = [call.question(digests) for call in calls]
+        asked = dict(zip(questions, calls, strict=True))
+        found = {key: known for key in asked if (known := self._store.get(key, kind)) is not None}
+        todo = sorted((key for key in asked if key not in found), key=lambda key: -asked[key].cost)
+        self._begin(stage, sum(asked[key].cost for key in todo))
+        for number, answer in self._found([asked[key] for key in todo], calls[0].work.where):
+            key = todo[number]
+            self._store.put(key, answer)
+            # As a later run will read it: an answer that was just found is no different from one that was stored.
+            read = self._store.get(key, kind)
+            if read is None:
+                raise TypeError(f"what {asked[key].work.function.__name__} found does not read as {kind} from JSON")
+            found[key] = read
+            self._add(asked[key].cost)
+        return [found[key] for key in questions]
+
+    def _begin(self, stage: str, cost: float) -> None:
+        self._costs[stage] = cost
+        self._add(0.0)
+
+    def _found(self, calls: Sequence[Call[R]], where: Place) -> Iterator[tuple[int, R]]:
+        jobs, cluster = (1 if where == "process" else self.jobs), (self._cluster if where == "cluster" else None)
+        return in_workers(_answered, enumerate(calls), jobs, cluster)
+
+    def _add(self, cost: float) -> None:
+        self._done += cost
+        total = sum(self._costs.values())
+        self._report(min(round(self._done), round(total)), round(total))
+
+
+def _answered(numbered: tuple[int, Call[R]]) -> tuple[int, R]:
+    number, call = numbered
+    return number, call()
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[None]:
+    """Turn what the operating system says of `path` into a StoreError."""
+    try:
+        yield
+    except StoreError:
+        raise
+    except BlockingIOError:
+        raise StoreError(f"{path} is in use by another run: wait for its end, or name another file") from None
+    except OSError as reason:
+        raise StoreError(f"{path} cannot be opened: {reason.strerror}") from reason
+
+
+def _digest(array: np.ndarray[Any, Any]) -> str:
+    shaped = f"{array.shape} {array.dtype.newbyteorder('<').str}\0".encode()
+    data = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
+    return blake2b(shaped + data.tobytes(), digest_size=16).hexdigest()
+
+
+def _crc(key: str, data: bytes) -> int:
+    return crc32(data, crc32(key.encode()))

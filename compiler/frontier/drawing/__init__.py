@@ -1,1 +1,0 @@
-"""A frontier as pictures, as a table, and in words."""

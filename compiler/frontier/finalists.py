@@ -1,0 +1,190 @@
+"""Finalists: which placements are worth a close look, and that look: all rounds and shapes of tables, in all folds."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import zip_longest
+from math import log
+
+import numpy as np
+
+from thenar.runtime.manifest import Inputs
+
+from .points import STEP, Rate, front
+from .price import PricedTables, Tabled, price
+from .screen import Screened, rate_of
+from .search import SHAPES, Candidate, Search, Shape
+from .survey import Survey, Tally
+
+# Of what the best recognises; the least gain that counts on a front of rates that were screened; what is level.
+_USEFUL, _STEP, _LEVEL = 0.75, 0.003, 0.005
+# The share of errors below which fewer no longer count: a screening of some hundred rows cannot tell.
+_FEWEST = 0.002
+# Expected seconds of one core: of training twice, and of the layouts of all tables.
+PRICE_S = 4.0
+# The share of the rows that more rounds than the paper's have to win in the first repeat.
+_DEEPER = 0.002
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Close:
+    """A finalist: what it recognises after every stage (by the ensemble) and with each of the tables; with a subject
+    left out, by the same tables (None: only one subject); what the tables worth building cost; how long choosing its
+    switches took.
+    """
+
+    screened: Screened
+    stages: dict[int, Rate]
+    rates: dict[Tabled, Rate]
+    left_out: dict[Tabled, Rate] | None
+    priced: tuple[PricedTables, ...]
+    choosing_s: float
+
+
+def finalists(screened: Sequence[Screened], wanted: Sequence[Candidate], most: int) -> tuple[Screened, ...]:
+    """Return at most `most` of `screened`, in their order; `wanted` ones come on top.
+
+    They are on a front of rate against frame time or, among the same inputs, against the number of switches, and are
+    shared out evenly among the kinds of inputs. Of a kind first the best, then the smallest that is level with it, then
+    always the one whose share of errors and frame time are least like those of any chosen. Choices of the same inputs
+    and switches count once; those that recognise less than three quarters of what the best does are of no use.
+    """
+    enough = _USEFUL * max((one.rate.mean for one in screened), default=0.0)
+    useful = [one for one in _different(screened) if one.rate.mean >= enough]
+    pool = _fronts(useful)
+    queues = [_spread([one for one in pool if one.choice.inputs == kind]) for kind in _kinds(pool)]
+    turns = [one for turn in zip_longest(*queues) for one in turn if one is not None]
+    chosen = {id(one) for one in turns[:most]} | {id(one) for one in screened if one.choice in wanted}
+    return tuple(one for one in screened if id(one) in chosen)
+
+
+def _kinds(screened: Sequence[Screened]) -> list[Inputs]:
+    return list(dict.fromkeys(one.choice.inputs for one in screened))
+
+
+def _fronts(screened: Sequence[Screened]) -> list[Screened]:
+    """Return what is on a front, in its order."""
+    found = front(screened, lambda one: one.frame_us, lambda one: one.rate.mean, _STEP)
+    for kind in _kinds(screened):
+        mine = [one for one in screened if one.choice.inputs == kind]
+        found += front(mine, lambda one: len(one.columns), lambda one: one.rate.mean, _STEP)
+    known = {id(one) for one in found}
+    return [one for one in screened if id(one) in known]
+
+
+def _spread(mine: list[Screened]) -> list[Screened]:
+    """Return all of `mine` in the order in which they are worth a closer look."""
+    if not mine:
+        return []
+    best = max(mine, key=lambda one: one.rate.mean)
+    level = [one for one in mine if one.rate.mean >= best.rate.mean - _LEVEL]
+    order = list(dict.fromkeys([best, min(level, key=lambda one: len(one.columns))]))
+    left = [one for one in mine if one not in order]
+    while left:
+        order.append(max(left, key=lambda one: min(_unlike(one, known) for known in order)))
+        left.remove(order[-1])
+    return order
+
+
+def _unlike(one: Screened, other: Screened) -> float:
+    return abs(_errors(one) - _errors(other)) + abs(log(one.frame_us / other.frame_us))
+
+
+def _errors(one: Screened) -> float:
+    """Return how many errors are made, on a scale on which halving them counts the same everywhere."""
+    return log(1.0 - one.rate.mean + _FEWEST)
+
+
+def _different(screened: Sequence[Screened]) -> list[Screened]:
+    return list({(one.choice.inputs, frozenset(one.columns)): one for one in reversed(screened)}.values())[::-1]
+
+
+def look_closely(survey: Survey, chosen: Sequence[Screened]) -> tuple[Close, ...]:
+    """Return the finalists with all that is to be known of them.
+
+    All are trained to the last round in the folds of the first repeat; in the others, those that gain nothing by more
+    rounds than the paper's hundred are trained for these alone.
+    """
+    search, cuts, choices = survey.search, survey.cuts, [one.choice for one in chosen]
+    survey.choose("finalists' placements", choices, cuts.others)
+    fits = survey.fit("finalists", choices, cuts.screening, search.stages, search.tabled, SHAPES)
+    depths = {choice: depth_of(search, [fits[choice, fold] for fold in cuts.screening]) for choice in choices}
+    for depth in dict.fromkeys(depths.values()):
+        alike = [choice for choice in choices if depths[choice] == depth]
+        fits |= survey.fit(further(depth.rounds), alike, cuts.others, depth.stages, depth.tabled, SHAPES)
+    rated = []
+    for one in chosen:
+        depth = depths[one.choice]
+        repeats = [[fits[one.choice, fold] for fold in folds] for folds in cuts.repeats]
+        left_out = [[fits[one.choice, fold] for fold in cuts.subjects]] if cuts.subjects else None
+        rates, alone = _tabled(depth, repeats), None if left_out is None else _tabled(depth, left_out)
+        rated.append((one, _staged(depth, repeats), rates, alone))
+    calls = [
+        price.call(
+            PRICE_S,
+            survey.inputs(one.choice.joints),
+            tuple(survey.switch_names[column] for column in one.columns),
+            one.columns,
+            tuple(dict.fromkeys([*worthwhile(rates), papers_tables(search)])),
+            search.max_bins,
+            survey.equipment,
+            cuts.screening[0],
+        )
+        for one, _, rates, _ in rated
+    ]
+    prices = survey.cache.ask("prices", calls)
+    return tuple(
+        Close(one, stages, rates, left_out, priced, survey.choosing_s(one.choice))
+        for (one, stages, rates, left_out), priced in zip(rated, prices, strict=True)
+    )
+
+
+def papers_tables(search: Search) -> Tabled:
+    """Return which tables stand for the paper's: of its hundred rounds, as wide as need be."""
+    return Tabled(papers_depth(search).rounds, Shape(16))
+
+
+def papers_depth(search: Search) -> Search:
+    """Return the same search, of no more than the paper's hundred rounds."""
+    return replace(search, rounds=min(100, search.rounds))
+
+
+def further(rounds: int) -> str:
+    """Return the name of the stage that trains finalists for so many rounds in all folds but the first repeat's."""
+    return f"finalists, {rounds} rounds"
+
+
+def depth_of(search: Search, fits: Sequence[Tally]) -> Search:
+    """Return how far a placement is worth following, by what the folds of the first repeat say."""
+    few = papers_depth(search)
+    correct = np.sum([fit.correct for fit in fits], axis=0)
+    total = sum(fit.total for fit in fits)
+    return search if correct.max() > correct[: len(few.stages)].max() + _DEEPER * total else few
+
+
+def worthwhile(rates: dict[Tabled, Rate]) -> tuple[Tabled, ...]:
+    """Return, for each shape, the tables of the fewest rounds that recognise as well as any of that shape."""
+    found = []
+    for shape in dict.fromkeys(tabled.shape for tabled in rates):
+        mine = {tabled: rate.mean for tabled, rate in rates.items() if tabled.shape == shape}
+        best = max(mine.values())
+        found.append(min((tabled for tabled in mine if mine[tabled] >= best - STEP), key=lambda tabled: tabled.rounds))
+    return tuple(found)
+
+
+def _staged(search: Search, repeats: Sequence[Sequence[Tally]]) -> dict[int, Rate]:
+    return {
+        stage: _rate(repeats, [[fit.correct[number] for fit in fits] for fits in repeats])
+        for number, stage in enumerate(search.stages)
+    }
+
+
+def _tabled(search: Search, repeats: Sequence[Sequence[Tally]]) -> dict[Tabled, Rate]:
+    return {
+        Tabled(rounds, Shape(*shape)): _rate(repeats, [[fit.deployed[row][column] for fit in fits] for fits in repeats])
+        for row, rounds in enumerate(search.tabled)
+        for column, shape in enumerate(SHAPES)
+    }
+
+
+def _rate(repeats: Sequence[Sequence[Tally]], correct: Sequence[Sequence[int]]) -> Rate:
+    return rate_of(tuple(map(sum, correct)), sum(fit.total for fit in repeats[0]))

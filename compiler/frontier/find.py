@@ -1,0 +1,337 @@
+"""A frontier from recordings: everything is screened, what is near the front is looked at closely, and put together."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from thenar.runtime.harness.wiring import Harness
+
+from ..limits import check_inputs, check_memory, check_types
+from ..placement.methods.base import METHODS, usual
+from ..placement.ports import ports_of_whole_glove
+from ..publication import check_folder, entries, publish_folder
+from ..recordings.graspset import GraspSet
+from ..samples import Samples
+from .cache import Cache, Report, Store
+from .designs import Design, Latencies, best_designs, designs, points_of, with_whole_scans
+from .equipment import equipment_for
+from .finalists import PRICE_S, Close, finalists, further, look_closely, papers_depth
+from .latency import Pace, latencies
+from .marks import choices_to_mark, marks_of, own_build
+from .measure import TRIAL_S, measured
+from .movements import holds_movements
+from .plots import PICTURES, pictures
+from .points import SCHEMA, Frontier, FrontierError, Mark, Point, Tried, frontier_to_bytes
+from .screen import QUICK_PRICE_S, Screened, screen
+from .search import SHAPES, Candidate, Search, available_inputs, curve_ways, ways
+from .stream import Stream, stream_of
+from .survey import Cuts, Survey, fit_s, path_s
+from .timing.wirings import wirings
+from .words import csv_bytes
+
+FRONTIER_NAME, TABLE_NAME, STORE_NAME = "frontier.json", "frontier.csv", "store.jsonl"
+_DOCUMENTS = frozenset({FRONTIER_NAME, TABLE_NAME, *(f"{name}.svg" for name in PICTURES)})
+_EARLY = (
+    "Scans that end early are tried with decisions on single frames: a dwell with a lead reads on for longer, and a "
+    "sequential test needs whole scans."
+)
+_RENEWED = f"{STORE_NAME} was an older thenar's, of another form: everything was computed anew"
+# As it turns out: so many placements come on top of the finalists, for the marks; so many designs of a finalist are on
+# a front; so many of the placements that are tried are different ones; so many layouts are simulated besides.
+_MARKED, _DESIGNS, _DIFFERENT, _CHECKED = 3, 2, 0.8, 30
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What a point has to satisfy: the best within a time, or the fastest that recognises a share; None: not asked."""
+
+    budget_us: float | None = None
+    rate: float | None = None
+
+    @property
+    def words(self) -> str:
+        """What was asked for, "" for nothing."""
+        if self.budget_us is not None:
+            return f"the best within {self.budget_us:g} us a frame"
+        return "" if self.rate is None else f"the fastest that recognises {100 * self.rate:g} %"
+
+    def pick(self, points: Sequence[Point]) -> Point | None:
+        """Return the point that suits; None where none does or nothing was asked for."""
+        single = [point for point in points if point.setting.decision == "single"]
+        if self.budget_us is not None:
+            quick = [point for point in single if point.frame.us <= self.budget_us]
+            return max(quick, key=lambda point: (point.rate.mean, -point.frame.us), default=None)
+        good = [point for point in single if self.rate is not None and point.rate.mean >= self.rate]
+        return min(good, key=lambda point: (point.frame.us, -point.rate.mean), default=None)
+
+
+def find_frontier(
+    grasp_set: GraspSet,
+    output: Path | None = None,
+    *,
+    source: str = "recordings",
+    harness: Harness | None = None,
+    target: str = "host",
+    search: Search | None = None,
+    wanted: Wanted | None = None,
+    build: Path | None = None,
+    stream: GraspSet | None = None,
+    jobs: int = -1,
+    cluster: str | None = None,
+    report: Report | None = None,
+) -> Frontier:
+    """Find what accuracy costs in time: which switches, joints, rounds, tables, wirings and decisions are worth it.
+
+    Every placement is screened by an honest cross-validation; those near the front are looked at closely, priced for
+    the target, and simulated there.
+
+    Parameters
+    ----------
+    grasp_set : GraspSet
+        Single trials, of at least two grasp types.
+    output : Path, optional
+        Folder for frontier.json, frontier.csv, three pictures, and the store, from which an interrupted run goes on.
+        Without it nothing is written, and nothing is kept.
+    source : str
+        What the recordings are called.
+    harness : Harness, optional
+        A glove's wiring: it is tried as well, and switches are chosen by what its ports cost.
+    target : str
+        What classifies, one of `thenar.compiler.frontier.targets.TARGETS`.
+    search : Search, optional
+        How much is tried. Rivals that are not installed are left out.
+    wanted : Wanted, optional
+        Which point to pick.
+    build : Path, optional
+        A build folder, to be marked beside the points.
+    stream : GraspSet, optional
+        Other recordings of the same glove, to measure decision latency on; usually the test rows of the first fold.
+    jobs : int
+        Worker processes, -1 for all cores.
+    cluster : str, optional
+        Address of a Dask scheduler, whose workers do the work.
+    report : callable, optional
+        Called with what is done and to do, in expected seconds of one core.
+
+    Returns
+    -------
+    Frontier
+        A point's rate is one of those by which the points were chosen, so the best of many is a little lucky; its rate
+        with subjects left out had no say.
+
+    Raises
+    ------
+    FrontierError
+        If the recordings, the build or the stream do not suit, nothing can be built, or the folder holds other things.
+    StoreError
+        If another run has the folder, or the disk is full.
+
+    Examples
+    --------
+    >>> from thenar.compiler import GraspSet
+    >>> found = find_frontier(GraspSet.load("set.grasps"), Path("frontier"))  # doctest: +SKIP
+    >>> found.points[0].frame.us  # doctest: +SKIP
+    """
+    samples = _samples(grasp_set, source)
+    search, lacking = _installed(search or Search(methods=usual(ours=True, wired=harness is not None)))
+    cuts = Cuts.of(samples.labels, grasp_set.subjects, search)
+    ports = ports_of_whole_glove(harness, grasp_set.switch_names)
+    with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:
+        cache = Cache(store, report or _unheard, jobs=jobs, cluster=cluster)
+        equipment = equipment_for(target, wirings(harness, target), cache)
+        survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
+        played = _stream(survey, stream)
+        own = () if build is None else (own_build(build, grasp_set, equipment),)
+        cache.foresee(foreseen(survey))
+        found = _found(survey, played, wanted or Wanted(), own, (*([_RENEWED] if store.renewed else []), *lacking))
+        if output is not None:
+            # The store goes into the new folder as the same file, and nobody else may have it meanwhile.
+            publish_folder(_documents(found), output, kept_entries, FrontierError)
+    return found
+
+
+def _samples(grasp_set: GraspSet, source: str) -> Samples:
+    """Return the rows of a set, checked before any work."""
+    n_types = len(np.unique(grasp_set.labels))
+    if n_types < 2:
+        raise FrontierError(f"the recordings hold {n_types} grasp type(s): there is nothing to tell apart")
+    check_types(n_types, FrontierError)
+    # All switches at once are tried as well.
+    check_inputs(n_types, len(grasp_set.switch_names), len(grasp_set.joints), FrontierError)
+    check_memory(len(grasp_set), n_types, FrontierError)
+    if holds_movements(grasp_set):
+        raise FrontierError(
+            f"{source} holds whole movements, every frame a row: rows of one would be trained on and tested; give a "
+            "set of single trials, and this one with --stream"
+        )
+    return Samples.of(grasp_set)
+
+
+def _installed(search: Search) -> tuple[Search, tuple[str, ...]]:
+    """Return the search without rivals that are not installed, and a sentence on each of these."""
+    missing = [name for name in search.rivals if not METHODS[name].installed]
+    there = tuple(name for name in search.rivals if name not in missing)
+    said = (f"{name} was left out: it needs {METHODS[name].install}, which is not installed" for name in missing)
+    return replace(search, rivals=there), tuple(said)
+
+
+@contextmanager
+def _folder(output: Path | None) -> Iterator[Path]:
+    if output is None:
+        with TemporaryDirectory(prefix="thenar") as folder:
+            yield Path(folder)
+        return
+    output.parent.mkdir(parents=True, exist_ok=True)
+    check_folder(output, kept_entries, FrontierError)
+    output.mkdir(exist_ok=True)
+    yield output
+
+
+def kept_entries(folder: Path) -> list[str]:
+    """Return the entries of a frontier's folder that are kept: the store and the user's files."""
+    there = entries(folder)
+    if there and not {FRONTIER_NAME, STORE_NAME} & set(there):
+        raise FrontierError(f"{folder} is not empty and holds no frontier: name another folder")
+    return [path for path in there if path not in _DOCUMENTS]
+
+
+def _documents(found: Frontier) -> dict[str, bytes]:
+    drawn = {f"{name}.svg": data for name, data in pictures(found, "svg").items()}
+    return {FRONTIER_NAME: frontier_to_bytes(found), TABLE_NAME: csv_bytes(found), **drawn}
+
+
+def _stream(survey: Survey, given: GraspSet | None) -> Stream:
+    """Return the test rows of the first fold as a stream, or the recordings that are given for it."""
+    grasp_set, seed = survey.grasp_set, survey.search.seed
+    if given is None:
+        return stream_of(grasp_set, survey.samples.labels, survey.cuts.screening[0].test, seed=seed)
+    if given.fingerprint() == grasp_set.fingerprint():
+        raise FrontierError(
+            f"the stream is what is trained on, {survey.source}: name other recordings with --stream, or leave it out, "
+            "and rows that are set aside are used"
+        )
+    if (given.switch_names, given.joints) != (grasp_set.switch_names, grasp_set.joints):
+        raise FrontierError(f"the stream has other switches or joints than {survey.source}")
+    number = {grasp: label for label, grasp in enumerate(survey.samples.grasps)}
+    strange = sorted({str(grasp) for grasp in given.grasps} - set(number))
+    if strange:
+        raise FrontierError(f"the stream holds {strange[0]!r}, which {survey.source} does not")
+    labels = np.array([number[str(grasp)] for grasp in given.grasps], dtype=np.intp)
+    return stream_of(given, labels, seed=seed)
+
+
+def foreseen(survey: Survey) -> dict[str, float]:
+    """Return the expected seconds of one core of each stage, before any has begun: the time that is left does not grow
+    on the way.
+    """
+    search, cuts, n_switches = survey.search, survey.cuts, len(survey.switch_names)
+    rows, simulated = len(survey.samples.labels), survey.equipment.model.part is not None
+    kinds = available_inputs(n_switches, survey.n_joints)
+    wired = len(kinds) - ("joints" in kinds)
+    train, more = ([len(fold.train) for fold in folds] for folds in (cuts.screening, cuts.others))
+    # Once, or for each of the inputs if a method learns from joints.
+    methods = [name for name in search.methods for _ in range(wired if METHODS[name].uses_joints else min(wired, 1))]
+    choices = sum(len(ways(name, n_switches)) for name in search.methods) * wired + ("joints" in kinds)
+    rivals = sum(len(curve_ways(name, n_switches)) for name in search.rivals)
+    last = min(search.finalists + _MARKED, choices)
+    few = papers_depth(search)
+    return {
+        "placements": sum(path_s(name, n) for name in methods for n in (rows, *train)),
+        "rivals": sum(path_s(name, n) for name in search.rivals for n in train) if wired else 0.0,
+        "screening": (_DIFFERENT * choices + rivals) * sum(fit_s(search.screened, 0, n) for n in train),
+        "times": _DIFFERENT * choices * QUICK_PRICE_S,
+        "finalists' placements": sum(path_s(name, n) for name in methods for n in more),
+        "finalists": last * sum(fit_s(search.rounds, len(search.tabled) * len(SHAPES), n) for n in train),
+        further(few.rounds): last * sum(fit_s(few.rounds, len(few.tabled) * len(SHAPES), n) for n in more),
+        "prices": last * PRICE_S,
+        "simulations": last * _DESIGNS * TRIAL_S * simulated,
+        "checks": _CHECKED * TRIAL_S * simulated,
+        "latencies": last * (2.0 + _DESIGNS),
+    }
+
+
+def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...], lacking: tuple[str, ...]) -> Frontier:
+    search, n_switches = survey.search, len(survey.switch_names)
+    screened, curves = screen(survey)
+    if not screened:
+        raise FrontierError(
+            f"no placement that was tried can be built for {survey.equipment.model.target}: name other --methods or "
+            "another --target"
+        )
+    named = choices_to_mark(n_switches, survey.n_joints)
+    closes = look_closely(survey, finalists(screened, list(named), search.finalists))
+    every = [design for close in closes for design in designs(close, survey.n_joints)]
+    by_time, by_switches = best_designs(every)
+    kept, checks, skipped = measured(with_whole_scans([*by_time, *by_switches]), survey.equipment, survey.cache)
+    points = points_of(kept, _latencies(survey, stream, kept), survey.switch_names, search.max_bins)
+    picked, tried = wanted.pick(points), _tried(screened, closes, search)
+    early = [_EARLY] if any(design.scan_kind == "early" for design in kept) else []
+    return Frontier(
+        schema=SCHEMA,
+        thenar=version("thenar"),
+        source=survey.source,
+        fingerprint=survey.grasp_set.fingerprint(),
+        rows=len(survey.samples.labels),
+        subjects=len(np.unique(survey.grasp_set.subjects)),
+        n_switches=n_switches,
+        n_joints=survey.n_joints,
+        grasps=survey.samples.grasps,
+        target=survey.equipment.model.target,
+        folds=search.folds,
+        repeats=search.repeats,
+        combinations=sum(len(design.decisions) for design in every) + len(tried),
+        points=points,
+        tried=tried,
+        curves=curves,
+        marks=(*marks_of(named, closes, survey), *own),
+        checks=checks,
+        skipped=(*lacking, *skipped, *early, stream.what),
+        picked=None if picked is None else picked.number,
+        wanted=wanted.words,
+    )
+
+
+def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latencies:
+    """Return the latency of every design with every decision that it serves, by tables of rows that the stream of the
+    set's own test rows does not hold.
+    """
+    fold, grouped = survey.cuts.screening[0], dict[Candidate, list[Design]]()
+    for design in kept:
+        grouped.setdefault(design.close.screened.choice, []).append(design)
+    calls = [
+        latencies.call(
+            2.0 + len(mine),
+            survey.inputs(choice.joints),
+            fold.train,
+            survey.columns(choice, fold),
+            stream,
+            tuple(Pace(design.tables.tabled, design.frame.us, design.decisions) for design in mine),
+            survey.search.max_bins,
+        )
+        for choice, mine in grouped.items()
+    ]
+    return {
+        (design, kind): latency
+        for mine, found in zip(grouped.values(), survey.cache.ask("latencies", calls), strict=True)
+        for design, several in zip(mine, found, strict=True)
+        for kind, latency in zip(design.decisions, several, strict=True)
+    }
+
+
+def _tried(screened: Sequence[Screened], closes: Sequence[Close], search: Search) -> tuple[Tried, ...]:
+    """Return everything that was screened, and the finalists after every stage of their training."""
+    first = [(one, search.screened, one.rate) for one in screened]
+    then = [(close.screened, rounds, rate) for close in closes for rounds, rate in close.stages.items()]
+    return tuple(
+        Tried(one.choice.way, one.choice.inputs, len(one.columns), rounds, rate, one.frame_us)
+        for one, rounds, rate in (*first, *then)
+    )
+
+
+def _unheard(_done: int, _total: int) -> None:
+    pass

@@ -1,0 +1,85 @@
+"""What the points themselves take: designs on a front simulated, or timed here, and the model held against that."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from thenar.runtime.tables import tables_from_bytes
+
+from ..firmware.choose import features
+from .cache import Cache, stored
+from .designs import Design
+from .equipment import Equipment
+from .points import Check, FrontierError, Time
+from .timing.checks import LEAST, check, unchecked
+from .timing.classify_times import ClassifyModel, fitting
+from .timing.measured_cycles import Trial, run_trial
+from .timing.python_times import classify_us
+from .timing.wire_check import check_wire
+
+# Expected seconds: of a trial, of timing all designs in Python, of checks there.
+TRIAL_S, _TIMES_S, _CHECK_S = 2.0, 1.0, 5.0
+
+
+@stored(1, where="machine")
+def count_steps(content: bytes, layout: str, model: ClassifyModel) -> float:
+    """Compile a layout of tables and run it; return cycles, or instructions, that the slowest frame took.
+
+    Raises FirmwareError.
+    """
+    assert model.part is not None
+    for option in fitting(tables_from_bytes(content), model.part):
+        if features(option[0], model.part) == layout:
+            return run_trial(Trial(option, model.part)).counted
+    raise FrontierError(f"there is no layout {layout!r} of these tables: another thenar made the store")
+
+
+@stored(1, where="process")
+def time_here(contents: tuple[bytes, ...], yardstick: float) -> tuple[float, ...]:
+    """Let the runtime classify with each of the tables, at the pace that its yardstick says; return microseconds."""
+    return tuple(classify_us([tables_from_bytes(content) for content in contents], yardstick))
+
+
+@stored(1, where="process", without=("jobs",))
+def run_checks(contents: tuple[bytes, ...], model: ClassifyModel, jobs: int) -> tuple[Check, ...]:
+    """Hold a model against what is measured of these tables, in `jobs` processes. Raises FirmwareError."""
+    return check(model, [tables_from_bytes(content) for content in contents], jobs=jobs)
+
+
+def measured(
+    designs: Sequence[Design], equipment: Equipment, cache: Cache
+) -> tuple[list[Design], tuple[Check, ...], tuple[str, ...]]:
+    """Return the designs with what they take, how far the model is off over these and more, and, in sentences, what
+    could not be done.
+
+    The simulators of this machine are asked, whatever cluster there is: its workers may have none.
+    """
+    model, lack = equipment.model, unchecked(equipment.model)
+    found, checks = list(designs), tuple[Check, ...]()
+    if not lack:
+        found = _simulated(designs, model, cache) if model.part else _timed(designs, model, cache)
+        cost = LEAST * TRIAL_S if model.part else _CHECK_S
+        (checks,) = cache.ask("checks", [run_checks.call(cost, _contents(designs), model, cache.jobs)])
+    wire, without = check_wire()
+    said = (lack, model.note, equipment.beside.what, without)
+    return found, (*checks, *wire), tuple(sentence for sentence in said if sentence)
+
+
+def _contents(designs: Sequence[Design]) -> tuple[bytes, ...]:
+    return tuple(dict.fromkeys(design.tables.content for design in designs))
+
+
+def _timed(designs: Sequence[Design], model: ClassifyModel, cache: Cache) -> list[Design]:
+    contents = _contents(designs)
+    assert model.python is not None
+    (us,) = cache.ask("simulations", [time_here.call(_TIMES_S, contents, model.python.yardstick)])
+    times = dict(zip(contents, us, strict=True))
+    return [replace(design, measured=Time(times[design.tables.content], "measured")) for design in designs]
+
+
+def _simulated(designs: Sequence[Design], model: ClassifyModel, cache: Cache) -> list[Design]:
+    calls = [count_steps.call(TRIAL_S, design.tables.content, design.classified.layout, model) for design in designs]
+    steps = cache.ask("simulations", calls)
+    return [
+        replace(design, measured=Time(model.us(round(each)), "simulated"))
+        for design, each in zip(designs, steps, strict=True)
+    ]

@@ -1,0 +1,122 @@
+"""A point of a frontier that is to be built: the options and the wiring that it settles."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from thenar.drivers.i2c.chips import CHIPS
+from thenar.runtime.files import read_file
+from thenar.runtime.harness.wiring import SLOWEST_HZ, Harness
+from thenar.runtime.names import shortened
+
+from ..placement.methods.base import METHODS
+from ..recordings.graspset import GraspSet
+from .points import MAX_BYTES, Frontier, FrontierError, Point, frontier_from_bytes
+from .timing.wirings import AS_WIRED, BOARD, Wiring
+
+
+@dataclass(frozen=True, slots=True)
+class Picked:
+    """A frontier, and the point of it that is to be built; see `picked`."""
+
+    frontier: Frontier
+    point: Point
+
+    @property
+    def options(self) -> dict[str, object]:
+        """The options of `compile_build` that the point settles."""
+        setting = self.point.setting
+        settled: dict[str, object] = {
+            "inputs": setting.inputs,
+            "rounds": setting.rounds,
+            "width": setting.width,
+            "table_bits": setting.table_bits,
+            "max_bins": setting.max_bins,
+        }
+        if setting.inputs == "joints":
+            return settled
+        parameter = "keep" if METHODS[setting.way.method].by_number else "prune"
+        return {**settled, "placement": setting.way.method, parameter: int(setting.way.parameter)}
+
+    def wired(self, given: Harness | None) -> Harness | Callable[[Sequence[str]], Harness] | None:
+        """Return the wiring to build for, as `compile_build` takes it: the given one where the point is wired so, else
+        a new one of its kind for the switches that are kept.
+
+        Raises FrontierError where the point is wired as a glove that is not given.
+        """
+        setting = self.point.setting
+        if not setting.wiring:
+            return given
+        if setting.wiring == AS_WIRED and given is None:
+            raise FrontierError(
+                f"point {self.point.number} is read as the glove was wired: name its glove.toml with --glove"
+            )
+
+        def harness_of(kept: Sequence[str]) -> Harness:
+            if set(kept) != set(self.point.switches):
+                raise FrontierError(
+                    f"point {self.point.number} lists {len(self.point.switches)} switches, but its placement keeps "
+                    f"{len(kept)}, not the same ones: run thenar frontier again"
+                )
+            if given is not None and setting.wiring == AS_WIRED:
+                return given
+            return Wiring(setting.wiring, setting.clock_hz).harness_of(kept, setting.inputs != "switches")
+
+        return harness_of
+
+
+def picked(path: Path, number: int | None, grasp_set: GraspSet) -> Picked:
+    """Return a point of a frontier, checked: it can be built from these recordings.
+
+    Parameters
+    ----------
+    path : Path
+        A frontier.json.
+    number : int or None
+        The point's number; None for the one that the frontier picked.
+    grasp_set : GraspSet
+        The recordings that the frontier was found for.
+
+    Raises
+    ------
+    FrontierError
+        If the file is no frontier's, is of other recordings, or has no such point, or if the point cannot be built.
+
+    Examples
+    --------
+    >>> chosen = picked(Path("frontier/frontier.json"), 7, grasp_set)  # doctest: +SKIP
+    >>> compile_build(
+    ...     grasp_set, Path("build"), **chosen.options, harness=chosen.wired(None)
+    ... )  # doctest: +SKIP
+    """
+    found = frontier_from_bytes(read_file(path, MAX_BYTES, FrontierError), str(path))
+    wanted = found.picked if number is None else number
+    if wanted is None:
+        raise FrontierError(f"{path} has points 1 to {len(found.points)}: say with --point which to build")
+    if found.fingerprint != grasp_set.fingerprint():
+        raise FrontierError(
+            f"{path} was found for other recordings ({found.source}): run thenar frontier on these, or compile those"
+        )
+    point = found.point(wanted)
+    _check(point, grasp_set, f"{path}: point {point.number}")
+    return Picked(found, point)
+
+
+def _check(point: Point, grasp_set: GraspSet, what: str) -> None:
+    """Raise FrontierError where a point cannot be built here: before the training, not after it."""
+    setting = point.setting
+    if not set(grasp_set.switch_names).issuperset(point.switches):
+        raise FrontierError(f"{what} keeps switches that the recordings do not have: run thenar frontier on these")
+    if setting.inputs != "joints" and setting.way.method not in METHODS:
+        raise FrontierError(f"{what} takes a method that is not there: {shortened(repr(setting.way.method))}")
+    least = 1 if setting.inputs != "joints" and METHODS[setting.way.method].by_number else 0
+    if not (setting.way.parameter.is_integer() and setting.way.parameter >= least):
+        raise FrontierError(
+            f"{what} takes {setting.way.parameter} for its method: it is a whole number from {least} on"
+        )
+    if setting.wiring not in ("", AS_WIRED, BOARD, *CHIPS):
+        raise FrontierError(f"{what} takes a wiring that is not there: {shortened(repr(setting.wiring))}")
+    if setting.wiring in CHIPS and not SLOWEST_HZ <= setting.clock_hz <= CHIPS[setting.wiring].clock_hz:
+        raise FrontierError(f"{what} runs its {setting.wiring} at {setting.clock_hz} Hz, which it cannot")
+    if setting.wiring not in ("", AS_WIRED) and not Wiring(setting.wiring, setting.clock_hz).fits(point.switches):
+        raise FrontierError(f"{what} has no room for its {len(point.switches)} switches on {setting.wiring}")

@@ -1,0 +1,362 @@
+"""A frontier's pictures: accuracy against the time of a frame, the number of switches and the decision latency."""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal
+
+from thenar.runtime.manifest import Inputs
+
+from ..pictures import painting, rendered
+from ..text import counted, duration, percent
+from .labels import FAINT, LINE, Label, Labels
+from .points import Curve, Frontier, Mark, Point, Rate, Tried, front
+from .words import featured, inputs_of, shorten
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    Dash = Literal["-"] | tuple[int, tuple[float, ...]]
+
+FONT = 9.0
+_INK, _GREY, _PALE, _WHITE = "#1a1a1a", "#5f5f5f", "#e3e3e3", "#ffffff"
+# Okabe and Ito's colours, which the colour-blind tell apart too, and shapes for who sees no colours.
+_COLOURS: dict[Inputs, str] = {"switches": "#0072b2", "joints": "#009e73", "both": "#d55e00"}
+_SHAPES: dict[Inputs, str] = {"switches": "o", "joints": "^", "both": "s"}
+_NAMES: dict[Inputs, str] = {"switches": "switches alone", "joints": "joints alone", "both": "switches and joints"}
+# Our curves are blue, as switches alone are everywhere; the rivals' colours are no inputs'; dashes tell the rest apart.
+_RIVALS = ("#a86f00", "#a3457c", "#6b6b6b")
+_DASHES: "tuple[Dash, ...]" = ("-", (0, (5, 2)), (0, (1, 1.4)), (0, (6, 1.5, 1, 1.5)), (0, (9, 3)))
+# What the colours mean, for a page that shows the pictures in its own.
+PALETTE: Mapping[str, str] = MappingProxyType(
+    {
+        **{"ink": _INK, "soft": _GREY, "line": _PALE, "paper": _WHITE},
+        **{str(inputs): colour for inputs, colour in _COLOURS.items()},
+        **{f"rival-{number}": colour for number, colour in enumerate(_RIVALS, 1)},
+    }
+)
+# Ids of a point's marker and of the ring around the featured one, in SVG.
+POINT_ID, RING_ID = "point-", "featured"
+
+_WIDTH, _HEIGHT = 9.0, 5.4  # inches
+_LEFT, _RIGHT, _BOTTOM, _TOP = 0.72, 0.18, 0.58, 1.02  # inches around the axes
+_SIZE, _MARK_SIZE, _TRIED_SIZE = 34.0, 52.0, 9.0  # square points
+_LOWEST = 1e-3  # a logarithmic axis has no 0
+_FEW = 16  # switches: curves may leave the picture below the rate of so many
+_DECISIONS = {"single": "one frame", "dwell": "dwell", "sequential": "sequential test"}
+
+
+@dataclass(frozen=True, slots=True)
+class _Cost:
+    """What a picture shows the accuracy against.
+
+    front       the front whose points are filled and joined by a line called `best`; "": all are filled, none joined
+    of_point, of_mark, of_tried  where each is, across; None: it is not on this picture
+    end         of a line from a point to the right; None: no line
+    words       on a point
+    """
+
+    title: str
+    axis: str
+    of_point: Callable[[Point], float | None]
+    of_mark: Callable[[Mark], float | None]
+    of_tried: Callable[[Tried], float | None]
+    front: str = ""
+    best: str = ""
+    end: Callable[[Point], float | None] = lambda _: None
+    words: Callable[[Point], str] = lambda _: ""
+
+    @property
+    def is_time(self) -> bool:
+        """Whether the cost is in microseconds; else it is a number of switches."""
+        return bool(self.front)
+
+
+_FRAME = _Cost(
+    title="What accuracy costs in time",
+    axis="time of a frame: the glove read, the grasp classified",
+    # A frame takes as long whatever is made of its answer: other decisions would lie on the same places.
+    of_point=lambda point: None if point.fronts == ("latency",) else point.frame.us,
+    of_mark=lambda mark: mark.frame_us,
+    of_tried=lambda tried: tried.frame_us,
+    front="frame",
+    best="the best for its time",
+    words=inputs_of,
+)
+_SWITCHES = _Cost(
+    title="What so many switches recognise",
+    axis="switches kept",
+    of_point=lambda point: float(len(point.switches)) or None,
+    of_mark=lambda mark: float(mark.n_switches) or None,
+    of_tried=lambda tried: float(tried.n_switches) or None,
+)
+_LATENCY = _Cost(
+    title="From the hand's arrival to the decision",
+    axis="time until a grasp is decided on: its mean, and a line to the 99th percentile",
+    of_point=lambda point: (point.latency.mean_us or None) if "latency" in point.fronts else None,
+    of_mark=lambda mark: mark.latency_us,
+    of_tried=lambda _: None,
+    front="latency",
+    best="the best for its latency",
+    end=lambda point: point.latency.p99_us if point.latency.p99_us != point.latency.mean_us else None,
+    words=lambda point: _DECISIONS[point.setting.decision],
+)
+
+
+def pictures(frontier: Frontier, kind: Literal["svg", "png"], *, letters: bool = False) -> Mapping[str, bytes]:
+    """Return "frontier", "switches" and "latency" as files; equal frontiers give equal bytes.
+
+    With `letters`, text in SVG is text and not outlines. Raises PictureError.
+    """
+    with painting(FONT, letters=letters):
+        return {name: rendered(draw(frontier), kind) for name, draw in PICTURES.items()}
+
+
+def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
+    figure, axes = _sheet(frontier, cost.title)
+    marks = [(max(x, _LOWEST), mark) for mark in frontier.marks if (x := cost.of_mark(mark)) is not None]
+    points = [(max(x, _LOWEST), point) for point in frontier.points if (x := cost.of_point(point)) is not None]
+    ends = [(x, end, point) for x, point in points if (end := cost.end(point)) is not None]
+    curves = () if cost.is_time else frontier.curves
+    _scale_rates(axes, [*(point.rate for _, point in points), *(mark.rate for _, mark in marks), *_shown(curves)])
+    lowest = axes.get_ylim()[0]
+    tried = [
+        (max(x, _LOWEST), each)
+        for each in frontier.tried
+        if (x := cost.of_tried(each)) is not None and each.rate.mean >= lowest
+    ]
+    if cost.is_time:
+        _scale_times(axes, [*(x for x, _ in (*marks, *tried, *points)), *(end for _, end, _ in ends)])
+    else:
+        _scale_counts(axes, frontier.n_switches)
+    axes.set_xlabel(cost.axis, color=_INK)
+
+    labels, spoken_of = Labels(axes), featured(frontier)
+    _draw_tried(labels, tried)
+    if cost.is_time:
+        _draw_best(labels, [(x, point.rate.mean) for x, point in points if cost.front in point.fronts], cost.best)
+    _draw_ends(labels, ends)
+    names = list(_draw_curves(labels, curves))
+    _draw_points(labels, points, cost.front)
+    _draw_marks(labels, marks)
+    for x, point in points:
+        if point is spoken_of:
+            y = point.rate.mean
+            axes.scatter(
+                [x], [y], s=4.5 * _SIZE, marker="o", facecolor="none", edgecolor=_INK, lw=1.6, zorder=5, gid=RING_ID
+            )
+    _draw_key(axes)
+    # What takes most room first.
+    said = duration if cost.is_time else lambda _: ""
+    labels.write(*(_loud_label(x, point, said(x)) for x, point in points if point is spoken_of))
+    labels.write(*names, *(_mark_label(x, mark, said(x)) for x, mark in marks))
+    labels.write(*(_point_label(x, point, cost.words(point)) for x, point in points if point is not spoken_of))
+    return figure
+
+
+# To be called inside `painting`.
+PICTURES: Mapping[str, Callable[[Frontier], "Figure"]] = MappingProxyType(
+    {
+        name: partial(_draw, cost=cost)
+        for name, cost in (("frontier", _FRAME), ("switches", _SWITCHES), ("latency", _LATENCY))
+    }
+)
+
+
+def _sheet(frontier: Frontier, title: str) -> tuple["Figure", "Axes"]:
+    """Return a figure and its axes with a title, and under it what was recognised, and how that was found."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(_WIDTH, _HEIGHT), dpi=144, facecolor=_WHITE)
+    left, right, bottom, top = _LEFT / _WIDTH, _RIGHT / _WIDTH, _BOTTOM / _HEIGHT, _TOP / _HEIGHT
+    under = (
+        f"{shorten(frontier.source)}: {frontier.rows:,} grasps of {counted(frontier.subjects, 'person', 'people')}, "
+        f"{len(frontier.grasps)} types; {shorten(frontier.target)}; "
+        f"{frontier.folds} folds x {frontier.repeats}, placement inside the fold, 95 % intervals"
+    )
+    figure.text(left, 1 - 0.30 / _HEIGHT, title, fontsize=13, fontweight="bold", color=_INK)
+    figure.text(left, 1 - 0.53 / _HEIGHT, under, fontsize=FONT, color=_GREY)
+    axes = figure.add_axes((left, bottom, 1 - left - right, 1 - bottom - top))
+    axes.set_axisbelow(True)
+    axes.grid(color=_PALE, lw=0.6)
+    axes.spines[["left", "bottom"]].set_color(_GREY)
+    axes.tick_params(colors=_GREY, labelcolor=_INK)
+    return figure, axes
+
+
+def _scale_times(axes: "Axes", us: Iterable[float]) -> None:
+    """Make the horizontal axis logarithmic, in times, with room for all of `us`."""
+    known = [max(each, _LOWEST) for each in us] or [100.0, 1000.0]
+    low, high = min(known), max(known)
+    room = max(1.15, (high / low) ** 0.07)
+    axes.set_xscale("log")
+    axes.set_xlim(low / room, high * room)
+    within = _round_times(low / room, high * room)
+    axes.set_xticks(within, [duration(tick) for tick in within])
+    axes.minorticks_off()
+
+
+def _round_times(low: float, high: float) -> list[float]:
+    """Return 1, 2 and 5 times powers of ten from low to high; powers alone where there would be too many."""
+    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    for steps in ((1, 2, 5), (1,)):
+        ticks = [tick for power in powers for step in steps if low <= (tick := step * 10.0**power) <= high]
+        if len(ticks) <= 10:
+            break
+    return ticks
+
+
+def _scale_counts(axes: "Axes", most: int) -> None:
+    """Make the horizontal axis logarithmic, from 1 to `most` switches."""
+    most = max(most, 2)
+    axes.set_xscale("log")
+    axes.set_xlim(0.94, most * 1.08)
+    doubled = [2**power for power in range(most.bit_length()) if 2**power * 1.2 < most]
+    axes.set_xticks([*doubled, most], [f"{tick}" for tick in (*doubled, most)])
+    axes.minorticks_off()
+
+
+def _scale_rates(axes: "Axes", shown: Sequence[Rate]) -> None:
+    """Make the vertical axis one of rates, from the least of `shown` to the greatest, whiskers and all."""
+    low = min((rate.low for rate in shown), default=0.0)
+    high = max((rate.high for rate in shown), default=1.0)
+    room = max(0.06 * (high - low), 0.004)
+    bottom, top = axes.set_ylim(max(low - room, -0.02), high + 1.6 * room)
+    ticks = [tick for tick in axes.get_yticks() if max(bottom, -1e-9) <= tick <= min(top, 1 + 1e-9)]
+    axes.set_yticks(ticks, [f"{100 * tick:.3g} %" for tick in ticks])
+    axes.set_ylabel("grasps recognised", color=_INK)
+
+
+def _draw_key(axes: "Axes") -> None:
+    """Explain shapes and lines above the axes: all that has a label."""
+    if axes.get_legend_handles_labels()[0]:
+        place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (-0.012, 0.995), "ncols": 6, "frameon": False}
+        axes.legend(**place, fontsize=FONT, handletextpad=0.35, columnspacing=1.4, handlelength=1.3)
+
+
+def _draw_tried(labels: Labels, tried: Sequence[tuple[float, Tried]]) -> None:
+    """Draw what was screened, faintly."""
+    if not tried:
+        return
+    for inputs, colour in _COLOURS.items():
+        xs = [x for x, each in tried if each.inputs == inputs]
+        ys = [each.rate.mean for _, each in tried if each.inputs == inputs]
+        labels.axes.scatter(xs, ys, s=_TRIED_SIZE, marker=_SHAPES[inputs], color=colour, alpha=0.22, lw=0, zorder=1.5)
+        labels.avoid(xs, ys, FAINT)
+    labels.axes.scatter([], [], s=_TRIED_SIZE, color=_GREY, alpha=0.6, lw=0, label="tried")
+
+
+def _draw_best(labels: Labels, best: Iterable[tuple[float, float]], name: str) -> None:
+    """Draw the line of best points, (cost, rate) each: from each point on its rate is to be had, until a better one.
+
+    A point that is best of its kind alone, as of those that decide alike, may lie below it.
+    """
+    axes, corners = labels.axes, front(list(best), lambda place: place[0], lambda place: place[1], step=0.0)
+    if not corners:
+        return
+    xs = [*(x for x, _ in corners), axes.get_xlim()[1]]
+    ys = [*(y for _, y in corners), corners[-1][1]]
+    axes.step(xs, ys, where="post", color=_INK, lw=1.6, zorder=2.5, label=name)
+    axes.fill_between(xs, ys, axes.get_ylim()[0], step="post", color=_INK, alpha=0.04, lw=0, zorder=0.5)
+    for (x, y), (after, higher) in zip(zip(xs, ys, strict=True), zip(xs[1:], ys[1:], strict=True), strict=False):
+        labels.avoid_line((x, after, after), (y, y, higher))
+
+
+def _draw_points(labels: Labels, points: Sequence[tuple[float, Point]], best: str) -> None:
+    """Draw points with intervals: those of the front `best` filled, the others hollow; all filled without a front."""
+    hollow = [point for _, point in points if best and best not in point.fronts]
+    for inputs, colour in _COLOURS.items():
+        some = [(x, point) for x, point in points if point.setting.inputs == inputs]
+        _draw_whiskers(labels, [(x, point.rate) for x, point in some], colour)
+        for face, drawn in (
+            (colour, [(x, point) for x, point in some if point not in hollow]),
+            (_WHITE, [(x, point) for x, point in some if point in hollow]),
+        ):
+            for x, point in drawn:
+                look: dict[str, Any] = {"marker": _SHAPES[inputs], "facecolor": face, "edgecolor": colour}
+                gid = f"{POINT_ID}{point.number}"
+                labels.axes.scatter([x], [point.rate.mean], s=_SIZE, lw=1.2, zorder=4, gid=gid, **look)
+            labels.avoid([x for x, _ in drawn], [point.rate.mean for _, point in drawn])
+        if some:
+            labels.axes.scatter([], [], s=_SIZE, marker=_SHAPES[inputs], color=colour, label=_NAMES[inputs])
+    if hollow:
+        labels.axes.scatter([], [], s=_SIZE, facecolor=_WHITE, edgecolor=_GREY, lw=1.2, label="not the best here")
+
+
+def _draw_ends(labels: Labels, ends: Iterable[tuple[float, float, Point]]) -> None:
+    """Draw lines from the mean to the end of what each point takes."""
+    for start, end, point in ends:
+        level = (point.rate.mean, point.rate.mean)
+        colour = _COLOURS[point.setting.inputs]
+        labels.axes.plot((start, end), level, color=colour, lw=0.9, alpha=0.45, marker="|", ms=5, markevery=[1])
+        labels.avoid_line((start, end), level, LINE / 3)
+
+
+def _draw_marks(labels: Labels, marks: Sequence[tuple[float, Mark]]) -> None:
+    """Draw marks with their intervals."""
+    _draw_whiskers(labels, [(x, mark.rate) for x, mark in marks], _INK)
+    xs, ys = [x for x, _ in marks], [mark.rate.mean for _, mark in marks]
+    labels.axes.scatter(xs, ys, s=_MARK_SIZE, marker="X", color=_INK, edgecolor=_WHITE, lw=0.8, zorder=4.5)
+    labels.avoid(xs, ys)
+
+
+def _draw_whiskers(labels: Labels, shown: Sequence[tuple[float, Rate]], colour: str) -> None:
+    xs, lows, highs = [x for x, _ in shown], [rate.low for _, rate in shown], [rate.high for _, rate in shown]
+    labels.axes.vlines(xs, lows, highs, color=colour, lw=1.1, alpha=0.8, zorder=3)
+    for x, low, high in zip(xs, lows, highs, strict=True):
+        labels.avoid_line((x, x), (low, high))
+
+
+def _shown(curves: tuple[Curve, ...]) -> list[Rate]:
+    pairs = [pair for curve in curves for pair in zip(curve.sizes, curve.rates, strict=True)]
+    return [rate for size, rate in pairs if size >= _FEW] or [rate for _, rate in pairs]
+
+
+def _draw_curves(labels: Labels, curves: Sequence[Curve]) -> Iterator[Label]:
+    """Draw ours and the rivals' curves, and yield their names, ours first."""
+    ours, rivals = ([curve for curve in curves if curve.ours == wanted] for wanted in (True, False))
+    for number, curve in enumerate(ours):
+        yield from _draw_curve(labels, curve, _COLOURS["switches"], _DASHES[number % len(_DASHES)])
+    for number, curve in enumerate(rivals):
+        turn, colour = divmod(number, len(_RIVALS))
+        yield from _draw_curve(labels, curve, _RIVALS[colour], _DASHES[turn % len(_DASHES)])
+
+
+def _draw_curve(labels: Labels, curve: Curve, colour: str, dash: "Dash") -> Iterator[Label]:
+    pairs = [(size, rate) for size, rate in zip(curve.sizes, curve.rates, strict=True) if size >= 1]
+    if not pairs:
+        return
+    xs, means = [size for size, _ in pairs], [rate.mean for _, rate in pairs]
+    width, shade, above = (2.4, 0.10, 3) if curve.ours else (1.1, 0.04, 2)
+    labels.axes.plot(xs, means, color=colour, lw=width, ls=dash, zorder=above)
+    lows, highs = [rate.low for _, rate in pairs], [rate.high for _, rate in pairs]
+    labels.axes.fill_between(xs, lows, highs, color=colour, alpha=shade, lw=0, zorder=1)
+    labels.avoid_line(xs, means)
+    places = tuple(zip(xs, means, strict=True))
+    seen = tuple(place for place in places if place[1] >= labels.axes.get_ylim()[0])
+    yield Label(seen or places, (shorten(curve.method),), colour, size=9.0 if curve.ours else 8.0, bold=curve.ours)
+
+
+def _loud_label(x: float, point: Point, cost: str) -> Label:
+    text = f"point {point.number}: {inputs_of(point)}\n{_and_rate(cost, point.rate)}"
+    return Label(((x, point.rate.mean),), (text,), _INK, size=9.5, bold=True)
+
+
+def _point_label(x: float, point: Point, words: str) -> Label:
+    """Return the words for a point: where there is little room, its number."""
+    texts = (f"{point.number}: {words}", str(point.number)) if words else (str(point.number),)
+    return Label(((x, point.rate.mean),), texts, _COLOURS[point.setting.inputs])
+
+
+def _mark_label(x: float, mark: Mark, cost: str) -> Label:
+    name = shorten(mark.name)
+    if str(mark.n_switches) not in name:
+        name = f"{name} ({counted(mark.n_switches, 'switch', 'switches')})"
+    return Label(((x, mark.rate.mean),), (f"{name}\n{_and_rate(cost, mark.rate)}",), _INK)
+
+
+def _and_rate(cost: str, rate: Rate) -> str:
+    return f"{cost}, {percent(rate.mean)}" if cost else percent(rate.mean)

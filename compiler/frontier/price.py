@@ -1,0 +1,117 @@
+"""What a placement costs once it is trained on all rows: its tables, how long they take to read and to classify."""
+
+import time
+from collections.abc import Iterator
+
+import numpy as np
+from msgspec import Struct
+from numpy.typing import NDArray
+
+from thenar.runtime.tables import IntegerTables, tables_to_bytes
+
+from ..evaluation.folds import Fold, Rows
+from ..samples import Columns, Samples
+from ..tables.collapse import collapse
+from ..tables.quantise import quantise
+from .cache import stored
+from .equipment import Equipment
+from .search import Shape
+from .survey import trained
+from .timing.classify_times import Classified
+from .timing.scan_times import ScanTimes, scan_times, transfer_us
+
+# Of more rows than this, evenly spaced ones tell how early a scan ends.
+_FRAMES = 1000
+
+
+class Tabled(Struct, frozen=True):
+    """Which tables: of the ensemble after so many rounds, cut in this shape."""
+
+    rounds: int
+    shape: Shape
+
+
+class Wired(Struct, frozen=True):
+    """What reading the switches takes in one wiring, "as wired" or of a new glove, at this clock."""
+
+    wiring: str
+    clock_hz: int
+    scan: ScanTimes
+
+
+class PricedTables(Struct, frozen=True):
+    """Tables with what they cost: `content` is a tables.bin; `wired` is empty where no switch is read; `seconds` is how
+    long it took to train for as many rounds and to make these tables.
+    """
+
+    tabled: Tabled
+    content: bytes
+    classified: tuple[Classified, ...]
+    wired: tuple[Wired, ...]
+    seconds: float
+
+    def fastest_us(self, joints: int) -> float | None:
+        """Return the least frame time in any wiring, whole scans; None where nothing fits the target."""
+        if not self.classified:
+            return None
+        scan_us = min((wired.scan.full_us for wired in self.wired), default=0.0)
+        return max(scan_us, transfer_us(joints)) + self.classified[0].us
+
+
+@stored(1)
+def price(
+    samples: Samples,
+    names: tuple[str, ...],
+    columns: Columns,
+    tables: tuple[Tabled, ...],
+    max_bins: int | None,
+    equipment: Equipment,
+    fold: Fold | None,
+) -> tuple[PricedTables, ...]:
+    """Train on all rows, on the switches `columns`, which have these names, and the joints; see what the tables cost.
+
+    fold  how early scans end is seen on its test rows, by tables of its training rows, as rows that were trained on end
+          them too soon; None: on all rows, where nobody asks about scans that end early
+    """
+    rows = np.arange(len(samples.labels))
+    made = list(tables_of(samples, rows, columns, tables, max_bins))
+    scanned = made if fold is None else list(tables_of(samples, fold.train, columns, tables, max_bins))
+    tested = rows if fold is None else fold.test
+    spread = tested[np.linspace(0, len(tested) - 1, min(_FRAMES, len(tested))).astype(np.intp)]
+    frames = samples.kept(columns)[spread]
+    return tuple(
+        PricedTables(
+            tabled,
+            tables_to_bytes(whole),
+            equipment.model.options(whole),
+            _wired(names, held, frames, equipment),
+            seconds,
+        )
+        for (tabled, whole, seconds), (_, held, _) in zip(made, scanned, strict=True)
+    )
+
+
+def tables_of(
+    samples: Samples, rows: Rows, columns: Columns, tables: tuple[Tabled, ...], max_bins: int | None
+) -> Iterator[tuple[Tabled, IntegerTables, float]]:
+    """Yield the tables that are asked for, of one training on some rows, and how many seconds each took."""
+    began, most, kept = time.perf_counter(), max(one.rounds for one in tables), len(columns)
+    stumps = trained(samples, rows, columns, most, max_bins)
+    training_s = time.perf_counter() - began
+    X = samples.kept(columns)[rows]
+    bits, codes = X[:, :kept].astype(bool), X[:, kept:]
+    for tabled in tables:
+        began = time.perf_counter()
+        scores = collapse(stumps.first(tabled.rounds), kept)
+        made = quantise(scores, bits, codes, tabled.shape.width, tabled.shape.table_bits)
+        yield tabled, made, training_s * tabled.rounds / most + time.perf_counter() - began
+
+
+def _wired(
+    names: tuple[str, ...], tables: IntegerTables, frames: NDArray[np.uint16], equipment: Equipment
+) -> tuple[Wired, ...]:
+    bits, codes = frames[:, : len(names)].astype(bool), frames[:, len(names) :]
+    return tuple(
+        Wired(wiring.name, wiring.clock_hz, scan_times(names, tables, wiring, bits, codes, equipment.beside))
+        for wiring in equipment.fitting(names)
+    )

@@ -1,0 +1,85 @@
+"""Screening: every placement at one number of rounds on the folds of one repeat, and in the fastest of its wirings."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..evaluation.rates import Rate as Counted
+from ..placement.methods.base import METHODS
+from ..samples import Columns
+from .points import Curve, Rate
+from .price import Tabled, price
+from .search import NO_SWITCHES, Candidate, Shape, available_inputs, curve_ways, ways
+from .survey import Survey
+
+# How long a frame takes hardly depends on how many rounds there were: tables of few tell it.
+_TABLED = Tabled(12, Shape(16))
+QUICK_PRICE_S = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Screened:
+    """A choice after screening: its switches when chosen from all rows, its rate, its frame time (us)."""
+
+    choice: Candidate
+    columns: Columns
+    rate: Rate
+    frame_us: float
+
+
+def rate_of(correct: tuple[int, ...], total: int) -> Rate:
+    """Return the rate of so many rows of `total` recognised in each repeat, with its 95 % interval."""
+    counted = Counted.of(correct, total)
+    return Rate(counted.mean, counted.low, counted.high)
+
+
+def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
+    """Return how well and how fast every choice is that may be built, and everybody's curves, rivals' included."""
+    search, cuts, n_switches = survey.search, survey.cuts, len(survey.switch_names)
+    inputs = available_inputs(n_switches, survey.n_joints)
+    every = [way for name in search.methods for way in ways(name, n_switches)]
+    choices = [Candidate(way, kind) for kind in inputs for way in (every if kind != "joints" else (NO_SWITCHES,))]
+    rivals = [Candidate(way, "switches") for name in search.rivals for way in curve_ways(name, n_switches)]
+    survey.choose("placements", choices, (cuts.everything, *cuts.screening))
+    # A placement that keeps nothing is none.
+    choices = [one for one in choices if one.way == NO_SWITCHES or survey.columns(one, cuts.everything)]
+    survey.choose("rivals", rivals, cuts.screening)
+    shown = [*choices, *rivals]
+    fits = survey.fit("screening", shown, cuts.screening, (search.screened,))
+    rates = {}
+    for choice in shown:
+        mine = [fits[choice, fold] for fold in cuts.screening]
+        rates[choice] = rate_of((sum(fit.correct[-1] for fit in mine),), sum(fit.total for fit in mine))
+    frames = _frames_us(survey, choices)
+    screened = tuple(
+        Screened(choice, survey.columns(choice, cuts.everything), rate, frames[choice])
+        for choice, rate in rates.items()
+        if choice in frames
+    )
+    names = dict.fromkeys([*search.methods, *search.rivals])
+    return screened, tuple(_curve(survey, name, rates) for name in names if "switches" in inputs)
+
+
+def _frames_us(survey: Survey, choices: Sequence[Candidate]) -> dict[Candidate, float]:
+    """Return the frame times of the choices that can be built."""
+    calls = []
+    for choice in choices:
+        columns = survey.columns(choice, survey.cuts.everything)
+        names = tuple(survey.switch_names[column] for column in columns)
+        rows, max_bins = survey.inputs(choice.joints), survey.search.max_bins
+        calls.append(price.call(QUICK_PRICE_S, rows, names, columns, (_TABLED,), max_bins, survey.equipment, None))
+    found = {}
+    for choice, (priced,) in zip(choices, survey.cache.ask("times", calls), strict=True):
+        us = priced.fastest_us(survey.n_joints if choice.joints else 0)
+        if us is not None and (priced.wired or choice.way == NO_SWITCHES):
+            found[choice] = us
+    return found
+
+
+def _curve(survey: Survey, name: str, rates: dict[Candidate, Rate]) -> Curve:
+    """Return a method's rates by the mean number of switches that it kept in the folds, switches alone."""
+    folds, points = survey.cuts.screening, {}
+    for choice, rate in rates.items():
+        if choice.way.method == name and choice.inputs == "switches":
+            points[sum(len(survey.columns(choice, fold)) for fold in folds) / len(folds)] = rate
+    sizes = tuple(sorted(points))
+    return Curve(name, METHODS[name].help, METHODS[name].ours, sizes, tuple(points[size] for size in sizes))

@@ -1,0 +1,127 @@
+"""What the frontier tries: placements under which parameters, inputs, rounds, widths, folds."""
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from thenar.runtime.manifest import Inputs, TableBits
+
+from ..placement.methods.base import METHODS, usual
+from .points import FrontierError, Way
+
+# Rivals are only seen beside ours: a few sizes show their curves.
+CURVE_SIZES = (4, 8, 16, 33, 66)
+# The placement of inputs without switches.
+NO_SWITCHES = Way("none", 0.0)
+USUAL_RIVALS = ("rfe", "forest", "mrmr", "mutual-information", "random", "sspoc", "qr")
+ROUNDS = (1, 2, 3, 5, 8, 12, 20, 30, 50, 75, 100, 150, 200, 300)
+
+
+class Shape(NamedTuple):
+    """How integers are cut: no sum needs more than `width` bits; with table_bits 8 no look-up spans more than 255."""
+
+    width: int
+    table_bits: TableBits = 16
+
+
+SHAPES = (*(Shape(width) for width in (16, 12, 8, 6, 5, 4)), Shape(16, 8))
+# Rounds of whose ensembles integer tables are made, in every shape.
+TABLED = (10, 30, 100)
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A way to choose switches, and whether the joints are read besides; inputs "joints" have NO_SWITCHES."""
+
+    way: Way
+    inputs: Inputs
+
+    @property
+    def joints(self) -> bool:
+        """Whether the joints are read."""
+        return self.inputs != "switches"
+
+    @property
+    def learns_from_joints(self) -> bool:
+        """Whether its switches are chosen by the joints as well."""
+        return self.inputs == "both" and METHODS[self.way.method].uses_joints
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """How much is tried.
+
+    Parameters
+    ----------
+    methods : tuple of str
+        Placement methods that points are built from.
+    rivals : tuple of str
+        Placement methods of which only curves are seen beside those.
+    folds, repeats, seed : int
+        The stratified folds are cut `repeats` times, with seeds seed, seed + 1, ...
+    screening : int
+        Rounds with which every placement is screened, on the folds of the first repeat.
+    rounds : int
+        The most rounds that those on the front are trained for.
+    finalists : int
+        The most placements that are looked at closely.
+    max_bins : int, optional
+        The most bins of a joint.
+
+    Raises
+    ------
+    MemberError
+        For a method that is not there.
+    FrontierError
+        Where nothing could come of it.
+    """
+
+    methods: tuple[str, ...] = field(default_factory=lambda: usual(ours=True))
+    rivals: tuple[str, ...] = field(default_factory=lambda: usual(ours=False))
+    folds: int = 4
+    repeats: int = 3
+    seed: int = 1
+    screening: int = 60
+    rounds: int = 300
+    finalists: int = 12
+    max_bins: int | None = None
+
+    def __post_init__(self) -> None:
+        for name in (*self.methods, *self.rivals):
+            METHODS.named(name)
+        if min(self.repeats, self.screening, self.rounds, self.finalists) < 1 or not self.methods:
+            raise FrontierError("a frontier needs a method, a repeat, a round and a finalist at least")
+
+    @property
+    def screened(self) -> int:
+        """The rounds of screening: no more than those on the front are trained for."""
+        return min(self.screening, self.rounds)
+
+    @property
+    def stages(self) -> tuple[int, ...]:
+        """The numbers of rounds whose rates are taken from one training."""
+        return (*(stage for stage in ROUNDS if stage < self.rounds), self.rounds)
+
+    @property
+    def tabled(self) -> tuple[int, ...]:
+        """The numbers of rounds of which integer tables are made."""
+        return (*(stage for stage in TABLED if stage < self.rounds), self.rounds)
+
+
+def ways(method: str, n_switches: int) -> tuple[Way, ...]:
+    """Return the placements of a method that are tried among so many switches."""
+    return tuple(Way(method, float(parameter)) for parameter in METHODS[method].ladder(n_switches))
+
+
+def curve_ways(method: str, n_switches: int) -> tuple[Way, ...]:
+    """Return the placements of a rival that its curve goes through."""
+    return tuple(Way(method, float(size)) for size in CURVE_SIZES if size <= n_switches)
+
+
+def available_inputs(n_switches: int, n_joints: int) -> tuple[Inputs, ...]:
+    """Return which inputs a set has; joints alone need no placement."""
+    kinds: list[Inputs] = []
+    if n_switches:
+        kinds.append("switches")
+    if n_joints:
+        kinds.append("joints")
+    return ("both", *kinds) if len(kinds) == 2 else tuple(kinds)

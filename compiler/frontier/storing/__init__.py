@@ -1,1 +1,0 @@
-"""Questions asked once: answers kept in a file, found in workers."""

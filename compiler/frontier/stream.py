@@ -1,0 +1,288 @@
+"""Streams: what a glove delivers while a hand goes from grasp to grasp, recorded or composed of single trials.
+
+Where nobody recorded how a hand goes from grasp to grasp, a stream is composed of single trials.
+What is taken from the recordings: the switches and joints of each grasp while it is held. What is made up: all between.
+The hand lets go: the switches of the grasp open one by one, at times spread evenly over RELEASE_US. It goes to the next
+one: its joints follow a minimum-jerk path (Flash and Hogan 1985, J. Neurosci. 5: 1688) bent half-way towards an open
+hand, most at two thirds of the way (Jeannerod 1984, J. Motor Behav. 16: 235), in TRAVEL_US, told every RECORD_US as a
+CyberGlove would. It grips: the switches of the next grasp close one by one over GRIP_US; with the last one the grasp is
+complete. The times are those of the scene `continuous`. The open hand is, joint by joint, the one that only a twentieth
+of the trials opens further.
+
+What that leaves out: a hand that holds is still, and a trial is one frame, so what a single frame gets wrong stays
+wrong for the whole hold, and no number of frames makes up for it; contacts that bounce; switches that are touched in
+passing.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..recordings.graspset import GraspSet
+from .movements import Movements, holds_movements, movements_of
+from .points import FrontierError
+
+Rows = NDArray[np.intp]
+Bits = NDArray[np.bool_]
+Codes = NDArray[np.uint16]
+Times = NDArray[np.int64]
+
+RELEASE_US, TRAVEL_US, GRIP_US = 200_000, 300_000, 200_000
+TRANSITION_US = RELEASE_US + TRAVEL_US + GRIP_US
+HOLD_US = (600_000, 1_000_000)
+RECORD_US = 10_000
+_OPENING = 0.5
+_OPEN = 0.05  # share of the trials in which a joint is opened further than in the open hand
+_BUMP = 3.0**9 / 2.0**6  # makes t^6 (1 - t)^3 one at its top, t = 2/3
+_NEVER = np.int64(1) << 60
+
+GRASPS = 300
+PERIOD_US = 10_000
+# The golden section: its multiples, less their whole parts, are spread evenly, however many there are.
+_GOLDEN = 0.618034
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stream:
+    """T states of a glove; each lasts until the next, the last is the end and lasts for no time.
+
+    bits      (T, s) bool     every switch of the set
+    codes     (T, j) uint16   the joints
+    at_us     (T,) int64      when each begins, never falling
+    types     (T,) intp       the class of the grasp; -1 while the hand moves
+    arrivals  (g,) intp       the states at which a grasp is complete, if its type is not that of the grasp before: one
+                              that is may be decided on from before, which tells nothing
+    ends      (g,) intp       the states at which these grasps no longer are
+    what      a sentence: what the stream is, and why this one
+    """
+
+    bits: NDArray[np.bool_]
+    codes: NDArray[np.uint16]
+    at_us: NDArray[np.int64]
+    types: Rows
+    arrivals: Rows
+    ends: Rows
+    what: str = ""
+
+    def __len__(self) -> int:
+        return len(self.at_us)
+
+
+def stream_of(
+    grasp_set: GraspSet,
+    labels: Rows,
+    rows: Rows | None = None,
+    *,
+    seed: int,
+    grasps: int = GRASPS,
+    period_us: int = PERIOD_US,
+) -> Stream:
+    """Return a stream of rows of a set: its own movements where it holds whole ones, else one composed of its trials.
+
+    labels  (n,) the classes of all rows, as the tables number them
+    rows    those that may be used, the tables' test rows; None: all. Of a set of whole movements only movements all of
+            whose rows are among them are
+
+    `what` of the stream says in a sentence which it is, and why. Raises FrontierError where nothing comes of the rows.
+    """
+    if holds_movements(grasp_set):
+        return recorded_stream(grasp_set, labels, rows, grasps=grasps, period_us=period_us)
+    chosen = np.arange(len(grasp_set)) if rows is None else rows
+    return composed_stream(
+        grasp_set.switches[chosen],
+        grasp_set.codes[chosen],
+        labels[chosen],
+        seed=seed,
+        grasps=grasps,
+        opens_up=np.array([joint.step < 0 for joint in grasp_set.joints], np.bool_),
+    )
+
+
+def recorded_stream(
+    grasp_set: GraspSet,
+    labels: Rows,
+    rows: Rows | None = None,
+    *,
+    grasps: int = GRASPS,
+    period_us: int = PERIOD_US,
+) -> Stream:
+    """Return the movements of a set whose rows are the frames of whole movements, one after the other.
+
+    A set does not tell when its rows were recorded: they are taken to be `period_us` apart (the scene `continuous`:
+    100 Hz). Between two movements a part of a period goes by as well, so that no frame time stays in step with the
+    rows. Where there are more than `grasps` movements, as many of them, evenly spread.
+
+    Raises FrontierError if no movement lies in `rows` as a whole.
+    """
+    found = movements_of(grasp_set)
+    if rows is not None:
+        found = found.pick(_whole(found, rows, len(grasp_set)))
+    if not len(found):
+        raise FrontierError(
+            "no whole movement is among the rows that a latency is measured on: cut the folds between movements"
+        )
+    found = found.pick(np.unique(np.linspace(0, len(found) - 1, min(grasps, len(found))).astype(np.intp)))
+    what = (
+        f"Latencies are over {len(found)} recorded movements, frames taken to be {period_us / 1000:g} ms apart: "
+        "neighbouring rows of a trial resemble each other, as the frames of a whole movement do."
+    )
+    return _laid_out(grasp_set, labels, found, period_us, what)
+
+
+def composed_stream(
+    switches: NDArray[np.bool_],
+    codes: NDArray[np.uint16],
+    labels: Rows,
+    *,
+    seed: int,
+    grasps: int = GRASPS,
+    opens_up: NDArray[np.bool_] | None = None,
+) -> Stream:
+    """Return a stream composed of single trials (n, s), (n, j) of classes `labels` (n,): see this module.
+
+    opens_up  (j,) the joints whose codes rise as the hand opens; None: the codes of all fall
+
+    Raises FrontierError for fewer than two grasp types: there is nothing to go from and to.
+    """
+    if len(np.unique(labels)) < 2:
+        raise FrontierError("a latency is measured between grasps of different types, and the rows are of one")
+    rising = np.zeros(codes.shape[1], np.bool_) if opens_up is None else opens_up
+    random = np.random.default_rng(seed)
+    order = _order(labels, grasps, random)
+    legs = _legs(switches, codes, _open_hand(codes, rising), order, random)
+    begins = np.concatenate([[0], np.cumsum([len(leg.at_us) for leg in legs])])
+    return stream_from(
+        bits=np.concatenate([leg.bits for leg in legs]),
+        codes=np.concatenate([leg.codes for leg in legs]),
+        at_us=np.concatenate([leg.at_us for leg in legs]),
+        end_us=int(legs[-1].at_us[-1]) + HOLD_US[0],
+        arrivals=begins[:-1] + np.array([leg.arrival for leg in legs]),
+        ends=begins[1:],
+        grasps=labels[order],
+        what=f"Latencies are over a stream composed of {grasps} single trials, each held for {HOLD_US[0] / 1e6:g} to "
+        f"{HOLD_US[1] / 1e6:g} s, up to {TRANSITION_US / 1e6:g} s from one to the next: the recordings hold no whole "
+        "movements.",
+    )
+
+
+def stream_from(
+    *,
+    bits: NDArray[np.bool_],
+    codes: NDArray[np.uint16],
+    at_us: NDArray[np.int64],
+    end_us: int,
+    arrivals: Rows,
+    ends: Rows,
+    grasps: Rows,
+    what: str,
+) -> Stream:
+    """Return the stream of states that end at end_us; all grasps (g,), classes `grasps`, are told, in order."""
+    types = np.full(len(at_us) + 1, -1, np.intp)
+    for arrival, end, grasp in zip(arrivals.tolist(), ends.tolist(), grasps.tolist(), strict=True):
+        types[arrival:end] = grasp
+    another = np.concatenate([[True], grasps[1:] != grasps[:-1]])
+    return Stream(
+        bits=np.vstack([bits, bits[-1:]]),
+        codes=np.vstack([codes, codes[-1:]]),
+        at_us=np.append(at_us, np.int64(end_us)),
+        types=types,
+        arrivals=arrivals[another],
+        ends=ends[another],
+        what=what,
+    )
+
+
+def _whole(movements: Movements, rows: Rows, count: int) -> NDArray[np.bool_]:
+    """Return which movements (m,) have all their rows among `rows`."""
+    there = np.zeros(count + 1, np.int64)
+    there[1:] = np.cumsum(np.bincount(rows, minlength=count) > 0)
+    whole: NDArray[np.bool_] = there[movements.beyond] - there[movements.first] == movements.beyond - movements.first
+    return whole
+
+
+def _laid_out(grasp_set: GraspSet, labels: Rows, movements: Movements, period_us: int, what: str) -> Stream:
+    sizes = movements.beyond - movements.first
+    begins = np.concatenate([[0], np.cumsum(sizes)[:-1]])
+    number = np.repeat(np.arange(len(sizes)), sizes)
+    rows = np.arange(sizes.sum()) - begins[number] + movements.first[number]
+    at_us = np.arange(len(rows), dtype=np.int64) * period_us + number * round(_GOLDEN * period_us)
+    return stream_from(
+        bits=grasp_set.switches[rows],
+        codes=grasp_set.codes[rows],
+        at_us=at_us,
+        end_us=int(at_us[-1]) + period_us,
+        arrivals=begins + movements.complete - movements.first,
+        ends=begins + movements.released - movements.first,
+        grasps=labels[movements.first],
+        what=what,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Leg:
+    """The way from one grasp to the next, and its hold: states (t,), of which number `arrival` is the first of it."""
+
+    bits: Bits
+    codes: Codes
+    at_us: Times
+    arrival: int
+
+
+def _order(labels: Rows, grasps: int, random: np.random.Generator) -> list[int]:
+    """Return which trials are held one after the other; every trial once before any comes again."""
+    chosen: list[int] = []
+    waiting: list[int] = []
+    while len(chosen) < grasps:
+        place = next((n for n, row in enumerate(waiting) if not chosen or labels[row] != labels[chosen[-1]]), None)
+        if place is None:
+            waiting += random.permutation(len(labels)).tolist()
+        else:
+            chosen.append(waiting.pop(place))
+    return chosen
+
+
+def _open_hand(codes: Codes, opens_up: Bits) -> NDArray[np.float64]:
+    if not len(codes):
+        return np.zeros(codes.shape[1])
+    rising = np.sort(codes, axis=0)
+    rank = int(_OPEN * (len(codes) - 1))
+    opened: NDArray[np.float64] = np.where(opens_up, rising[len(codes) - 1 - rank], rising[rank]).astype(np.float64)
+    return opened
+
+
+def _legs(
+    switches: Bits, codes: Codes, opened: NDArray[np.float64], order: list[int], random: np.random.Generator
+) -> list[_Leg]:
+    legs: list[_Leg] = []
+    bits, pose, leaves_us = np.zeros(switches.shape[1], np.bool_), opened, 0
+    for row in order:
+        lets_go = leaves_us + random.integers(0, RELEASE_US, len(bits))
+        grips = leaves_us + RELEASE_US + TRAVEL_US + random.integers(0, GRIP_US, len(bits))
+        open_us, close_us = np.where(bits, lets_go, -_NEVER), np.where(switches[row], grips, _NEVER)
+        path = _path(pose, codes[row].astype(np.float64), opened)
+        leg = _leg(leaves_us, open_us, close_us, path)
+        bits, pose = switches[row], codes[row].astype(np.float64)
+        leaves_us = int(leg.at_us[-1]) + int(random.integers(*HOLD_US))
+        legs.append(leg)
+    return legs
+
+
+def _path(start: NDArray[np.float64], end: NDArray[np.float64], opened: NDArray[np.float64]) -> Codes:
+    """Return the codes (TRAVEL_US / RECORD_US + 1, j) on the way, both ends among them."""
+    t = np.arange(TRAVEL_US // RECORD_US + 1)[:, np.newaxis] / (TRAVEL_US // RECORD_US)
+    cubed, left = t * t * t, 1.0 - t
+    straight = start + (end - start) * (cubed * (10.0 - t * (15.0 - 6.0 * t)))
+    bent = straight + (opened - straight) * (_OPENING * _BUMP * cubed * cubed * left * left * left)
+    return np.rint(bent).astype(np.uint16)
+
+
+def _leg(leaves_us: int, open_us: Times, close_us: Times, path: Codes) -> _Leg:
+    """Return the states from where the hand begins to let go: each in which something changes, up to the last."""
+    starts_us = leaves_us + RELEASE_US
+    records_us = starts_us + RECORD_US * np.arange(len(path)) if path.shape[1] else np.array([starts_us + TRAVEL_US])
+    changes = np.concatenate([[leaves_us], open_us[open_us > -_NEVER], records_us, close_us[close_us < _NEVER]])
+    at_us = np.unique(changes.astype(np.int64))
+    now = at_us[:, np.newaxis]
+    travelled = np.clip((at_us - starts_us) // RECORD_US, 0, len(path) - 1)
+    return _Leg((now < open_us) | (now >= close_us), path[travelled], at_us, len(at_us) - 1)

@@ -1,1 +1,0 @@
-"""Streams of grasps, recorded or composed, and how long a decision takes on them."""

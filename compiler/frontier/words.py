@@ -1,0 +1,131 @@
+"""A frontier in words: how its points are named, the sentence that sums it up, and `frontier.csv`."""
+
+import csv
+import io
+from collections.abc import Iterable, Iterator
+
+from thenar.runtime.names import printable
+
+from ..recordings.spreadsheet import cells
+from ..text import counted, duration, interval, listed, percent
+from .points import Frontier, Mark, Point, Rate, Setting, Time
+
+COLUMNS = (
+    *("number", "fronts", "n_switches", "inputs", "method", "parameter", "rounds", "width", "layout"),
+    *("wiring", "clock_hz", "scan", "decision", "rate", "rate_low", "rate_high"),
+    *("left_out", "left_out_low", "left_out_high", "scan_us", "scan_how", "transfer_us", "transfer_how"),
+    *("classify_us", "classify_how", "frame_us", "frame_how", "latency_mean_us", "latency_p99_us", "missed", "wrong"),
+    *("flash", "ram", "ports", "chips", "compile_s", "switches"),
+)
+
+_LONGEST = 40  # letters of a name on a picture
+_SPARED = 0.005  # what a rate may lack and still count as level: half a point
+
+
+def inputs_of(point: Point) -> str:
+    """Return what a point reads: "33 switches", "joints alone", "8 switches + joints"."""
+    if point.setting.inputs == "joints":
+        return "joints alone"
+    return counted(len(point.switches), "switch", "switches") + (" + joints" if point.setting.inputs == "both" else "")
+
+
+def shorten(name: str) -> str:
+    """Return a name that has room on a picture: one line of at most 40 letters, all of which XML knows."""
+    line = printable(" ".join(name.split()))
+    return line if len(line) <= _LONGEST else f"{line[: _LONGEST - 3]}..."
+
+
+def way_of(setting: Setting) -> str:
+    """Return how switches were chosen: "id3 62"."""
+    return f"{setting.way.method} {setting.way.parameter:g}"
+
+
+def wiring_of(setting: Setting) -> str:
+    """Return wiring and clock: "mcp23017 400 kHz", "board 1 Mbaud"; nothing where no switch is read."""
+    if not setting.clock_hz:
+        return ""
+    unit = "baud" if setting.wiring == "board" else "Hz"
+    for letter, size in (("M", 1_000_000), ("k", 1_000)):
+        if setting.clock_hz >= size:
+            return f"{setting.wiring} {setting.clock_hz / size:g} {letter}{unit}"
+    return f"{setting.wiring} {setting.clock_hz} {unit}"
+
+
+def featured(frontier: Frontier) -> Point | None:
+    """Return the point to speak of, or None: the picked one; else the fastest within half a point of recognition of the
+    mark of most switches, the first of equals; else the best.
+    """
+    if frontier.picked is not None:
+        return frontier.point(frontier.picked)
+    goal = max(frontier.marks, key=lambda mark: mark.n_switches, default=None)
+    level = [each for each in frontier.points if goal is not None and each.rate.mean >= goal.rate.mean - _SPARED]
+    if level:
+        return min(level, key=lambda each: (each.frame.us, -each.rate.mean, each.number))
+    return max(frontier.points, key=lambda each: (each.rate.mean, -each.frame.us, -each.number), default=None)
+
+
+def summary(frontier: Frontier) -> str:
+    """Return switches, time and accuracy of the featured point, against the marks, in a sentence."""
+    point = featured(frontier)
+    if point is None:
+        return f"Of {frontier.combinations:,} combinations none is a point of the frontier."
+    said = (
+        f"Point {point.number}: {_inputs(frontier, point)}, read and classified in {duration(point.frame.us)} "
+        f"on {frontier.target}, recognise {interval(point.rate)} % of the grasps"
+    )
+    against = [_mark(mark) for mark in frontier.marks]
+    return f"{said}, against {listed(against)}." if against else f"{said}."
+
+
+def _inputs(frontier: Frontier, point: Point) -> str:
+    some = f"{len(point.switches)} of {frontier.n_switches} switches"
+    joints = counted(frontier.n_joints, "joint")
+    return {"switches": some, "joints": joints, "both": f"{some} and {joints}"}[point.setting.inputs]
+
+
+def _mark(mark: Mark) -> str:
+    name = (
+        mark.name
+        if str(mark.n_switches) in mark.name
+        else f"{counted(mark.n_switches, 'switch', 'switches')} ({mark.name})"
+    )
+    return f"{percent(mark.rate.mean)} in {duration(mark.frame_us)} with {name}"
+
+
+def csv_bytes(frontier: Frontier) -> bytes:
+    """Return `frontier.csv`: UTF-8, a line of COLUMNS, a line for each point.
+
+    Rates are in 0..1, times in microseconds (compile_s: seconds), a missing `left_out` is empty. `fronts` and
+    `switches` are lists in their cell, parted by semicolons; what holds a semicolon or a quote is quoted as CSV quotes.
+    """
+    file = io.StringIO(newline="")
+    rows = csv.writer(file, lineterminator="\n")
+    rows.writerow(COLUMNS)
+    rows.writerows(cells(_values(point)) for point in frontier.points)
+    return file.getvalue().encode()
+
+
+def _values(point: Point) -> Iterator[object]:
+    setting, latency = point.setting, point.latency
+    yield from (point.number, _list(point.fronts), len(point.switches), setting.inputs)
+    yield from (setting.way.method, setting.way.parameter, setting.rounds, setting.width, setting.layout)
+    yield from (setting.wiring, setting.clock_hz, setting.scan, setting.decision)
+    yield from (*_rate(point.rate), *_rate(point.left_out))
+    for time in (point.scan, point.transfer, point.classify, point.frame):
+        yield from _time(time)
+    yield from (latency.mean_us, latency.p99_us, latency.missed, latency.wrong)
+    yield from (point.flash, point.ram, point.ports, point.chips, point.compile_s, _list(point.switches))
+
+
+def _rate(rate: Rate | None) -> tuple[object, ...]:
+    return ("", "", "") if rate is None else (rate.mean, rate.low, rate.high)
+
+
+def _time(time: Time) -> tuple[object, ...]:
+    return time.us, time.how
+
+
+def _list(names: Iterable[str]) -> str:
+    listed = io.StringIO(newline="")
+    csv.writer(listed, delimiter=";", lineterminator="").writerow(names)
+    return listed.getvalue()

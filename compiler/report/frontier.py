@@ -1,0 +1,287 @@
+"""The section on a frontier: its pictures, its points, what is shown of the picked one, and tables."""
+
+import re
+import shlex
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from xml.etree import ElementTree
+
+import msgspec
+from markupsafe import Markup
+from msgspec import Struct
+
+from ..frontier.plots import PALETTE, POINT_ID, RING_ID, pictures
+from ..frontier.points import Frontier, Point, Time
+from ..frontier.words import featured, inputs_of, summary, way_of, wiring_of
+from ..hand import HandShape
+from ..text import DASH, NBSP, counted, interval, microseconds, sentence
+from .content import PlainTable
+from .hand import HandPicture, hand_picture
+
+_FOREIGN = "This frontier is of other recordings than the build."
+_CAPTIONS = {
+    "frontier": (
+        "Recognition rate against the time of a frame, both in the table below. Points that differ in the decision "
+        "alone are not on it."
+    ),
+    "switches": (
+        "Recognition rate against the number of switches. Curves are of switches alone: ours are blue, the rivals' are "
+        "thin. Points without switches are not on it."
+    ),
+    "latency": (
+        "Recognition rate against decision latency, from the hand's arrival in a grasp until it is decided on. Grasps "
+        "that were missed are not in it; only the best for their kind of decision are on it."
+    ),
+}
+# Colours that the style sheet has as well; the others it has for dark screens alone.
+_OF_THE_PAGE = ("ink", "soft", "line", "paper")
+_COLOURS = {
+    colour: f"var(--{name})" if name in _OF_THE_PAGE else f"var(--{name}, {colour})" for name, colour in PALETTE.items()
+}
+_TARGET = "9"  # radius of what can be clicked, in units of the pictures
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """A picture as a part of the page: the id of its place, what it shows, and its SVG."""
+
+    ident: str
+    caption: str
+    drawing: Markup
+
+
+class Detail(Struct, frozen=True):
+    """What is shown of a picked point: a sentence, names and values, its switches, their numbers on the hand that is
+    drawn, and the command that builds it.
+    """
+
+    number: int
+    said: str
+    facts: tuple[tuple[str, str], ...]
+    switches: tuple[str, ...]
+    on_hand: tuple[int, ...]
+    command: str
+
+
+@dataclass(frozen=True, slots=True)
+class FrontierView:
+    """What the section holds; hand is None where nobody knows where the switches lie."""
+
+    charts: tuple[Chart, ...]
+    points: PlainTable
+    details: tuple[Detail, ...]
+    picked: Detail | None
+    hand: HandPicture | None
+    tables: tuple[PlainTable, ...]
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def frontier_view(
+    frontier: Frontier, fingerprint: str, hand: HandShape | None, built: int | None = None
+) -> FrontierView:
+    """Return the section of `frontier` in a build from the recordings of that fingerprint, which is point `built`.
+
+    Raises PictureError without matplotlib.
+    """
+    if hand is not None and not all(hand.knows(point.switches) for point in frontier.points):
+        hand = None
+    details = {point.number: _detail(point, frontier.source, hand) for point in frontier.points}
+    first = featured(frontier) if built is None else frontier.point(built)
+    picked = None if first is None else details[first.number]
+    title = "Switches of the picked point on the hand"
+    return FrontierView(
+        charts=() if picked is None else tuple(_charts(frontier, details, picked)),
+        points=_points(frontier),
+        details=tuple(details.values()),
+        picked=picked,
+        hand=(
+            None
+            if hand is None or picked is None
+            else hand_picture(hand, picked.switches, "picked-hand", title, picked.said)
+        ),
+        tables=tuple(_tables(frontier)),
+        warnings=() if frontier.fingerprint == fingerprint else (_FOREIGN,),
+        notes=(*_notes(frontier), *(() if built is None else (f"This build is point {built}.",))),
+    )
+
+
+def _charts(frontier: Frontier, details: Mapping[int, Detail], picked: Detail) -> Iterator[Chart]:
+    drawn = pictures(msgspec.structs.replace(frontier, picked=picked.number), "svg", letters=True)
+    for name, svg in drawn.items():
+        ident = f"by-{name}"
+        yield Chart(ident, _CAPTIONS[name], _embedded(svg, ident, details, picked.number))
+
+
+def _embedded(svg: bytes, ident: str, details: Mapping[int, Detail], picked: int) -> Markup:
+    """Return an SVG file as a part of a page, in the page's colours; its points can be clicked and say what they are.
+
+    Only ids that are referred to stay, and begin with `ident`.
+    """
+    root = ElementTree.fromstring(svg)
+    referred = set(re.findall(r'(?:href="|url\()#([^")]+)', svg.decode()))
+    for part in list(root.iter()):
+        for child in list(part):
+            if child.tag.endswith("}metadata") or child.get("id") == RING_ID or child.find("{*}style") is not None:
+                part.remove(child)
+        _translate(part, ident, referred)
+        number = part.get("data-point")
+        if number is not None:
+            _make_point(part, details[int(number)].said, number == str(picked))
+    root.attrib = {"viewBox": root.attrib["viewBox"], "role": "img", "aria-labelledby": f"{ident}-caption"}
+    return Markup(ElementTree.tostring(root, encoding="unicode"))
+
+
+def _translate(part: ElementTree.Element, ident: str, referred: set[str]) -> None:
+    """Rewrite an element of an SVG file for a page: no namespaces, ids of its own, colours by name."""
+    part.tag = part.tag.rpartition("}")[2]
+    given, part.attrib = part.attrib, {}
+    for name, value in given.items():
+        name = name.rpartition("}")[2]
+        if name == "id":
+            if value.startswith(POINT_ID):
+                part.set("data-point", value.removeprefix(POINT_ID))
+            if value in referred:
+                part.set("id", f"{ident}-{value}")
+        elif name == "style":
+            part.set(name, re.sub(r"#[0-9a-f]{6}\b", lambda found: _COLOURS.get(found[0], found[0]), value))
+        else:
+            part.set(name, re.sub(r"^(url\()?#", rf"\1#{ident}-", value))
+
+
+def _make_point(marker: ElementTree.Element, said: str, picked: bool) -> None:
+    (place,) = marker.iterfind(".//{*}use")
+    marker.set("class", "point picked" if picked else "point")
+    title = ElementTree.Element("title")
+    title.text = said
+    marker.insert(0, title)
+    circle = {"class": "target", "cx": place.attrib["x"], "cy": place.attrib["y"], "r": _TARGET}
+    ElementTree.SubElement(marker, "circle", circle)
+
+
+def _detail(point: Point, source: str, hand: HandShape | None) -> Detail:
+    setting = point.setting
+    what = (inputs_of(point), setting.way.method, counted(setting.rounds, "round"), f"{setting.width} bits")
+    words = ", ".join(filter(None, (*what, _wiring(point))))
+    return Detail(
+        number=point.number,
+        said=f"Point {point.number}: {words}; {interval(point.rate)} % in {microseconds(point.frame.us)} µs.",
+        facts=tuple(_facts(point)),
+        switches=point.switches,
+        on_hand=() if hand is None else tuple(hand.numbers_of(point.switches).tolist()),
+        command=f"thenar compile {shlex.quote(source)} -o build/ --from frontier/frontier.json --point {point.number}",
+    )
+
+
+def _facts(point: Point) -> Iterable[tuple[str, str]]:
+    setting = point.setting
+    yield "Recognition rate, %", interval(point.rate)
+    yield "Subject left out, %", interval(point.left_out)
+    yield "Placement", _placement(point)
+    yield "Inputs", f"{setting.inputs}, {counted(len(point.switches), 'switch', 'switches')}"
+    yield "Wiring", f"{_wiring(point)}; {counted(point.ports, 'port')}, {counted(point.chips, 'chip')}"
+    layout = setting.layout and f"; {setting.layout}"
+    yield "Tables", f"{counted(setting.rounds, 'round')}, {setting.width} bits{layout}"
+    ending = "ends early" if setting.scan == "early" else "full"
+    yield "Scan", f"{_time(point.scan)}; {ending}" if point.switches else DASH
+    yield "CyberGlove's record", DASH if setting.inputs == "switches" else _time(point.transfer)
+    yield "Classify", _time(point.classify)
+    yield "Frame", _time(point.frame)
+    yield "Decision", setting.decision
+    mean, late = _latency(point)
+    yield "Latency", DASH if mean == DASH else f"{mean} µs, 99th percentile {late} µs"
+    yield "Grasps missed", f"{100 * point.latency.missed:.1f} %"
+    yield "Flash and RAM", f"{point.flash:,} and {point.ram:,} bytes"
+    yield "To compile", f"{point.compile_s:.1f} s"
+
+
+def _placement(point: Point) -> str:
+    return way_of(point.setting) if point.switches else DASH
+
+
+def _wiring(point: Point) -> str:
+    return wiring_of(point.setting) or point.setting.wiring
+
+
+def _latency(point: Point) -> tuple[str, str]:
+    """Return mean and 99th percentile of the latency, µs; dashes where no grasp was decided on rightly."""
+    latency = point.latency
+    return (DASH, DASH) if latency.missed >= 1 else (microseconds(latency.mean_us), microseconds(latency.p99_us))
+
+
+def _time(time: Time) -> str:
+    return f"{microseconds(time.us)} µs ({time.how})"
+
+
+def _points(frontier: Frontier) -> PlainTable:
+    columns = ("Point", "Switches", "Inputs", "Method", "Rate, %", "Frame, µs", "Latency, µs", "99th pct., µs")
+    rows = tuple(
+        (
+            str(point.number),
+            str(len(point.switches)),
+            point.setting.inputs,
+            _placement(point),
+            interval(point.rate),
+            microseconds(point.frame.us),
+            *_latency(point),
+            f"{100 * point.latency.missed:.1f}",
+            f"{point.flash:,}",
+        )
+        for point in frontier.points
+    )
+    caption = f"Points of the frontier; rates with 95{NBSP}% intervals"
+    return PlainTable(caption, (*columns, "Missed, %", "Flash, bytes"), rows, words=(0, 2, 3))
+
+
+def _tables(frontier: Frontier) -> Iterator[PlainTable]:
+    """Yield what to compare with, the rivals, what was screened and how far models are off, where there are any."""
+    if frontier.marks:
+        marks = tuple(
+            (mark.name, str(mark.n_switches), interval(mark.rate), microseconds(mark.frame_us))
+            for mark in frontier.marks
+        )
+        yield PlainTable("To compare with", ("What", "Switches", "Rate, %", "Frame, µs"), marks)
+    if frontier.curves:
+        sizes = sorted({size for curve in frontier.curves for size in curve.sizes})
+        rows = []
+        for curve in frontier.curves:
+            rates = dict(zip(curve.sizes, curve.rates, strict=True))
+            cells = (f"{100 * rates[size].mean:.1f}" if size in rates else "" for size in sizes)
+            rows.append((f"{curve.method}{' (ours)' if curve.ours else ''}", curve.what, *cells))
+        columns = ("Method", "What it is", *(f"{size:g}" for size in sizes))
+        caption = "Recognition rate in %, switches alone, against the number of switches"
+        yield PlainTable(caption, columns, tuple(rows), words=(0, 1))
+    if frontier.tried:
+        tried = tuple(
+            (
+                f"{each.way.method} {each.way.parameter:g}",
+                each.inputs,
+                str(each.n_switches),
+                str(each.rounds),
+                interval(each.rate),
+                microseconds(each.frame_us),
+            )
+            for each in frontier.tried
+        )
+        columns = ("Placement", "Inputs", "Switches", "Rounds", "Rate, %", "Frame, µs")
+        yield PlainTable("Placements that were screened", columns, tried)
+    if frontier.checks:
+        checks = tuple(
+            (check.what, check.how, str(check.n), f"{100 * check.mean_error:.1f}", f"{100 * check.worst_error:.1f}")
+            for check in frontier.checks
+        )
+        columns = ("Model of", "Held against", "Points", "Mean error, %", "Worst error, %")
+        yield PlainTable("How far the models of times are off", columns, checks)
+
+
+def _notes(frontier: Frontier) -> Iterator[str]:
+    yield summary(frontier)
+    yield (
+        f"{frontier.combinations:,} combinations of {frontier.source}: {counted(frontier.rows, 'row')}, "
+        f"{counted(frontier.subjects, 'subject')}, {counted(frontier.n_switches, 'switch', 'switches')}, "
+        f"{counted(frontier.n_joints, 'joint')}; target {frontier.target}. Rates are honest: {frontier.folds} folds, "
+        f"{counted(frontier.repeats, 'repeat')}, placements chosen within the training folds; with 95{NBSP}% intervals."
+    )
+    if frontier.wanted and frontier.picked is not None:
+        yield f"Point {frontier.picked} was picked for {frontier.wanted}."
+    yield from map(sentence, frontier.skipped)

@@ -1,0 +1,73 @@
+"""The hand as SVG: paths, circles and names in mm, y downwards, for the template to write out."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..hand import Floats, HandShape
+
+_MARGIN_MM = 4.0
+_NEAREST_MM = 0.5  # points of an outline nearer to the last one drawn are left out
+_LABELS_MM = 7.0
+
+
+@dataclass(frozen=True, slots=True)
+class HandPicture:
+    """A hand to draw; `ident` begins the ids of its elements, title and summary are what a screen reader says.
+
+    view_box is SVG's; outline, strips and creases are values of `d`. Of a digit, labels hold the name and its place; of
+    a switch, dots hold the name, its place, and which of the kept ones it is, from 1; "" if none.
+    """
+
+    ident: str
+    title: str
+    summary: str
+    view_box: str
+    outline: str
+    strips: tuple[str, ...]
+    creases: tuple[str, ...]
+    labels: tuple[tuple[str, str, str], ...]
+    dots: tuple[tuple[str, str, str, str], ...]
+
+
+def hand_picture(hand: HandShape, kept: Sequence[str], ident: str, title: str, summary: str) -> HandPicture:
+    """Return the picture of `hand` with the switches called `kept`, all of which it knows, numbered in their order."""
+    order = {name: str(place) for place, name in enumerate(kept, 1)}
+    return HandPicture(
+        ident=ident,
+        title=title,
+        summary=summary,
+        view_box=_view_box(hand),
+        outline=_path(hand.outline, closed=True),
+        strips=tuple(_path(strip, closed=True) for strip in hand.strips),
+        creases=tuple(_path(crease, closed=False) for crease in hand.creases),
+        labels=tuple(
+            (name, _mm(x), _mm(-y)) for name, (x, y) in zip(hand.part_names, hand.labels.tolist(), strict=False)
+        ),
+        dots=tuple(
+            (name, _mm(x), _mm(-y), order.get(name, ""))
+            for name, (x, y) in zip(hand.names, hand.places.tolist(), strict=True)
+        ),
+    )
+
+
+def _view_box(hand: HandShape) -> str:
+    points = np.concatenate([hand.outline, *hand.strips, hand.places, hand.labels])
+    (left, bottom), (right, top) = points.min(axis=0) - _MARGIN_MM, points.max(axis=0) + _MARGIN_MM
+    # The names of the digits reach out beyond their places.
+    return " ".join(map(_mm, (left - _LABELS_MM, -top, right - left + 2 * _LABELS_MM, top - bottom)))
+
+
+def _path(points: Floats, *, closed: bool) -> str:
+    drawn = [points[0]]
+    for point in points[1:-1]:
+        if np.hypot(*(point - drawn[-1])) >= _NEAREST_MM:
+            drawn.append(point)
+    drawn.append(points[-1])
+    steps = " ".join(f"{_mm(x)} {_mm(-y)}" for x, y in drawn)
+    return f"M{steps}{'Z' if closed else ''}"
+
+
+def _mm(value: float) -> str:
+    return f"{value:.1f}"

@@ -1,0 +1,107 @@
+"""The sections on what is recognised: the paper's tables, and what is mistaken for what."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..evaluation.populations import PROTOCOLS
+from ..evaluation.study import Study, Table
+from ..text import NBSP, counted, interval, percent, sentence
+from .content import PlainTable, ReportContent
+from .sections import honest_rate
+
+# Wider tables cannot be read; the list of what is mistaken most often can.
+WIDEST = 40
+_MOST = 5
+_SHADES = 9
+
+
+def protocols(study: Study) -> tuple[tuple[str, str], ...]:
+    """Return the study's protocols and their meanings."""
+    return tuple((f"{each.name} protocol", each.meaning) for each in PROTOCOLS if each.name in study.options.protocols)
+
+
+def study_tables(study: Study) -> tuple[PlainTable, ...]:
+    """Return the paper's tables."""
+    return tuple(map(_table, study.tables))
+
+
+def study_notes(study: Study) -> Iterator[str]:
+    """Yield how the rows were cut, what to beware of, and which tables are missing, and why."""
+    yield sentence(str(study))
+    yield from map(sentence, study.warnings)
+    for left in study.left_out:
+        yield f"No table of {left.name}: {left.reason}."
+
+
+def _table(table: Table) -> PlainTable:
+    several = len(table.columns) > 1
+    columns = ("Row", "What", "Switches", *table.columns, *(["average"] * several))
+    rows = tuple(
+        (row.name, row.what, str(row.switches), *map(str, row.cells), *([interval(row.average)] * several))
+        for row in table.rows
+    )
+    return PlainTable(table.title, columns, rows, words=(0, 1), note=table.note)
+
+
+@dataclass(frozen=True, slots=True)
+class ConfusionView:
+    """Counts as a table: where they are from, the grasp types, a row for each of these, and what is mistaken most.
+
+    rows  grasp type; its counts, each with the class that shades it ("hit1" to "miss9", "" for none); how many rows it
+          has; the share of them that was recognised. There are none where the table would be too wide.
+    """
+
+    title: str
+    grasps: tuple[str, ...]
+    rows: tuple[tuple[str, tuple[tuple[str, str], ...], str, str], ...]
+    mistaken: tuple[str, ...]
+
+
+def confusion_view(title: str, grasps: Sequence[str], counts: NDArray[np.intp]) -> ConfusionView:
+    """Return the table of `counts` (K, K), row: true, column: recognised; a shade is a share of its row."""
+    rows = []
+    for number, (grasp, line) in enumerate(zip(grasps, counts.tolist(), strict=True)):
+        total = sum(line)
+        cells = tuple(_shaded(count, total, column == number) for column, count in enumerate(line))
+        rows.append((grasp, cells, f"{total:,}", percent(line[number] / total, NBSP) if total else ""))
+    shown = tuple(rows) if len(grasps) <= WIDEST else ()
+    return ConfusionView(title, tuple(grasps), shown, tuple(_mistaken(grasps, counts)))
+
+
+def confusions(content: ReportContent) -> Iterator[ConfusionView]:
+    """Yield the build's own matrix, then those of the compositions, honest folds, all subjects together."""
+    if content.confusion is not None:
+        rate = honest_rate(content.manifest)
+        folds = "honest folds" if rate is None else counted(rate.folds, "honest fold")
+        yield confusion_view(f"This build's own recipe, {folds}", content.manifest.grasps, content.confusion)
+    if content.study is None:
+        return
+    for table in content.study.tables:
+        if (table.name, table.protocol) == ("compositions", "honest"):
+            one = len(table.columns) == 1
+            whose = f"subject {table.columns[0]}" if one else f"{len(table.columns)} subjects together"
+            for row in table.rows:
+                counts = [cell.confusion for cell in row.cells if cell.confusion is not None]
+                if counts:
+                    title = f"{row.name}: {row.what}, honest folds of {whose}"
+                    yield confusion_view(title, content.study.grasps, np.sum(counts, axis=0))
+
+
+def _shaded(count: int, total: int, hit: bool) -> tuple[str, str]:
+    if not count:
+        return "·", ""
+    return f"{count:,}", f"{'hit' if hit else 'miss'}{1 + (_SHADES - 1) * count // total}"
+
+
+def _mistaken(grasps: Sequence[str], counts: NDArray[np.intp]) -> Iterator[str]:
+    """Yield sentences on the commonest mistakes; of equally common ones the first in the table."""
+    wrong = counts.copy()
+    np.fill_diagonal(wrong, 0)
+    for place in np.argsort(-wrong, axis=None, kind="stable")[:_MOST].tolist():
+        true, found = divmod(place, len(grasps))
+        if wrong[true, found]:
+            total = int(counts[true].sum())
+            yield f"{grasps[true]} taken for {grasps[found]}: {wrong[true, found]:,} of {total:,} rows"

@@ -1,0 +1,227 @@
+"""The sections on the build itself: summary, placement, guarantee, scan map and provenance."""
+
+import shlex
+from collections.abc import Iterator
+from itertools import accumulate
+
+import msgspec
+
+from thenar.runtime.manifest import Manifest, Recognised
+from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, scan_us, scanner_us
+
+from ..placement.gain import entropy_bits
+from ..placement.methods.base import METHODS
+from ..text import NBSP, counted, microseconds, percent
+from ..trainers.base import TRAINERS
+from .content import PlainTable, ReportContent
+
+Pairs = tuple[tuple[str, str], ...]
+
+
+def honest_rate(manifest: Manifest) -> Recognised | None:
+    """Return the rate to expect of new grasps, if it was measured."""
+    return next((rate for rate in manifest.rates if rate.protocol == "honest"), None)
+
+
+def headline(manifest: Manifest) -> str:
+    """Return the build in one sentence."""
+    inputs = []
+    if manifest.switches:
+        inputs.append(f"{len(manifest.switches)} of {counted(manifest.source.switches, 'switch', 'switches')}")
+    if manifest.joints:
+        inputs.append(counted(len(manifest.joints), "joint"))
+    said = f"This build recognises {len(manifest.grasps)} grasp types from {' and '.join(inputs)}"
+    rate = honest_rate(manifest)
+    if rate is None:
+        return f"{said}; what to expect of new grasps was not measured."
+    return f"{said}: {percent(rate.rate, NBSP)} of grasps that it was not trained on."
+
+
+def facts(content: ReportContent) -> Iterator[tuple[str, str, str]]:
+    """Yield the numbers that one asks for first: what each is, itself in large, and what it is out of."""
+    manifest = content.manifest
+    for rate in sorted(manifest.rates, key=lambda rate: rate.protocol):
+        yield (
+            "Recognised, honest folds" if rate.protocol == "honest" else "Recognised, rows trained on",
+            percent(rate.rate, NBSP),
+            f"{rate.correct:,} of {rate.total:,} rows" + (f", {rate.folds} folds" if rate.folds else ""),
+        )
+    yield "Switches kept", f"{len(manifest.switches)}", f"of {manifest.source.switches}"
+    yield "Joints", f"{len(manifest.joints)}", "of the CyberGlove" if manifest.joints else "none are used"
+    ended = f"of {manifest.options.rounds}: the tolerance ended the training"
+    yield "Rounds", f"{content.rounds}", ended if manifest.stopped_after else "of boosting"
+    yield "Tables", f"{content.tables_bytes:,}", "bytes of tables.bin"
+    yield "Changed by rounding", f"{manifest.proof.changed}", f"of {counted(manifest.source.rows, 'row')}"
+
+
+def warnings(content: ReportContent) -> Iterator[str]:
+    """Yield what to beware of."""
+    manifest = content.manifest
+    if content.only_answer is not None:
+        yield (
+            f"Every row is recognised as {content.only_answer}: no input tells grasp types apart by itself, and stumps "
+            "look at one at a time."
+        )
+    if manifest.zero_gain_nodes:
+        nodes = counted(manifest.zero_gain_nodes, "decision")
+        yield f"At {nodes} of the placement no switch gains anything alone: the lowest-numbered was taken."
+    if manifest.source.simulated:
+        yield f"The recordings are simulated ({manifest.source.simulated})."
+
+
+def kept_table(content: ReportContent) -> PlainTable:
+    """Return the kept switches in their order, and what each brought.
+
+    The share of the grasp types' entropy that it and those before it brought is known where a tree chose them.
+    """
+    switches, tree, hand = content.manifest.switches, content.tree, content.hand
+    entropy = 0.0 if tree is None else entropy_bits(list(tree.nodes[0].counts))
+    parts = {} if hand is None else dict(zip(hand.names, hand.parts.tolist(), strict=True))
+    rows = []
+    for order, (switch, gain) in enumerate(zip(switches, accumulate(each.gain for each in switches), strict=True), 1):
+        part = "" if hand is None else hand.part_names[parts[switch.name]]
+        together = () if tree is None else (percent(gain / entropy, NBSP) if entropy else "",)
+        rows.append((str(order), switch.name, part, str(switch.column), f"{switch.gain:.3f}", *together))
+    columns = ("Order", "Switch", "Part", "Column", "Bits", *(() if tree is None else ("Together",)))
+    caption = "Kept switches, in the order in which they were chosen"
+    return PlainTable(caption, columns, tuple(rows), words=(1, 2), head=1)
+
+
+def placement_sentences(content: ReportContent) -> tuple[str, str]:
+    """Return by which method the switches were chosen, and how to read their table."""
+    method = content.manifest.options.placement
+    how = METHODS[method].help if method in METHODS else "Chosen by another version of thenar"
+    if content.tree is not None:
+        bits = "brought the tree; together is what it and those before it brought, as a share of all there is to know"
+    else:
+        bits = "holds alone, without the others"
+    return (
+        f"{how} (--placement {method}).",
+        f"Columns count from 0 in the recordings. Bits are the information on the grasp type that a switch {bits}.",
+    )
+
+
+def no_tree(manifest: Manifest) -> str:
+    """Return why there is no tree."""
+    if not manifest.switches:
+        return "No tree: no switches were chosen."
+    return f"No tree: the switches were chosen by {manifest.options.placement}."
+
+
+def guarantee_sentences(content: ReportContent) -> Iterator[str]:
+    """Yield what build.json proves of the integers, and what the worst case adds to it."""
+    proof, rows, worst = content.manifest.proof, content.manifest.source.rows, content.worst
+    yield (
+        f"Scores are sums of integers, {proof.scale:.1f} steps to a unit of score. No sum of them, in any order and "
+        f"with any inputs missing, goes beyond {proof.bound:,} steps, and so none leaves {proof.width} bits."
+    )
+    yield (
+        f"Rounding moves no score by more than {proof.error:g} steps, so that a lead of more than "
+        f"{proof.safe_margin:g} steps keeps its grasp type: {_share(proof.covered, rows)} rows trained on have it. "
+        f"{counted(proof.changed, 'row')} changed grasp type."
+    )
+    if worst is not None:
+        yield (
+            f"At worst, over every frame there is and not only those recorded, {worst.leader} loses {worst.loss:.3f} "
+            f"steps of its lead over {worst.rival}. Worked out exactly, ties in whole steps included, a lead of more "
+            f"than {worst.safe_margin:.3f} steps is safe: {_share(worst.covered, rows)} rows trained on have it."
+        )
+
+
+def guarantee_table(content: ReportContent) -> PlainTable | None:
+    """Return the differences and their bounds, where the worst case was worked out."""
+    found, worst = content.comparison, content.worst
+    if found is None or worst is None:
+        return None
+    most, integer_bound = 2 ** (content.manifest.proof.width - 1) - 1, found.integer_bound + found.slack
+    float_difference, float_bound = f"{found.collapse_difference:.3g}", f"{found.collapse_bound:.3g}"
+    rows = (
+        ("Ensemble against float tables, units of score", float_difference, float_bound),
+        ("Float tables against integers, steps", f"{found.integer_difference:.3f}", f"{integer_bound:.3f}"),
+        ("Most that a lead can lose, steps, all frames", f"{worst.loss:.3f}", f"{worst.bound:.3f}"),
+        ("Furthest that a sum can get from zero, steps", f"{abs(worst.reach):,}", f"{most:,}"),
+    )
+    return PlainTable("Differences beside their bounds", ("What", "Found", "Bound"), rows)
+
+
+def _share(count: int, total: int) -> str:
+    return f"{count:,} of {total:,}" + (f" ({percent(count / total, NBSP)})" if total else "")
+
+
+def scan_table(content: ReportContent) -> PlainTable | None:
+    """Return the transactions that read the kept switches, in their order; None without a scan map or without any."""
+    scan, harness, names = content.scan, content.harness, content.switch_names
+    if scan is None or harness is None or not scan.ports:
+        return None
+    rows = []
+    for order, port in enumerate(scan.ports, 1):
+        bus = harness.buses[port.bus]
+        where = (f"{bus.device} at {bus.clock_hz / 1000:g} kHz", bus.chips[port.chip].place, port.reading)
+        switches = ", ".join(names[switch] for _, switch in port.switches)
+        us = microseconds(port_us(reading_of(port, harness), bus.clock_hz))
+        rows.append((str(order), *where, switches, us))
+    caption = "Transactions, in the order in which they are made; times on the wire, by arithmetic"
+    columns = ("Order", "Bus", "Chip", "Reads", "Switches", "µs")
+    return PlainTable(caption, columns, tuple(rows), words=(1, 2, 3, 4))
+
+
+def scan_sentences(content: ReportContent) -> Iterator[str]:
+    """Yield what the wire is bound to take; nothing without a scan map."""
+    scan, harness, joints = content.scan, content.harness, len(content.manifest.joints)
+    if scan is None or harness is None:
+        return
+    if scan.ports:
+        time = scan_us(scan, harness)
+        wired = sum(len(chip.pins) for bus in harness.buses for chip in bus.chips)
+        muxes = f", {counted(time.selects, 'write')} to muxes among them" if time.selects else ""
+        yield (
+            f"A whole scan is {counted(len(scan.ports) + time.selects, 'transaction')}{muxes}: "
+            f"{microseconds(time.us)} µs on the wire, {percent(time.share, NBSP)} of the "
+            f"{microseconds(time.full_us)} µs that all {wired} wired ones take."
+        )
+    for board, pairs in zip(harness.scanners, scan.scanners, strict=True):
+        yield (
+            f"The board on {board.port} shows {counted(len(pairs), 'kept switch', 'kept switches')} of "
+            f"{counted(len(board.switches), 'key')}, {microseconds(scanner_us(board))} µs a bitmap on its line."
+        )
+    if harness.cyberglove is not None and joints:
+        sensors = harness.cyberglove.sensors or joints
+        us = microseconds(glove_us(harness.cyberglove, sensors))
+        yield f"A record of the CyberGlove's {sensors} sensors takes {us} µs on its own line, beside the scan."
+
+
+def provenance(manifest: Manifest) -> Pairs:
+    """Return what build.json says of its origin. No date, no host."""
+    source = manifest.source
+    pairs = (
+        ("Made by", f"thenar {manifest.thenar}"),
+        ("Recordings, SHA-256", source.fingerprint),
+        ("Rows and taxonomy", f"{counted(source.rows, 'row')}, {source.taxonomy}"),
+        ("Simulated by", source.simulated),
+        ("build.json, its checksum", manifest.checksum),
+        ("tables.bin, SHA-256", manifest.tables_sha256),
+        ("ensemble.bin, SHA-256", manifest.ensemble_sha256),
+        ("scan.json, SHA-256", manifest.scan_sha256 or ""),
+    )
+    return tuple((name, value) for name, value in pairs if value)
+
+
+def options_set(manifest: Manifest) -> Pairs:
+    """Return every option that is set, by the name that `thenar compile` gives it: of trainers, only of its own."""
+    options = manifest.options
+    names = {trainer.name: {setting.name for setting in trainer.settings} for trainer in TRAINERS.values()}
+    foreign = set().union(*names.values()) - names.get(options.trainer, set()) | {"settings"}
+    fields = [field.name for field in msgspec.structs.fields(options) if field.name not in foreign]
+    values = {name: getattr(options, name) for name in fields} | options.settings
+    return tuple((f"--{name.replace('_', '-')}", _plain(value)) for name, value in values.items() if value is not None)
+
+
+def commands(content: ReportContent) -> tuple[str, str]:
+    """Return the commands that make the build again, and verify it."""
+    flags = "".join(f" {name} {shlex.quote(value)}" for name, value in options_set(content.manifest))
+    glove = "" if content.scan is None else " --glove glove.toml"
+    return f"thenar compile SET.grasps -o build/{flags}{glove}", "thenar verify build/ SET.grasps"
+
+
+def _plain(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)

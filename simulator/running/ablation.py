@@ -1,0 +1,29 @@
+"""What accuracy costs in time, for simulation: a scene with each of its effects removed in turn."""
+
+from collections.abc import Callable
+
+import msgspec
+
+from thenar.compiler.evaluation.ablation import FOLDS, ROUNDS, Ablation, Made, ablated
+
+from ..scenes.scene import Scene
+from .explain import best_us
+from .pipeline import DEFAULT_CONTACT
+from .simulation import simulate
+
+
+def ablate(scene: Scene, jobs: int = -1, progress: Callable[[int, int], None] | None = None) -> Ablation:
+    """Return what each effect of a scene does to the recognition rate and the time; a grasp is one row, its read-out.
+
+    No scene can do without a contact model: contact.quasistatic is never removed, and takes the place of another.
+    Raises SceneError if the scene cannot be simulated, EvaluationError if it has too few repetitions to cross-validate.
+    """
+    scene = msgspec.structs.replace(scene, recording=msgspec.structs.replace(scene.recording, rows="last"))
+    variants = [None, *(each.name for each in scene.effects if each.name != DEFAULT_CONTACT)]
+    times = best_us(scene, variants)
+    simulated = (
+        (without, us, simulate(scene, jobs, without=without)) for without, us in zip(variants, times, strict=True)
+    )
+    made = (Made(without, one.grasp_set, len(one.report.unsettled), us) for without, us, one in simulated)
+    found = ablated(made, len(variants), len(scene.subjects), jobs, progress)
+    return Ablation(simulated=True, scene=scene.name, seed=scene.seed, folds=FOLDS, rounds=ROUNDS, variants=found)

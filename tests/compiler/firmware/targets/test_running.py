@@ -1,0 +1,62 @@
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thenar.compiler.firmware.answers import Answers
+from thenar.compiler.firmware.classifier import classifier_files
+from thenar.compiler.firmware.layout import arrange
+from thenar.compiler.firmware.probes import Probes
+from thenar.compiler.firmware.targets import TARGETS
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.tables import IntegerTables
+
+UNITS = {
+    "host": "",
+    "avr328p": "cycles",
+    "avr2560": "cycles",
+    "cortex-m0plus": "instructions",
+    "cortex-m4": "instructions",
+}
+
+
+@pytest.mark.parametrize("incremental", [False, True], ids=["classify", "update"])
+@pytest.mark.parametrize("part", list(UNITS))
+def test_every_target_answers_as_python_does(
+    tool: Callable[[str], str],
+    make_tables: Callable[..., IntegerTables],
+    describe: Callable[[IntegerTables], Manifest],
+    probed: Callable[[IntegerTables, int], Probes],
+    same_as_python: Callable[[Answers, IntegerTables, Probes], None],
+    part: str,
+    incremental: bool,
+) -> None:
+    target = TARGETS[part]
+    if (missing := target.missing()) is not None:
+        tool(missing.split()[0])
+    tables = make_tables(classes=7, switches=12, joints=4)
+    layout, frames = arrange(tables), probed(tables, 500)
+    files = classifier_files("hand", describe(tables), layout, avr=target.avr)
+    sent = layout.frame_bytes(frames.bits, frames.codes)
+    answers = target.run(files, "hand", layout, sent, incremental=incremental)
+    same_as_python(answers, tables, frames)
+    assert answers.unit == UNITS[part]
+    assert (answers.cost is None) == (part == "host")
+    assert answers.cost is None or bool(np.all(answers.cost > 0))
+
+
+NEEDED = {
+    "host": "gcc or clang not found; Debian: apt-get install gcc",
+    "cortex-m4": "arm-none-eabi-gcc and qemu-system-arm not found; "
+    "Debian: apt-get install gcc-arm-none-eabi qemu-system-arm",
+    "avr328p": "avr-gcc and gcc or clang and make not found; Debian: apt-get install gcc-avr avr-libc gcc make",
+}
+
+
+@pytest.mark.parametrize("part", list(NEEDED))
+def test_missing_tools_are_named_before_anything_is_run(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, part: str
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert TARGETS[part].missing() == NEEDED[part]

@@ -1,0 +1,52 @@
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thenar.compiler.firmware.errors import FirmwareError
+from thenar.compiler.firmware.layout import arrange
+from thenar.compiler.firmware.targets import TARGETS, Target, kinds, timed
+from thenar.drivers.members import MemberError
+from thenar.runtime.tables import IntegerTables
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_every_target_says_what_it_is_and_what_to_do_with_its_folder(name: str) -> None:
+    target = TARGETS[name]
+    assert (target.name, bool(target.help), bool(target.part)) == (name, True, True)
+    assert "{folder}" in target.next_step or "libraries" in target.next_step
+    assert target.modes[0] == "classify"
+    assert not target.kind or target.missing() is None or "apt-get install" in str(target.missing())
+    if target.kind not in ("", "host"):
+        assert target.compiler is not None
+        assert target.size is not None
+
+
+def test_the_page_on_firmware_names_every_target() -> None:
+    page = (Path(__file__).parents[4] / "docs" / "firmware.md").read_text()
+    assert [name for name in TARGETS if f"`{name}`" not in page] == []
+
+
+def test_an_atmega328p_has_32_kib_of_flash_and_2_of_ram() -> None:
+    uno = TARGETS["avr328p"]
+    assert (uno.part, uno.flash, uno.ram, uno.clock_hz) == ("atmega328p", 32768, 2048, 16_000_000)
+
+
+def test_what_is_verified_and_what_is_timed_is_read_off_the_targets() -> None:
+    assert kinds() == ("host", "avr", "cortex-m")
+    assert timed() == ("avr328p", "avr2560", "cortex-m0plus", "cortex-m4", "host", "pi")
+
+
+def test_a_target_that_is_none_is_refused_with_those_that_are() -> None:
+    with pytest.raises(MemberError, match="no firmware target 'attiny85': choose one of host, avr328p, avr2560"):
+        TARGETS.named("attiny85")
+
+
+def test_a_target_without_a_simulator_says_so(make_tables: Callable[..., IntegerTables]) -> None:
+    core = Target(name="rv32", part="rv32imac", help="a core", flash=1 << 17, ram=1 << 14)
+    layout = arrange(make_tables())
+    assert core.cost(layout) == TARGETS["cortex-m4"].cost(layout)
+    assert core.missing() == "thenar has no simulator of a rv32imac"
+    with pytest.raises(FirmwareError, match="no simulator of a rv32imac"):
+        core.run({}, "hand", layout, np.zeros((1, 5), np.uint8))

@@ -1,0 +1,226 @@
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import thenar.simulator.scenes
+from thenar.compiler import compile_build
+from thenar.compiler.artifact.select import select_inputs
+from thenar.compiler.firmware import simavr
+from thenar.compiler.firmware.answers import Answers
+from thenar.compiler.firmware.classifier import classifier_files
+from thenar.compiler.firmware.errors import FirmwareError
+from thenar.compiler.firmware.layout import Adding, Layout, arrange
+from thenar.compiler.firmware.probes import Probes, random_frames
+from thenar.compiler.firmware.targets import TARGETS, Target
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.runtime.build import Build
+from thenar.runtime.manifest import Manifest
+from thenar.runtime.tables import IntegerTables
+from thenar.simulator import load_scene, simulate
+
+MakeTables = Callable[..., IntegerTables]
+Describe = Callable[[IntegerTables], Manifest]
+Probed = Callable[[IntegerTables, int], Probes]
+Compare = Callable[[Answers, IntegerTables, Probes], None]
+
+SMALL, LARGE = TARGETS["avr328p"], TARGETS["avr2560"]
+HEADER = """
+#include <stdint.h>
+typedef struct { uint8_t switches[1]; } thenar_test_frame;
+extern thenar_test_frame thenar_test_input;
+extern int16_t thenar_test_scores[2];
+uint8_t thenar_test_classify(void);
+uint8_t thenar_test_update(void);
+"""
+# A hundred turns more where the switch is closed; eight bytes on the stack. The grasp is the switch.
+SOURCE = """
+#include "thenar_test.h"
+thenar_test_frame thenar_test_input;
+int16_t thenar_test_scores[2];
+uint8_t thenar_test_classify(void)
+{
+    const uint8_t closed = thenar_test_input.switches[0];
+    uint8_t turns = (uint8_t)(1u + 100u * closed);
+    __asm__ volatile (".rept 8\\n push r0\\n .endr\\n .rept 8\\n pop r0\\n .endr\\n"
+                      "1: dec %0\\n brne 1b" : "+r" (turns));
+    thenar_test_scores[0] = closed;
+    thenar_test_scores[1] = -2;
+    return closed;
+}
+uint8_t thenar_test_update(void)
+{
+    return thenar_test_classify();
+}
+"""
+BY_HAND = {"thenar_test.h": HEADER, "thenar_test.c": SOURCE}
+BOTH = pytest.mark.parametrize("target", [SMALL, LARGE], ids=["328P", "2560"])
+
+
+@pytest.fixture(autouse=True)
+def installed(tool: Callable[[str], str]) -> None:
+    tool("avr-gcc")
+    if (gone := simavr.missing()) is not None:
+        assert "libsimavr" in gone, gone
+        tool("libsimavr-dev")
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Build, GraspSet]:
+    """Return a build and the recordings that it was made of."""
+    scene = load_scene(str(Path(thenar.simulator.scenes.__file__).parent / "quick.toml"))
+    grasps = simulate(scene, 1).grasp_set
+    made = compile_build(grasps, tmp_path_factory.mktemp("build") / "build", rounds=20, folds=0)
+    return Build.load(made.folder), grasps
+
+
+def one_switch() -> IntegerTables:
+    one = np.ones((1, 2), np.int16)
+    return IntegerTables(
+        bias=0 * one[0],
+        switch_rows=one,
+        thresholds=(),
+        joint_rows=(),
+        switch_means=0 * one,
+        joint_means=np.empty((0, 2), np.int16),
+        scale=1.0,
+    )
+
+
+def answered(
+    tables: IntegerTables, describe: Describe, layout: Layout, target: Target, frames: Probes, incremental: bool = False
+) -> Answers:
+    files = classifier_files("test", describe(tables), layout, avr=True)
+    given = layout.frame_bytes(frames.bits, frames.codes)
+    return target.run(files, "test", layout, given, incremental=incremental)
+
+
+@BOTH
+@pytest.mark.parametrize("incremental", [False, True], ids=["classify", "update"])
+def test_every_score_of_recordings_is_that_of_the_build(
+    recorded: tuple[Build, GraspSet], same_as_python: Compare, target: Target, incremental: bool
+) -> None:
+    build, grasps = recorded
+    frames = Probes(*select_inputs(grasps, build.manifest))
+    layout = arrange(build.tables, bins="search")
+    files = classifier_files("test", build.manifest, layout, avr=True)
+    given = layout.frame_bytes(frames.bits, frames.codes)
+    same_as_python(target.run(files, "test", layout, given, incremental=incremental), build.tables, frames)
+
+
+@BOTH
+@pytest.mark.parametrize("entry_bits", [16, 8])
+@pytest.mark.parametrize("highest", [254, 900], ids=["codes of 8 bits", "codes of 16 bits"])
+@pytest.mark.parametrize("incremental", [False, True], ids=["classify", "update"])
+def test_every_score_is_pythons_on_all_extreme_frames_and_random_ones(
+    make_tables: MakeTables,
+    describe: Describe,
+    probed: Probed,
+    same_as_python: Compare,
+    target: Target,
+    entry_bits: int,
+    highest: int,
+    incremental: bool,
+) -> None:
+    tables = make_tables(seed=entry_bits + highest, highest=highest)
+    layout = arrange(tables, entry_bits=entry_bits, bins="direct" if highest < 255 else "search")
+    frames = probed(tables, 1000)
+    same_as_python(answered(tables, describe, layout, target, frames, incremental), tables, frames)
+
+
+@BOTH
+@pytest.mark.parametrize("entry_bits", [16, 8])
+@pytest.mark.parametrize("adding", ["called", "unrolled"])
+@pytest.mark.parametrize(("classes", "switches", "joints"), [(14, 33, 16), (14, 33, 0), (3, 0, 4), (17, 12, 5)])
+def test_no_frame_takes_longer_than_the_static_bound_nor_far_less(
+    make_tables: MakeTables,
+    describe: Describe,
+    probed: Probed,
+    target: Target,
+    entry_bits: int,
+    adding: Adding,
+    classes: int,
+    switches: int,
+    joints: int,
+) -> None:
+    tables = make_tables(seed=1, classes=classes, switches=switches, joints=joints)
+    layout = arrange(tables, entry_bits=entry_bits, adding=adding)
+    answers = answered(tables, describe, layout, target, probed(tables, 200))
+    assert answers.cost is not None
+    assert answers.unit == "cycles"
+    bound = target.cost(layout).cycles
+    print(f"{answers.cost.min()} to {answers.cost.max()} cycles, bound {bound}, {answers.stack} bytes of stack")
+    assert bound - 16 <= answers.cost.max() <= bound
+
+
+@BOTH
+def test_stack_cycles_and_answers_are_those_of_the_function_alone(target: Target) -> None:
+    """A classifier by hand: its stack is eight bytes and the return address, its loop takes three cycles a turn."""
+    tables = one_switch()
+    layout = arrange(tables)
+    frames = layout.frame_bytes(np.array([[False], [True]]), np.empty((2, 0), np.uint16))
+    answers = target.run(BY_HAND, "test", layout, frames)
+    assert answers.cost is not None
+    assert answers.cost.tolist()[1] - answers.cost.tolist()[0] == 3 * 100
+    assert answers.stack == 8 + (2 if target is SMALL else 3)
+    assert answers.classes.tolist() == [0, 1]
+    assert answers.scores.tolist() == [[0, -2], [1, -2]]
+
+
+def test_ten_thousand_frames_take_seconds(make_tables: MakeTables, describe: Describe) -> None:
+    tables = make_tables(seed=2, classes=14, switches=33, joints=16)
+    frames = random_frames(tables, 10_000, seed=3)
+    begun = children_s()
+    answered(tables, describe, arrange(tables), SMALL, frames)
+    print(f"{children_s() - begun:.1f} s")
+    assert children_s() - begun < 15
+
+
+def children_s() -> float:
+    """Return what programs have taken of the processor that this one has waited for."""
+    times = os.times()
+    return times.children_user + times.children_system
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"thenar_test.c": "int unused(void) { int x; return 0; }"}, "unused variable"),
+        ({"thenar_test.h": HEADER.replace("switches[1]", "switches[2]")}, "thenar_test_input has 2 bytes"),
+        ({"thenar_test.c": SOURCE.replace("thenar_test_scores", "other")}, "thenar_test_scores"),
+        ({"thenar_test.c": SOURCE.replace("brne", "rjmp")}, "does not return within"),
+    ],
+    ids=["warning", "another frame", "no scores", "hangs"],
+)
+def test_files_that_are_no_such_classifier_are_an_error(changed: dict[str, str], said: str) -> None:
+    layout = arrange(one_switch())
+    with pytest.raises(FirmwareError, match=said):
+        SMALL.run({**BY_HAND, **changed}, "test", layout, np.ones((1, 1), np.uint8))
+
+
+def test_frames_of_another_size_are_refused() -> None:
+    with pytest.raises(FirmwareError, match="this layout takes uint8"):
+        SMALL.run(BY_HAND, "test", arrange(one_switch()), np.zeros((1, 2), np.uint8))
+
+
+def test_no_frames_have_no_answers() -> None:
+    answers = SMALL.run(BY_HAND, "test", arrange(one_switch()), np.zeros((0, 1), np.uint8))
+    assert (answers.scores.shape, answers.stack) == ((0, 2), None)
+
+
+def test_what_is_missing_is_named_with_the_packages_that_bring_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with monkeypatch.context() as changed:
+        changed.setenv("THENAR_SIMAVR", str(tmp_path))
+        assert "has no harness for simavr: set THENAR_SIMAVR" in str(simavr.missing())
+        lacks_libsimavr = "all:\n%:\n\t@echo 'fatal error: simavr/sim_avr.h: No such file' >&2; exit 1\n"
+        (tmp_path / "Makefile").write_text(lacks_libsimavr)
+        (tmp_path / "simavr_classify.c").touch()
+        assert simavr.missing() == "libsimavr not found; Debian: apt-get install libsimavr-dev"
+    monkeypatch.setenv("PATH", str(tmp_path))
+    gone = simavr.missing()
+    assert gone is not None
+    assert gone.endswith("Debian: apt-get install gcc-avr avr-libc gcc make")

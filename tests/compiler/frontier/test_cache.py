@@ -1,0 +1,372 @@
+"""What a store keeps through kills, damage and full disks; and that what it keeps is not found again."""
+
+import math
+import random
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from distributed import LocalCluster
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.compiler.cluster import ClusterError
+from thenar.compiler.frontier.cache import HEADER, OLD_HEADER, Cache, Call, Store, StoreError, stored
+
+
+def question(number: int) -> bytes:
+    return b"question %d" % number
+
+
+class Answer(msgspec.Struct, frozen=True):
+    rates: tuple[float, ...]
+    name: str = ""
+
+
+def filled(path: Path, count: int = 3) -> Path:
+    with Store(path, "set") as store:
+        for number in range(count):
+            store.put(question(number), Answer((number / 3,)))
+    return path
+
+
+def kept(path: Path, count: int = 3) -> list[int]:
+    """Return which of the questions of `filled` the store at `path` still answers, all of them rightly."""
+    with Store(path, "set") as store:
+        answers = {number: store.get(question(number), Answer) for number in range(count)}
+    assert all(answer in (None, Answer((number / 3,))) for number, answer in answers.items())
+    return [number for number, answer in answers.items() if answer is not None]
+
+
+def test_what_was_put_is_there_at_once_and_after_opening_again(tmp_path: Path) -> None:
+    with Store(tmp_path / "store", "set") as store:
+        store.put(question(1), Answer((0.1, 1 / 3), "Zylinder\n\u2028"))
+        at_once = store.get(question(1), Answer)
+    with Store(tmp_path / "store", "set") as store:
+        assert store.get(question(1), Answer) == at_once == Answer((0.1, 1 / 3), "Zylinder\n\u2028")
+        assert len(store) == 1
+
+
+def test_another_scope_of_question_is_another_question(tmp_path: Path) -> None:
+    filled(tmp_path / "store", 1)
+    with Store(tmp_path / "store", "other set") as store:
+        assert store.get(question(0), Answer) is None
+        store.put(question(0), Answer((9.0,)))
+    assert kept(tmp_path / "store", 1) == [0]
+
+
+def test_the_newest_answer_to_a_question_counts(tmp_path: Path) -> None:
+    filled(tmp_path / "store", 1)
+    with Store(tmp_path / "store", "set") as store:
+        store.put(question(0), Answer((7.0,)))
+    with Store(tmp_path / "store", "set") as store:
+        assert store.get(question(0), Answer) == Answer((7.0,))
+
+
+def test_an_answer_that_no_longer_reads_as_asked_is_to_be_found_again(tmp_path: Path) -> None:
+    filled(tmp_path / "store", 1)
+    with Store(tmp_path / "store", "set") as store:
+        assert store.get(question(0), int) is None
+        store.put(question(5), Answer((math.nan,)))
+        assert store.get(question(5), Answer) is None
+
+
+@given(lost=st.integers(min_value=1, max_value=400))
+def test_a_torn_end_loses_the_lines_it_tore_and_no_other(tmp_path_factory: pytest.TempPathFactory, lost: int) -> None:
+    path = filled(tmp_path_factory.mktemp("store") / "store")
+    whole = path.read_bytes()
+    torn = whole[: max(0, len(whole) - lost)]
+    path.write_bytes(torn)
+    lines = max(0, torn.count(b"\n") - 1)
+    assert kept(path) == list(range(lines))
+    assert path.read_bytes() == (torn[: torn.rindex(b"\n") + 1] if b"\n" in torn else HEADER)
+    filled(path)
+    assert kept(path) == [0, 1, 2]
+
+
+@given(at=st.integers(min_value=0), bit=st.integers(min_value=0, max_value=7))
+def test_a_damaged_line_is_taken_for_none_and_the_others_stay(
+    tmp_path_factory: pytest.TempPathFactory, at: int, bit: int
+) -> None:
+    path = filled(tmp_path_factory.mktemp("store") / "store")
+    data = bytearray(path.read_bytes())
+    at = len(HEADER) + at % (len(data) - len(HEADER))
+    data[at] ^= 1 << bit
+    line = data[:at].count(b"\n") - 1
+    path.write_bytes(data)
+    # A damaged end of line joins two lines.
+    assert set(range(3)) - {line, line + 1} <= set(kept(path))
+    left = kept(path)
+    assert line not in left
+    with Store(path, "set") as store:
+        assert len(store) == len(left)
+
+
+def test_zeros_that_a_loss_of_power_left_at_the_end_are_cut_off(tmp_path: Path) -> None:
+    path = filled(tmp_path / "store")
+    whole = path.read_bytes()
+    path.write_bytes(whole + bytes(4096))
+    assert kept(path) == [0, 1, 2]
+    assert path.read_bytes() == whole
+
+
+@pytest.mark.parametrize(
+    "content", [b"a,b\n1,2\n", b'{"key": 1}\n', HEADER.replace(b"2}", b"3}"), b"\n", bytes(100), b"\xff\xfe"]
+)
+def test_a_foreign_file_is_refused_and_not_touched(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "mine.csv"
+    path.write_bytes(content)
+    with pytest.raises(StoreError, match=r"mine\.csv is no store of answers"):
+        Store(path, "set")
+    assert path.read_bytes() == content
+
+
+@pytest.mark.parametrize("rest", [b"", b'{"key":"aa","crc":1,"answer":1}\n'])
+def test_a_store_of_the_older_form_is_emptied_and_says_so(tmp_path: Path, rest: bytes) -> None:
+    path = tmp_path / "store"
+    path.write_bytes(OLD_HEADER + rest)
+    with Store(path, "set") as store:
+        assert (store.renewed, len(store)) == (True, 0)
+        store.put(question(0), Answer((0.0,)))
+    with Store(path, "set") as store:
+        assert (store.renewed, len(store)) == (False, 1)
+
+
+def test_what_is_no_file_or_in_no_folder_is_refused(tmp_path: Path) -> None:
+    for path in (tmp_path, Path("/dev/null"), tmp_path / "no" / "store"):
+        with pytest.raises(StoreError, match=str(path)):
+            Store(path, "set")
+
+
+def test_two_runs_do_not_have_it_at_once(tmp_path: Path) -> None:
+    path = filled(tmp_path / "store")
+    with Store(path, "set"), pytest.raises(StoreError, match="in use by another run"):
+        Store(path, "set")
+    assert kept(path) == [0, 1, 2]
+
+
+OTHER_RUN = """
+import sys
+from pathlib import Path
+from thenar.compiler.frontier.cache import Store
+store = Store(Path(sys.argv[1]), "set")
+print("open", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_another_process_that_is_killed_lets_it_go(tmp_path: Path) -> None:
+    path = filled(tmp_path / "store")
+    command = [sys.executable, "-c", OTHER_RUN, str(path)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"open\n"
+        with pytest.raises(StoreError, match="in use by another run"):
+            Store(path, "set")
+        process.kill()
+        process.wait()
+    assert kept(path) == [0, 1, 2]
+
+
+def test_closing_twice_is_closing_and_nothing_is_put_after_it(tmp_path: Path) -> None:
+    store = Store(tmp_path / "store", "set")
+    store.close()
+    store.close()
+    with pytest.raises(StoreError, match="closed"):
+        store.put(question(1), Answer(()))
+
+
+FULL_DISK = """
+import resource, signal, sys
+from pathlib import Path
+from tests.compiler.frontier.test_cache import Answer, question
+from thenar.compiler.frontier.cache import Store, StoreError
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+with Store(Path(sys.argv[1]), "set") as store:
+    try:
+        for number in range(100):
+            store.put(question(number), Answer((number / 3,)))
+    except StoreError as reason:
+        print(number, reason)
+"""
+
+
+def test_a_full_disk_is_told_and_what_was_put_stays(tmp_path: Path) -> None:
+    path = tmp_path / "store"
+    command = [sys.executable, "-c", FULL_DISK, str(path)]
+    number, said = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split(maxsplit=1)
+    assert "File too large" in said
+    assert f"its {number} answers are kept" in said
+    assert kept(path, 100) == list(range(int(number)))
+
+
+class Found(msgspec.Struct, frozen=True):
+    square: float
+    parts: tuple[int, ...]
+
+
+@stored(1, without=("notes",))
+def squared(number: int, notes: Path) -> Found:
+    """Leave a line in `notes` whenever it is done."""
+    if number < 0:
+        raise ValueError(f"{number} is negative")
+    with notes.open("a") as file:
+        file.write(f"{number}\n")
+    return Found(number**2 / 7, (number,))
+
+
+@stored(1)
+def told_wrongly(number: int) -> str:
+    return number  # type: ignore[return-value]
+
+
+def calls_in(folder: Path, numbers: list[int] | range) -> list[Call[Found]]:
+    return [squared.call(1.0 + number % 3, number, folder / "notes") for number in numbers]
+
+
+def done_in(folder: Path) -> list[int]:
+    notes = folder / "notes"
+    return sorted(map(int, notes.read_text().split())) if notes.exists() else []
+
+
+def silent(_done: int, _total: int) -> None:
+    pass
+
+
+def asked(path: Path, calls: list[Call[Found]], jobs: int = 1, cluster: str | None = None) -> list[Found]:
+    with Store(path, "set") as store:
+        return Cache(store, silent, jobs=jobs, cluster=cluster).ask("", calls)
+
+
+def found_of(numbers: list[int] | range) -> list[Found]:
+    return [Found(number**2 / 7, (number,)) for number in numbers]
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_every_answer_is_found_once_and_comes_in_the_order_of_the_calls(tmp_path: Path, jobs: int) -> None:
+    assert asked(tmp_path / "store", calls_in(tmp_path, [3, 1, 3, 2]), jobs) == found_of([3, 1, 3, 2])
+    assert done_in(tmp_path) == [1, 2, 3]
+
+
+def test_a_cluster_finds_the_same_answers(tmp_path: Path) -> None:
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0") as cluster:
+        there = asked(tmp_path / "cluster", calls_in(tmp_path, range(9)), cluster=cluster.scheduler_address)
+    assert asked(tmp_path / "here", calls_in(tmp_path, range(9))) == there
+    assert done_in(tmp_path) == sorted(2 * [*range(9)])
+
+
+def test_work_for_a_cluster_is_not_done_here(tmp_path: Path) -> None:
+    with pytest.raises(ClusterError, match="no Dask scheduler answers"):
+        asked(tmp_path / "store", calls_in(tmp_path, [1]), cluster="")
+
+
+def test_what_is_stored_is_not_done_again_and_reads_as_what_was_found(tmp_path: Path) -> None:
+    first = asked(tmp_path / "store", calls_in(tmp_path, range(5)))
+    again = asked(tmp_path / "store", calls_in(tmp_path, range(7)))
+    assert done_in(tmp_path) == list(range(7))
+    assert again[:5] == first
+
+
+def test_the_order_of_calls_and_of_interruptions_changes_no_answer(tmp_path: Path) -> None:
+    numbers = list(range(12))
+    shuffled = random.Random(7)
+    for _ in range(4):
+        asked(tmp_path / "parts", calls_in(tmp_path, shuffled.sample(numbers, 5)))
+    shuffled.shuffle(numbers)
+    assert asked(tmp_path / "parts", calls_in(tmp_path, numbers)) == found_of(numbers)
+
+
+def test_what_was_found_before_an_error_is_kept(tmp_path: Path) -> None:
+    calls = [squared.call(9.0, 1, tmp_path / "notes"), squared.call(1.0, -1, tmp_path / "notes")]
+    with pytest.raises(ValueError, match="-1 is negative"):
+        asked(tmp_path / "store", calls)
+    with Store(tmp_path / "store", "set") as store:
+        assert store.get(calls[0].question({}), Found) is not None
+
+
+def test_an_answer_that_json_would_change_is_refused_when_it_is_found(tmp_path: Path) -> None:
+    with Store(tmp_path / "store", "set") as store, pytest.raises(TypeError, match="told_wrongly found does not read"):
+        Cache(store, silent, jobs=1).ask("", [told_wrongly.call(1.0, 1)])
+
+
+def test_the_dearest_calls_begin_first(tmp_path: Path) -> None:
+    costs = {1: 2.0, 2: 30.0, 3: 4.0}
+    asked(tmp_path / "store", [squared.call(cost, number, tmp_path / "notes") for number, cost in costs.items()])
+    assert (tmp_path / "notes").read_text().split() == ["2", "3", "1"]
+
+
+def test_one_progress_goes_over_all_stages_and_counts_nothing_that_was_stored(tmp_path: Path) -> None:
+    told: list[tuple[int, int]] = []
+    asked(tmp_path / "store", calls_in(tmp_path, [2]))
+    with Store(tmp_path / "store", "set") as store:
+        cache = Cache(store, lambda done, total: told.append((done, total)), jobs=1)
+        cache.foresee({"first": 10.0, "second": 20.0})
+        cache.ask("first", calls_in(tmp_path, range(3)))
+        cache.ask("second", [squared.call(40.0, 9, tmp_path / "notes")])
+    assert told == [(0, 23), (2, 23), (3, 23), (3, 43), (43, 43)]
+
+
+@stored(1)
+def lengths(array: np.ndarray[Any, Any], name: str = "") -> int:
+    return len(array) + len(name)
+
+
+@stored(2)
+def other_lengths(array: np.ndarray[Any, Any], name: str = "") -> int:
+    return len(array) + len(name)
+
+
+def test_a_question_is_its_function_version_and_arguments_and_no_other() -> None:
+    array = np.arange(6)
+    here = lengths.call(1.0, array).question({})
+    assert here == lengths.call(2.0, array=array.copy(), name="").question({})
+    others = (array[::-1], array.astype(np.int32), array.reshape(2, 3), array[:5], array + (array == 5))
+    different = [lengths.call(1.0, other) for other in others]
+    different += [lengths.call(1.0, array, "x"), other_lengths.call(1.0, array)]
+    assert here not in {call.question({}) for call in different}
+    assert len({call.question({}) for call in different}) == len(different)
+    assert squared.call(1.0, 1, Path("a")).question({}) == squared.call(1.0, 1, Path("b")).question({})
+
+
+def run(folder: Path, numbers: range) -> None:
+    """Do what the killed process below does; it says when ten answers are stored."""
+
+    def told(done: int, _total: int) -> None:
+        if done >= 10:
+            print("ten", flush=True)
+            signal.sigtimedwait([signal.SIGUSR1], 60)
+
+    with Store(folder / "store", "set") as store:
+        Cache(store, told, jobs=2).ask("", [squared.call(1.0, number, folder / "notes") for number in numbers])
+
+
+RUN = """
+import sys
+from pathlib import Path
+from tests.compiler.frontier.test_cache import run
+run(Path(sys.argv[1]), range(1000))
+"""
+
+
+def test_a_run_that_is_killed_goes_on_where_it_was(tmp_path: Path) -> None:
+    with subprocess.Popen([sys.executable, "-c", RUN, str(tmp_path)], stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"ten\n"
+        process.kill()
+        process.wait()
+    # What its workers, which outlive it for a moment, still note belongs to the killed run.
+    (tmp_path / "notes").rename(tmp_path / "notes.killed")
+    again = tmp_path / "again"
+    again.mkdir()
+    calls = calls_in(again, range(1000))
+    with Store(tmp_path / "store", "set") as store:
+        known = {number for number, call in enumerate(calls) if store.get(call.question({}), Found) is not None}
+    assert len(known) == 10
+    assert asked(tmp_path / "store", calls) == found_of(range(1000))
+    assert set(done_in(again)) == set(range(1000)) - known

@@ -1,0 +1,121 @@
+"""The runtime's deciders on runs of equal frames, beside the same deciders shown every single frame."""
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from thenar.compiler.frontier.deciders import NOTHING, Stretches, decisions, stretches
+from thenar.runtime.live.decision import Decision, SequentialTest, Standing
+from thenar.runtime.policy import Policy
+from thenar.runtime.scores import LANE_OFFSET, Scorer
+from thenar.runtime.tables import IntegerTables
+
+CLASSES, SCALE = 3, 4.0
+
+
+def bare_tables(classes: int = CLASSES) -> IntegerTables:
+    nothing = np.zeros((0, classes), np.int16)
+    return IntegerTables(np.zeros(classes, np.int16), nothing, (), (), nothing, nothing, SCALE)
+
+
+def frame_by_frame(frames: Stretches, policy: Policy) -> list[int]:
+    tables = bare_tables()
+    decider: Decision | SequentialTest
+    if policy.error_rate is None:
+        decider = Decision(policy.lead_steps(SCALE), policy.dwell_us, policy.hold_us)
+    else:
+        decider = SequentialTest(CLASSES, SCALE, policy.error_rate, policy.hold_us, policy.spacing_us)
+    found = []
+    for times, scores in zip(frames.times, frames.scores, strict=True):
+        for time_us in times:
+            standing = Standing(tuple((scores + LANE_OFFSET).tolist()), Scorer(tables))
+            held = decider.update(time_us, standing)
+            found.append(NOTHING if held is None else held)
+    return found
+
+
+rows = st.tuples(*[st.integers(-9, 9)] * CLASSES)
+times = st.integers(0, 400)
+
+
+@st.composite
+def runs(draw: st.DrawFn) -> Stretches:
+    """Up to twelve stretches of equal frames."""
+    scores = draw(st.lists(rows, min_size=1, max_size=12))
+    lengths = draw(st.lists(st.integers(1, 40) | st.integers(100, 300), min_size=len(scores), max_size=len(scores)))
+    first = np.concatenate([[0], np.cumsum(lengths)])
+    return Stretches(np.array(scores, np.int32), first, draw(st.integers(1, 30)))
+
+
+@st.composite
+def policies(draw: st.DrawFn) -> Policy:
+    dwell_us = draw(times)
+    return Policy(
+        lead=draw(st.sampled_from([0.0, 0.3, 1.0, 4.0])),
+        dwell_us=dwell_us,
+        hold_us=dwell_us + draw(times),
+        error_rate=draw(st.sampled_from([None, 0.5, 0.1, 1e-3])),
+        spacing_us=draw(st.sampled_from([0, 1, 17, 60, 300])),
+    )
+
+
+@settings(max_examples=150)
+@given(runs(), policies())
+# Class 2 is the best of the frames, yet class 0 wins: it leads both others by enough before it is overtaken.
+@example(Stretches(np.array([[20, 17, 0], [2, 0, 5]], np.int32), np.array([0, 1, 12]), 10), Policy(error_rate=0.5))
+def test_frames_left_out_change_no_decision_of_any_frame(frames: Stretches, policy: Policy) -> None:
+    found = decisions(bare_tables(), frames, policy)
+    assert found.at(np.arange(frames.first[-1])).tolist() == frame_by_frame(frames, policy)
+
+
+@given(runs(), policies())
+def test_decisions_are_told_only_where_they_change(frames: Stretches, policy: Policy) -> None:
+    found = decisions(bare_tables(), frames, policy)
+    assert found.frames[0] == 0
+    assert (np.diff(found.frames) > 0).all()
+    assert (found.types[1:] != found.types[:-1]).all()
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 50), st.integers(0, 2)), min_size=1, max_size=20),
+    st.integers(0, 1000),
+    st.integers(1, 60),
+)
+def test_every_frame_sees_the_state_that_began_last(
+    given_states: list[tuple[int, int]], begins_us: int, step_us: int
+) -> None:
+    lengths, values = zip(*given_states, strict=True)
+    at_us = begins_us + np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+    scores = np.array([[value, 0] for value in (*values, 0)], np.int32)
+    frames = stretches(scores, at_us, step_us)
+    due = np.arange(begins_us, at_us[-1], step_us)
+    seen = scores[np.searchsorted(at_us, due, side="right") - 1]
+    assert frames.first[-1] == len(due)
+    assert np.repeat(frames.scores, np.diff(frames.first), axis=0).tolist() == seen.tolist()
+
+
+def test_neighbouring_states_of_equal_scores_are_one_stretch() -> None:
+    frames = stretches(np.array([[1, 0], [1, 0], [2, 0], [2, 0]], np.int32), np.array([0, 10, 20, 30]), 5)
+    assert frames.first.tolist() == [0, 4, 6]
+
+
+@pytest.mark.parametrize("error_rate", [None, 0.01])
+def test_a_long_stretch_takes_few_looks(error_rate: float | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    looks = 0
+
+    def counted(kind: type[Decision] | type[SequentialTest]) -> None:
+        update = kind.update
+
+        def update_and_count(self: object, time_us: int, standing: Standing) -> int | None:
+            nonlocal looks
+            looks += 1
+            return update(self, time_us, standing)  # type: ignore[arg-type]
+
+        monkeypatch.setattr(kind, "update", update_and_count)
+
+    counted(Decision)
+    counted(SequentialTest)
+    frames = Stretches(np.array([[0, 9, 2], [5, 0, 0]], np.int32), np.array([0, 10**6, 2 * 10**6]), 20)
+    assert decisions(bare_tables(), frames, Policy(error_rate=error_rate)).types[-1] == 0
+    assert looks < 100

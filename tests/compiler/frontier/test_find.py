@@ -1,0 +1,298 @@
+"""The whole of a frontier, over small sets: what every one must satisfy, sets with little in them, and going on."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from distributed import LocalCluster
+from numpy.typing import NDArray
+
+from thenar.compiler.artifact.compile import compile_build
+from thenar.compiler.boosting.boost import boost
+from thenar.compiler.evaluation.folds import weka_folds
+from thenar.compiler.frontier.cache import OLD_HEADER
+from thenar.compiler.frontier.find import find_frontier
+from thenar.compiler.frontier.points import Frontier, FrontierError, Point, frontier_from_bytes
+from thenar.compiler.frontier.search import Search
+from thenar.compiler.placement.methods.base import METHODS
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.samples import Samples
+from thenar.compiler.tables.collapse import collapse
+from thenar.compiler.tables.quantise import quantise
+from thenar.drivers.members import MemberError
+from thenar.runtime.scanning.propose import propose_harness
+from thenar.runtime.scores import Scorer
+
+Make = Callable[..., GraspSet]
+Rows = NDArray[np.intp]
+Request = dict[str, Any]
+
+
+pytestmark = pytest.mark.slow
+
+
+def asked(folder: Path, grasp_set: GraspSet, **changes: Any) -> Request:
+    """Return arguments of find_frontier; `changes` are of its search or of itself."""
+    search: dict[str, Any] = {"methods": ("elimination", "id3"), "rivals": ("mrmr",), "rounds": 6}
+    search |= {"repeats": 1, "finalists": 2, "max_bins": None, "seed": 1}
+    search |= {name: changes.pop(name) for name in list(changes) if name in search}
+    return {"grasp_set": grasp_set, "output": folder / "out", "search": Search(**search), "jobs": 1} | changes
+
+
+def found_of(request: Request) -> Frontier:
+    return find_frontier(**request)
+
+
+def keys_in(store: Path) -> list[str]:
+    return [json.loads(line)["key"] for line in store.read_bytes().splitlines()[1:]]
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory: pytest.TempPathFactory, make_set: Make) -> tuple[Request, Frontier]:
+    request = asked(tmp_path_factory.mktemp("survey"), make_set(subjects=2))
+    return request, found_of(request)
+
+
+def test_a_frame_is_reading_on_lines_of_their_own_and_classifying(first: tuple[Request, Frontier]) -> None:
+    for point in first[1].points:
+        assert point.frame.us == pytest.approx(max(point.scan.us, point.transfer.us) + point.classify.us)
+
+
+def test_points_are_numbered_from_the_fastest_frame_on(first: tuple[Request, Frontier]) -> None:
+    points = first[1].points
+    assert [point.number for point in points] == list(range(1, len(points) + 1))
+    assert [point.frame.us for point in points] == sorted(point.frame.us for point in points)
+
+
+def test_every_point_is_on_a_front_and_none_beats_those_of_its_own(first: tuple[Request, Frontier]) -> None:
+    points = first[1].points
+    assert points
+    assert all(point.fronts for point in points)
+    for name, price in (("frame", lambda p: p.frame.us), ("switches", lambda p: len(p.switches))):
+        front = [point for point in points if name in point.fronts]
+        assert front
+        assert not any(price(a) < price(b) and a.rate.mean >= b.rate.mean for a in front for b in front)
+
+
+def test_scans_that_end_early_decide_on_single_frames(first: tuple[Request, Frontier]) -> None:
+    early = [point for point in first[1].points if point.setting.scan == "early"]
+    assert {point.setting.decision for point in early} <= {"single"}
+
+
+def test_subjects_are_left_out_where_there_are_several(first: tuple[Request, Frontier]) -> None:
+    assert first[1].subjects == 2
+    assert all(point.left_out is not None for point in first[1].points)
+
+
+def rows_recognised(grasp_set: GraspSet, point: Point, train: Rows, test: Rows) -> int:
+    """Choose, train and cut integers from some rows alone, and let the runtime answer the others."""
+    setting, joints = point.setting, point.setting.inputs != "switches"
+    labels = np.unique(grasp_set.labels, return_inverse=True)[1]
+    codes = grasp_set.codes if joints else grasp_set.codes[:, :0]
+    columns: tuple[int, ...] = ()
+    if setting.inputs != "joints":
+        beside = codes if setting.way.method == "elimination" else codes[:, :0]
+        learning = Samples(grasp_set.switches[train], beside[train], labels[train], tuple("0123"))
+        columns = METHODS[setting.way.method].chooser(learning)(setting.way.parameter)
+    bits = grasp_set.switches[:, list(columns)]
+    X = np.hstack([bits.astype(np.uint16), codes])
+    stumps, _ = boost(X[train], labels[train], 4, rounds=setting.rounds)
+    tables = collapse(stumps, len(columns))
+    scorer = Scorer(quantise(tables, bits[train], codes[train], setting.width, setting.table_bits))
+    answers = [scorer.lanes(bits[row], codes[row]) for row in test]
+    return sum(lanes.index(max(lanes)) == labels[row] for lanes, row in zip(answers, test, strict=True))
+
+
+def test_rates_are_those_of_rows_that_neither_placement_nor_training_saw(tmp_path: Path, make_set: Make) -> None:
+    """Two repeats of stratified folds, and each subject from the others; all of it done here once more, one by one."""
+    grasp_set = make_set(subjects=3)
+    found = found_of(asked(tmp_path, grasp_set, repeats=2, rivals=()))
+    labels = np.unique(grasp_set.labels, return_inverse=True)[1]
+    for point in found.points:
+        repeats = [
+            sum(rows_recognised(grasp_set, point, fold.train, fold.test) for fold in weka_folds(labels, 4, seed))
+            for seed in (1, 2)
+        ]
+        assert point.rate.mean == pytest.approx(np.mean(repeats) / len(grasp_set))
+        others = [np.flatnonzero(grasp_set.subjects == subject) for subject in ("S0", "S1", "S2")]
+        alone = [
+            rows_recognised(grasp_set, point, np.setdiff1d(np.arange(len(grasp_set)), test), test) for test in others
+        ]
+        assert point.left_out is not None
+        assert point.left_out.mean == pytest.approx(sum(alone) / len(grasp_set))
+
+
+def test_no_placement_without_switches_is_tried_but_the_joints_alone(first: tuple[Request, Frontier]) -> None:
+    assert all((each.n_switches == 0) == (each.inputs == "joints") for each in first[1].tried)
+
+
+def test_what_was_screened_says_with_how_many_rounds(first: tuple[Request, Frontier]) -> None:
+    assert {each.rounds for each in first[1].tried} == {1, 2, 3, 5, 6}
+
+
+def test_the_papers_placement_and_all_switches_are_marked(first: tuple[Request, Frontier]) -> None:
+    names = [mark.name for mark in first[1].marks]
+    assert "paper, S = 62" in names
+    assert "all of 14" in names
+
+
+def test_it_is_written_as_it_is_returned(first: tuple[Request, Frontier]) -> None:
+    request, found = first
+    assert frontier_from_bytes((request["output"] / "frontier.json").read_bytes()) == found
+
+
+def test_running_again_finds_everything_in_the_store(first: tuple[Request, Frontier]) -> None:
+    request, found = first
+    before = (request["output"] / "store.jsonl").read_bytes()
+    again = found_of(request)
+    assert (request["output"] / "store.jsonl").read_bytes() == before
+    assert again.points == found.points
+
+
+def test_a_store_of_the_older_form_is_computed_anew_and_that_is_said(tmp_path: Path, make_set: Make) -> None:
+    request = asked(tmp_path, make_set(), methods=("id3",), rivals=())
+    first = found_of(request)
+    store = request["output"] / "store.jsonl"
+    store.write_bytes(OLD_HEADER + store.read_bytes().split(b"\n", 1)[1])
+    again = found_of(request)
+    assert again.skipped[0] == "store.jsonl was an older thenar's, of another form: everything was computed anew"
+    assert len(again.skipped) == len(first.skipped) + 1
+    assert [(point.setting, point.rate) for point in again.points if "switches" in point.fronts] == [
+        (point.setting, point.rate) for point in first.points if "switches" in point.fronts
+    ]
+
+
+def test_without_a_folder_nothing_is_kept(tmp_path: Path, make_set: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert found_of(asked(tmp_path, make_set(), output=None, methods=("id3",), rivals=())).points
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_run_that_is_interrupted_goes_on_without_repeating_anything(tmp_path: Path, make_set: Make) -> None:
+    request = asked(tmp_path, make_set())
+    store, counts = request["output"] / "store.jsonl", list[int]()
+
+    def report(_done: int, _total: int) -> None:
+        if store.exists() and len(keys_in(store)) >= 40 * (len(counts) + 1):
+            counts.append(len(keys_in(store)))
+            raise KeyboardInterrupt
+
+    for _ in range(3):
+        with pytest.raises(KeyboardInterrupt):
+            found_of({**request, "report": report})
+    found = found_of(request)
+    keys = keys_in(store)
+    assert len(counts) == 3
+    assert len(keys) == len(set(keys))
+    assert found.points
+
+
+def test_the_time_that_is_left_is_told_from_the_start(tmp_path: Path, make_set: Make) -> None:
+    told = list[tuple[int, int]]()
+    grasp_set = make_set(rows=400, subjects=3)
+    found_of(asked(tmp_path, grasp_set, report=lambda done, total: told.append((done, total))))
+    totals = [total for _, total in told[1:]]
+    assert max(totals) <= 1.5 * totals[1]
+    assert told[-1][0] == told[-1][1]
+
+
+@pytest.mark.parametrize(
+    ("switches", "joints", "inputs"),
+    [(14, 0, {"switches"}), (0, 3, {"joints"}), (1, 2, {"both", "switches", "joints"})],
+)
+def test_a_set_may_lack_switches_or_joints(
+    tmp_path: Path, make_set: Make, switches: int, joints: int, inputs: set[str]
+) -> None:
+    found = found_of(asked(tmp_path, make_set(switches=switches, joints=joints)))
+    assert {each.inputs for each in found.tried} == inputs
+    assert found.points
+    assert all(point.left_out is None for point in found.points)
+    if joints == 0:
+        assert "paper, S = 62" in [mark.name for mark in found.marks]
+
+
+def test_two_rows_of_a_type_are_enough(tmp_path: Path, make_set: Make) -> None:
+    assert found_of(asked(tmp_path, make_set(rows=8))).points
+
+
+def test_a_glove_of_fewer_switches_serves_the_placements_within_it(tmp_path: Path, make_set: Make) -> None:
+    glove = propose_harness([f"s{number}" for number in range(10)])
+    methods = ("elimination-cost", "id3-cost")
+    found = found_of(asked(tmp_path, make_set(), harness=glove, methods=methods))
+    wired = [point for point in found.points if point.setting.wiring == "as wired"]
+    assert all(set(point.switches) <= {f"s{number}" for number in range(10)} for point in wired)
+    assert found.points
+
+
+def test_what_ports_cost_is_part_of_the_question(tmp_path: Path, make_set: Make) -> None:
+    methods = ("id3-cost",)
+    request = asked(tmp_path, make_set(), methods=methods, rivals=())
+    names = [f"s{number}" for number in range(14)]
+    glove = propose_harness(names[::-1], "pca9555")
+    alone = found_of({**request, "output": tmp_path / "alone", "harness": glove})
+    found_of(request)
+    after = found_of({**request, "harness": glove})
+    assert [(each.way, each.n_switches, each.rate) for each in after.tried] == [
+        (each.way, each.n_switches, each.rate) for each in alone.tried
+    ]
+    assert len(keys_in(tmp_path / "out" / "store.jsonl")) > len(keys_in(tmp_path / "alone" / "store.jsonl"))
+
+
+def test_another_stream_is_another_question(tmp_path: Path, make_set: Make) -> None:
+    request = asked(tmp_path, make_set(), methods=("id3",), rivals=())
+    found_of(request)
+    before = keys_in(request["output"] / "store.jsonl")
+    found_of({**request, "stream": make_set(seed=7)})
+    found_of({**request, "stream": make_set(seed=8)})
+    after = keys_in(request["output"] / "store.jsonl")
+    assert len(after) >= len(before) + 2
+
+
+def test_recordings_that_are_trained_on_are_no_stream(tmp_path: Path, make_set: Make) -> None:
+    request = asked(tmp_path, make_set())
+    with pytest.raises(FrontierError, match="is what is trained on"):
+        found_of({**request, "stream": make_set()})
+
+
+def test_a_build_is_marked_with_what_it_recognises(tmp_path: Path, make_set: Make) -> None:
+    grasp_set = make_set()
+    build = compile_build(grasp_set, tmp_path / "mine", rounds=5, folds=4).folder
+    found = found_of(asked(tmp_path, grasp_set, build=build, methods=("id3",), rivals=()))
+    assert found.marks[-1].name == "build mine"
+
+
+def test_a_build_that_does_not_say_what_it_recognises_is_refused(tmp_path: Path, make_set: Make) -> None:
+    grasp_set = make_set()
+    build = compile_build(grasp_set, tmp_path / "mine", rounds=5, folds=0).folder
+    with pytest.raises(FrontierError, match="does not say what it recognises"):
+        found_of(asked(tmp_path, grasp_set, build=build))
+
+
+def test_a_build_of_other_switches_is_refused(tmp_path: Path, make_set: Make) -> None:
+    build = compile_build(make_set(switches=40), tmp_path / "mine", rounds=5, folds=4, prune=0).folder
+    with pytest.raises(FrontierError, match="compiled from others"):
+        found_of(asked(tmp_path, make_set(switches=2), build=build))
+
+
+def test_an_unknown_rival_is_told(tmp_path: Path, make_set: Make) -> None:
+    with pytest.raises(MemberError, match="there is no placement method 'nonsense'"):
+        found_of(asked(tmp_path, make_set(), rivals=("nonsense",)))
+
+
+def test_two_workers_of_a_cluster_find_the_same(tmp_path: Path, make_set: Make) -> None:
+    grasp_set = make_set(subjects=2)
+    here = found_of(asked(tmp_path / "here", grasp_set, target="avr328p"))
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0") as cluster:
+        there = found_of(asked(tmp_path / "there", grasp_set, target="avr328p", cluster=cluster.scheduler_address))
+    assert _timeless(there) == _timeless(here)
+
+
+def _timeless(found: Frontier) -> tuple[object, ...]:
+    points = [
+        (each.setting, each.switches, each.rate, each.left_out, each.frame, each.latency) for each in found.points
+    ]
+    rest = (found.tried, found.curves, found.marks, found.combinations, found.picked)
+    return (points, *rest)

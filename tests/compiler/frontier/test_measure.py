@@ -1,0 +1,67 @@
+"""What is measured of designs: simulated once, with the model held beside it, and kept in the store."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from thenar.compiler.frontier.cache import Cache, Store
+from thenar.compiler.frontier.designs import Design
+from thenar.compiler.frontier.equipment import Equipment
+from thenar.compiler.frontier.finalists import Close
+from thenar.compiler.frontier.measure import measured
+from thenar.compiler.frontier.points import Rate, Way
+from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
+from thenar.compiler.frontier.screen import Screened
+from thenar.compiler.frontier.search import Candidate, Shape
+from thenar.compiler.frontier.timing.beside_wire import WIRE_ONLY
+from thenar.compiler.frontier.timing.checks import unchecked
+from thenar.compiler.frontier.timing.classify_times import ClassifyModel
+from thenar.compiler.frontier.timing.python_times import PythonCost, random_tables
+from thenar.compiler.frontier.timing.scan_times import ScanTimes
+from thenar.runtime.tables import tables_to_bytes
+
+PYTHON = PythonCost(5.0, 0.1, 0.5, 0.1, 0.01, 0.01, 10.0)
+
+
+def design_of(model: ClassifyModel) -> Design:
+    tables = random_tables(6, 0, 4)
+    scan = ScanTimes(500.0, 200.0, 4, 2, "wire", 1.5)
+    wired = Wired("mcp23017", 400_000, scan)
+    priced = PricedTables(Tabled(1, Shape(16)), tables_to_bytes(tables), model.options(tables), (wired,), 1.0)
+    screened = Screened(Candidate(Way("id3", 6.0), "switches"), tuple(range(6)), Rate(0.9, 0.9, 0.9), 1.0)
+    close = Close(screened, {}, {}, None, (priced,), 1.0)
+    return Design(close, priced, priced.classified[0], wired, "early", 0)
+
+
+@pytest.mark.slow
+def test_on_a_host_the_runtime_is_timed_and_the_model_checked_once(tmp_path: Path) -> None:
+    model = ClassifyModel("host", python=PYTHON)
+    design, equipment = design_of(model), Equipment(model, (), WIRE_ONLY)
+    with Store(tmp_path / "store", "here") as store:
+        cache = Cache(store, lambda *_: None, jobs=1, cluster="nowhere:1")
+        (timed,), checks, skipped = measured([design], equipment, cache)
+        known = len(store)
+        (again,), same, _ = measured([design], equipment, cache)
+        assert len(store) == known == 2
+    assert (again.classify, same[0]) == (timed.classify, checks[0])
+    assert (checks[0].how, checks[0].n > 1) == ("measured", True)
+    assert timed.classify.how == "measured"
+    assert 0 < timed.classify.us < 100_000
+    assert WIRE_ONLY.what in skipped
+
+
+@pytest.mark.slow
+def test_on_an_avr_every_look_takes_what_was_simulated(tmp_path: Path, tool: Callable[[str], str]) -> None:
+    tool("avr-gcc")
+    model = ClassifyModel("avr328p")
+    assert unchecked(model) is None
+    design = design_of(model)
+    with Store(tmp_path / "store", "here") as store:
+        cache = Cache(store, lambda *_: None, jobs=1)
+        (found,), checks, _ = measured([design], Equipment(model, (), WIRE_ONLY), cache)
+    assert found.measured is not None
+    assert found.measured.how == found.classify.how == "simulated"
+    assert found.classify.us == pytest.approx(1.5 * found.measured.us)
+    assert found.measured.us == pytest.approx(design.classified.us, rel=0.1)
+    assert len(checks) >= 2

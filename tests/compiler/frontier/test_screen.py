@@ -1,0 +1,64 @@
+import numpy as np
+import pytest
+
+from thenar.compiler.frontier.find import find_frontier
+from thenar.compiler.frontier.marks import choices_to_mark
+from thenar.compiler.frontier.points import FrontierError, Way
+from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
+from thenar.compiler.frontier.search import Candidate, Search, Shape, available_inputs, curve_ways, ways
+from thenar.compiler.frontier.timing.classify_times import Classified
+from thenar.compiler.frontier.timing.scan_times import ScanTimes, transfer_us
+from thenar.compiler.recordings.graspset import GraspSet
+
+QUICK = (Classified("quick", 40.0, "model", 900, 30), Classified("small", 60.0, "model", 500, 30))
+
+
+def priced(*scans_us: float, classified: tuple[Classified, ...] = QUICK) -> PricedTables:
+    wired = tuple(Wired("mcp23017", 400_000, ScanTimes(us, us, 1, 1, "wire", 1.0)) for us in scans_us)
+    return PricedTables(Tabled(12, Shape(16)), b"", classified, wired, 0.1)
+
+
+def test_a_choice_is_as_fast_as_its_fastest_wiring_and_layout() -> None:
+    assert priced(900.0, 300.0).fastest_us(0) == 340.0
+    assert priced(900.0, 300.0).fastest_us(16) == transfer_us(16) + 40.0
+    assert priced().fastest_us(16) == transfer_us(16) + 40.0
+
+
+def test_what_fits_no_flash_has_no_time() -> None:
+    assert priced(900.0, classified=()).fastest_us(0) is None
+
+
+def test_elimination_is_tried_at_every_size_up_to_all_switches() -> None:
+    assert [way.parameter for way in ways("elimination", 9)] == [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 9.0]
+    assert [way.parameter for way in ways("elimination", 8)] == [1.0, 2.0, 3.0, 4.0, 6.0, 8.0]
+    assert [way.parameter for way in ways("elimination", 1)] == [1.0]
+    assert max(way.parameter for way in curve_ways("rfe", 20)) == 16.0
+
+
+def test_inputs_are_those_that_a_set_has() -> None:
+    assert available_inputs(5, 2) == ("both", "switches", "joints")
+    assert available_inputs(5, 0) == ("switches",)
+    assert available_inputs(0, 2) == ("joints",)
+
+
+def test_nothing_is_screened_with_more_rounds_than_are_trained() -> None:
+    assert Search(rounds=10).screened == 10
+    assert Search(rounds=300).screened == Search(rounds=300).screening
+
+
+def test_the_papers_placements_are_marked_with_all_inputs_that_there_are() -> None:
+    assert Candidate(Way("id3", 62.0), "both") in choices_to_mark(14, 3)
+    assert Candidate(Way("id3", 62.0), "switches") in choices_to_mark(14, 0)
+    assert choices_to_mark(14, 0)[Candidate(Way("elimination", 14.0), "switches")] == "all of 14"
+    assert choices_to_mark(14, 3)[Candidate(Way("elimination", 14.0), "both")] == "all of 14, joints"
+    assert choices_to_mark(0, 3) == {}
+
+
+def test_one_type_leaves_nothing_to_tell_apart(grasp_set: GraspSet) -> None:
+    with pytest.raises(FrontierError, match="nothing to tell apart"):
+        find_frontier(grasp_set.rows(np.arange(0, 96, 4)))
+
+
+def test_a_search_for_nothing_is_refused() -> None:
+    with pytest.raises(FrontierError, match="at least"):
+        Search(methods=())

@@ -1,0 +1,117 @@
+"""The sentence that sums a frontier up, names, and the CSV: what was found, to the last digit."""
+
+import csv
+import io
+from typing import Any
+
+import msgspec
+import pytest
+
+from thenar.compiler.frontier.points import Frontier
+from thenar.compiler.frontier.words import COLUMNS, csv_bytes, featured, summary, wiring_of
+from thenar.compiler.recordings.spreadsheet import text_of
+
+
+def test_it_says_how_many_switches_how_much_time_how_much_recognition_and_against_what(examples: Any) -> None:
+    marks = examples.example_frontier().marks
+    assert summary(examples.example_frontier(marks=(marks[0], marks[2]))) == (
+        "Point 5: 33 of 160 switches, read and classified in 440 us on avr328p, recognise 92.9 [92.1, 93.7] % of the "
+        "grasps, against 93.6 % in 2.05 ms with all 160 switches and 91.5 % in 905 us with 35 switches (paper, S = 62)."
+    )
+
+
+def test_joints_are_told_too(examples: Any) -> None:
+    assert summary(examples.example_frontier(picked=8)).startswith("Point 8: 8 of 160 switches and 16 joints, read")
+    assert summary(examples.example_frontier(picked=7)).startswith("Point 7: 16 joints, read")
+
+
+def test_without_marks_and_without_points_it_is_still_a_summary(examples: Any) -> None:
+    assert summary(examples.example_frontier(marks=())).endswith("% of the grasps.")
+    none = examples.example_frontier(points=(), picked=None)
+    assert summary(none) == "Of 184,320 combinations none is a point of the frontier."
+
+
+def test_where_nothing_is_picked_the_fastest_point_level_with_all_switches_is_spoken_of(examples: Any) -> None:
+    frontier = examples.example_frontier(picked=None)
+    point = featured(frontier)
+    assert point is not None
+    assert point.number == 6
+    assert all(other.rate.mean < 0.931 for other in frontier.points if other.frame.us < point.frame.us)
+
+
+def test_where_no_point_is_level_the_best_is_spoken_of(examples: Any) -> None:
+    best = featured(examples.example_frontier(picked=None, marks=()))
+    assert best is not None
+    assert best.number == 10
+
+
+@pytest.mark.parametrize(
+    ("wiring", "clock", "said"),
+    [
+        ("mcp23017", 400_000, "mcp23017 400 kHz"),
+        ("board", 1_000_000, "board 1 Mbaud"),
+        ("board", 115_200, "board 115.2 kbaud"),
+        ("as wired", 0, ""),
+    ],
+)
+def test_a_wiring_is_told_with_its_clock(examples: Any, wiring: str, clock: int, said: str) -> None:
+    setting = examples.example_frontier().points[0].setting
+    assert wiring_of(msgspec.structs.replace(setting, wiring=wiring, clock_hz=clock)) == said
+
+
+def _rows(frontier: Frontier) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(csv_bytes(frontier).decode(), newline="")))
+
+
+def _list(cell: str) -> tuple[str, ...]:
+    (names,) = csv.reader([cell], delimiter=";")
+    return tuple(names)
+
+
+def test_what_is_read_again_are_the_points(examples: Any) -> None:
+    frontier = examples.example_frontier()
+    rows = _rows(frontier)
+    assert len(rows) == len(frontier.points)
+    for row, point in zip(rows, frontier.points, strict=True):
+        way, setting = point.setting.way, point.setting
+        assert tuple(row) == COLUMNS
+        assert (int(row["number"]), int(row["n_switches"])) == (point.number, len(point.switches))
+        assert (row["method"], float(row["parameter"])) == (way.method, way.parameter)
+        for name in ("inputs", "layout", "wiring", "scan", "decision"):
+            assert row[name] == getattr(setting, name)
+        for name in ("rounds", "width", "clock_hz"):
+            assert int(row[name]) == getattr(setting, name)
+        for name in ("flash", "ram", "ports", "chips"):
+            assert int(row[name]) == getattr(point, name)
+        for name in ("scan", "transfer", "classify", "frame"):
+            time = getattr(point, name)
+            assert (float(row[f"{name}_us"]), row[f"{name}_how"]) == (time.us, time.how)
+        for name in ("rate", "left_out"):
+            rate = getattr(point, name)
+            numbers = tuple(float(row[name + end]) for end in ("", "_low", "_high"))
+            assert numbers == (rate.mean, rate.low, rate.high)
+        latency = tuple(float(row[name]) for name in ("latency_mean_us", "latency_p99_us", "missed", "wrong"))
+        assert latency == msgspec.structs.astuple(point.latency)
+        assert float(row["compile_s"]) == point.compile_s
+        assert _list(row["switches"]) == point.switches or not point.switches
+        assert _list(row["fronts"]) == point.fronts
+
+
+@pytest.mark.parametrize("name", ["a;b", 'say "so"', "comma, too", "=1+1", "ü"])
+def test_names_come_back_as_they_are(examples: Any, name: str) -> None:
+    points = examples.example_frontier().points
+    named = msgspec.structs.replace(points[0], switches=(name, "s2"))
+    (row,) = _rows(examples.example_frontier(points=(named,), picked=None))
+    (names,) = csv.reader(io.StringIO(text_of(row["switches"]), newline=""), delimiter=";")
+    assert names == [name, "s2"]
+    assert not row["switches"].startswith("=")
+
+
+def test_one_subject_has_no_rate_of_those_left_out(examples: Any) -> None:
+    points = examples.example_frontier().points
+    (row,) = _rows(examples.example_frontier(points=(msgspec.structs.replace(points[0], left_out=None),), picked=None))
+    assert (row["left_out"], row["left_out_low"], row["left_out_high"]) == ("", "", "")
+
+
+def test_equal_frontiers_give_equal_tables(examples: Any) -> None:
+    assert csv_bytes(examples.example_frontier()) == csv_bytes(examples.example_frontier())

@@ -1,0 +1,82 @@
+"""A firmware target of somebody else's: listed, written, and what it wrote compiled and asked."""
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from thenar.compiler import compile_build
+from thenar.compiler.recordings.graspset import GraspSet, Joint
+from thenar.compiler.recordings.taxonomy import own
+from thenar.runtime.build import Build
+
+TYPES = ("cup", "pen", "plate")
+MAIN = """\
+#define THENAR_GLOVE_IMPLEMENTATION
+#include "thenar_glove.hpp"
+#include <iostream>
+
+int main()
+{
+    for (unsigned closed, code; std::cin >> closed >> code;) {
+        for (unsigned i = 0; i < THENAR_GLOVE_SWITCHES; ++i)
+            thenar_glove_set_switch(static_cast<thenar_glove_switch>(i), (closed >> i & 1u) != 0);
+        thenar_glove_input.codes[0] = static_cast<thenar_glove_code>(code);
+        std::cout << thenar_glove_grasp(thenar_glove_classify());
+        for (int score : thenar_glove_scores)
+            std::cout << ' ' << score;
+        std::cout << '\\n';
+    }
+}
+"""
+STRICT = ("-std=c++17", "-Wall", "-Wextra", "-Werror", "-fsanitize=address,undefined")
+
+
+def small_build(folder: Path) -> Build:
+    random, labels = np.random.default_rng(3), np.arange(60) % len(TYPES)
+    closed = np.array([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 0]], bool)
+    made = GraspSet(
+        switches=closed[labels] ^ (random.random((60, 4)) < 0.1),
+        switch_names=("a", "b", "c", "d"),
+        codes=(60 * labels[:, None] + random.integers(30, 90, (60, 1))).astype(np.uint16),
+        joints=(Joint("thumb", "deg", 0, 0.0, 255, 127.5),),
+        grasps=np.array(TYPES)[labels],
+        taxonomy=own(TYPES),
+        subjects=np.full(60, "A"),
+        objects=np.full(60, "thing"),
+        trials=np.arange(60),
+    )
+    return Build.load(compile_build(made, folder, rounds=10, folds=0).folder)
+
+
+def test_a_target_of_another_package_is_listed_and_its_firmware_answers_as_python_does(
+    install: Callable[[str, str], Any], tool: Callable[[str], str], tmp_path: Path
+) -> None:
+    compiler = tool("g++")
+    build, made = small_build(tmp_path / "build"), tmp_path / "made"
+    installed = install("target.py", "thenar.targets")
+    assert "one header for C++17" in installed.thenar("firmware", "--help")
+    told = installed.thenar("firmware", str(tmp_path / "build"), "--target", "cpp", "-o", str(made))
+    assert told.splitlines()[0].startswith("layout for cpp: 16-bit entries")
+    assert told.endswith(f"firmware for cpp; copy {made}/*.hpp to where your compiler finds it\n")
+    assert {path.name for path in made.iterdir()} == {"thenar_glove.hpp", "SHA256SUMS"}
+
+    (made / "main.cpp").write_text(MAIN)
+    (made / "other.cpp").write_text('#include "thenar_glove.hpp"\n')
+    subprocess.run([compiler, *STRICT, "main.cpp", "other.cpp", "-o", "main"], cwd=made, check=True, timeout=120)
+    frames = [(closed, code) for closed in range(1 << len(build.manifest.switches)) for code in range(0, 256, 5)]
+    asked = "".join(f"{closed} {code}\n" for closed, code in frames)
+    said = subprocess.run([made / "main"], input=asked, capture_output=True, text=True, check=True, timeout=60).stdout
+    for (closed, code), line in zip(frames, said.splitlines(), strict=True):
+        bits = [bool(closed >> number & 1) for number in range(len(build.manifest.switches))]
+        assert line.split() == [build.classify(bits, [code]), *map(str, build.scores(bits, [code]))]
+
+
+def test_what_nothing_runs_is_neither_verified_nor_timed(install: Callable[[str, str], Any], tmp_path: Path) -> None:
+    small_build(tmp_path / "build")
+    installed = install("target.py", "thenar.targets")
+    refused = installed.thenar("firmware", str(tmp_path / "build"), "--target", "cpp", "--measure", code=2)
+    assert "firmware for cpp cannot be measured here: thenar has no simulator of a cpp" in refused
+    assert "cpp" not in installed.thenar("frontier", "--help") + installed.thenar("verify", "--help")
