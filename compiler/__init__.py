@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from .boosting.classifier import LogitBoostClassifier
     from .evaluation.folds import EvaluationError
     from .evaluation.study import Study, evaluate
+    from .firmware.targets import TARGETS
     from .frontier.find import find_frontier
     from .frontier.points import Frontier
     from .frontier.search import Search
@@ -42,6 +43,7 @@ _HOMES = {
     ".boosting.classifier": ("LogitBoostClassifier",),
     ".evaluation.folds": ("EvaluationError",),
     ".evaluation.study": ("Study", "evaluate"),
+    ".firmware.targets": ("TARGETS",),
     ".frontier.find": ("find_frontier",),
     ".frontier.points": ("Frontier",),
     ".frontier.search": ("Search",),
@@ -57,6 +59,7 @@ _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "METHODS",
+    "TARGETS",
     "TRAINERS",
     "BoostingError",
     "Build",

@@ -65,7 +65,7 @@ class Build(LoadedBuild):
         folder : path
             The folder to write.
         target : str
-            What `thenar firmware --target` calls it: one of `thenar.compiler.firmware.targets.TARGETS`.
+            What `thenar firmware --target` calls it: one of `TARGETS`.
         mode : {"classify", "scan", "glove"}
             The classifier alone, a board that scans, or a glove that recognises by itself.
         board : Board, optional
