@@ -11,7 +11,7 @@ import pytest
 from thenar.simulator.body.shapes import Box, Cylinder, Sphere
 from thenar.simulator.pipeline.effect import EFFECTS
 from thenar.simulator.scenes import shipped
-from thenar.simulator.scenes.decode import _File, load_scene
+from thenar.simulator.scenes.decode import _SceneFile, load_scene
 from thenar.simulator.scenes.scene import SURVEYS, Glove, Population, Recording, SceneObject, Subject
 
 NAMES = tuple(EFFECTS)
@@ -128,11 +128,11 @@ def test_the_keys_of_an_object_are_those_of_the_page() -> None:
 def test_the_keys_of_a_scene_are_those_of_the_page() -> None:
     documented = keyed(table("key | meaning"), "key")
     # [effects.GROUP.NAME] stands for `effects`.
-    assert {key for key in documented if key.islower()} >= {*_File.__struct_fields__} - {
+    assert {key for key in documented if key.islower()} >= {*_SceneFile.__struct_fields__} - {
         *("subjects", "population", "recording", "glove", "effects")
     }
-    assert documented["seed"]["limits"] == limits(_File, "seed")
-    assert documented["repetitions"]["limits"] == limits(_File, "repetitions")
+    assert documented["seed"]["limits"] == limits(_SceneFile, "seed")
+    assert documented["repetitions"]["limits"] == limits(_SceneFile, "repetitions")
 
 
 def test_the_surveys_are_those_of_the_page() -> None:

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .cache import Cache, stored
-from .timing.beside_wire import Beside, beside_wire
 from .timing.classify_times import ClassifyModel
 from .timing.python_times import PythonCost
+from .timing.scan_times import Beside, beside_wire
 from .timing.wirings import Wiring
 
 # Expected seconds.

@@ -12,8 +12,8 @@ from .equipment import Equipment
 from .points import Check, FrontierError, Time
 from .timing.checks import LEAST, check, unchecked
 from .timing.classify_times import ClassifyModel, fitting
-from .timing.measured_cycles import Trial, run_trial
 from .timing.python_times import classify_us
+from .timing.simulated import run_layout
 from .timing.wire_check import check_wire
 
 # Expected seconds: of a trial, of timing all designs in Python, of checks there.
@@ -29,7 +29,7 @@ def count_steps(content: bytes, layout: str, model: ClassifyModel) -> float:
     assert model.part is not None
     for option in fitting(tables_from_bytes(content), model.part):
         if features(option[0], model.part) == layout:
-            return run_trial(Trial(option, model.part)).counted
+            return run_layout((option, model.part)).counted
     raise FrontierError(f"there is no layout {layout!r} of these tables: another thenar made the store")
 
 

@@ -6,6 +6,7 @@ and another a single one, effects that draw for every frame read on in the same 
 
 from collections.abc import Callable, Iterable
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ Words = dict[tuple[str, tuple[int, ...]], bytes]
 
 OTHERS = [name for name in NAMES if name not in CONTACTS]
 # Parameters with which everybody who can draw does, and the contact models are quick.
-LIVELY: dict[str, dict[str, object]] = {
+LIVELY: dict[str, dict[str, Any]] = {
     "bus.latency": {"jitter_us": 20.0},
     "port.dead": {"count": 2},
     "switch.stuck_open": {"count": 3},

@@ -11,13 +11,13 @@ import numpy as np
 
 from thenar.runtime.tables import IntegerTables
 
+from ...firmware.choose import Option
 from ...firmware.targets import Target
 from ...workers import in_workers
 from ..points import Check, How
-from .avr_scans import run_scan, scan_trials
 from .classify_times import ClassifyModel, fitting
-from .measured_cycles import Outcome, Trial, run_trial
 from .python_times import classify_us
+from .simulated import Outcome, run_layout, run_scan, scan_trials
 
 # At least so many points are measured.
 LEAST = 30
@@ -42,7 +42,7 @@ def check(
         return ()
     if model.part is None:
         return (_on_python(model, several, least),)
-    outcomes = list(in_workers(run_trial, _trials(several, model.part, least), jobs))
+    outcomes = list(in_workers(run_layout, _trials(several, model.part, least), jobs))
     what = "cycles of classify()" if model.part.avr else "instructions of classify()"
     found = [_judged(f"{what} on {model.part.named}, slowest frame", "simulated", outcomes)] if outcomes else []
     if "scan" in model.part.modes:
@@ -67,16 +67,16 @@ def _on_python(model: ClassifyModel, several: Sequence[IntegerTables], least: in
     predicted = [model.python.us(each) for each in tables]
     found = classify_us(tables, model.python.yardstick)
     outcomes = [Outcome(*pair) for pair in zip(predicted, found, strict=True)]
-    return _judged("time of a frame in runtime.scorer on this machine", "measured", outcomes)
+    return _judged("time of a frame in runtime.scores on this machine", "measured", outcomes)
 
 
-def _trials(several: Sequence[IntegerTables], part: Target, least: int) -> list[Trial]:
+def _trials(several: Sequence[IntegerTables], part: Target, least: int) -> list[tuple[Option, Target]]:
     """Return `least` layouts, evenly spread over those of the tables, or as many as there are."""
-    chosen, found = _spread(several, _TABLES), list[Trial]()
+    chosen, found = _spread(several, _TABLES), list[tuple[Option, Target]]()
     for number, tables in enumerate(chain(chosen, _smaller(chosen))):
         if number >= len(chosen) and len(found) >= least:
             break
-        found += [Trial(option, part) for option in fitting(tables, part)]
+        found += [(option, part) for option in fitting(tables, part)]
     return _spread(found, least)
 
 

@@ -8,8 +8,8 @@ from ...firmware.choose import Option, choose, features, flash_shares
 from ...firmware.errors import FirmwareError
 from ...firmware.targets import TARGETS, Target, timed
 from ..points import FrontierError, How
-from .beside_wire import on_a_pi
 from .python_times import PythonCost, fit_here
+from .scan_times import on_a_pi
 
 # How many times as long as here Python takes on a Raspberry Pi 4. Doubtful: a guess, and "here" is any machine.
 PI_FACTOR = 4.0

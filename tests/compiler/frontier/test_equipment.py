@@ -2,8 +2,8 @@ from msgspec.structs import replace
 
 from thenar.compiler.frontier.equipment import Equipment
 from thenar.compiler.frontier.price import price
-from thenar.compiler.frontier.timing.beside_wire import WIRE_ONLY, Beside
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel
+from thenar.compiler.frontier.timing.scan_times import WIRE_ONLY, Beside
 from thenar.compiler.frontier.timing.wirings import wirings
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples

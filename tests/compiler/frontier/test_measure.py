@@ -14,11 +14,10 @@ from thenar.compiler.frontier.points import Rate, Way
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import Candidate, Shape
-from thenar.compiler.frontier.timing.beside_wire import WIRE_ONLY
 from thenar.compiler.frontier.timing.checks import unchecked
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel
 from thenar.compiler.frontier.timing.python_times import PythonCost, random_tables
-from thenar.compiler.frontier.timing.scan_times import ScanTimes
+from thenar.compiler.frontier.timing.scan_times import WIRE_ONLY, ScanTimes
 from thenar.runtime.tables import tables_to_bytes
 
 PYTHON = PythonCost(5.0, 0.1, 0.5, 0.1, 0.01, 0.01, 10.0)

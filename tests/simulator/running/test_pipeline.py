@@ -1,6 +1,7 @@
 """The pipeline: what a scene lists, in order, and what cannot be compiled."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -37,13 +38,13 @@ SUBSETS = st.sets(st.sampled_from(OTHERS)).flatmap(
 )
 
 
-def listed_with(name: str, **parameters: object) -> tuple:
+def listed_with(name: str, **parameters: Any) -> tuple:
     return name, EFFECTS[name].parameters(**parameters)
 
 
 def light() -> list[tuple]:
     """Return all effects but the contact models: the ramp in two levels, the bus as it reads all that it can."""
-    special: dict[str, dict[str, object]] = {"contact.ramp": {"levels": 2}, "bus.latency": {"jitter_us": 20.0}}
+    special: dict[str, dict[str, Any]] = {"contact.ramp": {"levels": 2}, "bus.latency": {"jitter_us": 20.0}}
     return [listed_with(name, **special.get(name, {})) for name in OTHERS]
 
 

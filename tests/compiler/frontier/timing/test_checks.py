@@ -5,11 +5,10 @@ import pytest
 
 from thenar.compiler.firmware.simavr import missing
 from thenar.compiler.firmware.targets import TARGETS
-from thenar.compiler.frontier.timing.avr_scans import scan_trials
 from thenar.compiler.frontier.timing.checks import LEAST, check, unchecked
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel, fitting
-from thenar.compiler.frontier.timing.measured_cycles import Outcome, Trial, run_trial
 from thenar.compiler.frontier.timing.python_times import PythonCost, random_tables
+from thenar.compiler.frontier.timing.simulated import Outcome, run_layout, scan_trials
 
 PYTHON = PythonCost(2.0, 0.03, 0.15, 0.03, 0.0002, 0.0009, 10.0)
 TABLES = [random_tables(33, 16, 14), random_tables(20, 0, 14), random_tables(8, 0, 5)]
@@ -34,7 +33,7 @@ def test_cycles_of_an_avr_are_foretold_within_three_percent_and_never_too_few() 
     part = TARGETS["avr328p"]
     for tables in TABLES[1:]:
         for option in fitting(tables, part)[:2]:
-            outcome = run_trial(Trial(option, part))
+            outcome = run_layout((option, part))
             assert outcome.counted <= outcome.predicted <= 1.03 * outcome.counted
 
 

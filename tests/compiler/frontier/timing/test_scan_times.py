@@ -6,22 +6,24 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.firmware.targets import timed
-from thenar.compiler.frontier.timing.beside_wire import (
+from thenar.compiler.frontier.timing.python_times import random_tables
+from thenar.compiler.frontier.timing.scan_times import (
     Beside,
+    ScanTimes,
     beside_wire,
     board_beside,
     firmware_beside,
     measured_call_us,
+    scan_times,
+    transfer_us,
 )
-from thenar.compiler.frontier.timing.python_times import random_tables
-from thenar.compiler.frontier.timing.scan_times import ScanTimes, scan_times, transfer_us
 from thenar.compiler.frontier.timing.wirings import BOARD, Wiring
 from thenar.runtime.errors import HarnessError
-from thenar.runtime.scanning.costs import Costs
-from thenar.runtime.scanning.earlyexit import EarlyExit
-from thenar.runtime.scanning.plan import plan_scan
+from thenar.runtime.scanning.decided import EarlyExit
+from thenar.runtime.scanning.plan import Costs, plan_scan
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import scan_us, scanner_us
+from thenar.runtime.scores import Scorer
 
 CALL = Beside("a call", call_us=7.0)
 wired = st.builds(
@@ -59,7 +61,7 @@ def test_a_scan_that_ends_early_takes_what_scanning_the_frames_one_by_one_comes_
     # Of no more frames than decide on the order of ports, so that it is the same.
     scan = plan_scan(names, tables, harness, bits, codes)
     costs, ports = Costs(scan.ports, harness), [sum(1 << s for _, s in port.switches) for port in scan.ports]
-    early, taken_us, looks = EarlyExit(tables, ports), list[float](), 0
+    early, taken_us, looks = EarlyExit(Scorer(tables), ports), list[float](), 0
     for frame, code in zip(bits, codes, strict=True):
         closed = sum(1 << int(switch) for switch in np.flatnonzero(frame))
         early.start(code.tolist())
