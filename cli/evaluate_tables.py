@@ -5,7 +5,7 @@ from rich.table import Table as Grid
 from rich.text import Text
 
 from thenar.compiler.evaluation.populations import PROTOCOLS
-from thenar.compiler.evaluation.study import Cell, Study, Table
+from thenar.compiler.evaluation.study import Cell, RateTable, Study
 from thenar.compiler.text import interval
 
 from .common import out
@@ -31,7 +31,7 @@ def print_study(study: Study, *, confusion: bool) -> None:
         _print_confusions(console, study)
 
 
-def _grid(table: Table) -> Grid:
+def _grid(table: RateTable) -> Grid:
     grid = Grid()
     grid.add_column("")
     grid.add_column("")
