@@ -1,6 +1,6 @@
 """The options of commands that train: which trainer, and the settings of every one, read from the registry."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any
 
 import click
@@ -8,10 +8,10 @@ import click
 from thenar.compiler.trainers.base import TRAINERS, Setting
 
 
-def trainer_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add `--trainer` and an option for each setting of a trainer."""
+def trainer_options(command: Callable[..., Any], without: Collection[str] = ()) -> Callable[..., Any]:
+    """Add `--trainer` and an option for each setting of a trainer, `without` those that the command has itself."""
     settings = {setting.name: setting for trainer in TRAINERS.values() for setting in trainer.settings}
-    for setting in reversed(settings.values()):
+    for setting in reversed([setting for name, setting in settings.items() if name not in without]):
         command = _option(setting)(command)
     names = ", ".join(f"{trainer.name} ({trainer.what})" for trainer in TRAINERS.values())
     choice = click.Choice(list(TRAINERS))

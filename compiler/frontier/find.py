@@ -246,8 +246,8 @@ def foreseen(survey: Survey) -> dict[str, float]:
         "screening": (_DIFFERENT * choices + rivals) * sum(fit_s(search.screened, 0, n) for n in train),
         "times": _DIFFERENT * choices * QUICK_PRICE_S,
         "finalists' placements": sum(path_s(name, n) for name in methods for n in more),
-        "finalists": last * sum(fit_s(search.rounds, len(search.tabled) * len(SHAPES), n) for n in train),
-        further(few.rounds): last * sum(fit_s(few.rounds, len(few.tabled) * len(SHAPES), n) for n in more),
+        "finalists": last * sum(fit_s(search.stages[-1], len(search.tabled) * len(SHAPES), n) for n in train),
+        further(few): last * sum(fit_s(few.stages[-1], len(few.tabled) * len(SHAPES), n) for n in more),
         "prices": last * PRICE_S,
         "simulations": last * _DESIGNS * TRIAL_S * simulated,
         "checks": _CHECKED * TRIAL_S * simulated,
@@ -268,7 +268,7 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
     every = [design for close in closes for design in designs(close, survey.n_joints)]
     by_time, by_switches = best_designs(every)
     kept, checks, skipped = measured(with_whole_scans([*by_time, *by_switches]), survey.equipment, survey.cache)
-    points = points_of(kept, _latencies(survey, stream, kept), survey.switch_names, search.max_bins)
+    points = points_of(kept, _latencies(survey, stream, kept), survey.switch_names, search)
     picked, tried = wanted.pick(points), _tried(screened, closes, search)
     early = [_EARLY] if any(design.scan_kind == "early" for design in kept) else []
     return Frontier(
@@ -311,7 +311,7 @@ def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latenc
             survey.columns(choice, fold),
             stream,
             tuple(Pace(design.tables.tabled, design.frame.us, design.decisions) for design in mine),
-            survey.search.max_bins,
+            survey.search.training,
         )
         for choice, mine in grouped.items()
     ]
@@ -327,8 +327,9 @@ def _tried(screened: Sequence[Screened], closes: Sequence[Close], search: Search
     """Return everything that was screened, and the finalists after every stage of their training."""
     first = [(one, search.screened, one.rate) for one in screened]
     then = [(close.screened, rounds, rate) for close in closes for rounds, rate in close.stages.items()]
+    staged = search.staged
     return tuple(
-        Tried(one.choice.way, one.choice.inputs, len(one.columns), rounds, rate, one.frame_us)
+        Tried(one.choice.way, one.choice.inputs, len(one.columns), rounds if staged else None, rate, one.frame_us)
         for one, rounds, rate in (*first, *then)
     )
 

@@ -15,6 +15,7 @@ from thenar.runtime.tables import IntegerTables
 from ..evaluation.folds import Rows
 from ..samples import Columns, Samples
 from ..tables.quantise import integer_scores
+from ..trainers.base import Training
 from .cache import stored
 from .deciders import NOTHING, Decisions, decisions, stretches
 from .points import DecisionKind, FrontierError, Latency
@@ -39,13 +40,13 @@ class Pace(Struct, frozen=True):
 
 @stored(1)
 def latencies(
-    samples: Samples, rows: Rows, columns: Columns, stream: Stream, paces: tuple[Pace, ...], max_bins: int | None
+    samples: Samples, rows: Rows, columns: Columns, stream: Stream, paces: tuple[Pace, ...], training: Training
 ) -> tuple[tuple[Latency, ...], ...]:
     """Train on some rows, on the switches `columns` and the joints; return how long a stream keeps one waiting at every
     pace, for each of its decisions. The stream holds none of the rows.
     """
     wanted = tuple(dict.fromkeys(pace.tabled for pace in paces))
-    tables = {tabled: made for tabled, made, _ in tables_of(samples, rows, columns, wanted, max_bins)}
+    tables = {tabled: made for tabled, made, _ in tables_of(samples, rows, columns, wanted, training)}
     return tuple(
         tuple(latency(tables[pace.tabled], columns, stream, pace.frame_us, POLICIES[kind]) for kind in pace.decisions)
         for pace in paces
