@@ -2,10 +2,11 @@
 
     python benchmarks/live.py [--seconds N]
 
-Four tables: microseconds of CPU a frame against 150; frames a second on emulated devices against the wire's own rate;
-the kept switches' scan beside that of all 160; the peak of a `thenar run` against 80 MiB. Emulated buses need umockdev
-(Debian packages umockdev, gir1.2-umockdev-1.0, python3-gi). Emulated devices and readers work on the same cores as the
-run, so a machine that has other things to do, or but one core, shows worse numbers than a glove would.
+Four tables, and the way of a frame: microseconds of CPU a frame against 150; frames a second on emulated devices
+against the wire's own rate; the kept switches' scan beside that of all 160; which files a frame passes from the bytes
+on the wire to a published grasp, and the calls for a grasp; the peak of a `thenar run` against 80 MiB. Emulated buses
+need umockdev (Debian packages umockdev, gir1.2-umockdev-1.0, python3-gi). Emulated devices and readers work on the same
+cores as the run, so a machine that has other things to do, or but one core, shows worse numbers than a glove would.
 """
 
 import argparse
@@ -31,33 +32,25 @@ from liveplay import (
     played,
     read_along,
     restless,
-    session,
-    teller,
     with_glove,
 )
 from liverates import Found, of_board, of_bus, of_glove
 from livescans import compared, wired
+from liveway import way
 from rich.console import Console
 from rich.table import Table
 
+from thenar.runtime import Glove
+from thenar.runtime.frames import now_us
 from thenar.runtime.harness.writing import harness_to_toml
-from thenar.runtime.live.frames import now_us
-from thenar.runtime.live.loop import LiveLoop, Moment
 from thenar.runtime.live.system import System
-from thenar.runtime.preshape.loading import load_preshapes
-from thenar.runtime.preshape.selector import PreshapeSelector
-from thenar.runtime.recording.writer import Recorder
-from thenar.runtime.sinks.angles import AngleReader
-from thenar.runtime.sinks.fanout import Fanout
-from thenar.runtime.sinks.opening import open_sink
 from thenar.simulator.playing.bench import Bench
 
-MOST_US, LEAST_SHARE, MOST_MIB = 150, 0.9, 80
+MOST_US, LEAST_SHARE, MOST_MIB, MOST_FILES = 150, 0.9, 80, 20
 FRAMES, TURNS = 500, 8
 # A clock at which the wire takes so long that what emulates it does not matter.
 SLOW_HZ = 10_000
-STAGES = ("the step alone", "and JSON lines, preshape, angles", "and MCAP", "and health", "and a socket with a reader")
-Tell = Callable[[Moment], None]
+STAGES = ("the step alone", "and JSON lines, preshape, angles, health", "and MCAP", "and reports", "and a socket")
 # Prints the peak of its only child in KiB: a process's own begins at the size of who started it.
 PEAK = "import os, subprocess, sys; print(os.wait4(subprocess.Popen(sys.argv[1:]).pid, 0)[2].ru_maxrss)"
 
@@ -81,52 +74,48 @@ def loop_costs(scenes: Sequence[Played], folder: Path) -> Table:
 
 def _stages_us(scene: Played, folder: Path) -> list[list[float]]:
     """Return microseconds a frame for every stage. They run by turns, so that what else the machine does hits all."""
-    system = System.of(scene.build, with_glove(board(scene), glove(scene)))
-    frames = restless(len(system.switch_names), FRAMES, seed=1)
+    frames = restless(len(scene.kept), FRAMES, seed=1)
     with ExitStack() as stack:
-        loops = [_stage(stage, system, folder, stack) for stage in range(len(STAGES))]
-        turns = [[[_step_us(*each, *frame) for frame in frames] for each in loops] for _ in range(1 + TURNS)]
+        gloves = [_stage(stage, scene, folder, stack) for stage in range(len(STAGES))]
+        turns = [[[_step_us(*each, *frame) for frame in frames] for each in gloves] for _ in range(1 + TURNS)]
     # The first turn fills caches.
     return [list(chain(*stage)) for stage in zip(*turns[1:], strict=True)]
 
 
-def _step_us(loop: LiveLoop, feed: Memory, closed: int, sensors: bytes) -> float:
+def _step_us(run: Callable[[], object], feed: Memory, closed: int, sensors: bytes) -> float:
     feed.put(now_us(), closed, sensors)
     start = time.thread_time_ns()
-    loop.step()
+    run()
     return (time.thread_time_ns() - start) / 1e3
 
 
-def _stage(stage: int, system: System, folder: Path, stack: ExitStack) -> tuple[LiveLoop, Memory]:
-    """Return a loop with everything up to this stage, and what feeds it."""
+def _stage(stage: int, scene: Played, folder: Path, stack: ExitStack) -> tuple[Callable[[], object], Memory]:
+    """Return what makes one moment with everything up to this stage, and what feeds it."""
     own = Path(stack.enter_context(TemporaryDirectory(dir=folder)))
-    recorder = stack.enter_context(Recorder(own / "run.mcap", session(system))) if stage >= 2 else None
+    harness, feed = with_glove(board(scene), glove(scene)), Memory(len(scene.kept))
+    if stage == 0:
+        recognizer = System.of(scene.build, harness).recognizer()
+
+        def step() -> None:
+            taken = feed.take()
+            recognizer.step(now_us(), time.time_ns() // 1000, taken.switches, taken.glove)
+
+        return step, feed
+    sinks = ["jsonl:/dev/null", f"unix:{own}/socket"] if stage >= 4 else ["jsonl:/dev/null"]
+    record = own / "run.mcap" if stage >= 2 else None
+    run = Glove(
+        scene.build,
+        harness,
+        preshapes="barrett_bh8",
+        sinks=sinks,
+        record=record,
+        status=stage >= 3,
+        feed=feed,
+    )
+    stack.enter_context(run)
     if stage >= 4:
-        fanout = stack.enter_context(read_along(own))
-    else:
-        fanout = Fanout([open_sink("jsonl:/dev/null")])
-        stack.callback(fanout.close)
-    told = teller(system, fanout, system.sources(), recorder).tell
-    tell: Tell = told if stage >= 3 else _published(system, fanout) if stage else _told_to_nobody
-    feed = Memory(system)
-    return LiveLoop(feed, system.recognizer(), tell, recorder), feed
-
-
-def _told_to_nobody(_: Moment) -> None:
-    pass
-
-
-def _published(system: System, fanout: Fanout) -> Tell:
-    """Return what does with a moment what `thenar run` does, except to watch how the glove fares."""
-    assert system.calibration is not None
-    selector = PreshapeSelector(load_preshapes("barrett_bh8"))
-    angles = AngleReader(system.sensor_names, system.calibration)
-
-    def tell(moment: Moment) -> None:
-        assert moment.glove is not None
-        fanout.publish(moment.grasp, selector.update(moment.grasp), angles.angles(moment.glove.sensors))
-
-    return tell
+        stack.enter_context(read_along(own / "socket"))
+    return lambda: next(run), feed
 
 
 def rates(scene: Played, seconds: float, folder: Path) -> Table:
@@ -210,6 +199,10 @@ def main() -> None:
         console.print(loop_costs(scenes, folder), "")
         console.print(rates(scenes[0], options.seconds, folder), "")
         console.print(scans(scenes[0]), "")
+        passed = way(scenes[0])
+        calls = ", ".join(f"{calls:.0f} in {thread}" for thread, calls in sorted(passed.calls.items()))
+        console.print(f"A frame passes {len(passed.files)} files (at most {MOST_FILES}); calls a grasp: {calls}")
+        console.print("\n".join(passed.files), "")
         console.print(
             f"Peak of `thenar run`: {peak_mib(scenes[0], folder, options.seconds):.0f} MiB (at most {MOST_MIB})"
         )

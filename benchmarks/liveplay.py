@@ -6,33 +6,19 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from importlib.metadata import version
 from pathlib import Path
-from threading import Event
 from typing import Literal
 
 import msgspec
 import numpy as np
 
-from thenar.cli.teller import Teller
 from thenar.compiler import compile_build
 from thenar.drivers.cyberglove_protocol import ALWAYS, PLUGGED
 from thenar.runtime import Build
+from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import GloveWiring, Harness
-from thenar.runtime.harness.writing import harness_to_toml
-from thenar.runtime.live.arrivals import Arrivals, Taken
-from thenar.runtime.live.frames import GloveFrame, SwitchFrame
-from thenar.runtime.live.parts import Part, Parts
-from thenar.runtime.live.sources import Sources
-from thenar.runtime.live.system import System
-from thenar.runtime.preshape.loading import load_preshapes
-from thenar.runtime.preshape.selector import PreshapeSelector
-from thenar.runtime.recording.session import Session
-from thenar.runtime.recording.writer import Recorder
-from thenar.runtime.sinks.angles import AngleReader
-from thenar.runtime.sinks.fanout import Fanout
-from thenar.runtime.sinks.opening import open_sink
+from thenar.runtime.live.sources import Arrivals, Taken
 from thenar.simulator import load_scene, simulate
 from thenar.simulator.playing.performance import Performance, of_scene
 
@@ -98,23 +84,16 @@ def with_glove(harness: Harness, wiring: GloveWiring) -> Harness:
 
 
 class Memory:
-    """A feed of the live loop that holds what it was given: no device, no thread, no waiting."""
+    """A feed of a glove that holds what it was given: no device, no thread, no waiting."""
 
-    patience_s = 0.0
-
-    def __init__(self, system: System) -> None:
-        self._part = Part((1 << len(system.switch_names)) - 1)
-        self._arrivals = Arrivals(Parts(len(system.switch_names), [self._part]))
+    def __init__(self, switches: int) -> None:
+        self._arrivals = Arrivals(switches, [(1 << switches) - 1])
 
     def put(self, time_us: int, closed: int, sensors: bytes | None) -> None:
         """Let a frame of the switches come in, and before it one of the glove unless there is none."""
         if sensors is not None:
-            self._arrivals.put_glove(GloveFrame(time_us, sensors, STATUS))
-        self._arrivals.put_switches(self._part, SwitchFrame(time_us, closed), _LONGEST_US)
-
-    def wait(self, timeout_s: float) -> bool:
-        """Return whether something came in."""
-        return self._arrivals.wait(timeout_s)
+            self._arrivals.put_glove(GloveFrame(time_us, sensors, STATUS), _LONGEST_US)
+        self._arrivals.put_switches(0, SwitchFrame(time_us, closed), _LONGEST_US)
 
     def take(self) -> Taken:
         """Return what came in."""
@@ -133,32 +112,11 @@ def mask(closed: Sequence[bool]) -> int:
     return sum(1 << number for number, shut in enumerate(closed) if shut)
 
 
-def teller(system: System, fanout: Fanout, sources: Sources, recorder: Recorder | None) -> Teller:
-    """Return what tells `fanout` of every moment, preshapes and angles with it, and how the glove fares."""
-    assert system.calibration is not None
-    selector = PreshapeSelector(load_preshapes("barrett_bh8"))
-    angles = AngleReader(system.sensor_names, system.calibration)
-    return Teller(system, fanout, sources, None, Event(), selector, angles, recorder, status=True)
-
-
 @contextmanager
-def read_along(folder: Path) -> Iterator[Fanout]:
-    """Yield JSON lines to nowhere and a socket in `folder` that a process of its own reads."""
-    fanout = Fanout([open_sink("jsonl:/dev/null"), open_sink(f"unix:{folder}/socket")])
-    with subprocess.Popen([sys.executable, "-c", _READER, f"{folder}/socket"]):
+def read_along(socket: Path) -> Iterator[None]:
+    """Let a process of its own read a socket."""
+    with subprocess.Popen([sys.executable, "-c", _READER, str(socket)]) as reader:
         try:
-            yield fanout
+            yield
         finally:
-            fanout.close()
-
-
-def session(system: System) -> Session:
-    """Return what a recording of `system` says of itself."""
-    return Session(
-        thenar=version("thenar"),
-        switches=system.switch_names,
-        sensors=system.sensor_names,
-        build=system.build.manifest.checksum,
-        harness=harness_to_toml(system.harness),
-        calibration=system.calibration,
-    )
+            reader.terminate()

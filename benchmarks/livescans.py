@@ -14,17 +14,16 @@ from liveplay import Played, glove, with_glove
 from liverates import LIVEWIRE
 from livewire import SCANS, Scanned
 
+from thenar.runtime.calibration import CodeTables
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.harness.writing import harness_to_toml
-from thenar.runtime.live.codes import CodeTables
-from thenar.runtime.live.policy import Policy
-from thenar.runtime.scanning.costs import Costs
-from thenar.runtime.scanning.earlyexit import EarlyExit
-from thenar.runtime.scanning.plan import plan_scan
+from thenar.runtime.policy import Policy
+from thenar.runtime.scanning.decided import EarlyExit
+from thenar.runtime.scanning.plan import Costs, plan_scan
+from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import scan_us
-from thenar.runtime.scanning.whole import whole_scan
 from thenar.simulator.playing.bench import Bench
 
 CLOCK_HZ = 100_000
@@ -112,7 +111,7 @@ def _until_decided(scene: Played, harness: Harness, scan: ScanMap, rows: Iterabl
     """Yield for each row what the ports take that are read until the scan is decided."""
     build, costs = scene.build, Costs(scan.ports, harness)
     groups = [sum(1 << switch for _, switch in port.switches) for port in scan.ports]
-    early = EarlyExit(build.tables, groups, lead=Policy().lead_steps(build.tables.scale))
+    early = EarlyExit(build.scorer, groups, lead=Policy().lead_steps(build.tables.scale))
     sensors = [sensor.name for sensor in scene.performance.calibration.sensors]
     codes = CodeTables(build.manifest.joints, sensors, scene.performance.calibration)
     for row in rows:

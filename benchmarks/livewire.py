@@ -9,32 +9,28 @@ Both answer in JSON.
 
 import sys
 import time
-from contextlib import ExitStack
 from dataclasses import dataclass
 from fcntl import ioctl
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from threading import Event, Timer
 from typing import Any
 
 import msgspec
 import smbus2.smbus2
-from liveplay import STATUS, read_along, session, teller
+from liveplay import STATUS, read_along
 
 import thenar.drivers.i2c.node
-from thenar.runtime import Build
+from thenar.runtime import Build, Glove
+from thenar.runtime.frames import GloveFrame, Newest, SwitchFrame, now_us
 from thenar.runtime.harness.loading import load_harness
-from thenar.runtime.live.arrivals import Taken
-from thenar.runtime.live.frames import GloveFrame, SwitchFrame, now_us
-from thenar.runtime.live.i2c_device import I2cDevice
-from thenar.runtime.live.loop import LiveLoop, Moment
-from thenar.runtime.live.sources import Sources
+from thenar.runtime.live.sources import Sources, Taken
 from thenar.runtime.live.system import System
-from thenar.runtime.recording.writer import Recorder
-from thenar.runtime.scanning.whole import whole_scan
+from thenar.runtime.scanning.ports import whole_scan
+from thenar.runtime.sources.i2c import I2cDevice
 
 SCANS = 4
 _START_S = 20.0
+_LONGEST_US = 1_000_000
 
 
 class Rate(msgspec.Struct):
@@ -68,15 +64,6 @@ class Counted:
     gloves: int = 0
     recognised: int = 0
 
-    @property
-    def patience_s(self) -> float:
-        """As long as the sources say."""
-        return self.sources.patience_s
-
-    def wait(self, timeout_s: float) -> bool:
-        """Wait as the sources do."""
-        return self.sources.wait(timeout_s)
-
     def take(self) -> Taken:
         """Take what the sources have, and count."""
         taken = self.sources.take()
@@ -90,53 +77,54 @@ class Counted:
 
 def rate(build: str, glove: str, seconds: float, which: str = "early") -> Rate:
     """Run with all sinks on for so long, once all is well."""
-    system = System.of(Build.load(build), load_harness(glove))
-    with ExitStack() as stack:
-        folder = Path(stack.enter_context(TemporaryDirectory()))
-        feed = Counted(stack.enter_context(system.sources(full_scan=which == "full")))
-        recorder = stack.enter_context(Recorder(folder / "run.mcap", session(system)))
-        fanout = stack.enter_context(read_along(folder))
-        told, well = teller(system, fanout, feed.sources, recorder), Event()
-
-        def tell(moment: Moment) -> None:
-            told.tell(moment)
-            if moment.grasp.health == "ok":
-                well.set()
-
-        loop = LiveLoop(feed, system.recognizer(), tell, recorder)
-        _run(loop, well, _START_S)
-        if not well.is_set():
-            raise SystemExit(f"nothing came of it: {feed.sources.devices()}")
-        return _over(loop, feed, seconds)
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        run = Glove(
+            build,
+            glove,
+            preshapes="barrett_bh8",
+            sinks=["jsonl:/dev/null", f"unix:{folder}/socket"],
+            record=folder / "run.mcap",
+            full_scan=which == "full",
+            status=True,
+        )
+        with run, read_along(folder / "socket"):
+            feed = Counted(run.sources)
+            run.feed = feed
+            _run(run, _START_S, until_well=True)
+            return _over(run, feed, seconds)
 
 
-def _over(loop: LiveLoop, feed: Counted, seconds: float) -> Rate:
+def _over(glove: Glove, feed: Counted, seconds: float) -> Rate:
     ioctls = Ioctls()
     ioctls.stand_in()
-    counts, clocks = _counts(loop, feed), _clocks()
-    _run(loop, Event(), seconds)
+    counts, clocks = _counts(glove, feed), _clocks()
+    _run(glove, seconds)
     inside_s = ioctls.wall_ns / 1e9
     wall_s, loop_s, process_s = (now - then for now, then in zip(_clocks(), clocks, strict=True))
-    switches, gloves, recognised, grasps = (now - then for now, then in zip(_counts(loop, feed), counts, strict=True))
+    switches, gloves, recognised, grasps = (now - then for now, then in zip(_counts(glove, feed), counts, strict=True))
     each, between_us = 1e6 / grasps, 1e6 * (wall_s - inside_s) / switches if ioctls.count else 0.0
     return Rate(switches / wall_s, gloves / wall_s, recognised / wall_s, loop_s * each, process_s * each, between_us)
 
 
-def _counts(loop: LiveLoop, feed: Counted) -> tuple[int, int, int, int]:
-    return feed.switches, feed.gloves, feed.recognised, loop.frames
+def _counts(glove: Glove, feed: Counted) -> tuple[int, int, int, int]:
+    return feed.switches, feed.gloves, feed.recognised, glove.frames
 
 
 def _clocks() -> tuple[float, float, float]:
     return time.perf_counter(), time.thread_time(), time.process_time()
 
 
-def _run(loop: LiveLoop, stop: Event, seconds: float) -> None:
-    """Run until `stop`, or for so long."""
-    ending = Timer(seconds, stop.set)
-    ending.daemon = True
-    ending.start()
-    loop.run(stop)
-    ending.cancel()
+def _run(glove: Glove, seconds: float, *, until_well: bool = False) -> None:
+    """Run for so long, or until all is well."""
+    end = time.monotonic() + seconds
+    for moment in glove:
+        if until_well and moment.grasp.health == "ok":
+            return
+        if time.monotonic() > end:
+            break
+    if until_well:
+        raise SystemExit(f"nothing came of it: {glove.sources.devices()}")
 
 
 @dataclass(eq=False)
@@ -166,10 +154,10 @@ class Ioctls:
 def scans(build: str, glove: str, which: str) -> None:
     """Scan the one bus: all switches that are wired, the kept ones in full, or those until the scan is decided."""
     system = System.of(Build.load(build), load_harness(glove))
-    scout = system.recognizer() if which == "early" else None
     scan = whole_scan(system.harness, system.harness.switches) if which == "all" else system.scan
-    newest: GloveFrame | None = None
-    device = I2cDevice(system.harness, 0, scan, scout, lambda: newest)
+    device, newest = I2cDevice(system.harness, 0, scan), Newest[GloveFrame]()
+    if which == "early":
+        device.end_early(system.early_exit, system.joints(), newest)
     device.open()
     ioctls = Ioctls()
     ioctls.stand_in()
@@ -177,7 +165,8 @@ def scans(build: str, glove: str, which: str) -> None:
     for line in sys.stdin:
         found, before = Scanned([], [], 0), ioctls.count
         for _ in range(SCANS):
-            newest = GloveFrame(now_us(), bytes.fromhex(line), STATUS)
+            now = now_us()
+            newest.take(GloveFrame(now, bytes.fromhex(line), STATUS), now, _LONGEST_US)
             start, cpu_ns, inside_ns = time.perf_counter(), time.thread_time_ns(), ioctls.cpu_ns
             device.read(1.0)
             python_ns = time.thread_time_ns() - cpu_ns - (ioctls.cpu_ns - inside_ns)

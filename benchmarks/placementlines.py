@@ -16,9 +16,9 @@ from thenar.compiler.placement.optimum import Pairs, Subset, best_subset
 from thenar.compiler.placement.ports import port_costs
 from thenar.compiler.samples import Columns, Samples
 from thenar.compiler.workers import in_workers
+from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import scan_us
-from thenar.runtime.scanning.whole import whole_scan
 
 # Beside the joints, 33 switches are left out: that saves a fifth of the time.
 SHOWN = {False: (8, 16, 33), True: (8, 16)}

@@ -21,8 +21,7 @@ from synthetic import grasp_like
 from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.recordings.taxonomy import own
-from thenar.runtime import Build, Recognizer
-from thenar.runtime.recognizer import Frame
+from thenar.runtime import Build
 
 IMPORTS = 15
 REPEATS = 7
@@ -88,12 +87,11 @@ def main() -> None:
         build = Build.load(Path(folder) / "build")
     kept = [switch.column for switch in manifest.switches]
     bits, codes = np.ascontiguousarray(recorded.switches[0, kept]), recorded.codes[0]
-    recognizer, frame = Recognizer(build), Frame(0, bits, codes)
     ours = call_seconds(lambda: build.classify(bits, codes), 20_000)
-    whole = call_seconds(lambda: recognizer.recognise(frame), 10_000)
+    whole = call_seconds(lambda: build.recognise(bits, codes), 10_000)
     print(f"\none frame, {len(kept)} switches + {len(codes)} joints, {len(build.grasps)} grasp types, 100 rounds")
     print(f"Build.classify          {ours * MICRO:8.2f} us   (at most 10)")
-    print(f"Recognizer.recognise    {whole * MICRO:8.2f} us   with probability and margin")
+    print(f"Build.recognise         {whole * MICRO:8.2f} us   with probability and margin")
 
     X = np.hstack([recorded.switches[:, kept], recorded.codes]).astype(np.float32)
     model = GradientBoostingClassifier(n_estimators=100, max_depth=1).fit(X, recorded.grasps)

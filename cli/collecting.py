@@ -15,17 +15,14 @@ from thenar.drivers.calibration import GloveCalibration
 from thenar.drivers.errors import SettingError
 from thenar.runtime.calibration import load_calibration
 from thenar.runtime.errors import HarnessError
+from thenar.runtime.frames import now_us
 from thenar.runtime.harness.wiring import GloveWiring, Harness
-from thenar.runtime.live.arrivals import Taken
-from thenar.runtime.live.frames import now_us
-from thenar.runtime.live.keeper import DeviceState
-from thenar.runtime.live.sources import Sources
+from thenar.runtime.live.sources import DeviceState, Sources, Taken
 from thenar.runtime.live.system import sensor_names_of
-from thenar.runtime.recording.guide import Guide, Stage
+from thenar.runtime.recording.guide import Guide, Journal, Stage, Trial
 from thenar.runtime.recording.session import Collection, Session
-from thenar.runtime.recording.trials import Journal, Trial
 from thenar.runtime.recording.writer import Recorder
-from thenar.runtime.scanning.whole import whole_scan
+from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.toml_source import read_source
 
 from .common import err
@@ -33,17 +30,14 @@ from .ending import ended_by_signals
 from .guide_keys import GuideKeys
 from .guide_view import GuideView
 
-_WAIT_S = 0.05
+_WAIT_US = 50_000
 
 
 class Devices(Protocol):
     """What a collection takes from `Sources`."""
 
-    def wait(self, timeout_s: float) -> bool:
-        """Wait until something has come in."""
-
-    def take(self) -> Taken:
-        """Return what has come in."""
+    def take(self, at_most_us: int) -> Taken:
+        """Return what has come in, after waiting for something."""
 
     def devices(self) -> tuple[DeviceState, ...]:
         """Return how the devices fare."""
@@ -94,9 +88,9 @@ def lead(guide: Guide, devices: Devices, recorder: Recorder, view: GuideView, st
     """Lead through the guide's trials until they are done, the user leaves, `stop` is set, or the recording fails."""
     with GuideKeys(sys.stdin.fileno()) as keys, view:
         while guide.stage is not Stage.OVER and recorder.failure is None and not stop.is_set():
-            devices.wait(_WAIT_S)
+            arrived = devices.take(_WAIT_US).arrived
             devices.raise_settings()
-            guide.take(now_us(), devices.take().arrived)
+            guide.take(now_us(), arrived)
             for key in keys.pressed():
                 guide.press(now_us(), key)
             view.show(now_us(), guide, devices.devices())

@@ -32,7 +32,7 @@ def command(glove: Path, build: Path | None, as_json: bool) -> None:
     from thenar.runtime.harness.loading import load_harness
     from thenar.runtime.live.checkup import check_up
     from thenar.runtime.live.system import System
-    from thenar.runtime.scanning.whole import whole_scan
+    from thenar.runtime.scanning.ports import whole_scan
 
     harness = load_harness(glove)
     check_devices(harness, glove)

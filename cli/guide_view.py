@@ -11,11 +11,11 @@ from rich.table import Table
 from rich.text import Text
 
 from thenar.compiler.recordings.taxonomy import Taxonomy
-from thenar.runtime.live.keeper import DeviceState
+from thenar.runtime.live.sources import DeviceState
 from thenar.runtime.recording.guide import Guide, Stage
 
 if TYPE_CHECKING:
-    from thenar.runtime.recording.trials import Trial
+    from thenar.runtime.recording.guide import Trial
 
 _REDRAW_US = 100_000
 _KEYS = {

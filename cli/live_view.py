@@ -11,11 +11,10 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from thenar.runtime.live.health import DeviceHealth, HealthReport
-from thenar.runtime.live.published import LiveGrasp
+from thenar.runtime.published import DeviceHealth, HealthReport, LiveGrasp
 
 Devices = Callable[[], Sequence[DeviceHealth]]
-_Shown = tuple[LiveGrasp, Devices, Sequence[str]]
+_Shown = tuple[LiveGrasp, Devices, HealthReport | None]
 
 _REDRAW_S = 0.1
 _STYLES = {"ok": "bold green", "changing": "bold cyan", "degraded": "bold yellow", "unknown": "bold red"}
@@ -29,7 +28,9 @@ class LiveView:
     A thread of its own does: a terminal that is held (Ctrl-S), slow or gone holds up nobody else.
     """
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, console: Console, status: bool = False) -> None:
+        """With `status`, reports of the glove's health are drawn below the devices."""
+        self._status = status
         self._live = Live(console=console, transient=True, auto_refresh=False)
         self._newest: _Shown | None = None
         self._closing = Event()
@@ -48,9 +49,9 @@ class LiveView:
         with suppress(OSError):
             self._live.stop()
 
-    def show(self, grasp: LiveGrasp, devices: Devices, lines: Sequence[str] = ()) -> None:
-        """Draw this next, unless something newer comes first: `lines` stand below the devices, asked for then."""
-        self._newest = grasp, devices, lines
+    def show(self, grasp: LiveGrasp, devices: Devices, health: HealthReport | None = None) -> None:
+        """Draw this next, unless something newer comes first; the devices are asked for then."""
+        self._newest = grasp, devices, health
 
     def _draw(self) -> None:
         shown = None
@@ -59,7 +60,8 @@ class LiveView:
             while not self._closing.wait(_REDRAW_S):
                 newest = self._newest
                 if newest is not None and newest is not shown:
-                    grasp, devices, lines = shown = newest
+                    grasp, devices, health = shown = newest
+                    lines = health_lines(health) if self._status else ()
                     self._live.update(drawn(grasp, devices(), lines), refresh=True)
 
 

@@ -10,8 +10,8 @@ from .common import check_devices, existing_file, keep_apart, output_file, progr
 from .lines import echo
 
 if TYPE_CHECKING:
+    from thenar.runtime.recording.guide import Journal
     from thenar.runtime.recording.session import Collection
-    from thenar.runtime.recording.trials import Journal
 
 
 @click.command("record")
@@ -51,8 +51,8 @@ def command(
     from thenar.compiler.recordings.errors import check_names
     from thenar.compiler.recordings.objects import collected
     from thenar.runtime.harness.loading import load_harness
+    from thenar.runtime.recording.guide import planned, read_journal
     from thenar.runtime.recording.session import Collection
-    from thenar.runtime.recording.trials import planned, read_journal
 
     from .collecting import collect
 

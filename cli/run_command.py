@@ -1,16 +1,40 @@
 """`thenar run`: the runtime's recogniser, live on a glove or on recorded frames."""
 
+import errno
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
-from .common import existing_file, existing_folder, output_file
+from .common import err, existing_file, existing_folder, of_device, out, output_file, warning
+from .lines import echo
 
 if TYPE_CHECKING:
-    from thenar.runtime.live.policy import Policy
+    from thenar.compiler.recordings.graspset import GraspSet
+    from thenar.runtime import Build, Glove
+    from thenar.runtime.policy import Policy
+    from thenar.runtime.published import HealthReport, LiveGrasp
+    from thenar.runtime.sinks import Fanout, SinkReport
+
+    from .live_view import LiveView
+
+
+class _SinkOption(click.Option):
+    """Its help, which is only made when it is asked for, lists all kinds of sinks, those of other packages too."""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        from thenar.runtime.sinks import SINKS
+
+        kinds = "; ".join(f"{kind.spelling}, {kind.help}" for kind in SINKS.values())
+        self.help = f"Where grasps go: {kinds}. May be repeated."
+        return super().get_help_record(ctx)
 
 
 @click.command("run")
@@ -31,8 +55,7 @@ if TYPE_CHECKING:
     "sinks",
     metavar="SINK",
     multiple=True,
-    help="Where grasps go: jsonl:FILE (- is stdout), unix:PATH, tcp:127.0.0.1:PORT, ros:/NAMESPACE, on this machine; "
-    "tcp-public:ADDRESS:PORT and ros:/NAMESPACE?public let others read. May be repeated.",
+    cls=_SinkOption,
 )
 @click.option(
     "--preshape", metavar="NAME", help="Preshapes to send along: barrett_bh8, parallel_gripper or a .toml file."
@@ -84,15 +107,10 @@ def command(
         raise click.UsageError("name a glove to run on (--glove) or frames to run through (--replay), one of them")
     if record is not None and record.suffix != ".mcap":
         raise click.BadParameter(f"{record.name}: a recording ends in .mcap", param_hint="--record")
-    from thenar.runtime.build import Build
+    from thenar.runtime import Build
 
     _refuse_idle(glove, replay)
     loaded = Build.load(build)
-    if replay is not None and replay.suffix != ".mcap":
-        from .run_replay import replay_set
-
-        replay_set(loaded, replay, period_us)
-        return
     policy = _policy(
         {
             "lead": lead,
@@ -102,21 +120,21 @@ def command(
             "spacing_us": _us(spacing_ms),
         }
     )
-    if replay is not None:
-        from .run_replay import replay_recording
+    if replay is None:
+        if sys.stdout is None and not sinks:
+            raise click.UsageError("stdout is closed: name a --sink to send grasps to")
+        viewed = sys.stdout is not None and sys.stdout.isatty() and "jsonl:-" not in sinks
+        asked: dict[str, Any] = {"preshapes": preshape, "record": record, "full_scan": full_scan, "status": status}
+        _run_live(
+            loaded, glove, viewed, frames, sinks=sinks or (() if viewed else ("jsonl:-",)), policy=policy, **asked
+        )
+    elif replay.suffix == ".mcap":
+        _replay_recording(loaded, replay, sinks, policy)
+    else:
+        _replay_set(loaded, replay, sinks, period_us)
 
-        replay_recording(loaded, replay, policy)
-        return
-    from thenar.runtime.harness.loading import load_harness
-    from thenar.runtime.live.system import System
 
-    from .run_live import LiveOptions, run_live
-
-    system = System.of(loaded, load_harness(str(glove)), policy)
-    run_live(system, LiveOptions(sinks, preshape, record, full_scan, status, frames))
-
-
-_LIVE = ("sinks", "preshape", "record", "full_scan", "status", "frames")
+_LIVE = ("preshape", "record", "full_scan", "status", "frames")
 _POLICY = ("lead", "dwell_ms", "max_lost", "error_rate", "spacing_ms")
 
 
@@ -147,10 +165,182 @@ def _us(ms: float | None) -> int | None:
 
 def _policy(asked: dict[str, Any]) -> "Policy | None":
     """Return the usual policy with what was `asked` for in its place; None if nothing was."""
-    from thenar.runtime.live.policy import Policy
+    from thenar.runtime.policy import Policy
 
     given = {name: value for name, value in asked.items() if value is not None}
     if not given:
         return None
     usual = Policy()
     return replace(usual, **{"hold_us": max(usual.hold_us, given.get("dwell_us", 0)), **given})
+
+
+def _run_live(
+    build: "Build", harness: Path | None, viewed: bool, frames: int | None, *, status: bool, **asked: Any
+) -> None:
+    """Run until a signal comes, or so many frames are published."""
+    from thenar.runtime import Glove
+
+    from .ending import ended_by_signals
+    from .live_view import LiveView
+
+    with ExitStack() as stack:
+        stop = stack.enter_context(ended_by_signals())
+        glove = Glove(build, str(harness), stop=stop, status=status, **asked)
+        if glove.lacking:
+            err().print(f"thenar: {glove.lacking}")
+        stack.enter_context(glove)
+        view = stack.enter_context(LiveView(out(), status)) if viewed else None
+        _look_on(glove, view, frames)
+    recorder, reports = glove.recorder, glove.reports()
+    _say(f"{glove.frames} frame{'s' * (glove.frames != 1)}")
+    _say_what_was_lost(reports)
+    if recorder is not None:
+        failed = f"; {recorder.failure}" if recorder.failure else ""
+        _say(f"{recorder.path}: {recorder.messages} messages{failed}")
+    if (recorder and recorder.failure) or _spoilt(reports):
+        click.get_current_context().exit(1)
+
+
+def _look_on(glove: "Glove", view: "LiveView | None", frames: int | None) -> None:
+    """Let the glove run, and once a second look how it fares."""
+    said, health = dict[str, str](), None
+    for moment in islice(glove, frames):
+        if glove.health is not health and glove.health is not None:
+            health = glove.health
+            if view is None:
+                _say_news(glove, health, said)
+                if glove.recorder is None and _nobody_listens(glove.reports()):
+                    return
+        if view is not None:
+            view.show(moment.grasp, glove.devices, health)
+
+
+def _say_news(glove: "Glove", health: "HealthReport", said: dict[str, str]) -> None:
+    """Say on stderr how devices and recording fare, once each time that it changes."""
+    from thenar.runtime.live.sources import NOT_YET
+
+    news = {device.name: device.error or "connected" for device in health.devices}
+    if glove.recorder is not None and glove.recorder.failure:
+        news["recording"] = glove.recorder.failure
+    for name, state in news.items():
+        if said.get(name) != state and state != NOT_YET:
+            _say(of_device(name, state))
+            said[name] = state
+
+
+def _nobody_listens(reports: "Sequence[SinkReport]") -> bool:
+    """Return whether every reader went away for good (`| head`)."""
+    return bool(reports) and all(report.over for report in reports)
+
+
+def _say_what_was_lost(reports: "Sequence[SinkReport]") -> None:
+    for report in reports:
+        if report.lost or report.error:
+            why = f": {report.error}" if report.error else ""
+            dropped = f", {report.dropped} readers dropped" if report.dropped else ""
+            _say(f"{report.where}: {report.sent} frames sent, {report.lost} lost{dropped}{why}")
+
+
+def _spoilt(reports: "Sequence[SinkReport]") -> bool:
+    """Return whether a sink did not do what was asked of it, by more than a reader's leaving."""
+    gone = os.strerror(errno.EPIPE)
+    return any(report.over and report.error != gone for report in reports)
+
+
+def _say(line: str) -> None:
+    """Say it on stderr, where that is still there: a terminal that was closed is told nothing."""
+    with suppress(OSError):
+        echo(line, err=True)
+
+
+def _replay_recording(build: "Build", replay: Path, sinks: Sequence[str], policy: "Policy | None") -> None:
+    """Recognise the frames of a live recording again, at the times at which they were recognised then.
+
+    They go to the sinks as the live run sent them, without any as JSON lines to stdout; on stderr, how many came out as
+    they did then.
+    """
+    from thenar.runtime.live.replay import replayed
+    from thenar.runtime.sinks.jsonl import encode
+
+    same = frames = 0
+    with _opened(sinks) as fanout:
+        for then, now in replayed(build, replay, policy, warning):
+            same += then == now
+            frames += 1
+            if sinks:
+                fanout.publish(now, None, None)
+            else:
+                sys.stdout.buffer.write(encode(now, None, None))
+    sys.stdout.flush()
+    echo(f"{same} of {frames} frames recognised as they were recorded", err=True)
+
+
+def _replay_set(build: "Build", replay: Path, sinks: Sequence[str], period_us: int) -> None:
+    """Recognise every row of a set of grasps by itself, each for the sinks, without any as a JSON line on stdout; on
+    stderr, the rate.
+    """
+    import msgspec
+
+    from thenar.compiler.recordings.graspset import GraspSet
+
+    grasp_set, correct = GraspSet.load(replay), 0
+    with _opened(sinks) as fanout:
+        for grasp, degraded in _rows(build, grasp_set, period_us):
+            recorded = str(grasp_set.grasps[grasp.number])
+            correct += grasp.grasp == recorded
+            if sinks:
+                fanout.publish(grasp, None, None)
+                continue
+            line = {
+                "time_us": grasp.time_us,
+                "grasp": grasp.grasp,
+                "probability": round(grasp.probability, 6),
+                "margin": grasp.margin,
+                "degraded": degraded,
+                "recorded": recorded,
+            }
+            sys.stdout.buffer.write(msgspec.json.encode(line) + b"\n")
+    sys.stdout.flush()
+    rows = len(grasp_set)
+    echo(f"{correct} of {rows} frames recognised as recorded ({correct / max(rows, 1):.1%})", err=True)
+
+
+def _rows(build: "Build", grasp_set: "GraspSet", period_us: int) -> "Iterator[tuple[LiveGrasp, bool]]":
+    """Yield what is recognised in each row, and whether an input of it was missing. Both clocks begin with the set."""
+    from thenar.compiler.artifact.select import select_inputs
+    from thenar.runtime.published import LiveGrasp
+
+    bits, codes = select_inputs(grasp_set, build.manifest)
+    for row, (switches, joints) in enumerate(zip(bits, codes, strict=True)):
+        found = build.recognise(switches, joints)
+        grasp = LiveGrasp(
+            time_us=row * period_us,
+            unix_us=row * period_us,
+            number=row,
+            grasp=found.grasp,
+            candidate=found.grasp,
+            probability=found.probability,
+            margin=found.margin,
+            health="degraded" if found.degraded else "ok",
+            switch_age_us=None,
+            glove_age_us=None,
+            latency_us=0,
+        )
+        yield grasp, found.degraded
+
+
+@contextmanager
+def _opened(sinks: Sequence[str]) -> "Iterator[Fanout]":
+    """Open sinks for a replay, which wait for their readers; at the end say what was lost, with exit code 1."""
+    from thenar.runtime.sinks import Fanout, open_sink
+
+    with ExitStack() as stack:
+        opened = []
+        for name in sinks:
+            opened.append(open_sink(name, wait=True))
+            stack.callback(opened[-1].close)
+        fanout = Fanout(opened)
+        yield fanout
+    _say_what_was_lost(fanout.reports())
+    if _spoilt(fanout.reports()):
+        click.get_current_context().exit(1)

@@ -1,6 +1,7 @@
 """A build folder, loaded: `build.json` says what the tables mean, `tables.bin` holds them, `scan.json` how to read."""
 
 import hashlib
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Self
@@ -15,10 +16,24 @@ from .files import read_file
 from .manifest import Manifest, manifest_from_bytes
 from .scanning import scanmap as scan_file
 from .scanning.scanmap import ScanMap, check_switches, scanmap_from_bytes
-from .scorer import LANE_OFFSET, Scorer
+from .scores import LANE_OFFSET, Scorer, softmax
 from .tables import IntegerTables, tables_from_bytes
 
 MANIFEST_NAME, TABLES_NAME, ENSEMBLE_NAME, SCAN_NAME = "build.json", "tables.bin", "ensemble.bin", "scan.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Recognition:
+    """What was recognised in a frame, and how surely.
+
+    probability is the softmax of the scores, margin the lead over the second best in integer steps; degraded says that
+    a switch or a joint was missing and its mean contribution was added for it.
+    """
+
+    grasp: str
+    probability: float
+    margin: int
+    degraded: bool
 
 
 class Build:
@@ -26,10 +41,10 @@ class Build:
 
     A frame is `bits` (s,), the kept switches in the order of `manifest.switches`, and `codes` (j,), the joints in the
     order of `manifest.joints`. Of equal scores the first grasp type wins. `scan` is how to read the kept switches, None
-    where the build was compiled for no harness.
+    where the build was compiled for no harness. `scorer` is what all that score frames of this build share.
     """
 
-    __slots__ = ("_scorer", "grasps", "manifest", "scan", "tables")
+    __slots__ = ("grasps", "manifest", "scan", "scorer", "tables")
 
     def __init__(self, manifest: Manifest, tables: IntegerTables, scan: ScanMap | None = None) -> None:
         """Put together what belongs together. Raises BuildError if they describe different builds."""
@@ -46,7 +61,7 @@ class Build:
         self.tables = tables
         self.scan = scan
         self.grasps = manifest.grasps
-        self._scorer = Scorer(tables)
+        self.scorer = Scorer(tables)
 
     @classmethod
     def load(cls, folder: str | PathLike[str]) -> Self:
@@ -70,22 +85,59 @@ class Build:
 
     def lanes(self, bits: ArrayLike, codes: ArrayLike) -> tuple[int, ...]:
         """Return the scores of one frame as K plain integers, all 2^15 too high: enough to compare them."""
-        return self._scorer.lanes(bits, codes)
+        return self.scorer.lanes(bits, codes)
 
     def lanes_without(
         self, bits: ArrayLike, codes: ArrayLike, lost_switches: ArrayLike, lost_joints: ArrayLike
     ) -> tuple[int, ...]:
         """Return `lanes` with the mean contribution in place of every switch and joint that a mask calls lost."""
-        return self._scorer.lanes_without(bits, codes, lost_switches, lost_joints)
+        return self.scorer.lanes_without(bits, codes, lost_switches, lost_joints)
 
     def scores(self, bits: ArrayLike, codes: ArrayLike) -> NDArray[np.int64]:
         """Return the scores of one frame, (K,) in steps of 1 / `tables.scale`. Raises FrameError."""
-        return np.array(self._scorer.lanes(bits, codes)) - LANE_OFFSET
+        return np.array(self.scorer.lanes(bits, codes)) - LANE_OFFSET
 
     def classify(self, bits: ArrayLike, codes: ArrayLike) -> str:
         """Return the grasp type of one frame. Raises FrameError."""
-        lanes = self._scorer.lanes(bits, codes)
+        lanes = self.scorer.lanes(bits, codes)
         return self.grasps[lanes.index(max(lanes))]
+
+    def recognise(
+        self,
+        bits: ArrayLike,
+        codes: ArrayLike,
+        lost_switches: ArrayLike | None = None,
+        lost_joints: ArrayLike | None = None,
+    ) -> Recognition:
+        """Return what is recognised in one frame by itself, and how surely.
+
+        Parameters
+        ----------
+        bits : array of bool, shape (s,)
+            The kept switches, closed or not.
+        codes : array of int, shape (j,)
+            The joints' codes, 0 to 65535.
+        lost_switches : array of bool, shape (s,), optional
+            The switches that could not be read; whatever `bits` says of them, their mean contribution is added.
+        lost_joints : array of bool, shape (j,), optional
+            The same of joints.
+
+        Raises
+        ------
+        FrameError
+            If the frame does not fit the build.
+        """
+        if lost_switches is None and lost_joints is None:
+            lanes, degraded = self.scorer.lanes(bits, codes), False
+        else:
+            switches = np.zeros(self.tables.n_switches, bool) if lost_switches is None else lost_switches
+            joints = np.zeros(self.tables.n_joints, bool) if lost_joints is None else lost_joints
+            lanes = self.scorer.lanes_without(bits, codes, switches, joints)
+            degraded = bool(np.any(switches) or np.any(joints))
+        second, best = sorted(lanes)[-2:]
+        winner = lanes.index(best)
+        probability = softmax(lanes, winner, self.tables.scale)
+        return Recognition(self.grasps[winner], probability, best - second, degraded)
 
 
 def load_manifest(folder: Path) -> Manifest:

@@ -1,15 +1,187 @@
-"""A CyberGlove's calibration from its file, which `thenar calibrate` writes; errors name file, line and key."""
+"""A CyberGlove's calibration, and what it makes of a record's bytes: the joint codes of a build, and angles in rad.
 
+A raw byte r of a sensor that is calibrated means value(r); the build codes that value as
+
+    code = rint(code_a + (value(r) - value_a) / step),   step = (value_b - value_a) / (code_b - code_a)
+
+held to 0..65535, by the two points that its recordings were coded by. Importing recordings works out the same, so a
+live byte gets the code that a recorded one got.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from operator import getitem, itemgetter
 from pathlib import Path
 
 from thenar.drivers.calibration import GloveCalibration
 from thenar.drivers.errors import SettingError
 
+from .errors import FrameError
+from .frames import PERIODS, GloveFrame, Newest
+from .manifest import Calibration
+from .names import nearest
+from .published import JointAngles
 from .toml_source import read_source
 from .toml_struct import convert
 
+_BYTES = 256
+_HIGHEST_CODE = 65535
+# A CyberGlove never sends 0: it ends a record.
+_RAW_CODES = range(1, _BYTES)
+
 
 def load_calibration(path: Path) -> GloveCalibration:
-    """Return the calibration in a file. Raises SettingError with file, line and key."""
+    """Return the calibration that `thenar calibrate` wrote. Raises SettingError with file, line and key."""
     source = read_source(path, SettingError)
     return convert(source, (), source.tables(), GloveCalibration)
+
+
+class CodeTables:
+    """The joints of a build as look-ups into a record's bytes. The last record's codes are kept: switches come several
+    times as often as records do.
+    """
+
+    __slots__ = ("_last", "_last_codes", "_pick", "_sensors", "_tables")
+
+    def __init__(
+        self, joints: Sequence[Calibration], sensor_names: Sequence[str], calibration: GloveCalibration | None = None
+    ) -> None:
+        """Take the joints as the build's manifest has them, and the sensors' names in wire order.
+
+        Raises SettingError if the glove lacks a joint, or if its bytes cannot be turned into the build's codes.
+        """
+        self._sensors = len(sensor_names)
+        places = [_place(joint.name, sensor_names) for joint in joints]
+        self._pick = _picker(places)
+        self._tables = [codes_of_bytes(joint, calibration) for joint in joints]
+        self._last: bytes | None = None
+        self._last_codes: list[int] = []
+
+    def codes(self, sensors: bytes) -> list[int]:
+        """Return the codes of the build's joints, in its order, not to be changed. Raises FrameError for a record of
+        another length.
+        """
+        if sensors == self._last:
+            return self._last_codes
+        if len(sensors) != self._sensors:
+            raise FrameError(f"a CyberGlove record of {len(sensors)} sensors, {self._sensors} are named")
+        self._last, self._last_codes = sensors, list(map(getitem, self._tables, self._pick(sensors)))
+        return self._last_codes
+
+
+class Joints:
+    """The newest record of a CyberGlove as the codes of a build's joints, for one thread.
+
+    A record counts for two of its periods; one of a glove that is not plugged into its box holds no measurement.
+    """
+
+    __slots__ = ("_coded", "_codes", "_last", "_longest_us", "_wanted", "newest")
+
+    def __init__(
+        self,
+        joints: Sequence[Calibration],
+        sensor_names: Sequence[str],
+        calibration: GloveCalibration | None,
+        period_us: int | None,
+    ) -> None:
+        """Take what `CodeTables` takes, and how often records should come; None: there is no CyberGlove.
+
+        Raises SettingError if the CyberGlove cannot serve the build.
+        """
+        self.newest = Newest[GloveFrame]()
+        self._coded: GloveFrame | None = None
+        self._last: list[int] | None = None
+        self._wanted, self._longest_us = bool(joints), PERIODS * (period_us or 0)
+        self._codes = None if period_us is None else CodeTables(joints, sensor_names, calibration)
+
+    def codes(self, now_us: int, frame: GloveFrame | None) -> list[int] | None:
+        """Take the newest record that came; return the joints' codes, None while they are lost. Raises FrameError."""
+        if not self._wanted:
+            return []
+        if self._codes is None:
+            return None
+        newest = self.newest
+        if frame is not None and frame is not newest.frame:
+            newest.take(frame, now_us, self._longest_us)
+        found = newest.frame
+        if found is not self._coded and found is not None:
+            self._last = self._codes.codes(found.sensors) if found.plugged else None
+            self._coded = found
+        return self._last if now_us <= newest.expires_us else None
+
+
+class AngleReader:
+    """Turns a record's sensor bytes into angles: a table of 256 angles a sensor, made once.
+
+    `sensor_names` are the record's, in wire order; sensors that the calibration does not know are left out.
+    """
+
+    __slots__ = ("_names", "_pick", "_tables")
+
+    def __init__(self, sensor_names: Sequence[str], calibration: GloveCalibration) -> None:
+        """Raise SettingError if the calibration, which is in degrees, knows none of the sensors."""
+        known = {sensor.name: sensor for sensor in calibration.sensors}
+        found = [(number, known[name]) for number, name in enumerate(sensor_names) if name in known]
+        if not found:
+            raise SettingError("the calibration knows none of the glove's sensors: it is of another glove")
+        self._names = tuple(sensor.name for _, sensor in found)
+        self._pick = _picker([number for number, _ in found])
+        self._tables = [tuple(math.radians(sensor.value(raw)) for raw in range(_BYTES)) for _, sensor in found]
+
+    def angles(self, sensors: bytes) -> JointAngles:
+        """Return the angles of one record, whose sensors' bytes are in wire order."""
+        return JointAngles(self._names, tuple(map(getitem, self._tables, self._pick(sensors))))
+
+
+def _picker(places: Sequence[int]) -> Callable[[bytes], tuple[int, ...]]:
+    """Return what picks the bytes at these places, and the first of them once more: of a single one itemgetter makes no
+    tuple.
+    """
+    return itemgetter(*places, *places[:1]) if places else lambda _sensors: ()
+
+
+def _place(joint: str, sensor_names: Sequence[str]) -> int:
+    if joint in sensor_names:
+        return list(sensor_names).index(joint)
+    raise SettingError(
+        f"the build needs joint {joint!r}, and the CyberGlove has no sensor of that name"
+        f"{nearest(joint, sensor_names)}; name its sensors as the build does: `joints` of [cyberglove] in glove.toml"
+    )
+
+
+def codes_of_bytes(joint: Calibration, calibration: GloveCalibration | None) -> tuple[int, ...]:
+    """Return the code of each byte, 0 to 255, of the sensor of `joint`. Raises SettingError where there is none."""
+    if calibration is None:
+        return _raw(joint)
+    if calibration.unit != joint.unit:
+        raise SettingError(
+            f"the glove is calibrated in {calibration.unit!r}, joint {joint.name!r} of the build is in {joint.unit!r}: "
+            "compile recordings in that unit"
+        )
+    lines = {line.name: line for line in calibration.sensors}
+    if joint.name not in lines:
+        raise SettingError(f"the calibration has no sensor {joint.name!r}: calibrate the glove again")
+    return tuple(_code(joint, lines[joint.name].value(raw)) for raw in range(_BYTES))
+
+
+def _raw(joint: Calibration) -> tuple[int, ...]:
+    if joint.code_a in _RAW_CODES and joint.code_b in _RAW_CODES and joint.code_a != joint.code_b:
+        return tuple(range(_BYTES))
+    raise SettingError(
+        f"joint {joint.name!r} of the build is coded in {joint.unit!r}, not in a CyberGlove's bytes: calibrate the "
+        "glove (`thenar calibrate`) and name the file: `calibration` of [cyberglove] in glove.toml"
+    )
+
+
+def _code(joint: Calibration, value: float) -> int:
+    try:
+        code = joint.code_a + (value - joint.value_a) / (
+            (joint.value_b - joint.value_a) / (joint.code_b - joint.code_a)
+        )
+    except ZeroDivisionError:
+        raise SettingError(
+            f"the two points of joint {joint.name!r} in the build are no line: compile it again"
+        ) from None
+    if math.isnan(code):
+        raise SettingError(f"the calibration of joint {joint.name!r} is no number: calibrate the glove again")
+    return round(min(max(code, 0), _HIGHEST_CODE))

@@ -1,8 +1,8 @@
-"""What can go wrong between a build folder, a glove and a recognised grasp."""
+"""What can go wrong between a build folder, a glove, a recording and a recognised grasp."""
 
 from thenar.drivers.errors import ThenarError
 
-__all__ = ["BuildError", "FrameError", "HarnessError", "SealError", "ThenarError"]
+__all__ = ["BuildError", "FrameError", "HarnessError", "McapError", "SealError", "ThenarError"]
 
 
 class SealError(ThenarError, ValueError):
@@ -19,3 +19,7 @@ class FrameError(ThenarError, ValueError):
 
 class HarnessError(ThenarError, ValueError):
     """A harness cannot be as its file says, or does not fit the build; the message names file, line and key."""
+
+
+class McapError(ThenarError, ValueError):
+    """A recording cannot be read: no MCAP, none of thenar's, or altered. The message names the file and the byte."""

@@ -36,7 +36,7 @@ def _written(default: _T) -> _T:
     return made
 
 
-class Source(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+class Origin(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """The recordings: SHA-256 of their content, number of rows, taxonomy, number of switches to choose from; and what
     simulated them, which recordings leave out.
     """
@@ -154,7 +154,7 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     thenar: str
     tables_sha256: Digest
     ensemble_sha256: Digest
-    source: Source
+    source: Origin
     options: Options
     grasps: Annotated[tuple[Name, ...], Meta(min_length=2)]
     switches: tuple[Switch, ...]

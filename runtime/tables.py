@@ -90,10 +90,10 @@ class IntegerTables:
     @property
     def bound(self) -> int:
         """The largest absolute value that any partial sum, in any order, with any inputs or missing ones, can take."""
-        return max(int(_reach(self, +1).max()), int(_reach(self, -1).max()))
+        return max(int(_furthest(self, +1).max()), int(_furthest(self, -1).max()))
 
 
-def _reach(tables: IntegerTables, sign: int) -> NDArray[np.int64]:
+def _furthest(tables: IntegerTables, sign: int) -> NDArray[np.int64]:
     """Return, per class, the most that the rows can add up to in the direction of `sign`; (K,)."""
     choices = [np.stack([tables.switch_rows, tables.switch_means])]
     pairs = zip(tables.joint_rows, tables.joint_means, strict=True)

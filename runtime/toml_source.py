@@ -30,7 +30,7 @@ _TOKEN = re.compile(
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class TomlText:
     """The text of a TOML file, the name that messages call it by, and the kind of error that it raises."""
 
     name: str
@@ -59,12 +59,12 @@ class Source:
         return next(lines[place[:end]] for end in range(len(place), -1, -1) if place[:end] in lines)
 
 
-def read_source(file: Traversable, raises: type[ThenarError]) -> Source:
+def read_source(file: Traversable, raises: type[ThenarError]) -> TomlText:
     """Read a TOML file. Raises an error of the kind `raises` if it cannot be opened, is too large or not UTF-8."""
     try:
         # What ships with thenar may lie in a zip, where no path leads.
         data = read_file(file, LARGEST, raises) if isinstance(file, Path) else file.read_bytes()
-        return Source(file.name, data.removeprefix(codecs.BOM_UTF8).decode(), raises)
+        return TomlText(file.name, data.removeprefix(codecs.BOM_UTF8).decode(), raises)
     except UnicodeDecodeError as reason:
         before = reason.object[: reason.start].count(b"\n")
         raise raises(f"{file.name}, line {before + 1}: the text is not UTF-8: save it as UTF-8") from reason

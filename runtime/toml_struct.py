@@ -13,7 +13,7 @@ from msgspec import inspect
 
 from .errors import ThenarError
 from .names import list_names, nearest, shortened
-from .toml_source import Place, Source
+from .toml_source import Place, TomlText
 
 S = TypeVar("S", bound=msgspec.Struct)
 
@@ -45,7 +45,7 @@ _OTHER_UNITS = {
 }
 
 
-def convert(source: Source, place: Place, table: object, kind: type[S]) -> S:
+def convert(source: TomlText, place: Place, table: object, kind: type[S]) -> S:
     """Return `table`, which stands at `place` in `source`, as a struct. Raises about the first wrong key."""
     keys = as_table(source, place, table)
     if kind.__struct_config__.forbid_unknown_fields:
@@ -56,28 +56,28 @@ def convert(source: Source, place: Place, table: object, kind: type[S]) -> S:
         raise _worded(source, place, keys, kind, str(reason)) from reason
 
 
-def as_table(source: Source, place: Place, value: object) -> dict[str, object]:
+def as_table(source: TomlText, place: Place, value: object) -> dict[str, object]:
     """Return `value` if it is a table; raises otherwise."""
     if isinstance(value, dict):
         return value
     raise source.error(place, f"must be a table, not {_shown(value)}")
 
 
-def as_list(source: Source, place: Place, value: object) -> list[object]:
+def as_list(source: TomlText, place: Place, value: object) -> list[object]:
     """Return `value` if it is a list that holds something; raises otherwise."""
     if isinstance(value, list) and value:
         return value
     raise source.error(place, f"must be a list of tables, not {_shown(value)}")
 
 
-def check_keys(source: Source, place: Place, table: Mapping[str, object], known: Collection[str]) -> None:
+def check_keys(source: TomlText, place: Place, table: Mapping[str, object], known: Collection[str]) -> None:
     """Raise about the first key of `table` that is not among the `known` ones."""
     for key in table:
         if key not in known:
             raise source.error((*place, key), _advice(key, known))
 
 
-def check_finite(source: Source, place: Place, value: object) -> None:
+def check_finite(source: TomlText, place: Place, value: object) -> None:
     """Raise about the first number in `value`, or in anything it holds, that is not finite."""
     if isinstance(value, float) and not math.isfinite(value):
         raise source.error(place, f"must be a finite number, not {value}")
@@ -96,7 +96,7 @@ def _advice(key: str, known: Collection[str]) -> str:
     return f"{_UNITS[same[0].rpartition('_')[2]]}: {same[0]}"
 
 
-def _worded(source: Source, place: Place, table: dict[str, object], kind: type[S], reason: str) -> ThenarError:
+def _worded(source: TomlText, place: Place, table: dict[str, object], kind: type[S], reason: str) -> ThenarError:
     """Return msgspec's complaint about `table` as an error that names the key."""
     sentence, _, path = reason.partition(" - at `$")
     inner, value = _followed(path, table, sentence)

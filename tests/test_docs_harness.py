@@ -11,7 +11,8 @@ from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.loading import load_harness
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Debounce, GloveWiring, Harness, ScannerWiring
-from thenar.runtime.scanning import order, plan
+from thenar.runtime.scanning import plan
+from thenar.runtime.scanning import plan as order
 from thenar.runtime.scanning.timing import port_us, select_us
 
 PAGE = (Path(__file__).parents[1] / "docs" / "harness.md").read_text(encoding="utf-8")

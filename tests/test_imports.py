@@ -124,9 +124,6 @@ ALLOWED = {
     "cli": PACKAGES,
 }
 
-# Folders that still import each other.
-STILL_CIRCULAR = ({"runtime.live", "runtime.scanning"}, {"runtime.live", "runtime.recording"})
-
 # Third-party packages of the extras `compiler`, `cluster`, `sim` and `stability`, and of peers: a board has none.
 WORKSTATION_ONLY = {
     "sklearn",
@@ -242,7 +239,7 @@ def test_no_folders_of_a_room_import_each_other_in_a_circle() -> None:
     for name in SOURCES:
         here = folder_of(name)
         for there in map(folder_of, parts_imported(name)):
-            if not (fits(there, (here,)) or fits(here, (there,)) or {here, there} in STILL_CIRCULAR):
+            if not (fits(there, (here,)) or fits(here, (there,))):
                 graph.setdefault(here, set()).add(there)
     assert not circle(graph)
 

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from thenar.cli import run
-from thenar.runtime.live.frames import GloveFrame, SwitchFrame
-from thenar.runtime.live.published import LiveGrasp
+from thenar.runtime.frames import GloveFrame, SwitchFrame
+from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording import writer
 from thenar.runtime.recording.session import Session
 

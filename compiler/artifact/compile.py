@@ -17,9 +17,9 @@ from thenar.runtime.manifest import (
     Calibration,
     Manifest,
     Options,
+    Origin,
     Proof,
     Recognised,
-    Source,
     Switch,
     TableBits,
     manifest_from_bytes,
@@ -231,7 +231,7 @@ class Making:
             thenar=version("thenar"),
             tables_sha256=digests[TABLES_NAME],
             ensemble_sha256=digests[ENSEMBLE_NAME],
-            source=Source(
+            source=Origin(
                 fingerprint=grasp_set.fingerprint(),
                 rows=len(grasp_set),
                 taxonomy=grasp_set.taxonomy.name,

@@ -13,7 +13,7 @@ from msgspec import Struct
 from thenar.runtime.build import Build
 from thenar.runtime.files import read_file
 from thenar.runtime.manifest import Manifest
-from thenar.runtime.scorer import LANE_OFFSET
+from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.tables import IntegerTables
 
 from ..firmware.answers import Answers

@@ -7,7 +7,7 @@ from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.harness import checks
 from thenar.runtime.harness.wiring import BusWiring, Harness
 from thenar.runtime.names import fault, nearest, shortened
-from thenar.runtime.toml_source import Place, Source, read_source, spelled
+from thenar.runtime.toml_source import Place, TomlText, read_source, spelled
 from thenar.runtime.toml_struct import check_finite, convert
 
 from .board import Board, GloveUart, Matrix
@@ -176,10 +176,10 @@ def load_board(path: str | Path) -> Board:
 
 def parse_board(text: str, name: str = "board.toml") -> Board:
     """Return the board that `text`, which messages call `name`, is. Raises FirmwareError as `load_board` does."""
-    return _board_of(Source(name, text, FirmwareError))
+    return _board_of(TomlText(name, text, FirmwareError))
 
 
-def _board_of(source: Source) -> Board:
+def _board_of(source: TomlText) -> Board:
     tables = source.tables()
     check_finite(source, (), tables)
     board = convert(source, (), tables, Board)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from thenar.drivers.calibration import GloveCalibration
 from thenar.runtime.build import Build
-from thenar.runtime.live.codes import codes_of_bytes
+from thenar.runtime.calibration import codes_of_bytes
 from thenar.runtime.manifest import Calibration
 from thenar.runtime.tables import IntegerTables
 
@@ -26,7 +26,7 @@ BYTES = 256
 def on_bytes(tables: IntegerTables, codes: Sequence[Sequence[int]]) -> IntegerTables:
     """Return tables whose joint codes are bytes: those of byte b are what `tables` gives for codes[joint][b].
 
-    codes holds, for each joint, the code of each of the 256 bytes (runtime.live.codes.codes_of_bytes). Raises
+    codes holds, for each joint, the code of each of the 256 bytes (runtime.calibration.codes_of_bytes). Raises
     FirmwareError where they are not that many.
     """
     if [len(joint) for joint in codes] != [BYTES] * tables.n_joints:

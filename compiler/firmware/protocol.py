@@ -1,7 +1,7 @@
 """The portable C of a scanner board: frames, protocol, debouncing, and when a scan may stop.
 
 The C does no input or output: bytes in, bytes out, times as arguments. It is the same as `drivers.scanner_protocol`,
-`drivers.emulated.scanner_board.ScannerBoard`, `drivers.debounce.Debouncer` and `runtime.scanning.earlyexit.EarlyExit`,
+`drivers.emulated.scanner_board.ScannerBoard`, `drivers.debounce.Debouncer` and `runtime.scanning.decided.EarlyExit`,
 byte for byte, given the same scans, times and received bytes.
 """
 
@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from textwrap import wrap
 
 from thenar.firmware_templates.rendering import render
-from thenar.runtime.scanning.earlyexit import EarlyExit
-from thenar.runtime.scanning.reach import Reach
+from thenar.runtime.scanning.decided import EarlyExit
+from thenar.runtime.scores import Scorer
 from thenar.runtime.tables import IntegerTables
 
 from .errors import FirmwareError
@@ -100,12 +100,13 @@ def decided_files(
     in two, or is none of the build's.
     """
     masks = [sum(1 << switch for switch in port) for port in ports]
-    early = EarlyExit(tables, masks)
+    scorer = Scorer(tables)
+    early = EarlyExit(scorer, masks)
     if not 1 <= len(ports) <= _MOST_PORTS:
         raise FirmwareError(f"a scan of {len(ports)} ports: early exit is for 1 to {_MOST_PORTS}")
     if missing := (1 << tables.n_switches) - 1 & ~sum(masks):
         raise FirmwareError(f"no port reads switch {missing.bit_length() - 1}: early exit needs all of the build's")
-    reach, names = Reach(tables), [comment(grasp) for grasp in grasps]
+    names = [comment(grasp) for grasp in grasps]
     values = {
         "name": name,
         "guard": f"THENAR_{name.upper()}",
@@ -116,18 +117,18 @@ def decided_files(
         "ports": [
             line for number, port in enumerate(ports) for line in wrap(f"port {number}: {_listed(port)}", _WIDTH)
         ],
-        "tables": [_hurdles(reach, early.unread(port), names) for port in range(len(ports) - 1)],
+        "tables": [_hurdles(scorer, early.unread(port), names) for port in range(len(ports) - 1)],
     }
     return {f"thenar_{name}_decided.{end}": render(f"board/thenar_NAME_decided.{end}.j2", **values) for end in "hc"}
 
 
-def _hurdles(reach: Reach, unread: int, grasps: Sequence[str]) -> list[dict[str, object]]:
+def _hurdles(scorer: Scorer, unread: int, grasps: Sequence[str]) -> list[dict[str, object]]:
     """Return by how many steps each leader must be ahead of every class, in lines of C."""
     rows: list[dict[str, object]] = []
     for leader, grasp in enumerate(grasps):
         steps = [
             0 if rival == leader else min(most + (rival < leader), _NEVER)
-            for rival, most in enumerate(reach.of(leader, unread))
+            for rival, most in enumerate(scorer.reach(leader, unread))
         ]
         rows.append({"leader": grasp, "steps": wrap(", ".join(map(str, steps)), _WIDTH)})
     return rows

@@ -18,7 +18,7 @@ import numpy as np
 
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.files import is_special, read_file, sync_folder
-from thenar.runtime.recording.appending import AppendedFile
+from thenar.runtime.recording.writer import AppendedFile
 
 from ..workers import in_workers
 

@@ -14,12 +14,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.live.decision import Decision
-from thenar.runtime.live.policy import Policy
-from thenar.runtime.live.sequential import SequentialTest
-from thenar.runtime.live.standing import Standing
-from thenar.runtime.packed import LANE_OFFSET
-from thenar.runtime.scanning.reach import Reach
+from thenar.runtime.live.decision import Decision, SequentialTest, Standing
+from thenar.runtime.policy import Policy
+from thenar.runtime.scores import LANE_OFFSET, Scorer
 from thenar.runtime.tables import IntegerTables
 
 NOTHING = -1
@@ -80,11 +77,11 @@ def decisions(tables: IntegerTables, frames: Stretches, policy: Policy) -> Decis
     """Return what `thenar run` decides under `policy` on these frames, each whole and seen once, by both devices at the
     same time.
     """
-    decider, reach = decider_of(tables, policy), Reach(tables)
+    decider, scorer = decider_of(tables, policy), Scorer(tables)
     found: list[Decided] = []
     lanes = map(tuple, (frames.scores + LANE_OFFSET).tolist())
     for stretch, row in zip(frames.times, lanes, strict=True):
-        for time_us, held in decider.stay(stretch, Standing(row, reach)):
+        for time_us, held in decider.stay(stretch, Standing(row, scorer)):
             if not found or held != found[-1][1]:
                 found.append((time_us, held))
     return Decisions(
@@ -98,7 +95,7 @@ def decider_of(tables: IntegerTables, policy: Policy) -> Decider:
     if policy.error_rate is None:
         return _Hysteresis(Decision(policy.lead_steps(tables.scale), policy.dwell_us, policy.hold_us))
     test = _Test(tables.n_classes, tables.scale, policy.error_rate, policy.hold_us, policy.spacing_us)
-    return _Tests(test, Reach(tables))
+    return _Tests(test, Scorer(tables))
 
 
 class _Hysteresis:
@@ -167,8 +164,8 @@ class _Tests:
     setting the clock back: a test knows only how much time has gone.
     """
 
-    def __init__(self, test: _Test, reach: Reach) -> None:
-        self._test, self._reach = test, reach
+    def __init__(self, test: _Test, scorer: Scorer) -> None:
+        self._test, self._scorer = test, scorer
         self._back_us = 0
 
     def stay(self, times: range, standing: Standing) -> Iterator[Decided]:
@@ -193,7 +190,7 @@ class _Tests:
 
     def _summed(self, standing: Standing, frames: int) -> Standing:
         """Return what stands for so many equal frames."""
-        return standing if frames == 1 else Standing(tuple(frames * lane for lane in standing.lanes), self._reach)
+        return standing if frames == 1 else Standing(tuple(frames * lane for lane in standing.lanes), self._scorer)
 
     def _leave_out(self, left: range, frames: int) -> int:
         """Leave out as many tests of so many frames as lie in what is left; return how many frames those have."""

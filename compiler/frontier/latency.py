@@ -9,7 +9,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from thenar.runtime.live.policy import Policy
+from thenar.runtime.policy import Policy
 from thenar.runtime.tables import IntegerTables
 
 from ..evaluation.folds import Rows

@@ -12,10 +12,10 @@ from thenar.runtime.harness.wiring import GloveWiring, Harness
 from thenar.runtime.manifest import Manifest, Recognised
 from thenar.runtime.names import list_names
 from thenar.runtime.scanning.plan import check_harness
+from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import glove_us, scan_us, scanner_us
-from thenar.runtime.scanning.whole import whole_scan
 
 from ..hand import HandShape
 from .circuit import BillLine, Circuit, bill_of, glove_circuit

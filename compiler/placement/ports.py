@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import Harness
-from thenar.runtime.scanning.costs import Costs
-from thenar.runtime.scanning.order import Unit, ports_in
+from thenar.runtime.scanning.plan import Costs, Unit, ports_in
+from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import scanner_us
-from thenar.runtime.scanning.whole import whole_scan
 
 from .errors import PlacementError
 

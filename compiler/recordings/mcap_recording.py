@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.live.frames import GloveFrame, SwitchFrame
+from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.names import SHOWN, shortened
-from thenar.runtime.recording.frame_bytes import switch_matrix
+from thenar.runtime.recording.messages import switch_matrix
 from thenar.runtime.recording.reader import Reader, check_made
 from thenar.runtime.recording.session import Collection, Label, Session
 

@@ -9,7 +9,7 @@ The paper gave each type two objects of different volume.
 from pathlib import Path
 
 from thenar.runtime.recording.session import Task
-from thenar.runtime.toml_source import Source, read_source
+from thenar.runtime.toml_source import TomlText, read_source
 
 from .errors import ColumnsError, RecordingError, check_names
 from .taxonomy import Taxonomy, own, published
@@ -44,7 +44,7 @@ def collected(taxonomy: str, objects: Path | None) -> tuple[Taxonomy, tuple[Task
     return types, tuple(tasks.values())
 
 
-def _objects(source: Source, key: str, value: object) -> tuple[str, ...]:
+def _objects(source: TomlText, key: str, value: object) -> tuple[str, ...]:
     try:
         if not isinstance(value, list) or not value or not all(isinstance(name, str) for name in value):
             raise RecordingError("must be a list of the names of objects, at least one")

@@ -7,7 +7,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from thenar.runtime.scorer import LANE_OFFSET, Scorer
+from thenar.runtime.scores import LANE_OFFSET, Scorer
 from thenar.runtime.tables import LIMIT, IntegerTables
 
 from ..boosting.stumps import TIE, Stumps, winners

@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from ..errors import HarnessError
 from ..names import sound_name
-from ..toml_source import Source, read_source
+from ..toml_source import TomlText, read_source
 from ..toml_struct import check_finite, convert
 from .checks import faults
 from .wiring import Harness
@@ -26,10 +26,10 @@ def parse_harness(text: str, name: str) -> Harness:
 
     Raises HarnessError as `load_harness` does.
     """
-    return _harness_of(Source(name, text, HarnessError), name)
+    return _harness_of(TomlText(name, text, HarnessError), name)
 
 
-def _harness_of(source: Source, name: str) -> Harness:
+def _harness_of(source: TomlText, name: str) -> Harness:
     tables = source.tables()
     check_finite(source, (), tables)
     harness = convert(source, (), {"name": sound_name(name, "glove")} | tables, Harness)

@@ -14,8 +14,9 @@ from thenar.drivers.scanner import BoardGrasp
 from ..harness.wiring import GloveWiring, Harness, ScannerWiring
 from ..scanning.scanmap import ScanMap
 from ..scanning.timing import ChipTime, glove_us, scan_us
-from .devices import GloveDevice, ScannerDevice
-from .i2c_device import I2cDevice
+from ..sources.cyberglove import GloveDevice
+from ..sources.i2c import I2cDevice
+from ..sources.scanner import ScannerDevice
 
 # So much slower than its wire a device may be: computers have other things to do, too.
 SLOW = 1.5
@@ -93,7 +94,7 @@ def _recognising(grasp: BoardGrasp | None) -> tuple[str, ...]:
 
 
 def _bus(harness: Harness, number: int, scan: ScanMap) -> tuple[Finding, ...]:
-    device = I2cDevice(harness, number, scan, None, lambda: None)
+    device = I2cDevice(harness, number, scan)
     times = scan_us(_of_bus(scan, number), harness)
     try:
         device.open()

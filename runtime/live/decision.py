@@ -1,8 +1,83 @@
-"""Hysteresis and dwell: a decision that does not flicker, follows what persists, and rests on whole frames."""
+"""What is decided, frame after frame: who leads in one frame, hysteresis and dwell, and a sequential test.
 
-from dataclasses import dataclass
+The sequential test takes as many frames as a stated error rate takes, no more.
 
-from .standing import Standing
+The scores of a frame are log-likelihoods of the grasp types, up to a constant: their softmax is the probability of each
+type given the frame, and Bayes' rule divides that by the types' shares in training. The test adds the scores of frames
+and decides on the type that leads each of the others by at least ln((K - 1) / error_rate): Armitage's matrix of Wald's
+sequential probability ratio tests (P. Armitage, J. R. Stat. Soc. B 12, 1950; A. Wald, Sequential Analysis, 1947). For
+two types it is Wald's test. By Ville's inequality a wrong type leads the right one by ln(a) in *any* frame, now or
+later, with a probability of at most 1 / a; so, summed over the K - 1 wrong types, whatever the right one is, a test
+ends wrong with a probability of at most error_rate. Thresholds and sums are integers: scores in steps, ln(a) rounded
+up.
+
+That holds under assumptions, and no longer than they do:
+  - one type during a test: evidence older than the longest test is dropped, undecided, and the test begins anew;
+  - scores are log-likelihood ratios: the ensemble's probabilities are calibrated, types were recorded equally often;
+  - frames are independent, given the type. Successive frames are not: a hand that rests sends nearly the same frame
+    again, which is no new evidence. `spacing_us` leaves out frames nearer than that to the last one that counted; take
+    the time after which two frames of one grasp are no more alike than frames of two grasps of that type.
+
+Whole frames and frames with lost inputs are never evidence in one test. While an answer or a test that rests on whole
+frames is no older than the longest test, frames with lost inputs are left aside; after that they have tests of their
+own, whose answers and evidence are dropped at the next whole frame.
+"""
+
+import math
+from dataclasses import dataclass, field
+from operator import add
+
+from ..frames import Mask
+from ..scores import Scorer, softmax
+
+
+class Standing:
+    """The K scores of a frame (2^15 too high, unread switches left out), and what unread switches could do to them.
+
+    Without unread switches every number here is that of the frame. With some, `margin`, `lead` and `probability` are
+    the least that any state of the unread switches, closed, open or lost, would have given: the true ones are no less.
+    """
+
+    __slots__ = ("_rivals", "_scorer", "_unread", "candidate", "lanes")
+
+    def __init__(self, lanes: tuple[int, ...], scorer: Scorer, unread: Mask = 0) -> None:
+        self.lanes = lanes
+        self.candidate = lanes.index(max(lanes))
+        self._scorer, self._unread = scorer, unread
+        self._rivals = self._nearest(self.candidate) if unread else lanes
+
+    @property
+    def certain(self) -> bool:
+        """Whether the candidate wins whatever the unread switches are; of equal scores the lowest number wins."""
+        return self._rivals.index(max(self._rivals)) == self.candidate
+
+    @property
+    def margin(self) -> int:
+        """How many steps the candidate leads the second best by."""
+        second, best = sorted(self._rivals)[-2:]
+        return best - second
+
+    def lead(self, held: int) -> int:
+        """Return how many steps the candidate leads class `held` by."""
+        return self.lanes[self.candidate] - self._rivals[held]
+
+    def contradicts(self, held: int, lead: int) -> bool:
+        """Return whether the candidate is not `held` and leads it by `lead` steps, as far as may be: with unread
+        switches, whether any state of them gives that lead.
+        """
+        if self.candidate == held:
+            return False
+        most = self._scorer.reach(held, self._unread)[self.candidate] if self._unread else 0
+        return self.lanes[self.candidate] - self.lanes[held] + most >= lead
+
+    def probability(self, number: int, scale: float) -> float:
+        """Return the softmax of class `number`, at `scale` steps per unit."""
+        near = self._nearest(number) if self._unread and number != self.candidate else self._rivals
+        return softmax(near, number, scale)
+
+    def _nearest(self, number: int) -> tuple[int, ...]:
+        """Return the scores with every rival of class `number` as near to it, or as far above it, as it can come."""
+        return tuple(map(add, self.lanes, self._scorer.reach(number, self._unread)))
 
 
 @dataclass(slots=True)
@@ -63,3 +138,64 @@ class Decision:
     def _take(self, candidate: int, time_us: int, whole: bool) -> int:
         self.held, self._whole, self._rival, self._supported_us = candidate, whole, None, time_us
         return candidate
+
+
+@dataclass(slots=True)
+class SequentialTest:
+    """Decides test after test; an answer holds until the next test has one, or `longest_us` have gone.
+
+    After a whole frame, one with no input lost, both the answer and the evidence rest on whole frames.
+
+    error_rate lies between 0 and 1, scale is in steps per unit of score, times are in microseconds.
+    """
+
+    classes: int
+    scale: float
+    error_rate: float
+    longest_us: int
+    spacing_us: int = 0
+    held: int | None = None
+    threshold: int = field(init=False)
+    _sums: tuple[int, ...] = ()
+    _began_us: int = 0
+    _counted_us: int | None = None
+    _decided_us: int = 0
+    _whole: bool = True
+
+    def __post_init__(self) -> None:
+        self.threshold = math.ceil(self.scale * math.log((self.classes - 1) / self.error_rate))
+
+    def update(self, time_us: int, standing: Standing, *, whole: bool = True) -> int | None:
+        """Return the class of the last test that ended, None if none did lately; `whole`: no input is lost.
+
+        No switch of the frame may have been left unread.
+        """
+        if self.held is not None and time_us - self._decided_us > self.longest_us:
+            self.held = None
+        if whole != self._whole and (whole or not self._lasts(time_us)):
+            self.forget()
+            self._whole = whole
+        if whole == self._whole and self._counts(time_us):
+            self._counted_us = time_us
+            self._add(time_us, standing.lanes)
+        return self.held
+
+    def forget(self) -> None:
+        """Drop evidence and answer: too little can be read."""
+        self.held, self._sums, self._counted_us = None, (), None
+
+    def _lasts(self, time_us: int) -> bool:
+        """Return whether there is an answer, or a test under way that is not too old."""
+        return self.held is not None or (bool(self._sums) and time_us - self._began_us <= self.longest_us)
+
+    def _counts(self, time_us: int) -> bool:
+        return self._counted_us is None or time_us - self._counted_us >= max(self.spacing_us, 1)
+
+    def _add(self, time_us: int, lanes: tuple[int, ...]) -> None:
+        if not self._sums or time_us - self._began_us > self.longest_us:
+            self._sums, self._began_us = (0,) * self.classes, time_us
+        self._sums = tuple(map(int.__add__, self._sums, lanes))
+        second, best = sorted(self._sums)[-2:]
+        if best - second >= self.threshold:
+            self.held, self._decided_us = self._sums.index(best), time_us
+            self._sums = ()

@@ -1,66 +1,42 @@
-"""How the glove fares: what `thenar run --status` shows and what is published beside the grasps."""
+"""How the glove fares: what `thenar run --status` shows and what is published beside the grasps.
 
+Switches that are never, or always, on are held against how often they were in the recordings that the build was
+trained on.
+
+The tables remember that share: a switch's mean row is its row times the share of the recordings in which it was on. A
+grasp that is held is one observation, however many frames it lasts. If a switch is on in a share p of grasps, it stays
+off throughout n of them with a probability of at most (1 - p)^n, and on with at most p^n, given that grasps come as
+they did in the recordings. Because people also repeat one grasp for long, a switch is only suspected once half of the
+grasp types were seen since it was last found otherwise.
+
+A joint's codes wander off when a glove slips or a sensor ages. The hand opens and closes again and again, so a joint's
+lowest and highest code come back. When both have moved the same way since the first minute, the sensor's zero has moved
+by at least the smaller of both; grasps that merely use less of the range move them towards each other.
+"""
+
+import math
 from collections import Counter
 from collections.abc import Sequence
+from operator import gt, lt
 
-import msgspec
+import numpy as np
 
 from ..build import Build
-from .drift import JointDrift
-from .frames import SwitchFrame
-from .published import UNKNOWN, LiveGrasp
-from .rates import Chattering, FrameRate
-from .stuck import StuckSwitches
+from ..frames import Mask, SwitchFrame
+from ..published import UNKNOWN, DeviceHealth, Drift, HealthReport, LiveGrasp
+from ..tables import IntegerTables
 
+RATE_US = 1_000_000
+# Nobody presses and releases a switch ten times a second; a contact that is loose does.
+MOST_CHANGES = 20
+DRIFT_US = 60_000_000
+# Share of a joint's range in the first window by which both ends must have moved.
+LARGEST = 0.2
 
-class Count(msgspec.Struct, frozen=True):
-    """How often something happened: CRC errors, resynchronisations, frames lost."""
-
-    name: str
-    value: int
-
-
-class DeviceHealth(msgspec.Struct, frozen=True):
-    """A device: whether it is there, what is or was wrong last, and what its driver counts."""
-
-    name: str
-    connected: bool
-    error: str = ""
-    counts: tuple[Count, ...] = ()
-
-
-class Drift(msgspec.Struct, frozen=True):
-    """By how many codes a joint has drifted."""
-
-    joint: str
-    codes: int
-
-
-class HealthReport(msgspec.Struct, frozen=True):
-    """State at `time_us` of the host's monotonic clock.
-
-    stuck_open, stuck_closed   switches that should have been seen closed, or open, by now (stuck.py)
-    chattering                 switches that changed more often in the last second than a hand can (rates.py)
-    drifting                   joints whose codes have moved since the first minute (drift.py)
-    switch_hz, glove_hz        frames per second over the last whole second
-    frames, changing, degraded, unknown  how many grasps were published so far, and how many of them with that health
-    overflowed                 frames that came in and were not taken in time: a recording lacks them
-    devices                    as their drivers have it
-    """
-
-    time_us: int
-    stuck_open: tuple[str, ...]
-    stuck_closed: tuple[str, ...]
-    chattering: tuple[str, ...]
-    drifting: tuple[Drift, ...]
-    switch_hz: float
-    glove_hz: float
-    frames: int
-    changing: int
-    degraded: int
-    unknown: int
-    overflowed: int = 0
-    devices: tuple[DeviceHealth, ...] = ()
+Ends = list[tuple[int, int]]
+# How improbable what was seen must be of a switch that works.
+ALARM = 1e-4
+_SURE = 1 - 1e-12
 
 
 class Health:
@@ -87,7 +63,7 @@ class Health:
     ) -> None:
         """Take what was published, and the frames that it came of; a frame that was seen before counts once.
 
-        glove_us is the time of the glove's frame, codes are its joints' (`LiveRecognizer.codes`), None while lost.
+        glove_us is the time of the glove's frame, codes are its joints' (`Moment.codes`), None while lost.
         """
         self._published[grasp.health] += 1
         if grasp.grasp != self._grasp:
@@ -95,7 +71,10 @@ class Health:
             self._grasp = grasp.grasp
         if switches is not None and switches.time_us > self._switches_us:
             self._switches_us = switches.time_us
-            self._take(switches)
+            read = self._all & ~(switches.lost | switches.unread)
+            self._switch_rate.frame(switches.time_us)
+            self._stuck.frame(switches.closed, read)
+            self._chattering.frame(switches.time_us, switches.closed, read)
         if glove_us is not None and glove_us > self._glove_us:
             self._glove_us = glove_us
             self._glove_rate.frame(glove_us)
@@ -121,11 +100,193 @@ class Health:
             devices=tuple(devices),
         )
 
-    def _take(self, frame: SwitchFrame) -> None:
-        read = self._all & ~(frame.lost | frame.unread)
-        self._switch_rate.frame(frame.time_us)
-        self._stuck.frame(frame.closed, read)
-        self._chattering.frame(frame.time_us, frame.closed, read)
-
     def _named(self, switches: Sequence[int]) -> tuple[str, ...]:
         return tuple(self._switch_names[number] for number in switches)
+
+
+class FrameRate:
+    """Frames per second over the last second."""
+
+    def __init__(self) -> None:
+        self._began_us: int | None = None
+        self._frames = 0
+        self._hz = 0.0
+
+    def frame(self, time_us: int) -> None:
+        """Count a frame."""
+        if self._began_us is None:
+            self._began_us = time_us
+            return
+        self._frames += 1
+        if time_us - self._began_us >= RATE_US:
+            self._hz = self._over(time_us)
+            self._began_us, self._frames = time_us, 0
+
+    def hz(self, now_us: int) -> float:
+        """Return the rate of the last whole second; of the time since the last frames, when they do not come."""
+        if self._began_us is not None and now_us - self._began_us > 2 * RATE_US:
+            return self._over(now_us)
+        return self._hz
+
+    def _over(self, now_us: int) -> float:
+        return self._frames * 1e6 / (now_us - (self._began_us or 0))
+
+
+class Tally:
+    """Counts how often each of `bits` bits was set, of all at once: bit k of plane p is bit p of the count of bit k."""
+
+    def __init__(self, bits: int) -> None:
+        self._bits = bits
+        self._planes: list[Mask] = []
+
+    def add(self, mask: Mask) -> None:
+        """Count the bits of `mask`, one each."""
+        for place, plane in enumerate(self._planes):
+            if not mask:
+                return
+            self._planes[place], mask = plane ^ mask, plane & mask
+        if mask:
+            self._planes.append(mask)
+
+    def end(self) -> list[int]:
+        """Return the counts, and begin again at 0."""
+        planes, self._planes = self._planes, []
+        counts = [0] * self._bits
+        for place, plane in enumerate(planes):
+            for bit in range(self._bits):
+                counts[bit] += (plane >> bit & 1) << place
+        return counts
+
+
+class Chattering:
+    """Counts changes of every switch, a second at a time."""
+
+    def __init__(self, switches: int) -> None:
+        self._closed: Mask = 0
+        self._began_us: int | None = None
+        self._changes = Tally(switches)
+        self.switches: tuple[int, ...] = ()
+
+    def frame(self, time_us: int, closed: Mask, read: Mask) -> None:
+        """Take a frame in which the switches `read` were read; `switches` are then those of the last whole second."""
+        if self._began_us is None:
+            self._began_us = time_us
+        if time_us - self._began_us >= RATE_US:
+            self.switches = tuple(number for number, n in enumerate(self._changes.end()) if n > MOST_CHANGES)
+            self._began_us = time_us
+        self._changes.add((closed ^ self._closed) & read)
+        self._closed = (self._closed & ~read) | (closed & read)
+
+
+class JointDrift:
+    """Compares the lowest and highest code of every joint in the last whole window with those in the first one."""
+
+    def __init__(self) -> None:
+        self._first: Ends | None = None
+        self._began_us: int | None = None
+        self._low: list[int] = []
+        self._high: list[int] = []
+        self.codes: tuple[int, ...] = ()
+
+    def frame(self, time_us: int, codes: Sequence[int]) -> None:
+        """Take the codes of all joints; `codes` is then by how much each has drifted, 0 where it is within bounds."""
+        if self._began_us is not None and time_us - self._began_us >= DRIFT_US:
+            self._end()
+            self._began_us = None
+        if self._began_us is None:
+            self._began_us, self._low, self._high = time_us, list(codes), list(codes)
+        # Seldom so: after a few grasps a joint has been where it goes.
+        if any(map(lt, codes, self._low)):
+            self._low = list(map(min, self._low, codes))
+        if any(map(gt, codes, self._high)):
+            self._high = list(map(max, self._high, codes))
+
+    def _end(self) -> None:
+        ends = list(zip(self._low, self._high, strict=True))
+        if self._first is None:
+            self._first = ends
+        self.codes = tuple(_drift(first, last) for first, last in zip(self._first, ends, strict=True))
+
+
+def _drift(first: tuple[int, int], last: tuple[int, int]) -> int:
+    low, high = last[0] - first[0], last[1] - first[1]
+    if low * high <= 0:
+        return 0
+    shift = min(low, high, key=abs)
+    return shift if abs(shift) > LARGEST * (first[1] - first[0]) else 0
+
+
+def on_shares(tables: IntegerTables) -> list[float]:
+    """Return, for every switch, the share of the recordings in which it was on; nan where its row is all zeros."""
+    rows, means = tables.switch_rows.astype(np.float64), tables.switch_means.astype(np.float64)
+    weight = (rows * rows).sum(axis=1)
+    shares = np.divide((rows * means).sum(axis=1), weight, out=np.full(len(rows), np.nan), where=weight > 0)
+    found: list[float] = np.clip(shares, 0.0, 1.0).tolist()
+    return found
+
+
+def patience(share: float) -> float:
+    """Return after how many grasps in which it does not happen, what happens in `share` of them is missed."""
+    if math.isnan(share) or share <= 0:
+        return math.inf
+    return math.ceil(math.log(ALARM) / math.log1p(-min(share, _SURE)))
+
+
+class Missed:
+    """Counts, for every switch, the grasps since something was last seen of it: that it was on, or that it was off."""
+
+    def __init__(self, shares: Sequence[float], classes: int) -> None:
+        self._patience = [patience(share) for share in shares]
+        self._enough = classes / 2
+        self._grasps = [0] * len(shares)
+        self._types = [0] * len(shares)
+        self.seen: Mask = 0
+
+    def end_grasp(self, number: int, read: Mask) -> None:
+        """Count a grasp of type `number` that is over; `read` are the switches that were read during it."""
+        for switch in range(len(self._grasps)):
+            if self.seen >> switch & 1:
+                self._grasps[switch] = self._types[switch] = 0
+            elif read >> switch & 1:
+                self._grasps[switch] += 1
+                self._types[switch] |= 1 << number
+        self.seen = 0
+
+    def suspects(self) -> list[int]:
+        """Return the switches of which it should have been seen by now."""
+        return [
+            switch
+            for switch, (grasps, types) in enumerate(zip(self._grasps, self._types, strict=True))
+            if grasps >= self._patience[switch] and types.bit_count() >= self._enough
+        ]
+
+
+class StuckSwitches:
+    """Both kinds of being stuck."""
+
+    def __init__(self, tables: IntegerTables) -> None:
+        shares = on_shares(tables)
+        self._on = Missed(shares, tables.n_classes)
+        self._off = Missed([1 - share for share in shares], tables.n_classes)
+        self._read: Mask = 0
+
+    def frame(self, closed: Mask, read: Mask) -> None:
+        """Take a frame in which the switches `read` were read."""
+        self._read |= read
+        self._on.seen |= closed & read
+        self._off.seen |= ~closed & read
+
+    def end_grasp(self, number: int | None) -> None:
+        """End a grasp of type `number`; None: it was none, and what was seen meanwhile counts for the next."""
+        if number is not None:
+            self._on.end_grasp(number, self._read)
+            self._off.end_grasp(number, self._read)
+            self._read = 0
+
+    def open(self) -> list[int]:
+        """Return the switches that are suspected never to close."""
+        return self._on.suspects()
+
+    def closed(self) -> list[int]:
+        """Return the switches that are suspected never to open."""
+        return self._off.suspects()

@@ -6,11 +6,11 @@ from pathlib import Path
 from thenar.drivers.errors import SettingError
 
 from ..build import Build
+from ..frames import GloveFrame, SwitchFrame
 from ..harness.loading import parse_harness
+from ..policy import Policy
+from ..published import LiveGrasp
 from ..recording.reader import Reader
-from .frames import GloveFrame, SwitchFrame
-from .policy import Policy
-from .published import LiveGrasp
 from .system import System
 
 
@@ -34,7 +34,7 @@ def replayed(
         elif isinstance(entry, GloveFrame):
             glove = entry
         elif isinstance(entry, LiveGrasp):
-            yield entry, recognizer.step(entry.time_us, entry.unix_us, switches, glove)
+            yield entry, recognizer.step(entry.time_us, entry.unix_us, switches, glove).grasp
     for fault in reader.faults():
         warn(fault.message)
 

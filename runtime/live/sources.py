@@ -1,21 +1,262 @@
-"""Every device of a harness, each kept open in a thread of its own, and the newest that they delivered."""
+"""Every device of a harness, each kept open in a thread of its own, and the newest that they delivered, joined."""
 
+import logging
+from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
+from threading import Condition, Event, Thread
 from types import TracebackType
-from typing import Any, Self
+from typing import Generic, Protocol, Self, TypeVar
 
+from thenar.drivers.errors import DeviceError, SettingError
+
+from ..calibration import Joints
+from ..frames import GloveFrame, Mask, Newest, SwitchFrame, now_us
 from ..harness.wiring import Harness
+from ..published import Count, DeviceHealth
 from ..scanning.scanmap import ScanMap
-from .arrivals import Arrivals, Taken
-from .devices import GloveDevice, ScannerDevice
-from .frames import GloveFrame, SwitchFrame, now_us
-from .health import DeviceHealth
-from .i2c_device import I2cDevice
-from .joiner import LiveRecognizer
-from .keeper import DeviceState, Keeper
-from .parts import Part, Parts
+from ..sources.base import SOURCES, ExitOf, Source
 
+# What is said of a device before it was tried for the first time.
+NOT_YET = "not opened yet"
+# Recovery is promised within a second of the cable's return; opening a CyberGlove takes a part of that.
+RETRY_S = 0.2
+# How long a reading may block before its thread looks whether it is to stop.
+READ_S = 0.1
+# Frames that came in and were not taken yet; a loop that stalls for longer than they last loses the oldest.
+_MOST_WAITING = 4096
+# How long to wait for something new where there is no device whose period would say so.
 _PATIENCE_US = 100_000
+# No device's frames count for longer.
+_LONGEST_WAIT_US = 60_000_000
+
+_log = logging.getLogger("thenar")
+T_co = TypeVar("T_co", covariant=True)
+T = TypeVar("T")
+
+
+class Readable(Protocol[T_co]):
+    """What can be kept: a `Source`, as a rule."""
+
+    def open(self) -> object:
+        """Open it; raises DeviceError when it is not there, SettingError when no try helps."""
+
+    def read(self, timeout_s: float) -> T_co | None:
+        """Return the next sample, None if there is none in time; raises as `open` does."""
+
+    def close(self) -> None:
+        """Close it, in whatever state it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceState:
+    """How a device fares: `error` says what is or was wrong last, since_us when this state began, opened how often it
+    was opened, faults how often an exception ended its reading that only a fault of the program explains.
+    """
+
+    name: str
+    connected: bool
+    error: str
+    since_us: int
+    opened: int
+    faults: int = 0
+
+
+class Keeper(Generic[T]):
+    """Keeps `device` open and hands every sample to `take`, in a thread of its own, until it is closed.
+
+    A SettingError ends it unless the device was open before: `failure` holds it, for whoever waits on the device.
+    """
+
+    def __init__(
+        self, name: str, device: Readable[T], take: Callable[[T], None], changed: Callable[[], None] = lambda: None
+    ) -> None:
+        """changed() is called whenever the state changes."""
+        self.state = DeviceState(name, connected=False, error=NOT_YET, since_us=now_us(), opened=0)
+        self.failure: SettingError | None = None
+        self._device, self._take, self._changed = device, take, changed
+        self._stop = Event()
+        self._thread = Thread(target=self._keep, name=f"thenar {name}", daemon=True)
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Let it end soon."""
+        self._stop.set()
+
+    def close(self) -> None:
+        """End: returns once the device is closed."""
+        self.stop()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def _keep(self) -> None:
+        while not self._stop.is_set():
+            try:
+                self._device.open()
+                self._become(connected=True, error="")
+                self._read()
+            except SettingError as wrong:
+                self._become(connected=False, error=str(wrong))
+                # What it did before it can do: only a garbled answer can say otherwise.
+                if not self.state.opened:
+                    self.failure = wrong
+                    return
+            except DeviceError as wrong:
+                self._become(connected=False, error=str(wrong))
+            except Exception as fault:  # a fault of ours must not leave a dead thread that passes for a live device
+                self._blame(f"{type(fault).__name__}: {fault}")
+            finally:
+                with suppress(OSError):
+                    self._device.close()
+            self._stop.wait(RETRY_S)
+
+    def _read(self) -> None:
+        while not self._stop.is_set():
+            sample = self._device.read(READ_S)
+            if sample is not None:
+                self._take(sample)
+
+    def _blame(self, fault: str) -> None:
+        """Count an exception, and log it with its trace: the same one again and again is logged once."""
+        if self.state.error != fault:
+            _log.exception("%s: a fault of the program", self.state.name)
+        self.state = replace(self.state, faults=self.state.faults + 1)
+        self._become(connected=False, error=fault)
+
+    def _become(self, *, connected: bool, error: str) -> None:
+        old = self.state
+        if (old.connected, old.error) != (connected, error):
+            _log.info("%s: %s", old.name, error or "connected")
+            self.state = DeviceState(old.name, connected, error, now_us(), old.opened + connected, old.faults)
+            self._changed()
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """The newest frames at `time_us`; all that arrived since the last time; the glove's record if it still counts."""
+
+    time_us: int
+    switches: SwitchFrame | None
+    glove: GloveFrame | None
+    arrived: tuple[SwitchFrame | GloveFrame, ...]
+    measured: GloveFrame | None
+
+
+class Arrivals:
+    """Frames from the threads of the devices, for the one thread that takes them.
+
+    Each part reads some of the switches: `owned` are those of each, which share no switch; switches that no part owns
+    are always lost. What these methods share is only touched under the condition, but for `glove`, of which one
+    attribute at a time may be read without it, and `overflowed`: each is a value that is replaced whole.
+
+    switches    the newest frame of all parts together; None before the first
+    glove       the newest record of the CyberGlove
+    overflowed  frames that nobody took in time: a recording lacks them
+    """
+
+    def __init__(self, switches: int, owned: Sequence[Mask]) -> None:
+        self.switches: SwitchFrame | None = None
+        self.glove = Newest[GloveFrame]()
+        self.overflowed = 0
+        self._parts = tuple((mask, Newest[SwitchFrame]()) for mask in owned)
+        self._nobodys = (1 << switches) - 1 & ~sum(owned)
+        self._joined_until_us = -1
+        self._waiting: deque[SwitchFrame | GloveFrame] = deque(maxlen=_MOST_WAITING)
+        self._condition = Condition()
+
+    def put_switches(self, part: int, frame: SwitchFrame, longest_us: int) -> None:
+        """Take in a frame of part number `part`, which counts for longest_us from the time at which it was read."""
+        with self._condition:
+            now = now_us()
+            self._parts[part][1].take(frame, now, longest_us)
+            self.switches = self._joined(now)
+            if self.switches is not None:
+                self._wait_for_taking(self.switches)
+            self._condition.notify_all()
+
+    def put_glove(self, frame: GloveFrame, longest_us: int) -> None:
+        """Take in a record of the glove, which counts for longest_us from the time at which it was read."""
+        with self._condition:
+            self.glove.take(frame, now_us(), longest_us)
+            self._wait_for_taking(frame)
+            self._condition.notify_all()
+
+    def take(self, patience_us: Callable[[], int] | None = None, at_most_us: int = _LONGEST_WAIT_US) -> Taken:
+        """Return the newest frames, and all that arrived since the last call.
+
+        If nothing has arrived, wait for it, but no longer than at_most_us: until the first of the fresh frames is too
+        old; where none is fresh, for patience_us(). Without it, do not wait. A part of the switches that fell silent is
+        lost from then on, whether or not another one speaks.
+        """
+        with self._condition:
+            now = now_us()
+            if now > self._joined_until_us:
+                self._lose(now)
+            if patience_us is not None and not self._waiting:
+                left_us = self.fresh_for_us(now)
+                self._condition.wait(min(patience_us() if left_us is None else left_us, at_most_us) / 1e6)
+                now = now_us()
+                if now > self._joined_until_us:
+                    self._lose(now)
+            arrived = tuple(self._waiting)
+            self._waiting.clear()
+            glove = self.glove
+            return Taken(now, self.switches, glove.frame, arrived, glove.frame if now <= glove.expires_us else None)
+
+    def fresh_for_us(self, now_us: int) -> int | None:
+        """Return after how many microseconds the first of the fresh frames is too old; None: none is fresh. `take` asks
+        for it under the condition.
+        """
+        switches_us, glove_us = self._joined_until_us, self.glove.expires_us
+        if switches_us < now_us:
+            return glove_us + 1 - now_us if glove_us >= now_us else None
+        return (switches_us if glove_us < now_us else min(switches_us, glove_us)) + 1 - now_us
+
+    def _joined(self, now_us: int) -> SwitchFrame | None:
+        """Return the newest of all parts as one frame, None before the first came.
+
+        What a part owns is lost once its frame has expired, all of it when all have. The time is that of the newest
+        frame, expired or not: it never falls when a part does. It stays so until the first of the fresh frames expires.
+        """
+        fresh: list[SwitchFrame] = []
+        time_us, silent, until_us = -1, self._nobodys, -1
+        for owned, newest in self._parts:
+            frame = newest.frame
+            if frame is not None and frame.time_us > time_us:
+                time_us = frame.time_us
+            if frame is None or now_us > newest.expires_us:
+                silent |= owned
+                continue
+            until_us = newest.expires_us if not fresh else min(until_us, newest.expires_us)
+            fresh.append(frame)
+        self._joined_until_us = until_us
+        if len(fresh) == 1 and not silent:
+            return fresh[0]
+        if time_us < 0:
+            return None
+        closed = lost = unread = 0
+        glove = None
+        for frame in fresh:
+            closed, lost, unread = closed | frame.closed, lost | frame.lost, unread | frame.unread
+            if frame.unread and glove is None:
+                glove = frame.glove
+        return SwitchFrame(time_us, closed, lost | silent, unread, glove)
+
+    def _lose(self, now_us: int) -> None:
+        """Join the parts anew, of which one may have fallen silent: that is news once."""
+        switches = self._joined(now_us)
+        if switches is not None and switches != self.switches:
+            self.switches = switches
+            self._wait_for_taking(switches)
+
+    def _wait_for_taking(self, frame: SwitchFrame | GloveFrame) -> None:
+        self.overflowed += len(self._waiting) == _MOST_WAITING
+        self._waiting.append(frame)
 
 
 class Sources:
@@ -23,62 +264,44 @@ class Sources:
 
     switch_names  the switches wanted, in the order of the frames' bits: a build's kept switches
     scan          which ports of the I2C expanders to read, in which order
-    scout         a recogniser of their own, by which scans end early where one bus reads all switches; None: none does
+    early         what ends scans early where one device reads all switches, given the joints' codes; None: nothing does
+
+    take(at_most_us) returns the newest frames, and all that arrived since the last call. It waits for something as long
+    as the newest frames stay fresh, and for a period where none is, but no longer than at_most_us, if that is given.
     """
 
     def __init__(
-        self, harness: Harness, switch_names: Sequence[str], scan: ScanMap, scout: LiveRecognizer | None = None
+        self,
+        harness: Harness,
+        switch_names: Sequence[str],
+        scan: ScanMap,
+        early: tuple[ExitOf, Joints] | None = None,
     ) -> None:
-        self.gloves = () if harness.cyberglove is None else (GloveDevice(harness.cyberglove),)
-        self.scanners = tuple(ScannerDevice(wiring, switch_names, harness.debounce) for wiring in harness.scanners)
-        buses = sorted({port.bus for port in scan.ports})
-        alone = scout if len(buses) == 1 and not any(scanner.owned for scanner in self.scanners) else None
-        self.buses = tuple(I2cDevice(harness, bus, scan, alone, self.glove) for bus in buses)
-        switch_devices: tuple[ScannerDevice | I2cDevice, ...] = (*self.scanners, *self.buses)
-        self._parts = Parts(len(switch_names), [Part(device.owned) for device in switch_devices])
-        self._arrivals = Arrivals(self._parts)
-        self._readers = switch_devices
-        self._devices = (*switch_devices, *self.gloves)
-        self._keepers: list[Keeper[Any]] = [
-            Keeper(device.name, device, self._taking(part, device))
-            for part, device in zip(self._parts.parts, switch_devices, strict=True)
+        made = [(kind, source) for kind in SOURCES.values() for source in kind.sources(harness, switch_names, scan)]
+        self._devices = tuple(source for _, source in made)
+        self._readers = tuple(source for kind, source in made if kind.reads == "switches")
+        self._gloves = tuple(source for kind, source in made if kind.reads == "joints")
+        self._arrivals = Arrivals(len(switch_names), [reader.owned for reader in self._readers])
+        alone = [reader for reader in self._readers if reader.owned]
+        if early is not None and len(alone) == 1:
+            alone[0].end_early(*early, self._arrivals.glove)
+        self.take: Callable[..., Taken] = partial(self._arrivals.take, self._patience_us)
+        self._keepers = [
+            Keeper[SwitchFrame | GloveFrame](source.name, source, self._taking(source)) for source in self._devices
         ]
-        self._keepers += [Keeper(glove.name, glove, self._arrivals.put_glove) for glove in self.gloves]
 
-    def switches(self) -> SwitchFrame | None:
-        """Return the newest frame of the switches, None before the first."""
-        return self._arrivals.switches
-
-    def glove(self) -> GloveFrame | None:
-        """Return the newest frame of the glove, None before the first."""
-        return self._arrivals.glove
-
-    def wait(self, timeout_s: float) -> bool:
-        """Wait until something has come in that was not taken; return whether it has."""
-        return self._arrivals.wait(timeout_s)
-
-    def take(self) -> Taken:
-        """Return the newest frames, and all that arrived since the last call."""
-        return self._arrivals.take()
-
-    @property
-    def patience_s(self) -> float:
-        """How long to wait for something new: until what there is becomes too old, a period where nothing is left."""
-        left_us = self._arrivals.fresh_for_us(now_us(), self.glove_period_us)
-        if left_us is None:
-            periods = [period for period in (self.switch_period_us, self.glove_period_us) if period]
-            left_us = min(periods, default=_PATIENCE_US)
-        return left_us / 1e6
+    def _patience_us(self) -> int:
+        return min(filter(None, (self.switch_period_us, self.glove_period_us)), default=_PATIENCE_US)
 
     @property
     def switch_period_us(self) -> int | None:
         """How often the switches should come at least; None where nothing reads them."""
-        return max((device.period_us for device in self._readers), default=None)
+        return max((reader.period_us for reader in self._readers), default=None)
 
     @property
     def glove_period_us(self) -> int | None:
         """How often the glove should send; None where there is none."""
-        return max((glove.period_us for glove in self.gloves), default=None)
+        return max((glove.period_us for glove in self._gloves), default=None)
 
     def devices(self) -> tuple[DeviceState, ...]:
         """Return how every device fares."""
@@ -87,7 +310,12 @@ class Sources:
     def health(self) -> tuple[DeviceHealth, ...]:
         """Return how every device fares, with what its driver counts."""
         return tuple(
-            DeviceHealth(state.name, state.connected, state.error or device.trouble(), device.counts())
+            DeviceHealth(
+                state.name,
+                state.connected,
+                state.error or device.trouble(),
+                (*device.counts(), Count("program faults", state.faults)),
+            )
             for state, device in zip(self.devices(), self._devices, strict=True)
         )
 
@@ -97,15 +325,14 @@ class Sources:
         return self._arrivals.overflowed
 
     @property
-    def failed(self) -> bool:
-        """Whether a device can never work as it is told to."""
-        return any(keeper.failure is not None for keeper in self._keepers)
+    def failure(self) -> SettingError | None:
+        """Why a device can never work as glove.toml says; None: each may."""
+        return next((keeper.failure for keeper in self._keepers if keeper.failure is not None), None)
 
     def raise_settings(self) -> None:
-        """Raise the SettingError of a device that can never work as it is told to."""
-        for keeper in self._keepers:
-            if keeper.failure is not None:
-                raise keeper.failure
+        """Raise the SettingError of a device that can never work as glove.toml says."""
+        if self.failure is not None:
+            raise self.failure
 
     def __enter__(self) -> Self:
         for keeper in self._keepers:
@@ -115,11 +342,20 @@ class Sources:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        # All are told first: each may take as long as one reading.
+        # All are stopped first: each may take as long as one reading.
         for keeper in self._keepers:
             keeper.stop()
         for keeper in self._keepers:
             keeper.close()
 
-    def _taking(self, part: Part, device: ScannerDevice | I2cDevice) -> Callable[[SwitchFrame], None]:
-        return lambda frame: self._arrivals.put_switches(part, frame, device.longest_us)
+    def _taking(self, source: Source) -> Callable[[SwitchFrame | GloveFrame], None]:
+        """Return what takes the frames of a source, of either kind."""
+        part = self._readers.index(source) if source in self._readers else None
+
+        def take(frame: SwitchFrame | GloveFrame) -> None:
+            if isinstance(frame, GloveFrame):
+                self._arrivals.put_glove(frame, source.longest_us)
+            elif part is not None:
+                self._arrivals.put_switches(part, frame, source.longest_us)
+
+        return take

@@ -1,5 +1,6 @@
 """A build and a harness put together: the devices, and the recogniser of what they deliver."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -7,14 +8,16 @@ from thenar.drivers.calibration import GloveCalibration
 from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22
 
 from ..build import Build
-from ..calibration import load_calibration
+from ..calibration import Joints, load_calibration
+from ..frames import Mask
 from ..harness.wiring import GloveWiring, Harness
+from ..policy import Policy
+from ..scanning.decided import EarlyExit
 from ..scanning.plan import check_harness, plan_scan
 from ..scanning.scanmap import ScanMap
-from .devices import board_period_us, glove_period_us, sensors_of
-from .i2c_device import bus_period_us
-from .joiner import LiveRecognizer
-from .policy import Policy
+from ..sources.base import slowest_us
+from ..sources.cyberglove import sensors_of
+from .recogniser import LiveRecognizer
 from .sources import Sources
 
 _NAMES = {18: SENSORS_18, 22: SENSORS_22}
@@ -60,24 +63,31 @@ class System:
 
         Raises SettingError if the CyberGlove cannot serve the build.
         """
-        glove = self.harness.cyberglove
-        buses = {port.bus for port in self.scan.ports}
-        periods = [bus_period_us(self.scan, self.harness)] * len(buses)
-        boards = zip(self.harness.scanners, self.scan.scanners, strict=True)
-        periods += [board_period_us(wiring) for wiring, keys in boards if keys]
         return LiveRecognizer(
             self.build,
             sensor_names=self.sensor_names,
             calibration=self.calibration,
-            switch_period_us=max(periods, default=None),
-            glove_period_us=None if glove is None else glove_period_us(glove),
+            switch_period_us=slowest_us(self.harness, self.scan, "switches"),
+            glove_period_us=slowest_us(self.harness, self.scan, "joints"),
             policy=self.policy,
         )
 
     def sources(self, *, full_scan: bool = False) -> Sources:
-        """Return the devices; with `full_scan` every scan goes to its end."""
-        scout = None if full_scan else self.recognizer()
-        return Sources(self.harness, self.switch_names, self.scan, scout)
+        """Return the devices; with `full_scan`, and for a sequential test, every scan goes to its end."""
+        early = None if full_scan or self.policy.error_rate is not None else (self.early_exit, self.joints())
+        return Sources(self.harness, self.switch_names, self.scan, early)
+
+    def early_exit(self, ports: Sequence[Mask]) -> EarlyExit:
+        """Return what ends a scan of these ports early without changing any decision.
+
+        Hand `start` the codes of the glove's record that the recogniser will be given with the scan.
+        """
+        return EarlyExit(self.build.scorer, ports, lead=self.policy.lead_steps(self.build.tables.scale))
+
+    def joints(self) -> Joints:
+        """Return what makes the build's joint codes of the CyberGlove's records."""
+        period_us = slowest_us(self.harness, self.scan, "joints")
+        return Joints(self.build.manifest.joints, self.sensor_names, self.calibration, period_us)
 
 
 def sensor_names_of(glove: GloveWiring | None) -> tuple[str, ...]:

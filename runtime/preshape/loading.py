@@ -25,10 +25,9 @@ import msgspec
 from msgspec import Meta
 
 from ..names import fault, nearest, shortened
-from ..toml_source import Place, Source, read_source
+from ..toml_source import Place, TomlText, read_source
 from ..toml_struct import check_finite, convert
-from .preshape import Preshape, PreshapeError
-from .table import PreshapeTable
+from .selector import Preshape, PreshapeError, PreshapeTable
 
 SHIPPED = ("barrett_bh8", "parallel_gripper")
 
@@ -85,12 +84,12 @@ def _find(name: str | os.PathLike[str]) -> Traversable:
     return path
 
 
-def _check_name(source: Source, place: Place, name: str) -> None:
+def _check_name(source: TomlText, place: Place, name: str) -> None:
     if reason := fault(name):
         raise source.error(place, f"{shortened(repr(name))} {reason}")
 
 
-def _check_joints(source: Source, content: _File) -> None:
+def _check_joints(source: TomlText, content: _File) -> None:
     if not content.joints:
         raise source.error(("joints",), "must name at least one joint")
     seen: set[str] = set()
@@ -104,7 +103,7 @@ def _check_joints(source: Source, content: _File) -> None:
             raise source.error((*place, "range"), "must be the lowest position and then the highest")
 
 
-def _check_preshapes(source: Source, content: _File) -> None:
+def _check_preshapes(source: TomlText, content: _File) -> None:
     names: set[str] = set()
     grasps: dict[str, str] = {}
     for number, entry in enumerate(content.preshapes):
@@ -123,7 +122,7 @@ def _check_preshapes(source: Source, content: _File) -> None:
         raise source.error(("preshapes",), "must name at least one grasp type")
 
 
-def _check_positions(source: Source, place: Place, entry: _Entry, joints: tuple[_Joint, ...]) -> None:
+def _check_positions(source: TomlText, place: Place, entry: _Entry, joints: tuple[_Joint, ...]) -> None:
     if len(entry.positions) != len(joints):
         raise source.error(place, f"must be {len(joints)} positions, one a joint, not {len(entry.positions)}")
     for number, (position, joint) in enumerate(zip(entry.positions, joints, strict=True)):

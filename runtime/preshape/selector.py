@@ -1,8 +1,63 @@
-"""When a robot hand shall change its preshape: only on a grasp type that is sure, and has been for a moment."""
+"""Preshapes of a robot hand, and when it shall change from one to the next: only on a grasp type that is sure, and has
+been for a moment.
+"""
 
-from ..live.published import UNKNOWN, LiveGrasp
-from .preshape import Preshape, PreshapeError
-from .table import PreshapeTable
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import msgspec
+
+from ..errors import ThenarError
+from ..names import list_names
+from ..published import UNKNOWN, LiveGrasp
+
+
+class PreshapeError(ThenarError, ValueError):
+    """A table of preshapes cannot be used as it stands, or not with this build."""
+
+
+class Preshape(msgspec.Struct, frozen=True):
+    """One point of a trajectory, as trajectory_msgs/JointTrajectory has it.
+
+    name               what the table calls it; several grasp types may share a preshape
+    joint_names        the robot's joints, in the table's order
+    positions          one a joint: rad for a joint that turns, m for one that slides, as everywhere in ROS
+    time_from_start_s  when the hand shall be there, counted from the moment it is told
+    """
+
+    name: str
+    joint_names: tuple[str, ...]
+    positions: tuple[float, ...]
+    time_from_start_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class PreshapeTable:
+    """The preshapes of one robot hand: `chosen` holds one for every grasp type that the table names."""
+
+    name: str
+    chosen: Mapping[str, Preshape]
+
+    def find(self, grasp: str) -> Preshape | None:
+        """Return the preshape for a grasp type, or None where the table does not name it."""
+        return self.chosen.get(grasp)
+
+    def check(self, grasps: Iterable[str]) -> str:
+        """Return what is missing for a build that recognises `grasps`, as a sentence for the user, or nothing.
+
+        Raises PreshapeError if the table names none of them: it is for another taxonomy.
+        """
+        wanted = tuple(grasps)
+        missing = tuple(grasp for grasp in wanted if grasp not in self.chosen)
+        if not missing:
+            return ""
+        if len(missing) == len(wanted):
+            raise PreshapeError(
+                f"preshapes {self.name}: none of the build's grasp types ({list_names(wanted)}) is among the table's "
+                f"({list_names(tuple(self.chosen))}): take a table for the taxonomy of the build"
+            )
+        return f"preshapes {self.name}: none for {', '.join(missing)}: nothing is sent to the hand on those"
+
 
 MIN_PROBABILITY = 0.8
 SETTLE_MS = 100
@@ -38,13 +93,10 @@ class PreshapeSelector:
         if grasp.grasp == UNKNOWN or grasp.health == "unknown":
             self._called = None
             return None
-        wanted = self._table.find(grasp.grasp)
-        self._call(wanted if grasp.probability >= self._min_probability else None, grasp.time_us)
+        wanted = self._table.chosen.get(grasp.grasp)
+        called = wanted if grasp.probability >= self._min_probability else None
+        if called is not self._called:
+            self._called, self._since_us = called, grasp.time_us
+        if called is not None and grasp.time_us - self._since_us >= self._settle_us:
+            self._held = called
         return None if wanted is None else self._held
-
-    def _call(self, wanted: Preshape | None, time_us: int) -> None:
-        """Note what this frame calls for, and change to it once it was called for long enough."""
-        if wanted is not self._called:
-            self._called, self._since_us = wanted, time_us
-        if wanted is not None and time_us - self._since_us >= self._settle_us:
-            self._held = wanted

@@ -15,8 +15,8 @@ from mcap.records import Channel, DataEnd, Footer, Header, McapRecord, Metadata,
 
 from thenar.drivers.errors import SettingError
 
-from .cdr import BYTES, DEFINITIONS, STRING
-from .errors import McapError
+from ..errors import McapError
+from .messages import BYTES, DEFINITIONS, STRING
 from .session import METADATA, Session, from_metadata, to_metadata
 
 MAGIC = b"\x89MCAP0\r\n"

@@ -13,8 +13,8 @@ from zlib import crc32
 
 from mcap.opcode import Opcode
 
+from ..errors import McapError
 from ..files import open_file
-from .errors import McapError
 from .layout import LARGEST_RECORD, MAGIC
 
 _OPENING = Struct("<BQ")

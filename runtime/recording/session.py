@@ -12,9 +12,9 @@ from msgspec.structs import fields
 
 from thenar.drivers.calibration import GloveCalibration
 
-from ..live.policy import Policy
+from ..errors import McapError
 from ..names import fault, shortened
-from .errors import McapError
+from ..policy import Policy
 
 METADATA = "thenar"
 VERSION = 1

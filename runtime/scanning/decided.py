@@ -1,16 +1,95 @@
-"""How often a scan would be decided after some of its ports, over recorded frames: integer tables, exact.
+"""When a scan may stop: as soon as no state of the unread switches could change who wins. Integer tables, exact.
 
-A frame is decided when its leader can be overtaken by no state of the unread switches, as `earlyexit.py` defines it: an
-unread switch adds nothing, its row or its mean row, and a tie goes to the class of the lowest number.
+Among sums that leave the unread switches out, let l be the leader. Class r can still overtake l if its score and the
+most that the unread switches can bring it closer (`Scorer.reach`) exceed l's; or equal it, where r has the lower number
+and would win the tie. `EarlyExit` stops when no r can. It stops no later than that either: while it goes on, there is a
+state of the unread switches in which somebody else wins. `Decided` counts the same over recorded frames.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from functools import lru_cache
+from operator import add
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.drivers.errors import SettingError
+
 from ..errors import FrameError
+from ..frames import Mask
+from ..scores import LiveScores, Scorer, reaches
 from ..tables import IntegerTables
+
+_KEPT = 1 << 16
+
+
+class EarlyExit:
+    """Watches a scan port by port.
+
+    groups are the switches of each port, in the order in which ports are read; no switch may be in two of them. With a
+    `lead` in steps, the scan goes on until the leader is sure to lead everybody by so much: a decision that asks for
+    such a lead (`Policy.lead`) is then the same as after the whole scan.
+    """
+
+    def __init__(self, scorer: Scorer, groups: Sequence[Mask], *, lead: int = 0) -> None:
+        """Raise SettingError if a switch is in two groups or is none of the build's."""
+        tables = scorer.tables
+        self._groups = tuple(groups)
+        self._later = _later(self._groups, tables.n_switches)
+        self._lead = lead
+        self._scores = LiveScores(scorer)
+        self._reach = scorer.reach
+        self._hurdles = lru_cache(maxsize=_KEPT // tables.n_classes)(self._hurdles_of)
+        self._elsewhere: Mask = ~sum(self._groups) & ((1 << tables.n_switches) - 1)
+        self._closed: Mask = 0
+        self._lost: Mask = 0
+
+    def start(self, codes: Sequence[int] | None, closed: Mask = 0, lost: Mask | None = None) -> None:
+        """Begin a scan: the joints' codes (None: lost), and what is known of switches that are of no port.
+
+        With lost=None all of those are lost. Raises FrameError.
+        """
+        self._closed = closed & self._elsewhere
+        self._lost = self._elsewhere if lost is None else lost & self._elsewhere
+        self._scores.joints(codes)
+
+    def after(self, port: int, closed: Mask, lost: Mask = 0) -> bool:
+        """Take what port number `port` read, of its own switches; return whether the ports after it can be left out.
+
+        Ports come in order. After the last, with no `lead`, the answer is always yes.
+        """
+        group = self._groups[port]
+        self._closed |= closed & group
+        self._lost |= lost & group
+        lanes = self._scores.lanes(self._closed, self._lost)
+        best = max(lanes)
+        nearest: int = max(map(add, lanes, self._hurdles(port, lanes.index(best))))
+        return nearest <= best
+
+    def unread(self, port: int) -> Mask:
+        """Return the switches of the ports after number `port`."""
+        return self._later[port]
+
+    def _hurdles_of(self, port: int, leader: int) -> tuple[int, ...]:
+        """Return what, added to a class's score, must not exceed the leader's: (K,), 0 for the leader itself."""
+        found = [
+            reach + max(self._lead, rival < leader)
+            for rival, reach in enumerate(self._reach(leader, self._later[port]))
+        ]
+        found[leader] = 0
+        return tuple(found)
+
+
+def _later(groups: Sequence[Mask], n_switches: int) -> list[Mask]:
+    """Return, for every group, the switches of the groups after it."""
+    later, seen = [], 0
+    for group in reversed(groups):
+        later.append(seen)
+        if group & seen or group >> n_switches:
+            raise SettingError("a switch of the scan is read by two ports, or is none of the build's: compile it again")
+        seen |= group
+    return later[::-1]
+
 
 Ints = NDArray[np.int32]
 
@@ -40,7 +119,7 @@ class Decided:
         # No partial sum leaves int16 (IntegerTables), so nothing overflows here.
         self._base = _joints(tables, codes) + bits[:, known].astype(np.int32) @ rows[known]
         self._shares = [bits[:, list(port)].astype(np.int32) @ rows[list(port)] for port in ports]
-        self._reaches = [_reach(tables, list(port)) for port in ports]
+        self._reaches = [_reaches(tables, port) for port in ports]
         self._counts: dict[int, int] = {}
 
     def __len__(self) -> int:
@@ -66,18 +145,14 @@ class Decided:
         return leaders, (sums + hurdles[leaders]).max(axis=1) <= sums.max(axis=1)
 
 
-def reach_of(tables: IntegerTables, switches: Iterable[int]) -> int:
+def reach_of(tables: IntegerTables, switches: Sequence[int]) -> int:
     """Return the most steps by which these switches can bring any class closer to any other."""
-    return int(_reach(tables, list(switches)).max())
+    return int(_reaches(tables, switches).max())
 
 
-def _reach(tables: IntegerTables, switches: list[int]) -> Ints:
+def _reaches(tables: IntegerTables, switches: Sequence[int]) -> Ints:
     """Return the most steps by which class c can come closer to class l, at [l, c]; (K, K)."""
-    found = np.zeros((tables.n_classes, tables.n_classes), np.int32)
-    for switch in switches:
-        row, mean = (rows[switch].astype(np.int32) for rows in (tables.switch_rows, tables.switch_means))
-        found += np.maximum(0, np.maximum(row - row[:, np.newaxis], mean - mean[:, np.newaxis]))
-    return found
+    return np.array([reaches(tables, leader, switches) for leader in range(tables.n_classes)], np.int32)
 
 
 def _joints(tables: IntegerTables, codes: NDArray[np.uint16]) -> Ints:

@@ -1,7 +1,13 @@
-"""From a harness and a build's tables to its scan map: the fewest transactions, in the order that decides earliest."""
+"""From a harness and a build's tables to its scan map: the fewest transactions, in the order that decides earliest.
 
-from collections.abc import Sequence
+What belongs together stays together, such as the ports behind one channel of a mux; the rest is ordered for the least
+expected cost. A unit is a port, or units in a row that nothing else may come between. Costs are wire times in integer
+nanoseconds, so that sums have no order; the cost of an order is the sum over its ports.
+"""
+
+from collections.abc import Callable, Sequence
 from fractions import Fraction
+from typing import Union
 
 import numpy as np
 from msgspec.structs import replace
@@ -11,11 +17,135 @@ from ..errors import HarnessError
 from ..harness.wiring import Harness
 from ..names import list_names
 from ..tables import IntegerTables
-from .costs import Costs
 from .decided import Decided, reach_of
-from .order import Order, Unit, arranged, ports_in
+from .ports import whole_scan
 from .scanmap import Port, ScanMap
-from .whole import whole_scan
+from .timing import port_us, reading_of, select_us, selections
+
+# Up to so many ports every order counts (2^n sets of ports); above, a good one is looked for.
+EXACT = 10
+
+Order = tuple[int, ...]
+Unit = Union[int, Sequence["Unit"]]  # noqa: UP007 (an alias of itself has to be quoted)
+# Cost of reading a port, the last argument, after a set of ports: bit p is port p.
+Cost = Callable[[int, int], int]
+# Cost and order of walking through item number i after a set of ports.
+_Step = Callable[[int, int], tuple[int, Order]]
+
+
+def arranged(units: Sequence[Unit], cost: Cost) -> Order:
+    """Return all ports of all `units` in an order of low cost; of the lowest cost there is up to EXACT ports."""
+    best = _exact if len(ports_in(units)) <= EXACT else _searched
+
+    def through(read: int, unit: Unit) -> tuple[int, Order]:
+        if isinstance(unit, int):
+            return cost(read, unit), (unit,)
+        masks = [sum(1 << port for port in ports_in(each)) for each in unit]
+        return best(read, masks, lambda seen, number: through(seen, unit[number]))
+
+    return through(0, units)[1]
+
+
+def ports_in(unit: Unit) -> Order:
+    """Return the ports of a unit, in the order in which they stand there."""
+    return (unit,) if isinstance(unit, int) else tuple(port for each in unit for port in ports_in(each))
+
+
+def _exact(read: int, items: Sequence[int], step: _Step) -> tuple[int, Order]:
+    """Return the least cost of walking through all `items` (sets of ports) after `read`, and how (Held, Karp 1962)."""
+    best: list[tuple[int, Order]] = [(0, ())]
+    for some in range(1, 1 << len(items)):
+        ways = []
+        for last in (index for index in range(len(items)) if some >> index & 1):
+            others = some ^ 1 << last
+            seen = read | sum(item for index, item in enumerate(items) if others >> index & 1)
+            (before, way), (further, ports) = best[others], step(seen, last)
+            ways.append((before + further, way + ports))
+        best.append(min(ways))
+    return best[-1]
+
+
+def _searched(read: int, items: Sequence[int], step: _Step) -> tuple[int, Order]:
+    """Return a low cost of walking through all `items` after `read`, and how.
+
+    From the back: last comes what is cheapest then against being first. Then neighbours change places while it helps.
+    """
+    left, order = list(range(len(items))), list[int]()
+    while left:
+        seen = read | sum(items[index] for index in left)
+        last = min(left, key=lambda index: step(seen & ~items[index], index)[0] - step(read, index)[0])
+        left.remove(last)
+        order.insert(0, last)
+    found = _walked(read, items, step, order)
+    improved = True
+    while improved:
+        improved = False
+        for place in range(len(order) - 1):
+            other = [*order[:place], order[place + 1], order[place], *order[place + 2 :]]
+            tried = _walked(read, items, step, other)
+            if tried[0] < found[0]:
+                order, found, improved = other, tried, True
+    return found
+
+
+def _walked(read: int, items: Sequence[int], step: _Step, order: Sequence[int]) -> tuple[int, Order]:
+    total, ports = 0, Order()
+    for index in order:
+        further, way = step(read, index)
+        total, ports = total + further, ports + way
+        read |= items[index]
+    return total, ports
+
+
+# A channel of a mux, a whole mux, or a port that needs none.
+_Room = tuple[int, ...]
+
+
+class Costs:
+    """The costs of `ports`, by their numbers.
+
+    units are all of them as nested tuples: what is behind one channel stays together, and where a bus has more muxes
+    than one, what is behind one mux.
+    """
+
+    def __init__(self, ports: Sequence[Port], harness: Harness) -> None:
+        self._ns, rooms = list[int](), set(selections(ports, harness))
+        opened: dict[_Room, tuple[int, int]] = {}
+        nested: dict[_Room, dict[_Room, list[int]]] = {}
+        for number, port in enumerate(ports):
+            bus = harness.buses[port.bus]
+            mux = bus.chips[port.chip].mux
+            channel = (port.bus, mux.address, mux.channel) if mux else ()
+            way: list[_Room] = [room for room in (channel[:2], channel) if room in rooms]
+            for room in way:
+                opened[room] = (opened.get(room, (0, 0))[0] | 1 << number, round(1000 * select_us(bus.clock_hz)))
+            outer, inner = (way[0], way[-1]) if way else ((number,), (number,))
+            nested.setdefault(outer, {}).setdefault(inner, []).append(number)
+            self._ns.append(round(1000 * port_us(reading_of(port, harness), bus.clock_hz)))
+        self._rooms = tuple(opened.values())
+        self.units: tuple[Unit, ...] = tuple(tuple(map(tuple, inside.values())) for inside in nested.values())
+
+    def after(self, read: int, port: int) -> int:
+        """Return what reading `port` takes after the ports `read`: the first behind a channel needs it selected."""
+        return self._ns[port] + sum(ns for room, ns in self._rooms if room >> port & 1 and not read & room)
+
+    def of(self, unit: Unit) -> int:
+        """Return what reading a unit takes, with the selections that it alone needs."""
+        ports = ports_in(unit)
+        inside = sum(1 << port for port in ports)
+        return sum(self._ns[port] for port in ports) + sum(ns for room, ns in self._rooms if not room & ~inside)
+
+    def expected(self, frames: Decided) -> Cost:
+        """Return the time that reading a port takes over all `frames` that are not decided before.
+
+        The first counts in every frame, because nothing stops a scan before it.
+        """
+
+        def cost(read: int, port: int) -> int:
+            return self.after(read, port) * (frames.undecided(read) if read else len(frames))
+
+        return cost
+
 
 # Of more recorded frames than this, evenly spaced ones decide on the order.
 FRAMES = 5000

@@ -17,8 +17,8 @@ from thenar.drivers.i2c.chips import Reading
 from thenar.drivers.scanner_protocol import OVERHEAD
 
 from ..harness.wiring import GloveWiring, Harness, ScannerWiring
+from .ports import ports_of
 from .scanmap import Port, ScanMap
-from .transactions import ports_of
 
 _FREE_US = ((100_000, 4.7), (400_000, 1.3))
 _FREE_FASTEST_US = 0.5

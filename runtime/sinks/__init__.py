@@ -1,15 +1,12 @@
-"""Where recognised grasps go."""
+"""Where recognised grasps go: one file for each kind of sink, found by the registry `SINKS`."""
 
-from .angles import AngleReader, JointAngles
-from .fanout import Fanout
-from .jsonlines import JsonLines
-from .line import HealthLine, Line
-from .opening import open_sink
-from .sink import Sink, SinkError, SinkReport
+from ..published import JointAngles
+from .base import SINKS, Fanout, Sink, SinkError, SinkKind, SinkPlace, SinkReport, open_sink
+from .jsonl import HealthLine, JsonLines, Line
 from .sockets import SocketLines
 
 __all__ = [
-    "AngleReader",
+    "SINKS",
     "Fanout",
     "HealthLine",
     "JointAngles",
@@ -17,6 +14,8 @@ __all__ = [
     "Line",
     "Sink",
     "SinkError",
+    "SinkKind",
+    "SinkPlace",
     "SinkReport",
     "SocketLines",
     "open_sink",

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.names import nearest
-from thenar.runtime.toml_source import Place, Source, read_source
+from thenar.runtime.toml_source import Place, TomlText, read_source
 from thenar.runtime.toml_struct import as_table, check_finite, convert
 
 from ..body.hand import CAPSULES, DIGITS, LIMITS_DEG, Hand, Size
@@ -104,7 +104,7 @@ def _parts(pad: str) -> tuple[str, str | None, str]:
     return capsule, which, side
 
 
-def _prehension(source: Source, place: Place, table: object) -> Prehension:
+def _prehension(source: TomlText, place: Place, table: object) -> Prehension:
     found = convert(source, place, table, Prehension)
     for key, reason in _faults(found):
         raise source.error((*place, *key), reason)

@@ -14,7 +14,7 @@ from thenar.drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, 
 from thenar.drivers.emulated.scanner import EmulatedScanner
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
-from thenar.runtime.live.devices import sensors_of
+from thenar.runtime.sources.cyberglove import sensors_of
 
 from ..effects import wire_damaged_bytes, wire_lost_bytes
 from ..scenes.scene import Scene

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
-from thenar.runtime.live.frames import GloveFrame, SwitchFrame
-from thenar.runtime.live.published import UNKNOWN, LiveGrasp
-from thenar.runtime.recording.frame_bytes import switch_matrix
+from thenar.runtime.frames import GloveFrame, SwitchFrame
+from thenar.runtime.published import UNKNOWN, LiveGrasp
+from thenar.runtime.recording.messages import switch_matrix
 from thenar.runtime.recording.reader import Reader, check_made
 from thenar.runtime.recording.session import Label
 

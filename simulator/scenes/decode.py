@@ -13,7 +13,7 @@ import msgspec
 from thenar.compiler.recordings.errors import RecordingError
 from thenar.compiler.recordings.taxonomy import Taxonomy, published
 from thenar.runtime.names import fault, list_names, nearest
-from thenar.runtime.toml_source import Place, Source, read_source
+from thenar.runtime.toml_source import Place, TomlText, read_source
 from thenar.runtime.toml_struct import as_list, as_table, check_finite, check_keys, convert
 
 from ..body.shapes import Shape
@@ -52,7 +52,7 @@ def load_catalogue(name_or_path: str | Path) -> Catalogue:
     return Catalogue(file.name.removesuffix(".toml"), taxonomy.name, objects_of(source, found.objects, taxonomy))
 
 
-def find_taxonomy(source: Source, name: str) -> Taxonomy:
+def find_taxonomy(source: TomlText, name: str) -> Taxonomy:
     """Return the published taxonomy that `source` names under `taxonomy`; raises SceneError."""
     try:
         return published(name)
@@ -60,7 +60,7 @@ def find_taxonomy(source: Source, name: str) -> Taxonomy:
         raise source.error(("taxonomy",), str(reason)) from reason
 
 
-def objects_of(source: Source, tables: object, taxonomy: Taxonomy) -> tuple[SceneObject, ...]:
+def objects_of(source: TomlText, tables: object, taxonomy: Taxonomy) -> tuple[SceneObject, ...]:
     """Return the `[[objects]]` of a scene or catalogue; grasp types may be written as anything that `taxonomy` finds.
 
     Raises SceneError about the first that is wrong, and if a grasp type has none.
@@ -73,7 +73,7 @@ def objects_of(source: Source, tables: object, taxonomy: Taxonomy) -> tuple[Scen
     return found
 
 
-def check_names(source: Source, place: Place, names: list[str]) -> None:
+def check_names(source: TomlText, place: Place, names: list[str]) -> None:
     """Raise SceneError about the first of the tables at `place` whose name is taken or would not survive a file."""
     first: dict[str, int] = {}
     for number, name in enumerate(names):
@@ -85,7 +85,7 @@ def check_names(source: Source, place: Place, names: list[str]) -> None:
         first[name] = number
 
 
-def _object(source: Source, place: Place, value: object, taxonomy: Taxonomy) -> SceneObject:
+def _object(source: TomlText, place: Place, value: object, taxonomy: Taxonomy) -> SceneObject:
     table = as_table(source, place, value)
     shape = _shape(source, place, table)
     common = {key: table[key] for key in _OF_ANY_SHAPE if key in table}
@@ -97,7 +97,7 @@ def _object(source: Source, place: Place, value: object, taxonomy: Taxonomy) -> 
     return msgspec.structs.replace(item, grasp=grasp)
 
 
-def _shape(source: Source, place: Place, table: dict[str, object]) -> Shape:
+def _shape(source: TomlText, place: Place, table: dict[str, object]) -> Shape:
     name = table.get("shape")
     if not isinstance(name, str) or name not in _SHAPES:
         wrong = f"{name!r} is not a shape" if "shape" in table else "the key shape is missing"
@@ -192,7 +192,7 @@ def _file(path: Path) -> Traversable:
 class _Decoder:
     """A scene half way: `folder` is where its file lies."""
 
-    source: Source
+    source: TomlText
     file: _SceneFile
     folder: Path
 

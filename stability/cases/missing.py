@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from thenar.compiler.tables.collapse import HIGHEST_CODE
 from thenar.compiler.tables.furthest import furthest
 from thenar.runtime.build import Build
-from thenar.runtime.recognizer import Frame, Recognizer
-from thenar.runtime.scorer import LANE_OFFSET
+from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.tables import IntegerTables
 
 from ..checks.integer_sums import first_best
@@ -266,14 +265,14 @@ def _sums(small: SmallBuild, cases: list[Lost]) -> Finding:
 def _told(small: SmallBuild, cases: list[Lost]) -> Iterator[Finding]:
     degraded = Worst("frames called degraded", "those that lost a kept switch or a joint", 0, "frames")
     unread = Worst("answers that hang on what a lost input reads", "the answer without it", 0, "frames")
-    recognizer, grasps = Recognizer(small.build), small.build.grasps
+    build, grasps = small.build, small.build.grasps
     for case in cases:
         lost = case.loss.switches, case.loss.joints
         for bits, codes, scores in zip(case.bits, case.codes, case.scores.tolist(), strict=True):
-            found = recognizer.recognise(Frame(0, bits, codes, *lost))
+            found = build.recognise(bits, codes, *lost)
             right = found.degraded == bool(case.loss.inputs.any()) and found.grasp == grasps[first_best(scores)]
             degraded.see(float(not right), case.loss.name)
-            other = Frame(0, bits ^ case.loss.switches, np.where(case.loss.joints, HIGHEST_CODE - codes, codes), *lost)
-            unread.see(float(recognizer.recognise(other) != found), case.loss.name)
+            other = bits ^ case.loss.switches, np.where(case.loss.joints, HIGHEST_CODE - codes, codes)
+            unread.see(float(build.recognise(*other, *lost) != found), case.loss.name)
     yield degraded.finding()
     yield unread.finding()

@@ -14,7 +14,7 @@ from thenar.compiler.tables.furthest import furthest
 from thenar.compiler.tables.quantise import balance
 from thenar.compiler.tables.worstcase import Rounding
 from thenar.runtime.errors import BuildError
-from thenar.runtime.scorer import LANE_OFFSET, Scorer
+from thenar.runtime.scores import LANE_OFFSET, Scorer
 from thenar.runtime.tables import LIMIT, MAX_CLASSES, MAX_SWITCHES, IntegerTables, tables_from_bytes, tables_to_bytes
 
 from ..checks.integer_sums import first_best, furthest_sums, largest, largest_sum, ties

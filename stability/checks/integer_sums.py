@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from thenar.compiler.tables.furthest import furthest
 from thenar.runtime.build import Build
-from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Proof, Source, Switch
-from thenar.runtime.recognizer import Frame, Recognizer
-from thenar.runtime.scorer import LANE_OFFSET, Scorer
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Switch
+from thenar.runtime.scores import LANE_OFFSET, Scorer
 from thenar.runtime.tables import (
     LIMIT,
     MAX_CLASSES,
@@ -38,7 +37,7 @@ def bare_build(tables: IntegerTables) -> Build:
             thenar="",
             tables_sha256=_NO_DIGEST,
             ensemble_sha256=_NO_DIGEST,
-            source=Source(_NO_DIGEST, 0, "none", tables.n_switches),
+            source=Origin(_NO_DIGEST, 0, "none", tables.n_switches),
             options=Options(0, 1, "both", 1.0, 0, 1),
             grasps=tuple(str(number) for number in range(tables.n_classes)),
             switches=tuple(Switch(number, str(number), 0.0) for number in range(tables.n_switches)),
@@ -142,14 +141,13 @@ def ties(full: bool) -> Finding:
     for seed in range(30 if full else 3):
         tables = whole_numbers(seed, 5, 4, (3, 3), 1)
         build = bare_build(tables)
-        recognizer = Recognizer(build)
         for frame in every_frame(tables):
             bits, codes = np.array(frame.bits), np.array(frame.codes, np.uint16)
             scores = build.scores(bits, codes).tolist()
             best = first_best(scores)
             if scores.count(scores[best]) < 2:
                 continue
-            found = recognizer.recognise(Frame(0, bits, codes))
+            found = build.recognise(bits, codes)
             right = build.classify(bits, codes) == found.grasp == str(best) and found.margin == 0
             worst.see(float(not right), f"draw {seed}: {frame}")
     return worst.finding()

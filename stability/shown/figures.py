@@ -18,7 +18,7 @@ from thenar.compiler.tables.collapse import collapse
 from thenar.compiler.tables.quantise import quantise
 from thenar.compiler.tables.worstcase import Rounding
 from thenar.compiler.workers import in_workers
-from thenar.runtime.scorer import Scorer
+from thenar.runtime.scores import Scorer
 from thenar.runtime.tables import IntegerTables
 
 from ..checks.integer_sums import first_best

@@ -6,7 +6,7 @@ import pytest
 
 from thenar.cli import run
 from thenar.compiler import GraspSet
-from thenar.runtime.live.frames import SwitchFrame
+from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.recording.session import Collection, Label, Session, Task
 from thenar.runtime.recording.writer import Recorder
 

@@ -8,8 +8,7 @@ from msgspec.structs import replace
 from rich.console import Console
 
 from thenar.cli.live_view import LiveView, drawn
-from thenar.runtime.live.health import DeviceHealth
-from thenar.runtime.live.published import Health, LiveGrasp
+from thenar.runtime.published import DeviceHealth, Health, HealthReport, LiveGrasp
 
 LONG_S = 10.0
 
@@ -96,11 +95,12 @@ def test_what_is_missing_is_named_six_of_it_at_most() -> None:
 
 def test_the_newest_grasp_is_drawn() -> None:
     terminal = Terminal()
-    with view_on(terminal) as view:
+    health = HealthReport(0, (), (), ("s7",), (), 100.0, 90.0, 120, 0, 0, 0)
+    with LiveView(Console(file=terminal, force_terminal=True, width=80), status=True) as view:
         view.show(grasp("first"), nobody)
         terminal.until("first")
-        view.show(grasp("second"), lambda: (DeviceHealth("glove", False, "no such port"),), ("120 frames",))
-        terminal.until("second", "no such port", "120 frames")
+        view.show(grasp("second"), lambda: (DeviceHealth("glove", False, "no such port"),), health)
+        terminal.until("second", "no such port", "120 frames", "chattering: s7")
 
 
 def test_a_terminal_that_is_held_holds_nobody_up_and_then_shows_the_present() -> None:

@@ -19,7 +19,7 @@ from thenar.compiler import GraspSet
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.scanner import EmulatedScanner
 from thenar.drivers.emulated.serial_line import PtyLine
-from thenar.runtime.recording.trials import read_journal
+from thenar.runtime.recording.guide import read_journal
 
 # Collections over ptys, in real time.
 pytestmark = pytest.mark.slow

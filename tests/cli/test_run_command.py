@@ -61,7 +61,7 @@ def test_a_reader_that_goes_away_leaves_no_traceback(set_file: Path, build_folde
     [
         ("--glove", "--period-us", ("500",)),
         ("run.mcap", "--period-us", ("500",)),
-        ("run.mcap", "--sink", ("jsonl:-",)),
+        ("run.mcap", "--status", ()),
         ("run.mcap", "--frames", ("3",)),
         ("set.grasps", "--record", ("more.mcap",)),
         ("set.grasps", "--preshape", ("barrett_bh8",)),

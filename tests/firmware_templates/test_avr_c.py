@@ -13,7 +13,7 @@ from thenar.compiler.firmware.layout import arrange
 from thenar.compiler.firmware.protocol import decided_files, protocol_files
 from thenar.compiler.firmware.targets.base import Mode
 from thenar.drivers.cyberglove_protocol import SENSORS_18
-from thenar.runtime.manifest import Calibration, Manifest, Options, Proof, Source, Switch
+from thenar.runtime.manifest import Calibration, Manifest, Options, Origin, Proof, Switch
 from thenar.runtime.tables import IntegerTables
 
 Tool = Callable[[str], str]
@@ -88,7 +88,7 @@ def manifest_of(joints: tuple[str, ...]) -> Manifest:
         thenar="0.1.0",
         tables_sha256="0" * 64,
         ensemble_sha256="0" * 64,
-        source=Source("1" * 64, 10, "own", 20),
+        source=Origin("1" * 64, 10, "own", 20),
         options=Options(0, 100, "both", 1.0, 4, 1),
         grasps=GRASPS,
         switches=tuple(Switch(number, name, 0.5) for number, name in enumerate(SWITCHES)),

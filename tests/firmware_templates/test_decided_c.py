@@ -1,4 +1,4 @@
-"""The C of early exit against runtime.scanning.earlyexit.EarlyExit: the same answer after every port of every scan."""
+"""The C of early exit against runtime.scanning.decided.EarlyExit: the same answer after every port of every scan."""
 
 import ctypes
 from collections.abc import Callable, Sequence
@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from thenar.compiler.firmware.protocol import decided_files
-from thenar.runtime.scanning.earlyexit import EarlyExit
-from thenar.runtime.scorer import Scorer
+from thenar.runtime.scanning.decided import EarlyExit
+from thenar.runtime.scores import Scorer
 from thenar.runtime.tables import IntegerTables
 
 SharedLibrary = Callable[..., ctypes.CDLL]
@@ -69,7 +69,7 @@ class Decided:
 
 def expected(tables: IntegerTables, ports: Ports, closed: Sequence[bool]) -> list[bool]:
     masks = [sum(1 << switch for switch in port) for port in ports]
-    early, state = EarlyExit(tables, masks), sum(1 << switch for switch, bit in enumerate(closed) if bit)
+    early, state = EarlyExit(Scorer(tables), masks), sum(1 << switch for switch, bit in enumerate(closed) if bit)
     early.start([])
     return [early.after(port, state & mask) for port, mask in enumerate(masks)]
 

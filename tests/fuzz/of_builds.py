@@ -28,10 +28,9 @@ from thenar.compiler.placement.placement import place
 from thenar.compiler.report.frontier import frontier_view
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME, Build
-from thenar.runtime.live.frames import GloveFrame, SwitchFrame
+from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.live.system import System
 from thenar.runtime.manifest import Manifest
-from thenar.runtime.recognizer import Frame, Recognizer
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import scan_us
 
@@ -74,7 +73,7 @@ def _use_build(folder: Path) -> None:
     switches, joints = build.tables.n_switches, build.tables.n_joints
     closed, codes = np.ones(switches, np.bool_), np.full(joints, 65535, np.uint16)
     build.classify(closed, codes)
-    Recognizer(build).recognise(Frame(0, closed, codes, closed, np.zeros(joints, np.bool_)))
+    build.recognise(closed, codes, closed, np.zeros(joints, np.bool_))
     for step in (_live, _verified, _spec, _firmware):
         _allowed(step, build, folder)
 

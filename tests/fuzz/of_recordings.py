@@ -15,15 +15,14 @@ from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.build import Build
-from thenar.runtime.live.frames import GloveFrame, SwitchFrame
+from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.live.replay import replayed
 from thenar.runtime.live.system import System
 from thenar.runtime.recording import layout
-from thenar.runtime.recording.cdr import encode_bytes, encode_text
-from thenar.runtime.recording.frame_bytes import glove_bytes, switch_bytes
+from thenar.runtime.recording.guide import planned, read_journal
 from thenar.runtime.recording.layout import Tail, beginning, ending, session_record
+from thenar.runtime.recording.messages import encode_bytes, encode_text, glove_bytes, switch_bytes
 from thenar.runtime.recording.session import Collection, Label, Session, Task
-from thenar.runtime.recording.trials import planned, read_journal
 from thenar.simulator.playing.performance import of_recording
 
 _MESSAGE = Struct("<BQHIQQ")
@@ -102,7 +101,7 @@ def _recognised() -> bytes:
         time_us = 10_000 * number
         glove = GloveFrame(time_us, bytes(range(60 + number, 78 + number)), 3)
         frame = SwitchFrame(time_us, closed=number % (1 << len(names)), lost=number == 2, unread=0, glove=glove)
-        found = recognizer.step(time_us + 5, _CLOCK_NS // 1000 + time_us, frame, glove)
+        found = recognizer.step(time_us + 5, _CLOCK_NS // 1000 + time_us, frame, glove).grasp
         messages += [
             (layout.GLOVE, time_us, encode_bytes(glove_bytes(glove, 18))),
             (layout.SWITCHES, time_us, encode_bytes(switch_bytes(frame, len(names), 18))),

@@ -16,19 +16,17 @@ from thenar.compiler.recordings.objects import collected
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.build import Build
-from thenar.runtime.calibration import load_calibration
+from thenar.runtime.calibration import AngleReader, codes_of_bytes, load_calibration
 from thenar.runtime.harness.loading import load_harness, parse_harness
 from thenar.runtime.harness.writing import harness_to_toml
-from thenar.runtime.live.codes import codes_of_bytes
 from thenar.runtime.live.sources import Sources
 from thenar.runtime.manifest import Calibration
 from thenar.runtime.preshape.loading import SHIPPED, load_preshapes
+from thenar.runtime.recording.guide import planned
 from thenar.runtime.recording.session import Collection
-from thenar.runtime.recording.trials import planned
 from thenar.runtime.scanning.plan import plan_scan
+from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.timing import scan_us
-from thenar.runtime.scanning.whole import whole_scan
-from thenar.runtime.sinks.angles import AngleReader
 from thenar.simulator.body.condition import Thing
 from thenar.simulator.body.hand import Hand, Size
 from thenar.simulator.planning.postures import Postures

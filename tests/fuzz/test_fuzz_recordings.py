@@ -19,16 +19,16 @@ from thenar.compiler.recordings.taxonomy import own
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.errors import SettingError, ThenarError
 from thenar.runtime.build import Build
+from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, GloveWiring, Harness
 from thenar.runtime.harness.writing import harness_to_toml
-from thenar.runtime.live.frames import GloveFrame, SwitchFrame
-from thenar.runtime.live.policy import Policy
 from thenar.runtime.live.replay import replayed
 from thenar.runtime.live.system import System
+from thenar.runtime.policy import Policy
+from thenar.runtime.recording.guide import planned, read_journal
 from thenar.runtime.recording.session import Collection, Label, Session, Task
-from thenar.runtime.recording.trials import planned, read_journal
 from thenar.runtime.recording.writer import Recorder
-from thenar.runtime.sinks.line import encode
+from thenar.runtime.sinks.jsonl import encode
 from thenar.simulator.playing.performance import of_recording
 
 TYPES = ("cup", "pen", "rod")
@@ -84,7 +84,7 @@ def whole(build: Build, tmp_path_factory: pytest.TempPathFactory) -> bytes:
                 switches = SwitchFrame(time_us, number % (1 << len(names)), lost=int(number == 5))
                 recorder.glove(glove)
                 recorder.switches(switches)
-                recorder.grasp(recognizer.step(time_us + 10, 10**15 + time_us, switches, glove))
+                recorder.grasp(recognizer.step(time_us + 10, 10**15 + time_us, switches, glove).grasp)
                 event: Literal["captured", "accepted"] = "captured" if number % 2 == 0 else "accepted"
                 trial = 1 + begun * FRAMES // 2 + number // 2
                 recorder.label(Label(time_us + 20, event, trial, TYPES[trial % 3], "A", "mug"))

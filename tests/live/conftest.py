@@ -17,11 +17,11 @@ import pytest
 import thenar.simulator.scenes
 from thenar.compiler import compile_build
 from thenar.runtime import Build
+from thenar.runtime.calibration import CodeTables
+from thenar.runtime.frames import now_us
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import Harness
-from thenar.runtime.live.codes import CodeTables
-from thenar.runtime.live.frames import now_us
-from thenar.runtime.live.published import UNKNOWN, LiveGrasp
+from thenar.runtime.published import UNKNOWN, LiveGrasp
 from thenar.simulator import load_scene, simulate
 from thenar.simulator.playing.performance import Performance, of_scene
 

@@ -111,9 +111,9 @@ FAULTS = (
     ),
     Fault(
         "a code at a threshold goes right, in the build",
-        "runtime/scorer.py",
-        "bins = map(bisect_left, packed.thresholds",
-        "bins = map(__import__('bisect').bisect_right, packed.thresholds",
+        "runtime/scores.py",
+        "bins = map(bisect_left, self.thresholds",
+        "bins = map(__import__('bisect').bisect_right, self.thresholds",
         "tests/runtime/test_scorer.py",
     ),
     Fault(

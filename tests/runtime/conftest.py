@@ -1,11 +1,16 @@
-"""Integer tables of any size, and a build folder around them, without training anything."""
+"""Integer tables of any size, and a build folder around them, without training anything; and results to publish."""
 
 import hashlib
+import os
 from collections.abc import Callable
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from thenar.runtime.build import MANIFEST_NAME, TABLES_NAME, Build
 from thenar.runtime.manifest import (
@@ -13,16 +18,20 @@ from thenar.runtime.manifest import (
     Calibration,
     Manifest,
     Options,
+    Origin,
     Proof,
     Recognised,
-    Source,
     Switch,
     manifest_to_bytes,
 )
+from thenar.runtime.preshape import Preshape
+from thenar.runtime.published import Count, DeviceHealth, Drift, HealthReport, JointAngles, LiveGrasp
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
+MakeBuild = Callable[..., Build]
+MakeGrasp = Callable[..., LiveGrasp]
 
 
 def _make_tables(seed: int = 0, classes: int = 5, switches: int = 9, joints: int = 3, bins: int = 6) -> IntegerTables:
@@ -51,7 +60,7 @@ def _describe(tables: IntegerTables) -> Manifest:
         thenar="0.1.0",
         tables_sha256=hashlib.sha256(data).hexdigest(),
         ensemble_sha256="0" * 64,
-        source=Source("1" * 64, 10, "own", 20),
+        source=Origin("1" * 64, 10, "own", 20),
         options=Options(0, 100, "both", 1.0, 4, 1),
         grasps=tuple(f"grasp {number}" for number in range(tables.n_classes)),
         switches=tuple(Switch(number, f"s{number}", 0.5) for number in range(tables.n_switches)),
@@ -83,3 +92,63 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / TABLES_NAME).write_bytes(tables_to_bytes(tables))
     (tmp_path / MANIFEST_NAME).write_bytes(manifest_to_bytes(_describe(tables)))
     return tmp_path
+
+
+@pytest.fixture(scope="session")
+def make_build(make_tables: MakeTables, describe: Describe) -> MakeBuild:
+    """Return what makes builds whose joints are coded in a CyberGlove's bytes."""
+
+    def make(seed: int = 0, classes: int = 4, switches: int = 6, joints: int = 3) -> Build:
+        tables = make_tables(seed, classes, switches, joints)
+        raw = tuple(Calibration(number, f"j{number}", "raw", 1, 1.0, 255, 255.0) for number in range(joints))
+        return Build(replace(describe(tables), joints=raw), tables)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def make_grasp() -> MakeGrasp:
+    def make(number: int = 0, grasp: str = "PoS", lost: tuple[str, ...] = ()) -> LiveGrasp:
+        time_us = 10_000 * number
+        return LiveGrasp(
+            time_us=time_us,
+            unix_us=1_700_000_000_123_456 + time_us,
+            number=number,
+            grasp=grasp,
+            candidate=grasp,
+            probability=0.9375,
+            margin=120,
+            health="ok",
+            switch_age_us=900,
+            glove_age_us=None,
+            latency_us=310,
+            lost=lost,
+        )
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def ros() -> ModuleType:
+    """Return the messages of ROS, if Cyclone DDS is installed."""
+    if find_spec("cyclonedds") is None:
+        (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)("cyclonedds is missing")
+    return import_module("thenar.runtime.ros.messages")
+
+
+@pytest.fixture(scope="session")
+def preshape() -> Preshape:
+    return Preshape("cylindrical", ("finger_1/prox_joint", "finger_1/med_joint"), (0.0, 0.5), 1.25)
+
+
+@pytest.fixture(scope="session")
+def angles() -> JointAngles:
+    return JointAngles(("index_mpj", "index_pij", "thumb_ab"), (0.1, -0.2, 1 / 3))
+
+
+@pytest.fixture(scope="session")
+def health() -> HealthReport:
+    glove = DeviceHealth("cyberglove", True, "", (Count("resyncs", 2),))
+    return HealthReport(
+        7, ("s001",), (), ("s002",), (Drift("index_mpj", -3),), 100.0, 99.5, 600, 25, 10, 1, 0, (glove,)
+    )

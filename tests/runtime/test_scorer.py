@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 from thenar.runtime.errors import FrameError
-from thenar.runtime.scorer import LANE_OFFSET, Scorer
+from thenar.runtime.scores import LANE_OFFSET, Scorer
 from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]

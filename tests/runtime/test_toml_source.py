@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.runtime.errors import ThenarError
-from thenar.runtime.toml_source import Place, Source, read_source, spelled
+from thenar.runtime.toml_source import Place, TomlText, read_source, spelled
 from thenar.simulator.scenes import shipped
 
 
@@ -71,20 +71,20 @@ def places(value: object, here: Place = ()) -> Iterator[Place]:
     ids=str,
 )
 def test_a_key_has_the_line_on_which_it_stands(place: Place, line: int) -> None:
-    assert Source("a.toml", AWKWARD, OwnError).line(place) == line
-    assert Source("a.toml", AWKWARD.replace("\n", "\r\n"), OwnError).line(place) == line
+    assert TomlText("a.toml", AWKWARD, OwnError).line(place) == line
+    assert TomlText("a.toml", AWKWARD.replace("\n", "\r\n"), OwnError).line(place) == line
 
 
 @pytest.mark.parametrize("text", [AWKWARD, *(file.read_text() for file in shipped().values())])
 def test_everything_that_a_file_holds_has_a_line_of_its_own_and_its_last_key_stands_on_it(text: str) -> None:
-    source = Source("a.toml", text, OwnError)
+    source = TomlText("a.toml", text, OwnError)
     for place in places(tomllib.loads(text)):
         if place and isinstance(place[-1], str):
             assert place[-1] in text.splitlines()[source.line(place) - 1]
 
 
 def test_what_is_not_there_has_the_line_of_the_table_that_lacks_it() -> None:
-    source = Source("a.toml", AWKWARD, OwnError)
+    source = TomlText("a.toml", AWKWARD, OwnError)
     assert source.line(("subjects", 1, "hand_length_mm")) == 16
     assert source.line(("nothing", 3, "at all")) == 1
 
@@ -101,14 +101,14 @@ keys = st.text(min_size=1, max_size=8).filter(lambda key: key.isprintable())
 def test_quoted_keys_of_any_letters_are_found(names: list[str], blanks: int) -> None:
     quoted = ['"' + name.replace("\\", "\\\\").replace('"', '\\"') + '"' for name in names]
     text = "".join(f"{name} = {{{name} = 1}}\n" + "\n" * blanks for name in quoted)
-    source = Source("a.toml", text, OwnError)
+    source = TomlText("a.toml", text, OwnError)
     assert set(source.tables()) == set(names)
     for number, name in enumerate(names):
         assert source.line((name, name)) == 1 + number * (1 + blanks)
 
 
 def test_an_error_names_file_line_and_keys() -> None:
-    error = Source("a.toml", AWKWARD, OwnError).error(("subjects", 1, "na me"), "is no name")
+    error = TomlText("a.toml", AWKWARD, OwnError).error(("subjects", 1, "na me"), "is no name")
     assert str(error) == "a.toml, line 17: subjects[1].na me: is no name"
     assert spelled(("effects", "joint", "noise", "after", 0)) == "effects.joint.noise.after[0]"
 
@@ -133,14 +133,14 @@ def test_an_error_names_file_line_and_keys() -> None:
 )
 def test_what_is_no_toml_is_refused_with_the_reason(text: str, reason: str) -> None:
     with pytest.raises(OwnError, match=reason) as caught:
-        Source("a.toml", text, OwnError).tables()
+        TomlText("a.toml", text, OwnError).tables()
     assert str(caught.value).startswith("a.toml is ")
     assert len(str(caught.value)) < 500
 
 
 @given(st.text("[]{}=,.\n\"'# \\a1", max_size=60))
 def test_only_the_brackets_that_tomllib_reads_count_as_levels(text: str) -> None:
-    source = Source("a.toml", f"a = [{text}", OwnError)
+    source = TomlText("a.toml", f"a = [{text}", OwnError)
     try:
         deep = _depth(tomllib.loads(source.text))
     except ValueError:
@@ -152,7 +152,7 @@ def test_only_the_brackets_that_tomllib_reads_count_as_levels(text: str) -> None
 def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path: Path) -> None:
     path = tmp_path / "a.toml"
     path.write_bytes(b"\xef\xbb\xbfa = 1\n")
-    assert read_source(path, OwnError) == Source("a.toml", "a = 1\n", OwnError)
+    assert read_source(path, OwnError) == TomlText("a.toml", "a = 1\n", OwnError)
 
 
 def test_text_that_is_not_utf8_is_refused_with_its_line(tmp_path: Path) -> None:
@@ -175,7 +175,7 @@ def test_a_file_beyond_the_limit_and_an_endless_device_are_refused_unread(tmp_pa
 
 def test_what_an_error_repeats_of_a_file_is_short_and_printable() -> None:
     key, value = "k" * 100_000, "v" * 100_000
-    source = Source("a.toml", f'{key} = "{value}"', OwnError)
+    source = TomlText("a.toml", f'{key} = "{value}"', OwnError)
     said = str(source.error((key,), f"{value} is no value"))
     assert len(said) < 600
     assert "\x1b" not in str(source.error((), "obeyed \x1b[2J"))

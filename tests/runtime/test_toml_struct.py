@@ -4,7 +4,7 @@ import msgspec
 import pytest
 
 from thenar.runtime.errors import ThenarError
-from thenar.runtime.toml_source import Source
+from thenar.runtime.toml_source import TomlText
 from thenar.runtime.toml_struct import check_finite, convert
 
 
@@ -44,14 +44,14 @@ class Outer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def complaint(text: str) -> str:
-    source = Source("a.toml", f"[thing]\n{text}\n", OwnError)
+    source = TomlText("a.toml", f"[thing]\n{text}\n", OwnError)
     with pytest.raises(OwnError) as caught:
         convert(source, ("thing",), source.tables()["thing"], Thing)
     return str(caught.value)
 
 
 def test_a_table_becomes_a_struct() -> None:
-    source = Source("a.toml", 'width_mm = 3\ntags = ["x"]\nkind = "all"', OwnError)
+    source = TomlText("a.toml", 'width_mm = 3\ntags = ["x"]\nkind = "all"', OwnError)
     assert convert(source, (), source.tables(), Thing) == Thing(width_mm=3.0, tags=("x",), kind="all")
 
 
@@ -104,14 +104,14 @@ def test_an_unknown_key_is_told_the_nearest() -> None:
 
 @pytest.mark.parametrize("number", ["nan", "-nan", "inf", "-inf"])
 def test_a_number_that_is_not_finite_is_found_wherever_it_stands(number: str) -> None:
-    source = Source("a.toml", f"a = 1\n[[b]]\nc = [1,\n {number}]\n", OwnError)
+    source = TomlText("a.toml", f"a = 1\n[[b]]\nc = [1,\n {number}]\n", OwnError)
     with pytest.raises(OwnError, match=r"line 4: b\[0\]\.c\[1\]: must be a finite number"):
         check_finite(source, (), source.tables())
 
 
 def test_what_is_no_table_is_refused() -> None:
     with pytest.raises(OwnError, match="line 1: thing: must be a table, not 3"):
-        convert(Source("a.toml", "thing = 3", OwnError), ("thing",), 3, Thing)
+        convert(TomlText("a.toml", "thing = 3", OwnError), ("thing",), 3, Thing)
 
 
 @pytest.mark.parametrize(
@@ -127,7 +127,7 @@ def test_what_is_no_table_is_refused() -> None:
     ],
 )
 def test_a_wrong_key_or_value_of_an_inner_table_is_named_likewise(text: str, message: str) -> None:
-    source = Source("a.toml", text, OwnError)
+    source = TomlText("a.toml", text, OwnError)
     with pytest.raises(OwnError) as caught:
         convert(source, (), source.tables(), Outer)
     assert message in str(caught.value)

@@ -17,7 +17,7 @@ from thenar.compiler.firmware.generate import Firmware
 from thenar.drivers import scanner_protocol
 from thenar.drivers.scanner_protocol import Faults, FromBoard, GetState, Heartbeat, Hello, Lost, Ping, frame, from_board
 from thenar.runtime.build import Build
-from thenar.runtime.manifest import SCHEMA, Manifest, Options, Proof, Source, Switch
+from thenar.runtime.manifest import SCHEMA, Manifest, Options, Origin, Proof, Switch
 from thenar.runtime.tables import IntegerTables
 
 SWITCHES = ("s0", "s1", "s2", "s3")
@@ -52,7 +52,7 @@ def small_build() -> Build:
         thenar="0.1.0",
         tables_sha256="0" * 64,
         ensemble_sha256="0" * 64,
-        source=Source("1" * 64, 60, "own", 160),
+        source=Origin("1" * 64, 60, "own", 160),
         options=Options(13, 100, "switches", 1.0, 4, 1),
         grasps=("open", "closed"),
         switches=tuple(Switch(number, name, 0.5) for number, name in enumerate(SWITCHES)),

@@ -67,7 +67,7 @@ def _on_python(model: ClassifyModel, several: Sequence[IntegerTables], least: in
     predicted = [model.python.us(each) for each in tables]
     found = classify_us(tables, model.python.yardstick)
     outcomes = [Outcome(*pair) for pair in zip(predicted, found, strict=True)]
-    return _judged("time of a frame in runtime.scorer on this machine", "measured", outcomes)
+    return _judged("time of a frame in runtime.scores on this machine", "measured", outcomes)
 
 
 def _trials(several: Sequence[IntegerTables], part: Target, least: int) -> list[tuple[Option, Target]]:

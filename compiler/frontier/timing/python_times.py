@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.scorer import Scorer
+from thenar.runtime.scores import Scorer
 from thenar.runtime.tables import IntegerTables
 
 from ...firmware.probes import random_frames
@@ -36,7 +36,7 @@ class PythonCost:
     yardstick: float
 
     def us(self, tables: IntegerTables) -> float:
-        """Return what `runtime.scorer` and finding the best class take, on average over frames."""
+        """Return what `runtime.scores` and finding the best class take, on average over frames."""
         return float(_features(tables.n_switches, tables.n_joints, tables.n_classes) @ np.array(self._weights))
 
     @property

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from thenar.drivers.cyberglove_protocol import OVERHEAD, sending_us
 from thenar.drivers.i2c.chips import Reading
 from thenar.runtime.harness.wiring import Harness, ScannerWiring
-from thenar.runtime.scanning.costs import Costs
 from thenar.runtime.scanning.decided import Decided
-from thenar.runtime.scanning.plan import plan_scan
+from thenar.runtime.scanning.plan import Costs, plan_scan
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import reading_of, scanner_us
 from thenar.runtime.tables import IntegerTables

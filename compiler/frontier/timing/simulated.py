@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from thenar.runtime.harness.wiring import BusWiring
-from thenar.runtime.scanning.transactions import ports_of
+from thenar.runtime.scanning.ports import ports_of
 
 from ...firmware.board import Board, BoardBus
 from ...firmware.choose import Option

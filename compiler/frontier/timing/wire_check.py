@@ -19,8 +19,8 @@ from thenar.drivers.emulated.i2c import EmulatedBus, EmulatedChip, EmulatedI2c, 
 from thenar.drivers.errors import DeviceError
 from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead, Scan
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
+from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.timing import free_us, reading_of, scan_us
-from thenar.runtime.scanning.whole import whole_scan
 
 from ..points import Check
 from .wirings import BOARD, names_of, wirings

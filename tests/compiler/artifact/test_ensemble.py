@@ -25,7 +25,8 @@ def _arrays() -> dict[str, np.ndarray]:
 
 
 def test_what_was_written_is_read_again_bit_for_bit() -> None:
-    stumps = Stumps(5, **_arrays(), shrinkage=0.5)
+    arrays = _arrays()
+    stumps = Stumps(5, arrays["columns"], arrays["thresholds"], arrays["values"], shrinkage=0.5)
     data = ensemble_to_bytes(stumps)
     read = ensemble_from_bytes(data)
     assert isinstance(read, Stumps)
@@ -129,5 +130,6 @@ def test_mutated_content_is_read_or_refused(data: st.DataObject) -> None:
         stumps = ensemble_from_bytes(seal(KIND, 1, bytes(payload)))
     except ThenarError:
         return
+    assert isinstance(stumps, Stumps)
     scores = stumps.scores(np.zeros((1, stumps.n_inputs)))
     assert scores.shape == (1, stumps.n_classes)

@@ -14,9 +14,8 @@ from thenar.compiler.evaluation.folds import weka_folds
 from thenar.compiler.recordings.importer import import_file
 from thenar.compiler.tables.collapse import collapse, model_scores
 from thenar.compiler.tables.quantise import quantise
-from thenar.runtime import Build, Recognizer
+from thenar.runtime import Build
 from thenar.runtime.manifest import Inputs, Options
-from thenar.runtime.recognizer import Frame
 
 COLUMNS = Path(__file__).parents[3] / "examples" / "columns"
 
@@ -35,9 +34,9 @@ def test_a_build_of_real_recordings_holds_and_recognises(
     assert found.holds
     assert found.covered == len(grasp_set)
 
-    recognizer = Recognizer(Build.load(tmp_path / "build"))
+    build = Build.load(tmp_path / "build")
     bits, codes = select_inputs(grasp_set, manifest)
-    seen = [recognizer.recognise(Frame(0, *frame)).grasp for frame in zip(bits, codes, strict=True)]
+    seen = [build.recognise(*frame).grasp for frame in zip(bits, codes, strict=True)]
     assert np.count_nonzero(np.array(seen) == grasp_set.grasps) == found.correct_integers
 
 

@@ -9,7 +9,7 @@ import pytest
 from thenar.compiler.firmware.answers import Answers
 from thenar.compiler.firmware.probes import Probes, extreme_frames, joined, random_frames
 from thenar.runtime.build import Build
-from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Proof, Recognised, Source, Switch
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Recognised, Switch
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 MakeTables = Callable[..., IntegerTables]
@@ -52,7 +52,7 @@ def _describe(tables: IntegerTables) -> Manifest:
         thenar="0.1.0",
         tables_sha256=hashlib.sha256(tables_to_bytes(tables)).hexdigest(),
         ensemble_sha256="0" * 64,
-        source=Source("1" * 64, 10, "own", 20),
+        source=Origin("1" * 64, 10, "own", 20),
         options=Options(0, 100, "both", 1.0, 4, 1),
         grasps=tuple(f"grasp {number}" for number in range(tables.n_classes)),
         switches=tuple(Switch(number, f"s{number}", 0.5) for number in range(tables.n_switches)),

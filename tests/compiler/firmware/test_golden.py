@@ -13,7 +13,7 @@ from thenar.compiler.firmware.board_loading import parse_board
 from thenar.compiler.firmware.generate import Firmware
 from thenar.compiler.firmware.targets.base import Mode
 from thenar.runtime.build import Build
-from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Proof, Source, Switch
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Switch
 from thenar.runtime.tables import IntegerTables
 
 GOLDEN = Path(__file__).resolve().parents[2] / "golden" / "firmware"
@@ -83,7 +83,7 @@ def small_build() -> Build:
         thenar="0.1.0",
         tables_sha256="0123456789abcdef" * 4,
         ensemble_sha256="0" * 64,
-        source=Source("1" * 64, 60, "own", 160),
+        source=Origin("1" * 64, 60, "own", 160),
         options=Options(13, 100, "both", 1.0, 4, 1),
         grasps=GRASPS,
         switches=tuple(Switch(number, name, 0.5) for number, name in enumerate(SWITCHES)),

@@ -10,9 +10,9 @@ from thenar.compiler.firmware.one_hand import BYTES, for_one_hand, on_bytes
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.errors import SettingError
 from thenar.runtime.build import Build
-from thenar.runtime.live.codes import CodeTables, codes_of_bytes
+from thenar.runtime.calibration import CodeTables, codes_of_bytes
 from thenar.runtime.manifest import Calibration, Manifest
-from thenar.runtime.scorer import Scorer
+from thenar.runtime.scores import Scorer
 from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]

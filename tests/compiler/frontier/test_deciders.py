@@ -6,12 +6,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from thenar.compiler.frontier.deciders import NOTHING, Stretches, decisions, stretches
-from thenar.runtime.live.decision import Decision
-from thenar.runtime.live.policy import Policy
-from thenar.runtime.live.sequential import SequentialTest
-from thenar.runtime.live.standing import Standing
-from thenar.runtime.packed import LANE_OFFSET
-from thenar.runtime.scanning.reach import Reach
+from thenar.runtime.live.decision import Decision, SequentialTest, Standing
+from thenar.runtime.policy import Policy
+from thenar.runtime.scores import LANE_OFFSET, Scorer
 from thenar.runtime.tables import IntegerTables
 
 CLASSES, SCALE = 3, 4.0
@@ -32,7 +29,7 @@ def frame_by_frame(frames: Stretches, policy: Policy) -> list[int]:
     found = []
     for times, scores in zip(frames.times, frames.scores, strict=True):
         for time_us in times:
-            standing = Standing(tuple((scores + LANE_OFFSET).tolist()), Reach(tables))
+            standing = Standing(tuple((scores + LANE_OFFSET).tolist()), Scorer(tables))
             held = decider.update(time_us, standing)
             found.append(NOTHING if held is None else held)
     return found

@@ -24,7 +24,7 @@ from thenar.compiler.tables.collapse import collapse
 from thenar.compiler.tables.quantise import quantise
 from thenar.drivers.members import MemberError
 from thenar.runtime.scanning.propose import propose_harness
-from thenar.runtime.scorer import Scorer
+from thenar.runtime.scores import Scorer
 
 Make = Callable[..., GraspSet]
 Rows = NDArray[np.intp]

@@ -16,11 +16,11 @@ from thenar.compiler.frontier.latency import POLICIES, decided_on, latency
 from thenar.compiler.frontier.points import FrontierError
 from thenar.compiler.frontier.stream import Stream, stream_from
 from thenar.runtime.build import Build
-from thenar.runtime.live.frames import GloveFrame, SwitchFrame
-from thenar.runtime.live.joiner import LiveRecognizer
-from thenar.runtime.live.policy import Policy
-from thenar.runtime.live.published import UNKNOWN
-from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Proof, Recognised, Source, Switch
+from thenar.runtime.frames import GloveFrame, SwitchFrame
+from thenar.runtime.live.recogniser import LiveRecognizer
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Recognised, Switch
+from thenar.runtime.policy import Policy
+from thenar.runtime.published import UNKNOWN
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 CLASSES, SWITCHES, JOINTS = 4, 7, 3
@@ -72,7 +72,7 @@ def make_build(tables: IntegerTables) -> Build:
         thenar="0.1.0",
         tables_sha256=hashlib.sha256(tables_to_bytes(tables)).hexdigest(),
         ensemble_sha256="0" * 64,
-        source=Source("1" * 64, 10, "own", 20),
+        source=Origin("1" * 64, 10, "own", 20),
         options=Options(0, 100, "both", 1.0, 4, 1),
         grasps=tuple(f"grasp {number}" for number in range(CLASSES)),
         switches=tuple(Switch(column, f"s{column}", 0.5) for column in KEPT),
@@ -106,7 +106,7 @@ def played_live(tables: IntegerTables, stream: Stream, step_us: int, policy: Pol
         state = int(np.searchsorted(stream.at_us, time_us, side="right")) - 1
         closed = sum(1 << place for place, column in enumerate(KEPT) if stream.bits[state, column])
         glove = GloveFrame(time_us, stream.codes[state].astype(np.uint8).tobytes()) if tables.n_joints else None
-        found.append(live.step(time_us, 0, SwitchFrame(time_us, closed), glove).grasp)
+        found.append(live.step(time_us, 0, SwitchFrame(time_us, closed), glove).grasp.grasp)
     return found
 
 

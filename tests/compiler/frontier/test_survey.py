@@ -16,7 +16,7 @@ from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 from thenar.compiler.tables.collapse import collapse
 from thenar.compiler.tables.quantise import quantise
-from thenar.runtime.scorer import Scorer
+from thenar.runtime.scores import Scorer
 
 COLUMNS = (3, 0, 7, 9)
 SEARCH = Search(methods=("id3",), rivals=(), repeats=2)

@@ -15,8 +15,8 @@ from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.harness.loading import load_harness, parse_harness
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel, ScannerWiring
 from thenar.runtime.manifest import Manifest
+from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
-from thenar.runtime.scanning.whole import whole_scan
 
 if TYPE_CHECKING:
     from .conftest import Netlist

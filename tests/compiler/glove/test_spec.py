@@ -12,9 +12,9 @@ from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import GloveWiring, Harness, ScannerWiring
 from thenar.runtime.manifest import Manifest
+from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import scan_us
-from thenar.runtime.scanning.whole import whole_scan
 
 Manifests = Callable[..., Manifest]
 

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from thenar.compiler.placement.errors import PlacementError
 from thenar.compiler.placement.ports import PortCosts, port_costs
 from thenar.runtime.errors import HarnessError
+from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_board, propose_harness
 from thenar.runtime.scanning.timing import scan_us, scanner_us
-from thenar.runtime.scanning.whole import whole_scan
 
 sizes = st.integers(1, 200)
 

@@ -12,9 +12,9 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from thenar.runtime.live.published import LiveGrasp
-from thenar.runtime.recording.cdr import encode_bytes, encode_text
+from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.layout import GLOVE, LARGEST_RECORD, RECOGNITION, SWITCHES, TRIALS, beginning
+from thenar.runtime.recording.messages import encode_bytes, encode_text
 from thenar.runtime.recording.session import Collection, Label, Session, Task, to_metadata
 
 READ = """
@@ -22,7 +22,7 @@ import re, sys
 from pathlib import Path
 from thenar.compiler.recordings.mcap_recording import import_recordings
 from thenar.drivers.errors import ThenarError
-from thenar.runtime.recording.trials import planned, read_journal
+from thenar.runtime.recording.guide import planned, read_journal
 from thenar.simulator.playing.recorded import of_recording
 path = Path(sys.argv[1])
 for read in (lambda: import_recordings([path]), lambda: planned(read_journal(path).session.collection),

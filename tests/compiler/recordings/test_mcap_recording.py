@@ -13,12 +13,12 @@ from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.recordings.mcap_recording import import_recordings
 from thenar.compiler.recordings.taxonomy import KAMAKURA_14
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
-from thenar.runtime.live.codes import CodeTables
-from thenar.runtime.live.frames import GloveFrame, SwitchFrame
+from thenar.runtime.calibration import CodeTables
+from thenar.runtime.errors import McapError
+from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.manifest import Calibration
-from thenar.runtime.recording.errors import McapError
+from thenar.runtime.recording.guide import read_journal
 from thenar.runtime.recording.session import Collection, Label, Session, Task
-from thenar.runtime.recording.trials import read_journal
 from thenar.runtime.recording.writer import Recorder
 
 SENSORS = ("thumb_mpj", "index_mpj", "wrist_pitch", "wrist_yaw")

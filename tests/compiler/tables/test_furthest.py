@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thenar.compiler.tables.furthest import furthest
-from thenar.runtime.scorer import LANE_OFFSET, Scorer
+from thenar.runtime.scores import LANE_OFFSET, Scorer
 from thenar.runtime.tables import IntegerTables
 from thenar.stability.inputs.hard_tables import every_frame, whole_numbers
 

@@ -19,7 +19,7 @@ from thenar.compiler.firmware.board import Board, glove_toml
 from thenar.compiler.firmware.board_loading import parse_board
 from thenar.compiler.firmware.simavr import harness, missing
 from thenar.runtime.build import Build
-from thenar.runtime.sinks.line import Line
+from thenar.runtime.sinks.jsonl import Line
 
 ENDING_S = 20.0
 # By so much a frame may be younger than its age says.

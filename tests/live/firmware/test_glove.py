@@ -16,7 +16,7 @@ from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.drivers.scanner import BoardGrasp, Scanner
 from thenar.runtime.build import Build
-from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Proof, Recognised, Source, Switch
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Recognised, Switch
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 pytestmark = pytest.mark.slow
@@ -60,7 +60,7 @@ def random_build(joints: int) -> Build:
         thenar="0.1.0",
         tables_sha256=hashlib.sha256(tables_to_bytes(tables)).hexdigest(),
         ensemble_sha256="0" * 64,
-        source=Source("1" * 64, 10, "own", 20),
+        source=Origin("1" * 64, 10, "own", 20),
         options=Options(0, 100, "both", 1.0, 4, 1),
         grasps=tuple(f"grasp {number}" for number in range(classes)),
         switches=tuple(Switch(number, f"s{number}", 0.5) for number in range(12)),

@@ -16,10 +16,10 @@ import msgspec
 import pytest
 
 from thenar.drivers.emulated.i2c import WireCounters
+from thenar.runtime.frames import now_us
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.harness.writing import harness_to_toml
-from thenar.runtime.live.frames import now_us
-from thenar.runtime.sinks.line import HealthLine, Line
+from thenar.runtime.sinks.jsonl import HealthLine, Line
 from thenar.simulator.playing.bench import Bench
 
 _line = msgspec.json.Decoder(Line | HealthLine)

@@ -8,9 +8,9 @@ from typing import Any
 import msgspec
 import pytest
 
-from thenar.runtime.live.policy import Policy
-from thenar.runtime.live.published import LiveGrasp
 from thenar.runtime.live.replay import replayed
+from thenar.runtime.policy import Policy
+from thenar.runtime.published import LiveGrasp
 
 MakeRun = Callable[..., Any]
 

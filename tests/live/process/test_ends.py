@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from thenar.runtime.live.policy import Policy
 from thenar.runtime.live.replay import replayed
+from thenar.runtime.policy import Policy
 from thenar.runtime.recording.reader import Reader
 
 MakeRun = Callable[..., Any]

@@ -5,19 +5,17 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
-from threading import Event, Thread
+from threading import Thread
 from typing import Any
 
 import msgspec
 import pytest
 
+from thenar.runtime import Glove
+from thenar.runtime.frames import now_us
 from thenar.runtime.harness.wiring import Harness
-from thenar.runtime.live.frames import now_us
-from thenar.runtime.live.keeper import DeviceState
-from thenar.runtime.live.loop import LiveLoop
-from thenar.runtime.live.policy import Policy
-from thenar.runtime.live.system import System
-from thenar.runtime.recording.writer import Recorder
+from thenar.runtime.live.sources import DeviceState
+from thenar.runtime.policy import Policy
 from thenar.simulator.playing.bench import Bench
 
 # The answer is the candidate of each frame.
@@ -33,7 +31,7 @@ class Run:
         scene: Any,
         harness: Harness,
         folder: Path,
-        recorder: Callable[[System], Recorder] | None,
+        record: Path | None,
         damage: Callable[[bytes], bytes] | None,
         unplugged: int | None,
     ) -> None:
@@ -50,19 +48,18 @@ class Run:
             (folder / "calibration.toml").write_text(performance.calibration.to_toml())
             glove = msgspec.structs.replace(wired.cyberglove, calibration=str(folder / "calibration.toml"))
             wired = msgspec.structs.replace(wired, cyberglove=glove)
-        self.system = System.of(scene.truth.build, wired, FRANK)
-        self.recorder = None if recorder is None else stack.enter_context(recorder(self.system))
-        self.sources = stack.enter_context(self.system.sources())
-        self.stop = Event()
-        self.loop = LiveLoop(
-            self.sources, self.system.recognizer(), lambda moment: scene.grasps.add(moment.grasp), self.recorder
-        )
-        self._thread = Thread(target=self.loop.run, args=(self.stop,), name="loop")
+        self.glove = stack.enter_context(Glove(scene.truth.build, wired, policy=FRANK, record=record))
+        self.system, self.sources, self.recorder = self.glove.system, self.glove.sources, self.glove.recorder
+        self._thread = Thread(target=self._run, name="loop")
         self._thread.start()
         stack.callback(self.end)
 
+    def _run(self) -> None:
+        for moment in self.glove:
+            self.scene.grasps.add(moment.grasp)
+
     def end(self) -> None:
-        self.stop.set()
+        self.glove.stop.set()
         self._thread.join()
 
     def now_us(self) -> int:
@@ -109,13 +106,13 @@ def run(
             inputs: str,
             *parts: str,
             glove: str = "",
-            recorder: Callable[[System], Recorder] | None = None,
+            record: Path | None = None,
             damage: Callable[[bytes], bytes] | None = None,
             unplugged: int | None = None,
         ) -> Run:
             scene = make_scene(stage.truth(inputs), None)
             harness = harness_of(inputs, *parts, glove=glove)
-            made = Run(stack, scene, harness, tmp_path, recorder, damage, unplugged)
+            made = Run(stack, scene, harness, tmp_path, record, damage, unplugged)
             scene.show(0)
             if damage is None and unplugged is None:
                 scene.well(now_us())

@@ -8,12 +8,8 @@ from typing import Any
 
 import pytest
 
-from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.live.replay import replayed
-from thenar.runtime.live.system import System
 from thenar.runtime.recording.reader import Reader
-from thenar.runtime.recording.session import Session
-from thenar.runtime.recording.writer import Recorder
 
 MakeRun = Callable[..., Any]
 SetDate = Callable[[float], None]
@@ -48,7 +44,7 @@ def test_a_date_that_steps_changes_no_answer_no_age_and_no_recording(
     run: MakeRun, step_date: SetDate, tmp_path: Path, step_s: float
 ) -> None:
     path = tmp_path / "run.mcap"
-    running = run("both", "glove", "scanner", recorder=lambda system: Recorder(path, session_of(system)))
+    running = run("both", "glove", "scanner", record=path)
     scene = running.scene
     scene.settled(0)
     before = scene.grasps.all[-1]
@@ -72,14 +68,3 @@ def test_a_date_that_steps_changes_no_answer_no_age_and_no_recording(
     reader = Reader(path)
     assert len(list(reader)) > len(pairs)
     assert not reader.altered
-
-
-def session_of(system: System) -> Session:
-    return Session(
-        thenar="0",
-        switches=system.switch_names,
-        sensors=system.sensor_names,
-        build=system.build.manifest.checksum,
-        harness=harness_to_toml(system.harness),
-        calibration=system.calibration,
-    )

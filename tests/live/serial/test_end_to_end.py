@@ -6,13 +6,9 @@ from typing import Any
 
 import pytest
 
-from thenar.runtime.harness.writing import harness_to_toml
-from thenar.runtime.live.frames import now_us
-from thenar.runtime.live.policy import Policy
+from thenar.runtime.frames import now_us
 from thenar.runtime.live.replay import replayed
-from thenar.runtime.live.system import System
-from thenar.runtime.recording.session import Session
-from thenar.runtime.recording.writer import Recorder
+from thenar.runtime.policy import Policy
 
 MakeRun = Callable[..., Any]
 
@@ -39,10 +35,7 @@ def test_what_is_recognised_is_the_offline_classification_frame_by_frame(
 
 
 def test_a_recorded_run_replays_to_the_same_grasps_to_the_last_bit(run: MakeRun, tmp_path: Path) -> None:
-    def recorder(system: System) -> Recorder:
-        return Recorder(tmp_path / "run.mcap", session_of(system))
-
-    running = run("both", "glove", "scanner", recorder=recorder)
+    running = run("both", "glove", "scanner", record=tmp_path / "run.mcap")
     for row in range(10):
         running.scene.show(row)
         running.scene.settled(row)
@@ -70,19 +63,7 @@ def test_a_decision_with_hysteresis_follows_every_frame_that_lasts(run: MakeRun)
 def _decided(running: Any, recognizer: Any, until_us: int) -> str:
     """Return the answer once the hold of the last change must be over."""
     while True:
-        running.sources.wait(1.0)
         taken = running.sources.take()
-        grasp = recognizer.step(now_us(), time_ns() // 1000, taken.switches, taken.glove)
+        grasp = recognizer.step(now_us(), time_ns() // 1000, taken.switches, taken.glove).grasp
         if grasp.time_us > until_us and grasp.health == "ok":
             return str(grasp.grasp)
-
-
-def session_of(system: System) -> Session:
-    return Session(
-        thenar="0",
-        switches=system.switch_names,
-        sensors=system.sensor_names,
-        build=system.build.manifest.checksum,
-        harness=harness_to_toml(system.harness),
-        calibration=system.calibration,
-    )

@@ -13,8 +13,9 @@ from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.harness.wiring import Debounce, GloveWiring, ScannerWiring
-from thenar.runtime.live.devices import GloveDevice, ScannerDevice
-from thenar.runtime.live.keeper import Keeper
+from thenar.runtime.live.sources import Keeper
+from thenar.runtime.sources.cyberglove import GloveDevice
+from thenar.runtime.sources.scanner import ScannerDevice
 
 pytestmark = pytest.mark.slow
 

@@ -7,10 +7,9 @@ import pytest
 from msgspec.structs import replace as changed
 
 from thenar.runtime import Build
-from thenar.runtime.live.frames import SwitchFrame
-from thenar.runtime.live.health import Count, DeviceHealth, Drift, Health, HealthReport
-from thenar.runtime.live.published import UNKNOWN, LiveGrasp
-from thenar.runtime.live.stuck import on_shares, patience
+from thenar.runtime.frames import SwitchFrame
+from thenar.runtime.live.health import Health, on_shares, patience
+from thenar.runtime.published import UNKNOWN, Count, DeviceHealth, Drift, HealthReport, LiveGrasp
 
 MakeBuild = Callable[..., Build]
 

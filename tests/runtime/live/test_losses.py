@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from thenar.runtime import Build
-from thenar.runtime.live.frames import GloveFrame, SwitchFrame
-from thenar.runtime.live.joiner import LiveRecognizer
-from thenar.runtime.live.policy import Policy
-from thenar.runtime.live.published import UNKNOWN, LiveGrasp
-from thenar.runtime.scorer import Scorer
+from thenar.runtime.calibration import Joints
+from thenar.runtime.frames import GloveFrame, SwitchFrame
+from thenar.runtime.live.recogniser import LiveRecognizer
+from thenar.runtime.policy import Policy
+from thenar.runtime.published import UNKNOWN, LiveGrasp
+from thenar.runtime.scanning.decided import EarlyExit
+from thenar.runtime.scores import Scorer
 
 MakeBuild = Callable[..., Build]
 
@@ -22,6 +24,7 @@ PORTS = (0b000011, 0b001100, 0b110000)
 FRAME_US = 10_000
 ROWS = 240
 SHAKY = Policy(max_lost=1.0)
+NAMES = tuple(f"j{number}" for number in range(JOINTS))
 
 
 @dataclass(frozen=True)
@@ -50,8 +53,7 @@ def recording(build: Build, seed: int) -> list[Row]:
 
 
 def recognizer(build: Build, policy: Policy) -> LiveRecognizer:
-    names = tuple(f"j{number}" for number in range(JOINTS))
-    return LiveRecognizer(build, sensor_names=names, switch_period_us=FRAME_US, glove_period_us=FRAME_US, policy=policy)
+    return LiveRecognizer(build, sensor_names=NAMES, switch_period_us=FRAME_US, glove_period_us=FRAME_US, policy=policy)
 
 
 def losses(random: Random, frames: int) -> Iterator[tuple[int, bool]]:
@@ -70,26 +72,27 @@ class Player:
     def __init__(self, build: Build, policy: Policy, *, early: bool = False) -> None:
         self._live, self._grasps = recognizer(build, policy), build.grasps
         self._lead = policy.lead_steps(build.tables.scale)
-        self._exit = self._live.early_exit(PORTS) if early else None
+        self._exit = EarlyExit(build.scorer, PORTS, lead=self._lead) if early else None
+        self._joints = Joints(build.manifest.joints, NAMES, None, FRAME_US)
         self._now, self._last, self._confirmed = 0, UNKNOWN, False
         self.ok = self.changing = self.wrong = 0
 
     def play(self, rows: list[Row], patterns: Iterator[tuple[int, bool]]) -> None:
         """Play a sequence; nothing is decided on when it begins."""
         self._now += 10 * FRAME_US
-        self._last = self._live.step(self._now, 0, None, None).grasp
+        self._last = self._live.step(self._now, 0, None, None).grasp.grasp
         assert self._last == UNKNOWN
         for row, (lost, unplugged) in zip(rows, patterns, strict=True):
             self._now += FRAME_US
             glove = GloveFrame(self._now, row.sensors, 0 if unplugged else 1)
             unread = self._unread(row, lost, glove)  # what is left unread is not missed
             frame = SwitchFrame(self._now, row.closed & ~unread, lost & ~unread, unread, glove)
-            self._check(row, self._live.step(self._now, 0, frame, glove), whole=not (frame.lost or unplugged))
+            self._check(row, self._live.step(self._now, 0, frame, glove).grasp, whole=not (frame.lost or unplugged))
 
     def _unread(self, row: Row, lost: int, glove: GloveFrame) -> int:
         if self._exit is None:
             return 0
-        self._exit.start(self._live.codes(self._now, glove))
+        self._exit.start(self._joints.codes(self._now, glove))
         last = next(port for port in range(3) if self._exit.after(port, row.closed, lost) or port == 2)
         return self._exit.unread(last)
 
@@ -159,7 +162,7 @@ def test_a_hand_held_still_keeps_its_grasp_in_every_ok_line_while_all_switches_a
         for number in range(40):
             lost = ALL if 15 <= number < 25 else 0
             now = number * FRAME_US
-            lines.append(live.step(now, 0, SwitchFrame(now, closed, lost), GloveFrame(now, bytes((9, 99, 200)))))
+            lines.append(live.step(now, 0, SwitchFrame(now, closed, lost), GloveFrame(now, bytes((9, 99, 200)))).grasp)
         other += lines[20].candidate != lines[0].candidate
         assert {line.health for line in lines[15:25]} == {"degraded"}
         sure = [line for line in lines if line.health == "ok"]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from thenar.runtime import Build
-from thenar.runtime.live.missing import Missing, MissingInputs, weights
+from thenar.runtime.live.recogniser import Missing, MissingInputs, weights
 from thenar.runtime.tables import IntegerTables
 
 MakeBuild = Callable[..., Build]

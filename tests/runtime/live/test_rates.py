@@ -1,7 +1,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.runtime.live.rates import Tally
+from thenar.runtime.live.health import Tally
 
 masks = st.lists(st.integers(0, (1 << 70) - 1) | st.sampled_from([1, 3, (1 << 70) - 1]), max_size=70)
 

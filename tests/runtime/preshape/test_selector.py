@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.runtime.live.published import UNKNOWN, Health, LiveGrasp
 from thenar.runtime.preshape import Preshape, PreshapeError, PreshapeSelector, PreshapeTable
+from thenar.runtime.published import UNKNOWN, Health, LiveGrasp
 
 WRAP = Preshape("wrap", ("a",), (0.0,), 1.0)
 PINCH = Preshape("pinch", ("a",), (1.0,), 1.0)

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
-from thenar.runtime.live.frames import GloveFrame, SwitchFrame, now_us
-from thenar.runtime.live.published import LiveGrasp
+from thenar.runtime.frames import GloveFrame, SwitchFrame, now_us
+from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.session import Collection, Label, Session, Task
 from thenar.runtime.recording.writer import Recorder
 

@@ -4,7 +4,8 @@ from hypothesis import strategies as st
 from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 
-from thenar.runtime.recording.cdr import (
+from thenar.runtime.errors import McapError
+from thenar.runtime.recording.messages import (
     BYTES,
     DEFINITIONS,
     STRING,
@@ -13,7 +14,6 @@ from thenar.runtime.recording.cdr import (
     encode_bytes,
     encode_text,
 )
-from thenar.runtime.recording.errors import McapError
 
 
 def ros(name: str, message: bytes) -> object:

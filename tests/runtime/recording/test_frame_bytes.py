@@ -5,10 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.runtime.errors import FrameError
-from thenar.runtime.live.frames import GloveFrame, SwitchFrame
-from thenar.runtime.recording.errors import McapError
-from thenar.runtime.recording.frame_bytes import glove_bytes, glove_frame, switch_bytes, switch_frame
+from thenar.runtime.errors import FrameError, McapError
+from thenar.runtime.frames import GloveFrame, SwitchFrame
+from thenar.runtime.recording.messages import glove_bytes, glove_frame, switch_bytes, switch_frame
 
 times = st.integers(0, 2**63)
 

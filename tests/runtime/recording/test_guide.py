@@ -5,11 +5,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from thenar.runtime.live.frames import GloveFrame, SwitchFrame
-from thenar.runtime.recording.guide import FRESH_US, Guide, Key, Stage
+from thenar.runtime.frames import GloveFrame, SwitchFrame
+from thenar.runtime.recording.guide import FRESH_US, Guide, Key, Stage, planned
 from thenar.runtime.recording.reader import Reader
 from thenar.runtime.recording.session import Collection, Label, Session, Task
-from thenar.runtime.recording.trials import planned
 from thenar.runtime.recording.writer import Recorder
 
 COUNTDOWN_US = 3_000_000

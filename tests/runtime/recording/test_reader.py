@@ -15,13 +15,13 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 from msgspec.structs import replace
 
-from thenar.runtime.live.frames import GloveFrame, SwitchFrame
-from thenar.runtime.live.published import LiveGrasp
-from thenar.runtime.recording.errors import McapError
+from thenar.runtime.errors import McapError
+from thenar.runtime.frames import GloveFrame, SwitchFrame
+from thenar.runtime.published import LiveGrasp
+from thenar.runtime.recording.guide import read_journal
 from thenar.runtime.recording.layout import CHANNELS, LARGEST_RECORD, MAGIC
 from thenar.runtime.recording.reader import Reader
 from thenar.runtime.recording.session import Label, Session
-from thenar.runtime.recording.trials import read_journal
 from thenar.runtime.recording.writer import Recorder
 
 Entry = SwitchFrame | GloveFrame | LiveGrasp | Label

@@ -3,7 +3,7 @@ import json
 import pytest
 from msgspec.structs import replace
 
-from thenar.runtime.recording.errors import McapError
+from thenar.runtime.errors import McapError
 from thenar.runtime.recording.session import Session, from_metadata, to_metadata
 
 PLAN = (

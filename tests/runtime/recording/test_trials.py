@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from thenar.drivers.errors import SettingError
+from thenar.runtime.recording.guide import planned, read_journal
 from thenar.runtime.recording.session import Collection, Label, Session, Task
-from thenar.runtime.recording.trials import planned, read_journal
 from thenar.runtime.recording.writer import Recorder
 
 TASKS = (Task("cup", ("mug", "jar")), Task("pen", ("biro",)), Task("rod", ("a", "b", "c")))

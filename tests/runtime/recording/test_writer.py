@@ -22,12 +22,12 @@ from msgspec.structs import replace
 
 from thenar.drivers.errors import SettingError
 from thenar.runtime.errors import FrameError
-from thenar.runtime.live.frames import GloveFrame, SwitchFrame, now_us
-from thenar.runtime.live.published import LiveGrasp
+from thenar.runtime.frames import GloveFrame, SwitchFrame, now_us
+from thenar.runtime.published import LiveGrasp
+from thenar.runtime.recording.guide import read_journal
 from thenar.runtime.recording.layout import LARGEST_RECORD
 from thenar.runtime.recording.reader import Reader
 from thenar.runtime.recording.session import Collection, Label, Session
-from thenar.runtime.recording.trials import read_journal
 from thenar.runtime.recording.writer import Recorder
 
 Entry = SwitchFrame | GloveFrame | LiveGrasp | Label
@@ -313,7 +313,7 @@ def test_closing_twice_is_closing_once(recording: Path, session: Session, tmp_pa
 KILLED = """
     import sys
     from pathlib import Path
-    from thenar.runtime.live.frames import SwitchFrame
+    from thenar.runtime.frames import SwitchFrame
     from thenar.runtime.recording.session import Session
     from thenar.runtime.recording.writer import Recorder
 

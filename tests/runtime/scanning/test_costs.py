@@ -3,10 +3,9 @@
 import pytest
 
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel
-from thenar.runtime.scanning.costs import Costs
-from thenar.runtime.scanning.order import ports_in
+from thenar.runtime.scanning.plan import Costs, ports_in
+from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.timing import scan_us
-from thenar.runtime.scanning.whole import whole_scan
 
 READ, WRITE = 98_800, 51_300  # one port of a PCA9555, one write to a mux, at 400 kHz
 

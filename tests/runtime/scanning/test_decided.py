@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from thenar.runtime.errors import FrameError
-from thenar.runtime.scanning.decided import Decided, reach_of
-from thenar.runtime.scanning.earlyexit import EarlyExit
-from thenar.runtime.scorer import Scorer
+from thenar.runtime.scanning.decided import Decided, EarlyExit, reach_of
+from thenar.runtime.scores import Scorer
 from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
@@ -56,7 +55,7 @@ def test_the_plan_and_the_runtime_mean_the_same_by_decided(make_tables: MakeTabl
     ports = [list(map(int, part)) for part in np.split(random.permutation(12), [2, 3, 7, 9])]
     bits, codes = random.random((60, 12)) < 0.4, random.integers(0, 256, (60, 3)).astype(np.uint16)
     frames = Decided(tables, ports, bits, codes)
-    early = EarlyExit(tables, [sum(1 << switch for switch in port) for port in ports])
+    early = EarlyExit(Scorer(tables), [sum(1 << switch for switch in port) for port in ports])
     seen = set()
     for row in range(60):
         early.start(codes[row].tolist())

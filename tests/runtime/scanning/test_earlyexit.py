@@ -14,8 +14,8 @@ from thenar.compiler.artifact.select import select_inputs
 from thenar.compiler.recordings.importer import import_file
 from thenar.drivers.errors import SettingError
 from thenar.runtime import Build
-from thenar.runtime.scanning.earlyexit import EarlyExit
-from thenar.runtime.scorer import Scorer
+from thenar.runtime.scanning.decided import EarlyExit
+from thenar.runtime.scores import Scorer
 from thenar.runtime.tables import IntegerTables
 
 COLUMNS = Path(__file__).resolve().parents[3] / "examples" / "columns"
@@ -72,7 +72,7 @@ def test_a_scan_stops_exactly_when_every_completion_has_the_same_winner(
 ) -> None:
     """Every state of every switch, open, closed or lost, and so every pattern of bits and of lost ports."""
     tables, stopped = small_tables(seed), 0
-    exit_ = EarlyExit(tables, [sum(1 << switch for switch in group) for group in groups])
+    exit_ = EarlyExit(Scorer(tables), [sum(1 << switch for switch in group) for group in groups])
     for codes in ([0], [200]):
         winners = {state: winner(lanes) for state, lanes in all_lanes(tables, codes).items()}
         for state in winners:
@@ -88,7 +88,7 @@ def test_a_scan_stops_exactly_when_every_completion_has_the_same_winner(
 @pytest.mark.parametrize("lead", [1, 2, 5])
 def test_with_a_lead_a_scan_stops_exactly_when_every_completion_has_that_lead(lead: int) -> None:
     tables, codes, groups = small_tables(1, switches=4), [0], (0b0011, 0b1100)
-    exit_, lanes = EarlyExit(tables, groups, lead=lead), all_lanes(tables, [0])
+    exit_, lanes = EarlyExit(Scorer(tables), groups, lead=lead), all_lanes(tables, [0])
     seen = set()
     for state in lanes:
         alike = [lanes[other] for other in lanes if other[:2] == state[:2]]
@@ -106,7 +106,7 @@ def test_a_tie_is_an_overtaking_only_for_the_lower_number(bias: tuple[int, int],
     none, gain = np.zeros((0, 2), np.int16), [0, 2] if bias[0] > bias[1] else [2, 0]
     rows = np.array([[0, 0], gain], np.int16)
     tables = IntegerTables(np.array(bias, np.int16), rows, (), (), 0 * rows, none, 1.0)
-    exit_ = EarlyExit(tables, [1, 2])
+    exit_ = EarlyExit(Scorer(tables), [1, 2])
     exit_.start([])
     assert exit_.after(0, 0) is expected
 
@@ -115,9 +115,12 @@ def test_a_tie_is_an_overtaking_only_for_the_lower_number(bias: tuple[int, int],
 def test_a_scan_starts_afresh_whatever_went_before(make_tables: MakeTables, data: st.DataObject, seed: int) -> None:
     tables, groups = make_tables(seed), [0b111, 0b111000, 0b111000000]
     masks, codes = st.integers(0, 511), st.none() | st.lists(st.integers(0, 255), min_size=3, max_size=3)
-    used, scans = EarlyExit(tables, groups), data.draw(st.lists(st.tuples(masks, masks, codes), min_size=1, max_size=5))
+    used, scans = (
+        EarlyExit(Scorer(tables), groups),
+        data.draw(st.lists(st.tuples(masks, masks, codes), min_size=1, max_size=5)),
+    )
     for closed, lost, joints in scans:
-        fresh = EarlyExit(tables, groups)
+        fresh = EarlyExit(Scorer(tables), groups)
         for exit_ in (used, fresh):
             exit_.start(joints)
         for port in range(3):
@@ -129,7 +132,10 @@ def test_switches_of_no_port_are_known_from_the_start_or_lost(
     make_tables: MakeTables, closed: int, lost: int, seed: int
 ) -> None:
     tables, board, codes = make_tables(seed), 0b111, [1, 2, 3]
-    known, whole = EarlyExit(tables, [0b111000, 0b111000000]), EarlyExit(tables, [board, 0b111000, 0b111000000])
+    known, whole = (
+        EarlyExit(Scorer(tables), [0b111000, 0b111000000]),
+        EarlyExit(Scorer(tables), [board, 0b111000, 0b111000000]),
+    )
     for elsewhere in (lost, None):
         known.start(codes, closed, elsewhere)
         whole.start(codes)
@@ -139,14 +145,14 @@ def test_switches_of_no_port_are_known_from_the_start_or_lost(
 
 
 def test_what_is_left_after_a_port_is_told(make_tables: MakeTables) -> None:
-    exit_ = EarlyExit(make_tables(), [0b1, 0b110, 0b1000])
+    exit_ = EarlyExit(Scorer(make_tables()), [0b1, 0b110, 0b1000])
     assert [exit_.unread(port) for port in range(3)] == [0b1110, 0b1000, 0]
 
 
 @pytest.mark.parametrize("groups", [[1, 3], [1 << 9], [1, 0, 1]])
 def test_ports_that_do_not_fit_the_build_are_refused(make_tables: MakeTables, groups: list[int]) -> None:
     with pytest.raises(SettingError, match="read by two ports, or is none of the build's"):
-        EarlyExit(make_tables(), groups)
+        EarlyExit(Scorer(make_tables()), groups)
 
 
 @pytest.fixture(scope="module")
@@ -169,7 +175,7 @@ def test_on_every_recorded_frame_the_early_answer_is_the_full_scans(recorded: Fr
     build, bits, codes = recorded
     count = build.tables.n_switches
     ports = [range(first, min(first + width, count)) for first in range(0, count, width)]
-    exit_ = EarlyExit(build.tables, [sum(1 << switch for switch in port) for port in ports])
+    exit_ = EarlyExit(Scorer(build.tables), [sum(1 << switch for switch in port) for port in ports])
     present, left_out = np.zeros(build.tables.n_joints, bool), 0
     for frame_bits, frame_codes in zip(bits, codes, strict=True):
         full = build.classify(frame_bits, frame_codes)
@@ -196,7 +202,7 @@ def patterns(ports: range) -> list[tuple[int, ...]]:
 def test_on_every_recorded_frame_no_bits_of_the_ports_left_out_change_the_answer(recorded: Frames) -> None:
     build, bits, codes = recorded
     count, random = build.tables.n_switches, np.random.default_rng(7)
-    exit_ = EarlyExit(build.tables, [1 << switch for switch in range(count)])
+    exit_ = EarlyExit(Scorer(build.tables), [1 << switch for switch in range(count)])
     for frame_bits, frame_codes in zip(bits, codes, strict=True):
         full = build.classify(frame_bits, frame_codes)
         exit_.start(frame_codes.tolist())

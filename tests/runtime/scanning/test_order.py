@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thenar.runtime.scanning import order
-from thenar.runtime.scanning.order import Unit, arranged, ports_in
+from thenar.runtime.scanning import plan as order
+from thenar.runtime.scanning.plan import Unit, arranged, ports_in
 
 UNITS: list[tuple[Unit, ...]] = [
     (),

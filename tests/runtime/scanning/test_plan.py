@@ -12,11 +12,12 @@ from msgspec.structs import replace
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel, ScannerWiring
 from thenar.runtime.scanning import plan
-from thenar.runtime.scanning.earlyexit import EarlyExit
+from thenar.runtime.scanning.decided import EarlyExit
 from thenar.runtime.scanning.plan import check_harness, plan_scan
 from thenar.runtime.scanning.propose import propose_board
 from thenar.runtime.scanning.scanmap import Port, ScanMap, check_switches, scanmap_from_bytes, scanmap_to_bytes
 from thenar.runtime.scanning.timing import port_us, reading_of, scan_us
+from thenar.runtime.scores import Scorer
 from thenar.runtime.tables import IntegerTables
 
 Harnesses = Callable[..., st.SearchStrategy[Harness]]
@@ -79,7 +80,7 @@ def expected_us(
     """The mean time until the runtime's own early exit stops a scan of `ports`, nothing behind a mux."""
     bits, codes = recorded
     groups = [sum(1 << number for _, number in port.switches) for port in ports]
-    early = EarlyExit(tables, groups)
+    early = EarlyExit(Scorer(tables), groups)
     on_ports, total = sum(groups), 0.0
     for row in range(len(bits)):
         closed = sum(1 << number for number in np.flatnonzero(bits[row]).tolist())

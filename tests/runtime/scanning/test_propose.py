@@ -6,10 +6,9 @@ from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.checks import faults
 from thenar.runtime.harness.wiring import GloveWiring, MuxChannel
+from thenar.runtime.scanning.ports import ports_of, whole_scan
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import scan_us
-from thenar.runtime.scanning.transactions import ports_of
-from thenar.runtime.scanning.whole import whole_scan
 
 KINDS = sorted(CHIPS)
 

@@ -8,8 +8,8 @@ from msgspec.structs import replace
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.drivers.scanner_protocol import State, encode, frame
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, GloveWiring, Harness, MuxChannel, ScannerWiring
+from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.timing import free_us, glove_us, port_us, scan_us, scanner_us, select_us
-from thenar.runtime.scanning.whole import whole_scan
 
 EightChips = Callable[..., Harness]
 

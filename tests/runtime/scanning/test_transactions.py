@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.harness.checks import faults
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
+from thenar.runtime.scanning.ports import cover, ports_of
 from thenar.runtime.scanning.timing import port_us, reading_of
-from thenar.runtime.scanning.transactions import cover, ports_of
 
 Harnesses = Callable[..., st.SearchStrategy[Harness]]
 _KINDS = sorted(CHIPS)

@@ -3,15 +3,14 @@
 import io
 from collections.abc import Callable
 
-from thenar.runtime.live.health import HealthReport
-from thenar.runtime.live.published import LiveGrasp
 from thenar.runtime.preshape import Preshape
-from thenar.runtime.sinks import Fanout, JointAngles, JsonLines, SinkReport
+from thenar.runtime.published import HealthReport, LiveGrasp
+from thenar.runtime.sinks import Fanout, JointAngles, JsonLines, Sink, SinkReport
 
 MakeGrasp = Callable[..., LiveGrasp]
 
 
-class Faulty:
+class Faulty(Sink):
     """Raises from the frame `fails_at` on, and at its end."""
 
     def __init__(self, fails_at: int) -> None:

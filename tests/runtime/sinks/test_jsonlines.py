@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from msgspec import json
 
-from thenar.runtime.live.published import LiveGrasp
 from thenar.runtime.preshape import Preshape
+from thenar.runtime.published import LiveGrasp
 from thenar.runtime.sinks import JsonLines, Line, SinkError, open_sink
 
 MakeGrasp = Callable[..., LiveGrasp]
@@ -151,7 +151,7 @@ def test_a_file_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
 def test_stdout_gets_the_lines_and_stays_open() -> None:
     code = (
         "from thenar.runtime.sinks import open_sink\n"
-        "from thenar.runtime.live.published import LiveGrasp\n"
+        "from thenar.runtime.published import LiveGrasp\n"
         "sink = open_sink('jsonl:-')\n"
         "sink.publish(LiveGrasp(1, 2, 3, 'PoS', 'PoS', 0.5, 4, 'ok', None, None, 5), None, None)\n"
         "sink.close()\n"

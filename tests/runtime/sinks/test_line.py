@@ -8,11 +8,10 @@ from hypothesis import strategies as st
 from msgspec import json as typed_json
 from msgspec.structs import asdict
 
-from thenar.runtime.live.health import HealthReport
-from thenar.runtime.live.published import LiveGrasp
 from thenar.runtime.preshape import Preshape
+from thenar.runtime.published import HealthReport, LiveGrasp
 from thenar.runtime.sinks import HealthLine, JointAngles, Line
-from thenar.runtime.sinks.line import encode, encode_health
+from thenar.runtime.sinks.jsonl import encode, encode_health
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 names = st.text(st.characters(codec="utf-8"))

@@ -13,13 +13,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.drivers.errors import SettingError, ThenarError
-from thenar.runtime.live.published import LiveGrasp
+from thenar.runtime.published import LiveGrasp
 from thenar.runtime.sinks import SinkError
-from thenar.runtime.sinks.listening import open_tcp, open_unix
+from thenar.runtime.sinks.sockets import open_tcp, open_unix
 
 SERVER = """\
 import sys
-from thenar.runtime.sinks.listening import open_unix
+from thenar.runtime.sinks.sockets import open_unix
 sink = open_unix(sys.argv[1])
 print("open", flush=True)
 sys.stdin.read()

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.runtime.sinks.outlet import Outlet, patient_writer
+from thenar.runtime.sinks.jsonl import Outlet, patient_writer
 
 
 class Reader:

@@ -8,12 +8,10 @@ from pathlib import Path
 import pytest
 from msgspec import json
 
-from thenar.runtime.live.health import HealthReport
-from thenar.runtime.live.published import LiveGrasp
 from thenar.runtime.preshape import Preshape
+from thenar.runtime.published import HealthReport, LiveGrasp
 from thenar.runtime.sinks import HealthLine, JointAngles, Line, SocketLines
-from thenar.runtime.sinks.listening import open_tcp, open_unix
-from thenar.runtime.sinks.sockets import HANGING_S, MAX_OF_ONE, MAX_READERS
+from thenar.runtime.sinks.sockets import HANGING_S, MAX_OF_ONE, MAX_READERS, open_tcp, open_unix
 
 MakeGrasp = Callable[..., LiveGrasp]
 

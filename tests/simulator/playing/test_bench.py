@@ -4,7 +4,7 @@ import pytest
 
 from thenar.drivers.errors import SettingError
 from thenar.runtime.harness.loading import parse_harness
-from thenar.runtime.live.devices import GloveDevice
+from thenar.runtime.sources.cyberglove import GloveDevice
 from thenar.simulator.playing.bench import Bench
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler import GraspSet
-from thenar.runtime.live.codes import CodeTables
+from thenar.runtime.calibration import CodeTables
 from thenar.runtime.manifest import Calibration
 from thenar.simulator import load_scene, simulate
 from thenar.simulator.errors import SceneError

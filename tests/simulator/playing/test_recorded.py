@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from thenar.drivers.cyberglove_protocol import SENSORS_18
-from thenar.runtime.live.frames import GloveFrame, SwitchFrame
-from thenar.runtime.live.published import LiveGrasp
+from thenar.runtime.frames import GloveFrame, SwitchFrame
+from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.session import Label, Session
 from thenar.runtime.recording.writer import Recorder
 from thenar.simulator.errors import SceneError

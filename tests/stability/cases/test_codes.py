@@ -18,7 +18,7 @@ from thenar.compiler.recordings.errors import RecordingError, TableError
 from thenar.compiler.recordings.importer import code_joint, import_file
 from thenar.compiler.tables.collapse import HIGHEST_CODE, collapse
 from thenar.compiler.tables.quantise import quantise
-from thenar.runtime.scorer import Scorer
+from thenar.runtime.scores import Scorer
 from thenar.stability.cases.codes import EVERY_CODE, HARD_DOUBLES, NO_BITS, NO_CODES, NO_NUMBERS, hard_codes
 
 finite = st.floats(allow_nan=False, allow_infinity=False) | st.sampled_from(HARD_DOUBLES)

@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thenar.runtime.build import Build
-from thenar.runtime.recognizer import Frame, Recognition, Recognizer
-from thenar.runtime.scorer import Scorer
+from thenar.runtime.build import Build, Recognition
+from thenar.runtime.scores import Scorer
 from thenar.runtime.tables import IntegerTables
 from thenar.stability.cases import missing
 from thenar.stability.cases.missing import ExactMeans, changes, every_loss
@@ -70,8 +69,8 @@ def test_every_subset_of_ports_and_joints_is_lost_once(small: SmallBuild, width:
 @given(st.lists(st.booleans(), min_size=7, max_size=7))
 def test_a_frame_is_degraded_if_and_only_if_something_is_lost(lost: list[bool]) -> None:
     tables = whole_numbers(1, 3, 4, (2, 3, 2), 9)
-    frame = Frame(0, np.zeros(4, bool), np.zeros(3, np.uint16), np.array(lost[:4]), np.array(lost[4:]))
-    assert Recognizer(bare_build(tables)).recognise(frame).degraded == any(lost)
+    frame = np.zeros(4, bool), np.zeros(3, np.uint16), np.array(lost[:4]), np.array(lost[4:])
+    assert bare_build(tables).recognise(*frame).degraded == any(lost)
 
 
 def test_the_exact_scores_are_those_of_fractions(small: SmallBuild) -> None:
@@ -121,24 +120,23 @@ def test_wrong_means_are_caught(small: SmallBuild, monkeypatch: pytest.MonkeyPat
 
 
 def _found(monkeypatch: pytest.MonkeyPatch, recognise: Callable[..., Recognition]) -> dict[str, Finding]:
-    monkeypatch.setattr(Recognizer, "recognise", recognise)
+    monkeypatch.setattr(Build, "recognise", recognise)
     return {finding.check: finding for finding in missing.findings(full=False)}
 
 
 def test_a_recogniser_that_tells_nobody_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = Recognizer.recognise
+    right = Build.recognise
 
-    def silent(self: Recognizer, frame: Frame) -> Recognition:
-        return replace(right(self, frame), degraded=False)
+    def silent(self: Build, *frame: np.ndarray) -> Recognition:
+        return replace(right(self, *frame), degraded=False)
 
     assert _found(monkeypatch, silent)["frames called degraded"].error == 1
 
 
 def test_a_recogniser_that_reads_what_is_lost_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = Recognizer.recognise
+    right = Build.recognise
 
-    def nosy(self: Recognizer, frame: Frame) -> Recognition:
-        whole = replace(frame, lost_switches=None, lost_joints=None)
-        return replace(right(self, whole), degraded=right(self, frame).degraded)
+    def nosy(self: Build, *frame: np.ndarray) -> Recognition:
+        return replace(right(self, *frame[:2]), degraded=right(self, *frame).degraded)
 
     assert _found(monkeypatch, nosy)["answers that hang on what a lost input reads"].error == 1

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from thenar.compiler.tables.compare import float_slack
 from thenar.compiler.tables.worstcase import Rounding
-from thenar.runtime.scorer import LANE_OFFSET, Scorer
+from thenar.runtime.scores import LANE_OFFSET, Scorer
 from thenar.runtime.tables import IntegerTables
 from thenar.stability.cases.quantisation import LAST, BothWays, edge_tables, lost
 from thenar.stability.checks.integer_sums import first_best

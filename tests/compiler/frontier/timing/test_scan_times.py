@@ -19,11 +19,11 @@ from thenar.compiler.frontier.timing.scan_times import (
 )
 from thenar.compiler.frontier.timing.wirings import BOARD, Wiring
 from thenar.runtime.errors import HarnessError
-from thenar.runtime.scanning.costs import Costs
-from thenar.runtime.scanning.earlyexit import EarlyExit
-from thenar.runtime.scanning.plan import plan_scan
+from thenar.runtime.scanning.decided import EarlyExit
+from thenar.runtime.scanning.plan import Costs, plan_scan
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import scan_us, scanner_us
+from thenar.runtime.scores import Scorer
 
 CALL = Beside("a call", call_us=7.0)
 wired = st.builds(
@@ -61,7 +61,7 @@ def test_a_scan_that_ends_early_takes_what_scanning_the_frames_one_by_one_comes_
     # Of no more frames than decide on the order of ports, so that it is the same.
     scan = plan_scan(names, tables, harness, bits, codes)
     costs, ports = Costs(scan.ports, harness), [sum(1 << s for _, s in port.switches) for port in scan.ports]
-    early, taken_us, looks = EarlyExit(tables, ports), list[float](), 0
+    early, taken_us, looks = EarlyExit(Scorer(tables), ports), list[float](), 0
     for frame, code in zip(bits, codes, strict=True):
         closed = sum(1 << int(switch) for switch in np.flatnonzero(frame))
         early.start(code.tolist())

@@ -1,0 +1,139 @@
+"""What devices deliver: the newest state of the switches, the newest record of the glove, each with its own time.
+
+Times are integer microseconds of the host's monotonic clock, which no change of the date can step. A set of switches is
+one Python integer: bit k is switch k of the list that was asked for (a build's kept switches, in the build's order).
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from time import monotonic_ns
+from typing import Generic, TypeVar
+
+Mask = int
+
+# Bit of the CyberGlove's status byte: the glove is plugged into its box.
+_PLUGGED = 1
+
+
+def now_us() -> int:
+    """Return the host's monotonic clock in microseconds."""
+    return monotonic_ns() // 1000
+
+
+@dataclass(frozen=True, slots=True)
+class GloveFrame:
+    """One record of the CyberGlove: when its last byte came in, its sensors' bytes in wire order, and its status byte
+    where the glove sends one.
+    """
+
+    time_us: int
+    sensors: bytes
+    status: int | None = None
+
+    @property
+    def plugged(self) -> bool:
+        """Whether the glove is plugged into its box, as far as its status says."""
+        return self.status is None or bool(self.status & _PLUGGED)
+
+
+@dataclass(frozen=True, slots=True)
+class SwitchFrame:
+    """One reading of the switches.
+
+    time_us  when the last port was read
+    closed   which switches are closed
+    lost     which could not be read (their bits in `closed` mean nothing): a port is silent
+    unread   which were left unread, because with the joints of `glove` (None: lost) the leader could not be overtaken
+             any more; joined with another frame of the glove, nothing would be certain
+    glove    the glove's frame to join this one with, where the scan could have ended by it; None: the newest
+    """
+
+    time_us: int
+    closed: Mask
+    lost: Mask = 0
+    unread: Mask = 0
+    glove: GloveFrame | None = None
+
+
+# A frame counts for so many of its periods: one more may be late, two may not.
+PERIODS = 2
+F = TypeVar("F", SwitchFrame, GloveFrame)
+
+
+class Newest(Generic[F]):
+    """The newest frame of a device, and the last moment at which it counts, which is fixed when it arrives.
+
+    A frame that claims to be of the future is taken to be of the moment at which it came: whatever a device's clock
+    says, a frame ages from then on.
+
+    frame       None before the first
+    time_us     when it was read; -1 before the first
+    expires_us  until when it counts
+    """
+
+    __slots__ = ("expires_us", "frame", "time_us")
+
+    def __init__(self) -> None:
+        self.frame: F | None = None
+        self.time_us = self.expires_us = -1
+
+    def take(self, frame: F, now_us: int, longest_us: int) -> None:
+        """Take what came in by now: the same frame again, or another, which counts for `longest_us` from the time at
+        which it was read; one older than the newest is dropped.
+        """
+        if frame is self.frame or frame == self.frame:
+            return
+        time_us = min(frame.time_us, now_us)
+        if time_us >= self.time_us:
+            self.frame, self.time_us, self.expires_us = frame, time_us, time_us + longest_us
+
+    def fresh(self, now_us: int) -> F | None:
+        """Return the newest frame, None once it has expired."""
+        return self.frame if now_us <= self.expires_us else None
+
+
+class Rewired:
+    """Turns a set of a device's bits into a set of switches: bit by bit where `pairs` (bit, switch) say so.
+
+    Calling it costs a look-up as long as nothing changes: a hand rests for many scans.
+    """
+
+    __slots__ = ("_last", "_pairs", "_turned", "targets")
+
+    def __init__(self, pairs: Iterable[tuple[int, int]]) -> None:
+        self._pairs = tuple((1 << bit, 1 << switch) for bit, switch in pairs)
+        self.targets: Mask = sum(switch for _, switch in self._pairs)
+        self._last, self._turned = 0, 0
+
+    def __call__(self, bits: Mask) -> Mask:
+        """Return the switches of the device's `bits`."""
+        if bits != self._last:
+            self._turned = sum([switch for bit, switch in self._pairs if bits & bit])
+            self._last = bits
+        return self._turned
+
+
+class Pauses:
+    """Notes which switches are read, and for how long the others have not been: of a switch that is read again after a
+    pause, nothing that was read before it says anything.
+    """
+
+    __slots__ = ("_away", "_known", "pause_us")
+
+    def __init__(self, pause_us: int) -> None:
+        self.pause_us = pause_us
+        self._known: Mask = 0
+        self._away: list[tuple[int, Mask]] = []
+
+    def over(self, time_us: int, known: Mask) -> Mask:
+        """Return which of the switches that are read now were not read for longer than `pause_us`."""
+        over, away = 0, []
+        for since_us, switches in self._away:
+            if time_us - since_us > self.pause_us:
+                over |= switches & known
+            if rest := switches & ~known:
+                away.append((since_us, rest))
+        if gone := self._known & ~known:
+            away.append((time_us, gone))
+        self._known, self._away = known, away
+        return over

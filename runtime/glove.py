@@ -1,0 +1,220 @@
+"""`Glove`: a glove that recognises grasps, as an iterator of what it publishes."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from importlib.metadata import version
+from os import PathLike
+from pathlib import Path
+from threading import Event
+from time import time_ns
+from types import TracebackType
+from typing import Protocol, Self
+
+from .build import Build
+from .calibration import AngleReader
+from .frames import GloveFrame, SwitchFrame
+from .harness.loading import load_harness
+from .harness.wiring import Harness
+from .harness.writing import harness_to_toml
+from .live.health import Health
+from .live.recogniser import Moment
+from .live.sources import Taken
+from .live.system import System
+from .policy import Policy
+from .preshape.loading import load_preshapes
+from .preshape.selector import PreshapeSelector
+from .published import DeviceHealth, HealthReport, JointAngles
+from .recording.session import Session
+from .recording.writer import Recorder
+from .sinks.base import Fanout, Sink, SinkReport, open_sink
+
+_REPORT_US = 1_000_000
+
+
+class Feed(Protocol):
+    """Where frames come from: the devices of the harness, as a rule."""
+
+    def take(self) -> Taken:
+        """Return the newest frames, and all that arrived since the last call, after waiting for something new."""
+
+
+class Glove:
+    """A glove that recognises grasps: an iterator of the moments that it publishes, without an end.
+
+    Devices may come and go: what is missing makes an answer "degraded", and "unknown" when too little is left. Whenever
+    a device has delivered something, and when something has become too old, there is a moment.
+
+    Parameters
+    ----------
+    build : Build, str or path
+        What recognises: a build, or its folder.
+    harness : Harness, str or path
+        How the glove is wired: a harness, or its `glove.toml`.
+    policy : Policy, optional
+        When a grasp type is decided on, and when too much is missing.
+    preshapes : str or path, optional
+        Preshapes of a robot's hand: a table that ships, "barrett_bh8" or "parallel_gripper", or a file of your own.
+    sinks : sequence of str or Sink
+        Where each moment goes besides: "unix:/run/grasps", as `thenar run --sink` spells them.
+    record : str or path, optional
+        A new .mcap file for the raw frames and what came of them.
+    full_scan : bool
+        Whether every scan reads all ports, even when the rest cannot matter.
+    status : bool
+        Whether sinks get a report of the glove's health once a second.
+    stop : threading.Event, optional
+        Ends the iteration when it is set.
+    feed : Feed, optional
+        Where frames come from in place of the harness's devices, which are then left alone.
+
+    Attributes
+    ----------
+    frames : int
+        How many moments there were.
+    system : System
+        The build and the harness, put together.
+    sources : Sources
+        The devices.
+    recorder : Recorder or None
+        What writes the recording.
+    health : HealthReport or None
+        How the glove fares, worked out anew once a second.
+    lacking : str
+        A sentence on grasp types for which `preshapes` names none; "" if there are none.
+
+    Raises
+    ------
+    BuildError, HarnessError, PreshapeError, SettingError
+        If one of them cannot be used, or they do not fit each other. Nothing is opened before.
+    SinkError, OSError
+        On entering the context, if a sink or the recording cannot be opened.
+    SettingError
+        While iterating, if a device can never work as the harness says.
+
+    Examples
+    --------
+    ::
+
+        from thenar.runtime import Glove
+
+        with Glove("build", "glove.toml", preshapes="barrett_bh8") as glove:
+            for moment in glove:
+                print(moment.grasp.grasp, moment.grasp.probability, moment.preshape, glove.health.devices)
+    """
+
+    def __init__(
+        self,
+        build: Build | str | PathLike[str],
+        harness: Harness | str | PathLike[str],
+        *,
+        policy: Policy | None = None,
+        preshapes: str | PathLike[str] | None = None,
+        sinks: Sequence[str | Sink] = (),
+        record: str | PathLike[str] | None = None,
+        full_scan: bool = False,
+        status: bool = False,
+        stop: Event | None = None,
+        feed: Feed | None = None,
+    ) -> None:
+        loaded = build if isinstance(build, Build) else Build.load(build)
+        wired = harness if isinstance(harness, Harness) else load_harness(Path(harness))
+        self.system = system = System.of(loaded, wired, policy)
+        self.stop = Event() if stop is None else stop
+        self.frames, self.lacking = 0, ""
+        self.health: HealthReport | None = None
+        self.recorder: Recorder | None = None
+        self._recognizer, self.sources = system.recognizer(), system.sources(full_scan=full_scan)
+        self.feed: Feed = self.sources if feed is None else feed
+        self._selector: PreshapeSelector | None = None
+        if preshapes is not None:
+            table = load_preshapes(preshapes)
+            self.lacking, self._selector = table.check(loaded.grasps), PreshapeSelector(table)
+        calibration = system.calibration
+        self._angles = None if calibration is None else AngleReader(system.sensor_names, calibration)
+        self._measured: GloveFrame | None = None
+        self._newest_angles: JointAngles | None = None
+        self._sinks, self._record, self._status = tuple(sinks), record, status
+        self._health, self._due_us = Health(loaded), 0
+        self._fanout = Fanout(())
+        self._open = ExitStack()
+
+    def __enter__(self) -> Self:
+        with ExitStack() as opening:
+            sinks = []
+            for sink in self._sinks:
+                sinks.append(open_sink(sink) if isinstance(sink, str) else sink)
+                opening.callback(sinks[-1].close)
+            self._fanout = Fanout(sinks)
+            if self._record is not None:
+                self.recorder = opening.enter_context(Recorder(Path(self._record), self._session()))
+            if self.feed is self.sources:
+                opening.enter_context(self.sources)
+            self._open = opening.pop_all()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._open.close()
+
+    def __iter__(self) -> Iterator[Moment]:
+        return self
+
+    def __next__(self) -> Moment:
+        """Return the next moment. What is recorded is in the order in which it was used: the frames that came in, then
+        the grasp that came of the newest of them; so a replay of the recording gives the same grasps.
+        """
+        if self.stop.is_set():
+            raise StopIteration
+        taken = self.feed.take()
+        now = taken.time_us
+        moment = self._recognizer.step(now, time_ns() // 1000, taken.switches, taken.glove)
+        grasp, measured = moment.grasp, taken.measured
+        if self.recorder is not None:
+            for frame in taken.arrived:
+                if isinstance(frame, SwitchFrame):
+                    self.recorder.switches(frame)
+                else:
+                    self.recorder.glove(frame)
+            self.recorder.grasp(grasp)
+        if self._selector is not None:
+            moment.preshape = self._selector.update(grasp)
+        if self._angles is not None:
+            if measured is not self._measured:
+                self._measured = measured
+                there = measured is not None and measured.plugged
+                self._newest_angles = self._angles.angles(measured.sensors) if measured and there else None
+            moment.angles = self._newest_angles
+        self._fanout.publish(grasp, moment.preshape, moment.angles)
+        self._health.update(grasp, taken.switches, taken.glove.time_us if taken.glove else None, moment.codes)
+        if now >= self._due_us:
+            self._look(now)
+        self.frames += 1
+        return moment
+
+    def devices(self) -> tuple[DeviceHealth, ...]:
+        """Return how every device fares now."""
+        return self.sources.health()
+
+    def reports(self) -> tuple[SinkReport, ...]:
+        """Return how every sink is doing."""
+        return self._fanout.reports()
+
+    def _look(self, now: int) -> None:
+        self._due_us = now + _REPORT_US
+        self.health = self._health.report(now, self.sources.health(), self.sources.overflowed)
+        if self._status:
+            self._fanout.health(self.health)
+        self.sources.raise_settings()
+
+    def _session(self) -> Session:
+        system = self.system
+        return Session(
+            thenar=version("thenar"),
+            switches=system.switch_names,
+            sensors=system.sensor_names,
+            build=system.build.manifest.checksum,
+            harness=harness_to_toml(system.harness),
+            calibration=system.calibration,
+            policy=system.policy,
+        )

@@ -1,0 +1,214 @@
+"""The live recogniser: the newest frame of each device, joined, scored, decided upon."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import msgspec
+import numpy as np
+
+from thenar.drivers.calibration import GloveCalibration
+
+from ..build import Build
+from ..calibration import Joints
+from ..frames import PERIODS, GloveFrame, Mask, Newest, SwitchFrame
+from ..policy import Policy
+from ..preshape.selector import Preshape
+from ..published import UNKNOWN, Health, JointAngles, LiveGrasp
+from ..scores import LiveScores
+from ..tables import IntegerTables
+from .decision import Decision, SequentialTest, Standing
+
+
+class Decider(Protocol):
+    """What turns frames into a grasp type: `Decision` or `SequentialTest`."""
+
+    def update(self, time_us: int, standing: Standing, *, whole: bool) -> int | None:
+        """Return the class decided on. After a whole frame, one with no input lost, it rests on whole frames alone."""
+
+    def forget(self) -> None:
+        """Decide on nothing."""
+
+
+class Moment(msgspec.Struct):
+    """One grasp that is published, and what it came of.
+
+    grasp     the grasp type and how far to trust it
+    switches  the newest frame of the switches; None before the first
+    glove     the newest record of the CyberGlove; None before the first
+    codes     the joints' codes that were scored; None while the joints are lost
+    preshape  what the robot's hand shall have now; None where it shall be told nothing
+    angles    the glove's joints; None without a calibration, and while the glove says nothing
+    """
+
+    grasp: LiveGrasp
+    switches: SwitchFrame | None
+    glove: GloveFrame | None
+    codes: Sequence[int] | None
+    preshape: Preshape | None = None
+    angles: JointAngles | None = None
+
+
+class LiveRecognizer:
+    """Joins switches and CyberGlove and says what they show, whatever of them is there.
+
+    A frame counts for two of its periods. What is older, or lost, or of a glove that is not plugged into its box, is
+    replaced by its mean contribution, and the answer is degraded; it is unknown when the share of the tables' weight
+    that is lost exceeds `policy.max_lost`, and when nothing is left that the build uses. A device whose kind the build
+    does not use is left aside. The answer depends on nothing but the frames handed over and their times, so a replay of
+    the same calls gives the same answers.
+    """
+
+    def __init__(
+        self,
+        build: Build,
+        *,
+        sensor_names: Sequence[str] = (),
+        calibration: GloveCalibration | None = None,
+        switch_period_us: int | None = None,
+        glove_period_us: int | None = None,
+        policy: Policy | None = None,
+    ) -> None:
+        """Take the names of the CyberGlove's sensors in wire order, and periods; None: there is no such device.
+
+        Raises SettingError if the CyberGlove cannot serve the build.
+        """
+        self._policy, self._scorer, self._grasps = policy or Policy(), build.scorer, build.grasps
+        tables = build.tables
+        self._scale, self._all_switches = tables.scale, (1 << tables.n_switches) - 1
+        self._reads_switches = switch_period_us is not None and tables.n_switches > 0
+        self._longest_us = PERIODS * (switch_period_us or 0)
+        self._switches = Newest[SwitchFrame]()
+        self._joints = Joints(build.manifest.joints, sensor_names, calibration, glove_period_us)
+        self._scores = LiveScores(build.scorer)
+        self._scored: Sequence[int] | None = None
+        self._missing = MissingInputs(build, self._policy.max_lost)
+        self._decider, self._lead = _decider(build, self._policy), self._policy.lead_steps(tables.scale)
+        self._number = 0
+
+    def step(self, now_us: int, unix_us: int, switches: SwitchFrame | None, glove: GloveFrame | None) -> Moment:
+        """Return what is recognised at `now_us`, given what came in since the last step (None: nothing).
+
+        The same frame may be handed over again: it grows no younger. Raises FrameError for a frame of another glove.
+        """
+        newest = self._switches
+        if switches is not None and switches is not newest.frame and self._reads_switches:
+            newest.take(switches, now_us, self._longest_us)
+        frame = newest.frame if now_us <= newest.expires_us else None
+        # Ports that were left unread are certain only with the joints by which their scan ended; and a frame that was
+        # handed over once stays the newest, so every scan that can end early brings the joints' frame along.
+        codes = self._joints.codes(now_us, glove if frame is None or frame.glove is None else frame.glove)
+        if codes is not self._scored:
+            self._scores.joints(codes)
+            self._scored = codes
+        standing, lost = self._standing(frame)
+        missing = self._missing.of(lost, codes is None)
+        seen_us = max(newest.time_us, self._joints.newest.time_us)
+        if missing.too_much:
+            self._decider.forget()
+            decided = None
+        else:
+            decided = self._decider.update(max(seen_us, 0), standing, whole=not missing.names)
+        grasp = self._published(now_us, unix_us, standing, missing, decided, seen_us)
+        self._number += 1
+        return Moment(grasp, switches, glove, codes)
+
+    def _standing(self, frame: SwitchFrame | None) -> tuple[Standing, Mask]:
+        """Return who leads, and what is lost: unread switches are, unless the candidate is certain without them.
+
+        They always are certain where the scan was ended by an `EarlyExit` with the codes of this step; with others, the
+        frame may have been left unread too early.
+        """
+        if frame is None:
+            return Standing(self._scores.lanes(0, self._all_switches), self._scorer), self._all_switches
+        lost, unread = frame.lost, frame.unread & ~frame.lost
+        if unread and self._policy.error_rate is None:
+            standing = Standing(self._scores.lanes(frame.closed & ~unread, lost), self._scorer, unread)
+            if standing.certain:
+                return standing, lost
+        lost |= unread
+        return Standing(self._scores.lanes(frame.closed & ~lost, lost), self._scorer), lost
+
+    def _published(
+        self, now_us: int, unix_us: int, standing: Standing, missing: "Missing", decided: int | None, seen_us: int
+    ) -> LiveGrasp:
+        switches_us, glove_us = self._switches.time_us, self._joints.newest.time_us
+        unknown = missing.too_much
+        health: Health = "ok"
+        if unknown:
+            health = "unknown"
+        elif missing.names:
+            health = "degraded"
+        elif decided is None or standing.contradicts(decided, self._lead):
+            health = "changing"
+        return LiveGrasp(
+            time_us=now_us,
+            unix_us=unix_us,
+            number=self._number,
+            grasp=UNKNOWN if decided is None else self._grasps[decided],
+            candidate=UNKNOWN if unknown else self._grasps[standing.candidate],
+            probability=0.0 if decided is None else standing.probability(decided, self._scale),
+            margin=0 if unknown else standing.margin,
+            health=health,
+            switch_age_us=None if switches_us < 0 else now_us - switches_us,
+            glove_age_us=None if glove_us < 0 else now_us - glove_us,
+            latency_us=0 if seen_us < 0 else now_us - seen_us,
+            lost=missing.names,
+        )
+
+
+def _decider(build: Build, policy: Policy) -> Decider:
+    scale = build.tables.scale
+    if policy.error_rate is None:
+        return Decision(policy.lead_steps(scale), policy.dwell_us, policy.hold_us)
+    return SequentialTest(len(build.grasps), scale, policy.error_rate, policy.hold_us, policy.spacing_us)
+
+
+@dataclass(frozen=True, slots=True)
+class Missing:
+    """Names of lost switches and joints; share of the tables' weight that is lost; whether that is too much."""
+
+    names: tuple[str, ...] = ()
+    share: float = 0.0
+    too_much: bool = False
+
+
+class MissingInputs:
+    """Says what is missing, and keeps the last answer: what is lost seldom changes.
+
+    The weight of an input is how far its rows (of a switch: closed and open) lie apart, summed over the grasp types, in
+    steps: an input that never moves a score weighs nothing. Too much is lost when the lost inputs' share of the weight
+    of all exceeds `max_lost`, and when nothing that the build uses can be read.
+    """
+
+    def __init__(self, build: Build, max_lost: float) -> None:
+        self._switch_names = tuple(switch.name for switch in build.manifest.switches)
+        self._joint_names = tuple(joint.name for joint in build.manifest.joints)
+        self._switches, self._joints = weights(build.tables)
+        self._total = sum(self._switches) + self._joints
+        self._all: Mask = (1 << len(self._switches)) - 1
+        self._max_lost = max_lost
+        self._state: tuple[Mask, bool] = 0, False
+        self._last = Missing()
+
+    def of(self, lost: Mask, joints_lost: bool) -> Missing:
+        """Return what is missing when the switches `lost` are, and the joints or not."""
+        if (lost, joints_lost) != self._state:
+            self._state = lost, joints_lost
+            self._last = self._work_out(lost, joints_lost)
+        return self._last
+
+    def _work_out(self, lost: Mask, joints_lost: bool) -> Missing:
+        numbers = [number for number in range(len(self._switches)) if lost >> number & 1]
+        weight = sum(map(self._switches.__getitem__, numbers)) + self._joints * joints_lost
+        nothing_left = lost == self._all and (joints_lost or not self._joint_names)
+        share = 1.0 if nothing_left else weight / max(self._total, 1)
+        names = (*map(self._switch_names.__getitem__, numbers), *self._joint_names * joints_lost)
+        return Missing(names, share, nothing_left or share > self._max_lost)
+
+
+def weights(tables: IntegerTables) -> tuple[list[int], int]:
+    """Return the weight of each switch, and of all joints together, in steps."""
+    switches: list[int] = np.abs(tables.switch_rows.astype(np.int64)).sum(axis=1).tolist()
+    joints = sum(int(np.ptp(rows.astype(np.int64), axis=0).sum()) for rows in tables.joint_rows)
+    return switches, joints

@@ -1,0 +1,98 @@
+"""What is published, to terminals, files, sockets and robots: every frame's grasp, and how the glove fares."""
+
+from typing import Literal
+
+import msgspec
+
+UNKNOWN = "unknown"
+
+Health = Literal["ok", "changing", "degraded", "unknown"]
+
+
+class LiveGrasp(msgspec.Struct, frozen=True, omit_defaults=False):
+    """What is recognised now, and how far to trust it.
+
+    time_us       host's monotonic clock when this was worked out; unix_us: the same moment as the date has it
+    number        counts the frames of this run from 0
+    grasp         the grasp type decided on, "unknown" while too little can be read and before a sequential test ends
+    candidate     the best grasp type of this frame alone
+    probability   of `grasp` in this frame (softmax of the scores); 0 when unknown
+    margin        lead of the candidate over the second best, in integer steps
+    health        "ok": everything is read, `grasp` was decided on whole frames, and the candidate does not lead it by
+                  the lead that a change takes (policy.py) or more. "changing": everything is read, but the candidate
+                  leads `grasp` by that much, and the change has not dwelt yet; or no sequential test has ended yet.
+                  "degraded": means stood in for something that is lost. "unknown": too much is lost
+    switch_age_us, glove_age_us   how old the newest frames are; None before the first, or without such a device
+    latency_us    from the newer of both frames to this moment
+    lost          names of the switches and joints that are missing
+    """
+
+    time_us: int
+    unix_us: int
+    number: int
+    grasp: str
+    candidate: str
+    probability: float
+    margin: int
+    health: Health
+    switch_age_us: int | None
+    glove_age_us: int | None
+    latency_us: int
+    lost: tuple[str, ...] = ()
+
+
+class JointAngles(msgspec.Struct, frozen=True):
+    """The names of the joints that are calibrated, and their angles in rad, as a robot's messages have them."""
+
+    names: tuple[str, ...]
+    positions_rad: tuple[float, ...]
+
+
+class Count(msgspec.Struct, frozen=True):
+    """How often something happened: CRC errors, resynchronisations, frames lost."""
+
+    name: str
+    value: int
+
+
+class DeviceHealth(msgspec.Struct, frozen=True):
+    """A device: whether it is there, what is or was wrong last, and what its driver counts."""
+
+    name: str
+    connected: bool
+    error: str = ""
+    counts: tuple[Count, ...] = ()
+
+
+class Drift(msgspec.Struct, frozen=True):
+    """By how many codes a joint has drifted."""
+
+    joint: str
+    codes: int
+
+
+class HealthReport(msgspec.Struct, frozen=True):
+    """State at `time_us` of the host's monotonic clock.
+
+    stuck_open, stuck_closed   switches that should have been seen closed, or open, by now
+    chattering                 switches that changed more often in the last second than a hand can
+    drifting                   joints whose codes have moved since the first minute
+    switch_hz, glove_hz        frames per second over the last whole second
+    frames, changing, degraded, unknown  how many grasps were published so far, and how many of them with that health
+    overflowed                 frames that came in and were not taken in time: a recording lacks them
+    devices                    as their drivers have it
+    """
+
+    time_us: int
+    stuck_open: tuple[str, ...]
+    stuck_closed: tuple[str, ...]
+    chattering: tuple[str, ...]
+    drifting: tuple[Drift, ...]
+    switch_hz: float
+    glove_hz: float
+    frames: int
+    changing: int
+    degraded: int
+    unknown: int
+    overflowed: int = 0
+    devices: tuple[DeviceHealth, ...] = ()

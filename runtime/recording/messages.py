@@ -1,0 +1,144 @@
+"""A recording's messages: two standard ROS 2 messages as their bytes, and frames as bytes that a plot can show.
+
+std_msgs/msg/String and std_msgs/msg/UInt8MultiArray are CDR, little-endian: the encapsulation header 00 01 00 00, then
+the fields, each aligned to its size (OMG DDSI-RTPS 2.5, 10.2; the lengths of strings and sequences are uint32, and a
+string's counts its NUL).
+
+A switch's byte has bit 0 set when it is closed, bit 1 when it could not be read, bit 2 when it was left unread: 0 open,
+1 closed, 2 or more not known. Where switches were left unread because of a record of the glove, that record follows
+them: its time in microseconds of the host's monotonic clock (8 bytes, little-endian), then its bytes. The bytes of a
+glove are its sensors in wire order, then its status byte if it sends one.
+"""
+
+from collections.abc import Sequence
+from struct import Struct, error
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FrameError, McapError
+from ..frames import GloveFrame, Mask, SwitchFrame
+
+_ENCAPSULATION = b"\0\1\0\0"
+_TEXT = Struct("<4sI")
+# No dimensions, data_offset 0, then the length of the data.
+_BYTES = Struct("<4sIII")
+
+_RULE = "=" * 80
+
+STRING, BYTES = "std_msgs/msg/String", "std_msgs/msg/UInt8MultiArray"
+# As `ros2 bag record` embeds them: the definition, then those that it rests on.
+DEFINITIONS = {
+    STRING: "string data\n",
+    BYTES: (
+        "MultiArrayLayout layout\nuint8[] data\n"
+        f"{_RULE}\nMSG: std_msgs/MultiArrayLayout\nMultiArrayDimension[] dim\nuint32 data_offset\n"
+        f"{_RULE}\nMSG: std_msgs/MultiArrayDimension\nstring label\nuint32 size\nuint32 stride\n"
+    ),
+}
+
+
+def encode_text(text: bytes) -> bytes:
+    """Return a std_msgs/msg/String of UTF-8 `text`."""
+    return _TEXT.pack(_ENCAPSULATION, len(text) + 1) + text + b"\0"
+
+
+def encode_bytes(data: bytes) -> bytes:
+    """Return a std_msgs/msg/UInt8MultiArray of `data`, without dimensions."""
+    return _BYTES.pack(_ENCAPSULATION, 0, 0, len(data)) + data
+
+
+def decode_text(message: bytes) -> bytes:
+    """Return the UTF-8 text of a std_msgs/msg/String. Raises McapError."""
+    encapsulation, length = _unpack(_TEXT, message)
+    text = message[_TEXT.size :]
+    if encapsulation != _ENCAPSULATION or length != len(text) or not text.endswith(b"\0"):
+        raise McapError("is no little-endian CDR string")
+    return text[:-1]
+
+
+def decode_bytes(message: bytes) -> bytes:
+    """Return the data of a std_msgs/msg/UInt8MultiArray without dimensions. Raises McapError."""
+    encapsulation, dimensions, data_offset, length = _unpack(_BYTES, message)
+    data = message[_BYTES.size :]
+    if encapsulation != _ENCAPSULATION or dimensions or data_offset or length != len(data):
+        raise McapError("is no little-endian CDR array of bytes without dimensions")
+    return data
+
+
+def _unpack(layout: Struct, message: bytes) -> tuple[bytes, ...] | tuple[int, ...]:
+    try:
+        return layout.unpack_from(message)
+    except error:
+        raise McapError(f"has {len(message)} bytes, too few for what its channel carries") from None
+
+
+_CLOSED, _LOST, _UNREAD = 1, 2, 4
+_TIME_BYTES = 8
+_SPREAD = [bytes(byte >> bit & 1 for bit in range(8)) for byte in range(256)]
+
+
+def switch_bytes(frame: SwitchFrame, switches: int, sensors: int) -> bytes:
+    """Return a byte for each of so many switches, and the record of so many sensors that the frame rests on, if any.
+
+    Raises FrameError if the frame is not of so many.
+    """
+    if (frame.closed | frame.lost | frame.unread) >> switches:
+        raise FrameError(f"a frame with bits beyond the {switches} switches that are recorded")
+    states = _spread(frame.closed, switches)
+    if frame.lost or frame.unread:
+        lost, unread = _spread(frame.lost, switches), _spread(frame.unread, switches)
+        states = bytes(a + _LOST * b + _UNREAD * c for a, b, c in zip(states, lost, unread, strict=True))
+    if frame.glove is None:
+        return states
+    return states + frame.glove.time_us.to_bytes(_TIME_BYTES, "little") + glove_bytes(frame.glove, sensors)
+
+
+def switch_frame(time_us: int, data: bytes, switches: int, sensors: int) -> SwitchFrame:
+    """Return the frame that `switch_bytes` made. Raises McapError."""
+    states, rest = data[:switches], data[switches:]
+    if len(states) < switches or 0 < len(rest) < _TIME_BYTES:
+        raise McapError(f"holds {len(data)} bytes, its session names {switches} switches")
+    array = np.frombuffer(states, np.uint8)
+    if switches and int(array.max()) > _CLOSED | _LOST | _UNREAD:
+        raise McapError(f"holds a switch in state {int(array.max())}")
+    glove_us = int.from_bytes(rest[:_TIME_BYTES], "little")
+    return SwitchFrame(
+        time_us,
+        closed=_gather(array, _CLOSED),
+        lost=_gather(array, _LOST),
+        unread=_gather(array, _UNREAD),
+        glove=glove_frame(glove_us, rest[_TIME_BYTES:], sensors) if rest else None,
+    )
+
+
+def glove_bytes(frame: GloveFrame, sensors: int) -> bytes:
+    """Return the record of so many sensors. Raises FrameError if it has another number."""
+    if len(frame.sensors) != sensors:
+        found = f"a record of {len(frame.sensors)} sensors, {sensors} are recorded"
+        raise FrameError(f"{found}: say under [cyberglove] of glove.toml how many there are")
+    return frame.sensors if frame.status is None else frame.sensors + bytes((frame.status,))
+
+
+def glove_frame(time_us: int, data: bytes, sensors: int) -> GloveFrame:
+    """Return the frame that `glove_bytes` made. Raises McapError."""
+    if len(data) - sensors not in (0, 1):
+        raise McapError(f"holds {len(data)} bytes, its session names {sensors} sensors")
+    return GloveFrame(time_us, data[:sensors], data[sensors] if len(data) > sensors else None)
+
+
+def switch_matrix(masks: Sequence[Mask], switches: int) -> NDArray[np.bool_]:
+    """Return (len(masks), switches) bool: bit s of every mask."""
+    length = (switches + 7) // 8
+    rows = np.frombuffer(b"".join(mask.to_bytes(length, "little") for mask in masks), np.uint8)
+    bits = np.unpackbits(rows.reshape(len(masks), length), axis=1, count=switches, bitorder="little")
+    return bits.view(np.bool_)
+
+
+def _spread(mask: Mask, switches: int) -> bytes:
+    """Return a byte of 0 or 1 for each switch."""
+    return b"".join(map(_SPREAD.__getitem__, mask.to_bytes((switches + 7) // 8, "little")))[:switches]
+
+
+def _gather(states: NDArray[np.uint8], flag: int) -> Mask:
+    return int.from_bytes(np.packbits(states & flag != 0, bitorder="little").tobytes(), "little")

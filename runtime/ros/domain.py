@@ -1,0 +1,122 @@
+"""Names as ROS 2 has them, and a participant in its nodes' domain: on this machine, unless others are let in."""
+
+import os
+import re
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from cyclonedds.core import DDSException
+from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.pub import DataWriter
+from cyclonedds.qos import Policy, Qos
+from cyclonedds.topic import Topic
+
+from thenar.drivers.errors import SettingError
+
+from .messages import TYPE_HASHES
+
+_DEPTH = 10
+_MAX_DOMAIN = 232  # above it the ports of DDS would pass 65535
+_MAX_LENGTH = 200
+
+_FORM = "<CycloneDDS><Domain>{}</Domain></CycloneDDS>"
+# Behind all others. A reader that hangs would otherwise hold up every writer's end for a second.
+_SETTINGS = _FORM.format("<Internal><WriterLingerDuration>100 ms</WriterLingerDuration></Internal>")
+# Loopback has no multicast: participants look for each other at the ports of localhost.
+_LOOPBACK = _FORM.format(
+    """
+    <General>
+      <Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces><AllowMulticast>false</AllowMulticast>
+    </General>
+    <Discovery>
+      <ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>99</MaxAutoParticipantIndex>
+      <Peers><Peer address="localhost"/></Peers>
+    </Discovery>"""
+)
+_DESCRIPTORS = Path("/proc/self/fd")
+
+
+def join(number: int, *, public: bool) -> tuple[Domain | None, DomainParticipant]:
+    """Return the domain, where it is ours to end, and a participant in it.
+
+    CYCLONEDDS_URI says which network is used, where it is set. Otherwise it is loopback alone unless `public`. Raises
+    DDSException, and OSError where the system does not keep a socket to loopback.
+    """
+    users = os.environ.get("CYCLONEDDS_URI", "")
+    if users or public:
+        return _join(number, f"{users},{_SETTINGS}" if users else _SETTINGS)
+    with _kept_to_loopback():
+        return _join(number, f"{_LOOPBACK},{_SETTINGS}")
+
+
+def _join(number: int, settings: str) -> tuple[Domain | None, DomainParticipant]:
+    try:
+        ours = Domain(number, settings)
+    except DDSException as reason:
+        if reason.code != DDSException.DDS_RETCODE_PRECONDITION_NOT_MET:
+            raise
+        ours = None  # somebody in this process is in it already, with settings of their own
+    return ours, DomainParticipant(number)
+
+
+@contextmanager
+def _kept_to_loopback() -> Iterator[None]:
+    """Let the datagram sockets that are opened meanwhile receive from this machine alone.
+
+    Cyclone DDS binds those that it receives with to all addresses, whatever interface it is given.
+    """
+    before = _sockets()
+    yield
+    for descriptor in set(_sockets().items()) - set(before.items()):
+        with socket.socket(fileno=os.dup(descriptor[0])) as one:
+            if one.type == socket.SOCK_DGRAM and one.family in (socket.AF_INET, socket.AF_INET6):
+                one.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, b"lo")
+
+
+def _sockets() -> dict[int, str]:
+    """Return the sockets of this process: which descriptor is which socket."""
+    found = {}
+    for link in _DESCRIPTORS.iterdir():
+        with suppress(OSError):  # closed meanwhile
+            target = str(link.readlink())
+            if target.startswith("socket:"):
+                found[int(link.name)] = target
+    return found
+
+
+def namespace(name: str) -> str:
+    """Return `name` if topics can stand under it, as "/thenar" or "/lab/left_hand". Raises SettingError."""
+    fits = re.fullmatch(r"(?:/[A-Za-z][A-Za-z0-9_]*)+", name) and "__" not in name and len(name) <= _MAX_LENGTH
+    if not fits:
+        raise SettingError(f"ros:{name} is no name of ROS: write it as ros:/thenar, with letters, digits and single _")
+    return name
+
+
+def dds_topic(name: str) -> str:
+    """Return what DDS calls the ROS topic `name`: "/thenar/grasp" is "rt/thenar/grasp"."""
+    return f"rt{name}"
+
+
+def domain() -> int:
+    """Return the domain that the environment variable ROS_DOMAIN_ID names, or 0. Raises SettingError."""
+    text = os.environ.get("ROS_DOMAIN_ID", "").strip() or "0"
+    if not text.isdecimal() or int(text) > _MAX_DOMAIN:
+        raise SettingError(f"ROS_DOMAIN_ID is {text!r}: it is a whole number from 0 to {_MAX_DOMAIN}, or not set")
+    return int(text)
+
+
+def writer(participant: DomainParticipant, name: str, kind: Any) -> Any:
+    """Return what writes messages of a kind to the ROS topic `name`: reliable, volatile, the last 10 kept."""
+    qos = Qos(
+        # Nobody may hold the writer up: what does not fit is refused at once.
+        Policy.Reliability.Reliable(max_blocking_time=0),
+        Policy.Durability.Volatile,
+        Policy.History.KeepLast(_DEPTH),
+        Policy.WriterDataLifecycle(autodispose=False),
+        Policy.DataRepresentation(use_cdrv0_representation=True, use_xcdrv2_representation=False),
+        Policy.Userdata(f"typehash={TYPE_HASHES[kind.__idl_typename__]};".encode()),
+    )
+    return DataWriter(participant, Topic(participant, dds_topic(name), kind), qos=qos)

@@ -1,0 +1,213 @@
+"""Scores of single frames by the integer tables, in a few microseconds of plain Python.
+
+A row of K int16 steps is one Python integer, 16 bits a class: row = sum_k steps_k * 2^(16 k). Adding two such integers
+adds all K lanes at once. `IntegerTables` has proved that no sum leaves int16, so no lane can spill into the next; the
+offset 2^15 per lane, added once, keeps every lane positive while it is read out.
+"""
+
+import math
+from bisect import bisect_left
+from collections.abc import Sequence
+from functools import cached_property, lru_cache
+from itertools import compress, repeat
+from operator import getitem, sub, truediv
+from struct import Struct
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import FrameError
+from .frames import Mask
+from .tables import IntegerTables
+
+LANE_OFFSET = 1 << 15
+_HIGHEST_CODE = 65535
+# Switches are looked up eight at a time: a byte of a mask is the place of its sum of rows.
+_EIGHT = 8
+# Of how many classes answers of `reach` are kept, over all answers: some 2 MB.
+_KEPT = 1 << 16
+
+
+class Scorer:
+    """The tables of a build, arranged for one frame at a time. A build makes one, which all that score frames share.
+
+    start                       bias and offset: the sum of no rows
+    switch_rows, switch_means   s rows
+    joint_means                 j rows
+    joint_rows, thresholds      j lists: a row per bin, and the codes that part the bins
+    size, unpack                of a sum that began with `start`: its bytes, and what makes K scores of them, each 2^15
+                                too high
+    """
+
+    def __init__(self, tables: IntegerTables) -> None:
+        self.tables = tables
+        lanes = Struct(f"<{tables.n_classes}H")
+        self.size, self.unpack = lanes.size, lanes.unpack
+        offsets = _packed(np.zeros((1, tables.n_classes), np.int16), 0)[0]
+        self.start = _packed(tables.bias[np.newaxis], 0)[0]
+        self.switch_rows = _packed(tables.switch_rows, offsets)
+        self.switch_means = _packed(tables.switch_means, offsets)
+        self.joint_means = _packed(tables.joint_means, offsets)
+        self.joint_rows = [_packed(rows, offsets) for rows in tables.joint_rows]
+        self.thresholds: list[list[int]] = [thresholds.tolist() for thresholds in tables.thresholds]
+        self.reach = lru_cache(maxsize=_KEPT // tables.n_classes)(self._reach)
+
+    @cached_property
+    def row_sums(self) -> list[list[int]]:
+        """For every eight switches the sums of the rows of all sets of them, by the byte that such a set is."""
+        return _sums(self.switch_rows)
+
+    @cached_property
+    def mean_sums(self) -> list[list[int]]:
+        """The same of the mean rows."""
+        return _sums(self.switch_means)
+
+    def lanes(self, bits: ArrayLike, codes: ArrayLike) -> tuple[int, ...]:
+        """Return the scores of one frame, each 2^15 too high: K integers. Raises FrameError."""
+        switches = _flags(bits, len(self.switch_rows), "switches")
+        bins = map(bisect_left, self.thresholds, self._codes(codes))
+        total = sum(compress(self.switch_rows, switches), self.start)
+        total = sum(map(getitem, self.joint_rows, bins), total)
+        return self.unpack(total.to_bytes(self.size, "little"))
+
+    def lanes_without(
+        self, bits: ArrayLike, codes: ArrayLike, lost_switches: ArrayLike, lost_joints: ArrayLike
+    ) -> tuple[int, ...]:
+        """Return what `lanes` does, with the mean row in place of every switch and joint that the masks call lost."""
+        switches, joints = _flags(bits, len(self.switch_rows), "switches"), self._codes(codes)
+        lost_bits = _flags(lost_switches, len(self.switch_rows), "lost switches")
+        lost_codes = _flags(lost_joints, len(self.thresholds), "lost joints")
+        there = [bit and not lost for bit, lost in zip(switches, lost_bits, strict=True)]
+        total = sum(compress(self.switch_rows, there), sum(compress(self.switch_means, lost_bits), self.start))
+        for joint, (code, lost) in enumerate(zip(joints, lost_codes, strict=True)):
+            row = self.joint_rows[joint][bisect_left(self.thresholds[joint], code)]
+            total += self.joint_means[joint] if lost else row
+        return self.unpack(total.to_bytes(self.size, "little"))
+
+    def _codes(self, codes: ArrayLike) -> list[int]:
+        array = np.asarray(codes)
+        expected = len(self.thresholds)
+        if array.shape != (expected,):
+            raise FrameError(f"a frame with codes of shape {array.shape}, the build has {expected} joints")
+        values: list[int] = array.tolist()
+        if array.dtype != np.uint16 and values:
+            _check_codes(array, values)
+        return values
+
+    def _reach(self, leader: int, unread: Mask) -> tuple[int, ...]:
+        """Return the `reaches` of a leader as plain integers, kept for those that come again and again."""
+        switches = [number for number in range(self.tables.n_switches) if unread >> number & 1]
+        found: list[int] = reaches(self.tables, leader, switches).tolist()
+        return tuple(found)
+
+
+def reaches(tables: IntegerTables, leader: int, switches: Sequence[int]) -> NDArray[np.int64]:
+    """Return, for every class (K,), the most steps by which `switches`, unread, can bring it closer to class `leader`.
+
+    A switch adds nothing when open, its row when closed, its mean row when lost. So against a leader l, an unread
+    switch s can bring class r at most  max(0, row_sr - row_sl, mean_sr - mean_sl)  closer, and several switches at most
+    the sum of these: each is free to do its worst. For one rival that sum is reached, by some state of the switches; so
+    it is not only a bound, but the most there is. The leader's own is 0.
+    """
+    both = (rows[list(switches)].astype(np.int64) for rows in (tables.switch_rows, tables.switch_means))
+    closed, lost = (rows - rows[:, leader, np.newaxis] for rows in both)
+    found: NDArray[np.int64] = np.maximum(0, np.maximum(closed, lost)).sum(axis=0)
+    return found
+
+
+class LiveScores:
+    """The scores of live frames, kept up by what changes: the same numbers as a frame added up whole.
+
+    Three sums of packed rows, each worked out anew when what it is of changes; at first every switch is open and every
+    joint lost. A switch adds its row while it is closed, its mean row while it is lost; a joint adds the row of its
+    code's bin, its mean row while it is lost. So `lanes` are exactly `Scorer.lanes_without` of the same state.
+    """
+
+    __slots__ = ("_closed", "_codes", "_joints", "_lost", "_scorer", "_silent", "_there")
+
+    def __init__(self, scorer: Scorer) -> None:
+        self._scorer = scorer
+        self._there: Mask = 0
+        self._lost: Mask = 0
+        self._closed, self._silent = scorer.start, 0
+        self._codes: tuple[int, ...] | None = None
+        self._joints = sum(scorer.joint_means)
+
+    def joints(self, codes: Sequence[int] | None) -> None:
+        """Take the codes of all joints; None: all are lost. Raises FrameError."""
+        taken = None if codes is None else tuple(codes)
+        if taken == self._codes:
+            return
+        scorer = self._scorer
+        if taken is None:
+            self._joints = sum(scorer.joint_means)
+        elif len(taken) != len(scorer.thresholds):
+            raise FrameError(f"{len(taken)} codes, the build has {len(scorer.thresholds)} joints")
+        else:
+            self._joints = sum(map(getitem, scorer.joint_rows, map(bisect_left, scorer.thresholds, taken)))
+        self._codes = taken
+
+    def lanes(self, closed: Mask, lost: Mask = 0) -> tuple[int, ...]:
+        """Return the K scores, each 2^15 too high, of a state of all switches; bits of `closed` that are lost mean
+        nothing. Raises FrameError.
+        """
+        scorer = self._scorer
+        if (closed | lost) >> len(scorer.switch_rows):
+            raise FrameError(f"a switch beyond the {len(scorer.switch_rows)} of the build is closed or lost")
+        there = closed & ~lost
+        if there != self._there:
+            self._closed = scorer.start + _sum(there, scorer.row_sums)
+            self._there = there
+        if lost != self._lost:
+            self._silent = _sum(lost, scorer.mean_sums)
+            self._lost = lost
+        return scorer.unpack((self._closed + self._silent + self._joints).to_bytes(scorer.size, "little"))
+
+
+def softmax(scores: Sequence[int], number: int, scale: float) -> float:
+    """Return the softmax of `scores` (K,), in steps of 1 / `scale`, for class `number`; it cannot overflow.
+
+    It is worked out only to be published: no decision rests on it.
+    """
+    best = max(scores)
+    odds = map(math.exp, map(truediv, map(sub, scores, repeat(best)), repeat(scale)))
+    return math.exp((scores[number] - best) / scale) / sum(odds)
+
+
+def _packed(rows: NDArray[np.int16], offsets: int) -> list[int]:
+    """Return every row as one integer. `offsets` is 2^15 in each lane, taken off again; 0 leaves it in."""
+    lanes = (rows.astype(np.int32) + LANE_OFFSET).astype("<u2")
+    return [int.from_bytes(row.tobytes(), "little") - offsets for row in lanes]
+
+
+def _sums(rows: Sequence[int]) -> list[list[int]]:
+    found = []
+    for first in range(0, len(rows), _EIGHT):
+        sums = [0]
+        for row in rows[first : first + _EIGHT]:
+            sums += [row + others for others in sums]
+        found.append(sums)
+    return found
+
+
+def _sum(switches: Mask, sums: Sequence[Sequence[int]]) -> int:
+    """Return the sum of the rows of `switches`."""
+    return sum(map(getitem, sums, switches.to_bytes(len(sums), "little")))
+
+
+def _flags(flags: ArrayLike, expected: int, what: str) -> list[bool]:
+    array = np.asarray(flags)
+    if array.shape != (expected,):
+        raise FrameError(f"a frame with {what} of shape {array.shape}, the build has {expected}")
+    values: list[bool] = array.tolist()
+    if array.dtype != np.bool_ and any(value not in (0, 1) for value in values):
+        raise FrameError(f"{what} are 0 or 1, this frame has {next(v for v in values if v not in (0, 1))!r}")
+    return values
+
+
+def _check_codes(array: NDArray[np.generic], values: list[int]) -> None:
+    if array.dtype.kind not in "iu":
+        raise FrameError(f"joint codes are integers, this frame has {array.dtype}")
+    if min(values) < 0 or max(values) > _HIGHEST_CODE:
+        wrong = next(value for value in values if not 0 <= value <= _HIGHEST_CODE)
+        raise FrameError(f"joint codes are 0 to {_HIGHEST_CODE}, this frame has {wrong}")

@@ -1,0 +1,204 @@
+"""What every sink is, which kinds there are, and several sinks as one."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import msgspec
+
+from thenar.drivers.errors import SettingError, ThenarError
+from thenar.drivers.members import Members
+
+from ..names import shortened
+from ..preshape.selector import Preshape
+from ..published import HealthReport, JointAngles, LiveGrasp
+
+
+class SinkError(ThenarError, OSError):
+    """A sink cannot be opened: the name is taken, no such folder, a package is missing. The message says which."""
+
+
+class SinkReport(msgspec.Struct, frozen=True):
+    """How a sink is doing, since it was opened.
+
+    where     as `open_sink` has it
+    readers   how many read now; None where that cannot be known
+    sent      what went out, counted once a reader
+    lost      what did not: a reader was slow, was gone, or the system refused
+    error     what went wrong last, or nothing
+    over      whether nothing will go out any more: its only reader is gone, the disk is full, it broke
+    dropped   how many readers were dropped, for they took nothing, or were the slowest when all places were taken
+    """
+
+    where: str
+    readers: int | None
+    sent: int
+    lost: int
+    error: str = ""
+    over: bool = False
+    dropped: int = 0
+
+
+class Sink(ABC):
+    """An open sink: it takes every frame's result. A sink of your own derives from this, and needs `publish` alone.
+
+    No method blocks and none but the constructor raises: what cannot be sent is lost, and counted.
+    """
+
+    __slots__ = ()
+
+    @abstractmethod
+    def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
+        """Send on what was recognised.
+
+        preshape is what the hand shall have now, None where it shall be told nothing; angles are the glove's.
+        """
+
+    def health(self, report: HealthReport) -> None:  # noqa: B027
+        """Send on how the glove fares, once a second or so."""
+
+    def report(self) -> SinkReport:
+        """Return how the sink itself is doing."""
+        return SinkReport(type(self).__name__, None, 0, 0)
+
+    def close(self) -> None:  # noqa: B027
+        """Let go of everything; may be called twice."""
+
+
+@dataclass(frozen=True, slots=True)
+class SinkPlace:
+    """Where a sink is to be opened.
+
+    text     as the user wrote it: "ros:/thenar?public"
+    place    what follows the name: "/thenar"
+    options  the options that are given: {"public"}
+    wait     whether it had better wait for a slow reader than lose lines: right for a replay, wrong for a live glove
+    """
+
+    text: str
+    place: str
+    options: frozenset[str] = frozenset()
+    wait: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class SinkKind:
+    """A kind of sink, as `--sink NAME:PLACE` chooses it.
+
+    A module of `thenar.runtime.sinks` defines one as `MEMBER`, or a tuple of several; another package names one under
+    the entry point `thenar.sinks`.
+
+    Attributes
+    ----------
+    name : str
+        The name before the colon: "tcp".
+    place : str
+        What follows it, as help spells it: "127.0.0.1:PORT".
+    help : str
+        What it does, in a few words: "JSON lines to whoever connects".
+    open : callable
+        `open(where)` returns an open `Sink` at a `SinkPlace`. It raises SettingError about a place that means nothing,
+        SinkError about one that cannot be opened. A package that only this sink needs is imported in here.
+    options : tuple of str
+        Words that may follow the place behind a question mark.
+    rank : int
+        Orders the kinds.
+    """
+
+    name: str
+    place: str
+    help: str
+    open: Callable[[SinkPlace], Sink]
+    options: tuple[str, ...] = ()
+    rank: int = 0
+
+    @property
+    def spelling(self) -> str:
+        """How `--sink` has it: "ros:/NAMESPACE[?public]"."""
+        return f"{self.name}:{self.place}" + "".join(f"[?{option}]" for option in self.options)
+
+
+SINKS = Members("sink", SinkKind, "thenar.runtime.sinks", "thenar.sinks")
+
+
+def open_sink(where: str, *, wait: bool = False) -> Sink:
+    """Return the sink that `where` names: NAME:PLACE, as the kinds in `SINKS` spell it.
+
+    With `wait`, it rather waits for a slow reader than loses lines. Raises SettingError about a name that means
+    nothing, SinkError about one that cannot be opened.
+    """
+    name, _, place = where.partition(":")
+    if not place or name not in SINKS:
+        kinds = ", ".join(kind.spelling for kind in SINKS.values())
+        wrong = f"there is no kind of sink called {shortened(name)!r}" if place else "names no sink"
+        raise SettingError(f"{shortened(repr(where))}: {wrong}: take one of {kinds}")
+    kind, options = SINKS[name], list[str]()
+    if kind.options:
+        place, mark, given = place.partition("?")
+        options = given.split("&") if mark else []
+        if not set(options) <= set(kind.options):
+            known = " or ".join(f"`{option}`" for option in kind.options)
+            raise SettingError(f"{shortened(repr(where))}: behind the question mark can only be {known}")
+    return kind.open(SinkPlace(where, place, frozenset(options), wait))
+
+
+class Fanout:
+    """Publishes to every one of `sinks`. One that raises, against its promise, is left out from then on, and its report
+    says why.
+    """
+
+    __slots__ = ("_errors", "_lost", "_sinks")
+
+    def __init__(self, sinks: Iterable[Sink]) -> None:
+        self._sinks = tuple(sinks)
+        self._errors, self._lost = [""] * len(self._sinks), [0] * len(self._sinks)
+
+    def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
+        """Publish to all sinks that work."""
+        for number, sink in enumerate(self._sinks):
+            if self._errors[number]:
+                self._lost[number] += 1
+                continue
+            try:
+                sink.publish(grasp, preshape, angles)
+            except Exception as reason:
+                self._leave_out(number, reason)
+
+    def health(self, report: HealthReport) -> None:
+        """Send on to all sinks that work how the glove fares."""
+        for number, sink in enumerate(self._sinks):
+            if self._errors[number]:
+                self._lost[number] += 1
+                continue
+            try:
+                sink.health(report)
+            except Exception as reason:
+                self._leave_out(number, reason)
+
+    def reports(self) -> tuple[SinkReport, ...]:
+        """Return how every sink is doing, in their order."""
+        return tuple(self._report(number, sink) for number, sink in enumerate(self._sinks))
+
+    def close(self) -> None:
+        """Close all sinks, also after one of them fails to."""
+        for number, sink in enumerate(self._sinks):
+            try:
+                sink.close()
+            except Exception as reason:
+                self._errors[number] = _said(reason)
+
+    def _report(self, number: int, sink: Sink) -> SinkReport:
+        if not self._errors[number]:
+            try:
+                return sink.report()
+            except Exception as reason:
+                self._errors[number] = _said(reason)
+        return SinkReport(type(sink).__name__, None, 0, self._lost[number], self._errors[number], over=True)
+
+    def _leave_out(self, number: int, reason: Exception) -> None:
+        self._errors[number] = _said(reason)
+        self._lost[number] += 1
+
+
+def _said(reason: Exception) -> str:
+    return f"{type(reason).__name__}: {reason}"

@@ -1,0 +1,224 @@
+"""JSON lines into a file: stdout, a pipe, a file on disk, anything that takes bytes.
+
+Lines are of grasps, and now and then of how the glove fares. A reader tells them apart by `kind`; msgspec does so by
+itself: `msgspec.json.decode(line, type=Line | HealthLine)`.
+
+A line goes out entirely or not at all, and nobody waits for a descriptor that is slow.
+"""
+
+import os
+import select
+import stat
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from io import UnsupportedOperation
+from pathlib import Path
+from typing import BinaryIO
+
+from msgspec import json
+
+from ..preshape.selector import Preshape
+from ..published import HealthReport, JointAngles, LiveGrasp
+from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
+
+
+class Line(LiveGrasp, frozen=True, tag_field="kind", tag="grasp"):
+    """The fields of `LiveGrasp`, and behind them the preshape and the angles, null where there are none."""
+
+    preshape: Preshape | None = None
+    angles: JointAngles | None = None
+
+
+class HealthLine(HealthReport, frozen=True, tag_field="kind", tag="health"):
+    """The fields of `HealthReport`."""
+
+
+_encode = json.Encoder().encode
+_GRASP, _PRESHAPE, _ANGLES = b'{"kind":"grasp",', b',"preshape":', b',"angles":'
+
+
+def encode(grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> bytes:
+    """Return a frame's line, its newline included. UTF-8, no newline inside.
+
+    The bytes of a `Line`, without making one.
+    """
+    parts = (_GRASP, _encode(grasp)[1:-1], _PRESHAPE, _encode(preshape), _ANGLES, _encode(angles), b"}\n")
+    return b"".join(parts)
+
+
+def encode_health(report: HealthReport) -> bytes:
+    """Return a report's line, its newline included."""
+    return _encode(HealthLine(**{name: getattr(report, name) for name in report.__struct_fields__})) + b"\n"
+
+
+# What a descriptor that is writable takes at once without blocking, even where it is set to block (POSIX: PIPE_BUF).
+_PIECE = select.PIPE_BUF
+# Where an error waits or the reader is gone, writing says so.
+_WRITABLE = select.POLLOUT | select.POLLERR | select.POLLHUP
+
+
+# Writes some of the bytes and returns how many. Raises BlockingIOError: none now; any other OSError: never again.
+Writer = Callable[[bytes], int]
+
+
+class Outlet:
+    """One reader's end: at most the rest of one line waits here, what else waits stands in the system's own buffer.
+
+    written   how many bytes it has taken
+    """
+
+    __slots__ = ("_rest", "_write", "written")
+
+    def __init__(self, write: Writer) -> None:
+        self._write = write
+        self._rest = b""
+        self.written = 0
+
+    @property
+    def waiting(self) -> int:
+        """How many bytes of the newest line are still to be written."""
+        return len(self._rest)
+
+    def send(self, line: bytes) -> bool:
+        """Send `line` if the reader keeps up; return whether it went out or began to. Raises OSError if it is gone."""
+        for data in (self._rest, line):
+            self._rest = data
+            try:
+                while self._rest:
+                    taken = self._write(self._rest)
+                    self.written += taken
+                    self._rest = self._rest[taken:]
+            except BlockingIOError:
+                if data is not line:
+                    return False
+        # Nothing of this line went out: it is lost, and the next one starts afresh.
+        if line and len(self._rest) == len(line):
+            self._rest = b""
+            return False
+        return True
+
+
+def patient_writer(descriptor: int) -> Writer:
+    """Return a writer for a descriptor that is shared with others, and so must not be set to non-blocking."""
+    poll = select.poll()
+    poll.register(descriptor, select.POLLOUT)
+
+    def write(data: bytes) -> int:
+        events = poll.poll(0)
+        if not events or not events[0][1] & _WRITABLE:
+            raise BlockingIOError
+        return os.write(descriptor, data[:_PIECE])
+
+    return write
+
+
+class JsonLines(Sink):
+    """One line a frame into `file`.
+
+    A pipe whose reader is slow loses whole lines and holds nobody up; with `wait` it is the other way round, which is
+    right for a replay and wrong for a live glove. A reader that is gone (`head`) is noted in the report.
+    """
+
+    __slots__ = ("_error", "_file", "_lost", "_outlet", "_owned", "_sent", "_where")
+
+    def __init__(self, file: BinaryIO, *, wait: bool = False, where: str = "jsonl", owned: bool = False) -> None:
+        """Write into `file`, which `close` closes only if it is `owned`."""
+        self._file = file
+        self._outlet = Outlet(_writer(file, wait))
+        self._owned = owned
+        self._where = where
+        self._sent = self._lost = 0
+        self._error = ""
+
+    def publish(self, grasp: LiveGrasp, preshape: Preshape | None, angles: JointAngles | None) -> None:
+        """Write one line, or lose it."""
+        self._send(encode(grasp, preshape, angles))
+
+    def health(self, report: HealthReport) -> None:
+        """Write one line, or lose it."""
+        self._send(encode_health(report))
+
+    def _send(self, line: bytes) -> None:
+        sent = False
+        if not self._error:
+            try:
+                sent = self._outlet.send(line)
+            except (OSError, ValueError) as reason:  # ValueError: somebody closed the file
+                self._error = getattr(reason, "strerror", None) or str(reason)
+                self._take_back(len(line) - self._outlet.waiting)
+        if line:
+            self._sent += sent
+            self._lost += not sent
+
+    def _take_back(self, torn: int) -> None:
+        """Cut off the part of a line that a full disk had room for, unless somebody else has written behind it."""
+        if not (torn > 0 and self._owned):
+            return
+        with suppress(OSError, ValueError):
+            descriptor = self._file.fileno()
+            end = os.lseek(descriptor, 0, os.SEEK_CUR)
+            if os.fstat(descriptor).st_size == end:
+                os.ftruncate(descriptor, end - torn)
+
+    def report(self) -> SinkReport:
+        """Return how this sink is doing."""
+        return SinkReport(self._where, None, self._sent, self._lost, self._error, over=bool(self._error))
+
+    def close(self) -> None:
+        """Finish the line that was begun, if the reader lets us, and close what was opened here."""
+        self._send(b"")
+        if self._owned:
+            self._file.close()
+
+
+def _writer(file: BinaryIO, wait: bool) -> Writer:
+    def write(data: bytes) -> int:
+        file.write(data)
+        file.flush()
+        return len(data)
+
+    if wait:
+        return write
+    try:
+        descriptor = file.fileno()
+    except (AttributeError, UnsupportedOperation):  # held in memory
+        return write
+    file.flush()
+    return patient_writer(descriptor)
+
+
+def _open(place: SinkPlace) -> JsonLines:
+    """Return JSON lines on stdout ("-") or at the end of a file or named pipe. Raises SinkError."""
+    where, path, wait = place.text, place.place, place.wait
+    if path == "-":
+        return JsonLines(sys.stdout.buffer, wait=wait, where=where)
+    try:
+        # A named pipe that nobody reads would hold up a blocking open for ever.
+        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NONBLOCK, 0o666)
+    except OSError as reason:
+        hint = ": is its reader running?" if Path(path).is_fifo() else ""
+        raise SinkError(f"{where} cannot be written: {reason.strerror}{hint}") from None
+    try:
+        _finish_line(descriptor, path)
+    except OSError as reason:
+        os.close(descriptor)
+        raise SinkError(f"{where} cannot be written: {reason.strerror}") from None
+    if wait:
+        os.set_blocking(descriptor, True)
+    return JsonLines(os.fdopen(descriptor, "wb", buffering=0), wait=wait, where=where, owned=True)
+
+
+def _finish_line(descriptor: int, path: str) -> None:
+    """End the line that whoever wrote the file last was killed in, so that the next one begins a line."""
+    found = os.fstat(descriptor)
+    if not (stat.S_ISREG(found.st_mode) and found.st_size):
+        return
+    with Path(path).open("rb") as file:
+        file.seek(-1, os.SEEK_END)
+        whole = file.read(1) == b"\n"
+    if not whole:
+        os.write(descriptor, b"\n")
+
+
+MEMBER = SinkKind("jsonl", "FILE", "JSON lines at the end of a file; - is stdout", _open)

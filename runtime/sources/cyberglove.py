@@ -1,0 +1,87 @@
+"""The CyberGlove of a harness."""
+
+from collections.abc import Iterator, Sequence
+
+from thenar.drivers.cyberglove import CyberGlove
+from thenar.drivers.cyberglove_protocol import shortest_us
+
+from ..frames import PERIODS, GloveFrame
+from ..harness.wiring import GloveWiring, Harness
+from ..published import Count
+from ..scanning.scanmap import ScanMap
+from .base import SHORTEST_US, Source, SourceKind, counted
+
+_SLOWEST_BAUD = 9_600
+_SENSORS = 18
+
+
+class GloveDevice(Source):
+    """A CyberGlove. A record that says the glove is unplugged is no frame: it holds no measurement."""
+
+    def __init__(self, wiring: GloveWiring) -> None:
+        self.name = f"cyberglove at {wiring.port}"
+        self.sensors = sensors_of(wiring)
+        self.period_us = glove_period_us(wiring)
+        self.longest_us = PERIODS * self.period_us
+        self._unplugged, self._unplugged_records = False, 0
+        self.driver = CyberGlove(
+            wiring.port,
+            baud=None if wiring.baud == "auto" else wiring.baud,
+            mode=wiring.mode,
+            rate_hz=wiring.rate_hz,
+            sensors=self.sensors,
+        )
+
+    def open(self) -> None:
+        """Open the glove."""
+        self.driver.open()
+
+    def read(self, timeout_s: float) -> GloveFrame | None:
+        """Return the next record that holds a measurement."""
+        timed = self.driver.read(timeout_s)
+        if timed is None:
+            return None
+        time_us, record = timed
+        self._unplugged = record.fault == "unplugged"
+        self._unplugged_records += self._unplugged
+        return None if self._unplugged else GloveFrame(time_us, record.sensors, record.status)
+
+    def counts(self) -> tuple[Count, ...]:
+        """Return what the driver counts, and the records of a glove that was not plugged in."""
+        return (*counted(self.driver.counts), Count("unplugged", self._unplugged_records))
+
+    def trouble(self) -> str:
+        """Return what is wrong though the line is open; "" if nothing is."""
+        return "the glove is not plugged into its box" if self._unplugged else ""
+
+    def close(self) -> None:
+        """Close the glove."""
+        self.driver.close()
+
+
+def glove_period_us(wiring: GloveWiring) -> int:
+    """Return how often a CyberGlove so wired should send at least; the slowest that it can be where that is open.
+
+    One that is asked for more than box and line can do sends as fast as they can.
+    """
+    baud = _SLOWEST_BAUD if wiring.baud == "auto" else wiring.baud
+    shortest = round(shortest_us(sensors_of(wiring), baud, status=True, filtered=True))
+    return max(SHORTEST_US, shortest, round(1e6 / wiring.rate_hz) if wiring.rate_hz else 0)
+
+
+def sensors_of(wiring: GloveWiring) -> int:
+    """Return how many sensors a CyberGlove so wired must have: 18 where nothing says so."""
+    return len(wiring.joints) or wiring.sensors or _SENSORS
+
+
+def _sources(harness: Harness, _names: Sequence[str], _scan: ScanMap) -> Iterator[Source]:
+    if harness.cyberglove is not None:
+        yield GloveDevice(harness.cyberglove)
+
+
+def _periods_us(harness: Harness, _scan: ScanMap) -> Iterator[int]:
+    if harness.cyberglove is not None:
+        yield glove_period_us(harness.cyberglove)
+
+
+MEMBER = SourceKind("cyberglove", "A CyberGlove on a serial line: [cyberglove].", "joints", _sources, _periods_us, 2)

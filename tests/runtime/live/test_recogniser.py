@@ -1,0 +1,324 @@
+"""Random schedules of arrivals under a simulated clock, beside a slow recogniser that starts from the definitions."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.drivers.errors import SettingError
+from thenar.runtime import Build, FrameError
+from thenar.runtime.calibration import Joints
+from thenar.runtime.frames import GloveFrame, SwitchFrame
+from thenar.runtime.harness.wiring import Harness, ScannerWiring
+from thenar.runtime.live.recogniser import LiveRecognizer
+from thenar.runtime.live.system import System
+from thenar.runtime.policy import Policy
+from thenar.runtime.published import UNKNOWN, LiveGrasp
+from thenar.runtime.scanning.decided import EarlyExit
+from thenar.runtime.scores import Scorer
+
+MakeBuild = Callable[..., Build]
+Arrival = tuple[int, SwitchFrame | None, GloveFrame | None]
+
+SWITCHES, JOINTS = 6, 3
+SWITCH_PERIOD, GLOVE_PERIOD = 1000, 700
+NAMES = tuple(f"s{number}" for number in range(SWITCHES))
+SENSORS = ("j2", "other", "j0", "j1")
+AT_ONCE = Policy(lead=0, dwell_us=0, hold_us=0)
+
+masks = st.integers(0, (1 << SWITCHES) - 1)
+delays = st.integers(0, 300)
+
+
+def recognizer(build: Build, policy: Policy = AT_ONCE, sensor_names: tuple[str, ...] = SENSORS) -> LiveRecognizer:
+    return LiveRecognizer(
+        build,
+        sensor_names=sensor_names,
+        switch_period_us=SWITCH_PERIOD,
+        glove_period_us=GLOVE_PERIOD,
+        policy=policy,
+    )
+
+
+@st.composite
+def schedules(draw: st.DrawFn, unread: bool = False) -> list[Arrival]:
+    """Times that never fall, and what came in by then: frames of up to 300 us ago, or nothing."""
+    now, found = 10_000, []
+    for _ in range(draw(st.integers(1, 25))):
+        now += draw(st.sampled_from([0, 1, 300, 700, 1000, 1400, 1401, 2000, 2001, 5000]))
+        switches = draw(st.none() | st.builds(SwitchFrame, delays.map(now.__sub__), masks, st.just(0) | masks))
+        if switches is not None and unread:
+            switches = replace(switches, unread=draw(masks))
+        bytes_ = st.binary(min_size=len(SENSORS), max_size=len(SENSORS))
+        status = st.sampled_from([None, 0x81, 0x80, 0x87, 0x86])
+        found.append((now, switches, draw(st.none() | st.builds(GloveFrame, delays.map(now.__sub__), bytes_, status))))
+    return found
+
+
+def newest(frames: list[Any]) -> Any:
+    """The newest of frames in the order of their arrival; of equal times the last."""
+    found = None
+    for frame in frames:
+        if frame is not None and (found is None or frame.time_us >= found.time_us):
+            found = frame
+    return found
+
+
+def flags(mask: int) -> np.ndarray:
+    return np.array([mask >> bit & 1 for bit in range(SWITCHES)], bool)
+
+
+def definition(build: Build, arrivals: list[Arrival]) -> dict[str, Any]:
+    """What has to be said at the time of the last arrival, but for early exits."""
+    now, tables = arrivals[-1][0], build.tables
+    switches, glove = newest([arrival[1] for arrival in arrivals]), newest([arrival[2] for arrival in arrivals])
+    no_switches = switches is None or now - switches.time_us > 2 * SWITCH_PERIOD
+    no_glove = glove is None or now - glove.time_us > 2 * GLOVE_PERIOD or (glove.status or 1) % 2 == 0
+    lost = flags((1 << SWITCHES) - 1) if no_switches else flags(switches.lost)
+    bits = flags(0) if no_switches else flags(switches.closed)
+    codes = [0, 0, 0] if no_glove else [glove.sensors[SENSORS.index(f"j{number}")] for number in range(JOINTS)]
+    lanes = Scorer(tables).lanes_without(bits, codes, lost, np.full(JOINTS, no_glove))
+    weights = [np.abs(row.astype(int)).sum() for row in tables.switch_rows]
+    joints = sum(np.ptp(rows.astype(int), axis=0).sum() for rows in tables.joint_rows)
+    weight_lost = sum(np.array(weights)[lost]) + joints * no_glove
+    unknown = bool(weight_lost > 0.5 * (sum(weights) + joints)) or bool(lost.all() and no_glove)
+    best = int(np.argmax(lanes))
+    odds = np.exp((np.array(lanes) - max(lanes)) / tables.scale)
+    names = [f"s{number}" for number in np.flatnonzero(lost)] + ["j0", "j1", "j2"] * no_glove
+    return {
+        "grasp": UNKNOWN if unknown else build.grasps[best],
+        "candidate": UNKNOWN if unknown else build.grasps[best],
+        "probability": 0.0 if unknown else 1 / odds.sum(),
+        "margin": 0 if unknown else int(np.diff(np.sort(lanes)[-2:])[0]),
+        "health": "unknown" if unknown else "degraded" if names else "ok",
+        "switch_age_us": None if switches is None else now - switches.time_us,
+        "glove_age_us": None if glove is None else now - glove.time_us,
+        "latency_us": min([now - frame.time_us for frame in (switches, glove) if frame is not None], default=0),
+        "lost": tuple(names),
+    }
+
+
+@given(seed=st.integers(0, 20), schedule=schedules())
+def test_every_answer_follows_from_the_newest_frames_and_their_ages_alone(
+    make_build: MakeBuild, seed: int, schedule: list[Arrival]
+) -> None:
+    build = make_build(seed)
+    live = recognizer(build)
+    for number, (now, switches, glove) in enumerate(schedule):
+        found = live.step(now, now + 7, switches, glove).grasp
+        expected = definition(build, schedule[: number + 1])
+        assert (found.time_us, found.unix_us, found.number) == (now, now + 7, number)
+        assert math.isclose(found.probability, expected.pop("probability"), rel_tol=1e-9)
+        assert {name: getattr(found, name) for name in expected} == expected
+
+
+@pytest.mark.slow
+@given(schedule=schedules(), again=st.integers(0, 3))
+def test_frames_that_are_handed_over_again_grow_no_younger(
+    make_build: MakeBuild, schedule: list[Arrival], again: int
+) -> None:
+    once, repeated = recognizer(make_build()), recognizer(make_build())
+    last: list[Any] = [None, None]
+    for now, switches, glove in schedule:
+        last = [newest([last[0], switches]), newest([last[1], glove])]
+        expected = once.step(now, 0, switches, glove).grasp
+        for _ in range(again):
+            repeated.step(now, 0, *last)
+        found = repeated.step(now, 0, *last).grasp
+        assert found == LiveGrasp(**{**as_dict(expected), "number": found.number})
+
+
+def as_dict(grasp: LiveGrasp) -> dict[str, Any]:
+    return {name: getattr(grasp, name) for name in grasp.__struct_fields__}
+
+
+@pytest.mark.parametrize("silent", ["switches", "glove"])
+@pytest.mark.parametrize("policy", [AT_ONCE, Policy(max_lost=1.0)])
+def test_a_device_that_falls_silent_degrades_the_answer_within_two_of_its_periods(
+    make_build: MakeBuild, silent: str, policy: Policy
+) -> None:
+    """A device delivers at every period until one moment; the other goes on."""
+    live, last = recognizer(make_build(), policy), 20 * 7000
+    period = {"switches": SWITCH_PERIOD, "glove": GLOVE_PERIOD}
+    for now in range(0, last + 5000, 100):
+        there = {name: now % period[name] == 0 and (now <= last or name != silent) for name in period}
+        switches = SwitchFrame(now, 5) if there["switches"] else None
+        found = live.step(now, 0, switches, GloveFrame(now, b"\x05\x06\x07\x08") if there["glove"] else None).grasp
+        assert (found.health == "ok") == (now <= last + 2 * period[silent])
+
+
+def test_nothing_is_known_before_the_first_frame_nor_after_the_last(make_build: MakeBuild) -> None:
+    live = recognizer(make_build(), Policy(max_lost=1.0))
+    first = live.step(0, 0, None, None).grasp
+    assert (first.grasp, first.candidate, first.health, first.probability, first.margin) == (
+        UNKNOWN,
+        UNKNOWN,
+        "unknown",
+        0,
+        0,
+    )
+    assert (first.switch_age_us, first.glove_age_us, first.latency_us) == (None, None, 0)
+    assert live.step(1, 0, SwitchFrame(1, 3), None).grasp.health == "degraded"
+    gone = live.step(2002, 0, None, None).grasp
+    assert (gone.grasp, gone.health, gone.switch_age_us, gone.latency_us) == (UNKNOWN, "unknown", 2001, 2001)
+
+
+@pytest.mark.parametrize(("switches", "joints"), [(0, 3), (6, 0)])
+def test_a_device_that_the_build_does_not_use_is_not_missed(make_build: MakeBuild, switches: int, joints: int) -> None:
+    live = recognizer(make_build(switches=switches, joints=joints))
+    if switches:
+        found = live.step(0, 0, SwitchFrame(0, 3), None).grasp
+    else:
+        found = live.step(0, 0, None, GloveFrame(0, b"\x05\x06\x07\x08")).grasp
+    assert (found.health, found.lost) == ("ok", ())
+
+
+def test_a_glove_that_the_harness_does_not_have_is_lost_for_good(make_build: MakeBuild) -> None:
+    live = LiveRecognizer(make_build(), switch_period_us=1000, policy=Policy(max_lost=1.0))
+    found = live.step(0, 0, SwitchFrame(0, 3), GloveFrame(0, b"")).grasp
+    assert (found.health, found.lost, found.glove_age_us) == ("degraded", ("j0", "j1", "j2"), None)
+
+
+def test_a_glove_that_is_not_plugged_into_its_box_is_lost(make_build: MakeBuild) -> None:
+    live = recognizer(make_build(), Policy(max_lost=1.0))
+    for status, health in [(0x81, "ok"), (0x80, "degraded"), (None, "ok")]:
+        assert live.step(0, 0, SwitchFrame(0, 3), GloveFrame(0, b"\x05\x06\x07\x08", status)).grasp.health == health
+
+
+def test_what_does_not_fit_is_refused_with_our_own_errors(make_build: MakeBuild) -> None:
+    with pytest.raises(FrameError):
+        recognizer(make_build()).step(0, 0, None, GloveFrame(0, b"\x01"))
+    with pytest.raises(FrameError):
+        recognizer(make_build()).step(0, 0, SwitchFrame(0, 1 << SWITCHES), None)
+    with pytest.raises(SettingError):
+        recognizer(make_build(), sensor_names=("j0", "j1"))
+
+
+PORTS = (0b000011, 0b001100, 0b110000)
+
+
+@st.composite
+def scans(draw: st.DrawFn) -> list[tuple[int, int, bytes]]:
+    sensors = st.binary(min_size=len(SENSORS), max_size=len(SENSORS))
+    few = draw(st.lists(st.tuples(masks, sensors), min_size=1, max_size=4))
+    return [(draw(st.integers(1, 3)), *draw(st.sampled_from(few))) for _ in range(draw(st.integers(1, 30)))]
+
+
+@given(seed=st.integers(0, 20), scan=scans(), lead=st.sampled_from([0.0, 0.3, 1.0]))
+def test_early_exit_changes_no_decision_and_promises_no_more_than_the_whole_scan_holds(
+    make_build: MakeBuild, seed: int, scan: list[tuple[int, int, bytes]], lead: float
+) -> None:
+    build, policy = make_build(seed), Policy(lead=lead, dwell_us=2000, hold_us=5000)
+    whole, early = recognizer(build, policy), recognizer(build, policy)
+    exit_ = EarlyExit(build.scorer, PORTS, lead=policy.lead_steps(build.tables.scale))
+    joints, now = Joints(build.manifest.joints, SENSORS, None, GLOVE_PERIOD), 0
+    for wait, closed, sensors in scan:
+        now += wait * 500
+        glove = GloveFrame(now, sensors)
+        exit_.start(joints.codes(now, glove))
+        last = next((port for port in range(3) if exit_.after(port, closed)), 2)
+        unread = exit_.unread(last)
+        found = early.step(now, 0, SwitchFrame(now, closed & ~unread, 0, unread), glove).grasp
+        full = whole.step(now, 0, SwitchFrame(now, closed), glove).grasp
+        assert (found.grasp, found.candidate, found.health) == (full.grasp, full.candidate, full.health)
+        assert found.margin <= full.margin
+        assert found.probability <= full.probability * (1 + 1e-12)
+
+
+def test_a_scan_ends_only_when_the_lead_that_the_decision_asks_for_is_sure(make_build: MakeBuild) -> None:
+    build, ends = make_build(), []
+    for lead in (0.0, 0.4):
+        system = System.of(
+            build, Harness(name="any", scanners=(ScannerWiring(port="p", switches=NAMES),)), Policy(lead)
+        )
+        made = system.early_exit(PORTS)
+        expected = EarlyExit(build.scorer, PORTS, lead=round(lead * build.tables.scale))
+        found = []
+        for closed in range(1 << SWITCHES):
+            for exit_ in (made, expected):
+                exit_.start([5, 6, 7])
+            found += [made.after(port, closed) for port in range(3)]
+            assert found[-3:] == [expected.after(port, closed) for port in range(3)]
+        ends.append(found)
+    assert sum(ends[0]) > sum(ends[1]) > 0
+
+
+def test_after_unknown_the_first_candidate_is_decided_on_at_once(make_build: MakeBuild) -> None:
+    live, record = recognizer(make_build(), Policy(dwell_us=10**6, hold_us=10**6)), b"\x05\x06\x07\x08"
+    first = live.step(0, 0, SwitchFrame(0, 0), GloveFrame(0, record)).grasp
+    other = next(
+        closed
+        for closed in range(1 << SWITCHES)
+        if recognizer(make_build()).step(0, 0, SwitchFrame(0, closed), GloveFrame(0, record)).grasp.candidate
+        != first.grasp
+    )
+    held = live.step(100, 0, SwitchFrame(100, other), GloveFrame(100, record)).grasp
+    assert held.grasp == first.grasp != held.candidate
+    assert live.step(9000, 0, None, None).grasp.grasp == UNKNOWN
+    found = live.step(9100, 0, SwitchFrame(9100, other), GloveFrame(9100, record)).grasp
+    assert found.grasp == found.candidate == held.candidate
+
+
+@pytest.mark.slow
+@given(seed=st.integers(0, 20), schedule=schedules(unread=True))
+def test_switches_left_unread_too_early_count_as_lost(
+    make_build: MakeBuild, seed: int, schedule: list[Arrival]
+) -> None:
+    """Whatever was left unread: an answer is either the same for all that it may have been, or degraded."""
+    build = make_build(seed)
+    live = recognizer(build)
+    for number, (now, switches, glove) in enumerate(schedule):
+        found = live.step(now, 0, switches, glove).grasp
+        past = [
+            (then, seen and replace(seen, lost=seen.lost | seen.unread, unread=0), record)
+            for then, seen, record in schedule[: number + 1]
+        ]
+        expected = definition(build, past)
+        if found.health == "ok":
+            assert found.candidate == definition_winner(build, past)
+        if found.lost == expected["lost"]:
+            assert (found.grasp, found.margin, found.health) == tuple(
+                expected[name] for name in ("grasp", "margin", "health")
+            )
+
+
+def definition_winner(build: Build, arrivals: list[Arrival]) -> str:
+    """The candidate, also where so much is lost that it would not be named."""
+    switches, glove = newest([arrival[1] for arrival in arrivals]), newest([arrival[2] for arrival in arrivals])
+    codes = [glove.sensors[SENSORS.index(f"j{number}")] for number in range(JOINTS)]
+    present = np.zeros(JOINTS, bool)
+    lanes = build.lanes_without(flags(switches.closed), np.array(codes), flags(switches.lost), present)
+    return build.grasps[int(np.argmax(lanes))]
+
+
+def test_a_sequential_test_takes_whole_frames_only(make_build: MakeBuild) -> None:
+    live = recognizer(make_build(), Policy(error_rate=0.01, max_lost=1.0))
+    found = live.step(0, 0, SwitchFrame(0, 0, 0, 0b11), GloveFrame(0, b"\x05\x06\x07\x08")).grasp
+    assert (found.health, found.lost) == ("degraded", ("s0", "s1"))
+
+
+def test_a_sequential_test_answers_once_it_has_decided(make_build: MakeBuild) -> None:
+    live, answers = recognizer(make_build(), Policy(error_rate=1e-6, hold_us=10**6)), []
+    for now in range(0, 100_000, 1000):
+        found = live.step(now, 0, SwitchFrame(now, 0b101), GloveFrame(now, b"\x05\x06\x07\x08")).grasp
+        answers.append(found.grasp)
+        assert (found.probability == 0) == (found.grasp == UNKNOWN)
+        assert found.health == ("changing" if found.grasp == UNKNOWN else "ok")
+    assert answers[0] == UNKNOWN
+    assert answers[-1] == found.candidate
+
+
+def test_a_replay_gives_the_same_answers(make_build: MakeBuild) -> None:
+    random = np.random.default_rng(5)
+    calls = [
+        (now, SwitchFrame(now, int(random.integers(64))), GloveFrame(now, random.bytes(4)))
+        for now in range(0, 9000, 300)
+    ]
+    first, second = (recognizer(make_build(), Policy()) for _ in range(2))
+    for now, switches, glove in calls:
+        assert first.step(now, 0, switches, glove).grasp == second.step(now, 0, switches, glove).grasp

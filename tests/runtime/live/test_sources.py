@@ -1,0 +1,343 @@
+"""Devices that are kept, and what arrives of them, joined."""
+
+from collections.abc import Callable, Iterator, Sequence
+from queue import Queue
+from threading import Event, Thread
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from thenar.drivers.errors import DeviceError, SettingError
+from thenar.runtime import Build
+from thenar.runtime.frames import GloveFrame, SwitchFrame, now_us
+from thenar.runtime.live import sources as module
+from thenar.runtime.live.recogniser import LiveRecognizer
+from thenar.runtime.live.sources import RETRY_S, Arrivals, Keeper
+from thenar.runtime.policy import Policy
+from thenar.runtime.published import LiveGrasp
+
+MakeBuild = Callable[..., Build]
+PERIOD_US = 10_000_000
+LONGEST_US = 2 * PERIOD_US
+
+
+LOW, HIGH, NOBODYS = 0b0011, 0b1100, 0b10000
+
+times, limits = st.integers(0, 100), st.integers(0, 100)
+Joined = Callable[..., SwitchFrame | None]
+
+
+@pytest.fixture
+def joined(monkeypatch: pytest.MonkeyPatch) -> Joined:
+    """Return the frames of parts that came (when, part, frame, for how long it counts), as one at a later time."""
+
+    def at(
+        switches: int, owned: Sequence[int], frames: Sequence[tuple[int, int, SwitchFrame, int]], now: int
+    ) -> SwitchFrame | None:
+        arrivals, clock = Arrivals(switches, owned), [0]
+        with monkeypatch.context() as patched:
+            patched.setattr(module, "now_us", lambda: clock[0])
+            for clock[0], part, frame, longest_us in frames:
+                arrivals.put_switches(part, frame, longest_us)
+            clock[0] = now
+            return arrivals.take().switches
+
+    return at
+
+
+def made() -> Arrivals:
+    return Arrivals(3, [0b111])
+
+
+def switches_only(make_build: MakeBuild, period_us: int) -> LiveRecognizer:
+    """A recogniser of six switches that answers as long as one of them is read."""
+    policy = Policy(max_lost=0.99)
+    return LiveRecognizer(make_build(joints=0), switch_period_us=period_us, policy=policy)
+
+
+def test_what_arrived_is_taken_once_and_in_order() -> None:
+    arrivals = made()
+    assert arrivals.take().arrived == ()
+    first, glove, second = SwitchFrame(now_us(), 0b001), GloveFrame(now_us(), b"abc"), SwitchFrame(now_us(), 0b110)
+    arrivals.put_switches(0, first, LONGEST_US)
+    arrivals.put_glove(glove, LONGEST_US)
+    arrivals.put_switches(0, second, LONGEST_US)
+    taken = arrivals.take()
+    assert (taken.switches, taken.glove, taken.arrived) == (second, glove, (first, glove, second))
+    again = arrivals.take()
+    assert (again.switches, again.glove, again.arrived) == (second, glove, ())
+
+
+def test_waiting_ends_when_something_comes_and_not_before() -> None:
+    arrivals = made()
+    assert not arrivals.take().arrived
+    bringing = Thread(target=lambda: arrivals.put_switches(0, SwitchFrame(now_us(), 0b1), LONGEST_US))
+    bringing.start()
+    assert arrivals.take(lambda: PERIOD_US).arrived
+    bringing.join()
+    assert not arrivals.take().arrived
+    assert not arrivals.take(lambda: PERIOD_US, 1).arrived
+
+
+def test_of_more_frames_than_are_kept_the_newest_are() -> None:
+    arrivals = made()
+    frames = [GloveFrame(number, b"abc") for number in range(5000)]
+    for frame in frames:
+        arrivals.put_glove(frame, LONGEST_US)
+    assert arrivals.take().arrived == tuple(frames[-4096:])
+    assert arrivals.overflowed == 5000 - 4096
+    arrivals.put_switches(0, SwitchFrame(now_us(), 0b1), LONGEST_US)
+    assert arrivals.overflowed == 5000 - 4096
+
+
+def test_parts_that_fall_silent_are_lost_though_nothing_came_and_are_so_once(
+    make_build: MakeBuild, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two boards at 1 kHz under a recogniser that waits 20 ms: one falls silent, then the other."""
+    clock, live = [50_000], switches_only(make_build, 10_000)
+    monkeypatch.setattr(module, "now_us", lambda: clock[0])
+    arrivals = Arrivals(6, [0b000111, 0b111000])
+
+    def step(now: int) -> LiveGrasp:
+        clock[0] = now
+        taken = arrivals.take()
+        assert arrivals.take().arrived == ()
+        return live.step(now, 0, taken.switches, None).grasp
+
+    arrivals.put_switches(0, SwitchFrame(50_000, 0b101), 2000)
+    arrivals.put_switches(1, SwitchFrame(49_500, 0b011000), 2000)
+    whole = step(51_500)
+    assert whole.health == "ok"
+    degraded = step(51_501)
+    assert (degraded.health, degraded.lost, degraded.grasp) == ("degraded", ("s3", "s4", "s5"), whole.grasp)
+    for now in (52_001, 53_000, 69_999, 70_001, 80_000):
+        gone = step(now)
+        assert (gone.health, len(gone.lost), gone.candidate) == ("unknown", 6, "unknown")
+
+
+def test_a_part_that_falls_silent_later_than_another_one_read_is_lost_at_once(
+    make_build: MakeBuild, joined: Joined
+) -> None:
+    """The joined frame is then older than the one before it, but for the time of the part that is lost."""
+    live = switches_only(make_build, 10_000)
+    frames = [(49_000, 1, SwitchFrame(49_000, 0b011000), 20_000), (50_000, 0, SwitchFrame(50_000, 0b101), 2000)]
+    assert live.step(52_000, 0, joined(6, [0b000111, 0b111000], frames, 52_000), None).grasp.health == "ok"
+    later = joined(6, [0b000111, 0b111000], frames, 52_001)
+    assert live.step(52_001, 0, later, None).grasp.lost == ("s0", "s1", "s2")
+
+
+def test_a_silent_bus_does_not_take_a_living_glove_down_with_it(make_build: MakeBuild) -> None:
+    build = make_build()
+    arrivals = Arrivals(6, [0b111111])
+    names = ("j0", "j1", "j2")
+    recognizer = LiveRecognizer(build, sensor_names=names, switch_period_us=PERIOD_US, glove_period_us=PERIOD_US)
+    now = now_us()
+    ended_by = GloveFrame(now, b"\x10\x20\x30")
+    arrivals.put_glove(ended_by, LONGEST_US)
+    assert recognizer.step(now, 0, SwitchFrame(now, 0b101, glove=ended_by), ended_by).grasp.health == "ok"
+    for _ in range(5):
+        now += PERIOD_US
+        arrivals.put_glove(GloveFrame(now, b"\x10\x20\x30"), LONGEST_US)
+        grasp = recognizer.step(now, 0, SwitchFrame(now_us(), 0b101, glove=ended_by), arrivals.take().glove).grasp
+    assert grasp.glove_age_us == 0
+    assert set(grasp.lost) == {switch.name for switch in build.manifest.switches}
+
+
+def test_what_is_fresh_is_so_until_it_expires(monkeypatch: pytest.MonkeyPatch) -> None:
+    arrivals, clock = Arrivals(2, [0b01, 0b10]), [1000]
+    monkeypatch.setattr(module, "now_us", lambda: clock[0])
+
+    def fresh_for_us(now: int) -> int | None:
+        clock[0] = now
+        arrivals.take()
+        return arrivals.fresh_for_us(now)
+
+    assert fresh_for_us(1000) is None
+    arrivals.put_switches(0, SwitchFrame(1000, 0), 800)
+    assert fresh_for_us(1100) == 701
+    clock[0] = 1090
+    arrivals.put_switches(1, SwitchFrame(1050, 0), 200)
+    assert fresh_for_us(1100) == 151
+    arrivals.put_glove(GloveFrame(1090, b"abc"), 100)
+    assert fresh_for_us(1100) == 91
+    assert fresh_for_us(1250) == 1
+    assert fresh_for_us(1251) == 550
+    assert fresh_for_us(1801) is None
+
+
+def test_the_gloves_record_is_a_measurement_until_it_expires(monkeypatch: pytest.MonkeyPatch) -> None:
+    arrivals, clock = made(), [1000]
+    monkeypatch.setattr(module, "now_us", lambda: clock[0])
+    record = GloveFrame(990, b"abc")
+    arrivals.put_glove(record, 100)
+    for now, measured in ((1000, record), (1090, record), (1091, None)):
+        clock[0] = now
+        taken = arrivals.take()
+        assert (taken.glove, taken.measured) == (record, measured)
+
+
+def test_nothing_is_joined_before_the_first_frame(joined: Joined) -> None:
+    assert joined(5, [LOW, HIGH], [], 0) is None
+
+
+def test_a_part_alone_that_owns_everything_is_handed_on_as_it_is(joined: Joined) -> None:
+    frame = SwitchFrame(5, 0b01, 0, 0b10, GloveFrame(3, b"x"))
+    assert joined(2, [LOW], [(6, 0, frame, LONGEST_US)], 6) is frame
+
+
+def test_parts_are_joined_at_the_time_of_the_newest(joined: Joined) -> None:
+    first, second = SwitchFrame(100, 0b0001), SwitchFrame(90, 0b1000, lost=0b0100)
+    both = joined(5, [LOW, HIGH], [(100, 0, first, LONGEST_US), (100, 1, second, LONGEST_US)], 200)
+    assert both == SwitchFrame(100, 0b1001, lost=0b0100 | NOBODYS)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.tuples(times, times), st.tuples(limits, limits), times)
+def test_what_a_part_owns_is_lost_as_soon_as_its_frame_has_expired(
+    joined: Joined, read_us: tuple[int, int], longest_us: tuple[int, int], later_us: int
+) -> None:
+    """All of it when all have; and the time never falls, or whoever takes the frames would keep the one before."""
+    parts = zip(read_us, (0b0001, 0b1000), longest_us, strict=True)
+    frames = sorted(
+        (read, part, SwitchFrame(read, closed), longest) for part, (read, closed, longest) in enumerate(parts)
+    )
+    now = max(read_us) + later_us
+    low, high = (now - read <= longest for read, longest in zip(read_us, longest_us, strict=True))
+    lost = NOBODYS | LOW * (not low) | HIGH * (not high)
+    assert joined(5, [LOW, HIGH], frames, now) == SwitchFrame(max(read_us), 0b0001 * low | 0b1000 * high, lost)
+
+
+def test_a_frame_from_the_future_expires_as_if_it_were_of_the_moment_at_which_it_came(joined: Joined) -> None:
+    frames = [(100, 0, SwitchFrame(10**9, 0b01), LONGEST_US)]
+    for now, lost in ((100 + LONGEST_US, 0), (101 + LONGEST_US, LOW)):
+        found = joined(2, [LOW], frames, now)
+        assert found is not None
+        assert found.lost == lost
+
+
+def test_a_part_that_has_not_come_yet_is_lost(joined: Joined) -> None:
+    both = joined(5, [LOW, HIGH], [(9, 1, SwitchFrame(9, 0b1000), LONGEST_US)], 10)
+    assert both == SwitchFrame(9, 0b1000, lost=LOW | NOBODYS)
+
+
+LONG_S = 10.0
+
+
+class Device:
+    """Hands out what the test puts in, one thing a reading; an exception is raised."""
+
+    def __init__(self) -> None:
+        self.samples: Queue[int | Exception] = Queue()
+        self.openings: Queue[Exception | None] = Queue()
+        self.closed = Event()
+
+    def open(self) -> None:
+        wrong = self.openings.get(timeout=LONG_S)
+        if wrong is not None:
+            raise wrong
+
+    def read(self, timeout_s: float) -> int | None:
+        if self.samples.empty():
+            self.closed.wait(0.001)
+            return None
+        sample = self.samples.get()
+        if isinstance(sample, Exception):
+            raise sample
+        return sample
+
+    def close(self) -> None:
+        self.closed.set()
+
+
+class Kept:
+    def __init__(self) -> None:
+        self.device = Device()
+        self.taken: Queue[int] = Queue()
+        self.changes: Queue[tuple[bool, str]] = Queue()
+        self.keeper = Keeper("thing", self.device, self.taken.put, self._changed)
+        self.keeper.start()
+
+    def _changed(self) -> None:
+        self.changes.put((self.keeper.state.connected, self.keeper.state.error))
+
+    def next_change(self) -> tuple[bool, str]:
+        return self.changes.get(timeout=LONG_S)
+
+
+@pytest.fixture
+def kept() -> Iterator[Kept]:
+    one = Kept()
+    yield one
+    one.device.openings.put(None)
+    one.keeper.close()
+
+
+def test_every_sample_is_taken_in_order(kept: Kept) -> None:
+    kept.device.openings.put(None)
+    for number in range(100):
+        kept.device.samples.put(number)
+    assert [kept.taken.get(timeout=LONG_S) for _ in range(100)] == list(range(100))
+    assert kept.next_change() == (True, "")
+
+
+def test_a_device_that_is_lost_is_closed_and_opened_again_and_both_are_told(kept: Kept) -> None:
+    kept.device.openings.put(None)
+    assert kept.next_change() == (True, "")
+    kept.device.samples.put(DeviceError("the cable is out"))
+    assert kept.next_change() == (False, "the cable is out")
+    assert kept.device.closed.wait(LONG_S)
+    kept.device.openings.put(None)
+    assert kept.next_change() == (True, "")
+    kept.device.samples.put(7)
+    assert kept.taken.get(timeout=LONG_S) == 7
+    assert kept.keeper.state.opened == 2
+
+
+def test_failing_again_in_the_same_way_is_no_news(kept: Kept) -> None:
+    for _ in range(3):
+        kept.device.openings.put(DeviceError("nothing there"))
+    kept.device.openings.put(None)
+    assert kept.next_change() == (False, "nothing there")
+    assert kept.next_change() == (True, "")
+    assert kept.keeper.failure is None
+
+
+def test_what_no_try_can_help_ends_it(kept: Kept) -> None:
+    wrong = SettingError("such a glove there is not")
+    kept.device.openings.put(wrong)
+    assert kept.next_change() == (False, "such a glove there is not")
+    kept.keeper.close()
+    assert kept.keeper.failure is wrong
+
+
+def test_what_a_device_could_do_before_is_tried_again(kept: Kept) -> None:
+    kept.device.openings.put(None)
+    assert kept.next_change() == (True, "")
+    kept.device.samples.put(SettingError("an answer that the cable garbled"))
+    assert kept.next_change() == (False, "an answer that the cable garbled")
+    kept.device.openings.put(None)
+    assert kept.next_change() == (True, "")
+    assert kept.keeper.failure is None
+
+
+def test_a_fault_of_the_program_shows_with_its_trace_is_counted_and_leaves_no_dead_thread(
+    kept: Kept, caplog: pytest.LogCaptureFixture
+) -> None:
+    kept.device.openings.put(None)
+    assert kept.next_change() == (True, "")
+    for _ in range(3):  # one amid reading, two while it is opened again
+        kept.device.samples.put(ZeroDivisionError("oops"))
+        kept.device.openings.put(ZeroDivisionError("oops"))
+    assert kept.next_change() == (False, "ZeroDivisionError: oops")
+    kept.device.openings.put(None)
+    assert kept.next_change() == (True, "")
+    assert kept.keeper.state.faults >= 3
+    traces = [record for record in caplog.records if record.name == "thenar" and record.exc_info]
+    assert "thing" in traces[0].getMessage()
+    assert "ZeroDivisionError: oops" in caplog.text
+    assert "Traceback" in caplog.text
+
+
+def test_retries_leave_time_to_recover_within_a_second() -> None:
+    assert RETRY_S <= 0.25

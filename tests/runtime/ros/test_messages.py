@@ -1,0 +1,240 @@
+"""The messages are ROS 2's: layout on the wire and hashes of types, both worked out anew from the .msg files.
+
+The layout is CDR (OMG, plain XCDR1, little-endian), the hashes are REP-2011's: SHA-256 of the type's description.
+"""
+
+import hashlib
+import json
+import struct
+from collections.abc import Sequence
+from importlib import import_module
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.runtime.preshape import Preshape
+
+# As they stand in builtin_interfaces, std_msgs, sensor_msgs and trajectory_msgs, without their comments.
+MSG = {
+    "builtin_interfaces/msg/Time": "int32 sec\nuint32 nanosec",
+    "builtin_interfaces/msg/Duration": "int32 sec\nuint32 nanosec",
+    "std_msgs/msg/Header": "builtin_interfaces/Time stamp\nstring frame_id",
+    "std_msgs/msg/String": "string data",
+    "sensor_msgs/msg/JointState": (
+        "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort"
+    ),
+    "trajectory_msgs/msg/JointTrajectoryPoint": (
+        "float64[] positions\nfloat64[] velocities\nfloat64[] accelerations\nfloat64[] effort\n"
+        "builtin_interfaces/Duration time_from_start"
+    ),
+    "trajectory_msgs/msg/JointTrajectory": (
+        "std_msgs/Header header\nstring[] joint_names\ntrajectory_msgs/JointTrajectoryPoint[] points"
+    ),
+}
+PUBLISHED = ("std_msgs/msg/String", "sensor_msgs/msg/JointState", "trajectory_msgs/msg/JointTrajectory")
+# type_description_interfaces/msg/FieldType: 48 more is an array, 144 more an unbounded sequence.
+FIELD_TYPES = {"int32": 6, "uint32": 7, "float64": 11, "string": 17}
+NESTED, SEQUENCE = 1, 144
+
+strings = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=9)
+doubles = st.lists(st.floats(allow_nan=False), max_size=5)
+int32s = st.integers(-(2**31), 2**31 - 1)
+uint32s = st.integers(0, 2**32 - 1)
+
+
+class Cdr:
+    """Writes plain CDR, each value aligned to its size counted from behind the four bytes of the header."""
+
+    def __init__(self) -> None:
+        self.body = b""
+
+    def number(self, code: str, value: float) -> None:
+        size = struct.calcsize(code)
+        self.body += bytes(-len(self.body) % size) + struct.pack(f"<{code}", value)
+
+    def string(self, text: str) -> None:
+        data = text.encode() + b"\0"
+        self.number("I", len(data))
+        self.body += data
+
+    def strings(self, texts: Sequence[str]) -> None:
+        self.number("I", len(texts))
+        for text in texts:
+            self.string(text)
+
+    def doubles(self, *sequences: Sequence[float]) -> None:
+        for values in sequences:
+            self.number("I", len(values))
+            for value in values:
+                self.number("d", value)
+
+    def header(self, sec: int, nanosec: int, frame: str) -> None:
+        self.number("i", sec)
+        self.number("I", nanosec)
+        self.string(frame)
+
+    def message(self) -> bytes:
+        return b"\x00\x01\x00\x00" + self.body
+
+
+def written(message: Any) -> bytes:
+    data: bytes = message.serialize(use_version_2=False)
+    return data
+
+
+def described(name: str) -> dict[str, Any]:
+    return {"type_name": name, "fields": [field(line) for line in MSG[name].splitlines()]}
+
+
+def field(line: str) -> dict[str, Any]:
+    kind, name = line.split()
+    plain = kind.removesuffix("[]")
+    nested = "/msg/".join(plain.split("/")) if "/" in plain else ""
+    number = (NESTED if nested else FIELD_TYPES[plain]) + (SEQUENCE if kind != plain else 0)
+    kinds = {"type_id": number, "capacity": 0, "string_capacity": 0, "nested_type_name": nested}
+    return {"name": name, "type": kinds}
+
+
+def nested_in(name: str) -> set[str]:
+    inner = {one["type"]["nested_type_name"] for one in described(name)["fields"]} - {""}
+    return inner.union(*(nested_in(one) for one in inner))
+
+
+def rihs01(name: str) -> str:
+    whole = {
+        "type_description": described(name),
+        "referenced_type_descriptions": [described(one) for one in sorted(nested_in(name))],
+    }
+    return "RIHS01_" + hashlib.sha256(json.dumps(whole).encode()).hexdigest()
+
+
+def dds_name(name: str) -> str:
+    package, _, kind = name.split("/")
+    return f"{package}::msg::dds_::{kind}_"
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_a_types_hash_is_that_of_its_description(ros: ModuleType, name: str) -> None:
+    assert ros.TYPE_HASHES[dds_name(name)] == rihs01(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "known"),
+    [
+        ("builtin_interfaces/msg/Time", "b106235e25a4c5ed35098aa0a61a3ee9c9b18d197f398b0e4206cea9acf9c197"),
+        ("builtin_interfaces/msg/Duration", "e8d009f659816f758b75334ee1a9ca5b5c0b859843261f14c7f937349599d93b"),
+        ("std_msgs/msg/Header", "f49fb3ae2cf070f793645ff749683ac6b06203e41c891e17701b1cb597ce6a01"),
+        (
+            "trajectory_msgs/msg/JointTrajectoryPoint",
+            "de8907036d8bd45aac6f30cc9044a3d4a329c42cbf719aff7d95a584cfa532d7",
+        ),
+    ],
+)
+def test_the_way_hashes_are_worked_out_here_is_that_of_ross_own_packages(name: str, known: str) -> None:
+    assert rihs01(name) == f"RIHS01_{known}"
+
+
+def test_every_type_has_ross_name_and_fields(ros: ModuleType) -> None:
+    for name, text in MSG.items():
+        kind = getattr(ros, name.rpartition("/")[2])
+        assert kind.__idl_typename__ == dds_name(name)
+        assert list(kind.__dataclass_fields__) == [line.split()[1] for line in text.splitlines()]
+
+
+@given(text=strings)
+def test_a_string_has_ross_layout(ros: ModuleType, text: str) -> None:
+    cdr = Cdr()
+    cdr.string(text)
+    assert written(ros.String(text)) == cdr.message()
+
+
+@given(int32s, uint32s, strings, st.lists(strings, max_size=4), doubles, doubles, doubles)
+def test_a_joint_state_has_ross_layout(  # doubles fall on multiples of 8, which XCDR2 would not do
+    ros: ModuleType,
+    sec: int,
+    nanosec: int,
+    frame: str,
+    names: list[str],
+    positions: list[float],
+    velocities: list[float],
+    efforts: list[float],
+) -> None:
+    cdr = Cdr()
+    cdr.header(sec, nanosec, frame)
+    cdr.strings(names)
+    cdr.doubles(positions, velocities, efforts)
+    message = ros.JointState(ros.Header(ros.Time(sec, nanosec), frame), names, positions, velocities, efforts)
+    assert written(message) == cdr.message()
+
+
+@given(
+    st.lists(strings, max_size=3), st.lists(st.tuples(doubles, doubles, doubles, doubles, int32s, uint32s), max_size=3)
+)
+def test_a_trajectory_has_ross_layout(
+    ros: ModuleType,
+    names: list[str],
+    points: list[tuple[list[float], list[float], list[float], list[float], int, int]],
+) -> None:
+    cdr = Cdr()
+    cdr.header(0, 0, "")
+    cdr.strings(names)
+    cdr.number("I", len(points))
+    for *sequences, sec, nanosec in points:
+        cdr.doubles(*sequences)
+        cdr.number("i", sec)
+        cdr.number("I", nanosec)
+    made = [ros.JointTrajectoryPoint(*point[:4], ros.Duration(*point[4:])) for point in points]
+    message = ros.JointTrajectory(ros.Header(ros.Time(0, 0), ""), names, made)
+    assert written(message) == cdr.message()
+
+
+@given(st.lists(strings, max_size=6), st.integers(0, 2**31 * 10**6 - 1), st.data())
+def test_angles_that_are_packed_are_the_joint_state_that_cyclone_writes(
+    ros: ModuleType, names: list[str], unix_us: int, data: st.DataObject
+) -> None:
+    from thenar.runtime.ros.messages import PackedAngles
+    from thenar.runtime.sinks import JointAngles
+
+    packed = PackedAngles(tuple(names))
+    for _ in range(2):
+        positions = data.draw(st.tuples(*[st.floats(allow_nan=False)] * len(names)))
+        packed.set(unix_us, JointAngles(tuple(names), positions))
+        stamp = ros.Time(unix_us // 10**6, unix_us % 10**6 * 1000)
+        assert packed.serialize() == written(ros.JointState(ros.Header(stamp, ""), names, list(positions), [], []))
+
+
+@given(text=strings)
+def test_a_string_that_is_packed_is_the_one_that_cyclone_writes(ros: ModuleType, text: str) -> None:
+    from thenar.runtime.ros.messages import PackedString
+
+    assert PackedString(text).serialize(use_version_2=False) == written(ros.String(text))
+
+
+def test_a_preshape_is_a_trajectory_of_one_point_that_starts_at_once(ros: ModuleType, preshape: Preshape) -> None:
+    from thenar.runtime.ros.messages import trajectory
+
+    point = ros.JointTrajectoryPoint([0.0, 0.5], [], [], [], ros.Duration(1, 250_000_000))
+    names = ["finger_1/prox_joint", "finger_1/med_joint"]
+    assert trajectory(preshape) == ros.JointTrajectory(ros.Header(ros.Time(0, 0), ""), names, [point])
+
+
+@pytest.fixture(scope="module")
+def decoders() -> dict[str, Any]:
+    """Return decoders of another hand, made from the .msg files: those of the MCAP tools for ROS 2."""
+    dynamic = import_module("mcap_ros2._dynamic")
+    name = "trajectory_msgs/msg/JointTrajectory"
+    inner = [f"{'=' * 80}\nMSG: {one.replace('/msg/', '/')}\n{MSG[one]}" for one in sorted(nested_in(name))]
+    found: dict[str, Any] = dynamic.generate_dynamic(name, "\n".join([MSG[name], *inner]))
+    return found
+
+
+def test_the_tools_of_ros_2_read_a_preshape(ros: ModuleType, decoders: dict[str, Any], preshape: Preshape) -> None:
+    from thenar.runtime.ros.messages import trajectory
+
+    read: SimpleNamespace = decoders["trajectory_msgs/msg/JointTrajectory"](written(trajectory(preshape)))
+    assert tuple(read.joint_names) == preshape.joint_names
+    assert tuple(read.points[0].positions) == preshape.positions
+    assert (read.points[0].time_from_start.sec, read.points[0].time_from_start.nanosec) == (1, 250_000_000)

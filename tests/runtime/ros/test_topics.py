@@ -1,0 +1,294 @@
+"""Topics of ROS 2, read by another process that knows their types from elsewhere (ros_listener.py), over loopback."""
+
+import json
+import os
+import queue
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from itertools import count
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from thenar.drivers.errors import SettingError
+from thenar.runtime.preshape import Preshape
+from thenar.runtime.published import UNKNOWN, HealthReport, LiveGrasp
+from thenar.runtime.sinks import JointAngles, Sink, SinkError, open_sink
+
+MakeGrasp = Callable[..., LiveGrasp]
+Message = dict[str, Any]
+
+# Unicast on loopback alone: neither a network nor multicast is needed, and no other machine hears of it.
+LOOPBACK = """\
+<CycloneDDS><Domain>
+  <General><Interfaces><NetworkInterface name="lo"/></Interfaces><AllowMulticast>false</AllowMulticast></General>
+  <Discovery>
+    <ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>99</MaxAutoParticipantIndex>
+    <Peers><Peer address="localhost"/></Peers>
+  </Discovery>
+</Domain></CycloneDDS>"""
+DOMAIN = 77
+LISTENER = Path(__file__).with_name("ros_listener.py")
+names = count()
+
+
+@pytest.fixture(autouse=True)
+def loopback(ros: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
+
+
+@pytest.fixture
+def name() -> str:
+    """Return a namespace that no other test has, in whatever process it runs."""
+    return f"/hand{time.monotonic_ns()}n{next(names)}"
+
+
+@pytest.fixture
+def sink(name: str) -> Iterator[Sink]:
+    made = open_sink(f"ros:{name}")
+    yield made
+    made.close()
+
+
+class Listener:
+    """The other process; what it says comes out of a queue."""
+
+    def __init__(self, name: str, reliability: str = "reliable") -> None:
+        command = [sys.executable, str(LISTENER), name, reliability, str(DOMAIN)]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE)
+        self.said: queue.Queue[Message] = queue.Queue()
+        self.thread = threading.Thread(target=self._read, daemon=True)
+        self.thread.start()
+        assert self.said.get(timeout=20) == {"ready": True}
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            self.said.put(json.loads(line))
+
+    def hear(self, key: str, value: str, publish: Callable[[], None] = lambda: None) -> Message:
+        """Return the first message whose `key` is `value`; `publish` is called until it comes."""
+        deadline = time.monotonic() + 20
+        while time.monotonic() < deadline:
+            publish()
+            try:
+                said = self.said.get(timeout=0.01)
+            except queue.Empty:
+                continue
+            if said.get(key) == value:
+                return said
+        raise AssertionError(f"never heard of {value}")
+
+    def close(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        self.thread.join(timeout=5)
+        assert self.process.stdout is not None
+        self.process.stdout.close()
+
+
+@pytest.fixture
+def listen(name: str) -> Iterator[Callable[..., Listener]]:
+    listeners: list[Listener] = []
+
+    def listen(reliability: str = "reliable") -> Listener:
+        listeners.append(Listener(name, reliability))
+        return listeners[-1]
+
+    yield listen
+    for listener in listeners:
+        listener.close()
+
+
+Listen = Callable[..., Listener]
+
+
+@pytest.mark.parametrize("reliability", ["reliable", "best effort"])
+def test_every_topic_is_read_back_as_it_was_published(
+    sink: Sink, listen: Listen, reliability: str, make_grasp: MakeGrasp, preshape: Preshape, angles: JointAngles
+) -> None:
+    listener = listen(reliability)
+
+    def publish() -> None:
+        sink.publish(make_grasp(0), preshape, angles)
+
+    assert listener.hear("topic", "grasp", publish)["message"] == {"data": "PoS"}
+    assert listener.hear("topic", "angles", publish)["message"] == {
+        "header": {"stamp": {"sec": 1_700_000_000, "nanosec": 123_456_000}, "frame_id": ""},
+        "name": list(angles.names),
+        "position": list(angles.positions_rad),
+        "velocity": [],
+        "effort": [],
+    }
+    assert sink.report().readers == 1
+    assert sink.report().lost == 0
+
+
+def test_a_preshape_is_read_back_as_a_trajectory(
+    sink: Sink, listen: Listen, make_grasp: MakeGrasp, preshape: Preshape
+) -> None:
+    listener = listen()
+    heard = listener.hear("topic", "preshape", lambda: sink.publish(make_grasp(0), preshape, None))
+    assert heard["message"] == {
+        "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
+        "joint_names": ["finger_1/prox_joint", "finger_1/med_joint"],
+        "points": [
+            {
+                "positions": [0.0, 0.5],
+                "velocities": [],
+                "accelerations": [],
+                "effort": [],
+                "time_from_start": {"sec": 1, "nanosec": 250_000_000},
+            }
+        ],
+    }
+
+
+@pytest.mark.parametrize(
+    ("topic", "kind"),
+    [
+        ("grasp", "std_msgs::msg::dds_::String_"),
+        ("preshape", "trajectory_msgs::msg::dds_::JointTrajectory_"),
+        ("angles", "sensor_msgs::msg::dds_::JointState_"),
+        ("health", "std_msgs::msg::dds_::String_"),
+    ],
+)
+def test_writers_are_found_under_ros_2s_names_with_its_qos(
+    sink: Sink, listen: Listen, name: str, ros: ModuleType, topic: str, kind: str
+) -> None:
+    found = listen().hear("found", f"rt{name}/{topic}")
+    assert found["type"] == kind
+    assert found["user_data"] == f"typehash={ros.TYPE_HASHES[kind]};"
+    assert found["reliability"] == "Policy.Reliability.Reliable"
+    assert found["durability"] == "Policy.Durability.Volatile"
+
+
+def test_a_preshape_is_told_when_it_changes_and_to_whoever_comes_later(
+    sink: Sink, listen: Listen, make_grasp: MakeGrasp, preshape: Preshape
+) -> None:
+    def publish() -> None:
+        sink.publish(make_grasp(0), preshape, None)
+
+    first = listen()
+    first.hear("topic", "preshape", publish)
+    # Many frames later the hand has not been told again.
+    for number in range(50):
+        sink.publish(make_grasp(number), preshape, None)
+    sink.publish(make_grasp(0, "the last"), preshape, None)
+    between = [first.said.get(timeout=20)]
+    while between[-1].get("message") != {"data": "the last"}:
+        between.append(first.said.get(timeout=20))
+    assert not [said for said in between if said.get("topic") == "preshape"]
+    listen().hear("topic", "preshape", publish)
+    other = Preshape("other", preshape.joint_names, (1.0, 1.0), 0.5)
+    heard = first.hear("topic", "preshape", lambda: sink.publish(make_grasp(0), other, None))
+    while heard["message"]["points"][0]["positions"] != [1.0, 1.0]:
+        heard = first.hear("topic", "preshape")
+
+
+def test_unknown_is_published_as_such(sink: Sink, listen: Listen, make_grasp: MakeGrasp) -> None:
+    heard = listen().hear("topic", "grasp", lambda: sink.publish(make_grasp(0, UNKNOWN), None, None))
+    assert heard["message"] == {"data": "unknown"}
+
+
+def test_how_the_glove_fares_is_published_as_json(sink: Sink, listen: Listen, health: HealthReport) -> None:
+    heard = listen().hear("topic", "health", lambda: sink.health(health))
+    assert json.loads(heard["message"]["data"])["stuck_open"] == ["s001"]
+
+
+def resident_kb() -> int:
+    return int(Path("/proc/self/statm").read_text().split()[1]) * 4
+
+
+def test_a_reader_that_hangs_holds_up_nobody(
+    sink: Sink, listen: Listen, make_grasp: MakeGrasp, preshape: Preshape, angles: JointAngles
+) -> None:
+    hangs = listen()
+    hangs.hear("topic", "grasp", lambda: sink.publish(make_grasp(0), preshape, angles))
+    hangs.process.send_signal(signal.SIGSTOP)
+    before, begun = resident_kb(), time.monotonic()
+    for number in range(20_000):
+        sink.publish(make_grasp(number), preshape, angles)
+    took = time.monotonic() - begun
+    assert sink.report().lost == 0
+    assert took < 10
+    assert resident_kb() - before < 4_000
+    listen().hear("topic", "grasp", lambda: sink.publish(make_grasp(0), None, None))
+    begun = time.monotonic()
+    sink.close()
+    assert time.monotonic() - begun < 2
+
+
+def test_what_cannot_be_sent_is_counted_and_raises_nothing(
+    sink: Sink, make_grasp: MakeGrasp, angles: JointAngles
+) -> None:
+    sink.publish(make_grasp(0), None, JointAngles(("a", "b"), (1.0,)))
+    sink.publish(make_grasp(1), None, angles)
+    report = sink.report()
+    assert (report.sent, report.lost) == (1, 1)
+    assert report.error
+    sink.close()
+    sink.close()
+    sink.publish(make_grasp(2), None, angles)
+    assert sink.report().lost == 2
+
+
+def test_two_in_one_process_share_the_domain(sink: Sink, make_grasp: MakeGrasp, name: str) -> None:
+    other = open_sink(f"ros:{name}/left")
+    other.publish(make_grasp(0), None, None)
+    other.close()
+    sink.publish(make_grasp(0), None, None)
+    assert (other.report().sent, sink.report().sent) == (1, 1)
+
+
+def test_settings_that_dds_cannot_use_are_told(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK.replace('"lo"', '"no_such_interface"'))
+    monkeypatch.setenv("ROS_DOMAIN_ID", "78")
+    with pytest.raises(SinkError, match=r"in domain 78.*CYCLONEDDS_URI"):
+        open_sink(f"ros:{name}")
+
+
+@pytest.mark.parametrize("number", ["233", "-1", "lab"])
+def test_a_domain_that_ros_cannot_have_is_refused(monkeypatch: pytest.MonkeyPatch, name: str, number: str) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", number)
+    with pytest.raises(SettingError, match="from 0 to 232"):
+        open_sink(f"ros:{name}")
+
+
+def devices() -> set[bytes]:
+    """Return to which network devices the datagram sockets of this process are bound; empty: to all."""
+    found = set()
+    for link in Path("/proc/self/fd").iterdir():
+        with suppress(OSError):
+            if str(link.readlink()).startswith("socket:"):
+                with socket.socket(fileno=os.dup(int(link.name))) as one:
+                    if one.type == socket.SOCK_DGRAM and one.family in (socket.AF_INET, socket.AF_INET6):
+                        found.add(one.getsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, 16).rstrip(b"\0"))
+    return found
+
+
+def test_unless_it_is_asked_for_no_other_machine_can_read(
+    monkeypatch: pytest.MonkeyPatch, name: str, listen: Listen, make_grasp: MakeGrasp
+) -> None:
+    listener = listen()
+    monkeypatch.delenv("CYCLONEDDS_URI")
+    sink = open_sink(f"ros:{name}")
+    assert devices() == {b"lo"}
+    memberships = Path("/proc/net/igmp").read_text()
+    assert "0100FFEF" not in memberships  # 239.255.0.1, where participants call for each other
+    heard = listener.hear("topic", "grasp", lambda: sink.publish(make_grasp(0), None, None))
+    assert heard["message"] == {"data": "PoS"}
+    sink.close()
+    sink = open_sink(f"ros:{name}?public")
+    assert sink.report().where == f"ros:{name}?public"
+    assert b"" in devices()
+    sink.close()

@@ -1,0 +1,136 @@
+"""What a device makes of the answers of its ports; that the ports are read is shown on real device nodes."""
+
+from collections.abc import Callable, Sequence
+
+import pytest
+
+from thenar.runtime import Build
+from thenar.runtime.calibration import Joints
+from thenar.runtime.frames import GloveFrame, Newest, SwitchFrame
+from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Debounce, Harness
+from thenar.runtime.scanning.decided import EarlyExit
+from thenar.runtime.scanning.ports import whole_scan
+from thenar.runtime.sources import i2c as module
+from thenar.runtime.sources.i2c import I2cDevice
+
+MakeBuild = Callable[..., Build]
+NAMES = tuple(f"s{number}" for number in range(6))
+HIGH = 0xFF
+
+
+class Bench:
+    """A clock that only the answers move, and the answers of two PCF8574 in the order in which they are asked for."""
+
+    def __init__(self) -> None:
+        self.now = 1_000_000
+        self.answers: list[list[int | None]] = []
+        self.slept: list[float] = []
+        self.takes_us = 100
+
+    def read(self) -> list[int | None]:
+        self.now += self.takes_us
+        return self.answers.pop(0)
+
+
+class Bus:
+    bench: Bench
+
+    def __init__(self, *_: object, **__: object) -> None:
+        pass
+
+    def open(self) -> None:
+        pass
+
+    def prepare(self, _ports: Sequence[object]) -> Bench:
+        return self.bench
+
+
+@pytest.fixture
+def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
+    bench = Bench()
+    Bus.bench = bench
+    monkeypatch.setattr(module, "I2cBus", Bus)
+    monkeypatch.setattr(module, "now_us", lambda: bench.now)
+    monkeypatch.setattr("time.sleep", bench.slept.append)
+    return bench
+
+
+def device(debounce: Debounce) -> I2cDevice:
+    chips = tuple(
+        ChipWiring(kind="pcf8574", address=0x20 + chip, pins={f"P{pin}": NAMES[3 * chip + pin] for pin in range(3)})
+        for chip in range(2)
+    )
+    harness = Harness(name="two", buses=(BusWiring(device="/dev/i2c-1", chips=chips),), debounce=debounce)
+    return I2cDevice(harness, 0, whole_scan(harness, NAMES))
+
+
+def frame(of: I2cDevice) -> SwitchFrame:
+    of.open()
+    found = of.read(0.1)
+    assert found is not None
+    return found
+
+
+class AtOnce(EarlyExit):
+    """Nothing matters after the first port."""
+
+    def after(self, port: int, closed: int, lost: int = 0) -> bool:
+        return True
+
+
+OFF = Debounce(enabled=False)
+
+
+def test_a_pin_that_is_pulled_down_is_a_closed_switch(bench: Bench) -> None:
+    bench.answers = [[HIGH & ~0b001, HIGH & ~0b110]]
+    assert frame(device(OFF)) == SwitchFrame(bench.now, 0b110_001)
+
+
+def test_a_port_without_an_answer_is_lost_and_the_other_is_not(bench: Bench) -> None:
+    bench.answers = [[None, HIGH & ~0b010]]
+    assert frame(device(OFF)) == SwitchFrame(bench.now, 0b010_000, lost=0b000_111)
+    assert not bench.slept
+
+
+def test_a_bus_on_which_nobody_answers_is_not_asked_in_a_busy_loop(bench: Bench) -> None:
+    bench.answers = [[None, None]]
+    assert frame(device(OFF)).lost == 0b111_111
+    assert bench.slept
+
+
+def test_nor_is_one_whose_first_chip_is_gone_and_whose_others_do_not_matter(
+    bench: Bench, make_build: MakeBuild
+) -> None:
+    build = make_build(joints=3)
+    joints, glove = Joints(build.manifest.joints, ("j0", "j1", "j2"), None, 10_000), Newest[GloveFrame]()
+    glove.take(GloveFrame(bench.now, b"\x10\x20\x30"), bench.now, 20_000)
+    made = device(OFF)
+    made.end_early(lambda ports: AtOnce(build.scorer, ports), joints, glove)
+    bench.answers = [[None]]
+    found = frame(made)
+    assert (found.lost, found.unread) == (0b000_111, 0b111_000)
+    assert bench.slept
+
+
+def test_what_was_read_before_a_chip_held_the_bus_up_is_no_news(bench: Bench) -> None:
+    bench.takes_us = 1_000_000
+    bench.answers = [[HIGH & ~0b001, None]]
+    assert frame(device(OFF)) == SwitchFrame(bench.now, 0, lost=0b111_111)
+
+
+def test_bounce_within_a_scan_or_two_is_not_seen(bench: Bench) -> None:
+    made = device(Debounce())
+    bench.takes_us = 1000
+    for closed in (1, 0, 1, 1, 1):
+        bench.answers.append([HIGH & ~(0b001 * closed), HIGH])
+    assert [frame(made).closed for _ in range(5)] == [1] * 5
+
+
+@pytest.mark.parametrize("pause_us", [20_001, 60_000_000])
+def test_after_a_pause_a_reading_counts_at_once(bench: Bench, pause_us: int) -> None:
+    made = device(Debounce())
+    bench.answers += [[HIGH & ~0b001, HIGH]] * 20
+    bench.answers += [[HIGH, HIGH]]
+    assert [frame(made).closed for _ in range(20)] == [1] * 20
+    bench.now += pause_us
+    assert frame(made).closed == 0

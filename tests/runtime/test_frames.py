@@ -1,0 +1,70 @@
+"""Frames that age, and sets of switches."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.runtime.frames import Newest, Pauses, Rewired, SwitchFrame
+
+MASKS = st.integers(0, 255)
+PAIRS = st.lists(st.tuples(st.integers(0, 40), st.integers(0, 40)), unique_by=(lambda p: p[0], lambda p: p[1]))
+
+
+def test_a_frame_counts_for_as_long_as_was_said_when_it_came_and_no_longer() -> None:
+    newest = Newest[SwitchFrame]()
+    assert newest.fresh(0) is None
+    newest.take(SwitchFrame(1000, 5), 1000, 200)
+    assert newest.fresh(1200) == SwitchFrame(1000, 5)
+    assert newest.fresh(1201) is None
+    assert newest.time_us == 1000
+
+
+@given(ahead=st.integers(0, 10**12), again=st.integers(0, 5))
+def test_a_frame_from_the_future_ages_from_when_it_came(ahead: int, again: int) -> None:
+    newest = Newest[SwitchFrame]()
+    for late in range(again + 1):
+        newest.take(SwitchFrame(1000 + ahead, 5), 1000 + 30 * late, 200)
+    assert newest.fresh(1200) is not None
+    assert newest.fresh(1201) is None
+
+
+def test_an_older_frame_does_not_replace_a_newer_one() -> None:
+    newest = Newest[SwitchFrame]()
+    for frame in (SwitchFrame(50, 1), SwitchFrame(49, 2), SwitchFrame(50, 3)):
+        newest.take(frame, 60, 200)
+    assert newest.fresh(60) == SwitchFrame(50, 3)
+
+
+def test_a_switch_that_was_not_read_for_longer_than_the_pause_is_told_once_when_it_is_read_again() -> None:
+    pauses = Pauses(100)
+    readings = [(0, 0b11), (10, 0b01), (50, 0b01), (111, 0b11), (112, 0b11), (120, 0b01), (220, 0b11)]
+    assert [pauses.over(time, known) for time, known in readings] == [0, 0, 0, 0b10, 0, 0, 0]
+
+
+@given(st.lists(st.tuples(st.integers(0, 200), MASKS), max_size=40), st.integers(0, 300))
+def test_it_is_so_for_every_switch_by_itself(steps: list[tuple[int, int]], pause_us: int) -> None:
+    pauses, now = Pauses(pause_us), 0
+    gone = dict[int, int]()
+    before = 0
+    for passed, known in steps:
+        now += passed
+        gone |= {switch: now for switch in range(8) if (before & ~known) >> switch & 1}
+        back = [switch for switch in gone if known >> switch & 1]
+        assert pauses.over(now, known) == sum(1 << one for one in back if now - gone[one] > pause_us)
+        for one in back:
+            del gone[one]
+        before = known
+
+
+@given(PAIRS, st.lists(st.integers(0, 2**41 - 1)))
+def test_every_bit_goes_to_its_switch_whatever_was_asked_before(
+    pairs: list[tuple[int, int]], states: list[int]
+) -> None:
+    rewired = Rewired(pairs)
+    for bits in states:
+        closed = {switch for bit, switch in pairs if bits >> bit & 1}
+        assert rewired(bits) == sum(1 << switch for switch in closed)
+
+
+@given(PAIRS)
+def test_the_targets_are_all_its_switches(pairs: list[tuple[int, int]]) -> None:
+    assert Rewired(pairs).targets == Rewired(pairs)(2**41 - 1)
