@@ -99,6 +99,7 @@ def rows_recognised(grasp_set: GraspSet, point: Point, train: Rows, test: Rows) 
         columns = METHODS[setting.way.method].chooser(learning)(setting.way.parameter)
     bits = grasp_set.switches[:, list(columns)]
     X = np.hstack([bits.astype(np.uint16), codes])
+    assert setting.rounds is not None
     stumps, _ = boost(X[train], labels[train], 4, rounds=setting.rounds)
     tables = collapse(stumps, len(columns))
     scorer = Scorer(quantise(tables, bits[train], codes[train], setting.width, setting.table_bits))
