@@ -5,14 +5,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from rich.text import Text
 
-from .common import Listed, any_path, err, existing_file, existing_folder, json_flag, out, print_json, progress
-from .methods import WithMethods, method_names
-from .trainer_options import asked_settings, trainer_options
+from thenar.compiler.text import duration, interval
+
+from .common import Listed, any_path, err, existing_file, existing_folder, json_flag, out, progress, show, table
+from .options import WithMethods, asked_settings, method_names, trainer_options
 
 if TYPE_CHECKING:
     from rich.table import Table
-    from rich.text import Text
 
     from thenar.compiler.frontier.points import Check, Frontier, Point
 
@@ -69,7 +70,6 @@ def command(
     rate: float | None,
     methods: tuple[str, ...] | None,
     rivals: tuple[str, ...] | None,
-    as_json: bool,
     **asked: Any,
 ) -> int:
     """Show what accuracy costs in time: which switches, joints, rounds, tables, wirings and decisions are worth it.
@@ -114,10 +114,7 @@ def command(
             report=report,
             **asked,
         )
-    if as_json:
-        print_json(found)
-    else:
-        _print(found, output)
+    show(found, _print, output)
     if wanted.words and found.picked is None:
         err().print(f"no point suits: {wanted.words} is beyond this frontier")
         return 1
@@ -136,8 +133,6 @@ def _print(found: "Frontier", output: Path) -> None:
 
 def print_frontier(frontier: "Frontier") -> None:
     """Print the points, the picked one bold; then checks, what was left out, and what the picture says."""
-    from rich.text import Text
-
     from thenar.compiler.frontier.words import summary
 
     console = out()
@@ -154,16 +149,8 @@ def print_frontier(frontier: "Frontier") -> None:
 
 
 def _grid(frontier: "Frontier") -> "Table":
-    from rich.table import Table
-    from rich.text import Text
-
-    grid = Table(title=Text(_title(frontier)))
-    for head in ("point", "switches"):
-        grid.add_column(head, justify="right")
-    for head in _WORDS:
-        grid.add_column(head)
-    for head in _NUMBERS:
-        grid.add_column(head, justify="right")
+    counts = ("point", "switches")
+    grid = table((*counts, *_WORDS, *_NUMBERS), (*counts, *_NUMBERS), Text(_title(frontier)))
     for point in frontier.points:
         grid.add_row(*_cells(point), style="bold" if point.number == frontier.picked else None)
     return grid
@@ -174,11 +161,8 @@ def _title(frontier: "Frontier") -> str:
     return f"The best of {frontier.combinations:,} combinations, {frontier.source} on {frontier.target}{wanted}"
 
 
-def _cells(point: "Point") -> "tuple[Text, ...]":
-    from rich.text import Text
-
+def _cells(point: "Point") -> tuple[Text, ...]:
     from thenar.compiler.frontier.words import is_usual, training_of, way_of, wiring_of
-    from thenar.compiler.text import duration, interval
 
     setting = point.setting
     texts = (
