@@ -1,6 +1,6 @@
 """Options of several commands: the placement methods and the trainers, read from their registries."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -40,12 +40,12 @@ def _remarks(method: "Method") -> str:
     return f" ({'; '.join(remarks)})" if remarks else ""
 
 
-def trainer_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add `--trainer` and an option for each setting of a trainer."""
+def trainer_options(command: Callable[..., Any], without: Collection[str] = ()) -> Callable[..., Any]:
+    """Add `--trainer` and an option for each setting of a trainer, `without` those that the command has itself."""
     from thenar.compiler.trainers.base import TRAINERS
 
     settings = {setting.name: setting for trainer in TRAINERS.values() for setting in trainer.settings}
-    for setting in reversed(settings.values()):
+    for setting in reversed([setting for name, setting in settings.items() if name not in without]):
         command = _option(setting)(command)
     names = ", ".join(f"{trainer.name} ({trainer.what})" for trainer in TRAINERS.values())
     choice = click.Choice(list(TRAINERS))
