@@ -1,15 +1,49 @@
-"""The options of commands that train: which trainer, and the settings of every one, read from the registry."""
+"""Options of several commands: the placement methods and the trainers, read from their registries."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from thenar.compiler.trainers.base import TRAINERS, Setting
+from .common import parted
+
+if TYPE_CHECKING:
+    from thenar.compiler.placement.methods.base import Method
+    from thenar.compiler.trainers.base import Setting
+
+
+def method_names(_: click.Context, __: click.Parameter, text: str | None) -> tuple[str, ...] | None:
+    """Return the names in `text`, parted by commas; "none" names none. Raises MemberError for a wrong name."""
+    from thenar.compiler.placement.methods.base import METHODS
+
+    if text is None:
+        return None
+    return tuple(METHODS.named(name).name for name in parted(text) if name not in ("", "none"))
+
+
+class WithMethods(click.Command):
+    """A command whose help ends with all placement methods."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write each method's name and what it does."""
+        from thenar.compiler.placement.methods.base import METHODS
+
+        super().format_epilog(ctx, formatter)
+        with formatter.section("Placement methods"):
+            formatter.write_dl([(name, f"{method.help}{_remarks(method)}.") for name, method in METHODS.items()])
+
+
+def _remarks(method: "Method") -> str:
+    """Return what a user has to know besides, in brackets."""
+    remarks = [] if method.ours else ["rival"]
+    remarks += [f"pip install {method.install}"] if method.install else []
+    return f" ({'; '.join(remarks)})" if remarks else ""
 
 
 def trainer_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add `--trainer` and an option for each setting of a trainer."""
+    from thenar.compiler.trainers.base import TRAINERS
+
     settings = {setting.name: setting for trainer in TRAINERS.values() for setting in trainer.settings}
     for setting in reversed(settings.values()):
         command = _option(setting)(command)
@@ -25,6 +59,8 @@ def asked_settings(context: click.Context, asked: dict[str, Any]) -> dict[str, A
 
     Raises UsageError for a setting that is given to a trainer that takes none of that name.
     """
+    from thenar.compiler.trainers.base import TRAINERS
+
     trainer = asked.pop("trainer")
     own = {setting.name: setting.default for setting in TRAINERS[trainer].settings}
     found: dict[str, Any] = {"trainer": trainer}
@@ -37,7 +73,7 @@ def asked_settings(context: click.Context, asked: dict[str, Any]) -> dict[str, A
     return found
 
 
-def _option(setting: Setting) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def _option(setting: "Setting") -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     least = setting.least
     kind: click.ParamType[Any] = click.INT if setting.kind is int else click.FLOAT
     if least is not None:
