@@ -28,7 +28,7 @@ from .options import WithMethods, asked_settings, method_names, trainer_options
 if TYPE_CHECKING:
     from rich.table import Table as Grid
 
-    from thenar.compiler.evaluation.study import Cell, Study, Table
+    from thenar.compiler.evaluation.study import Cell, Study
 
 TABLES = ("compositions", "generality", "pruning", "baselines")
 

@@ -113,9 +113,8 @@ def command(
         thenar firmware build/ --target avr2560 --mode glove --board board.toml -o firmware/
         thenar firmware build/ --target avr328p --frontier
     """
-    from thenar.compiler.firmware.board_loading import load_board
-    from thenar.compiler.firmware.folder import write_folder
-    from thenar.compiler.firmware.generate import Firmware
+    from thenar.compiler.firmware.board import load_board
+    from thenar.compiler.firmware.generate import Firmware, write_folder
     from thenar.compiler.firmware.measuring import measure as measured_of
     from thenar.compiler.firmware.one_hand import for_one_hand
     from thenar.compiler.firmware.targets import TARGETS

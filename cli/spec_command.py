@@ -76,8 +76,7 @@ def _harness(folder: Path, loaded: "Build", glove: Path | None, board: Path | No
     if glove is not None:
         return load_harness(glove)
     if board is not None:
-        from thenar.compiler.firmware.board import glove_toml
-        from thenar.compiler.firmware.board_loading import load_board
+        from thenar.compiler.firmware.board import glove_toml, load_board
         from thenar.runtime.names import sound_name
 
         name = sound_name(board.stem, "board")
@@ -88,8 +87,7 @@ def _harness(folder: Path, loaded: "Build", glove: Path | None, board: Path | No
 
 def _board_pins(path: Path, manifest: "Manifest") -> "BoardPins":
     """Return how the board in a `board.toml` reaches its keys."""
-    from thenar.compiler.firmware.board import check_switches, key_names
-    from thenar.compiler.firmware.board_loading import load_board
+    from thenar.compiler.firmware.board import check_switches, key_names, load_board
     from thenar.compiler.glove.layout import BoardPins
     from thenar.runtime.harness.wiring import BusWiring
 
