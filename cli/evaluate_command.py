@@ -186,7 +186,7 @@ def _print(study: "Study", *, confusion: bool) -> None:
                 console.print(_matrix(study.grasps, cell))
 
 
-def _rates(rated: "Table") -> "Grid":
+def _rates(rated: "RateTable") -> "Grid":
     averaged = ["average"] if len(rated.columns) > 1 else []
     numbers = ("switches", *rated.columns, *averaged)
     grid = table(("", "", *numbers), numbers)

@@ -1,23 +1,31 @@
 """The live side: a build folder in, grasp types out. Imports with the base dependencies alone."""
 
+from importlib import import_module
 from typing import TYPE_CHECKING
 
-from .build import Build, Recognition
-from .errors import BuildError, FrameError, SealError, ThenarError
-
 if TYPE_CHECKING:
+    from .build import Build, Recognition
+    from .errors import BuildError, FrameError, SealError, ThenarError
     from .glove import Glove
+
+# Names are imported when they are first used: devices take as long as all the rest, and --help needs none of them.
+_HOMES = {
+    "Build": ".build",
+    "BuildError": ".errors",
+    "FrameError": ".errors",
+    "Glove": ".glove",
+    "Recognition": ".build",
+    "SealError": ".errors",
+    "ThenarError": ".errors",
+}
 
 __all__ = ["Build", "BuildError", "FrameError", "Glove", "Recognition", "SealError", "ThenarError"]
 
 
 def __getattr__(name: str) -> object:
-    # Its devices take as long to import as all the rest, and a frame by itself needs none.
-    if name == "Glove":
-        from .glove import Glove
-
-        return Glove
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name], __name__), name)
 
 
 def __dir__() -> list[str]:
