@@ -28,7 +28,7 @@ from .options import WithMethods, asked_settings, method_names, trainer_options
 if TYPE_CHECKING:
     from rich.table import Table as Grid
 
-    from thenar.compiler.evaluation.study import Cell, Study
+    from thenar.compiler.evaluation.study import Cell, RateTable, Study
 
 TABLES = ("compositions", "generality", "pruning", "baselines")
 
