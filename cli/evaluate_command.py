@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .common import existing_file, json_flag, keep_apart, output_file, print_json, progress, warning
-from .methods import WithMethods, method_names
-from .trainer_options import asked_settings, trainer_options
+from .methods import method_names
+from .trainer_options import Training, asked_settings, trainer_option
 
 if TYPE_CHECKING:
     from thenar.compiler.evaluation.study import Study
@@ -44,7 +44,7 @@ _COUNT = click.IntRange(min=1)
 _FOLDER = click.Path(file_okay=False, path_type=Path)
 
 
-@click.command(cls=WithMethods)
+@click.command(cls=Training)
 @click.argument("grasps", type=existing_file)
 @click.option("--subject", "subjects", multiple=True, metavar="NAME", help="Only this subject; may be given again.")
 @click.option("--folds", type=click.IntRange(min=2), default=4, show_default=True, help="Folds of cross-validation.")
@@ -56,7 +56,7 @@ _FOLDER = click.Path(file_okay=False, path_type=Path)
     help="Leave out a subject, an object, or a range of trials (as many as folds) at a time, instead of random rows.",
 )
 @click.option("--repeats", type=_COUNT, default=3, show_default=True, help="Repeats of random folds, other seeds each.")
-@trainer_options
+@trainer_option
 @click.option("--prune", type=click.IntRange(min=0), default=0, show_default=True, help="S: smallest node ID3 splits.")
 @click.option(
     "--prune-list",
