@@ -34,9 +34,9 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.avr_costs import worst_frame
 from thenar.compiler.firmware.choose import choose
-from thenar.compiler.firmware.errors import FirmwareError
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.tables import IntegerTables

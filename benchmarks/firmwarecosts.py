@@ -8,8 +8,8 @@ import numpy as np
 from firmwarepeers import Peer
 from numpy.typing import NDArray
 
+from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import classifier_files
-from thenar.compiler.firmware.errors import FirmwareError
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.simavr import harness
 from thenar.compiler.firmware.targets import Target

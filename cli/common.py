@@ -1,18 +1,19 @@
 """What the sub-commands share: paths, the `--json` flag, consoles, and a progress bar for work longer than a second."""
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 import click
 import msgspec
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.segment import Segment
-from rich.text import Text
+from rich.table import Table
+from rich.text import Text, TextType
 
 from thenar.drivers.names import shortened
 
@@ -20,6 +21,12 @@ from .lines import echo, echo_json, shown
 
 if TYPE_CHECKING:
     from thenar.runtime.harness.wiring import Harness
+
+Found = TypeVar("Found")
+Rest = ParamSpec("Rest")
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+_JSON = "thenar.json"
 
 
 class _OutputFile(click.Path):
@@ -68,7 +75,28 @@ any_path = click.Path(path_type=Path)
 output_file = _OutputFile(dir_okay=False, writable=True, path_type=Path)
 picture_file = _PictureFile(dir_okay=False, writable=True, path_type=Path)
 
-json_flag = click.option("--json", "as_json", is_flag=True, help="Print one JSON document for machines instead.")
+json_flag = click.option(
+    "--json",
+    is_flag=True,
+    expose_value=False,
+    callback=lambda context, _option, wanted: context.meta.update({_JSON: wanted}),
+    help="Print one JSON document for machines instead.",
+)
+
+
+def jobs_option(what: str = "Worker processes. The result does not depend on it.") -> Callable[[Command], Command]:
+    """Return the option --jobs, which is -1 for all cores."""
+    return click.option(
+        "--jobs",
+        type=click.IntRange(min=1),
+        callback=lambda _context, _option, jobs: jobs or -1,
+        help=f"{what}  [default: all cores]",
+    )
+
+
+def parted(text: str) -> tuple[str, ...]:
+    """Return what stands between the commas of `text`, each once, in the order given."""
+    return tuple(dict.fromkeys(part.strip() for part in text.split(",")))
 
 
 def serial_port(context: click.Context, parameter: click.Parameter, text: str) -> str:
@@ -130,9 +158,43 @@ def _console(stderr: bool = False, width: int | None = None) -> Console:
     return _Console(stderr=stderr, width=width, highlight=False, markup=False, emoji=False)
 
 
+def wants_json() -> bool:
+    """Return whether --json was given."""
+    return bool(click.get_current_context().meta[_JSON])
+
+
 def print_json(result: Any) -> None:
     """Print `result` (msgspec struct, dataclass or builtin) as one indented JSON document on stdout."""
-    echo_json(msgspec.json.format(msgspec.json.encode(result), indent=2).decode())
+    echo_json(_json(result).decode())
+
+
+def show(
+    found: Found, people: Callable[Concatenate[Found, Rest], None], *rest: Rest.args, **named: Rest.kwargs
+) -> None:
+    """Print `found` as JSON where --json asks for that, otherwise by `people`."""
+    if wants_json():
+        print_json(found)
+    else:
+        people(found, *rest, **named)
+
+
+def write_json(path: Path, found: Any) -> None:
+    """Write `found` as one indented JSON document."""
+    from thenar.runtime.files import write_atomically
+
+    write_atomically(path, _json(found) + b"\n")
+
+
+def _json(found: Any) -> bytes:
+    return msgspec.json.format(msgspec.json.encode(found), indent=2)
+
+
+def table(columns: Iterable[str], numbers: Container[str] = (), title: TextType | None = None) -> Table:
+    """Return a table of these columns, of which `numbers` are on the right."""
+    made = Table(title=title)
+    for column in columns:
+        made.add_column(column, justify="right" if column in numbers else "left")
+    return made
 
 
 @contextmanager

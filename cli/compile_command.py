@@ -15,16 +15,19 @@ from .common import (
     keep_apart,
     out,
     output_file,
-    print_json,
     progress,
+    show,
+    table,
     warning,
 )
-from .scan_tables import print_scan
-from .trainer_options import Training, asked_settings, trainer_option
+from .options import Training, asked_settings, trainer_option
 
 if TYPE_CHECKING:
     from thenar.compiler.artifact.documents import BuildReport
+    from thenar.runtime.harness.wiring import Harness
     from thenar.runtime.manifest import Manifest
+    from thenar.runtime.scanning.scanmap import ScanMap
+    from thenar.runtime.scanning.timing import ScanTime
 
 _BOARD = "board"
 # What a point of a frontier says.
@@ -91,7 +94,6 @@ def command(
     propose: Path | None,
     chip: str | None,
     overwrite: bool,
-    as_json: bool,
     **asked: Any,
 ) -> None:
     """Choose the switches, train, and write integer tables with their proof.
@@ -150,16 +152,7 @@ def command(
         )
     if propose is not None:
         _propose(made.manifest, propose, chip or next(iter(_chips())))
-    if as_json:
-        print_json(made.manifest)
-        return
-    _print(made, output)
-    if made.harness is not None and made.scan is not None:
-        print_scan(made.scan, made.harness)
-    if propose is not None:
-        out().print(
-            f"{propose}: a harness for the kept switches; wire the glove so, then compile with --glove {propose}"
-        )
+    show(made.manifest, lambda _: _print(made, output, propose))
 
 
 def _check_proposal(propose: Path | None, chip: str | None, glove: Path | None, *, overwrite: bool) -> None:
@@ -204,7 +197,7 @@ def _propose(manifest: "Manifest", path: Path, chip: str) -> None:
     write_atomically(path, harness_to_toml(harness).encode())
 
 
-def _print(made: "BuildReport", folder: Path) -> None:
+def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
     manifest, proof = made.manifest, made.manifest.proof
     console = out()
     console.print(
@@ -231,3 +224,42 @@ def _print(made: "BuildReport", folder: Path) -> None:
         f"{proof.error:g} steps; {proof.covered} of {manifest.source.rows} rows are safe, {proof.changed} change class"
     )
     console.print(made.firmware, soft_wrap=True)
+    if made.harness is not None and made.scan is not None:
+        _print_scan(made.scan, made.harness)
+    if propose is not None:
+        console.print(
+            f"{propose}: a harness for the kept switches; wire the glove so, then compile with --glove {propose}"
+        )
+
+
+def _print_scan(scan: "ScanMap", harness: "Harness") -> None:
+    """Print the map chip by chip in the order in which chips are read first, with what the wire is bound to take."""
+    from thenar.runtime.scanning.timing import scan_us, scanner_us
+
+    time = scan_us(scan, harness)
+    if time.chips:
+        _print_chips(time)
+        out().print(_in_all(scan, harness, time))
+    for board, pairs in zip(harness.scanners, scan.scanners, strict=True):
+        out().print(
+            f"board {board.port}: {len(pairs)} kept switches of {len(board.switches)} keys, "
+            f"{scanner_us(board):.0f} us a bitmap"
+        )
+
+
+def _print_chips(time: "ScanTime") -> None:
+    chips = table(("chip", "bus", "reads", "switches", "us"), title="Scan map")
+    for chip in time.chips:
+        chips.add_row(chip.place, chip.device, " ".join(chip.readings), str(chip.switches), f"{chip.us:.1f}")
+    if time.selects:
+        chips.add_row(f"{time.selects} writes to muxes", "", "", "", f"{time.select_us:.1f}")
+    out().print(chips)
+
+
+def _in_all(scan: "ScanMap", harness: "Harness", time: "ScanTime") -> str:
+    wired = sum(len(chip.pins) for bus in harness.buses for chip in bus.chips)
+    count = len(scan.ports) + time.selects
+    return (
+        f"a whole scan: {count} transaction{'s' if count > 1 else ''}, {time.us:.1f} us on the wire, "
+        f"{time.share:.1%} of the {time.full_us:.1f} us for all {wired} wired switches"
+    )

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import check_devices, existing_file, existing_folder, json_flag, of_device, out, print_json, progress
+from .common import check_devices, existing_file, existing_folder, json_flag, of_device, out, progress, show, table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @click.argument("glove", metavar="glove.toml", type=existing_file)
 @click.option("--build", metavar="BUILD", type=existing_folder, help="Look only at what this build reads of the glove.")
 @json_flag
-def command(glove: Path, build: Path | None, as_json: bool) -> None:
+def command(glove: Path, build: Path | None) -> None:
     """Open every device of glove.toml and say what is there, how fast it is and how fast its wire would let it be.
 
     Exit code 1 if something is missing; with --build, also if the build cannot work with the glove's calibration.
@@ -43,10 +43,7 @@ def command(glove: Path, build: Path | None, as_json: bool) -> None:
         for number, look in enumerate(looks):
             found += look()
             report(number + 1, len(looks))
-    if as_json:
-        print_json(found)
-    else:
-        _print(found)
+    show(found, _print)
     if not all(finding.present for finding in found):
         click.get_current_context().exit(1)
 
@@ -69,18 +66,15 @@ def _calibration(harness: "Harness", build: "Build | None") -> "Iterator[Finding
 
 
 def _print(found: "Sequence[Finding]") -> None:
-    from rich.table import Table
-
-    table = Table(title="Devices")
-    for heading in ("device", "part", "there", "predicted us", "measured us"):
-        table.add_column(heading, justify="right" if heading.endswith("us") else "left")
+    numbers = ("predicted us", "measured us")
+    devices = table(("device", "part", "there", *numbers), numbers, "Devices")
     for one in found:
         measured = "" if one.measured_us is None else f"{one.measured_us:.0f}"
         there = ("slow" if one.slow else "yes") if one.present else "no"
         predicted = f"{one.predicted_us:.0f}" if one.predicted_us else ""
-        table.add_row(one.device, one.part, there, predicted, measured)
+        devices.add_row(one.device, one.part, there, predicted, measured)
     console = out()
-    console.print(table)
+    console.print(devices)
     for one in found:
         for remark in one.remarks:
             console.print(of_device(f"{one.device} {one.part}".strip(), remark))

@@ -4,6 +4,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+import msgspec
+
+from thenar.drivers.errors import ThenarError
+from thenar.drivers.names import shortened
 
 from .common import existing_file, keep_apart, picture_file, progress
 from .lines import echo
@@ -11,6 +15,10 @@ from .lines import echo
 if TYPE_CHECKING:
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.simulator.handmaps.draw import Picture
+
+
+_LARGEST = 4_000_000  # bytes; a placement of the largest set has fewer
+_WANTED = "take a build's folder, the file of `thenar place -o`, or a text of one name a line"
 
 
 def _titled_paths(_context: click.Context, _option: click.Parameter, given: tuple[str, ...]) -> list[tuple[str, Path]]:
@@ -98,8 +106,6 @@ def _check_options(
 def _without_grasps(numbers: bool, kept: list[tuple[str, Path]]) -> "Picture":
     from thenar.simulator.handmaps import draw as handpanels
 
-    from .kept_files import kept_names
-
     if not kept:
         return handpanels.all_switches(numbers)
     return handpanels.kept([(title, kept_names(path)) for title, path in kept])
@@ -114,6 +120,56 @@ def _placements(grasp_set: "GraspSet", prune: int) -> "Picture":
     hand_map().numbers_of(grasp_set.switch_names)  # a foreign set is refused before a tree is grown
     with progress("growing a tree of each hand") as report:
         return kept([(title, list(found.names)) for title, found in place_by_subject(grasp_set, prune, report)])
+
+
+class KeptError(ThenarError, ValueError):
+    """A file does not say which switches are kept."""
+
+
+class _Chosen(msgspec.Struct, frozen=True):
+    name: str
+
+
+class _Placement(msgspec.Struct, frozen=True):
+    """What of a placement, or of a build's description, is asked for here."""
+
+    switches: tuple[_Chosen, ...]
+
+
+def kept_names(path: Path) -> tuple[str, ...]:
+    """Return the names of the kept switches, in the order in which they were chosen.
+
+    path is a build's folder, a JSON file (what `thenar place -o` writes, or an array of names), or a text of one name a
+    line. Raises KeptError if it is none of these or names no switch, BuildError if it is a damaged build.
+    """
+    from thenar.runtime.build import load_manifest
+    from thenar.runtime.names import fault
+
+    names = tuple(kept.name for kept in load_manifest(path).switches) if path.is_dir() else _of_file(path)
+    for name in names:
+        if reason := fault(name):
+            raise KeptError(f"{path}: switch {shortened(repr(name))} {reason}")
+    if not names:
+        raise KeptError(f"{path} keeps no switches: there is nothing to draw")
+    return names
+
+
+def _of_file(path: Path) -> tuple[str, ...]:
+    from thenar.runtime.files import read_file
+    from thenar.runtime.nesting import check_json
+
+    try:
+        text = read_file(path, _LARGEST, KeptError).decode()
+    except UnicodeDecodeError:
+        raise KeptError(f"{path} is no text: {_WANTED}") from None
+    if text.lstrip()[:1] not in ("{", "["):
+        return tuple(filter(None, map(str.strip, text.splitlines())))
+    try:
+        check_json(text.encode())
+        found = msgspec.json.decode(text, type=_Placement | tuple[str, ...])
+    except ValueError as reason:
+        raise KeptError(f"{path} is no list of switches ({shortened(str(reason))}): {_WANTED}") from None
+    return tuple(chosen.name for chosen in found.switches) if isinstance(found, _Placement) else found
 
 
 def _write(picture: "Picture", path: Path) -> None:

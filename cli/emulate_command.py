@@ -1,24 +1,25 @@
 """`thenar emulate`: a glove that is not there, on real ports, playing a scene or a recording."""
 
+import ctypes
 import os
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from threading import Event, Thread
-from typing import IO, TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 import msgspec
 
 from .common import check_devices, existing_file, keep_apart, output_file, progress, warning
 from .ending import ended_by_signals
-from .family import Family
 from .lines import echo
 
 if TYPE_CHECKING:
-    import subprocess
-
     from thenar.simulator.playing.bench import Bench, Cable
     from thenar.simulator.playing.performance import Log, Performance
 
@@ -32,6 +33,9 @@ _FRAME_US = 10_000
 _HARNESS, _CALIBRATION = "glove.toml", "calibration.toml"
 # What a shell adds to the number of the signal that ended a command.
 _KILLED = 128
+_PROCESSES = Path("/proc")
+_SET_CHILD_SUBREAPER = 36
+_LOOK_S = 0.02
 
 
 class Played(msgspec.Struct, frozen=True):
@@ -127,12 +131,10 @@ def _performance(source: str, subject: str | None, period_ms: float | None) -> t
         if subject is not None:
             raise click.UsageError("--subject picks one of a scene's subjects: a recording has its own")
         if path.suffix == ".mcap":
-            from thenar.simulator.playing.performance import of_recording
-
-            return of_recording(path, given_us or _FRAME_US, warning), _no_cable
+            return performance.of_recording(path, given_us or _FRAME_US, warning), lambda _line: None
         from thenar.compiler.recordings.graspset import GraspSet
 
-        return performance.of_set(GraspSet.load(path), given_us or _FRAME_US), _no_cable
+        return performance.of_set(GraspSet.load(path), given_us or _FRAME_US), lambda _line: None
     from thenar.simulator.playing.bench import cable_of
     from thenar.simulator.scenes.decode import load_scene
 
@@ -141,10 +143,6 @@ def _performance(source: str, subject: str | None, period_ms: float | None) -> t
         played = performance.of_scene(scene, subject, progress=report)
     played = played if given_us is None else replace(played, period_us=given_us)
     return played, lambda line: cable_of(scene, line)
-
-
-def _no_cable(_line: int) -> "Cable | None":
-    return None
 
 
 def _write_harness(bench: "Bench", performance: "Performance", folder: Path) -> Path:
@@ -176,17 +174,15 @@ def _noting(log: Path | None) -> Iterator["Log"]:
         yield lambda row, grasp, time_us: None
         return
     with log.open("wb", buffering=0) as file:
-        yield lambda row, grasp, time_us: _write(file, Played(time_us, row, grasp))
 
+        def note(row: int, grasp: str, time_us: int) -> None:
+            file.write(msgspec.json.encode(Played(time_us, row, grasp)) + b"\n")
 
-def _write(file: IO[bytes], played: Played) -> None:
-    file.write(msgspec.json.encode(played) + b"\n")
+        yield note
 
 
 @contextmanager
-def _beside(
-    client: tuple[str, ...], emulated: Path, bench: "Bench", stop: Event
-) -> Iterator["subprocess.Popen[bytes]"]:
+def _beside(client: tuple[str, ...], emulated: Path, bench: "Bench", stop: Event) -> Iterator[subprocess.Popen[bytes]]:
     """Run the command, and what it starts, for no longer than this context; `stop` is set when the command ends."""
     arguments = [argument.replace("{glove}", str(emulated)) for argument in client]
     try:
@@ -211,3 +207,91 @@ def _play(bench: "Bench", performance: "Performance", note: "Log", stop: Event, 
     player = Player(performance, bench.show, note)
     while player.play(stop) and repeat:
         pass
+
+
+class Family:
+    """A command that runs with `environment`, in our process group: it has the terminal and may ask for keys.
+
+    On Linux this process adopts what the command leaves behind, and so finds it; elsewhere it knows the command alone.
+    Raises OSError if the command cannot be run.
+    """
+
+    def __init__(self, arguments: Sequence[str], environment: Mapping[str, str]) -> None:
+        _adopt_orphans()
+        self._others = _children().get(os.getpid(), set())
+        self.command = subprocess.Popen(arguments, env=environment)
+
+    def end(self, patience_s: float, grace_s: float) -> None:
+        """End all of it; whatever happens here, none outlives this.
+
+        patience_s  the command is given to end by itself
+        grace_s     it is given after a SIGINT, and as much what it leaves behind, after a SIGTERM
+        """
+        try:
+            with suppress(subprocess.TimeoutExpired):
+                self.command.wait(patience_s)
+            if self.command.poll() is None:
+                self._signal(signal.SIGINT)
+                with suppress(subprocess.TimeoutExpired):
+                    self.command.wait(grace_s)
+            if self._signal(signal.SIGTERM):
+                self._wait(grace_s)
+        finally:
+            while self._signal(signal.SIGKILL):
+                self._wait(_LOOK_S)
+            self.command.wait()
+
+    def _wait(self, limit_s: float) -> None:
+        end = time.monotonic() + limit_s
+        while self._alive() and time.monotonic() < end:
+            time.sleep(_LOOK_S)
+
+    def _signal(self, number: signal.Signals) -> bool:
+        """Send the signal to all that run; return whether there are any."""
+        alive = self._alive()
+        for process in alive:
+            with suppress(ProcessLookupError, PermissionError):
+                os.kill(process, number)
+        return bool(alive)
+
+    def _alive(self) -> set[int]:
+        alive = set() if self.command.poll() is not None else {self.command.pid}
+        children = _children()
+        unseen = children.get(os.getpid(), set()) - self._others
+        for orphan in unseen - {self.command.pid}:
+            with suppress(ChildProcessError):
+                os.waitpid(orphan, os.WNOHANG)
+        while unseen:
+            process = unseen.pop()
+            if _runs(process):
+                alive.add(process)
+            unseen |= children.get(process, set())
+        return alive
+
+
+def _adopt_orphans() -> None:
+    prctl = getattr(ctypes.CDLL(None), "prctl", None)
+    if prctl is not None:
+        prctl(_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+
+
+def _children() -> dict[int, set[int]]:
+    """Return the children of each process, where there is a /proc."""
+    found: dict[int, set[int]] = {}
+    for folder in _PROCESSES.glob("[0-9]*"):
+        if fields := _fields(int(folder.name)):
+            found.setdefault(int(fields[1]), set()).add(int(folder.name))
+    return found
+
+
+def _runs(process: int) -> bool:
+    fields = _fields(process)
+    return bool(fields) and fields[0] != "Z"
+
+
+def _fields(process: int) -> list[str]:
+    """Return state, parent and so on; nothing of a process that is gone."""
+    try:
+        return (_PROCESSES / str(process) / "stat").read_text(errors="replace").rpartition(")")[2].split()
+    except OSError:
+        return []

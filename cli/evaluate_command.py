@@ -4,20 +4,38 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+import msgspec
+from rich.text import Text
 
-from .common import existing_file, json_flag, keep_apart, output_file, print_json, progress, warning
-from .methods import method_names
-from .trainer_options import Training, asked_settings, trainer_option
+from thenar.compiler.text import interval
+
+from .common import (
+    existing_file,
+    jobs_option,
+    json_flag,
+    keep_apart,
+    out,
+    output_file,
+    parted,
+    progress,
+    show,
+    table,
+    warning,
+    write_json,
+)
+from .options import Training, asked_settings, method_names, trainer_option
 
 if TYPE_CHECKING:
-    from thenar.compiler.evaluation.study import Study
+    from rich.table import Table as Grid
+
+    from thenar.compiler.evaluation.study import Cell, RateTable, Study
 
 TABLES = ("compositions", "generality", "pruning", "baselines")
 
 
 def _numbers(_: click.Context, __: click.Parameter, value: str) -> tuple[int, ...]:
     """Return the whole numbers in `value`, parted by commas: each once, in the order given."""
-    parts = [part.strip() for part in value.split(",")]
+    parts = parted(value)
     if not all(part.isascii() and part.isdigit() for part in parts):
         raise click.BadParameter(f"{value!r} is not a list of whole numbers such as 0,13,62")
     return tuple(dict.fromkeys(map(int, parts)))
@@ -25,7 +43,7 @@ def _numbers(_: click.Context, __: click.Parameter, value: str) -> tuple[int, ..
 
 def _tables(_: click.Context, __: click.Parameter, value: str) -> tuple[str, ...]:
     """Return the tables named in `value`, parted by commas, in the order of the paper."""
-    parts = [part.strip() for part in value.split(",")]
+    parts = parted(value)
     for part in parts:
         if part not in TABLES:
             raise click.BadParameter(f"{part!r} is none of {', '.join(TABLES)}")
@@ -40,7 +58,6 @@ def _scheme(_: click.Context, __: click.Parameter, value: str | None) -> str:
     return value or "stratified"
 
 
-_COUNT = click.IntRange(min=1)
 _FOLDER = click.Path(file_okay=False, path_type=Path)
 
 
@@ -55,7 +72,13 @@ _FOLDER = click.Path(file_okay=False, path_type=Path)
     type=click.Choice(("subject", "object", "block")),
     help="Leave out a subject, an object, or a range of trials (as many as folds) at a time, instead of random rows.",
 )
-@click.option("--repeats", type=_COUNT, default=3, show_default=True, help="Repeats of random folds, other seeds each.")
+@click.option(
+    "--repeats",
+    type=click.IntRange(min=1),
+    default=3,
+    show_default=True,
+    help="Repeats of random folds, other seeds each.",
+)
 @trainer_option
 @click.option("--prune", type=click.IntRange(min=0), default=0, show_default=True, help="S: smallest node ID3 splits.")
 @click.option(
@@ -76,7 +99,7 @@ _FOLDER = click.Path(file_okay=False, path_type=Path)
     help="Whose rows choose the placement.",
 )
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of the first repeat.")
-@click.option("--jobs", type=_COUNT, help="Worker processes. The result does not depend on it.  [default: all cores]")
+@jobs_option()
 @click.option(
     "--rivals",
     callback=method_names,
@@ -96,11 +119,10 @@ def command(
     context: click.Context,
     /,
     grasps: Path,
-    jobs: int | None,
+    jobs: int,
     confusion: bool,
     folder: Path | None,
     output: Path | None,
-    as_json: bool,
     **asked: Any,
 ) -> None:
     """Cross-validate GRASPS and print the paper's tables: recognition rates in percent, with 95 % intervals.
@@ -114,8 +136,6 @@ def command(
         thenar evaluate set.grasps
         thenar evaluate set.grasps --by subject --protocol honest --plot pictures/ -o result.json
     """
-    import msgspec
-
     from thenar.compiler.evaluation.study import Options, evaluate
     from thenar.compiler.recordings.graspset import GraspSet
 
@@ -126,30 +146,60 @@ def command(
         raise click.UsageError("--confusion and --plot show the compositions: name them among --tables")
     keep_apart(grasps, output)
     with progress("evaluating") as report:
-        study = evaluate(GraspSet.load(grasps), options, jobs or -1, report)
-    _write(study, folder, output)
-    _show(study, as_json=as_json, confusion=confusion)
-
-
-def _write(study: "Study", folder: Path | None, output: Path | None) -> None:
-    import msgspec
-
+        study = evaluate(GraspSet.load(grasps), options, jobs, report)
     if folder is not None:
         from thenar.compiler.evaluation.pictures import draw_confusions
 
         draw_confusions(study, folder)
     if output is not None:
-        from thenar.runtime.files import write_atomically
-
-        write_atomically(output, msgspec.json.format(msgspec.json.encode(study), indent=2) + b"\n")
-
-
-def _show(study: "Study", *, as_json: bool, confusion: bool) -> None:
+        write_json(output, study)
     for sentence in study.warnings:
         warning(sentence)
-    if as_json:
-        print_json(study)
-        return
-    from .evaluate_tables import print_study
+    show(study, _print, confusion=confusion)
 
-    print_study(study, confusion=confusion)
+
+def _print(study: "Study", *, confusion: bool) -> None:
+    """Print all tables, laid out as in the paper, and the confusion matrices if asked for."""
+    from thenar.compiler.evaluation.populations import PROTOCOLS
+
+    console = out()
+    for protocol in PROTOCOLS:
+        if protocol.name in study.options.protocols:
+            console.print(f"Protocol {protocol.name}: {protocol.meaning}")
+    for each in study.tables:
+        console.print()
+        console.print(Text(each.title, "bold"))
+        console.print(_rates(each))
+        if each.note:
+            console.print(each.note)
+    console.print()
+    for missing in study.left_out:
+        console.print(f"no table of {missing.name}: {missing.reason}")
+    console.print(str(study))
+    if not confusion:
+        return
+    for each in study.tables:
+        for row in each.rows if each.name == "compositions" else ():
+            for name, cell in zip(each.columns, row.cells, strict=True):
+                console.print()
+                console.print(Text(f"{row.name} {row.what}, subject {name}, {each.protocol} protocol", "bold"))
+                console.print(_matrix(study.grasps, cell))
+
+
+def _rates(rated: "RateTable") -> "Grid":
+    averaged = ["average"] if len(rated.columns) > 1 else []
+    numbers = ("switches", *rated.columns, *averaged)
+    grid = table(("", "", *numbers), numbers)
+    for row in rated.rows:
+        average = [Text(interval(row.average))] if averaged else []
+        rates = [Text(str(cell)) for cell in row.cells]
+        grid.add_row(Text(row.name), Text(row.what), str(row.switches), *rates, *average)
+    return grid
+
+
+def _matrix(grasps: tuple[str, ...], cell: "Cell") -> "Grid":
+    columns = ("true \\ found", *grasps)
+    grid = table(columns, columns)
+    for grasp, counts in zip(grasps, cell.confusion or (), strict=True):
+        grid.add_row(Text(grasp), *(str(count) if count else "." for count in counts))
+    return grid

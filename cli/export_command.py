@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 from msgspec import Struct
 
-from .common import existing_file, json_flag, keep_apart, output_file, print_json, progress
+from .common import existing_file, json_flag, keep_apart, output_file, progress, show
 from .lines import echo
 
 
@@ -24,7 +24,7 @@ class Exported(Struct, frozen=True):
 @click.option("--meta", is_flag=True, help="ARFF: write subject, object and trial too (CSV always holds them).")
 @click.option("--columns", type=output_file, help="Also write the columns.toml that imports the table again.")
 @json_flag
-def command(grasps: Path, output: Path, codes: bool, meta: bool, columns: Path | None, as_json: bool) -> None:
+def command(grasps: Path, output: Path, codes: bool, meta: bool, columns: Path | None) -> None:
     """Export GRASPS, a .grasps file, as CSV or as ARFF for Weka.
 
     \b
@@ -39,7 +39,5 @@ def command(grasps: Path, output: Path, codes: bool, meta: bool, columns: Path |
     grasp_set = GraspSet.load(grasps)
     with progress(f"exporting {grasps.name}"):
         export(grasp_set, output, codes, meta, columns)
-    if as_json:
-        print_json(Exported(str(output), None if columns is None else str(columns), len(grasp_set)))
-    else:
-        echo(f"{output}: {len(grasp_set)} grasps")
+    written = Exported(str(output), None if columns is None else str(columns), len(grasp_set))
+    show(written, lambda _: echo(f"{output}: {len(grasp_set)} grasps"))

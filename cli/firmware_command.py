@@ -8,7 +8,18 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.table import Table
 
-from .common import Listed, any_path, existing_file, existing_folder, json_flag, out, print_json, progress
+from .common import (
+    Listed,
+    any_path,
+    existing_file,
+    existing_folder,
+    json_flag,
+    out,
+    print_json,
+    progress,
+    table,
+    wants_json,
+)
 
 if TYPE_CHECKING:
     from thenar.compiler.firmware.choose import Fit
@@ -90,7 +101,6 @@ def command(
     frontier: bool,
     measure: bool,
     overwrite: bool,
-    as_json: bool,
 ) -> int:
     """Write C99 that recognises as BUILD does, bit for bit, with a Makefile, or as an Arduino library.
 
@@ -103,9 +113,8 @@ def command(
         thenar firmware build/ --target avr2560 --mode glove --board board.toml -o firmware/
         thenar firmware build/ --target avr328p --frontier
     """
-    from thenar.compiler.firmware.board_loading import load_board
-    from thenar.compiler.firmware.folder import write_folder
-    from thenar.compiler.firmware.generate import Firmware
+    from thenar.compiler.firmware.board import load_board
+    from thenar.compiler.firmware.generate import Firmware, write_folder
     from thenar.compiler.firmware.measuring import measure as measured_of
     from thenar.compiler.firmware.one_hand import for_one_hand
     from thenar.compiler.firmware.targets import TARGETS
@@ -129,7 +138,7 @@ def command(
     files = firmware.files(None if measured is None else fit.notes(measured.note))
     if output is not None:
         write_folder(files, output, overwrite=overwrite)
-    if as_json:
+    if wants_json():
         print_json(_document(fit, measured, sorted(files)))
     else:
         if mode != "scan":
@@ -193,14 +202,14 @@ def _layouts(fit: "Fit") -> list[dict[str, Any]]:
 
 def _frontier_table(fit: "Fit") -> Table:
     """Return the frontier as a table, the chosen layout marked."""
-    table = Table(title=f"Layouts for {fit.target.part}, {fit.target.bound}")
-    for heading in ("", "bits", "switches a look-up", "codes", "rows added", fit.target.unit, "flash", "RAM"):
-        table.add_column(heading, justify="left" if heading in ("", "codes", "rows added") else "right")
+    numbers = ("bits", "switches a look-up", fit.target.unit, "flash", "RAM")
+    columns = ("", *numbers[:2], "codes", "rows added", *numbers[2:])
+    layouts = table(columns, numbers, f"Layouts for {fit.target.part}, {fit.target.bound}")
     for row in _layouts(fit):
         mark, lookup = "*" if row["chosen"] else "", str(row["lookup"] or "")
-        numbers = (str(row[key]) for key in ("time", "flash", "ram"))
-        table.add_row(mark, str(row["entry_bits"]), lookup, row["bins"], row["adding"], *numbers)
-    return table
+        costs = (str(row[key]) for key in ("time", "flash", "ram"))
+        layouts.add_row(mark, str(row["entry_bits"]), lookup, row["bins"], row["adding"], *costs)
+    return layouts
 
 
 def _document(fit: "Fit", measured: "Measured | None", files: list[str]) -> dict[str, object]:

@@ -4,13 +4,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from rich.text import Text
 
-from .common import Listed, any_path, err, existing_file, existing_folder, json_flag, out, print_json, progress
-from .methods import WithMethods, method_names
+from thenar.compiler.text import duration, interval
+
+from .common import Listed, any_path, err, existing_file, existing_folder, json_flag, out, progress, show, table
+from .options import WithMethods, method_names
 
 if TYPE_CHECKING:
     from rich.table import Table
-    from rich.text import Text
 
     from thenar.compiler.frontier.points import Check, Frontier, Point
 
@@ -64,7 +66,6 @@ def command(
     rate: float | None,
     methods: tuple[str, ...] | None,
     rivals: tuple[str, ...] | None,
-    as_json: bool,
     **asked: Any,
 ) -> int:
     """Show what accuracy costs in time: which switches, joints, rounds, tables, wirings and decisions are worth it.
@@ -104,10 +105,7 @@ def command(
             report=report,
             **asked,
         )
-    if as_json:
-        print_json(found)
-    else:
-        _print(found, output)
+    show(found, _print, output)
     if wanted.words and found.picked is None:
         err().print(f"no point suits: {wanted.words} is beyond this frontier")
         return 1
@@ -126,8 +124,6 @@ def _print(found: "Frontier", output: Path) -> None:
 
 def print_frontier(frontier: "Frontier") -> None:
     """Print the points, the picked one bold; then checks, what was left out, and what the picture says."""
-    from rich.text import Text
-
     from thenar.compiler.frontier.words import summary
 
     console = out()
@@ -144,16 +140,8 @@ def print_frontier(frontier: "Frontier") -> None:
 
 
 def _grid(frontier: "Frontier") -> "Table":
-    from rich.table import Table
-    from rich.text import Text
-
-    grid = Table(title=Text(_title(frontier)))
-    for head in ("point", "switches"):
-        grid.add_column(head, justify="right")
-    for head in _WORDS:
-        grid.add_column(head)
-    for head in _NUMBERS:
-        grid.add_column(head, justify="right")
+    counts = ("point", "switches")
+    grid = table((*counts, *_WORDS, *_NUMBERS), (*counts, *_NUMBERS), Text(_title(frontier)))
     for point in frontier.points:
         grid.add_row(*_cells(point), style="bold" if point.number == frontier.picked else None)
     return grid
@@ -164,11 +152,8 @@ def _title(frontier: "Frontier") -> str:
     return f"The best of {frontier.combinations:,} combinations, {frontier.source} on {frontier.target}{wanted}"
 
 
-def _cells(point: "Point") -> "tuple[Text, ...]":
-    from rich.text import Text
-
+def _cells(point: "Point") -> tuple[Text, ...]:
     from thenar.compiler.frontier.words import way_of, wiring_of
-    from thenar.compiler.text import duration, interval
 
     setting = point.setting
     texts = (

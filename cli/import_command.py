@@ -4,8 +4,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from rich.table import Table
 
-from .common import existing_file, json_flag, keep_apart, out, output_file, print_json, progress, warning
+from .common import existing_file, json_flag, keep_apart, out, output_file, progress, show, warning
 from .lines import echo
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 @click.option("-o", "--output", type=output_file, required=True, help="The .grasps file to write.")
 @click.option("--columns", type=existing_file, help="columns.toml: what each column of the table is.")
 @json_flag
-def command(tables: tuple[Path, ...], output: Path, columns: Path | None, as_json: bool) -> None:
+def command(tables: tuple[Path, ...], output: Path, columns: Path | None) -> None:
     """Import TABLE (.csv, .csv.gz, .arff, .arff.gz or .npz) as labelled grasps.
 
     Missing or malformed cells and unknown labels stop the import, naming their rows and columns; what is merely odd
@@ -38,15 +39,10 @@ def command(tables: tuple[Path, ...], output: Path, columns: Path | None, as_jso
     with progress(f"importing {', '.join(table.name for table in tables)}"):
         grasp_set, report = import_files(tables, columns)
     grasp_set.save(output)
-    if as_json:
-        print_json(report)
-    else:
-        _print(report, output)
+    show(report, _print, output)
 
 
 def _print(report: "ImportReport", output: Path) -> None:
-    from rich.table import Table
-
     for finding in report.warnings:
         warning(finding.message)
     if report.coding:

@@ -4,8 +4,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from rich.table import Table
 
-from .common import existing_file, json_flag, keep_apart, out, picture_file, print_json, progress
+from .common import existing_file, json_flag, keep_apart, out, picture_file, progress, show
 from .lines import echo
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 @click.argument("grasps", type=existing_file)
 @click.option("--plot", type=picture_file, help="Also draw it: a .png or .svg file to write.")
 @json_flag
-def command(grasps: Path, plot: Path | None, as_json: bool) -> None:
+def command(grasps: Path, plot: Path | None) -> None:
     """Tell what GRASPS, a .grasps file, holds: counts, balance, odd columns and rows, and how separable it is.
 
     The ceiling is the rate of the best possible memory: no classifier that sees only these inputs is right more often
@@ -38,10 +39,7 @@ def command(grasps: Path, plot: Path | None, as_json: bool) -> None:
     if plot is not None:
         with progress(f"drawing {plot.name}"):
             _draw(grasp_set, plot)
-    if as_json:
-        print_json(summary)
-    else:
-        _print(summary, grasps)
+    show(summary, _print, grasps)
 
 
 def _draw(grasp_set: "GraspSet", path: Path) -> None:
@@ -67,8 +65,6 @@ def _print(summary: "Summary", path: Path) -> None:
 
 
 def _print_counts(summary: "Summary") -> None:
-    from rich.table import Table
-
     table = Table("grasp type", "rows", "share", title="Grasp types")
     for grasp in summary.grasps:
         table.add_row(grasp.name, str(grasp.rows), f"{grasp.rows / summary.rows:.1%}")
@@ -79,8 +75,6 @@ def _print_counts(summary: "Summary") -> None:
 
 
 def _print_joints(summary: "Summary") -> None:
-    from rich.table import Table
-
     if not summary.joints:
         return
     table = Table("joint", "unit", "least", "largest", "distinct codes", title="Joints")
@@ -91,8 +85,6 @@ def _print_joints(summary: "Summary") -> None:
 
 
 def _print_separability(summary: "Summary") -> None:
-    from rich.table import Table
-
     table = Table("inputs", "distinct frames", "ceiling", "nearest neighbour", "over rows", title="Separability")
     for line in summary.separability:
         rate = "-" if line.neighbour_rate is None else f"{line.neighbour_rate:.1%}"

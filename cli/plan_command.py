@@ -4,8 +4,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from rich.text import Text
 
-from .common import json_flag, keep_apart, out, output_file, print_json, progress
+from .common import jobs_option, json_flag, keep_apart, out, output_file, progress, show, table
 
 if TYPE_CHECKING:
     from thenar.simulator.planning.plan import Planned
@@ -15,11 +16,9 @@ if TYPE_CHECKING:
 @click.argument("scene")
 @click.option("-o", "--output", type=output_file, required=True, metavar="POSTURES.json", help="The file to write.")
 @click.option("--anew", is_flag=True, help="Plan everything, also what is planned already.")
-@click.option(
-    "--jobs", type=click.IntRange(1), help="Worker processes. The result does not depend on it.  [default: all cores]"
-)
+@jobs_option()
 @json_flag
-def command(scene: str, output: Path, anew: bool, jobs: int | None, as_json: bool) -> None:
+def command(scene: str, output: Path, anew: bool, jobs: int) -> None:
     """Plan how hands of all lengths in SCENE hold each of its objects: a TOML file, or a shipped scene by its name.
 
     Shipped objects are planned already. To use the postures, a scene names the file: postures = "POSTURES.json".
@@ -34,27 +33,19 @@ def command(scene: str, output: Path, anew: bool, jobs: int | None, as_json: boo
     keep_apart(own_file(scene), output)
     loaded = load_scene(scene)
     with progress(f"planning {loaded.name}") as report:
-        postures, planned = plan_scene(loaded, jobs or -1, report, anew=anew)
+        postures, planned = plan_scene(loaded, jobs, report, anew=anew)
     postures.save(output)
-    if as_json:
-        print_json(planned)
-        return
-    _print(planned, output)
+    show(planned, _print, output)
 
 
 def _print(planned: "list[Planned]", path: Path) -> None:
-    from rich.table import Table
-    from rich.text import Text
-
-    console = out()
-    table = Table(title=Text("Planned postures, worst of all hand lengths", "bold"), title_justify="left")
-    for column in ("grasp type", "object"):
-        table.add_column(column)
-    for column in ("hands mm", "gap mm", "sunk mm", "not balanced"):
-        table.add_column(column, justify="right")
+    console, numbers = out(), ("hands mm", "gap mm", "sunk mm", "not balanced")
+    title = Text("Planned postures, worst of all hand lengths", "bold")
+    postures = table(("grasp type", "object", *numbers), numbers, title)
+    postures.title_justify = "left"
     for one in planned:
         lengths = [held.length_mm for held in one.entry.held]
-        table.add_row(
+        postures.add_row(
             Text(one.entry.grasp),
             Text(one.entry.object),
             f"{lengths[0]:g} - {lengths[-1]:g}",
@@ -63,5 +54,5 @@ def _print(planned: "list[Planned]", path: Path) -> None:
             f"{one.imbalance:.0%}",
         )
     if planned:
-        console.print(table)
+        console.print(postures)
     console.print(f"{path}: {len(planned)} object(s) planned" + ("" if planned else ": all were planned already"))

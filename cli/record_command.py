@@ -49,7 +49,7 @@ def command(
         thenar record --glove glove.toml --subject A --objects objects.toml -o anna.grasps
     """
     from thenar.compiler.recordings.errors import check_names
-    from thenar.compiler.recordings.objects import collected
+    from thenar.compiler.recordings.taxonomy import collected
     from thenar.runtime.harness.loading import load_harness
     from thenar.runtime.recording.guide import planned, read_journal
     from thenar.runtime.recording.session import Collection

@@ -307,7 +307,7 @@ def _replay_set(build: "Build", replay: Path, sinks: Sequence[str], period_us: i
 
 def _rows(build: "Build", grasp_set: "GraspSet", period_us: int) -> "Iterator[tuple[LiveGrasp, bool]]":
     """Yield what is recognised in each row, and whether an input of it was missing. Both clocks begin with the set."""
-    from thenar.compiler.artifact.select import select_inputs
+    from thenar.compiler.artifact.verify_firmware import select_inputs
     from thenar.runtime.published import LiveGrasp
 
     bits, codes = select_inputs(grasp_set, build.manifest)

@@ -6,14 +6,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from rich.table import Table
+from rich.text import Text
 
-from .common import json_flag, keep_apart, output_file, print_json, progress
+from thenar.compiler.text import interval
+
+from .common import err, jobs_option, json_flag, keep_apart, out, output_file, progress, show, table, warning
 from .lines import echo
 
 if TYPE_CHECKING:
+    from thenar.compiler.evaluation.ablation import Ablation, Change, Variant
+    from thenar.simulator.running.explain import Explanation
+    from thenar.simulator.running.report import Report, StepReport
+    from thenar.simulator.scenes.decode import Shipped
     from thenar.simulator.scenes.scene import Scene
 
 _MODES = ("--output", "--explain", "--ablate", "--list")
+_SHOWN = 10  # unsettled repetitions that are named one by one
+_OWN = "dim"  # how own steps look
 
 
 @click.command("simulate")
@@ -26,9 +36,7 @@ _MODES = ("--output", "--explain", "--ablate", "--list")
 @click.option("--seed", type=click.IntRange(0, 2**63 - 1), help="Other random numbers; the subjects stay.")
 @click.option("--subject", "subjects", multiple=True, metavar="NAME", help="Only this subject; may be given again.")
 @click.option("--keep-unsettled", is_flag=True, help="Keep repetitions in which the hand did not come to rest.")
-@click.option(
-    "--jobs", type=click.IntRange(1), help="Worker processes. The set does not depend on it.  [default: all cores]"
-)
+@jobs_option("Worker processes. The set does not depend on it.")
 @json_flag
 def command(
     scene: str | None,
@@ -40,8 +48,7 @@ def command(
     seed: int | None,
     subjects: tuple[str, ...],
     keep_unsettled: bool,
-    jobs: int | None,
-    as_json: bool,
+    jobs: int,
 ) -> None:
     """Simulate SCENE: a TOML file, or a shipped scene by its name.
 
@@ -53,21 +60,27 @@ def command(
         thenar simulate quick --explain
         thenar simulate quick -o set.grasps
     """
+    from thenar.simulator.scenes.decode import load_scene, own_file, shipped_scenes
+
     _check_modes(scene, (output, explain, ablate, listing), keep_unsettled=keep_unsettled)
     if scene is None:
-        _list(as_json=as_json)
+        show(shipped_scenes(), _print_scenes)
         return
-    from thenar.simulator.scenes.decode import load_scene, own_file
-
     loaded = load_scene(scene).varied(repetitions, seed, subjects)
     with _located(scene):
         if output is not None:
             keep_apart(own_file(scene), loaded.postures, output)
-            _simulate(loaded, output, jobs or -1, keep_unsettled=keep_unsettled, as_json=as_json)
+            _simulate(loaded, output, jobs, keep_unsettled=keep_unsettled)
         elif explain:
-            _explain(loaded, jobs or -1, as_json=as_json)
+            from thenar.simulator.running.explain import explain as explained
+
+            show(explained(loaded, jobs), _print_explanation)
         else:
-            _ablate(loaded, jobs or -1, as_json=as_json)
+            from thenar.simulator.running.ablation import ablate as ablated
+
+            with progress(f"removing the effects of {loaded.name}") as report:
+                ablation = ablated(loaded, jobs, report)
+            show(ablation, _print_ablation)
 
 
 def _check_modes(scene: str | None, given: tuple[object, ...], *, keep_unsettled: bool) -> None:
@@ -97,51 +110,172 @@ def _located(name: str) -> Iterator[None]:
         raise located(name, fault) from fault
 
 
-def _simulate(scene: "Scene", output: Path, jobs: int, *, keep_unsettled: bool, as_json: bool) -> None:
+def _simulate(scene: "Scene", output: Path, jobs: int, *, keep_unsettled: bool) -> None:
     from thenar.simulator.running.simulation import simulate
 
     with progress(f"simulating {scene.name}") as report:
         simulated = simulate(scene, jobs, report, keep_unsettled=keep_unsettled)
     simulated.grasp_set.save(output)
-    if as_json:
-        print_json(simulated.report)
-        return
-    from .simulate_tables import print_report
-
-    print_report(simulated.report, output)
+    show(simulated.report, _print_report, output)
 
 
-def _explain(scene: "Scene", jobs: int, *, as_json: bool) -> None:
-    from thenar.simulator.running.explain import explain
-
-    explanation = explain(scene, jobs)
-    if as_json:
-        print_json(explanation)
-        return
-    from .simulate_tables import print_explanation
-
-    print_explanation(explanation)
-
-
-def _ablate(scene: "Scene", jobs: int, *, as_json: bool) -> None:
-    from thenar.simulator.running.ablation import ablate
-
-    with progress(f"removing the effects of {scene.name}") as report:
-        ablation = ablate(scene, jobs, report)
-    if as_json:
-        print_json(ablation)
-        return
-    from .simulate_tables import print_ablation
-
-    print_ablation(ablation)
-
-
-def _list(*, as_json: bool) -> None:
-    from thenar.simulator.scenes.decode import shipped_scenes
-
-    found = shipped_scenes()
-    if as_json:
-        print_json(found)
-        return
-    for scene in found:
+def _print_scenes(scenes: "list[Shipped]") -> None:
+    for scene in scenes:
         echo(f"{scene.name:<16}{scene.what}")
+
+
+def _print_report(report: "Report", path: Path) -> None:
+    """Print what came out, by grasp type and by step, and warn of what did not settle."""
+    console = out()
+    console.print(
+        f"{path}: {report.rows} rows, simulated: scene {report.scene}, seed {report.seed}, "
+        f"{len(report.subjects)} subject(s), {report.repetitions} grasps in {report.seconds:.1f} s"
+    )
+    console.print()
+    console.print(_grasps(report))
+    if report.lost_frames:
+        console.print(f"{report.lost_frames} frames did not arrive; what is read then is what arrived last")
+    console.print()
+    console.print(_steps(report.steps))
+    _warn_of_unsettled(report)
+
+
+def _table(title: str, *columns: str) -> Table:
+    """Return a table whose first column is a name, and is never cut."""
+    made = table(columns, columns[1:], Text(title, "bold"))
+    made.title_justify = "left"
+    made.columns[0].no_wrap = True
+    return made
+
+
+def _grasps(report: "Report") -> Table:
+    grasps = _table(
+        "Grasps, simulated",
+        *("grasp type", "grasps", "rows", "switches ON", "from - to", "distinct patterns", "no contact", "unsettled"),
+        *("N between switches", "largest residual N", "N mm"),
+    )
+    for grasp in report.grasps:
+        grasps.add_row(
+            Text(grasp.grasp),
+            str(grasp.repetitions),
+            str(grasp.rows),
+            f"{grasp.switches_mean:.1f}",
+            f"{grasp.switches_least} - {grasp.switches_most}",
+            str(grasp.patterns),
+            str(grasp.no_contact),
+            str(grasp.unsettled),
+            f"{grasp.between_n:.1f}",
+            f"{grasp.residual_n:.2f}",
+            f"{grasp.residual_nmm:.1f}",
+        )
+    return grasps
+
+
+def _steps(steps: "tuple[StepReport, ...]") -> Table:
+    columns = ("step", "whose", "calls", "grasps", "draws", "seconds", "us a grasp", "share")
+    costs = _table("Cost of every effect (own: a step that every scene has)", *columns)
+    for step in steps:
+        costs.add_row(
+            Text(step.name),
+            "own" if step.own else "effect",
+            str(step.calls),
+            str(step.grasps),
+            str(step.draws),
+            f"{step.seconds:.3f}",
+            f"{step.us_a_grasp:.1f}",
+            f"{step.share:.1%}",
+            style=_OWN if step.own else "",
+        )
+    costs.add_section()
+    draws, total, us = (sum(getattr(step, each) for step in steps) for each in ("draws", "seconds", "us_a_grasp"))
+    costs.add_row("all", "", "", "", str(draws), f"{total:.3f}", f"{us:.1f}", "")
+    return costs
+
+
+def _warn_of_unsettled(report: "Report") -> None:
+    if not report.unsettled:
+        return
+    what = "kept as asked" if report.kept_unsettled else "left out of the set (--keep-unsettled keeps them)"
+    console = err()
+    count = f"{len(report.unsettled)} of {report.repetitions} grasps"
+    warning(f"{count} cannot be trusted, and are {what}:")
+    for one in report.unsettled[:_SHOWN]:
+        console.print(
+            f"  subject {one.subject}, {one.grasp} with {one.object}, repetition {one.repetition}: {one.why}",
+            soft_wrap=True,
+        )
+    if len(report.unsettled) > _SHOWN:
+        console.print(f"  and {len(report.unsettled) - _SHOWN} more, which --json names")
+
+
+def _print_explanation(explanation: "Explanation") -> None:
+    """Print the steps of a scene in the order in which they run, what each does and costs, and what to expect."""
+    console = out()
+    steps = _table(
+        f"Steps of scene {explanation.scene}, in order (own: a step that every scene has)",
+        *("step", "whose", "stage", "acts", "draws a grasp", "us a grasp", "share"),
+    )
+    for step in explanation.steps:
+        steps.add_row(
+            Text(step.name),
+            "own" if step.own else "effect",
+            step.stage,
+            "on bytes" if step.on_wire else "in time" if step.timed else "",
+            f"{step.draws_a_grasp:.1f}",
+            f"{step.us_a_grasp:.1f}",
+            f"{step.share:.1%}",
+            style=_OWN if step.own else "",
+        )
+    console.print(steps)
+    console.print()
+    for step in explanation.steps:
+        text = Text(f"{step.name}: {step.summary}\n", _OWN if step.own else "")
+        console.print(text.append(f"    {', '.join(step.reads) or 'nothing'} -> {', '.join(step.writes)}"))
+    console.print()
+    console.print(_expected(explanation))
+
+
+def _expected(explanation: "Explanation") -> str:
+    frames = "every frame" if explanation.timed else "one frame a grasp, as no effect lives in time"
+    wire = ", sent and received as bytes" if explanation.on_wire else ""
+    return (
+        f"simulated: {frames}{wire}\n"
+        f"measured here on {explanation.measured} grasps of {explanation.conditions} conditions: "
+        f"{explanation.us_a_grasp:.0f} us a grasp on one core; {explanation.repetitions} grasps on "
+        f"{explanation.workers} core(s) should take about {explanation.expected_s:.1f} s, and the start of processes"
+    )
+
+
+def _print_ablation(ablation: "Ablation") -> None:
+    """Print what each effect does to the recognition rates and to the time."""
+    from thenar.simulator.pipeline.effect import EFFECTS
+    from thenar.simulator.running.pipeline import DEFAULT_CONTACT
+
+    console = out()
+    whole = ablation.variants[0]
+    columns = [f"{one.inputs}{what}" for one in whole.rates for what in ("", ", change")]
+    variants = _table(
+        f"Scene {ablation.scene} without each of its effects, simulated",
+        *("without", *columns, "us a grasp", "change", "unsettled"),
+    )
+    for variant in ablation.variants:
+        cells = [cell for one in variant.rates for cell in (interval(one.rate), _change(one.change))]
+        variants.add_row(Text(variant.without or "(nothing)"), *cells, *_times(variant, whole), str(variant.unsettled))
+    console.print(variants)
+    console.print(
+        f"LogitBoost of {ablation.rounds} rounds on all switches, all joints and both, {ablation.folds} folds within "
+        "each subject; rates in %, with 95 % intervals;\n"
+        "changes in percentage points, of grasps that settled with and without; time of a few grasps, best of several"
+    )
+    for variant in ablation.variants:
+        if variant.without is not None and EFFECTS[variant.without].model is not None:
+            console.print(f"without {variant.without}: {DEFAULT_CONTACT} closes the hands in its place")
+
+
+def _change(change: "Change | None") -> str:
+    return "" if change is None else f"{100 * change.mean:+z.1f} [{100 * change.low:+z.1f}, {100 * change.high:+z.1f}]"
+
+
+def _times(variant: "Variant", whole: "Variant") -> tuple[str, str]:
+    change = "" if variant is whole else f"{variant.us_a_grasp - whole.us_a_grasp:+.0f}"
+    return f"{variant.us_a_grasp:.0f}", change

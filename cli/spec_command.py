@@ -5,10 +5,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import any_path, existing_file, existing_folder, json_flag, out, print_json
+from .common import any_path, existing_file, existing_folder, json_flag, out, show, table
 
 if TYPE_CHECKING:
     from thenar.compiler.glove.layout import BoardPins
+    from thenar.compiler.glove.spec import SpecSummary
     from thenar.compiler.hand import HandShape
     from thenar.runtime.build import Build
     from thenar.runtime.harness.wiring import Harness
@@ -26,7 +27,7 @@ _WIRING = "glove.toml"
 @click.option("-o", "--output", type=any_path, help="Also write the files: a folder; a spec there is replaced.")
 @json_flag
 def command(
-    build: Path, hand_length: float | None, glove: Path | None, board: Path | None, output: Path | None, as_json: bool
+    build: Path, hand_length: float | None, glove: Path | None, board: Path | None, output: Path | None
 ) -> None:
     """Describe the reduced glove of a BUILD: where its switches lie, how they are wired, what to buy, what to expect.
 
@@ -42,8 +43,6 @@ def command(
     from thenar.compiler.glove.spec import glove_spec
     from thenar.runtime.build import Build
 
-    from .spec_tables import print_spec
-
     loaded = Build.load(build)
     if output is not None:
         check_output(output)
@@ -51,15 +50,12 @@ def command(
     pins = () if board is None else (_board_pins(board, loaded.manifest),)
     harness = _harness(build, loaded, glove, board)
     spec = glove_spec(loaded.manifest, loaded.scan, harness, hand, pins)
+    written = ""
     if output is not None:
         files = files_of(spec)
         write_spec(files, output)
-    if as_json:
-        print_json(spec.summary)
-        return
-    print_spec(spec.summary)
-    if output is not None:
-        out().print(f"{output}: {', '.join(sorted(files))}", soft_wrap=True)
+        written = f"{output}: {', '.join(sorted(files))}"
+    show(spec.summary, _print, written)
 
 
 def _hand(manifest: "Manifest", length_mm: float | None) -> "HandShape | None":
@@ -80,8 +76,7 @@ def _harness(folder: Path, loaded: "Build", glove: Path | None, board: Path | No
     if glove is not None:
         return load_harness(glove)
     if board is not None:
-        from thenar.compiler.firmware.board import glove_toml
-        from thenar.compiler.firmware.board_loading import load_board
+        from thenar.compiler.firmware.board import glove_toml, load_board
         from thenar.runtime.names import sound_name
 
         name = sound_name(board.stem, "board")
@@ -92,8 +87,7 @@ def _harness(folder: Path, loaded: "Build", glove: Path | None, board: Path | No
 
 def _board_pins(path: Path, manifest: "Manifest") -> "BoardPins":
     """Return how the board in a `board.toml` reaches its keys."""
-    from thenar.compiler.firmware.board import check_switches, key_names
-    from thenar.compiler.firmware.board_loading import load_board
+    from thenar.compiler.firmware.board import check_switches, key_names, load_board
     from thenar.compiler.glove.layout import BoardPins
     from thenar.runtime.harness.wiring import BusWiring
 
@@ -106,3 +100,55 @@ def _board_pins(path: Path, manifest: "Manifest") -> "BoardPins":
         return BoardPins(tuple(board.pins[name] for name in key_names(board, names)), ("",) * len(names))
     rows, columns = board.matrix.rows, board.matrix.columns
     return BoardPins(columns * len(rows), tuple(row for row in rows for _ in columns), board.matrix.diodes)
+
+
+def _print(spec: "SpecSummary", written: str) -> None:
+    """Print what `spec.json` holds, for people, and which files were written."""
+    from thenar.compiler.glove.lists import expectations
+
+    console = out()
+    hand = "" if spec.hand_length_mm is None else f", for a right hand of {spec.hand_length_mm:g} mm"
+    wired = "a proposed wiring" if spec.proposed else f"wired as {spec.glove}"
+    console.print(f"{len(spec.switches)} switches, {wired}{hand}")
+    _print_switches(spec)
+    _print_wires(spec)
+    _print_materials(spec)
+    if spec.print_on:
+        console.print(f"the pattern is for {spec.print_on}")
+    for sentence in (*expectations(spec.expected), *spec.remarks):
+        console.print(sentence)
+    if written:
+        console.print(written, soft_wrap=True)
+
+
+def _print_switches(spec: "SpecSummary") -> None:
+    pins = {
+        n: f"{reader.ref} {pin}" for reader in spec.readers for n, pin in zip(reader.switches, reader.pins, strict=True)
+    }
+    switches = table(("switch", "name", "part", "side", "x, mm", "y, mm", "read by"), title="Switches")
+    for switch in spec.switches:
+        place = ("", "") if switch.x_mm is None or switch.y_mm is None else (f"{switch.x_mm:.1f}", f"{switch.y_mm:.1f}")
+        number = f"SW{switch.number}"
+        switches.add_row(number, switch.name, switch.part or "", switch.side or "", *place, pins[switch.number])
+    out().print(switches)
+    for reader in spec.readers:
+        out().print(f"{reader.ref}: {reader.place}, {len(reader.switches)} switches")
+
+
+def _print_wires(spec: "SpecSummary") -> None:
+    bundles = table(("bundle", "connector", "signals", "returns", "wire, m"), title="Bundles")
+    for connector in dict.fromkeys(wire.connector for wire in spec.wires):
+        wires = [wire for wire in spec.wires if wire.connector == connector]
+        signals = sum(bool(wire.unit) for wire in wires)
+        lengths = [wire.length_mm for wire in wires if wire.length_mm is not None]
+        metres = f"{sum(lengths) / 1000:.2f}" if lengths else ""
+        bundles.add_row(wires[0].bundle, connector, str(signals), str(len(wires) - signals), metres)
+    out().print(bundles)
+
+
+def _print_materials(spec: "SpecSummary") -> None:
+    materials = table(("quantity", "what", "part number", "note"), title="Materials")
+    for line in spec.materials:
+        part = line.part if line.sure else f"{line.part} (not confirmed)"
+        materials.add_row(f"{line.quantity:g} {line.unit}", line.what, part, line.note)
+    out().print(materials)

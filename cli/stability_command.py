@@ -5,15 +5,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from rich.console import Console, JustifyMethod
+from rich.table import Table
+from rich.text import Text
 
-from .common import json_flag, output_file, print_json, progress
+from .common import jobs_option, json_flag, out, output_file, progress, show
 
 if TYPE_CHECKING:
-    from thenar.stability.report import Report
+    from thenar.stability.report import CaseReport, Check, Listed, Report
 
 # What a run, and a page, import sooner or later: better to say at once that it is not there than once in each case.
 _NEEDED = ("mpmath", "joblib", "scipy", "sklearn")
 _NEEDED_FOR_A_PAGE = ("jinja2", "matplotlib")
+_HEADS = ("check", "held against", "tried", "worst error", "bound", "verdict")
+_NUMBERS = ("tried", "worst error")
+_CHECK, _REFERENCE = 0, 1  # the columns of words, which take what the others leave
+_NARROWEST = 8
+_GAP = 2
 
 
 def _known(_: click.Context, __: click.Parameter, cases: tuple[str, ...]) -> tuple[str, ...]:
@@ -31,16 +39,12 @@ def _known(_: click.Context, __: click.Parameter, cases: tuple[str, ...]) -> tup
 @click.argument("cases", nargs=-1, metavar="[CASE]...", callback=_known)
 @click.option("--full", is_flag=True, help="Try more and harder inputs, such as 10,000 rounds of boosting: minutes.")
 @click.option("--list", "listing", is_flag=True, help="Only list the cases, and what could go wrong in each.")
-@click.option(
-    "--jobs", type=click.IntRange(min=1), help="Worker processes; they change no result.  [default: all cores]"
-)
+@jobs_option("Worker processes; they change no result.")
 @click.option(
     "-o", "--output", type=output_file, metavar="PAGE.html", help="Write a page with table and pictures there."
 )
 @json_flag
-def command(
-    cases: tuple[str, ...], full: bool, listing: bool, jobs: int | None, output: Path | None, as_json: bool
-) -> int:
+def command(cases: tuple[str, ...], full: bool, listing: bool, jobs: int, output: Path | None) -> int:
     """Run the hard cases: what could go wrong with the numbers, the truth they are held against, and the worst error.
 
     Without a CASE, all of them. The truth is worked out again at 60 digits, independently of the product, or is a fact
@@ -56,16 +60,18 @@ def command(
     if listing:
         if output is not None or full:
             raise click.UsageError("--list only lists: leave out --output and --full")
-        _list(cases, as_json=as_json)
+        from thenar.stability.report import listed
+
+        show(listed(cases), _print_list)
         return 0
     for name in (*_NEEDED, *(_NEEDED_FOR_A_PAGE if output is not None else ())):
         # Not imported: how matplotlib is, compiler/pictures.py says.
         if find_spec(name) is None:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-    return _run(cases, full=full, jobs=jobs or -1, output=output, as_json=as_json)
+    return _run(cases, full=full, jobs=jobs, output=output)
 
 
-def _run(cases: tuple[str, ...], *, full: bool, jobs: int, output: Path | None, as_json: bool) -> int:
+def _run(cases: tuple[str, ...], *, full: bool, jobs: int, output: Path | None) -> int:
     from thenar.stability.report import NAMES, Report, run
     from thenar.stability.weka import beside_weka
 
@@ -76,12 +82,7 @@ def _run(cases: tuple[str, ...], *, full: bool, jobs: int, output: Path | None, 
     result = Report(full, found, beside, all(case.holds for case in found))
     if output is not None:
         _write(result, jobs, output)
-    if as_json:
-        print_json(result)
-    else:
-        from .stability_tables import print_report
-
-        print_report(result)
+    show(result, _print)
     return 0 if result.holds else 1
 
 
@@ -96,13 +97,75 @@ def _write(result: "Report", jobs: int, path: Path) -> None:
     write_atomically(path, page(result, pictures).encode())
 
 
-def _list(cases: tuple[str, ...], *, as_json: bool) -> None:
-    from thenar.stability.report import listed
+def _print_list(cases: "list[Listed]") -> None:
+    shown = Table("case", "what it is", "what could go wrong", show_lines=True)
+    for case in cases:
+        shown.add_row(Text(case.name), Text(case.title), Text(case.danger))
+    out().print(shown)
 
-    found = listed(cases)
-    if as_json:
-        print_json(found)
-    else:
-        from .stability_tables import print_list
 
-        print_list(found)
+def _print(report: "Report") -> None:
+    """Print a table of each case under what could go wrong in it, what Weka said, and the sum: what fails, if any."""
+    from thenar.stability.report import besides, failures, legend, summary
+
+    console = out()
+    widths = _widths(report, console.width)
+    for case in report.cases:
+        _print_case(console, case, widths)
+    if report.beside is not None:
+        console.print(Text("beside Weka", "bold"))
+        for line in besides(report.beside):
+            console.print(line)
+        console.print()
+    for unit, meaning in legend(report):
+        console.print(Text.assemble((unit, "bold"), f": {meaning}"), style="dim")
+    console.print()
+    for failure in failures(report):
+        console.print(Text(failure, "red"))
+    console.print(Text(summary(report), "bold green" if report.holds else "bold red"))
+
+
+def _print_case(console: Console, case: "CaseReport", widths: tuple[int, ...]) -> None:
+    console.print(Text.assemble((case.name, "bold"), f": {case.about.title}"))
+    if case.about.danger:
+        console.print(Text(f"What could go wrong: {case.about.danger}", "dim"))
+    table = Table(box=None, padding=(0, _GAP, 0, 0), pad_edge=False)
+    for head, width in zip(_HEADS, widths, strict=True):
+        justify: JustifyMethod = "right" if head in _NUMBERS else "left"
+        table.add_column(head, width=width, justify=justify, header_style="dim", overflow="fold")
+    for check in case.checks:
+        table.add_row(*_cells(check))
+    if case.checks:
+        console.print(table)
+    if case.failure is not None:
+        console.print(Text(f"FAILED: {case.failure}", "red"))
+    console.print()
+
+
+def _cells(check: "Check") -> tuple[Text, ...]:
+    from thenar.stability.report import bound_of, figure, verdict
+
+    finding = check.finding
+    texts = (finding.check, finding.reference, f"{finding.tried:,}", figure(finding.error), bound_of(finding))
+    return (*map(Text, texts), Text(verdict(check), "green" if check.holds else "bold red"))
+
+
+def _widths(report: "Report", room: int) -> tuple[int, ...]:
+    """Return the widths of the columns, the same for all cases: words wrap where they must, and nothing is cut."""
+    columns = list(
+        zip(_HEADS, *(map(str, _cells(check)) for case in report.cases for check in case.checks), strict=True)
+    )
+    whole = [max(map(len, column)) for column in columns]
+    words = [max(len(word) for cell in column for word in cell.split()) for column in columns]
+    widths = [min(_NARROWEST, words[_CHECK]), min(_NARROWEST, words[_REFERENCE]), *words[2:]]
+    others = range(_REFERENCE + 1, len(_HEADS))
+    left = room - _GAP * (len(_HEADS) - 1) - sum(widths)
+    # First no word is broken, then no number; what is left goes to the words, three parts of five to the check.
+    aims = [(_CHECK, words[_CHECK]), (_REFERENCE, words[_REFERENCE]), *((column, whole[column]) for column in others)]
+    spare = max(0, left - sum(max(0, aim - widths[column]) for column, aim in aims))
+    aims += [(_CHECK, words[_CHECK] + 3 * spare // 5), (_REFERENCE, whole[_REFERENCE]), (_CHECK, whole[_CHECK])]
+    for column, aim in aims:
+        more = max(0, min(aim, whole[column]) - widths[column])
+        widths[column] += min(more, max(0, left))
+        left -= more
+    return tuple(widths)

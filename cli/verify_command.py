@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .common import existing_file, existing_folder, json_flag, out, print_json, progress
+from .common import existing_file, existing_folder, json_flag, out, parted, progress, show
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -36,7 +36,7 @@ class Kinds(click.ParamType[tuple[str, ...]]):
         """Return the kinds, each once."""
         if isinstance(value, tuple):
             return value
-        kinds = tuple(dict.fromkeys(part.strip() for part in str(value).split(",")))
+        kinds = parted(str(value))
         for kind in kinds:
             if kind not in _kinds():
                 self.fail(f"there is no target {kind!r}: it takes {', '.join(_kinds())}, with commas between them")
@@ -53,7 +53,7 @@ class Kinds(click.ParamType[tuple[str, ...]]):
     help="Also compile the classifier for these, and run it there or in a simulator.",
 )
 @json_flag
-def command(build: Path, recordings: Path, firmware: tuple[str, ...], as_json: bool) -> int:
+def command(build: Path, recordings: Path, firmware: tuple[str, ...]) -> int:
     """Send every row through ensemble, float tables and integer tables, and hold the differences against their bounds.
 
     The worst that integers can do is not looked for among the rows: it is worked out, over every frame there is.
@@ -76,10 +76,7 @@ def command(build: Path, recordings: Path, firmware: tuple[str, ...], as_json: b
     grasp_set = GraspSet.load(recordings)
     with progress("verifying, compiling and running firmware" if firmware else "verifying") as report:
         found = verify(build, grasp_set, firmware, report)
-    if as_json:
-        print_json(found)
-    else:
-        _print(found)
+    show(found, _print)
     return 0 if found.holds else 1
 
 

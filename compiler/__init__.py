@@ -10,9 +10,9 @@ if TYPE_CHECKING:
     from thenar.drivers.errors import ThenarError
     from thenar.runtime.manifest import Options
 
+    from .artifact import CompileError
     from .artifact.compile import compile_build
     from .artifact.documents import BuildReport, Documents
-    from .artifact.errors import CompileError
     from .artifact.estimator import Build, compile  # noqa: A004
     from .artifact.verify import Verification, verify
     from .boosting.boost import BoostingError
@@ -36,7 +36,7 @@ _HOMES = {
     "thenar.runtime.manifest": ("Options",),
     ".artifact.compile": ("compile_build",),
     ".artifact.documents": ("BuildReport", "Documents"),
-    ".artifact.errors": ("CompileError",),
+    ".artifact": ("CompileError",),
     ".artifact.estimator": ("Build", "compile"),
     ".artifact.verify": ("Verification", "verify"),
     ".boosting.boost": ("BoostingError",),

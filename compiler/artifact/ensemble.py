@@ -37,7 +37,7 @@ _DTYPES = {
 _LARGEST_VALUE, _LARGEST_THRESHOLD = 1e6, 1e6
 
 
-class _Header(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class _StumpsHeader(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     n_inputs: Annotated[int, Meta(ge=1, le=MAX_SWITCHES + MAX_JOINTS)]
     shrinkage: Annotated[float, Meta(gt=0.0, le=1.0)]
 
@@ -50,7 +50,7 @@ def ensemble_to_bytes(model: Model) -> bytes:
     """Return the content of `ensemble.bin`; the same model gives the same bytes."""
     arrays: dict[str, AnyArray]
     if isinstance(model, Stumps):
-        version, header = STUMPS, msgspec.json.encode(_Header(model.n_inputs, model.shrinkage))
+        version, header = STUMPS, msgspec.json.encode(_StumpsHeader(model.n_inputs, model.shrinkage))
         arrays = {"columns": model.columns, "thresholds": model.thresholds, "values": model.values}
     else:
         version, header = TABLES, msgspec.json.encode(_NoHeader())
@@ -77,10 +77,10 @@ def ensemble_from_bytes(data: bytes, what: str = "ensemble.bin") -> Model:
     if {name: array.dtype for name, array in arrays.items()} != {n: np.dtype(d) for n, d in dtypes.items()}:
         raise BuildError(f"{what} is damaged: it holds other arrays than {', '.join(dtypes)}")
     try:
-        header = msgspec.json.decode(header_bytes, type=_Header if version == STUMPS else _NoHeader)
+        header = msgspec.json.decode(header_bytes, type=_StumpsHeader if version == STUMPS else _NoHeader)
     except (ValueError, RecursionError) as wrong:
         raise BuildError(f"{what} is damaged: {wrong}") from None
-    return _stumps(header, arrays, what) if isinstance(header, _Header) else _tables(arrays, what)
+    return _stumps(header, arrays, what) if isinstance(header, _StumpsHeader) else _tables(arrays, what)
 
 
 def model_fault(model: Model, n_switches: int, n_joints: int, n_classes: int) -> str:
@@ -104,7 +104,7 @@ def model_fault(model: Model, n_switches: int, n_joints: int, n_classes: int) ->
     return ""
 
 
-def _stumps(header: _Header, arrays: Mapping[str, AnyArray], what: str) -> Stumps:
+def _stumps(header: _StumpsHeader, arrays: Mapping[str, AnyArray], what: str) -> Stumps:
     columns = arrays["columns"].astype(np.int32)
     if columns.ndim != 2 or not columns.size or not 2 <= columns.shape[1] <= MAX_CLASSES:
         raise BuildError(f"{what} is damaged: it has stumps of shape {columns.shape}, not of rounds and grasp types")

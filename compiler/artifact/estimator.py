@@ -17,8 +17,7 @@ from ..boosting.stumps import Stumps
 from ..evaluation.folds import weka_folds
 from ..firmware.board import Board
 from ..firmware.classifier import LIBRARY_NAME
-from ..firmware.folder import write_folder
-from ..firmware.generate import Firmware
+from ..firmware.generate import Firmware, write_folder
 from ..firmware.targets.base import Mode
 from ..placement.methods.base import METHODS, PAPERS
 from ..placement.placement import information_alone
@@ -26,11 +25,10 @@ from ..placement.selectors import SwitchSelector
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
 from ..tables.collapse import Model, ScoreTables
-from .compile import Making, Wired
+from . import CompileError
+from .compile import Making, Wired, check_target
 from .documents import BuildReport, Documents, Progress
 from .ensemble import model_fault
-from .errors import CompileError
-from .staging import check_target
 from .training import Tested, Trained
 
 

@@ -18,8 +18,8 @@ from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
 from ..tables.collapse import Model, model_scores
 from ..trainers.base import Report, Training
+from . import CompileError
 from .ensemble import MAX_STUMPS, model_fault
-from .errors import CompileError
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,11 +17,10 @@ from ..boosting.stumps import Stumps
 from ..recordings.graspset import GraspSet
 from ..tables.collapse import Model
 from ..tables.compare import Comparison, WorstCase, compare, worst_case
+from . import CompileError
 from .documents import Progress
 from .ensemble import MAX_BYTES, ensemble_from_bytes, model_fault
-from .errors import CompileError
-from .select import select_inputs
-from .verify_firmware import FirmwareVerification, verify_firmware
+from .verify_firmware import FirmwareVerification, select_inputs, verify_firmware
 
 
 class ChangedRow(Struct, frozen=True):

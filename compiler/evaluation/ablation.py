@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from ..recordings.graspset import GraspSet
 from ..trainers.base import Training
-from .fits import Fit, Progress, run_fits
-from .plan import COMPOSITIONS, inputs
+from .plan import COMPOSITIONS, FoldFit, Progress, inputs, run_fits
 from .populations import populations
-from .rates import Rate
+from .rates import RepeatedRate
 
 Bits = NDArray[np.bool_]
 
@@ -35,7 +34,7 @@ class Recognised(msgspec.Struct, frozen=True):
     """The recognition rate from some inputs, and what removing the effect changed; None for the whole scene."""
 
     inputs: str
-    rate: Rate
+    rate: RepeatedRate
     change: Change | None
 
 
@@ -99,7 +98,7 @@ def _correct(grasp_set: GraspSet, jobs: int, progress: Progress | None) -> dict[
     parts = populations(grasp_set, "stratified", FOLDS, repeats=1, seed=SEED)
     sizes = (len(grasp_set.switch_names), len(grasp_set.joints))
     fits = {
-        name: [Fit(fold, kind.columns((), *sizes), part.grasps) for part in parts for fold in part.folds]
+        name: [FoldFit(fold, kind.columns((), *sizes), part.grasps) for part in parts for fold in part.folds]
         for name, kind in _KINDS.items()
     }
     everything = [fit for some in fits.values() for fit in some]
@@ -116,7 +115,7 @@ def _correct(grasp_set: GraspSet, jobs: int, progress: Progress | None) -> dict[
 def _recognised(
     name: str, grasp_set: GraspSet, correct: dict[str, Bits], whole: tuple[GraspSet, dict[str, Bits]] | None
 ) -> Recognised:
-    rate = Rate.of((int(np.count_nonzero(correct[name])),), len(grasp_set))
+    rate = RepeatedRate.of((int(np.count_nonzero(correct[name])),), len(grasp_set))
     if whole is None:
         return Recognised(name, rate, None)
     rows, whole_rows = _common(grasp_set, whole[0])

@@ -8,7 +8,7 @@ import numpy as np
 from thenar.runtime.files import write_atomically
 
 from ..pictures import painting, rendered
-from .study import Row, Study, Table
+from .study import RateTable, Row, Study
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +32,7 @@ def draw_confusions(study: Study, folder: Path) -> list[Path]:
         ]
 
 
-def _draw(grasps: tuple[str, ...], table: Table, row: Row, path: Path) -> Path:
+def _draw(grasps: tuple[str, ...], table: RateTable, row: Row, path: Path) -> Path:
     from matplotlib.figure import Figure
 
     side = 1.6 + 0.42 * len(grasps)

@@ -1,6 +1,6 @@
-"""What to fit for each of the tables: which inputs, which placement, which folds."""
+"""What to fit for each of the tables (which inputs, which placement, which folds); and the fits, each done once."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Literal
@@ -8,13 +8,85 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..boosting.stumps import winners
 from ..placement.methods.base import METHODS, PAPERS, Chooser
 from ..placement.methods.filters import random_placement
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
-from .fits import Fit
+from ..tables.collapse import model_scores
+from ..trainers.base import Training
+from ..workers import in_workers
 from .folds import Fold, Rows
-from .populations import Population, Protocol, ProtocolName
+from .populations import Population, Protocol
+
+Inputs = NDArray[np.uint16]
+Labels = NDArray[np.intp]
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class FoldFit:
+    """Train on a fold's training rows and these columns, classes `grasps` (ascending labels); then test the fold.
+
+    The first `n_switches` columns are switches, the others joints. Two fits are one if they are of the same `Fold`
+    object and the same columns.
+    """
+
+    fold: Fold
+    columns: Columns
+    grasps: tuple[int, ...]
+    n_switches: int = 0
+
+
+def predictions(X: Inputs, labels: Labels, fit: FoldFit, training: Training) -> Labels:
+    """Return the labels given to the fold's test rows; X (n, d), labels (n,).
+
+    Where the fit is blind, every row gets the most frequent label of the training rows (the lowest of several), which
+    is the rate to beat.
+    """
+    grasps = np.array(fit.grasps, dtype=np.intp)
+    trained = np.searchsorted(grasps, labels[fit.fold.train])
+    if is_blind(X, fit):
+        return np.full(len(fit.fold.test), grasps[np.bincount(trained).argmax()])
+    part = X[:, fit.columns]
+    bits, codes = part[:, : fit.n_switches].astype(bool), part[:, fit.n_switches :]
+    rows, names = fit.fold.train, tuple(map(str, fit.grasps))
+    model = training.train(Samples(bits[rows], codes[rows], trained, names))
+    return grasps[winners(model_scores(model, bits[fit.fold.test], codes[fit.fold.test]))]
+
+
+def is_blind(X: Inputs, fit: FoldFit) -> bool:
+    """Return whether a fit has no column that varies among its training rows of X (n, d): nothing to tell apart by."""
+    rows = fit.fold.train
+    return not any((X[rows, column] != X[rows[0], column]).any() for column in fit.columns)
+
+
+def run_fits(
+    X: Inputs,
+    labels: Labels,
+    fits: Iterable[FoldFit],
+    training: Training,
+    jobs: int = -1,
+    progress: Progress | None = None,
+) -> dict[FoldFit, Labels]:
+    """Return the predictions of every fit. Equal fits are done once; `progress(done, total)` after each.
+
+    jobs  worker processes, as joblib counts them: -1 for all cores, 1 for none beside this one. A worker runs one
+          thread. Sums in boosting are exact, so the result does not depend on the number of workers.
+    """
+    todo = list(dict.fromkeys(fits))
+    results: dict[FoldFit, Labels] = {}
+    tasks = ((number, X, labels, fit, training) for number, fit in enumerate(todo))
+    for number, found in in_workers(_numbered, tasks, jobs):
+        results[todo[number]] = found
+        if progress is not None:
+            progress(len(results), len(todo))
+    return results
+
+
+def _numbered(task: tuple[int, Inputs, Labels, FoldFit, Training]) -> tuple[int, Labels]:
+    number, X, labels, fit, training = task
+    return number, predictions(X, labels, fit, training)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,10 +150,10 @@ class CellPlan:
     """The fits of one cell: `runs` of folds, one run a repeat; a cell of random draws has all repeats of each draw."""
 
     part: Population
-    runs: tuple[tuple[Fit, ...], ...]
+    runs: tuple[tuple[FoldFit, ...], ...]
 
     @property
-    def fits(self) -> list[Fit]:
+    def fits(self) -> list[FoldFit]:
         """The fits of all runs."""
         return [fit for run in self.runs for fit in run]
 
@@ -93,15 +165,6 @@ class RowPlan:
     name: str
     what: str
     cells: tuple[CellPlan, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class TablePlan:
-    """A table under one protocol."""
-
-    name: TableName
-    protocol: ProtocolName
-    rows: tuple[RowPlan, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,15 +184,15 @@ class Planner:
     rivals: tuple[str, ...] = RIVALS
     _choosers: dict[tuple[str, bytes], Chooser] = field(default_factory=dict, init=False, repr=False)
 
-    def table(self, name: TableName, protocol: Protocol) -> TablePlan:
-        """Return the plan of a table under a protocol."""
+    def table(self, name: TableName, protocol: Protocol) -> list[RowPlan]:
+        """Return the rows of a table under a protocol."""
         rows: dict[TableName, Callable[[Protocol], list[RowPlan]]] = {
             "compositions": self._compositions,
             "generality": self._generality,
             "pruning": self._pruning,
             "baselines": self._baselines,
         }
-        return TablePlan(name, protocol.name, tuple(rows[name](protocol)))
+        return rows[name](protocol)
 
     def _compositions(self, protocol: Protocol) -> list[RowPlan]:
         chosen = partial(self.own, protocol)
@@ -196,10 +259,10 @@ class Planner:
     def cell(self, part: Population, kind: Composition, select: Select) -> CellPlan:
         """Return the fits of composition `kind` on every fold of `part`; `select` gives the placement for a fold."""
 
-        def fit(fold: Fold) -> Fit:
+        def fit(fold: Fold) -> FoldFit:
             placement = select(part, fold) if kind.needs_placement else ()
             columns = kind.columns(placement, self._n_switches, self.n_joints)
-            return Fit(fold, columns, part.grasps, sum(column < self._n_switches for column in columns))
+            return FoldFit(fold, columns, part.grasps, sum(column < self._n_switches for column in columns))
 
         return CellPlan(part, tuple(tuple(map(fit, folds)) for folds in part.repeats))
 

@@ -10,7 +10,7 @@ _Z = 1.959963984540054  # the normal distribution's quantile of (1 + LEVEL) / 2
 
 
 @dataclass(frozen=True, slots=True)
-class Rate:
+class RepeatedRate:
     """Recognised / all, over repeats of the same rows.
 
     correct  rows recognised in each repeat        mean       in 0..1
@@ -62,7 +62,7 @@ class Average:
     high: float
 
     @classmethod
-    def of(cls, rates: tuple[Rate, ...]) -> Self:
+    def of(cls, rates: tuple[RepeatedRate, ...]) -> Self:
         """Return the average of one or more rates."""
         mean = fmean(rate.mean for rate in rates)
         # Not by `hypot`, whose last bit depends on the Python that runs.

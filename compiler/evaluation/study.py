@@ -1,6 +1,6 @@
 """An evaluation: the paper's tables for the user's own recordings, from fits that are each done once."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from statistics import fmean
 from typing import Any, Self
@@ -15,13 +15,24 @@ from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from ..text import counted, interval
 from ..trainers.base import Training, changed
-from .fits import Fit, Labels, Progress, is_blind, run_fits
 from .folds import EvaluationError
-from .plan import RIVALS, CellPlan, Planner, RowPlan, TableName, TablePlan, inputs
+from .plan import (
+    RIVALS,
+    CellPlan,
+    FoldFit,
+    Labels,
+    Planner,
+    Progress,
+    RowPlan,
+    TableName,
+    inputs,
+    is_blind,
+    run_fits,
+)
 from .populations import PROTOCOLS, Population, ProtocolName, Scheme, concerns, populations
-from .rates import Average, Rate
+from .rates import Average, RepeatedRate
 
-Predictions = Mapping[Fit, Labels]
+Predictions = Mapping[FoldFit, Labels]
 Confusion = tuple[tuple[int, ...], ...]
 
 _TITLES: dict[TableName, str] = {
@@ -61,7 +72,7 @@ class Cell:
                compositions
     """
 
-    rate: Rate
+    rate: RepeatedRate
     switches: Spread
     no_inputs: int
     draws: Spread | None
@@ -85,7 +96,7 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class RateTable:
     """A table in the paper's layout: a column a subject."""
 
     name: TableName
@@ -115,19 +126,19 @@ class Reader:
     grasps: tuple[int, ...]
     n_switches: int
     predictions: Predictions
-    blind: frozenset[Fit]
+    blind: frozenset[FoldFit]
 
-    def table(self, plan: TablePlan) -> Table:
-        """Return the table of a plan."""
-        columns = tuple(cell.part.name for cell in plan.rows[0].cells)
-        rows = tuple(self._row(row, confusing=plan.name == "compositions") for row in plan.rows)
-        return Table(plan.name, plan.protocol, columns, rows)
+    def table(self, name: TableName, protocol: ProtocolName, plans: Sequence[RowPlan]) -> RateTable:
+        """Return the table of these rows."""
+        columns = tuple(cell.part.name for cell in plans[0].cells)
+        rows = tuple(self._row(plan, confusing=name == "compositions") for plan in plans)
+        return RateTable(name, protocol, columns, rows)
 
     def cell(self, plan: CellPlan, *, confusing: bool) -> Cell:
         """Return the cell of a plan, with its confusion matrix if `confusing`."""
         correct = tuple(sum(map(self._correct, run)) for run in plan.runs)
         repeats = len(plan.part.repeats)
-        rate = Rate.of(correct, plan.part.total, repeats if len(correct) > repeats else 1)
+        rate = RepeatedRate.of(correct, plan.part.total, repeats if len(correct) > repeats else 1)
         counts = [sum(column < self.n_switches for column in fit.columns) for fit in plan.fits]
         blind = sum(fit in self.blind for fit in plan.fits)
         confusion = self._confusion(plan.fits) if confusing else None
@@ -139,10 +150,10 @@ class Reader:
         switches = Spread(min(s.least for s in spreads), fmean(s.mean for s in spreads), max(s.most for s in spreads))
         return Row(plan.name, plan.what, switches, cells, Average.of(tuple(cell.rate for cell in cells)))
 
-    def _correct(self, fit: Fit) -> int:
+    def _correct(self, fit: FoldFit) -> int:
         return int(np.count_nonzero(self.predictions[fit] == self.labels[fit.fold.test]))
 
-    def _confusion(self, fits: list[Fit]) -> Confusion:
+    def _confusion(self, fits: list[FoldFit]) -> Confusion:
         counts = np.zeros((len(self.grasps), len(self.grasps)), dtype=np.intp)
         for fit in fits:
             true = np.searchsorted(self.grasps, self.labels[fit.fold.test])
@@ -150,7 +161,7 @@ class Reader:
         return tuple(map(tuple, counts.tolist()))
 
 
-def _draws(rate: Rate, repeats: int) -> Spread | None:
+def _draws(rate: RepeatedRate, repeats: int) -> Spread | None:
     """Return the spread of the draws' own rates, each over its `repeats`; None if there is one draw only."""
     if len(rate.correct) == repeats:
         return None
@@ -214,7 +225,7 @@ class Study:
     grasps: tuple[str, ...]
     warnings: tuple[str, ...]
     left_out: tuple[LeftOut, ...]
-    tables: tuple[Table, ...]
+    tables: tuple[RateTable, ...]
 
     def __str__(self) -> str:
         """Return how many rows there are, and how they were cut."""
@@ -291,8 +302,13 @@ def evaluate(
         options.rivals,
     )
     protocols = [protocol for protocol in PROTOCOLS if protocol.name in options.protocols]
-    plans = [planner.table(name, each) for name, reason in reasons.items() if reason is None for each in protocols]
-    fits = [fit for plan in plans for row in plan.rows for cell in row.cells for fit in cell.fits]
+    plans = {
+        (name, each.name): planner.table(name, each)
+        for name, reason in reasons.items()
+        if reason is None
+        for each in protocols
+    }
+    fits = [fit for rows in plans.values() for row in rows for cell in row.cells for fit in cell.fits]
     X = inputs(chosen)
     predictions = run_fits(X, chosen.labels, fits, training, jobs, progress)
     grasps = tuple(np.unique(chosen.labels).tolist())
@@ -305,7 +321,7 @@ def evaluate(
         grasps=tuple(chosen.taxonomy.types[label] for label in grasps),
         warnings=concerns(chosen, parts, options.scheme, options.folds),
         left_out=tuple(LeftOut(name, reason) for name, reason in reasons.items() if reason is not None),
-        tables=tuple(map(reader.table, plans)),
+        tables=tuple(reader.table(*which, rows) for which, rows in plans.items()),
     )
 
 

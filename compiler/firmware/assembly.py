@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from .errors import FirmwareError
+from . import FirmwareError
 from .layout import Layout, Lookup, lookups
 from .words import Names, comment
 

@@ -81,7 +81,7 @@ _RIGHT, _LEFT = code("brcc ldi add add subi sub rjmp movw add adc").cycles, code
 _BYTES, _BYTES_EACH = 160, 20  # of code, rounded up
 
 
-class Search:
+class BinSearch:
     """The search in the thresholds of `joints`, for codes of 8 or 16 bits on an AVR of `counter_bytes`, 2 or 3, in its
     program counter.
     """
@@ -159,7 +159,7 @@ class AvrCosts:
         self._counter = 3 if flash > 128 << 10 else 2
         joints = [joint for joint in layout.joints if not joint.constant]
         searched = layout.bins == "search" and joints
-        self._search = Search(joints, layout.code_bits, self._counter) if searched else None
+        self._search = BinSearch(joints, layout.code_bits, self._counter) if searched else None
         self._steps = [code("")] * len(layout.groups) + [self._row_number(joint) for joint in joints]
 
     @property

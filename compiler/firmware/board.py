@@ -1,20 +1,25 @@
-"""How a microcontroller is wired to a glove: the tables of `board.toml`, field by field.
+"""How a microcontroller is wired to a glove: the tables of `board.toml`, how they are read, and what they must satisfy.
 
 Keys are numbered as the board numbers them in its frames: with pins and chips, key k is the build's kept switch k, all
 in one row; in a matrix it is row * columns + column.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Annotated, Literal
 
 from msgspec import Meta, Struct, field
 
-from thenar.runtime.harness.wiring import Baud, ChipWiring, Debounce, Harness, ScannerWiring
+from thenar.drivers.i2c.chips import CHIPS
+from thenar.runtime.harness import checks
+from thenar.runtime.harness.wiring import Baud, BusWiring, ChipWiring, Debounce, Harness, ScannerWiring
 from thenar.runtime.harness.writing import harness_to_toml
-from thenar.runtime.names import list_names
+from thenar.runtime.names import fault, list_names, nearest, shortened
+from thenar.runtime.toml_source import Place, TomlText, read_source, spelled
+from thenar.runtime.toml_struct import check_finite, convert
 
-from .errors import FirmwareError
-from .targets.avr import AVRS, Avr
+from . import FirmwareError
+from .targets.avr import AVRS, Avr, best_setting, near_rates
 from .words import Names
 
 Microseconds = Annotated[int, Meta(ge=0, le=60_000_000)]
@@ -137,3 +142,177 @@ def glove_toml(name: str, board: Board, names: Names, port: str = "/dev/ttyACM0"
     line = ScannerWiring(port=port, baud=board.baud, switches=key_names(board, switches))
     debounce = Debounce(enabled=not (board.debounce.press_us or board.debounce.release_us))
     return harness_to_toml(Harness(name=name, scanners=(line,), debounce=debounce))
+
+
+Fault = tuple[Place, str]
+_TIMER_HZ = 400  # the clock's timer counts periods of 20 ms in eighths of the processor's clock
+_KINDS = tuple(kind for kind, chip in CHIPS.items() if chip.registers)
+_TOLERANCE = 0.025
+
+
+def faults(board: Board) -> Iterator[Fault]:
+    """Yield what is wrong with `board` and where; what comes after a fault may be wrong because of it."""
+    if board.part not in AVRS:
+        yield ("part",), f"{board.part!r} is not among its values{nearest(board.part, list(AVRS))}"
+    yield from _of_clocks(board)
+    yield from _of_inputs(board)
+    if board.matrix is not None:
+        yield from _of_matrix(board.matrix)
+    yield from _of_chips(board)
+    if board.cyberglove is not None:
+        yield from _of_glove(board.cyberglove, board)
+    yield from _of_analog(board)
+    yield from _of_pins(board)
+    yield from _of_names(board)
+
+
+def _of_clocks(board: Board) -> Iterator[Fault]:
+    part = board.microcontroller
+    if board.clock_hz > part.highest_hz:
+        yield ("clock_hz",), f"{part.named} runs at {part.highest_hz} Hz at most"
+    if board.clock_hz % _TIMER_HZ:
+        yield ("clock_hz",), f"must be a multiple of {_TIMER_HZ}: the clock of microseconds would not be exact"
+    yield from _of_baud(("baud",), board.baud, board.clock_hz)
+    for key in ("state_us", "heartbeat_us"):
+        if 0 < getattr(board, key) < board.scan_us:
+            yield (key,), f"must be 0 (none) or at least scan_us, {board.scan_us}: what is sent is what was scanned"
+
+
+def _of_baud(place: Place, baud: int, clock_hz: int) -> Iterator[Fault]:
+    setting = best_setting(baud, clock_hz)
+    if setting is None or abs(setting.error) > _TOLERANCE:
+        rates = ", ".join(map(str, near_rates(baud, clock_hz)))
+        yield place, f"a UART at {clock_hz} Hz cannot make {baud} baud within {_TOLERANCE:.1%}: it can make {rates}"
+
+
+def _of_inputs(board: Board) -> Iterator[Fault]:
+    kinds = {"pins": bool(board.pins), "matrix": board.matrix is not None, "chip": bool(board.chips)}
+    there: list[Place] = [(kind,) for kind, used in kinds.items() if used]
+    if len(there) > 1:
+        yield there[1], f"{spelled(there[0])} is there already: switches hang on pins, a matrix or chips, one of them"
+    if not there:
+        yield (), "no switch is wired: add [pins], [matrix] or [[chip]] tables"
+    if board.early_exit and not board.chips:
+        yield ("early_exit",), "only chips are read one after another: without [[chip]] there is nothing to save"
+    if board.cyberglove is not None and board.analog:
+        yield ("analog",), "there is a [cyberglove] already: joints come from one of them"
+
+
+def _of_matrix(matrix: Matrix) -> Iterator[Fault]:
+    if len(matrix.switches) != len(matrix.rows):
+        yield ("matrix", "switches"), f"{len(matrix.switches)} lists for {len(matrix.rows)} rows: one list a row"
+    for number, row in enumerate(matrix.switches):
+        if len(row) != len(matrix.columns):
+            here: Place = ("matrix", "switches", number)
+            yield here, f'{len(row)} names for {len(matrix.columns)} columns: write "" where there is no key'
+
+
+def _of_chips(board: Board) -> Iterator[Fault]:
+    for number, chip in enumerate(board.chips):
+        here: Place = ("chip", number)
+        if chip.kind in CHIPS and chip.kind not in _KINDS:
+            yield (*here, "kind"), f"the firmware reads no {chip.kind}: it reads {', '.join(_KINDS)}"
+        if chip.mux is not None:
+            yield (*here, "mux"), "the firmware selects no channels: wire the chip to the bus itself"
+    if board.chips and board.clock_hz < 16 * board.bus.clock_hz:
+        yield ("bus", "clock_hz"), f"must be at most a 16th of the part's clock, {board.clock_hz // 16}"
+    if board.chips and board.clock_hz > (16 + 2 * 255) * board.bus.clock_hz:
+        yield ("bus", "clock_hz"), f"the part's clock cannot be divided so far: at least {board.clock_hz // 526 + 1}"
+    bus = BusWiring(device="bus", clock_hz=board.bus.clock_hz, chips=board.chips)
+    for place, reason in checks.faults(Harness(name="board", buses=(bus,))):
+        where = place[2:] if place[2:3] == ("chip",) else ("bus", *place[2:])
+        yield where, reason.replace("bus[0].", "")
+
+
+def _of_glove(glove: GloveUart, board: Board) -> Iterator[Fault]:
+    part = board.microcontroller
+    if len(part.uarts) == 1:
+        yield ("cyberglove",), f"{part.named} has one UART, which the host has: take an atmega2560, or [analog]"
+    if glove.uart == 0:
+        yield ("cyberglove", "uart"), "UART 0 is the host's: take 1, 2 or 3"
+    if glove.joints and len(glove.joints) != glove.sensors:
+        place: Place = ("cyberglove", "joints")
+        yield place, f"{len(glove.joints)} names for {glove.sensors} sensors: name every one, in wire order"
+    yield from _of_baud(("cyberglove", "baud"), glove.baud, board.clock_hz)
+
+
+def _of_analog(board: Board) -> Iterator[Fault]:
+    channels = board.microcontroller.analog
+    seen: dict[str, str] = {}
+    for joint, channel in board.analog.items():
+        if channel not in channels:
+            yield ("analog", joint), f"an {board.part} has no channel {channel!r}{nearest(channel, list(channels))}"
+        if channel in seen:
+            yield ("analog", joint), f"{channel} is that of {seen[channel]} already: a joint has a channel of its own"
+        seen[channel] = joint
+
+
+def _of_pins(board: Board) -> Iterator[Fault]:
+    part = board.microcontroller
+    taken = _held(board, part)
+    for place, pin in _used(board):
+        if pin not in part.pins and pin not in taken:
+            yield place, f"{part.named} has no pin {pin!r} that can be used{nearest(pin, part.pins)}"
+        if pin in taken:
+            yield place, f"{pin} is {taken[pin]} already: use another pin"
+        taken[pin] = f"that of {spelled(place)}"
+
+
+def _held(board: Board, part: Avr) -> dict[str, str]:
+    """Return the pins that are not free, and what they are."""
+    held = dict.fromkeys(part.uarts[0], "a pin of UART 0, the host's,")
+    if board.cyberglove is not None and board.cyberglove.uart < len(part.uarts):
+        number = board.cyberglove.uart
+        held |= dict.fromkeys(part.uarts[number], f"a pin of UART {number}, the glove's,")
+    if board.chips:
+        held |= dict(zip(part.twi, ("the bus's SDA", "the bus's SCL"), strict=True))
+    return held
+
+
+def _used(board: Board) -> Iterator[tuple[Place, str]]:
+    yield from ((("pins", name), pin) for name, pin in board.pins.items())
+    if board.matrix is not None:
+        yield from ((("matrix", "rows", n), pin) for n, pin in enumerate(board.matrix.rows))
+        yield from ((("matrix", "columns", n), pin) for n, pin in enumerate(board.matrix.columns))
+    channels = board.microcontroller.analog
+    yield from ((("analog", name), channels[at]) for name, at in board.analog.items() if channels.get(at))
+
+
+def _of_names(board: Board) -> Iterator[Fault]:
+    """Names must be good; those in TOML keys stand once anyway, and those of chips were seen to."""
+    joints: list[tuple[Place, str]] = [(("analog", name), name) for name in board.analog]
+    if board.cyberglove is not None:
+        joints += [(("cyberglove", "joints", n), name) for n, name in enumerate(board.cyberglove.joints) if name]
+    for place, name in joints:
+        if reason := fault(name):
+            yield place, f"{shortened(repr(name))} is no name of a joint: it {reason}"
+    named: list[tuple[Place, str]] = [(("pins", name), name) for name in board.pins]
+    if board.matrix is not None:
+        rows = enumerate(board.matrix.switches)
+        named += [(("matrix", "switches", r, c), name) for r, row in rows for c, name in enumerate(row) if name]
+    seen: dict[str, Place] = {}
+    for place, name in named:
+        if reason := fault(name):
+            yield place, f"{shortened(repr(name))} is no name of a switch: it {reason}"
+        if name in seen:
+            yield place, f"switch {name!r} is {spelled(seen[name])} already: a switch has one place"
+        seen[name] = place
+
+
+def load_board(path: str | Path) -> Board:
+    """Return the board in a TOML file. Raises FirmwareError with file, line and key."""
+    return _board_of(read_source(Path(path), FirmwareError))
+
+
+def parse_board(text: str, name: str = "board.toml") -> Board:
+    """Return the board that `text`, which messages call `name`, is. Raises FirmwareError as `load_board` does."""
+    return _board_of(TomlText(name, text, FirmwareError))
+
+
+def _board_of(source: TomlText) -> Board:
+    tables = source.tables()
+    check_finite(source, (), tables)
+    board = convert(source, (), tables, Board)
+    for place, reason in faults(board):
+        raise source.error(place, reason)
+    return board

@@ -8,9 +8,9 @@ from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.scanmap import Port
 from thenar.runtime.tables import IntegerTables
 
+from . import FirmwareError
 from .board import Board, check_switches, glove_toml, key_names, rows_and_columns
 from .board_inputs import expanders_file, joints_file, matrix_file, pair, pins_file, text, wrapped
-from .errors import FirmwareError
 from .layout import Layout
 from .protocol import BoardConfig
 from .targets.avr import best_setting

@@ -13,8 +13,8 @@ from thenar.runtime.manifest import Calibration
 from thenar.runtime.names import list_names, nearest
 from thenar.runtime.scanning.scanmap import Port
 
+from . import FirmwareError
 from .board import Board, GloveUart, Matrix
-from .errors import FirmwareError
 from .words import comment
 
 

@@ -9,8 +9,8 @@ from typing import get_args
 
 from thenar.runtime.tables import IntegerTables
 
+from . import FirmwareError
 from .costs import Cost
-from .errors import FirmwareError
 from .layout import LARGEST_GROUP, SMALLEST_GROUP, Adding, Bins, Layout, arrange
 from .targets import TARGETS, Target
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from thenar.runtime.tables import IntegerTables
 
-from .errors import FirmwareError
+from . import FirmwareError
 
 MOST_ROWS = 256  # a bin is one byte
 MOST_BINS = 256  # and so is what is left of a code when the first of a joint's bins is taken from it

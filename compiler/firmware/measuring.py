@@ -3,14 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .answers import Answers
+from . import FirmwareError
 from .avr_costs import worst_frame
 from .choose import Fit
 from .classifier import Library
 from .costs import NAME_BYTES, Unit
-from .errors import FirmwareError
 from .layout import Layout
-from .probes import Probes, changing_frames, extreme_frames, joined, random_frames
+from .probes import Answers, Probes, changing_frames, extreme_frames, joined, random_frames
 from .targets import Target
 from .tools import STRICT, call, find, workshop
 

@@ -18,7 +18,7 @@ from thenar.runtime.calibration import codes_of_bytes
 from thenar.runtime.manifest import Calibration
 from thenar.runtime.tables import IntegerTables
 
-from .errors import FirmwareError
+from . import FirmwareError
 
 BYTES = 256
 

@@ -1,12 +1,101 @@
-"""Frames that a compiled classifier is held against: extreme ones, all of a kind, and random ones."""
+"""Frames that a compiled classifier is held against, in bytes, and what it answers; and a few of each as C.
 
+Frames are extreme ones, all of a kind, and random ones. With those in C a folder of firmware tests itself.
+"""
+
+import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from textwrap import wrap
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.firmware_templates.rendering import render
 from thenar.runtime.tables import IntegerTables
+
+from . import FirmwareError
+from .costs import Unit
+from .layout import Layout
+from .words import string
+
+Frames = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answers:
+    """The answers to n frames: scores (n, K) int16, classes (n,) the first best of them.
+
+    cost   what each answer took, (n,) in `unit`; None where nothing was counted (unit "")
+    stack  bytes of stack that an answer needs; None where it was not measured
+    names  of the K types, as the program gave them; None where it was not asked
+    """
+
+    scores: NDArray[np.int16]
+    classes: NDArray[np.uint16]
+    cost: NDArray[np.uint32] | None = None
+    unit: Unit = ""
+    stack: int | None = None
+    names: tuple[str, ...] | None = None
+
+    @property
+    def most(self) -> int:
+        """What the slowest answer took, where it was counted."""
+        return 0 if self.cost is None else int(self.cost.max())
+
+
+def check_frames(frames: Frames, layout: Layout) -> None:
+    """Raise FirmwareError unless `frames` is uint8 (n, F)."""
+    size = layout.frame_size
+    if frames.dtype != np.uint8 or frames.ndim != 2 or frames.shape[1] != size:
+        raise FirmwareError(f"frames are {frames.dtype} {frames.shape}, this layout takes uint8 (n, {size})")
+
+
+def names_in(printed: bytes, layout: Layout) -> tuple[tuple[str, ...], bytes]:
+    """Return the names of the K types that a program printed first, each with a zero behind it, and the rest.
+
+    Raises FirmwareError if there are fewer.
+    """
+    *names, rest = printed.split(b"\0", len(layout.start))
+    if len(names) < len(layout.start):
+        raise FirmwareError(f"the program printed {len(names)} names for {len(layout.start)} grasp types")
+    return tuple(name.decode(errors="replace") for name in names), rest
+
+
+def answers_from(printed: bytes, frames: Frames, layout: Layout) -> Answers:
+    """Return the answers that a program printed: for each frame K scores and a class, 16 bits each, little-endian.
+
+    Raises FirmwareError unless there is one for every frame.
+    """
+    size = len(layout.start) + 1
+    if len(printed) != 2 * size * len(frames):
+        raise FirmwareError(f"the program printed {len(printed)} bytes for {len(frames)} frames of {2 * size} bytes")
+    words = np.frombuffer(printed, "<u2").astype(np.uint16).reshape(len(frames), size)
+    return Answers(words[:, :-1].view(np.int16), words[:, -1])
+
+
+def record_files(
+    name: str, layout: Layout, machine: Literal["host", "cortex"], answer: Literal["classify", "update"]
+) -> dict[str, str]:
+    """Return the files, name -> text, of the program that answers frames with the function `answer` of `name`.
+
+    For classify() it writes the groups' bytes into the input; for update() it calls set_switch() for every switch.
+    """
+    record = render(
+        "checking/record.h.j2",
+        name=name,
+        classes=len(layout.start),
+        sizes=[len(numbers) for numbers in layout.groups],
+        by_switch=answer == "update",
+        padding=layout.padding,
+        joints=len(layout.joints),
+        code_bytes=layout.code_bits // 8,
+        frame_bytes=layout.frame_size,
+    )
+    return {"record.h": record, "main.c": render(f"checking/{machine}_main.c.j2", name=name, answer=answer)}
+
 
 _BYTE, _WORD = 0xFF, 0xFFFF
 _CHANGING = 40
@@ -84,3 +173,55 @@ def turns(tables: IntegerTables, joint: int) -> NDArray[np.uint16]:
 def _top(tables: IntegerTables) -> int:
     wide = any(len(thresholds) and thresholds[-1] >= _BYTE for thresholds in tables.thresholds)
     return _WORD if wide else _BYTE
+
+
+DRAWN = 16  # frames beside the two extreme ones
+CHECKS = DRAWN + 2
+_WIDTH = 120
+
+
+def check_header(name: str, layout: Layout, grasps: Sequence[str]) -> str:
+    """Return the text of thenar_NAME_check.h: frames, their answers, the types' names, and a function that compares."""
+    frames = self_test_frames(layout)
+    what = ("every switch open, lowest codes", "every switch closed, highest codes", *DRAWN * ("drawn",))
+    answers = layout.scores(frames.bits, frames.codes)
+    rows = zip(what, np.packbits(frames.bits, axis=1, bitorder="little"), frames.codes, answers, strict=True)
+    checks = [_check(*row) for row in rows]
+    values = {"name": name, "upper": name.upper(), "classes": len(layout.start), "count": len(checks)}
+    inputs = {"switches": layout.tables.n_switches, "joints": layout.tables.n_joints}
+    return render("checking/check.h.j2", **values, **inputs, checks=checks, names=[string(each) for each in grasps])
+
+
+def self_test_frames(layout: Layout) -> Probes:
+    """Return the frames: the two extreme ones, then drawn ones, whose codes are those at which a joint's row changes.
+
+    They are drawn from a hash: the same build has the same ones with every release of numpy.
+    """
+    s, turning = layout.tables.n_switches, [turns(layout.tables, joint) for joint in range(layout.tables.n_joints)]
+    draws = _drawn(DRAWN, s + len(turning))
+    taken = [[0, codes[-1], *codes[draws[:, s + joint] % len(codes)]] for joint, codes in enumerate(turning)]
+    bits = np.vstack([np.zeros((1, s), bool), np.ones((1, s), bool), draws[:, :s] % 2 == 1])
+    return Probes(bits, np.array(taken, np.uint16).reshape(len(turning), CHECKS).T)
+
+
+def _drawn(rows: int, columns: int) -> NDArray[np.uint16]:
+    stream = hashlib.shake_256(b"thenar self test").digest(2 * rows * columns)
+    return np.frombuffer(stream, "<u2").astype(np.uint16).reshape(rows, columns)
+
+
+def _check(
+    what: str, closed: NDArray[np.uint8], codes: NDArray[np.uint16], scores: NDArray[np.int64]
+) -> dict[str, object]:
+    """Return what a frame is, the lines of its members' initialisers, and of its answer's."""
+    members = ([f"{byte:#04x}" for byte in closed.tolist()], [str(code) for code in codes.tolist()])
+    return {
+        "what": what,
+        "members": [_wrapped(words, 12) for words in members if words],
+        "grasp": int(scores.argmax()),
+        "scores": _wrapped([str(score) for score in scores.tolist()], 12),
+    }
+
+
+def _wrapped(words: list[str], indent: int) -> list[str]:
+    """Return the words as lines of an initialiser that stands `indent` columns in."""
+    return wrap(", ".join(words), _WIDTH - indent)

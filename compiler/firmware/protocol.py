@@ -14,7 +14,7 @@ from thenar.runtime.scanning.decided import EarlyExit
 from thenar.runtime.scores import Scorer
 from thenar.runtime.tables import IntegerTables
 
-from .errors import FirmwareError
+from . import FirmwareError
 from .words import comment
 
 # What a HEARTBEAT of a frame whose length is one byte has room for.

@@ -16,9 +16,9 @@ import numpy as np
 
 from thenar.firmware_templates.rendering import render
 
-from .answers import Answers, Frames, check_frames
-from .errors import FirmwareError
+from . import FirmwareError
 from .layout import Layout
+from .probes import Answers, Frames, check_frames
 from .tools import AVR_COMPILER, HOST_COMPILER, STRICT, Tool, call, find, lacking, workshop
 
 _CLOCK_HZ = 16_000_000  # of the simulated time, in which nothing is counted

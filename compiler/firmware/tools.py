@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from .errors import FirmwareError
+from . import FirmwareError
 
 LIMIT_S = 300.0
 # Every C file of ours is held to these.

@@ -9,7 +9,7 @@ from typing import Protocol
 from thenar.runtime.manifest import Calibration, Switch
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
-from .errors import FirmwareError
+from . import FirmwareError
 
 _LONGEST_NAME = 32
 

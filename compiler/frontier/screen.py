@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..evaluation.rates import Rate as Counted
+from ..evaluation.rates import RepeatedRate as Counted
 from ..placement.methods.base import METHODS
 from ..samples import Columns
 from .points import Curve, Rate

@@ -6,8 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from thenar.runtime.names import printable
 
-from ..recordings.spreadsheet import cells
-from ..text import counted, duration, interval, listed, percent
+from ..text import cells, counted, duration, interval, listed, percent
 from .points import Frontier, Mark, Point, Rate, Setting, Time
 
 COLUMNS = (

@@ -1,7 +1,12 @@
 """The files of a spec: what a person needs to cut, sew, solder and run the reduced glove; and their folder."""
 
-from collections.abc import Mapping, Sequence
+import io
+import uuid
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -12,11 +17,202 @@ from thenar.runtime.scanning.scanmap import ScanMap
 
 from ..hand import HandShape
 from ..publication import check_folder, entries, publish_folder
-from .drawings import dxf_of, svg_of
+from .circuit import Circuit, Component, Kind
 from .layout import BoardPins
 from .lists import materials_csv, readme_of, switches_csv, wiring_csv
-from .netlist import netlist_of
+from .pattern import LAYERS, Circle, Line, Pattern, Shape, Text
 from .spec import GloveSpec, SpecError, glove_spec
+
+if TYPE_CHECKING:
+    from ezdxf.layouts.layout import Modelspace
+
+_SVG_NAMESPACE = "http://www.w3.org/2000/svg"
+_INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
+_SVG_COLOURS = {
+    "outline": "#000",
+    "strips": "#06c",
+    "creases": "#aaa",
+    "holes": "#d00",
+    "names": "#333",
+    "scale": "#000",
+}
+_STROKE_MM = 0.2
+# The height of capitals in Helvetica and its kin, as a share of the size of the type.
+_CAPITALS = 0.72
+# AutoCAD's colour numbers: black or white, blue, grey, red.
+_DXF_COLOURS = {"outline": 7, "strips": 5, "creases": 8, "holes": 1, "names": 8, "scale": 7}
+
+
+def svg_of(pattern: Pattern) -> bytes:
+    """Return the SVG: one user unit is one millimetre, and drawing programs show each group as a layer."""
+    page = pattern.page
+    root = ET.Element(
+        "svg",
+        {
+            "xmlns": _SVG_NAMESPACE,
+            "xmlns:inkscape": _INKSCAPE,
+            "width": f"{page.width_mm:g}mm",
+            "height": f"{page.height_mm:g}mm",
+            "viewBox": f"0 0 {page.width_mm:g} {page.height_mm:g}",
+            "font-family": "Helvetica, Arial, sans-serif",
+        },
+    )
+    for layer in LAYERS:
+        group = ET.SubElement(root, "g", _layer(layer))
+        for shape in pattern.shapes:
+            if shape.layer == layer:
+                _add_to_svg(group, shape, page.height_mm)
+    ET.indent(root, " ")
+    return b'<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(root, encoding="unicode").encode() + b"\n"
+
+
+def _layer(name: str) -> dict[str, str]:
+    colour = _SVG_COLOURS[name]
+    paint = {"fill": colour} if name == "names" else {"fill": "none", "stroke": colour, "stroke-width": f"{_STROKE_MM}"}
+    return {"id": name, "inkscape:groupmode": "layer", "inkscape:label": name, **paint}
+
+
+def _add_to_svg(group: ET.Element, shape: Shape, height_mm: float) -> None:
+    match shape:
+        case Line(points=points, closed=closed):
+            places = " ".join(f"{x:.3f},{height_mm - y:.3f}" for x, y in points)
+            ET.SubElement(group, "polygon" if closed else "polyline", {"points": places})
+        case Circle(x=x, y=y, radius=radius):
+            ET.SubElement(group, "circle", {"cx": f"{x:.3f}", "cy": f"{height_mm - y:.3f}", "r": f"{radius:g}"})
+        case Text():
+            _add_text(group, shape, height_mm)
+
+
+def _add_text(group: ET.Element, text: Text, height_mm: float) -> None:
+    baseline = text.y - text.height / 2 if text.centred else text.y
+    attributes = {
+        "x": f"{text.x:.3f}",
+        "y": f"{height_mm - baseline:.3f}",
+        "font-size": f"{text.height / _CAPITALS:.3f}",
+    }
+    if text.centred:
+        attributes["text-anchor"] = "middle"
+    ET.SubElement(group, "text", attributes).text = text.text
+
+
+def dxf_of(pattern: Pattern) -> bytes:
+    """Return the DXF of AutoCAD 2000 in millimetres, which cutters and CAD programs read."""
+    from ezdxf.filemanagement import new
+    from ezdxf.units import MM
+
+    text = io.StringIO()
+    with _undated():
+        document = new("R2000", units=MM)
+        for layer in LAYERS:
+            document.layers.add(layer, color=_DXF_COLOURS[layer])
+        space = document.modelspace()
+        for shape in pattern.shapes:
+            _add_to_dxf(space, shape)
+        document.write(text)
+    return text.getvalue().encode(document.output_encoding, "dxfreplace")
+
+
+def _add_to_dxf(space: "Modelspace", shape: Shape) -> None:
+    from ezdxf.enums import TextEntityAlignment
+
+    on_layer = {"layer": shape.layer}
+    match shape:
+        case Line(points=points, closed=closed):
+            space.add_lwpolyline(points.tolist(), close=closed, dxfattribs=on_layer)
+        case Circle(x=x, y=y, radius=radius):
+            space.add_circle((x, y), radius, dxfattribs=on_layer)
+        case Text(x=x, y=y, height=height, text=text, centred=centred):
+            where = TextEntityAlignment.MIDDLE_CENTER if centred else TextEntityAlignment.LEFT
+            space.add_text(text, height=height, dxfattribs=on_layer).set_placement((x, y), align=where)
+
+
+@contextmanager
+def _undated() -> Iterator[None]:
+    """Keep dates and random identifiers out of what ezdxf writes."""
+    from ezdxf._options import options
+
+    before = options.write_fixed_meta_data_for_testing
+    options.write_fixed_meta_data_for_testing = True
+    try:
+        yield
+    finally:
+        options.write_fixed_meta_data_for_testing = before
+
+
+_VERSION = "E"
+# Any constant will do: identifiers must only be the same whenever the same component is written.
+_NAMESPACE = uuid.UUID("5e1f3c0a-7f7a-5d0b-9a53-4d6f0b7c2e61")
+
+
+def netlist_of(circuit: Circuit, title: str) -> bytes:
+    """Return the netlist. What is off the board is in it, and KiCad is told to leave it out of the layout.
+
+    It holds no date and no path: the same circuit gives the same bytes.
+    """
+    lines = [
+        f"(export (version {_quoted(_VERSION)})",
+        f'  (design (source {_quoted(title)}) (date "") (tool "thenar")',
+        f'    (sheet (number "1") (name "/") (tstamps "/") (title_block (title {_quoted(title)}))))',
+        "  (components",
+        *(line for component in circuit.components for line in _component(component)),
+        "  )",
+        "  (libparts",
+        *(line for kind in _symbols(circuit) for line in _libpart(kind)),
+        "  )",
+        "  (libraries)",
+        "  (nets",
+        *_nets(circuit),
+        "  ))",
+    ]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _component(component: Component) -> Iterator[str]:
+    kind = component.kind
+    yield f"    (comp (ref {_quoted(component.ref)})"
+    yield f"      (value {_quoted(component.name if component.name and not kind.part else kind.value)})"
+    if kind.footprint:
+        yield f"      (footprint {_quoted(kind.footprint)})"
+    fields = {"MPN": kind.part, "Manufacturer": kind.maker, "Place": component.name}
+    given = [f"(field (name {_quoted(name)}) {_quoted(value)})" for name, value in fields.items() if value]
+    if given:
+        yield f"      (fields {' '.join(given)})"
+    yield f'      (libsource (lib {_quoted(kind.library)}) (part {_quoted(kind.symbol)}) (description ""))'
+    if not component.on_board:
+        yield '      (property (name "exclude_from_board"))'
+    yield '      (sheetpath (names "/") (tstamps "/"))'
+    yield f"      (tstamps {_quoted(str(uuid.uuid5(_NAMESPACE, component.ref)))}))"
+
+
+def _symbols(circuit: Circuit) -> list[Kind]:
+    """Return one sort of component for each symbol."""
+    return list({(c.kind.library, c.kind.symbol): c.kind for c in circuit.components}.values())
+
+
+def _libpart(kind: Kind) -> Iterator[str]:
+    yield f"    (libpart (lib {_quoted(kind.library)}) (part {_quoted(kind.symbol)})"
+    yield "      (pins"
+    for number, name, electrical in kind.pins:
+        yield f"        (pin (num {_quoted(number)}) (name {_quoted(name)}) (type {_quoted(electrical)}))"
+    yield "      ))"
+
+
+def _nets(circuit: Circuit) -> Iterator[str]:
+    pins = {c.ref: {number: (name, kind) for number, name, kind in c.kind.pins} for c in circuit.components}
+    for code, (net, nodes) in enumerate(circuit.nets.items(), start=1):
+        yield f'    (net (code "{code}") (name {_quoted(net)})'
+        for node in nodes:
+            name, electrical = pins[node.ref][node.pin]
+            yield (
+                f"      (node (ref {_quoted(node.ref)}) (pin {_quoted(node.pin)}) "
+                f"(pinfunction {_quoted(name)}) (pintype {_quoted(electrical)}))"
+            )
+        yield "    )"
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
 
 # All that a spec may hold.
 NAMES = frozenset(

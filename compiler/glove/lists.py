@@ -5,7 +5,7 @@ import io
 from collections.abc import Iterable, Iterator, Sequence
 from textwrap import fill
 
-from ..recordings.spreadsheet import cells
+from ..text import cells
 from .circuit import BillLine
 from .layout import CONTACT_MM
 from .spec import Expected, SpecSummary

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .errors import PlacementError
 from .exact import Counts
+from .inputs import PlacementError
 
 NARROW = 16
 _DIGIT = 256

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from thenar.runtime.files import write_atomically
 
 from ..pictures import painting, rendered
-from .errors import PlacementError
+from .inputs import PlacementError
 from .placement import Aim, Placement, Standard
 from .tree import Tree, names_for
 

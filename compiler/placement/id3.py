@@ -7,10 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from .counts import Counter, Digits
-from .errors import PlacementError
 from .exact import Counts
 from .gain import NodeCounts, best_position, gain_bits
-from .inputs import check_labels, check_matrix
+from .inputs import PlacementError, check_labels, check_matrix
 from .tree import Node, Tree
 
 Rows = npt.NDArray[np.intp]

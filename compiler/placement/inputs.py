@@ -1,4 +1,4 @@
-"""Checks of what the user hands over: a matrix of inputs and one label for each of its rows."""
+"""Checks of what the user hands over to a placement: a matrix of inputs and one label for each of its rows."""
 
 import math
 from typing import Any
@@ -6,7 +6,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .errors import PlacementError
+from thenar.runtime.errors import ThenarError
+
+
+class PlacementError(ThenarError, ValueError):
+    """Inputs, labels or a stored tree from which no placement can be made."""
 
 
 def check_matrix(X: npt.ArrayLike) -> npt.NDArray[Any]:

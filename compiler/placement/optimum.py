@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..samples import Columns, Samples
-from .errors import PlacementError
 from .exact import Counts
+from .inputs import PlacementError
 
 Numbers = NDArray[np.intp]
 

@@ -13,9 +13,9 @@ from ..limits import check_types
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
 from .cooccurrence import Cooccurrence
-from .errors import PlacementError
 from .gain import entropy_bits
 from .id3 import grow_id3
+from .inputs import PlacementError
 from .methods.base import METHODS, PAPERS
 from .optimum import Pairs, best_subset
 from .ports import PortCosts

@@ -22,7 +22,7 @@ from ..boosting.stumps import winners
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
 from ..workers import in_workers
-from .errors import PlacementError
+from .inputs import PlacementError
 from .methods.base import BEST, METHODS
 from .placement import Aim, CurvePoint, Placement, Progress, Served, Standard, kept_of, samples_of
 

@@ -14,7 +14,7 @@ from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import scanner_us
 
-from .errors import PlacementError
+from .inputs import PlacementError
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..text import counted
-from .errors import PlacementError
-from .inputs import check_matrix
+from .inputs import PlacementError, check_matrix
 
 Label = bool | int | float | str
 

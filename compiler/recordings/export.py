@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 from thenar.runtime.files import write_atomically
 
+from ..text import cell
 from .errors import TableError
 from .graspset import GraspSet, Joint
-from .spreadsheet import cell
 from .taxonomy import is_published
 
 

@@ -24,10 +24,9 @@ from numpy.typing import NDArray
 from thenar.runtime.files import open_file
 from thenar.runtime.names import list_names, shortened
 
-from .arrays import AnyArray
+from ..text import text_of
+from .arrays import AnyArray, read_arrays
 from .errors import COLUMNS, LARGEST, LONGEST_LINE, ROWS, RecordingError, TableError, check_names, unpacked
-from .npz import read_arrays
-from .spreadsheet import text_of
 
 
 @contextmanager

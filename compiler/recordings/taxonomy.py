@@ -1,18 +1,25 @@
 """Taxonomies of grasp types: Kamakura's 14, Cutkosky's 16, Feix's 33, and the user's own.
 
 A type may be written as its name, and in the published taxonomies also as its abbreviation, full name or number; case,
-underscores and punctuation do not count.
+underscores and punctuation do not count. An `objects.toml` says with which objects each type is collected (the paper
+gave each two of different volume); a key a grasp type, its value a list of objects:
+
+    PoS = ["bottle", "broom"]
+    Tip = ["pin", "bead"]
 """
 
 import difflib
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from unicodedata import decimal
 
 from thenar.runtime.names import LONGEST_SHOWN, MOST_COMPARED, shortened
+from thenar.runtime.recording.session import Task
+from thenar.runtime.toml_source import TomlText, read_source
 
-from .errors import RecordingError, check_names
+from .errors import ColumnsError, RecordingError, check_names
 
 # Kamakura et al. 1980, Patterns of static prehension in normal hands, Am. J. Occup. Ther. 34(7):437-445, with the usual
 # abbreviations.
@@ -151,3 +158,43 @@ def is_published(taxonomy: Taxonomy) -> bool:
 KAMAKURA_14 = published("kamakura14")
 CUTKOSKY_16 = published("cutkosky16")
 FEIX_33 = published("feix33")
+
+
+# What a grasp type is collected with where no object is named.
+ANY = "any"
+
+
+def collected(taxonomy: str, objects: Path | None) -> tuple[Taxonomy, tuple[Task, ...]]:
+    """Return the taxonomy of this name and what is to be collected of it: what `objects` lists, or every type.
+
+    "own" is the user's own taxonomy: the types that `objects` lists, in its order. Raises RecordingError, or
+    ColumnsError naming file, line and key.
+    """
+    if objects is None:
+        types = published(taxonomy)
+        return types, tuple(Task(grasp, (ANY,)) for grasp in types.types)
+    source = read_source(objects, ColumnsError)
+    tables = source.tables()
+    if len(tables) < 2:
+        raise ColumnsError(f"{objects.name} names {len(tables)} grasp types: a collection takes two at least")
+    types = own(tables) if taxonomy == "own" else published(taxonomy)
+    find = types.finder()
+    tasks: dict[str, Task] = {}
+    for key, value in tables.items():
+        grasp = find(key)
+        if grasp is None:
+            raise source.error((key,), types.unknown(key))
+        if grasp in tasks:
+            raise source.error((key,), f"is {grasp}, which is there already: list it once")
+        tasks[grasp] = Task(grasp, _objects(source, key, value))
+    return types, tuple(tasks.values())
+
+
+def _objects(source: TomlText, key: str, value: object) -> tuple[str, ...]:
+    try:
+        if not isinstance(value, list) or not value or not all(isinstance(name, str) for name in value):
+            raise RecordingError("must be a list of the names of objects, at least one")
+        check_names("object", value)
+        return tuple(value)
+    except RecordingError as wrong:
+        raise source.error((key,), str(wrong)) from None

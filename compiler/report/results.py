@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..evaluation.populations import PROTOCOLS
-from ..evaluation.study import Study, Table
+from ..evaluation.study import RateTable, Study
 from ..text import NBSP, counted, interval, percent, sentence
 from .content import PlainTable, ReportContent
 from .sections import honest_rate
@@ -36,7 +36,7 @@ def study_notes(study: Study) -> Iterator[str]:
         yield f"No table of {left.name}: {left.reason}."
 
 
-def _table(table: Table) -> PlainTable:
+def _table(table: RateTable) -> PlainTable:
     several = len(table.columns) > 1
     columns = ("Row", "What", "Switches", *table.columns, *(["average"] * several))
     rows = tuple(

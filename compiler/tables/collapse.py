@@ -74,6 +74,15 @@ class ScoreTables:
         return scores
 
 
+def first_codes(*thresholds: NDArray[np.uint16]) -> NDArray[np.int64]:
+    """Return the smallest code of each bin of a joint, where the bins of several `thresholds` overlap of each part.
+
+    Such a code stands for all codes of its bin; a bin beyond the codes has none.
+    """
+    codes = np.unique(np.concatenate([[0], *(each.astype(np.int64) + 1 for each in thresholds)]))
+    return codes[codes <= HIGHEST_CODE]
+
+
 # What trainers make: score tables, or an ensemble that collapses to them.
 Model = Stumps | ScoreTables
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from thenar.runtime.tables import IntegerTables
 
-from .collapse import HIGHEST_CODE
+from .collapse import first_codes
 
 OPEN, CLOSED, LOST = 0, 1, -1
 _SIGNS = 1, -1
@@ -70,6 +70,5 @@ def _choices(tables: IntegerTables, missing: bool) -> Iterator[tuple[NDArray[np.
     for row, mean in zip(tables.switch_rows, tables.switch_means, strict=True):
         yield np.array([OPEN, CLOSED, LOST])[last], np.stack([0 * row, row, mean])[last].astype(np.int64)
     for thresholds, rows, mean in zip(tables.thresholds, tables.joint_rows, tables.joint_means, strict=True):
-        codes = np.concatenate([[0], thresholds.astype(np.int64) + 1])
-        codes = codes[codes <= HIGHEST_CODE]
+        codes = first_codes(thresholds)
         yield np.append(codes, LOST)[last], np.vstack([rows[: len(codes)], mean])[last].astype(np.int64)

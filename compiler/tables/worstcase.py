@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from thenar.runtime.tables import IntegerTables
 
-from .collapse import HIGHEST_CODE, Floats, ScoreTables
+from .collapse import Floats, ScoreTables, first_codes
 
 Exact = NDArray[np.object_]  # of Python's integers
 
@@ -173,9 +173,7 @@ def _choices(tables: ScoreTables, integers: IntegerTables) -> Iterator[_Choice]:
     for one, rows, other, steps in zip(
         tables.thresholds, tables.joint_rows, integers.thresholds, integers.joint_rows, strict=True
     ):
-        # The smallest code of each bin of either stands for all of its codes.
-        codes = np.concatenate([[0], np.union1d(one, other).astype(np.int64) + 1])
-        codes = codes[codes <= HIGHEST_CODE]
+        codes = first_codes(one, other)
         yield _Choice(codes, rows[np.searchsorted(one, codes)], steps[np.searchsorted(other, codes)])
 
 

@@ -177,6 +177,35 @@ Z_MAX = 3.0
 SAME = "what is learnt from the set as it was"
 
 
+class Followed:
+    """A training on a set, weights left out, of which every round is worked out at 60 digits once, when it is reached:
+    all changes of the set are held against the same numbers.
+    """
+
+    def __init__(self, hard: HardSet, rounds: int) -> None:
+        self.hard = hard
+        self.stumps = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds)[0]
+        self.scores = list(self.stumps.staged_scores(hard.X))
+        self._given: dict[int, list[ClassRound]] = {}
+        self._steps: dict[int, Step] = {}
+
+    def given(self, number: int) -> list[ClassRound]:
+        """Return what the stumps of round `number`, from 0, are fitted to."""
+        if number not in self._given:
+            F = self.scores[number - 1] if number else np.zeros((len(self.hard.X), self.hard.n_classes))
+            self._given[number] = class_rounds(F.tolist(), self.hard.labels.tolist(), Z_MAX)
+        return self._given[number]
+
+    def step(self, number: int, largest: float) -> Step:
+        """Return the step of round `number`; |F| <= largest."""
+        if number not in self._steps:
+            places = zip(self.stumps.columns[number].tolist(), self.stumps.thresholds[number].tolist(), strict=True)
+            parts = [branches(self.hard.X[:, column], threshold) for column, threshold in places]
+            labels = self.hard.labels.tolist()
+            self._steps[number] = step_of(self.given(number), parts, labels, self.stumps.shrinkage, Z_MAX)
+        return self._steps[number].on_scores_of(largest)
+
+
 class Partings:
     """Gathers how far the scores of two trainings are apart, and which rows they give to different classes, as long as
     their stumps are the same; and where these first are not, by how much the stumps differ in what they explain.
@@ -193,30 +222,27 @@ class Partings:
         """Yield what was found."""
         return (worst.finding() for worst in (self._apart, self._answers, self._parted))
 
-    def see(self, hard: HardSet, change: Change, rounds: int) -> None:
-        """Train on both sets, weights left out, and follow the rounds to the end or to where they part."""
-        one, other = (boost(of.X, of.labels, of.n_classes, rounds=rounds)[0] for of in (hard, change.hard))
-        other = renumbered(other, change)
+    def see(self, training: Followed, change: Change) -> None:
+        """Train on the other set, weights left out, and follow the rounds to the end or to where the two part."""
+        one, hard, of = training.stumps, training.hard, change.hard
+        other = renumbered(boost(of.X, of.labels, of.n_classes, rounds=one.n_rounds)[0], change)
         steps: list[Step] = []
-        F = np.zeros((len(hard.X), hard.n_classes))
-        for number, both in enumerate(zip(one.staged_scores(hard.X), other.staged_scores(hard.X), strict=True)):
+        for number, both in enumerate(zip(training.scores, other.staged_scores(hard.X), strict=True)):
             at = f"{hard.name}, {change.name}, round {number + 1}"
-            given = class_rounds(F.tolist(), hard.labels.tolist(), Z_MAX)
-            if self._see_stumps(hard, given, [one.first(number + 1), other.first(number + 1)], change, at):
+            if self._see_stumps(training, number, other, change, at):
                 return
-            steps.append(_step(hard, one, number, given, float(np.abs(both).max())))
+            steps.append(training.step(number, float(np.abs(both).max())))
             self._apart.see(float((np.abs(both[0] - both[1]).ravel() / (2 * grown(steps))).max()), at)
             self._answers.see(_answered_otherwise(*both), at, len(hard.X))
-            F = both[0]
 
-    def _see_stumps(
-        self, hard: HardSet, given: Sequence[ClassRound], trainings: Sequence[Stumps], change: Change, at: str
-    ) -> bool:
-        """Return whether the last stumps differ; then see by how much they do in what they explain."""
-        places = [list(zip(of.columns[-1].tolist(), of.thresholds[-1].tolist(), strict=True)) for of in trainings]
+    def _see_stumps(self, training: Followed, number: int, other: Stumps, change: Change, at: str) -> bool:
+        """Return whether the stumps of round `number` differ; then see by how much they do in what they explain."""
+        both = (training.stumps, other)
+        places = [list(zip(of.columns[number].tolist(), of.thresholds[number].tolist(), strict=True)) for of in both]
         for k, (first, second) in enumerate(zip(*places, strict=True)):
             if first != second:
-                self._parted.see(_doubt(hard, given[k], (first, second), len(change.hard.labels)), at)
+                given = training.given(number)[k]
+                self._parted.see(_doubt(training.hard, given, (first, second), len(change.hard.labels)), at)
         return places[0] != places[1]
 
 
@@ -227,12 +253,6 @@ def renumbered(other: Stumps, change: Change) -> Stumps:
     order = list(change.classes)
     columns = place[other.columns[:, order]]
     return Stumps(len(change.inputs), columns, other.thresholds[:, order], other.values[:, order], other.shrinkage)
-
-
-def _step(hard: HardSet, stumps: Stumps, number: int, given: Sequence[ClassRound], largest: float) -> Step:
-    places = zip(stumps.columns[number].tolist(), stumps.thresholds[number].tolist(), strict=True)
-    parts = [branches(hard.X[:, column], threshold) for column, threshold in places]
-    return step_of(given, parts, hard.labels.tolist(), stumps.shrinkage, Z_MAX, largest)
 
 
 @precisely()
@@ -269,37 +289,43 @@ _EXACT: dict[str, Callable[[HardSet, np.random.Generator], Change]] = {
 
 def findings(full: bool) -> Iterator[Finding]:
     """Yield what each change of a set changes in all that is learnt from it."""
-    draws = 12 if full else 1
-    sets = [hard for seed in range(draws) for hard in hard_sets(seed)]
+    sets = list(hard_sets(12 if full else 1))
     yield from _exact(sets)
     yield from _tree(sets)
     yield from _near(sets, 40 if full else 8)
 
 
-def hard_sets(seed: int) -> Iterator[HardSet]:
-    """Yield sets with and without ties of columns, of 2 to 6 classes, separable, contradictory and noisy."""
-    rng = np.random.default_rng(seed)
-    yield noisy(3, 16, 0.3, seed)
-    yield noisy(2, 16, 0.5, seed)
-    yield words(5)
-    yield intervals(4)
-    yield separable(3)
-    yield contradictory([[5, 3, 1], [2, 9, 4]])
+def hard_sets(draws: int) -> Iterator[HardSet]:
+    """Yield sets with and without ties of columns, of 2 to 6 classes, separable, contradictory and noisy, draw by draw.
+
+    The sets that are not drawn are the same objects at every draw: what is learnt of them is learnt once.
+    """
     both = np.array([[0, 0], [0, 1], [1, 0], [1, 1]])
-    yield HardSet("both switches of two", both, both.min(axis=1), 2, 2)
-    X = np.column_stack([rng.integers(0, 2, (14, 4)), rng.integers(0, 3, (14, 1))])
-    yield HardSet(f"random, draw {seed}", X, rng.integers(0, 6, 14), 6, 4)
+    fixed = (
+        words(5),
+        intervals(4),
+        separable(3),
+        contradictory([[5, 3, 1], [2, 9, 4]]),
+        HardSet("both switches of two", both, both.min(axis=1), 2, 2),
+    )
+    for seed in range(draws):
+        rng = np.random.default_rng(seed)
+        yield noisy(3, 16, 0.3, seed)
+        yield noisy(2, 16, 0.5, seed)
+        yield from fixed
+        X = np.column_stack([rng.integers(0, 2, (14, 4)), rng.integers(0, 3, (14, 1))])
+        yield HardSet(f"random, draw {seed}", X, rng.integers(0, 6, 14), 6, 4)
 
 
 def _exact(sets: list[HardSet]) -> Iterator[Finding]:
     """Yield, change by change, how many of the arrays that are learnt change in any bit."""
-    before = [learn(hard) for hard in sets]
+    before = {hard: learn(hard) for hard in dict.fromkeys(sets)}
     for name, change_of in _EXACT.items():
         rng = np.random.default_rng(1)
         worst = Worst(f"{name}: all that is learnt", SAME, 0.0, "arrays")
-        for hard, learnt in zip(sets, before, strict=True):
+        for hard in sets:
             if change_of is not classes_permuted or hard.n_classes == 2:
-                _see_exact(learnt, change_of(hard, rng), worst)
+                _see_exact(before[hard], change_of(hard, rng), worst)
         yield worst.finding()
 
 
@@ -336,9 +362,14 @@ def _asked(hard: HardSet) -> list[tuple[int | None, tuple[int, ...]]]:
 def _near(sets: list[HardSet], rounds: int) -> Iterator[Finding]:
     """What moves by rounding: how far, why trainings part if they do, and that rows get the same class until then."""
     rng, partings = np.random.default_rng(3), Partings()
-    for hard in map(unweighted, sets):
-        partings.see(hard, classes_permuted(hard, rng), rounds)
-        partings.see(hard, rows_several_times(hard, 2), rounds)
-        partings.see(hard, rows_several_times(hard, 3), rounds)
-        partings.see(hard, columns_reversed(hard), rounds)
+    trainings = {hard: Followed(unweighted(hard), rounds) for hard in dict.fromkeys(sets)}
+    for training in map(trainings.__getitem__, sets):
+        hard = training.hard
+        for change in (
+            classes_permuted(hard, rng),
+            rows_several_times(hard, 2),
+            rows_several_times(hard, 3),
+            columns_reversed(hard),
+        ):
+            partings.see(training, change)
     yield from partings.findings()

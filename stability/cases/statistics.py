@@ -7,11 +7,10 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from thenar.compiler.evaluation.fits import Fit, predictions
 from thenar.compiler.evaluation.folds import Fold, weka_folds
-from thenar.compiler.evaluation.plan import inputs
+from thenar.compiler.evaluation.plan import FoldFit, inputs, predictions
 from thenar.compiler.evaluation.populations import Population, Scheme, populations
-from thenar.compiler.evaluation.rates import Average, Rate
+from thenar.compiler.evaluation.rates import Average, RepeatedRate
 from thenar.compiler.evaluation.study import Cell, Options, evaluate
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.trainers.base import Training
@@ -59,7 +58,7 @@ def guessed_untrained(grasp_set: GraspSet, scheme: Scheme) -> int:
     wrong = 0
     for part in parts_of(grasp_set, scheme):
         for fold in part.folds:
-            fit = Fit(fold, tuple(range(X.shape[1])), part.grasps, len(grasp_set.switch_names))
+            fit = FoldFit(fold, tuple(range(X.shape[1])), part.grasps, len(grasp_set.switch_names))
             found = predictions(X, labels, fit, Training("logitboost", {"rounds": 10}))
             wrong += int((~np.isin(found, labels[fold.train])).sum())
     return wrong
@@ -97,7 +96,7 @@ def _wilson(totals: range) -> Iterator[Finding]:
     counts = [(correct, total) for total in totals for correct in range(total + 1)]
     counts += [(correct, n) for n in _TOTALS for correct in {0, 1, n // 2, n - 1, n}]
     for correct, total in counts:
-        rate = Rate.of((correct,), total)
+        rate = RepeatedRate.of((correct,), total)
         off.see(_apart(rate, wilson(correct, total)), f"{correct} of {total}")
         if correct in (0, total):
             ends = rate.low == 0 if correct == 0 else rate.high == 1
@@ -118,7 +117,7 @@ def _repeated(repeats: int) -> Iterator[Finding]:
     for n in range(2, repeats + 1):
         for total in (1, 2, 7, 1000):
             for correct in product(sorted({0, 1, total // 2, total - 1, total}), repeat=n):
-                rate = Rate.of(correct, total)
+                rate = RepeatedRate.of(correct, total)
                 off.see(_apart(rate, _hull(correct, total)), f"{correct} of {total}")
                 outside.see(not 0 <= rate.low <= rate.mean <= rate.high <= 1, f"{correct} of {total}")
     yield off.finding()
@@ -132,7 +131,7 @@ def _hull(correct: tuple[int, ...], total: int) -> Interval:
     return max(min(low for low, _ in both), mpf(0)), min(max(high for _, high in both), mpf(1))
 
 
-def _apart(found: Rate | Average, truth: Interval) -> float:
+def _apart(found: RepeatedRate | Average, truth: Interval) -> float:
     return max(distance(found.low, truth[0]), distance(found.high, truth[1]))
 
 
@@ -144,7 +143,7 @@ def _averages(draws: int) -> Iterator[Finding]:
     off = Worst("ends of the interval of an average", _SIXTY, 7 * ROUNDING, "rate")
     outside = Worst("averages whose interval leaves 0 to 1, or their mean", "the rule itself", 0, "averages")
     for pairs, total in _subjects(draws):
-        rates = tuple(Rate.of(tuple(pair), total) for pair in pairs)
+        rates = tuple(RepeatedRate.of(tuple(pair), total) for pair in pairs)
         average = Average.of(rates)
         off.see(_apart(average, _mover(rates)), f"{pairs} of {total}")
         outside.see(not 0 <= average.low <= average.mean <= average.high <= 1, f"{pairs} of {total}")
@@ -167,7 +166,7 @@ def _subjects(draws: int) -> Iterator[tuple[list[list[int]], int]]:
 
 
 @precisely()
-def _mover(rates: tuple[Rate, ...]) -> Interval:
+def _mover(rates: tuple[RepeatedRate, ...]) -> Interval:
     k = len(rates)
     means, lows, highs = (
         [mpf(each) for each in column] for column in zip(*((r.mean, r.low, r.high) for r in rates), strict=True)

@@ -163,7 +163,7 @@ def _see_scores(training: Training, stages: Sequence[Floats], scores: Worst) -> 
             break
         parts = [branches(training.X[:, splits[0][1]], splits[0][2]) for splits in each.splits]
         largest = float(np.abs(ours).max())
-        steps.append(step_of(given, parts, labels, training.shrinkage, training.z_max, largest))
+        steps.append(step_of(given, parts, labels, training.shrinkage, training.z_max).on_scores_of(largest))
         truth = each.scores
     if not steps:
         return

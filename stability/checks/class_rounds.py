@@ -214,6 +214,10 @@ class Step:
     added: Floats  # (n K,)
     jacobian: Floats  # (n K, n K)
 
+    def on_scores_of(self, largest: float) -> "Step":
+        """Return the step with the rounding of F, once, |F| <= largest."""
+        return Step(self.added + ROUNDING * largest, self.jacobian)
+
 
 def step_of(
     rounds: Sequence[ClassRound],
@@ -221,9 +225,8 @@ def step_of(
     labels: Sequence[int],
     shrinkage: float,
     z_max: float,
-    largest: float,
 ) -> Step:
-    """Return the step of a round whose stump of class k parts the rows into `branches[k]`; |F| <= largest."""
+    """Return the step of a round whose stump of class k parts the rows into `branches[k]`, F itself not rounded yet."""
     K, n = len(rounds), len(labels)
     spread = shrinkage * (K - 1) / K * (np.eye(K) - 1 / K)
     P = np.array([[float(share) for share in each.shares] for each in rounds])
@@ -239,8 +242,8 @@ def step_of(
     # dP_ik / dF_ij
     by_score = np.einsum("ki,kj->kij", P, np.eye(K)) - np.einsum("ki,ji->kij", P, P)
     jacobian = np.eye(n * K) + np.einsum("ck,kli,kij->lcij", spread, by_share, by_score).reshape(n * K, n * K)
-    # A centred step rounds K + 6 times, and F once.
-    rounded = ROUNDING * ((K + 6) * shrinkage * z_max + largest)
+    # A centred step rounds K + 6 times.
+    rounded = ROUNDING * (K + 6) * shrinkage * z_max
     return Step((np.abs(spread) @ errors).T.ravel() + rounded, jacobian)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.artifact.ensemble import ensemble_from_bytes
-from thenar.compiler.artifact.select import select_inputs
+from thenar.compiler.artifact.verify_firmware import select_inputs
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import own
 from thenar.compiler.tables.collapse import ScoreTables, collapse

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import mpmath
 from mpmath import mpf
 
-from .numbers import DIGITS, precisely
+from .numbers import DIGITS, added, precisely
 
 exp, log = precisely()(mpmath.exp), precisely()(mpmath.log)
 
@@ -170,7 +170,7 @@ def scores(
         [answer(row[column], threshold, branches) for column, threshold, branches in zip(*stumps, strict=True)]
         for stumps in zip(columns, thresholds, values, strict=True)
     ]
-    return step([mpmath.fsum(own) for own in zip(*answers, strict=True)], shrinkage)
+    return step([added(own) for own in zip(*answers, strict=True)], shrinkage)
 
 
 def answer(x: float, threshold: float, branches: Sequence[float]) -> float:

@@ -38,6 +38,7 @@ def student(rates: Sequence[float], level: float = 0.95) -> Interval:
     return mean - reach, mean + reach
 
 
+@lru_cache
 @precisely()
 def normal_quantile(p: float) -> mpf:
     """Return z with P(N(0, 1) <= z) = p, 0 < p < 1."""

@@ -12,7 +12,7 @@ import mpmath
 from mpmath import mpf
 
 from .boosting import answer, step
-from .numbers import precisely
+from .numbers import added, precisely
 
 HIGHEST_CODE = 65535
 
@@ -111,7 +111,7 @@ def _parts(
         answers: list[list[float]] = [[] for _ in range(n_classes)]
         for k, threshold, branches in stumps:
             answers[k].append(answer(x, threshold, branches))
-        parts.append(step([mpmath.fsum(own) for own in answers], shrinkage))
+        parts.append(step([added(own) for own in answers], shrinkage))
     return parts
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from thenar.cli import run
-from thenar.cli.kept_files import kept_names
+from thenar.cli.draw_command import kept_names
 from thenar.compiler import GraspSet
 from thenar.compiler.recordings.taxonomy import own
 from thenar.runtime.harness.writing import harness_to_toml

@@ -18,8 +18,8 @@ from types import FrameType
 from typing import Any, NamedTuple
 
 from thenar.compiler import publication
-from thenar.compiler.artifact import staging
-from thenar.compiler.firmware import folder as firmware
+from thenar.compiler.artifact import compile as artifact
+from thenar.compiler.firmware import generate as firmware
 from thenar.compiler.frontier.cache import HEADER, Store
 from thenar.compiler.frontier.find import kept_entries
 from thenar.compiler.frontier.points import FrontierError
@@ -73,7 +73,7 @@ KINDS = {
     "build": Kind(
         {"build.json": "old", "tables.bin": "old", "firmware/thenar_glove.c": "old", "spec/spec.json": "old"},
         *(BUILD, BUILD, {}),
-        lambda files, folder: staging.publish(_encoded(files), staging.check_target(folder)),
+        lambda files, folder: artifact.publish(_encoded(files), artifact.check_target(folder)),
     ),
     "spec": Kind(
         {"spec.json": "old", "bom.csv": "old", "cutting.svg": "old"},

@@ -17,8 +17,7 @@ from distributed import Client, LocalCluster
 from numpy.typing import NDArray
 
 from thenar.compiler import cluster as under_test
-from thenar.compiler.cluster import ClusterError
-from thenar.compiler.payloads import SHARED_BYTES
+from thenar.compiler.cluster import SHARED_BYTES, ClusterError
 from thenar.compiler.workers import in_workers
 
 pytestmark = pytest.mark.slow

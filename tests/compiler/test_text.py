@@ -1,6 +1,20 @@
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from thenar.compiler.text import DASH, NBSP, counted, duration, interval, listed, microseconds, percent, sentence
+from thenar.compiler.text import (
+    DASH,
+    NBSP,
+    cell,
+    counted,
+    duration,
+    interval,
+    listed,
+    microseconds,
+    percent,
+    sentence,
+    text_of,
+)
 
 
 class Rate:
@@ -37,3 +51,27 @@ def test_counts_agree_with_their_nouns() -> None:
 def test_lists_and_sentences() -> None:
     assert [listed(parts) for parts in ([], ["a"], ["a", "b"], ["a", "b", "c"])] == ["", "a", "a and b", "a, b and c"]
     assert sentence("no tools were there") == sentence("no tools were there.") == "No tools were there."
+
+
+TEXTS = st.text("'=+-@\t\ra1", max_size=5) | st.text(max_size=5)
+
+
+@pytest.mark.parametrize("text", ["=1", "+1", "-1", "@a", "\ta", "\ra", "'=1", "''@"])
+def test_what_a_spreadsheet_would_compute_has_an_apostrophe_before_it(text: str) -> None:
+    assert cell(text) == f"'{text}"
+
+
+@pytest.mark.parametrize("text", ["", "a", "'a", "1-1", "a=b", "'", "1"])
+def test_everything_else_stays_as_it_is(text: str) -> None:
+    assert cell(text) == text_of(text) == text
+
+
+@given(TEXTS)
+def test_every_text_comes_back_from_its_cell_and_no_cell_is_a_formula(text: str) -> None:
+    assert text_of(cell(text)) == text
+    assert not cell(text).startswith(("=", "+", "-", "@", "\t", "\r"))
+
+
+@given(TEXTS, TEXTS)
+def test_two_texts_have_two_cells(one: str, other: str) -> None:
+    assert (cell(one) == cell(other)) == (one == other)

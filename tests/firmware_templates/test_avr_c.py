@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from thenar.compiler.firmware.board import parse_board
 from thenar.compiler.firmware.board_files import board_files, board_makefile, config_of, readings, switches_of
-from thenar.compiler.firmware.board_loading import parse_board
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.layout import arrange
 from thenar.compiler.firmware.protocol import decided_files, protocol_files

@@ -15,10 +15,9 @@ import numpy as np
 from material import GRASPS, SWITCHES, Format, build_files, grasp_set, harness, make_folder
 from mutating import Mutate, altered, json_file, npz_file, sealed
 
-from thenar.cli.kept_files import kept_names
+from thenar.cli.draw_command import kept_names
 from thenar.compiler.artifact.verify import verify
-from thenar.compiler.firmware.folder import sums, write_folder
-from thenar.compiler.firmware.generate import Firmware
+from thenar.compiler.firmware.generate import Firmware, sums, write_folder
 from thenar.compiler.frontier import points
 from thenar.compiler.frontier.cache import HEADER, Store
 from thenar.compiler.frontier.picked import picked

@@ -8,11 +8,11 @@ import msgspec
 from material import GLOVE_TOML, GRASPS, SENSORS, Format, build_files, harness, make_folder
 from mutating import json_file, toml_file
 
-from thenar.compiler.firmware.board_loading import load_board
+from thenar.compiler.firmware.board import load_board
 from thenar.compiler.firmware.generate import Firmware
 from thenar.compiler.glove.files import spec_files
 from thenar.compiler.placement.ports import ports_of_whole_glove
-from thenar.compiler.recordings.objects import collected
+from thenar.compiler.recordings.taxonomy import collected
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime.build import Build

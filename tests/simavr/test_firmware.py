@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import serial
 
-from thenar.compiler.firmware.board_loading import parse_board
+from thenar.compiler.firmware.board import parse_board
 from thenar.compiler.firmware.generate import Firmware
 from thenar.drivers import scanner_protocol
 from thenar.drivers.scanner_protocol import Faults, FromBoard, GetState, Heartbeat, Hello, Lost, Ping, frame, from_board

@@ -63,7 +63,7 @@ small = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(small)
 
 import thenar.simulator.effects
-from thenar.simulator.pipeline.ledger import Ledger
+from thenar.simulator.running.pipeline import Ledger
 from thenar.simulator.running.pipeline import compile_pipeline
 from thenar.simulator.pipeline.effect import EFFECTS
 

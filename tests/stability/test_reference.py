@@ -38,7 +38,7 @@ from thenar.stability.reference.information import (
     sign_of_log_sum,
 )
 from thenar.stability.reference.intervals import normal_quantile, student, student_quantile, wilson
-from thenar.stability.reference.numbers import DIGITS, cos, distance, exact, precisely, sin, solve, turn, ulps
+from thenar.stability.reference.numbers import DIGITS, added, cos, distance, exact, precisely, sin, solve, turn, ulps
 from thenar.stability.reference.tables import balanced, mean_row, mean_switch, score_tables, steps, table_scores
 
 HAIR = mpf(10) ** (8 - DIGITS)  # a few roundings of 60 digits
@@ -63,6 +63,13 @@ def as_fraction(number: mpf) -> Fraction:
 def test_a_double_becomes_the_number_that_it_is(x: float) -> None:
     assert as_fraction(exact(x)) == Fraction(x)
     assert ulps(x, exact(x)) == 0.0
+
+
+@given(st.lists(st.floats(-1e250, 1e250)))
+def test_a_sum_of_doubles_is_exact_to_sixty_digits(doubles: list[float]) -> None:
+    truth = sum(map(Fraction, doubles), Fraction(0))
+    with precisely():
+        assert abs(added(doubles) - mpf(truth.numerator) / truth.denominator) <= HAIR * abs(mpf(float(truth)))
 
 
 @given(DOUBLES.filter(lambda x: abs(x) < 1e300))

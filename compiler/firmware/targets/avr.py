@@ -10,9 +10,9 @@ from ..tools import AVR_COMPILER
 from .base import Mode, Target
 
 if TYPE_CHECKING:
-    from ..answers import Answers, Frames
     from ..classifier import Library
     from ..layout import Layout
+    from ..probes import Answers, Frames
 
 _DIVIDERS = 4096
 _USUAL = (9600, 19_200, 38_400, 57_600, 76_800, 115_200, 230_400, 250_000, 500_000, 1_000_000, 2_000_000)

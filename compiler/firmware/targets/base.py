@@ -4,14 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
+from .. import FirmwareError
 from ..costs import CORTEX_M4, Core, Cost, word_cost
-from ..errors import FirmwareError
 from ..tools import Tool
 
 if TYPE_CHECKING:
-    from ..answers import Answers, Frames
     from ..classifier import Library
     from ..layout import Layout
+    from ..probes import Answers, Frames
 
 Mode = Literal["classify", "scan", "glove"]
 

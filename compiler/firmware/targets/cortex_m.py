@@ -13,15 +13,15 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
+from .. import FirmwareError
 from ..costs import Core
-from ..errors import FirmwareError
 from ..tools import ARM_COMPILER, ARM_EMULATOR, LIMIT_S, STRICT, call, find, lacking, workshop
 from .base import Target
 
 if TYPE_CHECKING:
-    from ..answers import Answers, Frames
     from ..classifier import Library
     from ..layout import Layout
+    from ..probes import Answers, Frames
 
 _SHIFT = 9
 STACK = 512  # bytes that the linker keeps free: main() and an answer take less
@@ -49,7 +49,7 @@ class CortexM(Target):
         """
         from thenar.firmware_templates.rendering import render
 
-        from ..self_test import CHECKS, check_header
+        from ..probes import CHECKS, check_header
 
         name = library.name
         values = {"name": name, "core": self.title}
@@ -79,7 +79,7 @@ class CortexM(Target):
 
         limit_s  the emulator is stopped after that time, which is an error
         """
-        from ..answers import check_frames, record_files
+        from ..probes import check_frames, record_files
 
         check_frames(frames, layout)
         assert self.compiler is not None
@@ -113,7 +113,7 @@ def _counted(written: bytes, frames: "Frames", layout: "Layout", machine: Machin
     """Return the answers in what the program wrote: names, the ticks of one instruction, each answer and its ticks."""
     import numpy as np
 
-    from ..answers import answers_from, names_in
+    from ..probes import answers_from, names_in
 
     size = 2 * len(layout.start) + 2
     names, written = names_in(written, layout)

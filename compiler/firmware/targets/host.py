@@ -8,9 +8,9 @@ from ..tools import HOST_COMPILER, STRICT, call, find, lacking, workshop
 from .base import Target
 
 if TYPE_CHECKING:
-    from ..answers import Answers, Frames
     from ..classifier import Library
     from ..layout import Layout
+    from ..probes import Answers, Frames
 
 _SANITIZE = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
@@ -23,7 +23,7 @@ class Host(Target):
         """Return path -> text: the library, a Makefile (library, self test, size) and the self test."""
         from thenar.firmware_templates.rendering import render
 
-        from ..self_test import CHECKS, check_header
+        from ..probes import CHECKS, check_header
 
         return {
             **library.files,
@@ -52,7 +52,7 @@ class Host(Target):
         compiler  "gcc" or "clang"; without it, the first that is installed
         sanitize  with the address and undefined behaviour sanitizers: a finding is an error
         """
-        from ..answers import answers_from, check_frames, names_in, record_files
+        from ..probes import answers_from, check_frames, names_in, record_files
 
         check_frames(frames, layout)
         command = find(HOST_COMPILER if compiler is None else ((compiler,), compiler))

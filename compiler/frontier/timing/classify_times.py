@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
+from ...firmware import FirmwareError
 from ...firmware.choose import Option, choose, features, flash_shares
-from ...firmware.errors import FirmwareError
 from ...firmware.targets import TARGETS, Target, timed
 from ..points import FrontierError, How
 from .python_times import PythonCost, fit_here

@@ -12,10 +12,10 @@ import numpy as np
 from thenar.runtime.harness.wiring import BusWiring
 from thenar.runtime.scanning.ports import ports_of
 
+from ...firmware import FirmwareError
 from ...firmware.board import Board, BoardBus
 from ...firmware.choose import Option
 from ...firmware.classifier import LIBRARY_NAME, Library
-from ...firmware.errors import FirmwareError
 from ...firmware.generate import Firmware
 from ...firmware.measuring import run_counted, slow_frames
 from ...firmware.simavr import harness

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from thenar.drivers.members import Members
 
 from ...samples import Columns, Samples
-from ..errors import PlacementError
+from ..inputs import PlacementError
 from ..ports import PortCosts
 
 Chooser = Callable[[float], Columns]

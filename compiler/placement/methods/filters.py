@@ -12,8 +12,8 @@ import numpy as np
 from ...elementary import add_up, log
 from ...samples import Columns
 from ..cooccurrence import Cooccurrence
-from ..errors import PlacementError
 from ..exact import Floats, n_log_n
+from ..inputs import PlacementError
 from .base import Bits, Labels, Method, ranked
 
 _SEED = 0

@@ -9,9 +9,26 @@ largest
 is chosen: gain against cost, with the cost that is left of it. A switch on a port that is read anyway is free; one on a
 port of its own counts half where all ports take equally long. Of equal ones the cheaper wins, then the lowest number.
 The comparison is exact.
+
+Pruning is of weakest links: the decisions that bring least go first, until few enough inputs are left (Breiman,
+Friedman, Olshen and Stone, Classification and Regression Trees, 1984, section 3.3). With R the risk of a node as a
+leaf, the weakest link is the decision t of the smallest
+
+    g(t) = (R(t) - sum of R over the leaves below t) / (leaves below t - 1),
+
+and it becomes a leaf. The risk is the caller's: entropy of the rows that the tree was grown on makes this
+cost-complexity pruning; errors on rows held out make it reduced-error pruning, since the links of g <= 0 are those that
+Quinlan's bottom-up procedure (1987) takes off. Risks are whole numbers, so that g is compared exactly; of equal links
+the last in preorder goes first, what hangs below before what it hangs from.
 """
 
-from heapq import heappop, heappush
+import collections
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from heapq import heapify, heappop, heappush
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +38,136 @@ from ..counts import Counter, Digits
 from ..gain import NodeCounts, best_per_cost
 from ..id3 import grow_id3
 from ..ports import PortCosts
-from ..pruning import entropy_brought, errors_spared, weakest_links
+from ..tree import Tree
 from .base import PAPERS, Chooser, Method, first_of
+
+# A decision's share of the entropy, in whole 2^-30 bits: far below what a row more or less changes.
+_BITS = 30
+
+
+@dataclass(frozen=True)
+class PruningPath:
+    """How a tree is pruned: the first n of `order`, numbers of its nodes, are made leaves, for n = 0 to all.
+
+    strengths  (links,) g of each as it went, never descending
+    n_inputs   (links + 1,) how many different inputs the tree asks for once the first n links are gone
+    """
+
+    tree: Tree
+    order: tuple[int, ...]
+    strengths: tuple[Fraction, ...]
+    n_inputs: tuple[int, ...]
+
+    @cached_property
+    def n_useless(self) -> int:
+        """Number of links of g <= 0: without them the risk is no higher."""
+        return bisect_right(self.strengths, 0)
+
+    def placement(self, most: float, least_links: int = 0) -> tuple[int, ...]:
+        """Return the inputs, in preorder of their nodes, of the largest tree on the path that asks for at most `most`,
+        with `least_links` of the links, the first ones, gone in any case.
+        """
+        links = next(n for n in range(least_links, len(self.n_inputs)) if self.n_inputs[n] <= max(most, 0))
+        leaves = set(self.order[:links])
+        return tuple(dict.fromkeys(_labels(self.tree, leaves)))
+
+
+def weakest_links(tree: Tree, brought: Sequence[int]) -> PruningPath:
+    """Return how `tree` is pruned, where the decision at each node lowers the risk by `brought` (0 for a leaf)."""
+    pruning = _Pruning(tree, brought)
+    steps = list(pruning.steps())
+    n_inputs = (len(set(tree.inputs)), *(left for _, _, left in steps))
+    return PruningPath(tree, tuple(node for node, _, _ in steps), tuple(g for _, g, _ in steps), n_inputs)
+
+
+def entropy_brought(tree: Tree) -> list[int]:
+    """Return by how much each node's decision lowers the entropy of the rows that the tree was grown on."""
+    return [round(Fraction(node.gain) * node.size * 2**_BITS) for node in tree.nodes]
+
+
+def errors_spared(tree: Tree, X: NDArray[np.bool_], labels: NDArray[np.intp]) -> list[int]:
+    """Return by how many each node's decision lowers the errors on rows X (n, d), of class numbers `labels` (n,).
+
+    X holds the tree's bits: every value is met below every decision.
+    """
+    errors = [0] * len(tree.nodes)
+    spared = [0] * len(tree.nodes)
+    rows_of = {0: np.arange(len(X))}
+    for number, node in enumerate(tree.nodes):
+        rows = rows_of.pop(number)
+        errors[number] = int(np.count_nonzero(labels[rows] != node.majority))
+        if node.input is not None:
+            column = X[rows, node.input]
+            for value, child in zip(node.values, tree.children[number], strict=True):
+                rows_of[child] = rows[column == value]
+    for number, children in enumerate(tree.children):
+        if children:
+            spared[number] = errors[number] - sum(errors[child] for child in children)
+    return spared
+
+
+class _Pruning:
+    """The decisions of a tree that still stand; every node with what those below it, and itself, bring together."""
+
+    def __init__(self, tree: Tree, brought: Sequence[int]) -> None:
+        self.tree = tree
+        self.standing = [node.input is not None for node in tree.nodes]
+        self.brought = list(brought)
+        self.links = [max(len(node.values) - 1, 0) for node in tree.nodes]
+        for number in range(len(tree.nodes) - 1, 0, -1):
+            parent = tree.parents[number]
+            self.brought[parent] += self.brought[number]
+            self.links[parent] += self.links[number]
+        self.labels = collections.Counter(node.input for node in tree.nodes if node.input is not None)
+
+    def steps(self) -> Iterator[tuple[int, Fraction, int]]:
+        """Yield each weakest link as it goes: node, g, how many different inputs are left."""
+        waiting = [self._key(number) for number, stands in enumerate(self.standing) if stands]
+        heapify(waiting)
+        while waiting:
+            key = heappop(waiting)
+            number = -key[1]
+            if not self.standing[number] or key != self._key(number):
+                continue  # gone, or pushed again since
+            for above in self._take_off(number):
+                heappush(waiting, self._key(above))
+            yield number, key[0], len(self.labels)
+
+    def _key(self, number: int) -> tuple[Fraction, int]:
+        return Fraction(self.brought[number], self.links[number]), -number
+
+    def _take_off(self, number: int) -> Iterator[int]:
+        """Make a node a leaf; yield the nodes above it, whose links are others now."""
+        brought, links = self.brought[number], self.links[number]
+        self._clear(number)
+        above = self.tree.parents[number]
+        while above >= 0:
+            self.brought[above] -= brought
+            self.links[above] -= links
+            yield above
+            above = self.tree.parents[above]
+
+    def _clear(self, number: int) -> None:
+        waiting = [number]
+        while waiting:
+            node = waiting.pop()
+            label = self.tree.nodes[node].input
+            if label is not None and self.standing[node]:
+                self.standing[node] = False
+                self.labels -= collections.Counter([label])
+                waiting += self.tree.children[node]
+
+
+def _labels(tree: Tree, leaves: set[int]) -> Iterator[int]:
+    """Yield the inputs of the decisions of `tree` in preorder, those at or below `leaves` left out."""
+    waiting = [0]
+    while waiting:
+        number = waiting.pop()
+        label = tree.nodes[number].input
+        if label is not None and number not in leaves:
+            yield label
+            waiting += reversed(tree.children[number])
+
 
 _HELD_OUT = 3
 # The paper's S, and beyond, until next to nothing is left of the tree.

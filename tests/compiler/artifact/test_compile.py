@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler import GraspSet, compile_build, grow_id3
-from thenar.compiler.artifact.errors import CompileError
+from thenar.compiler.artifact import CompileError
 from thenar.compiler.artifact.verify import verify
 from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.drivers.errors import ThenarError

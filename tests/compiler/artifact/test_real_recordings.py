@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from thenar.compiler import compile_build
-from thenar.compiler.artifact.select import select_inputs
 from thenar.compiler.artifact.training import samples_of, train
 from thenar.compiler.artifact.verify import verify
+from thenar.compiler.artifact.verify_firmware import select_inputs
 from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.evaluation.folds import weka_folds
 from thenar.compiler.recordings.importer import import_file

@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from thenar.compiler.artifact.errors import CompileError
-from thenar.compiler.artifact.staging import check_target, publish
+from thenar.compiler.artifact import CompileError
+from thenar.compiler.artifact.compile import check_target, publish
 
 OLD = {"build.json": b"old", "tables.bin": b"old"}
 NEW = {"build.json": b"new", "tables.bin": b"new", "ensemble.bin": b"new"}

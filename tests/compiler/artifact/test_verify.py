@@ -10,10 +10,10 @@ import pytest
 from msgspec.structs import replace as replace_fields
 
 from thenar.compiler import GraspSet, compile_build
+from thenar.compiler.artifact import CompileError
+from thenar.compiler.artifact.compile import MEMBERS
 from thenar.compiler.artifact.documents import REPORT_NAME
 from thenar.compiler.artifact.ensemble import ensemble_from_bytes
-from thenar.compiler.artifact.errors import CompileError
-from thenar.compiler.artifact.staging import MEMBERS
 from thenar.compiler.artifact.verify import ScanCheck, check_scan, verify
 from thenar.compiler.tables.collapse import collapse
 from thenar.runtime import Build, BuildError

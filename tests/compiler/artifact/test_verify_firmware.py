@@ -10,9 +10,8 @@ from thenar.compiler import GraspSet, compile_build
 from thenar.compiler.artifact import verify_firmware as trial
 from thenar.compiler.artifact.verify import verify
 from thenar.compiler.artifact.verify_firmware import verify_firmware
-from thenar.compiler.firmware import classifier
+from thenar.compiler.firmware import FirmwareError, classifier
 from thenar.compiler.firmware.classifier import classifier_files
-from thenar.compiler.firmware.errors import FirmwareError
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.probes import extreme_frames
 from thenar.runtime.build import Build

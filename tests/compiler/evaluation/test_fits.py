@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from thenar.compiler import LogitBoostClassifier
-from thenar.compiler.evaluation.fits import Fit, is_blind, predictions, run_fits
 from thenar.compiler.evaluation.folds import Fold, weka_folds
-from thenar.compiler.evaluation.plan import inputs
+from thenar.compiler.evaluation.plan import FoldFit, inputs, is_blind, predictions, run_fits
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.trainers.base import Training
 
@@ -15,13 +14,13 @@ QUICK = Training("logitboost", {"rounds": 5})
 
 
 @pytest.fixture
-def fits(make_grasps: Make) -> tuple[GraspSet, list[Fit]]:
+def fits(make_grasps: Make) -> tuple[GraspSet, list[FoldFit]]:
     grasps = make_grasps(noise=0.3)
     folds = weka_folds(grasps.labels, 4, 1)
-    return grasps, [Fit(fold, columns, (0, 1, 2, 3)) for fold in folds for columns in [(0, 1, 2), (3, 4, 12)]]
+    return grasps, [FoldFit(fold, columns, (0, 1, 2, 3)) for fold in folds for columns in [(0, 1, 2), (3, 4, 12)]]
 
 
-def test_a_fit_answers_as_the_classifier_does(fits: tuple[GraspSet, list[Fit]]) -> None:
+def test_a_fit_answers_as_the_classifier_does(fits: tuple[GraspSet, list[FoldFit]]) -> None:
     grasps, todo = fits
     X = inputs(grasps)
     for fit in todo:
@@ -36,7 +35,7 @@ def test_labels_keep_their_numbers_where_some_do_not_occur(make_grasps: Make) ->
     grasps = make_grasps(noise=0.0)
     rows = np.flatnonzero(np.isin(grasps.labels, (1, 3)))
     fold = Fold(rows[::2], rows[1::2], "1")
-    found = predictions(inputs(grasps), grasps.labels, Fit(fold, tuple(range(12)), (1, 3)), QUICK)
+    found = predictions(inputs(grasps), grasps.labels, FoldFit(fold, tuple(range(12)), (1, 3)), QUICK)
     assert np.array_equal(found, grasps.labels[fold.test])
 
 
@@ -44,18 +43,18 @@ def test_without_inputs_the_most_frequent_training_label_is_answered(make_grasps
     grasps = make_grasps()
     rows = np.concatenate([np.flatnonzero(grasps.labels == 2)[:5], np.flatnonzero(grasps.labels == 1)[:4]])
     fold = Fold(rows, np.arange(6), "1")
-    found = predictions(inputs(grasps), grasps.labels, Fit(fold, (), (0, 1, 2, 3)), QUICK)
+    found = predictions(inputs(grasps), grasps.labels, FoldFit(fold, (), (0, 1, 2, 3)), QUICK)
     assert found.tolist() == [2] * 6
 
 
-def test_equal_fits_are_done_once_and_progress_counts_each(fits: tuple[GraspSet, list[Fit]]) -> None:
+def test_equal_fits_are_done_once_and_progress_counts_each(fits: tuple[GraspSet, list[FoldFit]]) -> None:
     grasps, todo = fits
     seen: list[tuple[int, int]] = []
     run_fits(inputs(grasps), grasps.labels, todo + todo, QUICK, 1, lambda done, total: seen.append((done, total)))
     assert seen == [(done, len(todo)) for done in range(1, len(todo) + 1)]
 
 
-def test_any_number_of_workers_gives_the_same(fits: tuple[GraspSet, list[Fit]]) -> None:
+def test_any_number_of_workers_gives_the_same(fits: tuple[GraspSet, list[FoldFit]]) -> None:
     grasps, todo = fits
     alone = run_fits(inputs(grasps), grasps.labels, todo, QUICK, jobs=1)
     together = run_fits(inputs(grasps), grasps.labels, todo, QUICK, jobs=2)
@@ -73,7 +72,7 @@ def test_where_no_input_varies_the_most_frequent_training_label_is_answered(make
     rows = np.concatenate([np.flatnonzero(grasps.labels == 2)[:5], np.flatnonzero(grasps.labels == 1)[:4]])
     X = inputs(grasps).copy()
     X[rows, :2] = 7, 65535
-    fit = Fit(Fold(rows, np.arange(6), "1"), (0, 1), (0, 1, 2, 3))
+    fit = FoldFit(Fold(rows, np.arange(6), "1"), (0, 1), (0, 1, 2, 3))
     assert is_blind(X, fit)
     assert predictions(X, grasps.labels, fit, QUICK).tolist() == [2] * 6
     X[rows[-1], 1] = 0

@@ -14,7 +14,6 @@ from thenar.compiler.evaluation.plan import (
     Planner,
     RowPlan,
     TableName,
-    TablePlan,
     available,
 )
 from thenar.compiler.evaluation.populations import HONEST, PAPER, Protocol, populations
@@ -78,15 +77,15 @@ def planner(make_grasps: Make) -> Planner:
     return planner_of(make_grasps(noise=0.25))
 
 
-def row(table: TablePlan, name: str) -> RowPlan:
-    (found,) = (candidate for candidate in table.rows if candidate.name == name)
+def row(table: list[RowPlan], name: str) -> RowPlan:
+    (found,) = (candidate for candidate in table if candidate.name == name)
     return found
 
 
 @both_protocols
 def test_every_cell_tests_each_row_of_its_subject_once_a_repeat(planner: Planner, protocol: Protocol) -> None:
     for name in ("compositions", "generality", "pruning"):
-        for line in planner.table(name, protocol).rows:
+        for line in planner.table(name, protocol):
             for cell in line.cells:
                 for run in cell.runs:
                     assert np.array_equal(np.sort(np.concatenate([fit.fold.test for fit in run])), cell.part.rows)
@@ -94,7 +93,7 @@ def test_every_cell_tests_each_row_of_its_subject_once_a_repeat(planner: Planner
 
 def test_what_needs_no_placement_is_the_same_work_under_both_protocols(planner: Planner) -> None:
     paper, honest = (planner.table("compositions", protocol) for protocol in (PAPER, HONEST))
-    shared = {line.name for line in paper.rows if line.cells == row(honest, line.name).cells}
+    shared = {line.name for line in paper if line.cells == row(honest, line.name).cells}
     assert shared == {"I", "IV", "V"}
 
 
@@ -108,18 +107,18 @@ def test_the_papers_placement_is_one_a_subject_and_the_honest_one_differs_by_fol
 @both_protocols
 def test_the_diagonal_of_generality_is_composition_six(planner: Planner, protocol: Protocol) -> None:
     six = row(planner.table("compositions", protocol), "VI")
-    for i, line in enumerate(planner.table("generality", protocol).rows):
+    for i, line in enumerate(planner.table("generality", protocol)):
         assert line.cells[i] == six.cells[i]
 
 
 def test_off_the_diagonal_both_protocols_take_the_others_placement(planner: Planner) -> None:
     paper, honest = (planner.table("generality", protocol) for protocol in (PAPER, HONEST))
-    for i, line in enumerate(paper.rows):
+    for i, line in enumerate(paper):
         giver = planner.parts[i]
         given = tuple(sorted(planner.chosen("id3", giver.rows, 0)))
         for j, cell in enumerate(line.cells):
             if i != j:
-                assert cell == honest.rows[i].cells[j]
+                assert cell == honest[i].cells[j]
                 assert {fit.columns for fit in cell.fits} == {given}
 
 
@@ -128,10 +127,10 @@ def test_pruning_starts_from_all_switches_and_takes_one_placement_for_all_subjec
     planner: Planner, protocol: Protocol
 ) -> None:
     table = planner.table("pruning", protocol)
-    assert [line.name for line in table.rows] == ["all", "0", "30"]
-    assert {fit.columns for cell in table.rows[0].cells for fit in cell.fits} == {tuple(range(12))}
+    assert [line.name for line in table] == ["all", "0", "30"]
+    assert {fit.columns for cell in table[0].cells for fit in cell.fits} == {tuple(range(12))}
     everyone = np.concatenate([part.rows for part in planner.parts])
-    for line, least in zip(table.rows[1:], (0, 30), strict=True):
+    for line, least in zip(table[1:], (0, 30), strict=True):
         for cell in line.cells:
             for fit in cell.fits:
                 seen = everyone if protocol is PAPER else np.setdiff1d(everyone, fit.fold.test)
@@ -142,8 +141,8 @@ def test_pruning_starts_from_all_switches_and_takes_one_placement_for_all_subjec
 def test_baselines_have_as_many_switches_as_id3_in_every_fold(planner: Planner, protocol: Protocol) -> None:
     table = planner.table("baselines", protocol)
     id3 = row(table, "ID3")
-    assert [line.name for line in table.rows] == ["ID3", "CMIM", "top-k", "random"]
-    for line in table.rows:
+    assert [line.name for line in table] == ["ID3", "CMIM", "top-k", "random"]
+    for line in table:
         for cell, reference in zip(line.cells, id3.cells, strict=True):
             draws = DRAWS if line.name == "random" else 1
             assert len(cell.runs) == draws * len(reference.runs)
@@ -193,7 +192,7 @@ def test_every_method_sees_exactly_the_rows_given_in_whatever_order(make_grasps:
 
 def test_any_method_can_be_a_rival(make_grasps: Make) -> None:
     table = replace(planner_of(make_grasps()), rivals=("mrmr",)).table("baselines", HONEST)
-    assert [line.name for line in table.rows] == ["ID3", "mrmr", "random"]
+    assert [line.name for line in table] == ["ID3", "mrmr", "random"]
 
 
 def test_a_set_without_switches_has_an_empty_placement(make_grasps: Make) -> None:

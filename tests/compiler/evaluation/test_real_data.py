@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thenar.compiler.evaluation.rates import Rate
-from thenar.compiler.evaluation.study import Options, Study, Table, evaluate
+from thenar.compiler.evaluation.rates import RepeatedRate
+from thenar.compiler.evaluation.study import Options, RateTable, Study, evaluate
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import import_file
 
@@ -30,13 +30,13 @@ def aml(aml_table: Path) -> GraspSet:
     return import_file(aml_table, COLUMNS / "aml.toml")[0]
 
 
-def rates(study: Study, name: str, row: str, protocol: str = "honest") -> tuple[Rate, ...]:
+def rates(study: Study, name: str, row: str, protocol: str = "honest") -> tuple[RepeatedRate, ...]:
     (table,) = (t for t in study.tables if (t.name, t.protocol) == (name, protocol))
     (found,) = (line for line in _rows(table) if line[0] == row)
     return found[1]
 
 
-def _rows(table: Table) -> list[tuple[str, tuple[Rate, ...]]]:
+def _rows(table: RateTable) -> list[tuple[str, tuple[RepeatedRate, ...]]]:
     return [(row.name, tuple(cell.rate for cell in row.cells)) for row in table.rows]
 
 

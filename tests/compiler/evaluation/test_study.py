@@ -5,20 +5,19 @@ import msgspec
 import numpy as np
 import pytest
 
-from thenar.compiler.evaluation.fits import Fit
 from thenar.compiler.evaluation.folds import EvaluationError, Fold
-from thenar.compiler.evaluation.plan import CellPlan, RowPlan, TablePlan
+from thenar.compiler.evaluation.plan import CellPlan, FoldFit, RowPlan
 from thenar.compiler.evaluation.populations import Population, Scheme
-from thenar.compiler.evaluation.rates import Rate
-from thenar.compiler.evaluation.study import TABLES, Options, Reader, Row, Study, Table, evaluate
+from thenar.compiler.evaluation.rates import RepeatedRate
+from thenar.compiler.evaluation.study import TABLES, Options, RateTable, Reader, Row, Study, evaluate
 from thenar.compiler.recordings.graspset import GraspSet
 
 # Six rows of labels 2 and 5 (others do not occur), two folds, two repeats of the same folds; switches are columns 0..2.
 LABELS = np.array([2, 2, 2, 5, 5, 5])
 FOLDS = (Fold(np.arange(3, 6), np.arange(3), "1"), Fold(np.arange(3), np.arange(3, 6), "2"))
 PART = Population("A", np.arange(6), (2, 5), (FOLDS, FOLDS))
-FIRST = tuple(Fit(fold, (0, 1, 7), (2, 5)) for fold in FOLDS)
-SECOND = tuple(Fit(fold, columns, (2, 5)) for fold, columns in zip(FOLDS, [(0, 1, 2), ()], strict=True))
+FIRST = tuple(FoldFit(fold, (0, 1, 7), (2, 5)) for fold in FOLDS)
+SECOND = tuple(FoldFit(fold, columns, (2, 5)) for fold, columns in zip(FOLDS, [(0, 1, 2), ()], strict=True))
 ANSWERS = {
     FIRST[0]: np.array([2, 2, 5]),
     FIRST[1]: np.array([5, 5, 5]),
@@ -51,19 +50,19 @@ def test_more_runs_than_repeats_are_draws_with_a_range_of_their_own() -> None:
     cell = READER.cell(CellPlan(PART, (FIRST, FIRST, SECOND, SECOND)), confusing=False)
     assert cell.draws is not None
     assert (cell.draws.least, cell.draws.most) == pytest.approx((4 / 6, 5 / 6))
-    assert cell.rate == Rate.of((5, 5, 4, 4), 6, repeats_a_draw=2)
+    assert cell.rate == RepeatedRate.of((5, 5, 4, 4), 6, repeats_a_draw=2)
     assert READER.cell(CELL, confusing=False).draws is None
-    assert READER.cell(CELL, confusing=False).rate == Rate.of((5, 4), 6)
+    assert READER.cell(CELL, confusing=False).rate == RepeatedRate.of((5, 4), 6)
 
 
 def test_a_row_averages_its_subjects_and_only_compositions_carry_confusions() -> None:
     row = RowPlan("VI", "Sel-Co", (CellPlan(PART, (FIRST, FIRST)), CellPlan(PART, (SECOND, SECOND))))
-    table = READER.table(TablePlan("pruning", "paper", (row,)))
+    table = READER.table("pruning", "paper", (row,))
     assert table.columns == ("A", "A")
     assert table.rows[0].average.mean == pytest.approx((5 / 6 + 4 / 6) / 2)
     assert (table.rows[0].switches.least, table.rows[0].switches.most) == (0, 3)
     assert table.rows[0].cells[0].confusion is None
-    assert READER.table(TablePlan("compositions", "paper", (row,))).rows[0].cells[0].confusion is not None
+    assert READER.table("compositions", "paper", (row,)).rows[0].cells[0].confusion is not None
 
 
 Make = Callable[..., GraspSet]
@@ -75,12 +74,12 @@ def study(make_grasps: Make) -> Study:
     return evaluate(make_grasps(noise=0.2), QUICK, jobs=1)
 
 
-def table(study: Study, name: str, protocol: str = "honest") -> Table:
+def table(study: Study, name: str, protocol: str = "honest") -> RateTable:
     (found,) = (candidate for candidate in study.tables if (candidate.name, candidate.protocol) == (name, protocol))
     return found
 
 
-def row(table: Table, name: str) -> Row:
+def row(table: RateTable, name: str) -> Row:
     (found,) = (candidate for candidate in table.rows if candidate.name == name)
     return found
 

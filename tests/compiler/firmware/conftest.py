@@ -6,8 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from thenar.compiler.firmware.answers import Answers
-from thenar.compiler.firmware.probes import Probes, extreme_frames, joined, random_frames
+from thenar.compiler.firmware.probes import Answers, Probes, extreme_frames, joined, random_frames
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Recognised, Switch
 from thenar.runtime.tables import IntegerTables, tables_to_bytes

@@ -5,9 +5,17 @@ from pathlib import Path
 import pytest
 from msgspec.structs import fields
 
-from thenar.compiler.firmware.board import Board, GloveUart, check_switches, glove_toml, key_names, rows_and_columns
-from thenar.compiler.firmware.board_loading import load_board, parse_board
-from thenar.compiler.firmware.errors import FirmwareError
+from thenar.compiler.firmware import FirmwareError
+from thenar.compiler.firmware.board import (
+    Board,
+    GloveUart,
+    check_switches,
+    glove_toml,
+    key_names,
+    load_board,
+    parse_board,
+    rows_and_columns,
+)
 from thenar.compiler.firmware.targets.avr import AVRS, best_setting
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.harness.loading import parse_harness

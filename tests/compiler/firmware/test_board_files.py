@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from thenar.compiler.firmware.board import check_switches
+from thenar.compiler.firmware import FirmwareError
+from thenar.compiler.firmware.board import check_switches, parse_board
 from thenar.compiler.firmware.board_files import (
     board_files,
     board_makefile,
@@ -14,8 +15,6 @@ from thenar.compiler.firmware.board_files import (
     shortest_scan_us,
     switches_of,
 )
-from thenar.compiler.firmware.board_loading import parse_board
-from thenar.compiler.firmware.errors import FirmwareError
 from thenar.compiler.firmware.layout import arrange
 from thenar.compiler.firmware.targets.base import Mode
 from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22

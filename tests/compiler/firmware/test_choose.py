@@ -6,9 +6,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.choose import Option, choose, flash_shares, frontier
 from thenar.compiler.firmware.costs import Cost
-from thenar.compiler.firmware.errors import FirmwareError
 from thenar.compiler.firmware.layout import arrange
 from thenar.compiler.firmware.targets import TARGETS, Target
 from thenar.runtime.tables import IntegerTables

@@ -5,11 +5,10 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from thenar.compiler.firmware.answers import Answers
+from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import classifier_files
-from thenar.compiler.firmware.errors import FirmwareError
 from thenar.compiler.firmware.layout import arrange
-from thenar.compiler.firmware.probes import Probes
+from thenar.compiler.firmware.probes import Answers, Probes
 from thenar.compiler.firmware.tools import STRICT, call, workshop
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables

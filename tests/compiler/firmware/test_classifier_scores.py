@@ -9,10 +9,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from thenar.compiler.firmware import simavr
-from thenar.compiler.firmware.answers import Answers
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.layout import Layout, arrange
-from thenar.compiler.firmware.probes import Probes, random_frames
+from thenar.compiler.firmware.probes import Answers, Probes, random_frames
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.targets.host import MEMBER as HOST
 from thenar.runtime.manifest import Manifest

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from thenar.compiler.firmware.board_loading import parse_board
+from thenar.compiler.firmware.board import parse_board
 from thenar.compiler.firmware.generate import Firmware
 from thenar.compiler.firmware.one_hand import for_one_hand
 from thenar.compiler.firmware.targets.base import Mode

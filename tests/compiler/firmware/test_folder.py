@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from thenar.compiler.firmware.errors import FirmwareError
-from thenar.compiler.firmware.folder import SUMS, sums, write_folder
+from thenar.compiler.firmware import FirmwareError
+from thenar.compiler.firmware.generate import SUMS, sums, write_folder
 
 OLD = {"thenar_glove.c": "old\n", "examples/one/one.ino": "old\n", "gone.h": "old\n"}
 NEW = {"thenar_glove.c": "new\n", "examples/one/one.ino": "new\n", "Makefile": "all:\n"}

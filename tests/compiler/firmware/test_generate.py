@@ -5,11 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from thenar.compiler.firmware.board import Board
-from thenar.compiler.firmware.board_loading import parse_board
-from thenar.compiler.firmware.errors import FirmwareError
-from thenar.compiler.firmware.folder import write_folder
-from thenar.compiler.firmware.generate import Firmware
+from thenar.compiler.firmware import FirmwareError
+from thenar.compiler.firmware.board import Board, parse_board
+from thenar.compiler.firmware.generate import Firmware, write_folder
 from thenar.compiler.firmware.one_hand import for_one_hand
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.targets.base import Mode

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thenar.compiler.firmware.board_loading import parse_board
+from thenar.compiler.firmware.board import parse_board
 from thenar.compiler.firmware.generate import Firmware
 from thenar.compiler.firmware.targets.base import Mode
 from thenar.runtime.build import Build

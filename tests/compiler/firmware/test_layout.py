@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.firmware.errors import FirmwareError
+from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.layout import Bins, Layout, arrange, lookups, parts_of
 from thenar.compiler.firmware.probes import Probes
 from thenar.runtime.tables import IntegerTables

@@ -4,7 +4,7 @@ from dataclasses import replace
 import pytest
 from msgspec import structs
 
-from thenar.compiler.firmware.errors import FirmwareError
+from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.generate import Firmware
 from thenar.compiler.firmware.measuring import Measured, measure
 from thenar.runtime.build import Build

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from thenar.compiler.firmware.errors import FirmwareError
+from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.protocol import MOST_KEYS, BoardConfig, decided_files, protocol_files
 from thenar.drivers.errors import SettingError
 from thenar.runtime.tables import IntegerTables

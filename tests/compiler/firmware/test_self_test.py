@@ -10,8 +10,7 @@ import pytest
 
 from thenar.compiler.firmware.classifier import Library
 from thenar.compiler.firmware.layout import Layout, arrange
-from thenar.compiler.firmware.probes import turns
-from thenar.compiler.firmware.self_test import CHECKS, check_header, self_test_frames
+from thenar.compiler.firmware.probes import CHECKS, check_header, self_test_frames, turns
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import Manifest

@@ -7,13 +7,11 @@ import pytest
 
 import thenar.simulator.scenes
 from thenar.compiler import compile_build
-from thenar.compiler.artifact.select import select_inputs
-from thenar.compiler.firmware import simavr
-from thenar.compiler.firmware.answers import Answers
+from thenar.compiler.artifact.verify_firmware import select_inputs
+from thenar.compiler.firmware import FirmwareError, simavr
 from thenar.compiler.firmware.classifier import classifier_files
-from thenar.compiler.firmware.errors import FirmwareError
 from thenar.compiler.firmware.layout import Adding, Layout, arrange
-from thenar.compiler.firmware.probes import Probes, random_frames
+from thenar.compiler.firmware.probes import Answers, Probes, random_frames
 from thenar.compiler.firmware.targets import TARGETS, Target
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.runtime.build import Build

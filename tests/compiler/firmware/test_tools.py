@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from thenar.compiler.firmware.errors import FirmwareError
+from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.tools import call, find, lacking, workshop
 
 NOWHERE = (("no-such-compiler", "nor-this-one"), "no-such-package")

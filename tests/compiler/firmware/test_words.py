@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.firmware.errors import FirmwareError
+from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.words import check_name, comment, inputs_in_words, markdown, string
 
 ANY_TEXT = st.text(max_size=60)

@@ -9,7 +9,7 @@ import pytest
 
 from thenar.compiler.frontier.points import Frontier
 from thenar.compiler.frontier.words import COLUMNS, csv_bytes, featured, summary, wiring_of
-from thenar.compiler.recordings.spreadsheet import text_of
+from thenar.compiler.text import text_of
 
 
 def test_it_says_how_many_switches_how_much_time_how_much_recognition_and_against_what(examples: Any) -> None:

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thenar.compiler.glove.files import spec_files
-from thenar.compiler.recordings.spreadsheet import text_of
+from thenar.compiler.text import text_of
 from thenar.runtime.harness.loading import parse_harness
 from thenar.runtime.harness.wiring import GloveWiring
 from thenar.runtime.manifest import Manifest

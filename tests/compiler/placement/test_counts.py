@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.placement.counts import Counter, Digits
-from thenar.compiler.placement.errors import PlacementError
+from thenar.compiler.placement.inputs import PlacementError
 
 
 def random_inputs(seed: int, n: int, radices: list[int]) -> npt.NDArray[np.int64]:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thenar.compiler.placement.errors import PlacementError
+from thenar.compiler.placement.inputs import PlacementError
 from thenar.compiler.placement.optimum import Pairs, best_subset, filled, swapped
 from thenar.compiler.samples import Columns, Samples
 

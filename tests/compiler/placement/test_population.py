@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler.placement import population
-from thenar.compiler.placement.errors import PlacementError
+from thenar.compiler.placement.inputs import PlacementError
 from thenar.compiler.placement.placement import Aim
 from thenar.compiler.placement.population import (
     EXCHANGES,

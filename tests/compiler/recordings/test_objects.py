@@ -3,8 +3,7 @@ from pathlib import Path
 import pytest
 
 from thenar.compiler.recordings.errors import ColumnsError, RecordingError
-from thenar.compiler.recordings.objects import collected
-from thenar.compiler.recordings.taxonomy import KAMAKURA_14
+from thenar.compiler.recordings.taxonomy import KAMAKURA_14, collected
 from thenar.runtime.recording.session import Task
 
 

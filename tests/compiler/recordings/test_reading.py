@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from thenar.compiler.recordings.cells import Readings, read_cells
 from thenar.compiler.recordings.columns import Columns, JointColumns, select
 from thenar.compiler.recordings.errors import TableError
+from thenar.compiler.recordings.importer import Readings, read_cells
 from thenar.compiler.recordings.summary import Finding
 from thenar.compiler.recordings.table import Column, Table
 

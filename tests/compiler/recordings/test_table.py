@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thenar.compiler.recordings.cells import numbers
 from thenar.compiler.recordings.errors import TableError
+from thenar.compiler.recordings.importer import numbers
 from thenar.compiler.recordings.table import Table, read_table
 
 

@@ -15,8 +15,7 @@ import msgspec
 import pytest
 
 from thenar.compiler.firmware import generate
-from thenar.compiler.firmware.board import Board, glove_toml
-from thenar.compiler.firmware.board_loading import parse_board
+from thenar.compiler.firmware.board import Board, glove_toml, parse_board
 from thenar.compiler.firmware.simavr import harness, missing
 from thenar.runtime.build import Build
 from thenar.runtime.sinks.jsonl import Line

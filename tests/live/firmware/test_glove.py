@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from thenar.compiler.firmware.board_loading import parse_board
+from thenar.compiler.firmware.board import parse_board
 from thenar.compiler.firmware.one_hand import for_one_hand
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.serial_line import PtyLine

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler import compile_build
-from thenar.compiler.artifact.select import select_inputs
+from thenar.compiler.artifact.verify_firmware import select_inputs
 from thenar.compiler.recordings.importer import import_file
 from thenar.drivers.errors import SettingError
 from thenar.runtime import Build

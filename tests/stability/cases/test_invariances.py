@@ -12,7 +12,7 @@ from thenar.compiler.boosting.classifier import LogitBoostClassifier
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.placement.tree import Tree
 from thenar.stability.cases import invariances as changes
-from thenar.stability.cases.invariances import Change, Partings, learn, numbers, renumbered
+from thenar.stability.cases.invariances import Change, Followed, Partings, learn, numbers, renumbered
 from thenar.stability.checks.rounds import counted
 from thenar.stability.inputs.hard_data import HardSet, intervals
 
@@ -77,7 +77,7 @@ NEAR: dict[str, Change_] = {
 @settings(max_examples=8, deadline=None)
 def test_scores_move_by_rounding_until_stumps_tie(change_of: Change_, hard: HardSet, seed: int) -> None:
     partings = Partings()
-    partings.see(hard, change_of(hard, np.random.default_rng(seed)), rounds=8)
+    partings.see(Followed(hard, rounds=8), change_of(hard, np.random.default_rng(seed)))
     assert not [found for found in partings.findings() if found.tried and not found.holds]
 
 
@@ -85,7 +85,7 @@ def test_stumps_that_part_without_a_tie_are_found() -> None:
     hard = intervals(4)
     other = HardSet("other", hard.X, np.roll(hard.labels, 1), 4, 0)
     partings = Partings()
-    partings.see(hard, Change("no change at all", other, (0,), (0, 1, 2, 3)), rounds=2)
+    partings.see(Followed(hard, rounds=2), Change("no change at all", other, (0,), (0, 1, 2, 3)))
     *_, parted = partings.findings()
     assert parted.tried
     assert not parted.holds

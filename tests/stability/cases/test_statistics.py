@@ -4,7 +4,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from thenar.compiler.evaluation.folds import block_folds, leave_one_out, weka_folds
-from thenar.compiler.evaluation.rates import Average, Rate
+from thenar.compiler.evaluation.rates import Average, RepeatedRate
 from thenar.compiler.evaluation.study import Options, evaluate
 from thenar.stability.cases.statistics import WILSON_BOUND, lopsided
 from thenar.stability.inputs.small_sets import make_set
@@ -18,7 +18,7 @@ from thenar.stability.reference.numbers import distance
 @example(10**15, 1.0)
 def test_an_interval_is_wilsons_to_the_last_places(total: int, share: float) -> None:
     correct = min(int(share * total), total)
-    rate = Rate.of((correct,), total)
+    rate = RepeatedRate.of((correct,), total)
     low, high = wilson(correct, total)
     assert max(distance(rate.low, low), distance(rate.high, high)) <= WILSON_BOUND
     assert 0 <= rate.low <= rate.mean <= rate.high <= 1
@@ -28,7 +28,7 @@ def test_an_interval_is_wilsons_to_the_last_places(total: int, share: float) -> 
 @pytest.mark.parametrize("total", [1, 2, 12, 1000, 10**12])
 @pytest.mark.parametrize("repeats", [1, 2, 5])
 def test_nothing_or_everything_recognised_ends_the_interval_there_and_leaves_it_wide(total: int, repeats: int) -> None:
-    none, everything = Rate.of((0,) * repeats, total), Rate.of((total,) * repeats, total)
+    none, everything = RepeatedRate.of((0,) * repeats, total), RepeatedRate.of((total,) * repeats, total)
     assert none.low == 0 < none.high
     assert everything.low < 1 == everything.high
     # What holds of the one holds of the other, turned round.
@@ -38,7 +38,7 @@ def test_nothing_or_everything_recognised_ends_the_interval_there_and_leaves_it_
 
 @given(st.integers(1, 300).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))
 def test_the_average_of_one_rate_is_that_rate(counts: tuple[int, int]) -> None:
-    rate = Rate.of((counts[0],), counts[1])
+    rate = RepeatedRate.of((counts[0],), counts[1])
     average = Average.of((rate,))
     assert average.mean == rate.mean
     # The end less the mean, and the mean less that: two roundings of at most 2^-53.
@@ -46,7 +46,7 @@ def test_the_average_of_one_rate_is_that_rate(counts: tuple[int, int]) -> None:
 
 
 def test_an_average_of_zeros_and_of_ones_ends_there() -> None:
-    zeros, ones = Average.of((Rate.of((0,), 12),) * 7), Average.of((Rate.of((12,), 12),) * 7)
+    zeros, ones = Average.of((RepeatedRate.of((0,), 12),) * 7), Average.of((RepeatedRate.of((12,), 12),) * 7)
     assert (zeros.mean, zeros.low) == (0, 0)
     assert (ones.mean, ones.high) == (1, 1)
     assert zeros.high == pytest.approx(float(wilson(0, 12)[1]) / 7**0.5)

@@ -4,11 +4,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thenar.compiler.firmware.answers import Answers
+from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import classifier_files
-from thenar.compiler.firmware.errors import FirmwareError
 from thenar.compiler.firmware.layout import Layout, arrange
-from thenar.compiler.firmware.probes import Probes
+from thenar.compiler.firmware.probes import Answers, Probes
 from thenar.compiler.firmware.targets.cortex_m import MEMBER
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables

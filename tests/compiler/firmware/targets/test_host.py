@@ -6,11 +6,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from thenar.compiler.firmware.answers import Answers
+from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.classifier import classifier_files
-from thenar.compiler.firmware.errors import FirmwareError
 from thenar.compiler.firmware.layout import Layout, arrange
-from thenar.compiler.firmware.probes import Probes
+from thenar.compiler.firmware.probes import Answers, Probes
 from thenar.compiler.firmware.targets.host import MEMBER as HOST
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables

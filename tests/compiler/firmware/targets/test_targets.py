@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thenar.compiler.firmware.errors import FirmwareError
+from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.layout import arrange
 from thenar.compiler.firmware.targets import TARGETS, Target, kinds, timed
 from thenar.drivers.members import MemberError

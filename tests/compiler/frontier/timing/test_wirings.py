@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.firmware import board_loading
+from thenar.compiler.firmware import board as boards
 from thenar.compiler.firmware.board import Board, BoardBus
 from thenar.compiler.frontier.timing.wirings import AS_WIRED, BOARD, CLOCKS_HZ, Wiring, wirings
 from thenar.drivers.i2c.chips import CHIPS
@@ -36,7 +36,7 @@ def test_a_board_accepts_every_wiring_of_an_avr_that_fits(size: int) -> None:
         if wiring.fits(names_of(size)):
             (bus,) = wiring.harness_of(names_of(size), joints=False).buses
             board = Board(part="atmega328p", bus=BoardBus(clock_hz=bus.clock_hz), chips=bus.chips)
-            assert not list(board_loading.faults(board))
+            assert not list(boards.faults(board))
 
 
 def test_a_new_glove_has_every_sort_of_chip_at_every_clock_that_it_allows_or_a_board() -> None:

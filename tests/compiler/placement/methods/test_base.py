@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from thenar.compiler.placement.errors import PlacementError
+from thenar.compiler.placement.inputs import PlacementError
 from thenar.compiler.placement.methods.base import METHODS, Method, usual
 from thenar.compiler.placement.ports import PortCosts
 from thenar.compiler.samples import Samples

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.placement.cooccurrence import Cooccurrence
-from thenar.compiler.placement.errors import PlacementError
+from thenar.compiler.placement.inputs import PlacementError
 from thenar.compiler.placement.methods import filters
 from thenar.compiler.placement.methods.filters import cmim, most_informative, random_placement
 

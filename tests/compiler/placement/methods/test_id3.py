@@ -14,9 +14,8 @@ from hypothesis import strategies as st
 
 from thenar.compiler import grow_id3
 from thenar.compiler.placement.methods.base import METHODS
-from thenar.compiler.placement.methods.id3 import cost_aware_order, every_third
+from thenar.compiler.placement.methods.id3 import cost_aware_order, errors_spared, every_third, weakest_links
 from thenar.compiler.placement.ports import PortCosts
-from thenar.compiler.placement.pruning import errors_spared, weakest_links
 from thenar.compiler.samples import Samples
 
 Bits = npt.NDArray[np.bool_]

@@ -12,7 +12,7 @@ from sklearn.tree import DecisionTreeClassifier
 
 from thenar.compiler import grow_id3
 from thenar.compiler.placement.gain import gain_bits
-from thenar.compiler.placement.pruning import entropy_brought, errors_spared, weakest_links
+from thenar.compiler.placement.methods.id3 import entropy_brought, errors_spared, weakest_links
 from thenar.compiler.placement.tree import Node, Tree
 
 Bits = npt.NDArray[np.bool_]

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 import click
 import pytest
 
-from thenar.cli.typed_lines import TypedLines
+from thenar.cli.calibrate_command import TypedLines
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""The options of commands that train: which trainer, and the settings of every one, read from the registry."""
+"""Options of several commands: the placement methods and the trainers, read from their registries."""
 
 from collections.abc import Iterable
 from functools import cached_property
@@ -6,11 +6,39 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .common import Listed
-from .methods import WithMethods
+from .common import Listed, parted
 
 if TYPE_CHECKING:
+    from thenar.compiler.placement.methods.base import Method
     from thenar.compiler.trainers.base import Setting
+
+
+def method_names(_: click.Context, __: click.Parameter, text: str | None) -> tuple[str, ...] | None:
+    """Return the names in `text`, parted by commas; "none" names none. Raises MemberError for a wrong name."""
+    from thenar.compiler.placement.methods.base import METHODS
+
+    if text is None:
+        return None
+    return tuple(METHODS.named(name).name for name in parted(text) if name not in ("", "none"))
+
+
+class WithMethods(click.Command):
+    """A command whose help ends with all placement methods."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write each method's name and what it does."""
+        from thenar.compiler.placement.methods.base import METHODS
+
+        super().format_epilog(ctx, formatter)
+        with formatter.section("Placement methods"):
+            formatter.write_dl([(name, f"{method.help}{_remarks(method)}.") for name, method in METHODS.items()])
+
+
+def _remarks(method: "Method") -> str:
+    """Return what a user has to know besides, in brackets."""
+    remarks = [] if method.ours else ["rival"]
+    remarks += [f"pip install {method.install}"] if method.install else []
+    return f" ({'; '.join(remarks)})" if remarks else ""
 
 
 def _names() -> Iterable[str]:
