@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 _BOARD = "board"
 # What a point of a frontier says.
-_SETTLED = ("prune", "rounds", "inputs", "table_bits", "max_bins", "placement", "keep", "width")
+_SETTLED = ("prune", "inputs", "table_bits", "placement", "keep", "width", "trainer")
 
 
 def _chips() -> Iterable[str]:
@@ -169,11 +169,13 @@ def _check_proposal(propose: Path | None, chip: str | None, glove: Path | None, 
 
 def _check_point(context: click.Context, from_frontier: Path | None, point: int | None) -> None:
     """Raise UsageError for what does not go with --from."""
+    from thenar.compiler.trainers.base import TRAINERS
+
     if from_frontier is None:
         if point is not None:
             raise click.UsageError("--point is one of a frontier: name its file with --from.")
         return
-    for name in _SETTLED:
+    for name in (*_SETTLED, *(setting.name for trainer in TRAINERS.values() for setting in trainer.settings)):
         if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
             raise click.UsageError(
                 f"--{name.replace('_', '-')} is settled by the point that --from names: leave it out."

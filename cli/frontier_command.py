@@ -9,7 +9,7 @@ from rich.text import Text
 from thenar.compiler.text import duration, interval
 
 from .common import Listed, any_path, err, existing_file, existing_folder, json_flag, out, progress, show, table
-from .options import WithMethods, method_names
+from .options import Training, asked_settings, method_names, trainer_option
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from thenar.compiler.frontier.points import Check, Frontier, Point
 
 
-_SEARCHED = ("rounds", "repeats", "finalists", "max_bins", "seed")
+_SEARCHED = ("repeats", "finalists", "seed")
 _WORDS = ("inputs", "placement", "rounds, bits", "wiring", "scan", "decision")
 _NUMBERS = ("rate %", "left out %", "frame", "latency, 99 %", "flash", "RAM")
 
@@ -28,7 +28,7 @@ def _timed() -> tuple[str, ...]:
     return timed()
 
 
-@click.command("frontier", cls=WithMethods)
+@click.command("frontier", cls=Training)
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option("-o", "--output", type=any_path, required=True, help="Folder for tables, pictures and the store.")
 @click.option("--glove", type=existing_file, help="A glove.toml: try its wiring as well, and choose by its ports.")
@@ -45,19 +45,22 @@ def _timed() -> tuple[str, ...]:
 @click.option(
     "--rivals", callback=method_names, help="Methods to compare them with, by commas, or none.  [default: most rivals]"
 )
+@trainer_option
 @click.option("--rounds", type=click.IntRange(1, 300), default=300, show_default=True, help="The most rounds to try.")
 @click.option("--repeats", type=click.IntRange(1), default=3, show_default=True, help="Repeats of the folds.")
 @click.option(
     "--finalists", type=click.IntRange(1), default=12, show_default=True, help="Placements to look at closely."
 )
-@click.option("--max-bins", type=click.IntRange(2), help="At most so many bins a joint.  [default: no limit]")
 @click.option("--seed", type=int, default=1, show_default=True, help="Seed of folds and stream.")
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Worker processes; -1: all cores.")
 @click.option(
     "--dask", "cluster", metavar="ADDRESS", help="Work on the cluster of this Dask scheduler, such as tcp://host:8786."
 )
 @json_flag
+@click.pass_context
 def command(
+    context: click.Context,
+    /,
     recordings: Path,
     output: Path,
     glove: Path | None,
@@ -88,9 +91,14 @@ def command(
     if budget_us is not None and rate is not None:
         raise click.UsageError("--budget-us and --rate each pick a point: give one of them.")
     wanted, harness = Wanted(budget_us, rate), None if glove is None else load_harness(glove)
+    rounds = asked["rounds"]
+    training = asked_settings(context, asked)
     search = Search(
         methods=methods or usual(ours=True, wired=harness is not None),
         rivals=usual(ours=False) if rivals is None else rivals,
+        rounds=rounds,
+        trainer=training.pop("trainer"),
+        settings={name: value for name, value in training.items() if name != "rounds"},
         **{name: asked.pop(name) for name in _SEARCHED},
     )
     with progress("frontier") as report:
@@ -153,7 +161,7 @@ def _title(frontier: "Frontier") -> str:
 
 
 def _cells(point: "Point") -> tuple[Text, ...]:
-    from thenar.compiler.frontier.words import way_of, wiring_of
+    from thenar.compiler.frontier.words import is_usual, training_of, way_of, wiring_of
 
     setting = point.setting
     texts = (
@@ -161,7 +169,7 @@ def _cells(point: "Point") -> tuple[Text, ...]:
         str(len(point.switches)),
         setting.inputs,
         way_of(setting),
-        f"{setting.rounds}, {setting.width}",
+        f"{setting.rounds if is_usual(setting) else training_of(setting)}, {setting.width}",
         wiring_of(setting),
         setting.scan if setting.clock_hz else "",
         setting.decision,

@@ -64,15 +64,16 @@ trainer_option = click.option(
 
 
 class Training(WithMethods):
-    """A command with `trainer_option`: an option for each setting of a trainer follows it. The trainers are imported
-    when the options are asked for, not when the command is defined.
+    """A command with `trainer_option`: an option for each setting of a trainer follows it, without those that the
+    command has itself. The trainers are imported when the options are asked for, not when the command is defined.
     """
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         """Return the options of the command, and those of the trainers."""
         params = super().get_params(ctx)
-        place = [param.name for param in params].index("trainer") + 1
-        return [*params[:place], *self._settings, *params[place:]]
+        names = [param.name for param in params]
+        place = names.index("trainer") + 1
+        return [*params[:place], *(each for each in self._settings if each.name not in names), *params[place:]]
 
     @cached_property
     def _settings(self) -> tuple[click.Option, ...]:

@@ -2,9 +2,9 @@
 
 import importlib
 import pkgutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from functools import cached_property
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from typing import Generic, Protocol, TypeVar
 
 from .errors import ThenarError
@@ -67,21 +67,31 @@ class Members(Mapping[str, M], Generic[M]):
             for member in defined if isinstance(defined, tuple) else (defined,):
                 found[member.name] = member
         found = dict(sorted(found.items(), key=lambda item: (getattr(item[1], "rank", 0), item[0])))
-        for point in sorted(entry_points(group=self.group), key=lambda point: point.name):
-            member = self._loaded(point.name, point.value, point.load)
-            if member.name in found:
-                raise MemberError(f"two packages define the {self.kind} {member.name!r}: uninstall one of them")
+        for point in self._points():
+            member = self._loaded(point)
+            self._check_free(member.name, found)
             found[member.name] = member
         return found
 
-    def _loaded(self, name: str, value: str, load: object) -> M:
-        where = f"the {self.kind} {shortened(name)!r} ({shortened(value)}) of another package"
+    def _points(self) -> list[EntryPoint]:
+        return sorted(entry_points(group=self.group), key=lambda point: point.name)
+
+    def _check_free(self, name: str, taken: Container[str]) -> None:
+        if name in taken:
+            raise MemberError(f"two packages define the {self.kind} {shortened(name)!r}: uninstall one of them")
+
+    def _where(self, point: EntryPoint) -> str:
+        return f"the {self.kind} {shortened(point.name)!r} ({shortened(point.value)}) of another package"
+
+    def _loaded(self, point: EntryPoint) -> M:
         try:
-            member = load() if callable(load) else None
+            member = point.load()
         except Exception as error:
-            raise MemberError(f"{where} cannot be loaded: {shortened(str(error))}; mend or uninstall it") from error
+            said = f"cannot be loaded: {shortened(str(error))}; mend or uninstall it"
+            raise MemberError(f"{self._where(point)} {said}") from error
         if not isinstance(member, self.shape):
-            raise MemberError(f"{where} is no {self.shape.__name__}: docs/extending.md says what one defines")
+            said = f"is no {self.shape.__name__}: docs/extending.md says what one defines"
+            raise MemberError(f"{self._where(point)} {said}")
         return member
 
     def __getitem__(self, name: str) -> M:
@@ -95,6 +105,51 @@ class Members(Mapping[str, M], Generic[M]):
 
     def named(self, name: str) -> M:
         """Return a member. Raises MemberError, which lists all names, if there is none of that name."""
-        if name not in self._members:
-            raise MemberError(f"there is no {self.kind} {shortened(name)!r}: choose one of {', '.join(self._members)}")
-        return self._members[name]
+        if name not in self:
+            raise MemberError(f"there is no {self.kind} {shortened(name)!r}: choose one of {', '.join(self)}")
+        return self[name]
+
+
+class MembersByName(Members[M]):
+    """Members of which each is imported when it is asked for, and no other: to list their names imports none.
+
+    The module hand_object_pose of the folder defines the member "hand.object_pose" as `MEMBER`. A member of another
+    package has the name of its entry point. Names come in alphabetical order, those of other packages last.
+
+    Raises
+    ------
+    MemberError
+        On use, if a name is taken. When a member of another package is asked for: if it cannot be imported, is no
+        `shape`, or has another name than its entry point.
+    """
+
+    @cached_property
+    def _places(self) -> dict[str, EntryPoint | None]:
+        """The entry points by the names of their members; None for those of the folder."""
+        folder = importlib.import_module(self.package)
+        modules = sorted(info.name for info in pkgutil.iter_modules(folder.__path__))
+        places: dict[str, EntryPoint | None] = {module.replace("_", ".", 1): None for module in modules}
+        for point in self._points():
+            self._check_free(point.name, places)
+            places[point.name] = point
+        return places
+
+    def __getitem__(self, name: str) -> M:
+        point = self._places[name]
+        if point is None:
+            member: M = importlib.import_module(f"{self.package}.{name.replace('.', '_')}").MEMBER
+            return member
+        member = self._loaded(point)
+        if member.name != name:
+            said = f"has another name, {shortened(member.name)!r}: give its entry point that name"
+            raise MemberError(f"{self._where(point)} {said}")
+        return member
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._places
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._places)
+
+    def __len__(self) -> int:
+        return len(self._places)

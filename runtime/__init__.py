@@ -3,22 +3,29 @@
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from .errors import BuildError, FrameError, SealError, ThenarError
-
 if TYPE_CHECKING:
     from .build import Build, Recognition
+    from .errors import BuildError, FrameError, SealError, ThenarError
     from .glove import Glove
+
+# Names are imported when they are first used: devices take as long as all the rest, and --help needs none of them.
+_HOMES = {
+    "Build": ".build",
+    "BuildError": ".errors",
+    "FrameError": ".errors",
+    "Glove": ".glove",
+    "Recognition": ".build",
+    "SealError": ".errors",
+    "ThenarError": ".errors",
+}
 
 __all__ = ["Build", "BuildError", "FrameError", "Glove", "Recognition", "SealError", "ThenarError"]
 
-# Numpy and the devices take longer to import than all the rest, and a part of the runtime may need neither.
-_LATER = {"Build": ".build", "Recognition": ".build", "Glove": ".glove"}
-
 
 def __getattr__(name: str) -> object:
-    if name not in _LATER:
+    if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_LATER[name], __name__), name)
+    return getattr(import_module(_HOMES[name], __name__), name)
 
 
 def __dir__() -> list[str]:

@@ -7,6 +7,7 @@ from .finalists import Close
 from .latency import POLICIES
 from .points import DecisionKind, Latency, Point, Scan, Setting, Time, front
 from .price import PricedTables, Wired
+from .search import Search
 from .timing.classify_times import Classified
 from .timing.scan_times import transfer_us
 
@@ -121,7 +122,7 @@ def _identity(design: Design) -> tuple[object, ...]:
 
 
 def points_of(
-    several: Sequence[Design], latencies: Latencies, names: Sequence[str], max_bins: int | None
+    several: Sequence[Design], latencies: Latencies, names: Sequence[str], search: Search
 ) -> tuple[Point, ...]:
     """Return those that are on a front, numbered from the fastest frame on.
 
@@ -131,7 +132,7 @@ def points_of(
     ordered = sorted(several, key=lambda design: (design.frame.us, design.n_switches))
     found = [(design, kind) for design in ordered for kind in design.decisions if fronts[design, kind]]
     return tuple(
-        _point(number, design, kind, latencies[design, kind], fronts[design, kind], names, max_bins)
+        _point(number, design, kind, latencies[design, kind], fronts[design, kind], names, search)
         for number, (design, kind) in enumerate(found, 1)
     )
 
@@ -155,7 +156,7 @@ def _point(
     latency: Latency,
     fronts: tuple[str, ...],
     names: Sequence[str],
-    max_bins: int | None,
+    search: Search,
 ) -> Point:
     wired, tabled, close = design.wired, design.tables.tabled, design.close
     choice = close.screened.choice
@@ -164,7 +165,7 @@ def _point(
         setting=Setting(
             way=choice.way,
             inputs=choice.inputs,
-            rounds=tabled.rounds,
+            rounds=tabled.rounds if search.staged else None,
             width=tabled.shape.width,
             layout=design.classified.layout,
             scan=design.scan_kind,
@@ -172,7 +173,7 @@ def _point(
             wiring="" if wired is None else wired.wiring,
             clock_hz=0 if wired is None else wired.clock_hz,
             table_bits=tabled.shape.table_bits,
-            max_bins=max_bins,
+            **search.trained,
         ),
         switches=tuple(names[column] for column in close.screened.columns),
         rate=close.rates[tabled],

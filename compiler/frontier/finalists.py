@@ -110,7 +110,7 @@ def look_closely(survey: Survey, chosen: Sequence[Screened]) -> tuple[Close, ...
     depths = {choice: depth_of(search, [fits[choice, fold] for fold in cuts.screening]) for choice in choices}
     for depth in dict.fromkeys(depths.values()):
         alike = [choice for choice in choices if depths[choice] == depth]
-        fits |= survey.fit(further(depth.rounds), alike, cuts.others, depth.stages, depth.tabled, SHAPES)
+        fits |= survey.fit(further(depth), alike, cuts.others, depth.stages, depth.tabled, SHAPES)
     rated = []
     for one in chosen:
         depth = depths[one.choice]
@@ -125,7 +125,7 @@ def look_closely(survey: Survey, chosen: Sequence[Screened]) -> tuple[Close, ...
             tuple(survey.switch_names[column] for column in one.columns),
             one.columns,
             tuple(dict.fromkeys([*worthwhile(rates), papers_tables(search)])),
-            search.max_bins,
+            search.training,
             survey.equipment,
             cuts.screening[0],
         )
@@ -140,7 +140,7 @@ def look_closely(survey: Survey, chosen: Sequence[Screened]) -> tuple[Close, ...
 
 def papers_tables(search: Search) -> Tabled:
     """Return which tables stand for the paper's: of its hundred rounds, as wide as need be."""
-    return Tabled(papers_depth(search).rounds, Shape(16))
+    return Tabled(papers_depth(search).tabled[-1], Shape(16))
 
 
 def papers_depth(search: Search) -> Search:
@@ -148,9 +148,9 @@ def papers_depth(search: Search) -> Search:
     return replace(search, rounds=min(100, search.rounds))
 
 
-def further(rounds: int) -> str:
-    """Return the name of the stage that trains finalists for so many rounds in all folds but the first repeat's."""
-    return f"finalists, {rounds} rounds"
+def further(search: Search) -> str:
+    """Return the name of the stage that trains finalists as far as that in all folds but the first repeat's."""
+    return f"finalists, {search.stages[-1]} rounds"
 
 
 def depth_of(search: Search, fits: Sequence[Tally]) -> Search:

@@ -9,28 +9,29 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from thenar.runtime.build import Build
 from thenar.runtime.harness.wiring import Harness
 
 from ..limits import check_inputs, check_memory, check_types
-from ..placement.methods.base import METHODS, usual
+from ..placement.methods.base import BEST, METHODS, PAPERS, usual
 from ..placement.ports import ports_of_whole_glove
 from ..publication import check_folder, entries, publish_folder
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from .cache import Cache, Report, Store
 from .designs import Design, Latencies, best_designs, designs, points_of, with_whole_scans
-from .equipment import equipment_for
-from .finalists import PRICE_S, Close, finalists, further, look_closely, papers_depth
+from .equipment import Equipment, equipment_for
+from .finalists import PRICE_S, Close, finalists, further, look_closely, papers_depth, papers_tables
 from .latency import Pace, latencies
-from .marks import choices_to_mark, marks_of, own_build
 from .measure import TRIAL_S, measured
 from .movements import holds_movements
 from .plots import PICTURES, pictures
-from .points import SCHEMA, Frontier, FrontierError, Mark, Point, Tried, frontier_to_bytes
-from .screen import QUICK_PRICE_S, Screened, screen
+from .points import SCHEMA, Frontier, FrontierError, Mark, Point, Tried, Way, frontier_to_bytes
+from .screen import QUICK_PRICE_S, Screened, rate_of, screen
 from .search import SHAPES, Candidate, Search, available_inputs, curve_ways, ways
 from .stream import Stream, stream_of
 from .survey import Cuts, Survey, fit_s, path_s
+from .timing.scan_times import scan_times, transfer_us
 from .timing.wirings import wirings
 from .words import csv_bytes
 
@@ -246,8 +247,8 @@ def foreseen(survey: Survey) -> dict[str, float]:
         "screening": (_DIFFERENT * choices + rivals) * sum(fit_s(search.screened, 0, n) for n in train),
         "times": _DIFFERENT * choices * QUICK_PRICE_S,
         "finalists' placements": sum(path_s(name, n) for name in methods for n in more),
-        "finalists": last * sum(fit_s(search.rounds, len(search.tabled) * len(SHAPES), n) for n in train),
-        further(few.rounds): last * sum(fit_s(few.rounds, len(few.tabled) * len(SHAPES), n) for n in more),
+        "finalists": last * sum(fit_s(search.stages[-1], len(search.tabled) * len(SHAPES), n) for n in train),
+        further(few): last * sum(fit_s(few.stages[-1], len(few.tabled) * len(SHAPES), n) for n in more),
         "prices": last * PRICE_S,
         "simulations": last * _DESIGNS * TRIAL_S * simulated,
         "checks": _CHECKED * TRIAL_S * simulated,
@@ -268,7 +269,7 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
     every = [design for close in closes for design in designs(close, survey.n_joints)]
     by_time, by_switches = best_designs(every)
     kept, checks, skipped = measured(with_whole_scans([*by_time, *by_switches]), survey.equipment, survey.cache)
-    points = points_of(kept, _latencies(survey, stream, kept), survey.switch_names, search.max_bins)
+    points = points_of(kept, _latencies(survey, stream, kept), survey.switch_names, search)
     picked, tried = wanted.pick(points), _tried(screened, closes, search)
     early = [_EARLY] if any(design.scan_kind == "early" for design in kept) else []
     return Frontier(
@@ -311,7 +312,7 @@ def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latenc
             survey.columns(choice, fold),
             stream,
             tuple(Pace(design.tables.tabled, design.frame.us, design.decisions) for design in mine),
-            survey.search.max_bins,
+            survey.search.training,
         )
         for choice, mine in grouped.items()
     ]
@@ -327,11 +328,73 @@ def _tried(screened: Sequence[Screened], closes: Sequence[Close], search: Search
     """Return everything that was screened, and the finalists after every stage of their training."""
     first = [(one, search.screened, one.rate) for one in screened]
     then = [(close.screened, rounds, rate) for close in closes for rounds, rate in close.stages.items()]
+    staged = search.staged
     return tuple(
-        Tried(one.choice.way, one.choice.inputs, len(one.columns), rounds, rate, one.frame_us)
+        Tried(one.choice.way, one.choice.inputs, len(one.columns), rounds if staged else None, rate, one.frame_us)
         for one, rounds, rate in (*first, *then)
     )
 
 
 def _unheard(_done: int, _total: int) -> None:
     pass
+
+
+# The paper's S.
+_PAPERS = (62.0,)
+
+
+def choices_to_mark(n_switches: int, n_joints: int) -> dict[Candidate, str]:
+    """Return what to mark, with its name: the paper's placement and all switches, alone and with the joints."""
+    if not n_switches:
+        return {}
+    marked = {Way(PAPERS, prune): f"paper, S = {prune:g}" for prune in _PAPERS}
+    # Whichever method says so, to keep all of them is the same.
+    marked[Way(BEST, float(n_switches))] = f"all of {n_switches}"
+    alone = {Candidate(way, "switches"): name for way, name in marked.items()}
+    return alone | ({Candidate(way, "both"): f"{name}, joints" for way, name in marked.items()} if n_joints else {})
+
+
+def marks_of(named: dict[Candidate, str], closes: Sequence[Close], survey: Survey) -> tuple[Mark, ...]:
+    """Return the marks of these choices that were looked at closely, with the paper's rounds and whole scans."""
+    found, tabled = [], papers_tables(survey.search)
+    for close in closes:
+        screened = close.screened
+        if screened.choice in named:
+            priced = next(tables for tables in close.priced if tables.tabled == tabled)
+            us = priced.fastest_us(survey.n_joints if screened.choice.joints else 0)
+            if us is not None:
+                found.append(Mark(named[screened.choice], len(screened.columns), close.rates[tabled], us))
+    return tuple(found)
+
+
+def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
+    """Return the user's own build as a mark: its rate as it says, its frame in the fastest wiring for its switches.
+
+    Raises FrontierError where it does not say, or is not for these recordings or this equipment.
+    """
+    build = Build.load(folder)
+    manifest = build.manifest
+    names = [switch.name for switch in manifest.switches]
+    honest = [rate for rate in manifest.rates if rate.protocol == "honest"]
+    if not honest:
+        raise FrontierError(
+            f"{folder} does not say what it recognises: compile it with --folds 4, or leave --build out"
+        )
+    rate, options, fitting = honest[-1], equipment.model.options(build.tables), equipment.fitting(names)
+    if not options or (names and not fitting):
+        raise FrontierError(f"{folder} cannot be built for {equipment.model.target}: leave --build out, or --target")
+    joints = [joint.name for joint in manifest.joints]
+    bits = grasp_set.switches[:, _places(names, grasp_set.switch_names, folder)]
+    codes = grasp_set.codes[:, _places(joints, [joint.name for joint in grasp_set.joints], folder)]
+    scans = [scan_times(names, build.tables, wiring, bits, codes, equipment.beside).full_us for wiring in fitting]
+    frame_us = max(min(scans, default=0.0), transfer_us(len(joints))) + options[0].us
+    return Mark(f"build {folder.name}", len(names), rate_of((rate.correct,), rate.total), frame_us)
+
+
+def _places(names: Sequence[str], there: Sequence[str], folder: Path) -> list[int]:
+    for name in names:
+        if name not in there:
+            raise FrontierError(
+                f"{folder} reads {name!r}, which the recordings do not hold: it was compiled from others"
+            )
+    return [there.index(name) for name in names]

@@ -1,25 +1,243 @@
-"""How long after a hand has arrived in a grasp `thenar run` has decided on it."""
+"""How long after a hand has arrived in a grasp `thenar run` has decided on it.
+
+The runtime's own `Decision` and `SequentialTest` decide on a stream. Where many frames in succession are alike, a
+decider does nothing in most of them: they are shown those frames alone in which something can happen.
+"""
 
 import math
-from collections.abc import Mapping, Sequence
+from bisect import bisect_left
+from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
+from itertools import pairwise
 from types import MappingProxyType
+from typing import Protocol
 
 import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
+from thenar.runtime.live.decision import Decision, SequentialTest, Standing
 from thenar.runtime.policy import Policy
+from thenar.runtime.scores import LANE_OFFSET, Scorer
 from thenar.runtime.tables import IntegerTables
 
 from ..evaluation.folds import Rows
 from ..samples import Columns, Samples
 from ..tables.quantise import integer_scores
+from ..trainers.base import Training
 from .cache import stored
-from .deciders import NOTHING, Decisions, decisions, stretches
 from .points import DecisionKind, FrontierError, Latency
 from .price import Tabled, tables_of
 from .stream import Stream
+
+NOTHING = -1
+# So many frames must be left for it to be worth while to work out how many of them decide nothing.
+_WORTHWHILE = 4
+
+# From a frame's time on, this is decided; None: nothing.
+Decided = tuple[int, int | None]
+
+
+class Decider(Protocol):
+    """Sees stretches of equal frames, one after the other."""
+
+    def stay(self, times: range, standing: Standing) -> Iterator[Decided]:
+        """Yield what is decided at the first frame of a stretch, and again whenever it may have changed since."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stretches:
+    """Frames step_us apart in which nothing changes: stretch i is frames first[i] to first[i + 1] - 1, and its scores
+    are scores[i] (K,); first has an entry more, the number of frames.
+    """
+
+    scores: NDArray[np.int32]
+    first: NDArray[np.int64]
+    step_us: int
+
+    @property
+    def times(self) -> Iterator[range]:
+        """The times of the frames of each stretch, in microseconds; the first frame is at 0."""
+        bounds = (self.first * self.step_us).tolist()
+        return (range(a, b, self.step_us) for a, b in pairwise(bounds))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Decisions:
+    """From frame frames[i] (c,) on class types[i] (c,) is decided on, NOTHING where none is."""
+
+    frames: NDArray[np.int64]
+    types: NDArray[np.intp]
+
+    def at(self, frames: NDArray[np.int64]) -> NDArray[np.intp]:
+        """Return what is decided at some frames, none before the first."""
+        return self.types[np.searchsorted(self.frames, frames, side="right") - 1]
+
+
+def stretches(scores: NDArray[np.int32], at_us: NDArray[np.int64], step_us: int) -> Stretches:
+    """Return the frames, one every step_us from at_us[0] on, of states (T,) with scores (T, K); the last is the end."""
+    due = -((at_us[0] - at_us) // step_us)
+    seen = np.flatnonzero(due[1:] > due[:-1])
+    alike = np.zeros(len(seen), np.bool_)
+    alike[1:] = (scores[seen[1:]] == scores[seen[:-1]]).all(axis=1)
+    kept = seen[~alike]
+    return Stretches(scores[kept], np.append(due[kept], due[-1]), step_us)
+
+
+def decisions(tables: IntegerTables, frames: Stretches, policy: Policy) -> Decisions:
+    """Return what `thenar run` decides under `policy` on these frames, each whole and seen once, by both devices at the
+    same time.
+    """
+    decider, scorer = decider_of(tables, policy), Scorer(tables)
+    found: list[Decided] = []
+    lanes = map(tuple, (frames.scores + LANE_OFFSET).tolist())
+    for stretch, row in zip(frames.times, lanes, strict=True):
+        for time_us, held in decider.stay(stretch, Standing(row, scorer)):
+            if not found or held != found[-1][1]:
+                found.append((time_us, held))
+    return Decisions(
+        np.array([time_us // frames.step_us for time_us, _ in found], np.int64),
+        np.array([NOTHING if held is None else held for _, held in found], np.intp),
+    )
+
+
+def decider_of(tables: IntegerTables, policy: Policy) -> Decider:
+    """Return the decider that the live recogniser has under `policy`."""
+    if policy.error_rate is None:
+        return _Hysteresis(Decision(policy.lead_steps(tables.scale), policy.dwell_us, policy.hold_us))
+    test = _Test(tables.n_classes, tables.scale, policy.error_rate, policy.hold_us, policy.spacing_us)
+    return _Tests(test, Scorer(tables))
+
+
+class _Hysteresis:
+    """In a stretch a decision changes but once: its candidate takes over, and stands for the rest."""
+
+    def __init__(self, decision: Decision) -> None:
+        self._decision = decision
+
+    def stay(self, times: range, standing: Standing) -> Iterator[Decided]:
+        """Yield what is decided at the first frame of a stretch, and at the one with which that changes."""
+        decision = self._decision
+        held = decision.update(times[0], standing)
+        yield times[0], held
+        if held != standing.candidate and self._changes(times[-1], standing):
+            # Rival and support stand still: once the time for a change has come, it has come for good.
+            first = bisect_left(times, True, key=lambda time_us: self._changes(time_us, standing))
+            yield times[first], decision.update(times[first], standing)
+        decision.update(times[-1], standing)
+
+    def _changes(self, time_us: int, standing: Standing) -> bool:
+        """Whether the decision would change with a frame of this time, were it the next."""
+        return copy(self._decision).update(time_us, standing) != self._decision.held
+
+
+class _Test(SequentialTest):
+    """A sequential test that tells when it waits, how long it will, and when it begins anew."""
+
+    __slots__ = ()
+
+    @property
+    def next_us(self) -> int:
+        """The earliest time at which a frame counts again."""
+        return 0 if self._counted_us is None else self._counted_us + max(self.spacing_us, 1)
+
+    @property
+    def stands_until_us(self) -> int:
+        """The latest time of a frame with which the answer still stands."""
+        return self._decided_us + self.longest_us
+
+    @property
+    def goes_on_until_us(self) -> int:
+        """The latest time of a frame that is still of the test under way."""
+        return self._began_us + self.longest_us
+
+    def ended_at(self, time_us: int) -> bool:
+        """Whether a test ended with the frame of this time."""
+        return not self._sums and self._counted_us == time_us
+
+    def quiet(self, lanes: tuple[int, ...], most: int) -> int:
+        """Return after how many frames of these scores, up to `most`, the test under way is still undecided."""
+        best = lanes.index(max(lanes))
+        # Only the best of the frames gains on all others; the best of the sums might lead it by enough to end, though.
+        if not self._sums or max(self._sums) - self._sums[best] >= self.threshold:
+            return 0
+        wanted = [self.threshold + total - self._sums[best] for total in self._sums]
+        gains = [lanes[best] - lane for lane in lanes]
+        del wanted[best], gains[best]
+        # It ends with the first frame after which the best leads every other class by the threshold.
+        pairs = zip(wanted, gains, strict=True)
+        return max(min(most, (left - 1) // gain if gain else most) for left, gain in pairs if left > 0)
+
+
+class _Tests:
+    """Frames that do not count are left out. Frames that decide nothing are added up at once. Where two tests ended in
+    a stretch with the same answer, each further one would go as the second did; whole numbers of them are left out by
+    setting the clock back: a test knows only how much time has gone.
+    """
+
+    def __init__(self, test: _Test, scorer: Scorer) -> None:
+        self._test, self._scorer = test, scorer
+        self._back_us = 0
+
+    def stay(self, times: range, standing: Standing) -> Iterator[Decided]:
+        """Yield what is decided at the first frame of a stretch, and again whenever it may have changed since."""
+        place, frames = 0, 1
+        ended: tuple[int, int | None] | None = None  # the last test that ended here, and its answer while it stands
+        while place < len(times):
+            held = self._test.update(times[place] - self._back_us, self._summed(standing, frames))
+            yield times[place], held
+            if held is None:
+                ended = None
+            elif self._test.ended_at(times[place] - self._back_us):
+                if ended is not None and ended[1] == held:
+                    place += self._leave_out(times[place:], place - ended[0])
+                ended = place, held
+            after, frames = self._next(times, place, standing)
+            expired = self._expired(times[place + 1 : after])
+            if expired is not None:
+                yield expired, None
+                ended = None
+            place = after
+
+    def _summed(self, standing: Standing, frames: int) -> Standing:
+        """Return what stands for so many equal frames."""
+        return standing if frames == 1 else Standing(tuple(frames * lane for lane in standing.lanes), self._scorer)
+
+    def _leave_out(self, left: range, frames: int) -> int:
+        """Leave out as many tests of so many frames as lie in what is left; return how many frames those have."""
+        whole = (len(left) - 1) // frames * frames
+        self._back_us += whole * left.step
+        return whole
+
+    def _next(self, times: range, place: int, standing: Standing) -> tuple[int, int]:
+        """Return the place of the next frame to look at, past the last if it is in a later stretch, and for how many
+        frames that count it stands: itself, and those before it that decide nothing.
+        """
+        if self._test.spacing_us <= times.step and place + _WORTHWHILE >= len(times):
+            return place + 1, 1
+        counts = self._place(times, self._test.next_us, up=True)
+        counts = min(max(counts, place + 1), len(times))
+        apart = max(-(-self._test.spacing_us // times.step), 1)
+        last = min(self._place(times, self._test.goes_on_until_us), len(times) - 1)
+        most = (last - counts) // apart + 1
+        frames = self._test.quiet(standing.lanes, most) if most >= _WORTHWHILE else 1
+        return (counts + (frames - 1) * apart, frames) if frames > 1 else (counts, 1)
+
+    def _expired(self, idle: range) -> int | None:
+        """Return from which of some frames that do not count, or decide nothing, an answer no longer stands."""
+        if not idle or self._test.held is None:
+            return None
+        gone = max(self._place(idle, self._test.stands_until_us) + 1, 0)
+        return idle[gone] if gone < len(idle) else None
+
+    def _place(self, times: range, test_us: int, *, up: bool = False) -> int:
+        """Return which of the frames, or of those that would go on before and after them, is the last up to a time of
+        the test's clock; `up`: the first from it on.
+        """
+        since_us = test_us + self._back_us - times[0]
+        return -(-since_us // times.step) if up else since_us // times.step
+
 
 Times = NDArray[np.int64]
 
@@ -39,13 +257,13 @@ class Pace(Struct, frozen=True):
 
 @stored(1)
 def latencies(
-    samples: Samples, rows: Rows, columns: Columns, stream: Stream, paces: tuple[Pace, ...], max_bins: int | None
+    samples: Samples, rows: Rows, columns: Columns, stream: Stream, paces: tuple[Pace, ...], training: Training
 ) -> tuple[tuple[Latency, ...], ...]:
     """Train on some rows, on the switches `columns` and the joints; return how long a stream keeps one waiting at every
     pace, for each of its decisions. The stream holds none of the rows.
     """
     wanted = tuple(dict.fromkeys(pace.tabled for pace in paces))
-    tables = {tabled: made for tabled, made, _ in tables_of(samples, rows, columns, wanted, max_bins)}
+    tables = {tabled: made for tabled, made, _ in tables_of(samples, rows, columns, wanted, training)}
     return tuple(
         tuple(latency(tables[pace.tabled], columns, stream, pace.frame_us, POLICIES[kind]) for kind in pace.decisions)
         for pace in paces

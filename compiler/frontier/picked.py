@@ -11,6 +11,7 @@ from thenar.runtime.names import shortened
 
 from ..placement.methods.base import METHODS
 from ..recordings.graspset import GraspSet
+from ..trainers.base import TRAINERS
 from .points import MAX_BYTES, Frontier, FrontierError, Point, frontier_from_bytes
 from .timing.wirings import AS_WIRED, BOARD, Wiring
 
@@ -28,11 +29,14 @@ class Picked:
         setting = self.point.setting
         settled: dict[str, object] = {
             "inputs": setting.inputs,
-            "rounds": setting.rounds,
             "width": setting.width,
             "table_bits": setting.table_bits,
+            "trainer": setting.trainer,
             "max_bins": setting.max_bins,
+            **setting.settings,
         }
+        if setting.rounds is not None:
+            settled["rounds"] = setting.rounds
         if setting.inputs == "joints":
             return settled
         parameter = "keep" if METHODS[setting.way.method].by_number else "prune"
@@ -114,6 +118,10 @@ def _check(point: Point, grasp_set: GraspSet, what: str) -> None:
         raise FrontierError(
             f"{what} takes {setting.way.parameter} for its method: it is a whole number from {least} on"
         )
+    if setting.trainer not in TRAINERS:
+        raise FrontierError(f"{what} takes a trainer that is not there: {shortened(repr(setting.trainer))}")
+    if TRAINERS[setting.trainer].staged != (setting.rounds is not None):
+        raise FrontierError(f"{what} gives rounds to a trainer that takes none, or none to one that does")
     if setting.wiring not in ("", AS_WIRED, BOARD, *CHIPS):
         raise FrontierError(f"{what} takes a wiring that is not there: {shortened(repr(setting.wiring))}")
     if setting.wiring in CHIPS and not SLOWEST_HZ <= setting.clock_hz <= CHIPS[setting.wiring].clock_hz:

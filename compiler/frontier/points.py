@@ -4,10 +4,10 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Annotated, Literal, TypeVar
 
 import msgspec
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, field
 
 from thenar.drivers.errors import ThenarError
-from thenar.runtime.manifest import Inputs, TableBits
+from thenar.runtime.manifest import Inputs, Name, Options, TableBits, Value
 from thenar.runtime.names import fault, shortened
 
 SCHEMA = 1
@@ -24,6 +24,7 @@ Count = Annotated[int, Meta(ge=0, le=2**53)]
 Microseconds = Annotated[float, Meta(ge=0.0, le=1e12)]
 Amount = Annotated[float, Meta(ge=0.0, le=1e12)]
 _T = TypeVar("_T")
+WIDEST: TableBits = 16
 
 # A point has to recognise so much better than all that are no dearer, a twentieth of a percent: less is the cut's luck.
 STEP = 0.0005
@@ -55,26 +56,30 @@ class Way(Struct, frozen=True, forbid_unknown_fields=True):
     parameter: Annotated[float, Meta(ge=0.0, le=1e6)]
 
 
-class Setting(Struct, frozen=True, forbid_unknown_fields=True):
+class Setting(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """All that a point chose: what `compile --from` needs, and what the runtime is told.
 
+    rounds      None for a trainer that does not go by rounds
     width       bits that every sum fits; table_bits: 8 where firmware may store a byte an entry
     layout      how the tables lie in flash, in words; "" where nothing is laid out (host and pi)
     wiring      "as wired" (the given glove.toml), "board" (a switch scanner) or a kind of port expander; clock_hz of
                 its bus, or baud of the board's line; 0 where no switch is read
+    trainer     what makes the model, and `settings` of it that are no defaults; the paper's is not written
     """
 
     way: Way
     inputs: Inputs
-    rounds: Annotated[int, Meta(ge=1, le=10**6)]
+    rounds: Annotated[int, Meta(ge=1, le=10**6)] | None
     width: Annotated[int, Meta(ge=4, le=16)]
     layout: str
     scan: Scan
     decision: DecisionKind
     wiring: str
     clock_hz: Annotated[int, Meta(ge=0, le=12_000_000)]
-    table_bits: TableBits = 16
-    max_bins: Annotated[int, Meta(ge=2, le=2**53)] | None = None
+    table_bits: TableBits = field(default_factory=lambda: WIDEST)
+    max_bins: Annotated[int, Meta(ge=2, le=2**53)] | None = field(default_factory=lambda: None)
+    trainer: Name = Options().trainer
+    settings: dict[Name, Value] = {}
 
 
 class Latency(Struct, frozen=True, forbid_unknown_fields=True):
@@ -121,12 +126,14 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class Tried(Struct, frozen=True, forbid_unknown_fields=True):
-    """A placement as it was screened: its rate at the best number of rounds, in the fastest of its wirings."""
+    """A placement as it was screened: its rate after so many rounds (None: its trainer does not go by them), in the
+    fastest of its wirings.
+    """
 
     way: Way
     inputs: Inputs
     n_switches: Count
-    rounds: Count
+    rounds: Count | None
     rate: Rate
     frame_us: Microseconds
 

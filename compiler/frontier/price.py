@@ -13,10 +13,10 @@ from ..evaluation.folds import Fold, Rows
 from ..samples import Columns, Samples
 from ..tables.collapse import collapse
 from ..tables.quantise import quantise
+from ..trainers.base import Training
 from .cache import stored
 from .equipment import Equipment
 from .search import Shape
-from .survey import trained
 from .timing.classify_times import Classified
 from .timing.scan_times import ScanTimes, scan_times, transfer_us
 
@@ -64,7 +64,7 @@ def price(
     names: tuple[str, ...],
     columns: Columns,
     tables: tuple[Tabled, ...],
-    max_bins: int | None,
+    training: Training,
     equipment: Equipment,
     fold: Fold | None,
 ) -> tuple[PricedTables, ...]:
@@ -74,8 +74,8 @@ def price(
           them too soon; None: on all rows, where nobody asks about scans that end early
     """
     rows = np.arange(len(samples.labels))
-    made = list(tables_of(samples, rows, columns, tables, max_bins))
-    scanned = made if fold is None else list(tables_of(samples, fold.train, columns, tables, max_bins))
+    made = list(tables_of(samples, rows, columns, tables, training))
+    scanned = made if fold is None else list(tables_of(samples, fold.train, columns, tables, training))
     tested = rows if fold is None else fold.test
     spread = tested[np.linspace(0, len(tested) - 1, min(_FRAMES, len(tested))).astype(np.intp)]
     frames = samples.kept(columns)[spread]
@@ -92,18 +92,17 @@ def price(
 
 
 def tables_of(
-    samples: Samples, rows: Rows, columns: Columns, tables: tuple[Tabled, ...], max_bins: int | None
+    samples: Samples, rows: Rows, columns: Columns, tables: tuple[Tabled, ...], training: Training
 ) -> Iterator[tuple[Tabled, IntegerTables, float]]:
     """Yield the tables that are asked for, of one training on some rows, and how many seconds each took."""
-    began, most, kept = time.perf_counter(), max(one.rounds for one in tables), len(columns)
-    stumps = trained(samples, rows, columns, most, max_bins)
+    began, most = time.perf_counter(), max(one.rounds for one in tables)
+    kept = samples.rows(rows).keeping(columns)
+    models = training.stages(kept, [one.rounds for one in tables])
     training_s = time.perf_counter() - began
-    X = samples.kept(columns)[rows]
-    bits, codes = X[:, :kept].astype(bool), X[:, kept:]
-    for tabled in tables:
+    for tabled, model in zip(tables, models, strict=True):
         began = time.perf_counter()
-        scores = collapse(stumps.first(tabled.rounds), kept)
-        made = quantise(scores, bits, codes, tabled.shape.width, tabled.shape.table_bits)
+        scores = collapse(model, kept.n_switches)
+        made = quantise(scores, kept.switches, kept.codes, tabled.shape.width, tabled.shape.table_bits)
         yield tabled, made, training_s * tabled.rounds / most + time.perf_counter() - began
 
 

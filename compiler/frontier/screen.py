@@ -65,8 +65,8 @@ def _frames_us(survey: Survey, choices: Sequence[Candidate]) -> dict[Candidate, 
     for choice in choices:
         columns = survey.columns(choice, survey.cuts.everything)
         names = tuple(survey.switch_names[column] for column in columns)
-        rows, max_bins = survey.inputs(choice.joints), survey.search.max_bins
-        calls.append(price.call(QUICK_PRICE_S, rows, names, columns, (_TABLED,), max_bins, survey.equipment, None))
+        rows, training = survey.inputs(choice.joints), survey.search.training
+        calls.append(price.call(QUICK_PRICE_S, rows, names, columns, (_TABLED,), training, survey.equipment, None))
     found = {}
     for choice, (priced,) in zip(choices, survey.cache.ask("times", calls), strict=True):
         us = priced.fastest_us(survey.n_joints if choice.joints else 0)

@@ -1,11 +1,14 @@
 """What the frontier tries: placements under which parameters, inputs, rounds, widths, folds."""
 
+import sys
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from thenar.runtime.manifest import Inputs, TableBits
+from thenar.runtime.manifest import Inputs, Options, TableBits
 
 from ..placement.methods.base import METHODS, usual
+from ..trainers.base import TRAINERS, Number, Training, changed
 from .points import FrontierError, Way
 
 # Rivals are only seen beside ours: a few sizes show their curves.
@@ -61,16 +64,20 @@ class Search:
     screening : int
         Rounds with which every placement is screened, on the folds of the first repeat.
     rounds : int
-        The most rounds that those on the front are trained for.
+        The most rounds that those on the front are trained for. A trainer without stages has one, and trains once.
     finalists : int
         The most placements that are looked at closely.
-    max_bins : int, optional
-        The most bins of a joint.
+    trainer : str
+        What makes the models.
+    settings : mapping
+        Its settings that are no defaults, but for rounds.
 
     Raises
     ------
     MemberError
-        For a method that is not there.
+        For a method or a trainer that is not there.
+    TrainerError
+        For a setting that the trainer does not take.
     FrontierError
         Where nothing could come of it.
     """
@@ -83,28 +90,49 @@ class Search:
     screening: int = 60
     rounds: int = 300
     finalists: int = 12
-    max_bins: int | None = None
+    trainer: str = "logitboost"
+    settings: Mapping[str, Number] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
         for name in (*self.methods, *self.rivals):
             METHODS.named(name)
         if min(self.repeats, self.screening, self.rounds, self.finalists) < 1 or not self.methods:
             raise FrontierError("a frontier needs a method, a repeat, a round and a finalist at least")
+        _ = self.training
+
+    @property
+    def training(self) -> Training:
+        """The trainer, and values for all its settings."""
+        return Training.of(changed(Options(), {"trainer": self.trainer, **self.settings}))
+
+    @property
+    def trained(self) -> dict[str, Any]:
+        """What the `Setting` of a point says of the trainer, but for rounds."""
+        own = {name: value for name, value in self.settings.items() if name != "max_bins" and value is not None}
+        return {"trainer": sys.intern(self.trainer), "max_bins": self.settings.get("max_bins"), "settings": own}
+
+    @property
+    def staged(self) -> bool:
+        """Whether there are several numbers of rounds to try."""
+        return TRAINERS.named(self.trainer).staged
 
     @property
     def screened(self) -> int:
         """The rounds of screening: no more than those on the front are trained for."""
-        return min(self.screening, self.rounds)
+        return min(self.screening, self.stages[-1])
 
     @property
     def stages(self) -> tuple[int, ...]:
         """The numbers of rounds whose rates are taken from one training."""
-        return (*(stage for stage in ROUNDS if stage < self.rounds), self.rounds)
+        return self._up_to_last(ROUNDS)
 
     @property
     def tabled(self) -> tuple[int, ...]:
         """The numbers of rounds of which integer tables are made."""
-        return (*(stage for stage in TABLED if stage < self.rounds), self.rounds)
+        return self._up_to_last(TABLED)
+
+    def _up_to_last(self, rounds: tuple[int, ...]) -> tuple[int, ...]:
+        return (*(each for each in rounds if each < self.rounds), self.rounds) if self.staged else (1,)
 
 
 def ways(method: str, n_switches: int) -> tuple[Way, ...]:

@@ -9,15 +9,15 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from ..boosting.boost import boost
-from ..boosting.stumps import Stumps, winners
+from ..boosting.stumps import winners
 from ..evaluation.folds import Fold, Rows, check_cut, leave_one_out, weka_folds
 from ..placement.methods.base import METHODS
 from ..placement.ports import PortCosts
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
-from ..tables.collapse import collapse
+from ..tables.collapse import ScoreTables, collapse, model_scores
 from ..tables.quantise import integer_scores, quantise
+from ..trainers.base import Training
 from .cache import Cache, stored
 from .equipment import Equipment
 from .points import Way
@@ -165,7 +165,7 @@ class Survey:
                 stages,
                 tabled,
                 shapes,
-                self.search.max_bins,
+                self.search.training,
             )
             for choice, fold in places
         ]
@@ -201,38 +201,30 @@ def fit_stages(
     stages: tuple[int, ...],
     tabled: tuple[int, ...],
     shapes: tuple[Shape, ...],
-    max_bins: int | None,
+    training: Training,
 ) -> Tally:
     """Train once on a fold's training rows, on the switches `columns` and the joints; test at every stage.
 
     Rows of a placement without a switch that varies get the most frequent type.
     """
-    stumps = trained(samples, fold.train, columns, stages[-1], max_bins)
-    train, test = samples.labels[fold.train], samples.labels[fold.test]
-    if not stumps.n_rounds:
-        same = int(np.count_nonzero(test == np.bincount(train).argmax()))
-        return Tally(len(test), (same,) * len(stages), ((same,) * len(shapes),) * len(tabled))
-    X = samples.kept(columns)
-    scores = enumerate(stumps.staged_scores(X[fold.test]), 1)
-    counts = {done: int(np.count_nonzero(winners(each) == test)) for done, each in scores if done in stages}
-    deployed = tuple(
-        tuple(_recognised(stumps.first(stage), shape, X, len(columns), fold, test) for shape in shapes)
-        for stage in tabled
-    )
-    return Tally(len(test), tuple(counts[stage] for stage in stages), deployed)
+    kept = samples.keeping(columns)
+    train, test = kept.rows(fold.train), kept.rows(fold.test)
+    if not (train.inputs != train.inputs[0]).any():
+        same = int(np.count_nonzero(test.labels == np.bincount(train.labels).argmax()))
+        return Tally(len(test.labels), (same,) * len(stages), ((same,) * len(shapes),) * len(tabled))
+    rounds = (*stages, *tabled)
+    models = dict(zip(rounds, training.stages(train, rounds), strict=True))
+    answers = (winners(model_scores(models[stage], test.switches, test.codes)) for stage in stages)
+    correct = tuple(int(np.count_nonzero(answer == test.labels)) for answer in answers)
+    scores = [collapse(models[stage], kept.n_switches) for stage in tabled]
+    deployed = tuple(tuple(_recognised(each, shape, train, test) for shape in shapes) for each in scores)
+    return Tally(len(test.labels), correct, deployed)
 
 
-def trained(samples: Samples, rows: Rows, columns: Columns, rounds: int, max_bins: int | None) -> Stumps:
-    """Return the ensemble of so many rounds on some rows of the switches `columns` and the joints."""
-    X, y = samples.kept(columns)[rows], samples.labels[rows]
-    return boost(X, y, samples.n_classes, rounds=rounds, max_bins=max_bins)[0]
-
-
-def _recognised(stumps: Stumps, shape: Shape, X: NDArray[np.uint16], kept: int, fold: Fold, right: Rows) -> int:
-    bits, codes = X[:, :kept].astype(bool), X[:, kept:]
+def _recognised(scores: ScoreTables, shape: Shape, train: Samples, test: Samples) -> int:
     # The rows trained on have a say in what stands in for lost inputs, which nothing here looks at; in scores only
     # where entries are narrow.
-    seen = fold.train if shape.table_bits < 16 else fold.train[:1]
-    tables = quantise(collapse(stumps, kept), bits[seen], codes[seen], shape.width, shape.table_bits)
-    answers = integer_scores(tables, bits[fold.test], codes[fold.test]).argmax(axis=1)
-    return int(np.count_nonzero(answers == right))
+    seen = train if shape.table_bits < 16 else train.rows(np.arange(1))
+    tables = quantise(scores, seen.switches, seen.codes, shape.width, shape.table_bits)
+    answers = integer_scores(tables, test.switches, test.codes).argmax(axis=1)
+    return int(np.count_nonzero(answers == test.labels))

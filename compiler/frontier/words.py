@@ -4,6 +4,7 @@ import csv
 import io
 from collections.abc import Iterable, Iterator
 
+from thenar.runtime.manifest import Options
 from thenar.runtime.names import printable
 
 from ..text import cells, counted, duration, interval, listed, percent
@@ -16,6 +17,10 @@ COLUMNS = (
     *("classify_us", "classify_how", "frame_us", "frame_how", "latency_mean_us", "latency_p99_us", "missed", "wrong"),
     *("flash", "ram", "ports", "chips", "compile_s", "switches"),
 )
+
+# They follow only where a point's trainer, or a setting of it, is not the default.
+TRAINER_COLUMNS = ("trainer", "settings")
+_PAPERS = Options().trainer
 
 _LONGEST = 40  # letters of a name on a picture
 _SPARED = 0.005  # what a rate may lack and still count as level: half a point
@@ -37,6 +42,22 @@ def shorten(name: str) -> str:
 def way_of(setting: Setting) -> str:
     """Return how switches were chosen: "id3 62"."""
     return f"{setting.way.method} {setting.way.parameter:g}"
+
+
+def training_of(setting: Setting) -> str:
+    """Return how the model was made, the paper's trainer unnamed: "100 rounds", "naive-bayes, joint-bins 5"."""
+    name = () if setting.trainer == _PAPERS else (setting.trainer,)
+    rounds = () if setting.rounds is None else (counted(setting.rounds, "round"),)
+    return ", ".join((*name, *rounds, *_settings(setting)))
+
+
+def is_usual(setting: Setting) -> bool:
+    """Return whether rounds and bins say all of how the model was made."""
+    return setting.trainer == _PAPERS and not setting.settings
+
+
+def _settings(setting: Setting) -> list[str]:
+    return [f"{name.replace('_', '-')} {value:g}" for name, value in setting.settings.items()]
 
 
 def wiring_of(setting: Setting) -> str:
@@ -92,15 +113,20 @@ def _mark(mark: Mark) -> str:
 
 
 def csv_bytes(frontier: Frontier) -> bytes:
-    """Return `frontier.csv`: UTF-8, a line of COLUMNS, a line for each point.
+    """Return `frontier.csv`: UTF-8, a line of COLUMNS, perhaps with TRAINER_COLUMNS, and a line for each point.
 
-    Rates are in 0..1, times in microseconds (compile_s: seconds), a missing `left_out` is empty. `fronts` and
-    `switches` are lists in their cell, parted by semicolons; what holds a semicolon or a quote is quoted as CSV quotes.
+    Rates are in 0..1, times in microseconds (compile_s: seconds), a missing `left_out` is empty. `fronts`, `switches`
+    and `settings` are lists in their cell, parted by semicolons; what holds a semicolon or a quote is quoted as CSV
+    quotes.
     """
     file = io.StringIO(newline="")
     rows = csv.writer(file, lineterminator="\n")
-    rows.writerow(COLUMNS)
-    rows.writerows(cells(_values(point)) for point in frontier.points)
+    usual = all(is_usual(point.setting) for point in frontier.points)
+    rows.writerow(COLUMNS if usual else COLUMNS + TRAINER_COLUMNS)
+    for point in frontier.points:
+        setting = point.setting
+        trained = () if usual else (setting.trainer, _list(_settings(setting)))
+        rows.writerow(cells((*_values(point), *trained)))
     return file.getvalue().encode()
 
 

@@ -12,7 +12,7 @@ from msgspec import Struct
 
 from ..frontier.plots import PALETTE, POINT_ID, RING_ID, pictures
 from ..frontier.points import Frontier, Point, Time
-from ..frontier.words import featured, inputs_of, summary, way_of, wiring_of
+from ..frontier.words import featured, inputs_of, summary, training_of, way_of, wiring_of
 from ..hand import HandShape
 from ..text import DASH, NBSP, counted, interval, microseconds, sentence
 from .content import PlainTable
@@ -161,7 +161,7 @@ def _make_point(marker: ElementTree.Element, said: str, picked: bool) -> None:
 
 def _detail(point: Point, source: str, hand: HandShape | None) -> Detail:
     setting = point.setting
-    what = (inputs_of(point), setting.way.method, counted(setting.rounds, "round"), f"{setting.width} bits")
+    what = (inputs_of(point), setting.way.method, training_of(setting), f"{setting.width} bits")
     words = ", ".join(filter(None, (*what, _wiring(point))))
     return Detail(
         number=point.number,
@@ -181,7 +181,7 @@ def _facts(point: Point) -> Iterable[tuple[str, str]]:
     yield "Inputs", f"{setting.inputs}, {counted(len(point.switches), 'switch', 'switches')}"
     yield "Wiring", f"{_wiring(point)}; {counted(point.ports, 'port')}, {counted(point.chips, 'chip')}"
     layout = setting.layout and f"; {setting.layout}"
-    yield "Tables", f"{counted(setting.rounds, 'round')}, {setting.width} bits{layout}"
+    yield "Tables", f"{training_of(setting)}, {setting.width} bits{layout}"
     ending = "ends early" if setting.scan == "early" else "full"
     yield "Scan", f"{_time(point.scan)}; {ending}" if point.switches else DASH
     yield "CyberGlove's record", DASH if setting.inputs == "switches" else _time(point.transfer)
@@ -257,7 +257,7 @@ def _tables(frontier: Frontier) -> Iterator[PlainTable]:
                 f"{each.way.method} {each.way.parameter:g}",
                 each.inputs,
                 str(each.n_switches),
-                str(each.rounds),
+                DASH if each.rounds is None else str(each.rounds),
                 interval(each.rate),
                 microseconds(each.frame_us),
             )

@@ -1,7 +1,7 @@
 """The shape of a trainer, and the registry of all trainers."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -67,11 +67,14 @@ class Trainer(ABC):
         A sentence about it, for `--help`.
     settings : tuple of Setting
         The numbers that it takes. Trainers that share a name share its meaning.
+    staged : bool
+        Whether it takes `rounds`, and one training gives the models of all smaller numbers of rounds as well.
     """
 
     name: str
     what: str
     settings: tuple[Setting, ...] = ()
+    staged: bool = False
 
     @abstractmethod
     def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> "Model":
@@ -92,6 +95,14 @@ class Trainer(ABC):
             A model of these s switches and j joints, with a class for each of `samples.grasps`. It is a function of
             the samples and settings alone, to the last bit.
         """
+
+    def stages(self, samples: "Samples", settings: Mapping[str, Any], rounds: Sequence[int]) -> "tuple[Model, ...]":
+        """Return a model for each of these numbers of rounds, of one training; see `train`.
+
+        Staged trainers override it. Each model is the one that `train` makes for that many rounds, to the last bit; a
+        trainer without stages has the same one for all.
+        """
+        return (self.train(samples, settings),) * len(rounds)
 
     def given(self, options: Options) -> dict[str, Number]:
         """Return a value for each setting, as `options` give them. Raises TrainerError for what it does not take."""
@@ -134,3 +145,7 @@ class Training:
     def train(self, samples: "Samples", report: Report | None = None) -> "Model":
         """Return the trainer's model of `samples`."""
         return TRAINERS.named(self.trainer).train(samples, self.settings, report)
+
+    def stages(self, samples: "Samples", rounds: Sequence[int]) -> "tuple[Model, ...]":
+        """Return the trainer's models of `samples` after each of these numbers of rounds."""
+        return TRAINERS.named(self.trainer).stages(samples, self.settings, rounds)

@@ -1,6 +1,6 @@
 """LogitBoost on decision stumps, the paper's trainer."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from .base import Report, Setting, Trainer
@@ -16,6 +16,7 @@ class LogitBoost(Trainer):
     name = "logitboost"
     what = "LogitBoost on decision stumps, the paper's"
     rank = -1
+    staged = True
     settings = (
         Setting("rounds", "Rounds of LogitBoost.", int, 100, 1),
         Setting("shrinkage", "Share of each round that is kept.", float, 1.0),
@@ -25,10 +26,14 @@ class LogitBoost(Trainer):
 
     def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> "Stumps":
         """Return the ensemble. Raises BoostingError for settings that make no sense."""
-        from ..boosting.classifier import LogitBoostClassifier
+        from ..boosting.boost import boost
 
-        classifier = LogitBoostClassifier(**settings, classes=range(samples.n_classes))
-        return classifier.fit(samples.inputs, samples.labels, progress=report).stumps_
+        return boost(samples.inputs, samples.labels, samples.n_classes, **settings, on_round=report)[0]
+
+    def stages(self, samples: "Samples", settings: Mapping[str, Any], rounds: Sequence[int]) -> "tuple[Stumps, ...]":
+        """Return the ensembles of the first rounds of the longest."""
+        longest = self.train(samples, {**settings, "rounds": max(rounds)})
+        return tuple(longest.first(each) for each in rounds)
 
 
 MEMBER = LogitBoost()

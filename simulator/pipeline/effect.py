@@ -10,7 +10,7 @@ A contact model has `model(parameters, setting) -> ContactModel` instead of `pre
 model again has `together(parameters, setting, contact) -> Together`.
 
 `Effect.name` is the key of the scene: [effects.joint.noise] is "joint.noise", in the module effects/joint_noise.py.
-Other packages add effects by entry points in the group `thenar.effects`.
+Other packages add effects by entry points of that name in the group `thenar.effects`.
 
 Stage by stage. Within a stage, an effect acts after the glove's own step that makes what it touches, and before the one
 that reads what it alters; after those that `Effect.after` and the scene's `after` name; and else by its rank.
@@ -26,7 +26,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.drivers.members import Members
+from thenar.drivers.members import MembersByName
 from thenar.runtime.names import nearest
 
 from ..contact.model import ContactModel
@@ -105,7 +105,8 @@ class Setting:
     on_wire: bool
 
 
-EFFECTS = Members("effect", Effect, "thenar.simulator.effects", "thenar.effects")
+# A scene imports the effects that it lists, and no other.
+EFFECTS = MembersByName("effect", Effect, "thenar.simulator.effects", "thenar.effects")
 
 
 Integers = NDArray[np.int64]

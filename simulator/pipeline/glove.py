@@ -1,6 +1,6 @@
 """What every scene does whatever its effects: the hand recalls a posture, switches close, frames are scanned and read.
 
-`STEPS` holds these steps in the order in which they act within a stage; effects come in between (ordering.py).
+`STEPS` holds these steps in the order in which they act within a stage; effects come in between (`effect.in_order`).
 """
 
 import numpy as np

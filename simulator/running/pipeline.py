@@ -1,8 +1,6 @@
 """The pipeline: what a scene calls for, compiled once into one list of steps, and what each step costs.
 
-Of effects that the scene does not list nothing is prepared; no step asks whether it is enabled.
-
-Of effects that the scene does not list nothing is prepared; no step asks whether it is enabled.
+Effects that the scene does not list are not imported; no step asks whether it is enabled.
 """
 
 from collections import Counter

@@ -247,10 +247,12 @@ class _Decoder:
 
     def _effects(self) -> tuple[Listed, ...]:
         tables = dict(self._effect_tables())
+        effects = sorted((EFFECTS[name] for name in tables), key=lambda effect: (effect.rank, effect.name))
         listed = tuple(
-            Listed(name, convert(self.source, ("effects", *name.split(".")), tables[name], effect.parameters))
-            for name, effect in EFFECTS.items()
-            if name in tables
+            Listed(
+                each.name, convert(self.source, ("effects", *each.name.split(".")), tables[each.name], each.parameters)
+            )
+            for each in effects
         )
         places = [Ordered(EFFECTS[name], own=False, parameters=each) for name, each in listed]
         try:

@@ -98,7 +98,7 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     taxonomy     a published one
     objects      at least one for every grasp type of the taxonomy
     repetitions  of every grasp type by every subject, shared evenly by the type's objects
-    effects      in the order of the registry EFFECTS, one contact model among them
+    effects      by their rank, at most one contact model among them
     postures     a file of planned postures for objects that are not shipped
     """
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from thenar.drivers.members import MemberError, Members
+from thenar.drivers.members import MemberError, Members, MembersByName
 
 
 @dataclass(frozen=True)
@@ -98,6 +98,53 @@ def test_a_member_of_another_package_that_cannot_be_one_is_refused_in_a_sentence
     registry = members(a="MEMBER = Sort('one')")
     with pytest.raises(MemberError, match=said):
         list(registry)
+
+
+@pytest.fixture
+def by_name(site: Path, request: pytest.FixtureRequest) -> MembersByName[Sort]:
+    """Return the registry of a package that defines the sorts "sort.grip" and "sort.object_pose"."""
+    package = f"package_of_{request.node.name.partition('[')[0]}"
+    names = ("sort.object_pose", "sort.grip")
+    write_package(site / package, **{name.replace(".", "_"): f"MEMBER = Sort({name!r})" for name in names})
+    return MembersByName("sort", Sort, package, "thenar.sorts")
+
+
+def imported() -> set[str]:
+    """Return which of the modules of the next test are imported."""
+    return {"sort_grip", "sort_object_pose", "other_joint"} & {name.rpartition(".")[2] for name in sys.modules}
+
+
+def test_names_are_listed_without_an_import_and_a_member_is_imported_alone(
+    site: Path, by_name: MembersByName[Sort]
+) -> None:
+    (site / "other_joint.py").write_text("from test_members import Sort\nMEMBER = Sort('joint.offset')\n")
+    write_distribution(
+        site, "somebody", **{"joint.offset": "other_joint:MEMBER", "joint.lost": "no_such_module:MEMBER"}
+    )
+    assert list(by_name) == ["sort.grip", "sort.object_pose", "joint.lost", "joint.offset"]
+    assert (len(by_name), "sort.grip" in by_name, "sort_grip" in by_name) == (4, True, False)
+    with pytest.raises(MemberError, match=r"there is no sort 'x': choose one of sort.grip, sort.object_pose, joint"):
+        by_name.named("x")
+    assert imported() == set()
+    assert by_name["sort.object_pose"] == Sort("sort.object_pose")
+    assert imported() == {"sort_object_pose"}
+    assert by_name.named("joint.offset") == Sort("joint.offset")
+    assert imported() == {"sort_object_pose", "other_joint"}
+    with pytest.raises(MemberError, match=r"'joint.lost' .* cannot be loaded: No module named 'no_such_module'; mend"):
+        by_name["joint.lost"]
+
+
+def test_a_name_that_is_taken_or_that_the_entry_point_does_not_have_is_refused(
+    site: Path, by_name: MembersByName[Sort]
+) -> None:
+    (site / "other_misnamed.py").write_text(OTHER)
+    write_distribution(site, "somebody", **{"joint.one": "other_misnamed:ONE"})
+    with pytest.raises(MemberError, match=r"'joint.one' .* has another name, 'one': give its entry point that name"):
+        by_name["joint.one"]
+    write_distribution(site, "another", **{"sort.grip": "other_misnamed:ONE"})
+    taken = MembersByName("sort", Sort, by_name.package, "thenar.sorts")
+    with pytest.raises(MemberError, match=r"two packages define the sort 'sort.grip': uninstall one of them"):
+        list(taken)
 
 
 @pytest.mark.parametrize("value", ["no_such_module:MEMBER", "json:dumps"])

@@ -32,21 +32,21 @@ class Installed:
         return done.stdout if code == 0 else done.stderr
 
 
-Install = Callable[[str, str], Installed]
+Install = Callable[..., Installed]
 
 
 @pytest.fixture
 def install(tmp_path: Path) -> Install:
-    """Install a file of examples/extending as a distribution, by its name and its group of entry points."""
+    """Install a file of examples/extending as a distribution with one entry point: file, group, name of the point."""
 
-    def installed(file: str, group: str) -> Installed:
+    def installed(file: str, group: str, name: str = "member") -> Installed:
         folder = tmp_path / "site"
         metadata = folder / "somebody_else-1.0.dist-info"
         metadata.mkdir(parents=True)
         module = f"somebody_elses_{Path(file).stem}"
         (folder / f"{module}.py").write_bytes((EXAMPLES / file).read_bytes())
         (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: somebody-else\nVersion: 1.0\n")
-        (metadata / "entry_points.txt").write_text(f"[{group}]\nmember = {module}:MEMBER\n")
+        (metadata / "entry_points.txt").write_text(f"[{group}]\n{name} = {module}:MEMBER\n")
         return Installed(folder)
 
     return installed

@@ -74,6 +74,39 @@ def test_the_trainer_is_evaluated_as_the_papers_is(installed: Any, recordings: P
     assert table["rows"][0]["average"]["mean"] > 0.8
 
 
+def test_a_frontier_of_the_trainer_has_one_stage_and_its_points_are_built(
+    installed: Any, recordings: Path, tmp_path: Path
+) -> None:
+    words = " ".join(installed.thenar("frontier", "--help").split())
+    assert "--trainer [logitboost|naive-bayes]" in words
+    assert "--joint-bins INTEGER RANGE Into how many bins naive Bayes cuts a joint. [default: 8; x>=2]" in words
+
+    folder, build = tmp_path / "frontier", tmp_path / "build"
+    given = ("frontier", str(recordings), "-o", str(folder), "--trainer", "naive-bayes")
+    few = ("--methods", "elimination", "--rivals", "none", "--repeats", "1", "--finalists", "2", "--jobs", "1")
+    found = json.loads(installed.thenar(*given, "--joint-bins", "5", *few, "--json"))
+    settings = [point["setting"] for point in found["points"]]
+    assert {(each["trainer"], each["rounds"]) for each in settings} == {("naive-bayes", None)}
+    assert all(each["settings"] == {"joint_bins": 5.0} for each in settings)
+    assert {each["rounds"] for each in found["tried"]} == {None}
+    header, *lines = (folder / "frontier.csv").read_text().splitlines()
+    assert header.endswith(",switches,trainer,settings")
+    assert all(line.endswith(",naive-bayes,joint-bins 5") for line in lines)
+    assert "--rounds is no setting of --trainer naive-bayes" in installed.thenar(*given, "--rounds", "9", code=2)
+
+    point = max(found["points"], key=lambda each: each["rate"]["mean"])
+    chosen = ("--from", str(folder / "frontier.json"), "--point", str(point["number"]))
+    made = ("compile", str(recordings), "-o", str(build), *chosen)
+    assert "--trainer is settled by the point" in installed.thenar(*made, "--trainer", "logitboost", code=2)
+    installed.thenar(*made)
+    document = json.loads((build / "build.json").read_bytes())
+    assert document["options"]["trainer"] == "naive-bayes"
+    assert document["options"]["settings"]["joint_bins"] == 5.0
+    assert [switch["name"] for switch in document["switches"]] == point["switches"]
+    assert f"Point {point['number']}: " in (build / "report.html").read_text()
+    assert "naive-bayes, joint-bins 5" in (build / "report.html").read_text()
+
+
 def test_a_setting_of_another_trainer_is_refused(installed: Any, recordings: Path, tmp_path: Path) -> None:
     given = ("compile", str(recordings), "-o", str(tmp_path / "build"))
     assert "--rounds is no setting" in installed.thenar(*given, "--trainer", "naive-bayes", "--rounds", "5", code=2)

@@ -13,8 +13,6 @@ from thenar.simulator.pipeline.effect import EFFECTS, EffectParameters, Setting
 from thenar.simulator.scenes.scene import Glove, Listed, Recording, Scene, SceneObject, Subject
 from thenar.simulator.streams import Draw, Draws, Site
 
-NAMES = tuple(EFFECTS)
-
 BAR = Cylinder(diameter_mm=40.0, length_mm=120.0)
 # Fingers bent round it, the thumb in opposition, order of DOF.
 ROUND_IT_DEG = np.array([40.0, 20.0, 20.0, 20.0] + [0.0, 50.0, 45.0, 30.0] * 4)
@@ -58,7 +56,7 @@ def _draw(effect: str, batch: Batch, seed: int = 7) -> Draw:
 
 def _scene(effects: Sequence[str | tuple[str, EffectParameters]] = (), **changes: object) -> Scene:
     pairs = [(given, EFFECTS[given].parameters()) if isinstance(given, str) else given for given in effects]
-    listed = tuple(Listed(*pair) for pair in sorted(pairs, key=lambda pair: NAMES.index(pair[0])))
+    listed = tuple(Listed(*pair) for pair in sorted(pairs, key=lambda pair: EFFECTS[pair[0]].rank))
     usual = {
         "name": "small",
         "seed": 7,

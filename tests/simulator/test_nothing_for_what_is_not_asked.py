@@ -1,4 +1,4 @@
-"""An effect that a scene does not list costs nothing: it is not prepared, counted, drawn for or allocated.
+"""An effect that a scene does not list costs nothing: it is not imported, counted, drawn for or allocated.
 
 Two scenes are simulated in fresh interpreters; each lists what the other does not. So every effect is audited once
 where it must not show, and once where it must: the control without which an audit proves nothing.
@@ -58,25 +58,30 @@ CONFTEST = Path(__file__).with_name("conftest.py")
 AUDIT = """
 import importlib.util, json, sys, tracemalloc
 
+executed = set()
+sys.addaudithook(lambda event, args: executed.add(args[0].co_filename) if event == "exec" else None)
 spec = importlib.util.spec_from_file_location("small", sys.argv[1])
 small = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(small)
 
 import thenar.simulator.effects
-from thenar.simulator.running.pipeline import Ledger
-from thenar.simulator.running.pipeline import compile_pipeline
 from thenar.simulator.pipeline.effect import EFFECTS
+from thenar.simulator.running.pipeline import Ledger, compile_pipeline
 
-batch, ledger, scene = small._batch(range(2)), Ledger(), small._scene(sys.argv[2:])
+batch, ledger = small._batch(range(2)), Ledger()
 tracemalloc.start()
-compile_pipeline(scene).run([batch], ledger)
+compile_pipeline(small._scene(sys.argv[2:])).run([batch], ledger)
 effects = tracemalloc.take_snapshot().filter_traces([tracemalloc.Filter(True, "*/simulator/effects/*.py")])
 allocated = {file.traceback[0].filename: file.size for file in effects.statistics("filename")}
 
 def audit(name):
     module = name.replace(".", "_")
     ending = f"effects/{module}.py"
-    return sum(size for path, size in allocated.items() if path.endswith(ending))
+    return {
+        "imported": f"thenar.simulator.effects.{module}" in sys.modules,
+        "executed": any(path.endswith(ending) for path in executed),
+        "bytes": sum(size for path, size in allocated.items() if path.endswith(ending)),
+    }
 
 print(json.dumps({
     "effects": {name: audit(name) for name in EFFECTS},
@@ -89,7 +94,7 @@ print(json.dumps({
 class Audit(NamedTuple):
     """What one fresh interpreter saw."""
 
-    effects: dict[str, int]  # bytes allocated by its module
+    effects: dict[str, dict[str, float]]
     modules: list[str]
     steps: dict[str, tuple[bool, int, int, dict[str, int]]]
 
@@ -110,10 +115,17 @@ def scenes_of(name: str, audits: dict[tuple[str, ...], Audit]) -> tuple[Audit, A
 
 
 @pytest.mark.parametrize("name", NAMES)
+def test_it_is_imported_where_it_is_listed_and_nowhere_else(name: str, audits: dict[tuple[str, ...], Audit]) -> None:
+    control, without = (audit.effects[name] for audit in scenes_of(name, audits))
+    assert (control["imported"], control["executed"]) == (True, True)
+    assert (without["imported"], without["executed"]) == (False, False)
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_it_allocates_where_it_is_listed_and_nowhere_else(name: str, audits: dict[tuple[str, ...], Audit]) -> None:
     control, without = (audit.effects[name] for audit in scenes_of(name, audits))
-    assert control > 0
-    assert without == 0
+    assert control["bytes"] > 0
+    assert without["bytes"] == 0
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -151,7 +163,11 @@ def test_what_only_some_effects_need_is_imported_for_these_alone(audits: dict[tu
     needed = {
         "mujoco": (OTHER,),
         "thenar.simulator.contact.mujoco": (OTHER,),
+        "thenar.simulator.contact.balance": (ONE, ()),
+        "thenar.simulator.contact.settle": (ONE, ()),
+        "thenar.simulator.effects.contact_quasistatic": (ONE, ()),
         "thenar.simulator.pipeline.wire": (ONE, OTHER),
+        "thenar.simulator.pipeline.parts": (ONE, OTHER),
         "thenar.drivers.scanner_protocol": (ONE, OTHER),
     }
     for module, scenes in needed.items():

@@ -10,7 +10,7 @@ from thenar.compiler.frontier.latency import POLICIES
 from thenar.compiler.frontier.points import Latency, Rate, Time, Way
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.screen import Screened
-from thenar.compiler.frontier.search import Candidate, Shape
+from thenar.compiler.frontier.search import Candidate, Search, Shape
 from thenar.compiler.frontier.timing.classify_times import Classified
 from thenar.compiler.frontier.timing.scan_times import ScanTimes
 
@@ -53,7 +53,7 @@ def test_joints_alone_have_one_design_a_layout_and_wait_for_a_record() -> None:
 
 def test_compiling_is_choosing_training_and_making_the_tables() -> None:
     design = next(designs(close_of(), 0))
-    (point, *_) = points_of([design], dict.fromkeys(((design, kind) for kind in POLICIES), WAIT), NAMES, None)
+    (point, *_) = points_of([design], dict.fromkeys(((design, kind) for kind in POLICIES), WAIT), NAMES, Search())
     assert point.compile_s == 3.25
 
 
@@ -82,7 +82,7 @@ def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
     assert other.frame.us < one.frame.us
     several = [simulated(one, 20.0), simulated(other, 60.0)]
     waits = {(design, kind): WAIT for design in several for kind in design.decisions}
-    points = points_of(several, waits, NAMES, None)
+    points = points_of(several, waits, NAMES, Search())
     assert [point.frame.us for point in points] == sorted(point.frame.us for point in points)
     fronts = {(len(point.switches), point.setting.decision): point.fronts for point in points}
     assert fronts[20, "single"] == ("frame", "switches", "latency")
@@ -96,7 +96,7 @@ def test_a_decision_that_is_quicker_is_on_its_own_front() -> None:
     one, other = (next(designs(close_of(n, rate), 0)) for n, rate in ((20, 0.9), (10, 0.8)))
     waits = {(design, kind): WAIT for design in (one, other) for kind in design.decisions}
     waits[other, "sequential"] = replace_latency(WAIT, 10.0)
-    points = points_of([one, other], waits, NAMES, None)
+    points = points_of([one, other], waits, NAMES, Search())
     (found,) = (each for each in points if len(each.switches) == 10 and each.setting.decision == "sequential")
     assert found.fronts == ("latency",)
     assert found.latency.mean_us == 10.0

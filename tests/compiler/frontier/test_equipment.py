@@ -2,6 +2,7 @@ from msgspec.structs import replace
 
 from thenar.compiler.frontier.equipment import Equipment
 from thenar.compiler.frontier.price import price
+from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel
 from thenar.compiler.frontier.timing.scan_times import WIRE_ONLY, Beside
 from thenar.compiler.frontier.timing.wirings import wirings
@@ -25,7 +26,8 @@ def test_whatever_times_depend_on_is_part_of_the_question(grasp_set: GraspSet) -
         *(Equipment(MODEL, wirings(given), WIRE_ONLY) for given in (glove, slower, other, faster)),
     ]
     names, rows = tuple(NAMES), Samples.of(grasp_set)
-    asked = {price.call(1.0, rows, names, (0, 1, 2), (), None, each, None).question({}) for each in equipments}
+    training = Search().training
+    asked = {price.call(1.0, rows, names, (0, 1, 2), (), training, each, None).question({}) for each in equipments}
     assert len(asked) == len(equipments)
 
 

@@ -37,7 +37,7 @@ pytestmark = pytest.mark.slow
 def asked(folder: Path, grasp_set: GraspSet, **changes: Any) -> Request:
     """Return arguments of find_frontier; `changes` are of its search or of itself."""
     search: dict[str, Any] = {"methods": ("elimination", "id3"), "rivals": ("mrmr",), "rounds": 6}
-    search |= {"repeats": 1, "finalists": 2, "max_bins": None, "seed": 1}
+    search |= {"repeats": 1, "finalists": 2, "seed": 1}
     search |= {name: changes.pop(name) for name in list(changes) if name in search}
     return {"grasp_set": grasp_set, "output": folder / "out", "search": Search(**search), "jobs": 1} | changes
 
@@ -99,6 +99,7 @@ def rows_recognised(grasp_set: GraspSet, point: Point, train: Rows, test: Rows) 
         columns = METHODS[setting.way.method].chooser(learning)(setting.way.parameter)
     bits = grasp_set.switches[:, list(columns)]
     X = np.hstack([bits.astype(np.uint16), codes])
+    assert setting.rounds is not None
     stumps, _ = boost(X[train], labels[train], 4, rounds=setting.rounds)
     tables = collapse(stumps, len(columns))
     scorer = Scorer(quantise(tables, bits[train], codes[train], setting.width, setting.table_bits))

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from thenar.compiler.frontier.find import find_frontier
-from thenar.compiler.frontier.marks import choices_to_mark
+from thenar.compiler.frontier.find import choices_to_mark, find_frontier
 from thenar.compiler.frontier.points import FrontierError, Way
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.search import Candidate, Search, Shape, available_inputs, curve_ways, ways

@@ -37,7 +37,7 @@ def cuts_of(grasp_set: GraspSet) -> Cuts:
 
 
 def fit_of(samples: Samples, cuts: Cuts, stages: tuple[int, ...], columns: tuple[int, ...] = COLUMNS) -> Tally:
-    return fit_stages(samples, cuts.screening[0], columns, stages, stages, SHAPES, None)
+    return fit_stages(samples, cuts.screening[0], columns, stages, stages, SHAPES, SEARCH.training)
 
 
 @pytest.mark.parametrize("inputs", ["both", "switches"])
@@ -88,7 +88,7 @@ def test_folds_and_costs_of_ports_are_told_apart(samples: Samples, cuts: Cuts) -
     costs = [None, *(PortCosts(*each) for each in several)]
     folds = [*cuts.screening, *cuts.others, cuts.everything]
     asked = {choose_path.call(1.0, samples, folds[0].train, "id3", (0.0,), ports).question({}) for ports in costs}
-    asked |= {fit_stages.call(1.0, samples, fold, (0,), (1,), (), (), None).question({}) for fold in folds}
+    asked |= {fit_stages.call(1.0, samples, fold, (0,), (1,), (), (), SEARCH.training).question({}) for fold in folds}
     assert len(asked) == len(costs) + len(folds)
 
 

@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from thenar.compiler.frontier.points import Frontier
-from thenar.compiler.frontier.words import COLUMNS, csv_bytes, featured, summary, wiring_of
+from thenar.compiler.frontier.words import COLUMNS, csv_bytes, featured, summary, training_of, wiring_of
 from thenar.compiler.text import text_of
 
 
@@ -43,6 +43,24 @@ def test_where_no_point_is_level_the_best_is_spoken_of(examples: Any) -> None:
     best = featured(examples.example_frontier(picked=None, marks=()))
     assert best is not None
     assert best.number == 10
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, "20 rounds"),
+        ({"settings": {"shrinkage": 0.5}}, "20 rounds, shrinkage 0.5"),
+        ({"trainer": "logit", "rounds": None, "settings": {"joint_bins": 5.0}}, "logit, joint-bins 5"),
+    ],
+)
+def test_a_trainer_is_named_where_it_is_not_the_papers(examples: Any, changes: dict[str, Any], said: str) -> None:
+    point = examples.example_frontier().points[0]
+    setting = msgspec.structs.replace(point.setting, **changes)
+    assert training_of(setting) == said
+    written = msgspec.json.decode(msgspec.json.encode(setting))
+    assert {"trainer", "settings"} & set(written) == {"trainer", "settings"} & set(changes)
+    table = csv_bytes(examples.example_frontier(points=(msgspec.structs.replace(point, setting=setting),), picked=None))
+    assert table.split(b"\n")[0].decode().split(",")[len(COLUMNS) :] == (["trainer", "settings"] if changes else [])
 
 
 @pytest.mark.parametrize(

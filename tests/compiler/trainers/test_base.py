@@ -93,3 +93,21 @@ def test_logitboost_is_the_classifier(grasp_set: GraspSet) -> None:
     assert isinstance(model, Stumps)
     assert model.values.tobytes() == classifier.stumps_.values.tobytes()
     assert seen == [(1, 3), (2, 3), (3, 3)]
+
+
+def test_stages_are_the_models_of_fewer_rounds_and_the_same_for_all_where_there_are_none(
+    constant: Constant, grasp_set: GraspSet
+) -> None:
+    samples, rounds = Samples.of(grasp_set), (2, 7, 3)
+    for number, stage in zip(rounds, Training.of(Options(max_bins=5)).stages(samples, rounds), strict=True):
+        alone = Training.of(Options(max_bins=5, rounds=number)).train(samples)
+        assert isinstance(stage, Stumps)
+        assert isinstance(alone, Stumps)
+        assert [stage.columns.tolist(), stage.thresholds.tolist(), stage.values.tolist()] == [
+            alone.columns.tolist(),
+            alone.thresholds.tolist(),
+            alone.values.tolist(),
+        ]
+    first, *others = Training.of(Options(trainer="constant")).stages(samples, rounds)
+    assert len(others) == 2
+    assert all(other is first for other in others)

@@ -63,7 +63,7 @@ def test_a_pipeline_holds_the_scenes_effects_and_the_gloves_own_steps_and_nothin
 
 
 @given(names=SUBSETS, seed=st.integers(0, 100))
-def test_the_order_is_that_of_stages_and_registry_however_the_scene_lists_them(
+def test_the_order_is_that_of_stages_and_ranks_however_the_scene_lists_them(
     make_scene: SceneMaker, names: list[str], seed: int
 ) -> None:
     scene = make_scene(names)
@@ -75,7 +75,7 @@ def test_the_order_is_that_of_stages_and_registry_however_the_scene_lists_them(
     stages = [STAGES.index(stop.effect.stage) for stop in stops]
     assert stages == sorted(stages)
     for stage in STAGES:
-        ranks = [NAMES.index(s.effect.name) for s in stops if not s.own and s.effect.stage == stage]
+        ranks = [s.effect.rank for s in stops if not s.own and s.effect.stage == stage]
         assert ranks == sorted(ranks)
 
 

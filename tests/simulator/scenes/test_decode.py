@@ -1,3 +1,5 @@
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -77,7 +79,7 @@ def test_everything_that_is_said_is_kept(scene: Load, tmp_path: Path) -> None:
     assert found.glove == Glove(threshold_n=0.8, codes="raw")
 
 
-def test_effects_come_in_the_order_of_the_registry_with_their_parameters(scene: Load) -> None:
+def test_effects_come_by_their_rank_with_their_parameters(scene: Load) -> None:
     found = scene(LEAST + "[effects.joint.noise]\nsd_deg = 3\n[effects.hand.grip]\n[effects.joint.drift]\n").effects
     assert [name for name, _ in found] == ["hand.grip", "joint.noise", "joint.drift"]
     assert found[0].parameters == EFFECTS["hand.grip"].parameters()
@@ -99,7 +101,18 @@ def test_an_effect_may_be_spelled_in_every_way_of_toml(scene: Load, text: str) -
 def test_every_effect_may_be_listed_without_parameters(scene: Load) -> None:
     names = [name for name in NAMES if name != "contact.mujoco"]
     found = scene(LEAST + "".join(f"[effects.{name}]\n" for name in names))
-    assert [name for name, _ in found.effects] == names
+    assert [name for name, _ in found.effects] == sorted(names, key=lambda name: EFFECTS[name].rank)
+
+
+def test_only_the_effects_that_are_listed_are_imported(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(LEAST + "[effects.joint.noise]\n[effects.switch.bounce]\n")
+    program = (
+        "import sys; from thenar.simulator.scenes.decode import load_scene; load_scene(sys.argv[1]);"
+        "print(*sorted(name for name in sys.modules if name.startswith('thenar.simulator.effects.')))"
+    )
+    done = subprocess.run([sys.executable, "-c", program, str(path)], check=True, capture_output=True, text=True)
+    assert done.stdout.split() == ["thenar.simulator.effects.joint_noise", "thenar.simulator.effects.switch_bounce"]
 
 
 def test_a_population_is_drawn_with_the_seed_of_the_scene(scene: Load) -> None:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from thenar.compiler.frontier.deciders import NOTHING, Stretches, decisions, stretches
+from thenar.compiler.frontier.latency import NOTHING, Stretches, decisions, stretches
 from thenar.runtime.live.decision import Decision, SequentialTest, Standing
 from thenar.runtime.policy import Policy
 from thenar.runtime.scores import LANE_OFFSET, Scorer

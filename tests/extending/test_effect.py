@@ -1,0 +1,68 @@
+"""An effect of somebody else's: explained and simulated where a scene lists it, and not even imported elsewhere."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from thenar.compiler import GraspSet
+
+SCENE = """
+seed = 3
+taxonomy = "kamakura14"
+objects = "kamakura14"
+repetitions = 2
+
+[recording]
+hold_ms = 20
+
+[[subjects]]
+name = "A"
+hand_length_mm = 188
+hand_breadth_mm = 84
+
+[[subjects]]
+name = "B"
+hand_length_mm = 181
+hand_breadth_mm = 81
+"""
+LISTED = "[effects.joint.offset]\nsd_deg = 6\n"
+
+
+@pytest.mark.slow
+def test_an_effect_of_another_package_is_explained_and_acts_where_a_scene_lists_it(
+    install: Callable[..., Any], tmp_path: Path
+) -> None:
+    package = install("effect.py", "thenar.effects", "joint.offset")
+    plain, off = tmp_path / "plain.toml", tmp_path / "off.toml"
+    plain.write_text(SCENE)
+    off.write_text(SCENE + LISTED)
+    assert "joint.offset: joint sensors are off" in package.thenar("simulate", str(off), "--explain")
+
+    one, other = (GraspSet.load(simulated(package, scene)) for scene in (plain, off))
+    assert np.array_equal(one.switches, other.switches)
+    for subject in "AB":
+        moved = (other.codes.astype(int) - one.codes)[one.subjects == subject]
+        assert (np.ptp(moved, axis=0) <= 4).all()  # counts of half a degree, of bytes of up to 1.6 degrees
+        assert np.abs(moved.mean(axis=0)).max() > 6
+
+
+def simulated(package: Any, scene: Path) -> Path:
+    written = scene.with_suffix(".grasps")
+    package.thenar("simulate", str(scene), "-o", str(written), "--jobs", "2")
+    return written
+
+
+def test_one_that_cannot_be_loaded_disturbs_only_scenes_that_list_it(
+    install: Callable[..., Any], tmp_path: Path
+) -> None:
+    package = install("effect.py", "thenar.effects", "joint.offset")
+    (package.folder / "somebody_elses_effect.py").write_text("raise RuntimeError('no such glove')\n")
+    plain, off = tmp_path / "plain.toml", tmp_path / "off.toml"
+    plain.write_text(SCENE)
+    off.write_text(SCENE + LISTED)
+    assert "joint.offset" not in package.thenar("simulate", str(plain), "--explain")
+    said = package.thenar("simulate", str(off), "--explain", code=2)
+    assert "the effect 'joint.offset' (somebody_elses_effect:MEMBER) of another package cannot be loaded" in said
