@@ -1,15 +1,26 @@
 """`thenar compile`: recordings in, a build folder out."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from thenar.drivers.i2c.chips import CHIPS
-
-from .common import any_path, existing_file, json_flag, keep_apart, out, output_file, progress, show, table, warning
-from .options import WithMethods, asked_settings, trainer_options
+from .common import (
+    Listed,
+    any_path,
+    existing_file,
+    json_flag,
+    keep_apart,
+    out,
+    output_file,
+    progress,
+    show,
+    table,
+    warning,
+)
+from .options import Training, asked_settings, trainer_option
 
 if TYPE_CHECKING:
     from thenar.compiler.artifact.documents import BuildReport
@@ -23,7 +34,13 @@ _BOARD = "board"
 _SETTLED = ("prune", "inputs", "table_bits", "placement", "keep", "width", "trainer")
 
 
-@click.command("compile", cls=WithMethods)
+def _chips() -> Iterable[str]:
+    from thenar.drivers.i2c.chips import CHIPS
+
+    return (*CHIPS, _BOARD)
+
+
+@click.command("compile", cls=Training)
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option("-o", "--output", type=any_path, required=True, help="Folder of the build; a build there is replaced.")
 @click.option(
@@ -36,7 +53,7 @@ _SETTLED = ("prune", "inputs", "table_bits", "placement", "keep", "width", "trai
     show_default=True,
     help="What to use.",
 )
-@trainer_options
+@trainer_option
 @click.option("--folds", type=int, default=4, show_default=True, help="Folds of the rate in build.json; 0 for none.")
 @click.option("--seed", type=int, default=1, show_default=True, help="Seed of the folds.")
 @click.option(
@@ -58,7 +75,7 @@ _SETTLED = ("prune", "inputs", "table_bits", "placement", "keep", "width", "trai
 @click.option("--propose", type=output_file, help="Write a glove.toml for the kept switches: on the fewest ports.")
 @click.option(
     "--chip",
-    type=click.Choice([*CHIPS, _BOARD]),
+    type=Listed(_chips),
     help="The port expander to propose, or a switch-scanner board.  [default: the first]",
 )
 @click.option("--overwrite", is_flag=True, help="Let --propose replace a file that is there.")
@@ -134,7 +151,7 @@ def command(
             "itself, and stumps look at one at a time"
         )
     if propose is not None:
-        _propose(made.manifest, propose, chip or next(iter(CHIPS)))
+        _propose(made.manifest, propose, chip or next(iter(_chips())))
     show(made.manifest, lambda _: _print(made, output, propose))
 
 

@@ -23,7 +23,7 @@ from .common import (
     warning,
     write_json,
 )
-from .options import WithMethods, asked_settings, method_names, trainer_options
+from .options import Training, asked_settings, method_names, trainer_option
 
 if TYPE_CHECKING:
     from rich.table import Table as Grid
@@ -61,7 +61,7 @@ def _scheme(_: click.Context, __: click.Parameter, value: str | None) -> str:
 _FOLDER = click.Path(file_okay=False, path_type=Path)
 
 
-@click.command(cls=WithMethods)
+@click.command(cls=Training)
 @click.argument("grasps", type=existing_file)
 @click.option("--subject", "subjects", multiple=True, metavar="NAME", help="Only this subject; may be given again.")
 @click.option("--folds", type=click.IntRange(min=2), default=4, show_default=True, help="Folds of cross-validation.")
@@ -79,7 +79,7 @@ _FOLDER = click.Path(file_okay=False, path_type=Path)
     show_default=True,
     help="Repeats of random folds, other seeds each.",
 )
-@trainer_options
+@trainer_option
 @click.option("--prune", type=click.IntRange(min=0), default=0, show_default=True, help="S: smallest node ID3 splits.")
 @click.option(
     "--prune-list",

@@ -1,6 +1,5 @@
 """`thenar frontier`: what accuracy costs in time."""
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +9,7 @@ from rich.text import Text
 from thenar.compiler.text import duration, interval
 
 from .common import Listed, any_path, err, existing_file, existing_folder, json_flag, out, progress, show, table
-from .options import WithMethods, asked_settings, method_names, trainer_options
+from .options import Training, asked_settings, method_names, trainer_option
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -29,7 +28,7 @@ def _timed() -> tuple[str, ...]:
     return timed()
 
 
-@click.command("frontier", cls=WithMethods)
+@click.command("frontier", cls=Training)
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option("-o", "--output", type=any_path, required=True, help="Folder for tables, pictures and the store.")
 @click.option("--glove", type=existing_file, help="A glove.toml: try its wiring as well, and choose by its ports.")
@@ -46,7 +45,7 @@ def _timed() -> tuple[str, ...]:
 @click.option(
     "--rivals", callback=method_names, help="Methods to compare them with, by commas, or none.  [default: most rivals]"
 )
-@partial(trainer_options, without=("rounds",))
+@trainer_option
 @click.option("--rounds", type=click.IntRange(1, 300), default=300, show_default=True, help="The most rounds to try.")
 @click.option("--repeats", type=click.IntRange(1), default=3, show_default=True, help="Repeats of the folds.")
 @click.option(

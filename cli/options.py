@@ -1,11 +1,12 @@
 """Options of several commands: the placement methods and the trainers, read from their registries."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Iterable
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .common import parted
+from .common import Listed, parted
 
 if TYPE_CHECKING:
     from thenar.compiler.placement.methods.base import Method
@@ -40,22 +41,51 @@ def _remarks(method: "Method") -> str:
     return f" ({'; '.join(remarks)})" if remarks else ""
 
 
-def trainer_options(command: Callable[..., Any], without: Collection[str] = ()) -> Callable[..., Any]:
-    """Add `--trainer` and an option for each setting of a trainer, `without` those that the command has itself."""
+def _names() -> Iterable[str]:
     from thenar.compiler.trainers.base import TRAINERS
 
-    settings = {setting.name: setting for trainer in TRAINERS.values() for setting in trainer.settings}
-    for setting in reversed([setting for name, setting in settings.items() if name not in without]):
-        command = _option(setting)(command)
-    names = ", ".join(f"{trainer.name} ({trainer.what})" for trainer in TRAINERS.values())
-    choice = click.Choice(list(TRAINERS))
-    return click.option(
-        "--trainer", type=choice, default="logitboost", show_default=True, help=f"What makes the model: {names}."
-    )(command)
+    return TRAINERS
+
+
+class _TrainerOption(click.Option):
+    """Its help, which is only made when it is asked for, says what each trainer is."""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        from thenar.compiler.trainers.base import TRAINERS
+
+        names = ", ".join(f"{trainer.name} ({trainer.what})" for trainer in TRAINERS.values())
+        self.help = f"What makes the model: {names}."
+        return super().get_help_record(ctx)
+
+
+trainer_option = click.option(
+    "--trainer", type=Listed(_names), default="logitboost", show_default=True, cls=_TrainerOption
+)
+
+
+class Training(WithMethods):
+    """A command with `trainer_option`: an option for each setting of a trainer follows it, without those that the
+    command has itself. The trainers are imported when the options are asked for, not when the command is defined.
+    """
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        """Return the options of the command, and those of the trainers."""
+        params = super().get_params(ctx)
+        names = [param.name for param in params]
+        place = names.index("trainer") + 1
+        return [*params[:place], *(each for each in self._settings if each.name not in names), *params[place:]]
+
+    @cached_property
+    def _settings(self) -> tuple[click.Option, ...]:
+        from thenar.compiler.trainers.base import TRAINERS
+
+        settings = {setting.name: setting for trainer in TRAINERS.values() for setting in trainer.settings}
+        return tuple(map(_option, settings.values()))
 
 
 def asked_settings(context: click.Context, asked: dict[str, Any]) -> dict[str, Any]:
-    """Take what `trainer_options` added out of `asked`; return the trainer, and its settings that are no defaults.
+    """Take what the options of a `Training` command say of the trainer out of `asked`; return the trainer, and its
+    settings that are no defaults.
 
     Raises UsageError for a setting that is given to a trainer that takes none of that name.
     """
@@ -73,10 +103,10 @@ def asked_settings(context: click.Context, asked: dict[str, Any]) -> dict[str, A
     return found
 
 
-def _option(setting: "Setting") -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def _option(setting: "Setting") -> click.Option:
     least = setting.least
     kind: click.ParamType[Any] = click.INT if setting.kind is int else click.FLOAT
     if least is not None:
         kind = click.IntRange(int(least)) if setting.kind is int else click.FloatRange(least)
-    name, shown = f"--{setting.name.replace('_', '-')}", setting.default is not None
-    return click.option(name, setting.name, type=kind, default=setting.default, show_default=shown, help=setting.what)
+    decls, shown = [f"--{setting.name.replace('_', '-')}", setting.name], setting.default is not None
+    return click.Option(decls, type=kind, default=setting.default, show_default=shown, help=setting.what)

@@ -8,11 +8,13 @@ sum its splits.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Floats = NDArray[np.float64]
 
@@ -103,7 +105,7 @@ class ManyValued:
         """Return the value between the two that the split parts."""
         return float(self._edges[position][split])
 
-    def _one_hot(self, n_summands: int) -> Iterator[tuple[slice, int, csr_array]]:
+    def _one_hot(self, n_summands: int) -> Iterator[tuple[slice, int, "csr_array"]]:
         """Yield (columns, bins W of the widest, one-hot matrix ((W + 1) * c, n)); bin W holds the missing rows."""
         start = 0
         while start < len(self._bins):
@@ -117,7 +119,10 @@ class ManyValued:
             yield batch, width, self._stack(batch, width)
             start = stop
 
-    def _stack(self, batch: slice, width: int) -> csr_array:
+    def _stack(self, batch: slice, width: int) -> "csr_array":
+        # Help of commands lists the methods, and none of it takes scipy's half a second.
+        from scipy.sparse import csr_array
+
         n_columns = batch.stop - batch.start
         rows = []
         for offset, (bins, edges) in enumerate(zip(self._bins[batch], self._edges[batch], strict=True)):

@@ -32,6 +32,9 @@ _PATIENCE_US = 100_000
 # No device's frames count for longer.
 _LONGEST_WAIT_US = 60_000_000
 
+# Faults of one device that are logged with their traces; one whose text never repeats must not fill a disk.
+_MOST_FAULTS = 20
+
 _log = logging.getLogger("thenar")
 T_co = TypeVar("T_co", covariant=True)
 T = TypeVar("T")
@@ -77,6 +80,7 @@ class Keeper(Generic[T]):
         self.state = DeviceState(name, connected=False, error=NOT_YET, since_us=now_us(), opened=0)
         self.failure: SettingError | None = None
         self._device, self._take, self._changed = device, take, changed
+        self._logged: set[str] = set()
         self._stop = Event()
         self._thread = Thread(target=self._keep, name=f"thenar {name}", daemon=True)
 
@@ -122,8 +126,9 @@ class Keeper(Generic[T]):
                 self._take(sample)
 
     def _blame(self, fault: str) -> None:
-        """Count an exception, and log it with its trace: the same one again and again is logged once."""
-        if self.state.error != fault:
+        """Count an exception, and log it with its trace, once: a device that opens and then fails does so for hours."""
+        if fault not in self._logged and len(self._logged) < _MOST_FAULTS:
+            self._logged.add(fault)
             _log.exception("%s: a fault of the program", self.state.name)
         self.state = replace(self.state, faults=self.state.faults + 1)
         self._become(connected=False, error=fault)

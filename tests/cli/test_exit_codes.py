@@ -36,9 +36,19 @@ def test_no_command_is_loaded_before_it_is_called() -> None:
     assert done.stdout.splitlines()[-1] == "[]"
 
 
-@pytest.mark.parametrize("arguments", [["run", "--help"], ["verify", "--help"], ["compile", "--help"]])
+@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["verify", "--help"]])
 def test_help_loads_no_heavy_library(arguments: list[str]) -> None:
     program = f"import sys, thenar.cli as c; c.run({arguments}); print([m for m in {HEAVY} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+@pytest.mark.parametrize("command", ["compile", "place", "frontier", "evaluate"])
+def test_help_that_lists_the_methods_loads_numpy_at_most(command: str) -> None:
+    heavy = [name for name in HEAVY if name != "numpy"]
+    program = (
+        f"import sys, thenar.cli as c; c.run({[command, '--help']}); print([m for m in {heavy} if m in sys.modules])"
+    )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
 

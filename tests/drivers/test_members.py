@@ -156,3 +156,17 @@ def test_a_command_says_so_and_exits_with_2(tmp_path: Path, value: str) -> None:
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith(f"thenar: the I2C chip 'odd' ({value}) of another package")
     assert done.stderr.count("\n") == 1
+
+
+def test_what_is_broken_stops_no_command_that_does_not_need_it(tmp_path: Path) -> None:
+    (tmp_path / "somebody-1.0.dist-info").mkdir()
+    (tmp_path / "somebody-1.0.dist-info" / "METADATA").write_text(
+        "Metadata-Version: 2.1\nName: somebody\nVersion: 1.0\n"
+    )
+    kinds = ("methods", "trainers", "targets", "chips", "sinks", "sources")
+    points = "".join(f"[thenar.{kind}]\nodd = no_such_module:MEMBER\n" for kind in kinds)
+    (tmp_path / "somebody-1.0.dist-info" / "entry_points.txt").write_text(points)
+    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
+    command = [sys.executable, "-P", "-m", "thenar.cli", "--help"]
+    done = subprocess.run(command, env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")

@@ -23,7 +23,7 @@ from pathlib import Path
 from thenar.compiler.recordings.mcap_recording import import_recordings
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.recording.guide import planned, read_journal
-from thenar.simulator.playing.recorded import of_recording
+from thenar.simulator.playing.performance import of_recording
 path = Path(sys.argv[1])
 for read in (lambda: import_recordings([path]), lambda: planned(read_journal(path).session.collection),
              lambda: of_recording(path, 1)):

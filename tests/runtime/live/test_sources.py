@@ -339,5 +339,15 @@ def test_a_fault_of_the_program_shows_with_its_trace_is_counted_and_leaves_no_de
     assert "Traceback" in caplog.text
 
 
+def test_a_fault_after_each_opening_is_logged_once(kept: Kept, caplog: pytest.LogCaptureFixture) -> None:
+    for _ in range(3):
+        kept.device.openings.put(None)
+        assert kept.next_change() == (True, "")
+        kept.device.samples.put(ZeroDivisionError("oops"))
+        assert kept.next_change() == (False, "ZeroDivisionError: oops")
+    assert kept.keeper.state.faults == 3
+    assert len([record for record in caplog.records if record.exc_info]) == 1
+
+
 def test_retries_leave_time_to_recover_within_a_second() -> None:
     assert RETRY_S <= 0.25
