@@ -166,7 +166,9 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     scan_sha256: Digest | None = None
 
 
-class _Version(Struct, frozen=True):
+class SchemaVersion(Struct, frozen=True):
+    """What is read of a JSON file first: whether the rest can be understood."""
+
     schema: int
 
 
@@ -182,7 +184,7 @@ def manifest_from_bytes(data: bytes, what: str = "build.json") -> Manifest:
     """
     if len(data) > MAX_BYTES:
         raise BuildError(f"{what} has {len(data)} bytes, a build has at most {MAX_BYTES}")
-    schema = _decode(data, _Version, what).schema
+    schema = _decode(data, SchemaVersion, what).schema
     if schema > SCHEMA:
         raise BuildError(f"{what} has schema {schema}, this thenar reads up to {SCHEMA}: update thenar")
     if schema < 1:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from .finalists import Close
 from .latency import POLICIES
-from .points import DecisionKind, Latency, Point, Scan, Setting, Time, front
+from .points import DecisionKind, Latency, Point, Recipe, Scan, Time, front
 from .price import PricedTables, Wired
 from .search import Search
 from .timing.classify_times import Classified
@@ -162,7 +162,7 @@ def _point(
     choice = close.screened.choice
     return Point(
         number=number,
-        setting=Setting(
+        setting=Recipe(
             way=choice.way,
             inputs=choice.inputs,
             rounds=tabled.rounds if search.staged else None,

@@ -56,7 +56,7 @@ class Way(Struct, frozen=True, forbid_unknown_fields=True):
     parameter: Annotated[float, Meta(ge=0.0, le=1e6)]
 
 
-class Setting(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """All that a point chose: what `compile --from` needs, and what the runtime is told.
 
     rounds      None for a trainer that does not go by rounds
@@ -108,7 +108,7 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """
 
     number: int
-    setting: Setting
+    setting: Recipe
     switches: tuple[str, ...]
     rate: Rate
     left_out: Rate | None

@@ -107,7 +107,7 @@ class Search:
 
     @property
     def trained(self) -> dict[str, Any]:
-        """What the `Setting` of a point says of the trainer, but for rounds."""
+        """What the `Recipe` of a point says of the trainer, but for rounds."""
         own = {name: value for name, value in self.settings.items() if name != "max_bins" and value is not None}
         return {"trainer": sys.intern(self.trainer), "max_bins": self.settings.get("max_bins"), "settings": own}
 

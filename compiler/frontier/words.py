@@ -8,7 +8,7 @@ from thenar.runtime.manifest import Options
 from thenar.runtime.names import printable
 
 from ..text import cells, counted, duration, interval, listed, percent
-from .points import Frontier, Mark, Point, Rate, Setting, Time
+from .points import Frontier, Mark, Point, Rate, Recipe, Time
 
 COLUMNS = (
     *("number", "fronts", "n_switches", "inputs", "method", "parameter", "rounds", "width", "layout"),
@@ -39,28 +39,28 @@ def shorten(name: str) -> str:
     return line if len(line) <= _LONGEST else f"{line[: _LONGEST - 3]}..."
 
 
-def way_of(setting: Setting) -> str:
+def way_of(setting: Recipe) -> str:
     """Return how switches were chosen: "id3 62"."""
     return f"{setting.way.method} {setting.way.parameter:g}"
 
 
-def training_of(setting: Setting) -> str:
+def training_of(setting: Recipe) -> str:
     """Return how the model was made, the paper's trainer unnamed: "100 rounds", "naive-bayes, joint-bins 5"."""
     name = () if setting.trainer == _PAPERS else (setting.trainer,)
     rounds = () if setting.rounds is None else (counted(setting.rounds, "round"),)
     return ", ".join((*name, *rounds, *_settings(setting)))
 
 
-def is_usual(setting: Setting) -> bool:
+def is_usual(setting: Recipe) -> bool:
     """Return whether rounds and bins say all of how the model was made."""
     return setting.trainer == _PAPERS and not setting.settings
 
 
-def _settings(setting: Setting) -> list[str]:
+def _settings(setting: Recipe) -> list[str]:
     return [f"{name.replace('_', '-')} {value:g}" for name, value in setting.settings.items()]
 
 
-def wiring_of(setting: Setting) -> str:
+def wiring_of(setting: Recipe) -> str:
     """Return wiring and clock: "mcp23017 400 kHz", "board 1 Mbaud"; nothing where no switch is read."""
     if not setting.clock_hz:
         return ""

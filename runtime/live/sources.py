@@ -3,7 +3,6 @@
 import logging
 from collections import deque
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from threading import Condition, Event, Thread
@@ -115,9 +114,16 @@ class Keeper(Generic[T]):
             except Exception as fault:  # a fault of ours must not leave a dead thread that passes for a live device
                 self._blame(f"{type(fault).__name__}: {fault}")
             finally:
-                with suppress(OSError):
-                    self._device.close()
+                self._let_go()
             self._stop.wait(RETRY_S)
+
+    def _let_go(self) -> None:
+        try:
+            self._device.close()
+        except OSError:  # it is gone already
+            pass
+        except Exception as fault:  # as above
+            self._blame(f"{type(fault).__name__}: {fault}")
 
     def _read(self) -> None:
         while not self._stop.is_set():

@@ -10,6 +10,7 @@ import msgspec
 from msgspec import Meta, Struct
 
 from ..errors import BuildError
+from ..manifest import SchemaVersion
 from ..names import fault, shortened
 
 SCHEMA = 1
@@ -53,10 +54,6 @@ class ScanMap(Struct, frozen=True, forbid_unknown_fields=True):
         return tuple(switch for pairs in sources for _, switch in pairs)
 
 
-class _Version(Struct, frozen=True):
-    schema: int
-
-
 def scanmap_to_bytes(scan: ScanMap) -> bytes:
     """Return the content of `scan.json`."""
     return msgspec.json.format(msgspec.json.encode(scan), indent=2) + b"\n"
@@ -69,7 +66,7 @@ def scanmap_from_bytes(data: bytes, what: str = "scan.json") -> ScanMap:
     """
     if len(data) > MAX_BYTES:
         raise BuildError(f"{what} has {len(data)} bytes, a scan map has at most {MAX_BYTES}")
-    schema = _decode(data, _Version, what).schema
+    schema = _decode(data, SchemaVersion, what).schema
     if schema > SCHEMA:
         raise BuildError(f"{what} has schema {schema}, this thenar reads up to {SCHEMA}: update thenar")
     if schema < 1:

@@ -23,7 +23,7 @@ class GloveDevice(Source):
         self.sensors = sensors_of(wiring)
         self.period_us = glove_period_us(wiring)
         self.longest_us = PERIODS * self.period_us
-        self._unplugged, self._unplugged_records = False, 0
+        self._unplugged = False
         self.driver = CyberGlove(
             wiring.port,
             baud=None if wiring.baud == "auto" else wiring.baud,
@@ -43,12 +43,11 @@ class GloveDevice(Source):
             return None
         time_us, record = timed
         self._unplugged = record.fault == "unplugged"
-        self._unplugged_records += self._unplugged
         return None if self._unplugged else GloveFrame(time_us, record.sensors, record.status)
 
     def counts(self) -> tuple[Count, ...]:
-        """Return what the driver counts, and the records of a glove that was not plugged in."""
-        return (*counted(self.driver.counts), Count("unplugged", self._unplugged_records))
+        """Return what the driver counts."""
+        return counted(self.driver.counts)
 
     def trouble(self) -> str:
         """Return what is wrong though the line is open; "" if nothing is."""

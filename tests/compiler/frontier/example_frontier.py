@@ -19,8 +19,8 @@ from thenar.compiler.frontier.points import (
     Mark,
     Point,
     Rate,
+    Recipe,
     Scan,
-    Setting,
     Time,
     Tried,
     Way,
@@ -183,7 +183,7 @@ def _point(
 ) -> Point:
     transfer_us = 0.0 if inputs == "switches" else TRANSFER_US
     layout = f"{8 * (1 + (width > 8))}-bit entries, {4 if kept > 8 else 2} switches a look-up"
-    setting = Setting(Way(method, parameter), inputs, rounds, width, layout, scan, decision, wiring, 1000 * clock_khz)
+    setting = Recipe(Way(method, parameter), inputs, rounds, width, layout, scan, decision, wiring, 1000 * clock_khz)
     return Point(
         number=number,
         setting=setting,
