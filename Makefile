@@ -44,7 +44,7 @@ demo: $(VENV)/installed  ## simulate, draw, evaluate, find the frontier, compile
 	@echo "what accuracy costs in time: $(OUT)/frontier/frontier.svg; the build on one page: $(OUT)/build/report.html; its glove: $(OUT)/build/spec;"
 	@echo "hand maps: $(OUT)/contacts.svg (which switches close), $(OUT)/kept.svg (which are kept); the rates: $(OUT)/evaluation.json."
 
-test: $(VENV)/installed  ## the tests, under ten minutes on two cores
+test: $(VENV)/installed  ## the tests, some six minutes on two cores
 	$(BIN)/python -m pytest -m "not slow" -n $(WORKERS)
 
 test-slow: $(VENV)/installed pythons  ## the slower checks: real Weka, fuzzing, real recordings at full length
