@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from html.parser import HTMLParser
 
+import click
 import msgspec
 import numpy as np
 import pytest
@@ -122,7 +123,7 @@ def test_the_kept_switches_and_no_others_are_marked_on_the_hand(bare: ReportCont
 
 def test_the_command_to_make_the_build_again_is_one_that_compile_understands(bare: ReportContent) -> None:
     (said,) = re.findall(r"thenar compile SET.grasps -o build/ --prune.*", report_html(bare).decode())
-    known = {flag for parameter in command.params for flag in parameter.opts}
+    known = {flag for parameter in command.get_params(click.Context(command)) for flag in parameter.opts}
     assert {word for word in shlex.split(said) if word.startswith("--")} <= known
     assert "--prune 8 --rounds 4 --inputs both" in said
     assert said.endswith("--glove glove.toml")
