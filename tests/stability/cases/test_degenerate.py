@@ -5,7 +5,6 @@ import json
 import sys
 import warnings
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -96,7 +95,7 @@ def test_a_build_is_made_verified_and_run_or_refused(
         return
     assert command(capsys, "verify", build, path)[1].rstrip().endswith("holds")
     lines = io.BytesIO()
-    monkeypatch.setattr(sys, "stdout", SimpleNamespace(buffer=lines))
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(lines))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert run(["run", str(build), "--replay", str(path)]) == 0
