@@ -188,7 +188,7 @@ def test_the_extras_in_hints_are_those_of_the_project() -> None:
         ("firmware {build} --target host -o {new}", "", "compiler"),
         ("frontier {set} -o {new}", "", "compiler"),
         ("evaluate {set}", "", "compiler"),
-        ("place {set} --method elimination --keep 2", "", "compiler"),
+        ("place {set} --method rfe --keep 2", "", "compiler"),
         ("place {set} --draw {new}.svg", "", "compiler"),
         ("simulate quick -o {new}.grasps", "", "compiler"),
         ("stability", "", "stability"),
