@@ -257,7 +257,7 @@ def _grasp_report(name: str, rows: Rows, notes: Sequence[Notes]) -> GraspReport:
 
 def step_reports(ledger: Ledger) -> Iterator[StepReport]:
     """Yield what each step cost, in the order in which they run."""
-    shares = dict(ledger.shares())
+    total = ledger.nanoseconds
     for name, entry in ledger.entries.items():
         yield StepReport(
             name=name,
@@ -267,6 +267,6 @@ def step_reports(ledger: Ledger) -> Iterator[StepReport]:
             draws=entry.draws,
             seconds=entry.nanoseconds / 1e9,
             us_a_grasp=entry.nanoseconds / 1e3 / entry.grasps,
-            share=shares[name],
+            share=entry.nanoseconds / total if total else 0.0,
             counts=tuple(Count(what, number) for what, number in sorted(entry.counters.items())),
         )

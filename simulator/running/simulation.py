@@ -1,8 +1,8 @@
 """`simulate`: a scene in, a set of grasps and a report out."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, field
+from functools import lru_cache, partial
 from time import perf_counter
 
 import numpy as np
@@ -113,23 +113,17 @@ class Simulated:
     report: Report
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Work:
-    """Batches for one worker, each with the number of its condition."""
-
-    scene: Scene
-    without: str | None
-    keep_unsettled: bool
-    batches: tuple[tuple[int, Batch], ...]
+# For one worker: batches, each with the number of its condition.
+_Batches = tuple[tuple[int, Batch], ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Done:
     """What came of them."""
 
-    rows: list[Rows]
-    notes: list[Notes]
-    ledger: Ledger
+    rows: list[Rows] = field(default_factory=list)
+    notes: list[Notes] = field(default_factory=list)
+    ledger: Ledger = field(default_factory=Ledger)
 
 
 def simulate(
@@ -155,10 +149,10 @@ def simulate(
     # What is wrong with the scene shows here and not in a worker.
     setting = compile_pipeline(scene, without).setting
     plan = sessions(scene, Postures.of(scene))
-    works = (_Work(scene, without, keep_unsettled, group) for group in _groups(plan, at_a_time(setting, block)))
+    run = partial(_run, scene, without, keep_unsettled)
     total = sum(len(session.before) for session in plan)
-    made = _gathered(in_workers(_run, works, jobs), total, progress)
-    rows = _in_order(plan, made.rows)
+    made = _gathered(in_workers(run, _groups(plan, at_a_time(setting, block)), jobs), total, progress)
+    rows = joined(made.rows, np.repeat(np.arange(len(plan)), [len(session.conditions) for session in plan]))
     if not len(rows):
         why = _unsettled(scene, made)[0].why
         raise SceneError(f"scene {scene.name}: none of its {total} repetitions can be trusted; of the first, {why}")
@@ -166,7 +160,7 @@ def simulate(
     return Simulated(found, _report(scene, rows, found, made, perf_counter() - start, keep_unsettled=keep_unsettled))
 
 
-def _groups(plan: Sequence[Session], block: int) -> Iterator[tuple[tuple[int, Batch], ...]]:
+def _groups(plan: Sequence[Session], block: int) -> Iterator[_Batches]:
     """Yield groups of about `block` repetitions of one subject: batches with the numbers of their conditions."""
     first = 0
     for session in plan:
@@ -187,12 +181,12 @@ def _pipeline(scene: Scene, without: str | None) -> Pipeline:
     return compile_pipeline(scene, without)
 
 
-def _run(work: _Work) -> _Done:
-    pipeline, scene, done = _pipeline(work.scene, work.without), work.scene, _Done([], [], Ledger())
+def _run(scene: Scene, without: str | None, keep_unsettled: bool, batches: _Batches) -> _Done:
+    pipeline, done = _pipeline(scene, without), _Done()
     every_frame, held = scene.recording.rows == "all", hold_frame(pipeline.setting)
-    pipeline.run([batch for _, batch in work.batches], done.ledger)
-    for number, batch in work.batches:
-        kept = np.flatnonzero(batch.settled | work.keep_unsettled)
+    pipeline.run([batch for _, batch in batches], done.ledger)
+    for number, batch in batches:
+        kept = np.flatnonzero(batch.settled | keep_unsettled)
         done.rows.append(rows_of(batch, kept, number, _codes(scene, batch), held, every_frame=every_frame))
         done.notes.append(notes_of(batch))
     return done
@@ -205,7 +199,7 @@ def _codes(scene: Scene, batch: Batch) -> Codes:
 
 
 def _gathered(answers: Iterator[_Done], total: int, progress: Progress | None) -> _Done:
-    everything, repetitions = _Done([], [], Ledger()), 0
+    everything, repetitions = _Done(), 0
     for done in answers:
         everything.rows.extend(done.rows)
         everything.notes.extend(done.notes)
@@ -214,11 +208,6 @@ def _gathered(answers: Iterator[_Done], total: int, progress: Progress | None) -
         if progress is not None:
             progress(repetitions, total)
     return everything
-
-
-def _in_order(plan: Sequence[Session], blocks: list[Rows]) -> Rows:
-    subjects = np.repeat(np.arange(len(plan)), [len(session.conditions) for session in plan])
-    return joined(blocks, subjects)
 
 
 def _set_of(scene: Scene, plan: Sequence[Session], rows: Rows) -> GraspSet:
