@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from .common import err, existing_file, existing_folder, of_device, out, output_file, warning
+from .common import Number, OutputFile, err, existing_file, existing_folder, of_device, out, overwrite_flag, warning
 from .lines import echo
 
 if TYPE_CHECKING:
@@ -60,19 +60,18 @@ class _SinkOption(click.Option):
 @click.option(
     "--preshape", metavar="NAME", help="Preshapes to send along: barrett_bh8, parallel_gripper or a .toml file."
 )
-@click.option("--record", metavar="FILE.mcap", type=output_file, help="Record the raw frames, and what came of them.")
+@click.option(
+    "--record", metavar="FILE.mcap", type=OutputFile(".mcap"), help="Record the raw frames, and what came of them."
+)
+@overwrite_flag
 @click.option("--full-scan", is_flag=True, help="Read all ports in every scan, even when the rest cannot matter.")
 @click.option("--status", is_flag=True, help="Once a second, how the glove fares: in the view, and to all sinks.")
 @click.option("--frames", metavar="N", type=click.IntRange(1), help="Stop after so many frames.")
-@click.option("--lead", type=click.FloatRange(0), help="By how much a new grasp type must lead, in score units.")
-@click.option("--dwell-ms", type=click.FloatRange(0, 10_000), help="For how long it must lead.")
-@click.option("--max-lost", type=click.FloatRange(0, 1), help="Share of the build's weight that may be missing.")
-@click.option(
-    "--error-rate", type=click.FloatRange(0, 1), help="Decide by a sequential test of this error rate instead."
-)
-@click.option(
-    "--spacing-ms", type=click.FloatRange(0, 10_000), help="Frames that the sequential test takes are so far apart."
-)
+@click.option("--lead", type=Number(0), help="By how much a new grasp type must lead, in score units.")
+@click.option("--dwell-ms", type=Number(0, 10_000), help="For how long it must lead.")
+@click.option("--max-lost", type=Number(0, 1), help="Share of the build's weight that may be missing.")
+@click.option("--error-rate", type=Number(0, 1), help="Decide by a sequential test of this error rate instead.")
+@click.option("--spacing-ms", type=Number(0, 10_000), help="Frames that the sequential test takes are so far apart.")
 def command(
     build: Path,
     glove: Path | None,
@@ -105,8 +104,6 @@ def command(
     """
     if (glove is None) == (replay is None):
         raise click.UsageError("name a glove to run on (--glove) or frames to run through (--replay), one of them")
-    if record is not None and record.suffix != ".mcap":
-        raise click.BadParameter(f"{record.name}: a recording ends in .mcap", param_hint="--record")
     from thenar.runtime import Build
 
     _refuse_idle(glove, replay)

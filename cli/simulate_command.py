@@ -11,7 +11,20 @@ from rich.text import Text
 
 from thenar.compiler.text import interval
 
-from .common import err, jobs_option, json_flag, keep_apart, out, output_file, progress, show, table, warning
+from .common import (
+    OutputFile,
+    err,
+    jobs_option,
+    json_flag,
+    keep_apart,
+    out,
+    overwrite_flag,
+    progress,
+    seed_range,
+    show,
+    table,
+    warning,
+)
 from .lines import echo
 
 if TYPE_CHECKING:
@@ -28,12 +41,15 @@ _OWN = "dim"  # how own steps look
 
 @click.command("simulate")
 @click.argument("scene", required=False)
-@click.option("-o", "--output", type=output_file, metavar="SET.grasps", help="Simulate, and write the set there.")
+@click.option(
+    "-o", "--output", type=OutputFile(".grasps"), metavar="SET.grasps", help="Simulate, and write the set there."
+)
+@overwrite_flag
 @click.option("--explain", is_flag=True, help="Only say which steps would run, in which order, and what each costs.")
 @click.option("--ablate", is_flag=True, help="Remove each effect in turn: what that does to recognition and time.")
 @click.option("--list", "listing", is_flag=True, help="Only list the scenes that are shipped.")
 @click.option("--repetitions", type=click.IntRange(1, 100_000), help="Of each grasp type by each subject.")
-@click.option("--seed", type=click.IntRange(0, 2**63 - 1), help="Other random numbers; the subjects stay.")
+@click.option("--seed", type=seed_range, help="Other random numbers; the subjects stay.")
 @click.option("--subject", "subjects", multiple=True, metavar="NAME", help="Only this subject; may be given again.")
 @click.option("--keep-unsettled", is_flag=True, help="Keep repetitions in which the hand did not come to rest.")
 @jobs_option("Worker processes. The set does not depend on it.")

@@ -97,5 +97,5 @@ def test_a_recording_has_the_ending_that_replay_knows_it_by(thenar: Thenar, buil
     (tmp_path / "glove.toml").write_text('[cyberglove]\nport = "none"\n')
     done = thenar("run", build_folder, "--glove", tmp_path / "glove.toml", "--record", tmp_path / "run.dat")
     assert done.returncode == 2
-    assert "run.dat: a recording ends in .mcap" in done.stderr
+    assert "run.dat: a file to write here ends in .mcap" in done.stderr
     assert not (tmp_path / "run.dat").exists()
