@@ -139,7 +139,7 @@ def _print_scenes(scenes: "list[Shipped]") -> None:
 def _print_report(report: "Report", path: Path) -> None:
     """Print what came out, by grasp type and by step, and warn of what did not settle."""
     console = out()
-    fresh = f"repetitions from {report.done + 1} on, " if report.done else ""
+    fresh = f"after repetition {report.done}, " if report.done else ""
     console.print(
         f"{path}: {report.rows} rows, simulated: scene {report.scene}, seed {report.seed}, {fresh}"
         f"{len(report.subjects)} subject(s), {report.repetitions} grasps in {report.seconds:.1f} s"

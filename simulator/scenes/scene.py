@@ -164,7 +164,7 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     @property
     def origin(self) -> str:
         """What made its grasps, as a set says of itself."""
-        numbers = f", repetitions {self.done + 1} to {self.done + self.repetitions}" if self.done else ""
+        numbers = f", {self.repetitions} more after {self.done} repetitions" if self.done else ""
         return f"scene {self.name}, seed {self.seed}{numbers}"
 
     def shares(self) -> Iterator[tuple[SceneObject, range]]:

@@ -77,9 +77,9 @@ def test_fresh_grasps_are_asked_for_with_more_and_the_help_says_what_a_seed_draw
 ) -> None:
     path = tmp_path / "fresh.grasps"
     assert run(["simulate", "quick", *SMALL, "--more", "3", "-o", str(path)]) == 0
-    assert "scene quick, seed 1, repetitions from 2 on, 2 subject(s), 84 grasps" in capsys.readouterr().out
+    assert "scene quick, seed 1, after repetition 1, 2 subject(s), 84 grasps" in capsys.readouterr().out
     made = GraspSet.load(path)
-    assert made.simulated == "scene quick, seed 1, repetitions 2 to 4"
+    assert made.simulated == "scene quick, seed 1, 3 more after 1 repetitions"
     assert made.trials.min() >= 14
     assert run(["simulate", "--help"]) == 0
     said = " ".join(capsys.readouterr().out.split())

@@ -112,7 +112,7 @@ def test_more_grasps_of_the_same_hands_are_those_that_a_longer_scene_adds(quick:
     for subject in ("A", "C"):
         before, after = (each.grasp_set.trials[each.grasp_set.subjects == subject] for each in (quick, fresh))
         assert after.tolist() == list(range(len(before), len(before) + 3 * 5))
-    assert fresh.grasp_set.simulated == "scene quick, seed 1, repetitions 7 to 11"
+    assert fresh.grasp_set.simulated == "scene quick, seed 1, 5 more after 6 repetitions"
     assert (fresh.report.done, fresh.report.repetitions) == (6, 2 * 3 * 5)
 
 

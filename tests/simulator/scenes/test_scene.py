@@ -44,7 +44,7 @@ def test_more_repetitions_go_on_where_those_of_the_scene_end(grasps: list[str], 
     for (_, old), (_, new), (_, whole) in zip(scene.shares(), fresh.shares(), both.shares(), strict=True):
         assert [*old, *new] == [*whole]
     assert fresh.setting([]).session_trials == scene.setting([]).session_trials
-    assert fresh.origin == f"scene x, seed 1, repetitions {repetitions + 1} to {repetitions + more}"
+    assert fresh.origin == f"scene x, seed 1, {more} more after {repetitions} repetitions"
 
 
 def test_a_setting_has_times_in_microseconds_from_the_first_contact(make_scene: MakeScene) -> None:
