@@ -294,7 +294,11 @@ class GraspSet:
 
     def save(self, path: str | Path) -> None:
         """Write a `.grasps` file, whole or not at all; the same set gives the same bytes."""
-        write_atomically(Path(path), seal(KIND, self._format, _pack(self)))
+        write_atomically(Path(path), self.encoded())
+
+    def encoded(self) -> bytes:
+        """Return the bytes of its `.grasps` file."""
+        return seal(KIND, self._format, _pack(self))
 
 
 KIND = b"THNRGRSP"
