@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..evaluation.populations import PROTOCOLS
-from ..evaluation.study import RateTable, Study
-from ..text import NBSP, counted, interval, percent, sentence
+from ..evaluation.study import Study
+from ..evaluation.tables import RateTable, both
+from ..text import NBSP, counted, percent, sentence
 from .content import PlainTable, ReportContent
 from .sections import honest_rate
 
@@ -40,7 +41,7 @@ def _table(table: RateTable) -> PlainTable:
     several = len(table.columns) > 1
     columns = ("Row", "What", "Switches", *table.columns, *(["all"] * several))
     rows = tuple(
-        (row.name, row.what, str(row.switches), *map(str, row.cells), *([interval(row.rate)] * several))
+        (row.name, row.what, str(row.switches), *map(str, row.cells), *([both(row.rate, row.frames)] * several))
         for row in table.rows
     )
     return PlainTable(table.title, columns, rows, words=(0, 1), note=table.note)
