@@ -7,6 +7,7 @@ codes     (n, j) uint16
 grasps    (n,) uint32               index into the taxonomy's types
 subjects, objects (n,) uint32       index into the header's names
 trials    (n,) int64
+sessions  (n,) uint32               index into the header's names; only where there are several, and then in format 2
 """
 
 import hashlib
@@ -118,14 +119,21 @@ class GraspSet:
     subjects, objects : (n,) arrays of str
         Who grasped, and what.
     trials : (n,) array of int64
-        The number of the repetition.
+        The number of the repetition. Rows of one subject, grasp type, object, session and number are the frames of one
+        trial.
     simulated : str, optional
         What simulated them; empty: they were recorded.
+    sessions : (n,) array of str, optional
+        Between which the glove was taken off; none given: one session, "1".
+    independent : bool
+        Whether whoever recorded the rows states that each is a trial of its own, whatever its number is.
 
     Attributes
     ----------
     labels : (n,) array of intp
         The place of each grasp in `taxonomy.types`.
+    trial_ids : (n,) array of intp
+        The trial of each row, numbered from 0 in the order of first appearance.
 
     Raises
     ------
@@ -165,6 +173,8 @@ class GraspSet:
     trials: NDArray[np.int64]
     labels: NDArray[np.intp] = field(init=False)
     simulated: str = ""
+    sessions: NDArray[np.str_] = field(default_factory=lambda: np.empty(0, np.str_))
+    independent: bool = False
 
     def __post_init__(self) -> None:
         rows = len(self.grasps)
@@ -173,7 +183,9 @@ class GraspSet:
             raise RecordingError("a set of grasps needs at least one switch or joint")
         self._freeze("switches", np.bool_, (rows, len(self.switch_names)))
         self._freeze("codes", np.uint16, (rows, len(self.joints)))
-        for name in ("grasps", "subjects", "objects"):
+        if not self.sessions.size:
+            object.__setattr__(self, "sessions", np.full(rows, "1"))
+        for name in ("grasps", "subjects", "objects", "sessions"):
             self._freeze(name, np.str_, (rows,))
             check_names(name[:-1], np.unique(getattr(self, name)).tolist())
         self._freeze("trials", np.int64, (rows,))
@@ -220,6 +232,19 @@ class GraspSet:
         """The joints' names, in the order of `codes`."""
         return tuple(joint.name for joint in self.joints)
 
+    @property
+    def trial_ids(self) -> NDArray[np.intp]:
+        """The trial of each row, numbered from 0 in the order of first appearance."""
+        if self.independent:
+            return np.arange(len(self))
+        ids = np.zeros(len(self), np.intp)
+        for column in (self.labels, self.subjects, self.objects, self.sessions, self.trials):
+            _, part = np.unique(column, return_inverse=True)
+            # Numbered densely again at once: the product of all counts may not fit.
+            ids = np.unique(ids * (part.max(initial=0) + 1) + part, return_inverse=True)[1]
+        _, first, ids = np.unique(ids, return_index=True, return_inverse=True)
+        return np.argsort(np.argsort(first))[ids]
+
     def rows(self, index: ArrayLike) -> "GraspSet":
         """Return the set of the rows that `index` picks (numbers or a mask of n), in that order."""
         pick = np.asarray(index)
@@ -235,6 +260,8 @@ class GraspSet:
             objects=self.objects[pick],
             trials=self.trials[pick],
             simulated=self.simulated,
+            sessions=self.sessions[pick],
+            independent=self.independent,
         )
 
     def fingerprint(self) -> str:
@@ -246,7 +273,14 @@ class GraspSet:
         digest.update(self.codes.astype("<u2").tobytes())
         digest.update(self.trials.astype("<i8").tobytes())
         digest.update(self.simulated.encode())
+        if self._format > 1:
+            digest.update(msgspec.json.encode((self.sessions.tolist(), self.independent)))
         return digest.hexdigest()
+
+    @property
+    def _format(self) -> int:
+        """The format of its file: 2 where there are sessions, or rows that are stated to be independent."""
+        return 1 + bool(self.independent or (self.sessions != "1").any())
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -260,15 +294,16 @@ class GraspSet:
 
     def save(self, path: str | Path) -> None:
         """Write a `.grasps` file, whole or not at all; the same set gives the same bytes."""
-        write_atomically(Path(path), seal(KIND, VERSION, _pack(self)))
+        write_atomically(Path(path), seal(KIND, self._format, _pack(self)))
 
 
 KIND = b"THNRGRSP"
-VERSION = 1
+VERSION = 2
 # Rows, columns and grasp types of a set.
 MOST = 10_000_000
 
-_DTYPES = {"switches": "u1", "codes": "<u2", "grasps": "<u4", "subjects": "<u4", "objects": "<u4", "trials": "<i8"}
+_DTYPES = {"switches": "u1", "codes": "<u2", "trials": "<i8"}
+_DTYPES |= dict.fromkeys(("grasps", "subjects", "objects", "sessions"), "<u4")
 
 AnyGraspSet = TypeVar("AnyGraspSet", bound=GraspSet)
 
@@ -281,11 +316,15 @@ class _Header(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
     subjects: tuple[str, ...]
     objects: tuple[str, ...]
     simulated: str = ""
+    sessions: tuple[str, ...] = ()
+    independent: bool = False
 
 
 def _pack(grasp_set: GraspSet) -> bytes:
     subjects, subject = np.unique(grasp_set.subjects, return_inverse=True)
     objects, object_ = np.unique(grasp_set.objects, return_inverse=True)
+    sessions, session = np.unique(grasp_set.sessions, return_inverse=True)
+    several = sessions.tolist() != ["1"]
     header = _Header(
         rows=len(grasp_set),
         switches=grasp_set.switch_names,
@@ -294,6 +333,8 @@ def _pack(grasp_set: GraspSet) -> bytes:
         subjects=tuple(subjects.tolist()),
         objects=tuple(objects.tolist()),
         simulated=grasp_set.simulated,
+        sessions=tuple(sessions.tolist()) if several else (),
+        independent=grasp_set.independent,
     )
     arrays: dict[str, AnyArray] = {
         "switches": np.packbits(grasp_set.switches, axis=1),
@@ -303,6 +344,8 @@ def _pack(grasp_set: GraspSet) -> bytes:
         "objects": object_,
         "trials": grasp_set.trials,
     }
+    if header.sessions:
+        arrays["sessions"] = session
     return pack(msgspec.json.encode(header), {name: array.astype(_DTYPES[name]) for name, array in arrays.items()})
 
 
@@ -326,14 +369,17 @@ def _unpack(cls: type[AnyGraspSet], size: int, header_bytes: bytes, arrays: dict
         objects=_names("objects", header.objects, arrays, size),
         trials=arrays["trials"].astype(np.int64),
         simulated=header.simulated,
+        sessions=_names("sessions", header.sessions, arrays, size) if header.sessions else np.empty(0, np.str_),
+        independent=header.independent,
     )
 
 
 def _check_arrays(header: _Header, arrays: dict[str, AnyArray]) -> None:
     if max(header.rows, len(header.switches) + len(header.joints), len(header.taxonomy.types)) > MOST:
         raise RecordingError(f"it has more than {MOST} rows, columns or grasp types")
-    if arrays.keys() != _DTYPES.keys():
-        raise RecordingError(f"it holds the arrays {sorted(arrays)}, not {sorted(_DTYPES)}")
+    expected = _DTYPES.keys() - (() if header.sessions else {"sessions"})
+    if arrays.keys() != expected:
+        raise RecordingError(f"it holds the arrays {sorted(arrays)}, not {sorted(expected)}")
     widths = {"switches": -(-len(header.switches) // 8), "codes": len(header.joints)}
     for name, array in arrays.items():
         shape = (header.rows, widths[name]) if name in widths else (header.rows,)

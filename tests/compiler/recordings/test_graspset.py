@@ -16,6 +16,7 @@ from thenar.compiler.recordings.graspset import Joint
 
 def fields(grasp_set: GraspSet) -> dict[str, Any]:
     names = ["switches", "switch_names", "codes", "joints", "grasps", "taxonomy", "subjects", "objects", "trials"]
+    names += ["sessions", "independent"]
     return {name: getattr(grasp_set, name) for name in names}
 
 
@@ -35,7 +36,7 @@ def test_rows_picks_every_array_alike(data: st.DataObject, grasp_sets: st.Search
     grasp_set = data.draw(grasp_sets)
     index = data.draw(st.lists(st.integers(0, len(grasp_set) - 1), max_size=5))
     picked = grasp_set.rows(index)
-    for name in ("switches", "codes", "grasps", "subjects", "objects", "trials", "labels"):
+    for name in ("switches", "codes", "grasps", "subjects", "objects", "sessions", "trials", "labels"):
         assert getattr(picked, name).tolist() == [getattr(grasp_set, name)[row].tolist() for row in index]
     mask = np.zeros(len(grasp_set), bool)
     mask[index] = True
@@ -46,7 +47,7 @@ def test_arrays_have_the_promised_types_and_cannot_be_written(small: GraspSet) -
     kinds = {name: getattr(small, name).dtype.kind for name in ("switches", "codes", "grasps", "trials", "labels")}
     assert kinds == {"switches": "b", "codes": "u", "grasps": "U", "trials": "i", "labels": "i"}
     assert small.codes.dtype == np.uint16
-    for name in ("switches", "codes", "grasps", "subjects", "objects", "trials", "labels"):
+    for name in ("switches", "codes", "grasps", "subjects", "objects", "sessions", "trials", "labels"):
         with pytest.raises(ValueError, match="read-only"):
             getattr(small, name)[0] = getattr(small, name)[1]
 
@@ -97,6 +98,7 @@ def test_the_fingerprint_sees_every_field_and_nothing_else(small: GraspSet) -> N
         {name: getattr(small, name)[::-1]} for name in ("switches", "codes", "grasps", "subjects", "trials")
     ]
     changes += [{"objects": np.array(["mug"] * 5 + ["cup"])}, {"switch_names": ("a", "b", "c", "d")}]
+    changes += [{"sessions": np.array(["1"] * 5 + ["2"])}, {"independent": True}]
     changes += [{"joints": (replace(small.joints[0], value_a=-11.0), small.joints[1])}]
     prints = {GraspSet(**fields(small) | change).fingerprint() for change in changes}
     assert len(prints | {small.fingerprint()}) == len(changes) + 1
@@ -105,6 +107,30 @@ def test_the_fingerprint_sees_every_field_and_nothing_else(small: GraspSet) -> N
 def test_load_is_the_inverse_of_save(small: GraspSet, tmp_path: Path) -> None:
     small.save(tmp_path / "set.grasps")
     assert GraspSet.load(str(tmp_path / "set.grasps")).fingerprint() == small.fingerprint()
+
+
+@given(data=st.data())
+@settings(deadline=None)
+def test_a_trial_is_a_subject_a_type_an_object_a_session_and_a_number(
+    data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet]
+) -> None:
+    grasp_set = data.draw(grasp_sets)
+    grasp_set = grasp_set.rows(data.draw(st.lists(st.integers(0, len(grasp_set) - 1), max_size=20)))
+    sessions = np.array([data.draw(st.sampled_from("12")) for _ in range(len(grasp_set))], np.str_)
+    grasp_set = GraspSet(**fields(grasp_set) | {"sessions": sessions, "independent": data.draw(st.booleans())})
+    each = (grasp_set.subjects, grasp_set.grasps, grasp_set.objects, grasp_set.sessions, grasp_set.trials)
+    keys = list(zip(*(column.tolist() for column in each), strict=True))
+    number = {key: place for place, key in enumerate(dict.fromkeys(keys))}
+    expected = range(len(keys)) if grasp_set.independent else [number[key] for key in keys]
+    assert grasp_set.trial_ids.tolist() == list(expected)
+
+
+def test_a_file_has_format_2_only_where_sessions_or_the_claim_need_it(small: GraspSet, tmp_path: Path) -> None:
+    formats = []
+    for change in ({}, {"sessions": np.array(["1"] * 5 + ["2"])}, {"independent": True}):
+        GraspSet(**fields(small) | change).save(tmp_path / "set.grasps")
+        formats.append((tmp_path / "set.grasps").read_bytes()[8])
+    assert formats == [1, 2, 2]
 
 
 def test_a_joint_reads_codes_as_values_by_its_two_points() -> None:
