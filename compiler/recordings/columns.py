@@ -95,6 +95,8 @@ class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
     """A columns.toml, key by key. Lists of inputs hold globs (`*`, `?`, `[...]`); other keys hold columns by name.
 
     A label, subject, object, session or trial may be spread over several columns: what they say together counts.
+    `frames` says how trials are told apart otherwise: "independent" states that each row is one; after "restart" one
+    begins where `time` does not rise, or another label, subject, object or session comes.
     """
 
     label: str | tuple[str, ...]
@@ -103,7 +105,7 @@ class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
     session: str | tuple[str, ...] | None = None
     trial: str | tuple[str, ...] | None = None
     time: str | None = None
-    frames: Literal["independent"] | None = None
+    frames: Literal["independent", "restart"] | None = None
     taxonomy: str | tuple[str, ...] = "own"
     switches: tuple[str, ...] = ()
     missing: Literal["refuse", "drop", "keep"] = "refuse"
@@ -126,6 +128,8 @@ class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
             raise ValueError(f"`delimiter` must be one character that is not the `quote`, not {self.delimiter!r}")
         if not _is_encoding(self.encoding):
             raise ValueError(f"`encoding` must be one that Python knows, not {shortened(repr(self.encoding))}")
+        if self.frames == "restart" and (self.time is None or self.trial is not None):
+            raise ValueError("`frames` = 'restart' takes `time`, and no `trial`")
         if not self.parts("label"):
             raise ValueError("`label` must name a column")
 
@@ -177,8 +181,12 @@ def select(columns: Columns, names: Sequence[str]) -> Selection:
         for column in columns.parts(key):
             if column not in there:
                 raise ColumnsError(f"{key}: the table has no column {shortened(repr(column))}{nearest(column, names)}")
-    entries = (*columns.taxels, *columns.joints)
-    _check_globs([*columns.switches, *(pattern for entry in entries for pattern in entry.columns)], names)
+    lists = [
+        columns.switches,
+        *(entry.columns for entry in columns.taxels),
+        *(entry.columns for entry in columns.joints),
+    ]
+    _check_globs([pattern for patterns in lists for pattern in patterns], names)
     # One match more than there are columns, and some column is matched twice.
     found = list(islice(_matched(columns, names), len(names) + 1))
     used = Counter([*(name for key in KEYS for name in columns.parts(key)), *(name for name, _ in found)])
@@ -209,10 +217,12 @@ def _matched(columns: Columns, names: Sequence[str]) -> Iterator[tuple[str, Taxe
     there = frozenset(names)
     for pattern in columns.switches:
         yield from ((name, None) for name in _matches("switches", pattern, names, there))
-    for key, entries in (("taxels", columns.taxels), ("joints", columns.joints)):
-        for entry in entries:
-            for pattern in entry.columns:
-                yield from ((name, entry) for name in _matches(key, pattern, names, there))
+    for taxel in columns.taxels:
+        for pattern in taxel.columns:
+            yield from ((name, taxel) for name in _matches("taxels", pattern, names, there))
+    for joint in columns.joints:
+        for pattern in joint.columns:
+            yield from ((name, joint) for name in _matches("joints", pattern, names, there))
 
 
 def _matches(what: str, pattern: str, names: Sequence[str], there: frozenset[str]) -> list[str]:

@@ -183,7 +183,8 @@ def _even(found: Mapping[str, AnyArray]) -> tuple[Columns, Sequence[int]]:
     for name, array in found.items():
         if array.dtype.names:
             for field in array.dtype.names:
-                columns |= _columns(f"{name}.{field}", array.reshape(-1)[field])
+                records: Any = array.reshape(-1)
+                columns |= _columns(f"{name}.{field}", records[field])
         else:
             columns |= _columns(name, array)
     lengths = Counter(len(column) for column in columns.values())
@@ -204,7 +205,7 @@ def _columns(name: str, array: AnyArray) -> Columns:
     if array.dtype.kind == "V" or array.ndim > 2:
         return {}
     if array.dtype.kind == "S":
-        array = np.char.decode(array, "utf-8", "replace")
+        array = np.char.decode(array.astype(np.bytes_), "utf-8", "replace")
     if array.ndim == 1 or 1 in array.shape:
         return {name: array.reshape(-1)}
     return {f"{name}.{number}": array[:, number] for number in range(array.shape[1])}

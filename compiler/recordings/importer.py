@@ -22,7 +22,7 @@ from .graspset import GraspSet
 from .summary import Finding, find_oddities
 from .table import Table, read_table
 from .taxonomy import Taxonomy, own, published
-from .trials import Frames, fill, groups, in_time, numbered, otsu
+from .trials import Frames, fill, groups, in_time, numbered, otsu, restarts
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,9 +80,11 @@ def read_cells(table: Table, columns: Columns, selection: Selection) -> Read:
     warnings = _dropped(readings, keep, reader.missing)
     missing = {name: _kept(mask, keep) for name, mask in reader.missing.items()}
     readings, time = readings.kept(keep), _kept(time, keep)
+    if columns.frames == "restart":
+        readings = replace(readings, trials=restarts(readings.trial_ids(), time))
     independent = columns.frames == "independent"
     trial_ids = np.arange(len(readings.rows)) if independent else readings.trial_ids()
-    if not (independent or columns.parts("trial")):
+    if columns.frames is None and not columns.parts("trial"):
         _check_told(table.what, trial_ids)
     if columns.time is not None:
         order = in_time(trial_ids, time)
@@ -194,8 +196,7 @@ def _reduced(readings: Readings, how: str, trial_ids: NDArray[np.intp], notes: l
     if how == "middle":
         switches, joints = readings.switches[frames.middle], readings.joints[frames.middle]
     else:
-        switch = frames.any if how == "any" else frames.median
-        switches = _each(switch, readings.switches, len(frames.middle))
+        switches = _each(frames.any if how == "any" else frames.median, readings.switches, len(frames.middle))
         joints = _each(frames.median, readings.joints, len(frames.middle))
     notes.append(f"{len(trial_ids)} frames of {len(frames.middle)} trials were reduced to one row a trial ({how})")
     return replace(reduced, switches=switches, joints=joints)
@@ -334,6 +335,8 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
         subjects=readings.subjects,
         objects=readings.objects,
         trials=readings.trials,
+        sessions=readings.sessions,
+        independent=columns.frames == "independent",
     )
     warnings += [
         *aliases,
@@ -354,6 +357,7 @@ def report_of(
     return ImportReport(
         table=what,
         rows=len(grasp_set),
+        trials=len(np.unique(grasp_set.trial_ids)),
         subjects=len(np.unique(grasp_set.subjects)),
         objects=len(np.unique(grasp_set.objects)),
         grasp_types=len(np.unique(grasp_set.labels)),

@@ -18,10 +18,11 @@ from thenar.runtime.recording.messages import switch_matrix
 from thenar.runtime.recording.reader import Reader, check_made
 from thenar.runtime.recording.session import Collection, Label, Session
 
+from .coding import CodingCost, code_joint
 from .columns import Calibration, JointColumns
 from .errors import ColumnsError, TableError, list_rows
 from .graspset import GraspSet, Joint
-from .importer import CodingCost, ImportReport, code_joint, import_file, report_of
+from .importer import ImportReport, import_file, report_of
 from .summary import Finding, find_oddities
 from .taxonomy import Taxonomy
 

@@ -33,20 +33,29 @@ from .foreign import READERS, read_foreign
 
 
 @contextmanager
-def open_lines(path: Path, encoding: str = "utf-8") -> Iterator[Iterator[str]]:
-    """Open a text file, gzipped or not, behind its byte order mark; a fault of its content becomes a TableError."""
-    known = codecs.lookup(encoding).name
-    zipped = path.suffix.lower() == ".gz"
+def open_bytes(path: Path) -> Iterator[BinaryIO]:
+    """Open a file of text, gzipped or not; a fault of the packing becomes a TableError."""
     try:
         with open_file(path, TableError) as raw:
             size = os.fstat(raw.fileno()).st_size
             if size > LARGEST:
                 raise TableError(f"{path.name} is larger than {LARGEST} bytes, the most that is read of a table")
-            file = io.BufferedReader(_Unpacked(path.name, raw, unpacked(size))) if zipped else raw
-            with io.TextIOWrapper(file, "utf-8-sig" if known == "utf-8" else known, newline="") as text:
-                yield _lines(path.name, text)
+            zipped = path.suffix.lower() == ".gz"
+            yield io.BufferedReader(_Unpacked(path.name, raw, unpacked(size))) if zipped else raw
     except (gzip.BadGzipFile, EOFError, zlib.error) as reason:
         raise TableError(f"{path.name} is damaged: {reason}") from reason
+
+
+@contextmanager
+def open_lines(path: Path, encoding: str = "utf-8") -> Iterator[Iterator[str]]:
+    """Open a text file, gzipped or not, behind its byte order mark; a fault of its content becomes a TableError."""
+    known = codecs.lookup(encoding).name
+    try:
+        with (
+            open_bytes(path) as file,
+            io.TextIOWrapper(file, "utf-8-sig" if known == "utf-8" else known, newline="") as text,
+        ):
+            yield _lines(path.name, text)
     except UnicodeError as reason:
         why = getattr(reason, "reason", str(reason))
         raise TableError(
@@ -261,18 +270,18 @@ def read_table(path: Path, text: TextFormat = PLAIN) -> Table:
     return replace(table, size=path.stat().st_size)
 
 
-def parted(lines: Iterable[str], text: TextFormat, delimiter: str) -> "csv._reader":
-    """Return a reader of the rows in `lines`."""
-    quoting = csv.QUOTE_MINIMAL if text.quote else csv.QUOTE_NONE
-    return csv.reader(lines, delimiter=delimiter, strict=True, quotechar=text.quote or None, quoting=quoting)
-
-
 def _read_csv(what: str, lines: Iterator[str], text: TextFormat, delimiter: str) -> Table:
-    reader = parted(_narrow(what, lines, delimiter), text, delimiter)
+    reader = csv.reader(
+        _narrow(what, lines, delimiter),
+        delimiter=delimiter,
+        strict=True,
+        quotechar=text.quote or None,
+        quoting=csv.QUOTE_MINIMAL if text.quote else csv.QUOTE_NONE,
+    )
     rows = array("q")
     try:
-        filled = filter(None, reader)
-        first = next(filled, [])
+        filled: Iterator[list[str]] = filter(None, reader)
+        first: list[str] = next(filled, [])
         names = [text_of(name.strip()) if text.header else "" for name in first]
         names = [name or f"column {number}" for number, name in enumerate(names, start=1)]
         cells = TextRows(len(names))

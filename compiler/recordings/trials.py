@@ -2,9 +2,12 @@
 
 import re
 from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+Value = TypeVar("Value", bound=np.generic)
 
 _DIGITS = re.compile(r"(\d+)")
 
@@ -21,19 +24,29 @@ def natural_key(text: str) -> tuple[object, ...]:
 
 def numbered(columns: Sequence[NDArray[np.str_]]) -> tuple[NDArray[np.int64], list[str]]:
     """Return a number (n,) from 1 for each row, equal where all `columns` (n,) are, and their texts in that order."""
-    parts = [np.unique(column, return_inverse=True) for column in columns]
-    pairs, number = np.unique(np.stack([inverse for _, inverse in parts], axis=1), axis=0, return_inverse=True)
-    texts = [[str(found[place]) for (found, _), place in zip(parts, pair, strict=True)] for pair in pairs.tolist()]
+    number = groups(*columns)
+    first = np.unique(number, return_index=True)[1]
+    texts = [[str(column[row]) for column in columns] for row in first.tolist()]
     order = sorted(range(len(texts)), key=lambda row: [natural_key(text) for text in texts[row]])
     rank = np.empty(len(order), np.int64)
     rank[order] = np.arange(1, len(order) + 1)
-    return rank[number.reshape(-1)], [" ".join(texts[row]) for row in order]
+    return rank[number], [" ".join(texts[row]) for row in order]
 
 
 def groups(*columns: NDArray[np.generic]) -> NDArray[np.intp]:
-    """Return a number (n,) for each row, equal exactly where all `columns` (n,) are."""
-    inverses = [np.unique(column, return_inverse=True)[1] for column in columns]
-    return np.unique(np.stack(inverses, axis=1), axis=0, return_inverse=True)[1].reshape(-1)
+    """Return a number (n,) for each row from 0 in the order of first appearance, equal where all `columns` (n,) are."""
+    ids = np.zeros(len(columns[0]), np.intp)
+    for column in columns:
+        _, part = np.unique(column, return_inverse=True)
+        # Numbered densely again at once: the product of all counts may not fit.
+        ids = np.unique(ids * (part.max(initial=0) + 1) + part, return_inverse=True)[1]
+    _, first, ids = np.unique(ids, return_index=True, return_inverse=True)
+    return np.argsort(np.argsort(first))[ids]
+
+
+def restarts(ids: NDArray[np.intp], time: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return numbers (n,) from 1 that rise by one where `ids` (n,) changes, or `time` (n,) does not rise."""
+    return np.cumsum((np.diff(ids, prepend=-1) != 0) | ~(np.diff(time, prepend=-np.inf) > 0)).astype(np.int64)
 
 
 def in_time(trials: NDArray[np.intp], time: NDArray[np.float64]) -> NDArray[np.intp]:
@@ -76,10 +89,11 @@ class Frames:
         # Trials in the order of their middle frames.
         self._sorted = np.argsort(self.order[self._middles])
 
-    def median(self, values: NDArray[np.generic]) -> NDArray[np.generic]:
+    def median(self, values: NDArray[Value]) -> NDArray[Value]:
         """Return the lower median (trials,) of `values` (n,): a value that occurred; of switches what most are."""
         column = values[self.order]
-        return column[np.lexsort((column, self._trials))][self._middles][self._sorted]
+        middle: NDArray[Value] = column[np.lexsort((column, self._trials))][self._middles]
+        return middle[self._sorted]
 
     def any(self, bits: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return (trials,) whether any of `bits` (n,) is set."""

@@ -60,7 +60,7 @@ def test_every_key_is_read(tmp_path: Path) -> None:
     ("text", "reason"),
     [
         ("", "line 1: the key label is missing"),
-        ("label = 3", "line 1: label: must be text, not 3"),
+        ("label = 3", "line 1: label: must be text or a list, not 3"),
         ('label = "a"\nlables = 1', "line 2: lables: there is no such key here"),
         (
             'label = "a"\n[[joints]]\ncolumns = ["b"]\ngird = 1',

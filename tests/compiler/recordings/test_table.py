@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thenar.compiler.recordings.errors import TableError
-from thenar.compiler.recordings.importer import numbers
+from thenar.compiler.recordings.cells import numbers
 from thenar.compiler.recordings.table import Table, read_table
 
 
