@@ -83,7 +83,8 @@ def _parquet(path: Path) -> tuple[Columns, Sequence[int]]:
     import pyarrow
     from pyarrow import parquet
 
-    with parquet.ParquetFile(path, memory_pool=pyarrow.system_memory_pool()) as file:
+    pyarrow.set_memory_pool(pyarrow.system_memory_pool())
+    with parquet.ParquetFile(path) as file:
         _check(file.metadata.num_rows, file.metadata.num_columns)
         table = file.read(use_threads=False)
     columns: Columns = {}
@@ -122,7 +123,7 @@ def _dataset(file: Any, item: Any, matlab: bool) -> AnyArray | None:
 
     _check(max(item.shape) if matlab else item.shape[0], min(item.shape) if matlab else 1)
     if h5py.check_string_dtype(item.dtype):
-        return np.array(item.asstr()[()])
+        return item[()] if item.dtype.kind == "S" else np.array(item.asstr("utf-8", "replace")[()], np.str_)
     kind = item.attrs.get("MATLAB_class", b"")
     if kind == b"cell" and h5py.check_ref_dtype(item.dtype):
         return _array([_letters(file[reference][()]) for reference in item[()].ravel()])

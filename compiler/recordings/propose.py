@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 import msgspec
 import numpy as np
 import tomli_w
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from thenar.runtime.names import printable, shortened
@@ -26,19 +27,20 @@ from .trials import groups, restarts
 
 # Words in the names of columns, as people write them in several languages.
 _LISTS = {
-    "label": "grasp grasps grip label class gesture posture pose category target action griff griffart greifart "
+    "label": "grasp grip label class gesture posture pose category target action griff griffart greifart "
     "klasse geste prise classe agarre clase presa y",
     "subject": "subject subj participant person user wearer proband teilnehmer vp sujet participante sujeto soggetto",
     "object": "object obj item thing objekt gegenstand objet objeto oggetto",
     "session": "session day visit sitzung tag jour séance sesión sessione",
     "trial": "trial rep repetition repeat attempt take run versuch wiederholung durchgang essai répétition ensayo",
     "time": "time timestamp frame t zeit zeitstempel bild temps tiempo tempo",
-    "unit": "ms s us sec seconds milliseconds no nr number",
-    "note": "n num id idx duration age date gender sex row frames",
+    "unit": "ms s us sec second millisecond no nr number",
+    "note": "n num id idx duration age date gender sex row",
     "pad": "pad taxel fsr pressure force tactile touch press contact druck kraft pression presión",
     "joint": "flex bend joint angle enc encoder mcp pip dip cmc abduction winkel biegung",
 }
-_WORDS = {role: frozenset(words.split()) for role, words in _LISTS.items()}
+# Without the s of a plural, as the words of names are looked up.
+_WORDS = {role: frozenset(word.removesuffix("s") or word for word in words.split()) for role, words in _LISTS.items()}
 # More distinct values than these are no grasp types.
 _TYPES = 200
 # An unknown analog column is at rest in so many of its cells, in the lowest tenth of its range: then it is a pad.
@@ -62,6 +64,10 @@ class Proposal(msgspec.Struct, frozen=True):
     roles: tuple[Role, ...]
     remarks: tuple[str, ...]
     lacks: str = ""
+
+    def independent(self) -> "Proposal":
+        """Return the proposal with the claim that each row is a trial of its own."""
+        return replace(self, columns=replace(self.columns, frames="independent"), lacks="")
 
     def toml(self) -> str:
         """Return the text of the columns.toml, with the reasons."""
@@ -109,7 +115,7 @@ class _Column(NamedTuple):
 def _look(table: Table, name: str) -> _Column:
     column, rows = table.columns[name], len(table.rows)
     found = re.findall(r"[A-Z]{2,}(?![^\W\dA-Z_])|[^\W\d_][^\W\dA-Z_]*", name)
-    words = frozenset(map(str.casefold, found))
+    words = frozenset(word.casefold().removesuffix("s") or word for word in found)
     parsed = numbers(column, table.decimal)
     if parsed.wrong.any():
         switch = bits(column, table.decimal)
@@ -264,15 +270,16 @@ def _add_parts(
 
 def _inputs(columns: Sequence[_Column]) -> list[Role]:
     """Return what the other columns are taken for, those alike together."""
-    # One grid for columns that are numbered alike, whatever their ranges.
-    stems: dict[str, list[NDArray[np.float64]]] = {}
-    for column in columns:
-        if column.values is not None and not _no_input(column):
-            stems.setdefault(_stem(column.name), []).append(column.values)
-    grids = {stem: sound_grid(np.concatenate(values)) for stem, values in stems.items()}
     found: dict[tuple[str, str], list[str]] = {}
+    stems: dict[str, list[_Column]] = {}
     for column in columns:
-        found.setdefault(_input(column, grids.get(_stem(column.name), 1.0)), []).append(column.name)
+        if out := _no_input(column):
+            found.setdefault(("left out", out), []).append(column.name)
+        else:
+            stems.setdefault("" if column.bits else _stem(column.name), []).append(column)
+    # Columns that are numbered alike are of one kind, whatever the range of each.
+    for several in stems.values():
+        found.setdefault(_input(several), []).extend(column.name for column in several)
     order = ["switches", "taxels", "joints", "left out"]
     return [Role(tuple(alike), *key) for key, alike in sorted(found.items(), key=lambda item: order.index(item[0][0]))]
 
@@ -281,20 +288,19 @@ def _stem(name: str) -> str:
     return name.rstrip("0123456789")
 
 
-def _input(column: _Column, grid: float) -> tuple[str, str]:
-    """Return the role of an input, and why."""
-    values = column.values
-    out = _no_input(column)
-    if out or values is None:
-        return "left out", out
-    if column.bits:
+def _input(columns: Sequence[_Column]) -> tuple[str, str]:
+    """Return the role of inputs that are alike, and why."""
+    words = frozenset[str]().union(*(column.words for column in columns))
+    each = [column.values for column in columns if column.values is not None]
+    values = np.concatenate(each)
+    if all(column.bits for column in columns):
         return "switches", "0 and 1 only"
-    if column.words & _WORDS["pad"]:
+    if words & _WORDS["pad"]:
         return "taxels", "pads by their names, closed above a threshold (Otsu)"
-    low, high = float(values.min()), float(values.max())
-    if not column.whole or low < 0 or high >= CODES:
-        return "joints", f"{_NUMBERS}{grid:g}"
-    if not column.words & _WORDS["joint"] and np.mean(values <= low + _REST * (high - low)) > _AT_REST:
+    if not all(column.whole for column in columns) or values.min() < 0 or values.max() >= CODES:
+        return "joints", f"{_NUMBERS}{sound_grid(values):g}"
+    rest = np.mean([np.mean(part <= part.min() + _REST * np.ptp(part)) for part in each])
+    if not words & _WORDS["joint"] and rest > _AT_REST:
         return "taxels", "at rest in most rows, as a pad is: closed above a threshold (Otsu)"
     return "joints", "whole numbers, taken as codes"
 
