@@ -8,7 +8,19 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import existing_file, json_flag, keep_apart, out, output_file, progress, show, table, wants_json, warning
+from .common import (
+    OutputFile,
+    existing_file,
+    json_flag,
+    keep_apart,
+    out,
+    overwrite_flag,
+    progress,
+    show,
+    table,
+    wants_json,
+    warning,
+)
 from .lines import echo
 
 if TYPE_CHECKING:
@@ -19,7 +31,8 @@ if TYPE_CHECKING:
 
 @click.command("import")
 @click.argument("tables", metavar="TABLE", type=existing_file, nargs=-1, required=True)
-@click.option("-o", "--output", type=output_file, required=True, help="The .grasps file to write.")
+@click.option("-o", "--output", type=OutputFile(".grasps"), required=True, help="The .grasps file to write.")
+@overwrite_flag
 @click.option("--columns", type=existing_file, help="columns.toml: what each column of the table is.")
 @click.option("-y", "--yes", is_flag=True, help="Import what was found without --columns, and do not ask.")
 @json_flag
@@ -40,8 +53,6 @@ def command(tables: tuple[Path, ...], output: Path, columns: Path | None, yes: b
         thenar import trials.csv.gz -o set.grasps --columns columns.toml
         thenar import anna.mcap ben.mcap -o set.grasps
     """
-    if output.suffix != ".grasps":
-        raise click.BadParameter(f"{output.name}: a set of grasps ends in .grasps", param_hint="--output")
     keep_apart(*tables, columns, output)
     from thenar.compiler.recordings.mcap_recording import import_files
 
@@ -69,7 +80,8 @@ def _found(path: Path, output: Path, yes: bool) -> "tuple[GraspSet, ImportReport
         proposal = proposal.independent()
     written = _write(proposal.toml(), output.parent)
     echo(f"{written}: what was found", err=wants_json())
-    again = shlex.join(["thenar", "import", str(path), "-o", str(output), "--columns", str(written)])
+    replacing = ["--overwrite"] if output.exists() else []
+    again = shlex.join(["thenar", "import", str(path), "-o", str(output), *replacing, "--columns", str(written)])
     if proposal.lacks:
         raise ColumnsError(f"{proposal.lacks}: do so in {written}, then run: {again}")
     if asked and not click.confirm("Import it so?"):
@@ -111,11 +123,12 @@ def _print(report: "ImportReport", output: Path) -> None:
     for note in report.notes:
         echo(note)
     if report.coding:
-        rows = table(("joint", "unit", "step", "largest error", "rms error", "values before", "after"), title="Coding")
+        numbers = ("step", "largest error", "rms error", "values before", "after")
+        coding = table(("joint", "unit", *numbers), numbers, "Coding")
         for cost in report.coding:
             errors = (f"{cost.step:g}", f"{cost.largest_error:.3g}", f"{cost.rms_error:.3g}")
-            rows.add_row(cost.joint, cost.unit, *errors, str(cost.distinct_before), str(cost.distinct_after))
-        out().print(rows)
+            coding.add_row(cost.joint, cost.unit, *errors, str(cost.distinct_before), str(cost.distinct_after))
+        out().print(coding)
     echo(
         f"{output}: {report.rows} grasps of {report.grasp_types} types ({report.taxonomy}) in {report.trials} trials; "
         f"subjects {report.subjects}, objects {report.objects}, switches {report.switches}, joints {report.joints}"
