@@ -130,6 +130,7 @@ def _print(report: "ImportReport", output: Path) -> None:
             coding.add_row(cost.joint, cost.unit, *errors, str(cost.distinct_before), str(cost.distinct_after))
         out().print(coding)
     echo(
-        f"{output}: {report.rows} grasps of {report.grasp_types} types ({report.taxonomy}) in {report.trials} trials; "
-        f"subjects {report.subjects}, objects {report.objects}, switches {report.switches}, joints {report.joints}"
+        f"{output}: {report.rows} grasps of {report.grasp_types} types ({report.taxonomy}); "
+        f"subjects {report.subjects}, objects {report.objects}, switches {report.switches}, joints {report.joints}, "
+        f"trials {report.trials}"
     )

@@ -192,7 +192,7 @@ def _reduced(readings: Readings, how: str, trial_ids: NDArray[np.intp], notes: l
     if how == "none":
         return readings
     frames = Frames(trial_ids)
-    reduced = replace(readings, switches=readings.switches[:0], joints=readings.joints[:0]).kept(frames.middle)
+    reduced = replace(readings, switches=readings.switches[:, :0], joints=readings.joints[:, :0]).kept(frames.middle)
     if how == "middle":
         switches, joints = readings.switches[frames.middle], readings.joints[frames.middle]
     else:

@@ -29,11 +29,11 @@ from .trials import groups, restarts
 _LISTS = {
     "label": "grasp grip label class gesture posture pose category target action griff griffart greifart "
     "klasse geste prise classe agarre clase presa y",
-    "subject": "subject subj participant person user wearer proband teilnehmer vp sujet participante sujeto soggetto",
+    "subject": "subject subj who wer participant person user wearer proband teilnehmer sujet participante sujeto",
     "object": "object obj item thing objekt gegenstand objet objeto oggetto",
     "session": "session day visit sitzung tag jour séance sesión sessione",
     "trial": "trial rep repetition repeat attempt take run versuch wiederholung durchgang essai répétition ensayo",
-    "time": "time timestamp frame t zeit zeitstempel bild temps tiempo tempo",
+    "time": "time timestamp stamp frame t zeit zeitstempel bild temps tiempo tempo",
     "unit": "ms s us sec second millisecond no nr number",
     "note": "n num id idx duration age date gender sex row",
     "pad": "pad taxel fsr pressure force tactile touch press contact druck kraft pression presión",

@@ -74,12 +74,15 @@ def _encoding(path: Path) -> tuple[str, str]:
 def _dialect(sample: str) -> tuple[str, str]:
     """Return the delimiter, "" for none, and the quote."""
     try:
-        from clevercsv import Detector
+        from clevercsv import Detector, Error
     except ImportError:
         raise TableError(
             "finding how a table is written needs clevercsv: pip install 'thenar[compiler]', or write a columns.toml"
         ) from None
-    found = Detector().detect(sample, delimiters=list(_DELIMITERS))
+    try:
+        found = Detector().detect(sample.replace("\0", ""), delimiters=list(_DELIMITERS))
+    except Error:
+        found = None
     return ("", "") if found is None else (found.delimiter or "", found.quotechar or "")
 
 

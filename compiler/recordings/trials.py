@@ -12,14 +12,11 @@ Value = TypeVar("Value", bound=np.generic)
 _DIGITS = re.compile(r"(\d+)")
 
 
-def natural_key(text: str) -> tuple[object, ...]:
+def natural_key(text: str) -> tuple[list[tuple[int, str]], str]:
     """Return what `text` is sorted by where numbers count as such: "T2" before "T10"."""
-    parts = _DIGITS.split(text.casefold())
+    parts = enumerate(_DIGITS.split(text.casefold()))
     # Digits by their length, then as text: int() takes no more than 4,300 of them.
-    return (
-        *((len(part.lstrip("0")), part.lstrip("0")) if odd % 2 else (-1, part) for odd, part in enumerate(parts)),
-        text,
-    )
+    return [(len(part.lstrip("0")), part.lstrip("0")) if odd % 2 else (-1, part) for odd, part in parts], text
 
 
 def numbered(columns: Sequence[NDArray[np.str_]]) -> tuple[NDArray[np.int64], list[str]]:

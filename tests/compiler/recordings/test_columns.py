@@ -115,7 +115,7 @@ def test_globs_heed_case() -> None:
         (Columns("grasp", switches=("s*", "s1")), "column 's1' is used 2 times"),
         (Columns("grasp", switches=("*",)), "column 'grasp' is used 2 times"),
         (Columns("grasp", subject="grasp", switches=("s*",)), "column 'grasp' is used 2 times"),
-        (Columns("grasp"), "no column is a switch or a joint"),
+        (Columns("grasp"), "no column is an input"),
     ],
 )
 def test_columns_that_do_not_fit_the_table_are_refused(columns: Columns, reason: str) -> None:
