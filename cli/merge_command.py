@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 from msgspec import Struct
 
-from .common import existing_file, json_flag, keep_apart, output_file, progress, show
+from .common import OutputFile, existing_file, json_flag, keep_apart, overwrite_flag, progress, show
 from .lines import echo
 
 
@@ -22,7 +22,8 @@ class Merged(Struct, frozen=True):
 
 @click.command("merge")
 @click.argument("sets", metavar="SET.grasps...", type=existing_file, nargs=-1, required=True)
-@click.option("-o", "--output", type=output_file, required=True, help="The .grasps file to write.")
+@click.option("-o", "--output", type=OutputFile(".grasps"), required=True, help="The .grasps file to write.")
+@overwrite_flag
 @click.option(
     "--each",
     type=click.Choice(["subject", "session", "object"]),
@@ -43,8 +44,6 @@ def command(sets: tuple[Path, ...], output: Path, each: str | None) -> None:
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.compiler.recordings.merging import merge
 
-    if output.suffix != ".grasps":
-        raise click.BadParameter(f"{output.name}: a set of grasps ends in .grasps", param_hint="--output")
     keep_apart(*sets, output)
     with progress(f"merging {len(sets)} sets"):
         merged = merge({str(path): GraspSet.load(path) for path in sets}, each)  # type: ignore[arg-type]

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 from msgspec import Struct
 
-from .common import any_path, existing_file, json_flag, progress, show
+from .common import OutputFolder, existing_file, json_flag, progress, show
 from .lines import echo
 
 
@@ -20,7 +20,9 @@ class Part(Struct, frozen=True):
 @click.command("split")
 @click.argument("grasps", metavar="SET.grasps", type=existing_file)
 @click.option("--by", type=click.Choice(["subject", "object", "session"]), required=True, help="What a file is of.")
-@click.option("-o", "--output", metavar="DIR", type=any_path, required=True, help="The folder to write files into.")
+@click.option(
+    "-o", "--output", metavar="DIR", type=OutputFolder(), required=True, help="The folder to write files into."
+)
 @click.option("--overwrite", is_flag=True, help="Replace files of the same names; other files stay.")
 @json_flag
 def command(grasps: Path, by: str, output: Path, overwrite: bool) -> None:
