@@ -150,7 +150,9 @@ class ListOf(Listed):
         super().__init__(kind, names)
         self._none = none
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, ...]:
+    def convert(  # type: ignore[override]
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, ...]:
         """Return the names, each once, in the order given. Raises BadParameter for a wrong one."""
         if isinstance(value, tuple):
             return value
