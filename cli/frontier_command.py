@@ -36,6 +36,11 @@ def _timed() -> tuple[str, ...]:
 @click.option("--budget-us", type=click.FloatRange(min=0, min_open=True), help="Pick the best within so long a frame.")
 @click.option("--rate", type=click.FloatRange(0, 1, min_open=True), help="Pick the fastest that recognises this share.")
 @click.option("--build", type=existing_folder, help="A build of yours: mark it on the pictures.")
+@click.option(
+    "--joint-us",
+    type=click.FloatRange(min=0, min_open=True),
+    help="What reading the joints takes.  [default: a CyberGlove's record; of other joints unknown, left out]",
+)
 @click.option("--stream", type=existing_file, help="A set of whole movements: measure decision latency on it.")
 @click.option(
     "--methods",
