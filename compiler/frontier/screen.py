@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..evaluation.rates import RepeatedRate as Counted
+from ..evaluation.rates import Rate as Counted
 from ..placement.methods.base import METHODS
 from ..samples import Columns
 from .points import Curve, Rate
@@ -28,7 +28,7 @@ class Screened:
 
 def rate_of(correct: tuple[int, ...], total: int) -> Rate:
     """Return the rate of so many rows of `total` recognised in each repeat, with its 95 % interval."""
-    counted = Counted.of(correct, total)
+    counted = Counted.counted(correct, total, of="pooled")
     return Rate(counted.mean, counted.low, counted.high)
 
 
