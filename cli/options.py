@@ -5,8 +5,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.shell_completion import CompletionItem
 
-from .common import Command, Listed, ListOf, Number
+from .common import Command, ListOf, Number, OneOf
 
 if TYPE_CHECKING:
     from thenar.compiler.placement.methods.base import Method
@@ -25,8 +26,24 @@ def _trainers() -> Iterable[str]:
     return TRAINERS
 
 
-method_name, trainer_name = Listed("method", _methods), Listed("trainer", _trainers)
+method_name, trainer_name = OneOf("method", _methods), OneOf("trainer", _trainers)
 method_list = ListOf("method", _methods, none=True)
+
+
+class _Scene(click.ParamType[str]):
+    """A shipped scene's name, or a file."""
+
+    name = "scene"
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        """Complete the names of shipped scenes, and of files."""
+        from thenar.simulator.scenes import shipped
+
+        names = [CompletionItem(name) for name in shipped() if name.startswith(incomplete)]
+        return [*names, CompletionItem(incomplete, type="file")]
+
+
+scene_name = _Scene()
 
 
 def method_option(destination: str = "method", default: str = "id3") -> Callable[[Command], Command]:
