@@ -19,7 +19,8 @@ from thenar.drivers.names import shortened
 from .lines import echo
 
 COMMANDS = (
-    *("simulate", "plan", "import", "export", "info", "place", "draw", "evaluate", "frontier", "compile", "verify"),
+    *("simulate", "plan", "import", "export", "merge", "split", "info", "place", "draw"),
+    *("evaluate", "frontier", "compile", "verify"),
     *("firmware", "spec", "run", "calibrate", "record", "emulate", "doctor", "stability"),
 )
 

@@ -72,6 +72,20 @@ def test_a_scene_can_be_changed_on_the_way(tmp_path: Path, capsys: Captured) -> 
     assert json.loads(capsys.readouterr().out)["subjects"] == ["C"]
 
 
+def test_fresh_grasps_are_asked_for_with_more_and_the_help_says_what_a_seed_draws(
+    tmp_path: Path, capsys: Captured
+) -> None:
+    path = tmp_path / "fresh.grasps"
+    assert run(["simulate", "quick", *SMALL, "--more", "3", "-o", str(path)]) == 0
+    assert "scene quick, seed 1, after repetition 1, 2 subject(s), 84 grasps" in capsys.readouterr().out
+    made = GraspSet.load(path)
+    assert made.simulated == "scene quick, seed 1, 3 more after 1 repetitions"
+    assert made.trials.min() >= 14
+    assert run(["simulate", "--help"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "habits, calibrations, the glove's parts, all grasps. The sizes of the hands stay." in said
+
+
 HASTY = "\n[effects.contact.quasistatic]\nmost_steps = 12\n"
 
 
