@@ -20,8 +20,8 @@ from ..pipeline.batch import Batch, Integers
 from ..pipeline.effect import at_a_time, hold_frame
 from ..planning.postures import Postures
 from ..scenes.scene import Scene, Subject
-from ..streams import Draw, Draws, Site
-from .pipeline import Ledger, Pipeline, compile_pipeline
+from ..streams import Draw, Draws
+from .pipeline import Ledger, compile_pipeline
 from .report import (
     Codes,
     Notes,
@@ -78,26 +78,17 @@ def conditions_of(scene: Scene, subject: Subject, postures: Postures) -> tuple[C
 def session_of(scene: Scene, conditions: tuple[Condition, ...]) -> Session:
     """Return the session of the subject whose conditions these are."""
     repetitions = [share for _, share in scene.shares() if share]
-    words = [_words(scene.seed, each, count) for each, count in zip(conditions, repetitions, strict=True)]
-    return _shuffled(conditions, words)
-
-
-def _words(seed: int, condition: Condition, repetitions: int) -> NDArray[np.uint64]:
-    site = Site(condition.subject, condition.grasp, condition.thing.name, np.arange(repetitions))
-    return Draw(seed, ORDER, site, Draws()).per_repetition().words
-
-
-def _shuffled(found: tuple[Condition, ...], words: list[NDArray[np.uint64]]) -> Session:
-    """Put all repetitions in the order of one random word each: no other repetition, type or object changes a word."""
-    counts = [len(each) for each in words]
-    owner = np.repeat(np.arange(len(found)), counts)
+    sites = [each.site(np.arange(count)) for each, count in zip(conditions, repetitions, strict=True)]
+    # In the order of one random word each: no other repetition, type or object changes a word.
+    words = [Draw(scene.seed, ORDER, site, Draws()).per_repetition().words for site in sites]
+    owner = np.repeat(np.arange(len(conditions)), repetitions)
     order = np.argsort(np.concatenate(words), kind="stable")
     trials = np.empty(len(order), dtype=np.int64)
     trials[order] = np.arange(len(order))
     return Session(
-        conditions=found,
-        trials=tuple(np.split(trials, np.cumsum(counts)[:-1])),
-        planned_deg=np.stack([condition.held.posture_deg for condition in found]),
+        conditions=conditions,
+        trials=tuple(np.split(trials, np.cumsum(repetitions)[:-1])),
+        planned_deg=np.stack([condition.held.posture_deg for condition in conditions]),
         before=owner[np.concatenate([order[:1], order[:-1]])],
     )
 
@@ -176,9 +167,7 @@ def _groups(plan: Sequence[Session], block: int) -> Iterator[_Batches]:
         first += len(session.conditions)
 
 
-@lru_cache(maxsize=1)
-def _pipeline(scene: Scene, without: str | None) -> Pipeline:
-    return compile_pipeline(scene, without)
+_pipeline = lru_cache(maxsize=1)(compile_pipeline)
 
 
 def _run(scene: Scene, without: str | None, keep_unsettled: bool, batches: _Batches) -> _Done:
