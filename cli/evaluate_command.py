@@ -10,12 +10,14 @@ from rich.text import Text
 from thenar.compiler.text import interval
 
 from .common import (
+    OutputFile,
+    OutputFolder,
     existing_file,
     jobs_option,
     json_flag,
     keep_apart,
     out,
-    output_file,
+    overwrite_flag,
     parted,
     progress,
     show,
@@ -23,7 +25,7 @@ from .common import (
     warning,
     write_json,
 )
-from .options import Training, asked_settings, method_names, trainer_option
+from .options import Training, asked_settings, method_list, trainer_option
 
 if TYPE_CHECKING:
     from rich.table import Table as Grid
@@ -51,14 +53,11 @@ def _tables(_: click.Context, __: click.Parameter, value: str) -> tuple[str, ...
 
 
 def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, ...]:
-    return ("paper", "honest") if value == "both" else (value,)
+    return ("paper", "nested") if value == "both" else (value,)
 
 
 def _scheme(_: click.Context, __: click.Parameter, value: str | None) -> str:
-    return value or "stratified"
-
-
-_FOLDER = click.Path(file_okay=False, path_type=Path)
+    return value or "trial"
 
 
 @click.command(cls=Training)
@@ -93,7 +92,7 @@ _FOLDER = click.Path(file_okay=False, path_type=Path)
     "--protocol",
     "protocols",
     callback=_protocols,
-    type=click.Choice(("both", "paper", "honest")),
+    type=click.Choice(("both", "paper", "nested")),
     default="both",
     show_default=True,
     help="Whose rows choose the placement.",
@@ -102,7 +101,7 @@ _FOLDER = click.Path(file_okay=False, path_type=Path)
 @jobs_option()
 @click.option(
     "--rivals",
-    callback=method_names,
+    type=method_list,
     default="cmim,mutual-information",
     show_default=True,
     help="Methods to compare ID3 with, by commas.",
@@ -111,8 +110,11 @@ _FOLDER = click.Path(file_okay=False, path_type=Path)
     "--tables", callback=_tables, metavar="NAME,...", default=",".join(TABLES), show_default=True, help="Which tables."
 )
 @click.option("--confusion", is_flag=True, help="Print the confusion matrix of every composition and subject.")
-@click.option("--plot", "folder", type=_FOLDER, metavar="FOLDER", help="Draw the confusion matrices there.")
-@click.option("-o", "--output", type=output_file, metavar="FILE", help="Write the whole result there, as JSON.")
+@click.option(
+    "--plot", "folder", type=OutputFolder(fresh=True), metavar="FOLDER", help="Draw the confusion matrices there."
+)
+@click.option("-o", "--output", type=OutputFile(".json"), metavar="FILE", help="Write the whole result there, as JSON.")
+@overwrite_flag
 @json_flag
 @click.pass_context
 def command(
@@ -128,13 +130,13 @@ def command(
     """Cross-validate GRASPS and print the paper's tables: recognition rates in percent, with 95 % intervals.
 
     Every rate comes under two protocols: `paper` chooses the placement from all rows, as the paper did (optimistic);
-    `honest` chooses it inside each training fold. What ID3 is worth shows beside random and information-greedy
+    `nested` chooses it inside each training fold. What ID3 is worth shows beside random and information-greedy
     placements of as many switches.
 
     \b
     Example:
         thenar evaluate set.grasps
-        thenar evaluate set.grasps --by subject --protocol honest --plot pictures/ -o result.json
+        thenar evaluate set.grasps --by subject --protocol nested --plot pictures/ -o result.json
     """
     from thenar.compiler.evaluation.study import Options, evaluate
     from thenar.compiler.recordings.graspset import GraspSet
@@ -187,11 +189,11 @@ def _print(study: "Study", *, confusion: bool) -> None:
 
 
 def _rates(rated: "RateTable") -> "Grid":
-    averaged = ["average"] if len(rated.columns) > 1 else []
+    averaged = ["all"] if len(rated.columns) > 1 else []
     numbers = ("switches", *rated.columns, *averaged)
     grid = table(("", "", *numbers), numbers)
     for row in rated.rows:
-        average = [Text(interval(row.average))] if averaged else []
+        average = [Text(interval(row.rate))] if averaged else []
         rates = [Text(str(cell)) for cell in row.cells]
         grid.add_row(Text(row.name), Text(row.what), str(row.switches), *rates, *average)
     return grid

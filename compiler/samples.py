@@ -1,6 +1,6 @@
 """What is learnt from: the rows of a training set, as plain arrays."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,9 @@ class Samples:
         Class numbers, that index `grasps`.
     grasps : tuple of str
         The grasp types. A fold keeps all of them, whether they occur in it or not.
+    trials, subjects : ndarray of intp, shape (n,), optional
+        The number of each row's trial and subject: what is chosen by inner folds must not part them. None given: each
+        row is a trial of its own, of one subject.
 
     Raises
     ------
@@ -50,13 +53,20 @@ class Samples:
     codes: NDArray[np.uint16]
     labels: NDArray[np.intp]
     grasps: tuple[str, ...]
+    trials: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
+    subjects: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
 
     def __post_init__(self) -> None:
-        rows = {len(part) for part in (self.switches, self.codes, self.labels)}
+        if not self.trials.size:
+            object.__setattr__(self, "trials", np.arange(len(self.labels)))
+        if not self.subjects.size:
+            object.__setattr__(self, "subjects", np.zeros(len(self.labels), np.intp))
+        rows = {len(part) for part in (self.switches, self.codes, self.labels, self.trials, self.subjects)}
         if len(rows) != 1 or self.switches.ndim != 2 or self.codes.ndim != 2 or self.labels.ndim != 1:
             raise SamplesError(
-                f"switches {self.switches.shape}, codes {self.codes.shape} and labels {self.labels.shape} must be "
-                f"(n, s), (n, j) and (n,) of the same n rows"
+                f"switches {self.switches.shape}, codes {self.codes.shape}, labels {self.labels.shape}, trials "
+                f"{self.trials.shape} and subjects {self.subjects.shape} must be (n, s), (n, j), (n,), (n,) and (n,) "
+                "of the same n rows"
             )
         if not rows.pop():
             raise SamplesError("nothing can be learnt from a set without rows")
@@ -73,6 +83,8 @@ class Samples:
             codes=grasp_set.codes[:, : None if inputs != "switches" else 0],
             labels=labels,
             grasps=tuple(grasp_set.taxonomy.types[label] for label in found),
+            trials=grasp_set.trial_ids,
+            subjects=np.unique(grasp_set.subjects, return_inverse=True)[1],
         )
 
     @property
@@ -87,11 +99,18 @@ class Samples:
 
     def rows(self, chosen: NDArray[np.intp] | NDArray[np.bool_]) -> "Samples":
         """Return some of the rows, by number or by mask (n,)."""
-        return Samples(self.switches[chosen], self.codes[chosen], self.labels[chosen], self.grasps)
+        return Samples(
+            self.switches[chosen],
+            self.codes[chosen],
+            self.labels[chosen],
+            self.grasps,
+            self.trials[chosen],
+            self.subjects[chosen],
+        )
 
     def keeping(self, columns: Columns) -> "Samples":
         """Return the same rows with the switches `columns` alone, in their order, and all joints."""
-        return Samples(self.switches[:, list(columns)], self.codes, self.labels, self.grasps)
+        return replace(self, switches=self.switches[:, list(columns)])
 
     @property
     def inputs(self) -> NDArray[np.uint16]:

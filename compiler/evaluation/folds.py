@@ -81,6 +81,25 @@ def weka_folds(labels: ArrayLike, n_folds: int, seed: int) -> list[Fold]:
     return [_cut(order, n_folds, fold, random) for fold in range(n_folds)]
 
 
+def trial_folds(labels: ArrayLike, trials: NDArray[np.intp], n_folds: int, seed: int) -> list[Fold]:
+    """Return stratified folds of rows (n,) that part no trial: rows of one number in `trials` (n,) stay together.
+
+    The trials, in the order of their first rows, are cut as `weka_folds` cuts rows; where each row is a trial of its
+    own, these are Weka's folds. All rows of a trial have one label. Raises EvaluationError as `weka_folds` does.
+    """
+    _, first, number = np.unique(trials, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    number = np.argsort(order)[number]
+    rows, starts = np.argsort(number, kind="stable"), np.concatenate([[0], np.cumsum(np.bincount(number))])
+    check_cut(len(order), n_folds, "trials" if len(order) < len(number) else "rows")
+
+    def expanded(chosen: Rows) -> Rows:
+        return np.concatenate([rows[starts[trial] : starts[trial + 1]] for trial in chosen.tolist()])
+
+    folds = weka_folds(np.asarray(labels)[first[order]], n_folds, seed)
+    return [Fold(expanded(fold.train), expanded(fold.test), fold.name) for fold in folds]
+
+
 def check_cut(n_parts: int, n_folds: int, what: str) -> None:
     """Raise EvaluationError unless `n_parts` `what` can be cut into `n_folds` folds that all have some."""
     if n_folds < 2:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..evaluation.rates import RepeatedRate as Counted
+from ..evaluation.rates import Rate as Counted
 from ..placement.methods.base import METHODS
 from ..samples import Columns
 from .points import Curve, Rate
@@ -28,7 +28,7 @@ class Screened:
 
 def rate_of(correct: tuple[int, ...], total: int) -> Rate:
     """Return the rate of so many rows of `total` recognised in each repeat, with its 95 % interval."""
-    counted = Counted.of(correct, total)
+    counted = Counted.counted(correct, total, of="pooled")
     return Rate(counted.mean, counted.low, counted.high)
 
 
@@ -69,7 +69,7 @@ def _frames_us(survey: Survey, choices: Sequence[Candidate]) -> dict[Candidate, 
         calls.append(price.call(QUICK_PRICE_S, rows, names, columns, (_TABLED,), training, survey.equipment, None))
     found = {}
     for choice, (priced,) in zip(choices, survey.cache.ask("times", calls), strict=True):
-        us = priced.fastest_us(survey.n_joints if choice.joints else 0)
+        us = priced.fastest_us(survey.equipment.joints.us if choice.joints else 0.0)
         if us is not None and (priced.wired or choice.way == NO_SWITCHES):
             found[choice] = us
     return found

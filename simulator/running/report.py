@@ -207,6 +207,7 @@ class Report(msgspec.Struct, frozen=True):
     """A simulation: what came out by grasp type, what each step cost, and what did not settle.
 
     simulated       True, so that nobody takes a result for a recording
+    done            repetitions of each grasp type that were made before these
     seconds         from start to end, on all workers
     lost_frames     frames that did not arrive
     kept_unsettled  whether repetitions that did not settle are in the set all the same
@@ -215,6 +216,7 @@ class Report(msgspec.Struct, frozen=True):
     simulated: bool
     scene: str
     seed: int
+    done: int
     subjects: tuple[str, ...]
     repetitions: int
     rows: int

@@ -45,20 +45,25 @@ ORDER = "session.order"  # the draw site of the order of trials
 class Session:
     """The trials of one subject: p conditions in the order of the scene's objects, t trials.
 
-    trials      an array a condition: the trial of each of its repetitions
+    first       (p,)     the number of each condition's first repetition
+    done        trials that were made before
+    trials      an array a condition: the trial of each of its repetitions, counted from these
     planned_deg (p, 20)  the conditions' planned postures
     before      (t,)     the condition of the trial before each trial; of the first: its own
     """
 
     conditions: tuple[Condition, ...]
+    first: tuple[int, ...]
+    done: int
     trials: tuple[Integers, ...]
     planned_deg: Floats
     before: Integers
 
     def batch(self, place: int, repetitions: Integers) -> Batch:
-        """Return some repetitions (n,) of a condition of the session, ready for the pipeline."""
+        """Return some repetitions (n,) of a condition of the session, its first is 0, ready for the pipeline."""
         trials = self.trials[place][repetitions]
-        return Batch(self.conditions[place], repetitions, trials, self.planned_deg[self.before[trials]])
+        numbers = self.first[place] + repetitions
+        return Batch(self.conditions[place], numbers, self.done + trials, self.planned_deg[self.before[trials]])
 
 
 def sessions(scene: Scene, postures: Postures) -> tuple[Session, ...]:
@@ -77,17 +82,20 @@ def conditions_of(scene: Scene, subject: Subject, postures: Postures) -> tuple[C
 
 def session_of(scene: Scene, conditions: tuple[Condition, ...]) -> Session:
     """Return the session of the subject whose conditions these are."""
-    repetitions = [share for _, share in scene.shares() if share]
-    sites = [each.site(np.arange(count)) for each, count in zip(conditions, repetitions, strict=True)]
-    # In the order of one random word each: no other repetition, type or object changes a word.
+    numbers = [share for _, share in scene.shares() if share]
+    sites = [each.site(np.array(share)) for each, share in zip(conditions, numbers, strict=True)]
+    # All repetitions in the order of one random word each: no other repetition, type or object changes a word.
     words = [Draw(scene.seed, ORDER, site, Draws()).per_repetition().words for site in sites]
-    owner = np.repeat(np.arange(len(conditions)), repetitions)
+    counts = [len(each) for each in words]
+    owner = np.repeat(np.arange(len(conditions)), counts)
     order = np.argsort(np.concatenate(words), kind="stable")
     trials = np.empty(len(order), dtype=np.int64)
     trials[order] = np.arange(len(order))
     return Session(
         conditions=conditions,
-        trials=tuple(np.split(trials, np.cumsum(repetitions)[:-1])),
+        first=tuple(share.start for share in numbers),
+        done=scene.done * scene.types,
+        trials=tuple(np.split(trials, np.cumsum(counts)[:-1])),
         planned_deg=np.stack([condition.held.posture_deg for condition in conditions]),
         before=owner[np.concatenate([order[:1], order[:-1]])],
     )
@@ -203,8 +211,7 @@ def _set_of(scene: Scene, plan: Sequence[Session], rows: Rows) -> GraspSet:
     conditions = [condition for session in plan for condition in session.conditions]
     switches = tuple(patch.name for patch in murakami160())
     joints = raw_joints() if scene.glove.codes == "raw" else common_joints()
-    simulated = f"scene {scene.name}, seed {scene.seed}"
-    return grasp_set(rows, conditions, switches, joints, published(scene.taxonomy), simulated)
+    return grasp_set(rows, conditions, switches, joints, published(scene.taxonomy), scene.origin)
 
 
 def _report(scene: Scene, rows: Rows, found: GraspSet, made: _Done, seconds: float, *, keep_unsettled: bool) -> Report:
@@ -212,6 +219,7 @@ def _report(scene: Scene, rows: Rows, found: GraspSet, made: _Done, seconds: flo
         simulated=True,
         scene=scene.name,
         seed=scene.seed,
+        done=scene.done,
         subjects=tuple(subject.name for subject in scene.subjects),
         repetitions=sum(note.repetitions for note in made.notes),
         rows=len(rows),

@@ -6,7 +6,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.evaluation.folds import EvaluationError, Fold, JavaRandom, block_folds, leave_one_out, weka_folds
+from thenar.compiler.evaluation.folds import (
+    EvaluationError,
+    Fold,
+    JavaRandom,
+    block_folds,
+    leave_one_out,
+    trial_folds,
+    weka_folds,
+)
 
 seeds = st.integers(-(2**63), 2**63 - 1)
 
@@ -53,6 +61,23 @@ def test_a_draw_from_the_incomplete_last_run_is_thrown_away() -> None:
 def test_a_bound_that_java_refuses_is_refused(bound: int) -> None:
     with pytest.raises(ValueError, match="bound"):
         JavaRandom(1).next_int(bound)
+
+
+@given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, 3)), min_size=2, max_size=60), seeds, st.integers(2, 5))
+def test_no_fold_parts_a_trial_and_trials_are_cut_as_weka_cuts_rows(
+    frames: list[tuple[int, int]], seed: int, n_folds: int
+) -> None:
+    """The label of a frame is a part of its trial's name."""
+    names = list(dict.fromkeys(frames))
+    trials, labels = np.array([names.index(frame) for frame in frames]), np.array([label for _, label in frames])
+    if len(names) < n_folds:
+        with pytest.raises(EvaluationError, match="cannot be cut"):
+            trial_folds(labels, trials, n_folds, seed)
+        return
+    expected = weka_folds([label for _, label in names], n_folds, seed)
+    for fold, of_trials in zip(trial_folds(labels, trials, n_folds, seed), expected, strict=True):
+        for rows, chosen in ((fold.train, of_trials.train), (fold.test, of_trials.test)):
+            assert rows.tolist() == [row for trial in chosen for row in np.flatnonzero(trials == trial)]
 
 
 GOLDENS = ("bin3", "bin14nom", "dupfeat", "missing", "twoclass", "separable", "rare", "paper14")

@@ -13,9 +13,12 @@ from thenar.compiler.recordings import graspset
 from thenar.compiler.recordings.errors import RecordingError
 from thenar.compiler.recordings.graspset import Joint
 
+PAD, PADS = Joint("pad", "N", 0, 0.0, 4095, 20.0), np.array([[0], [4095], [65535], [1], [2], [3]], np.uint16)
+
 
 def fields(grasp_set: GraspSet) -> dict[str, Any]:
     names = ["switches", "switch_names", "codes", "joints", "grasps", "taxonomy", "subjects", "objects", "trials"]
+    names += ["sessions", "independent", "taxels", "taxel_columns"]
     return {name: getattr(grasp_set, name) for name in names}
 
 
@@ -35,7 +38,7 @@ def test_rows_picks_every_array_alike(data: st.DataObject, grasp_sets: st.Search
     grasp_set = data.draw(grasp_sets)
     index = data.draw(st.lists(st.integers(0, len(grasp_set) - 1), max_size=5))
     picked = grasp_set.rows(index)
-    for name in ("switches", "codes", "grasps", "subjects", "objects", "trials", "labels"):
+    for name in ("switches", "codes", "grasps", "subjects", "objects", "sessions", "trials", "labels"):
         assert getattr(picked, name).tolist() == [getattr(grasp_set, name)[row].tolist() for row in index]
     mask = np.zeros(len(grasp_set), bool)
     mask[index] = True
@@ -46,7 +49,7 @@ def test_arrays_have_the_promised_types_and_cannot_be_written(small: GraspSet) -
     kinds = {name: getattr(small, name).dtype.kind for name in ("switches", "codes", "grasps", "trials", "labels")}
     assert kinds == {"switches": "b", "codes": "u", "grasps": "U", "trials": "i", "labels": "i"}
     assert small.codes.dtype == np.uint16
-    for name in ("switches", "codes", "grasps", "subjects", "objects", "trials", "labels"):
+    for name in ("switches", "codes", "grasps", "subjects", "objects", "sessions", "trials", "labels"):
         with pytest.raises(ValueError, match="read-only"):
             getattr(small, name)[0] = getattr(small, name)[1]
 
@@ -97,14 +100,62 @@ def test_the_fingerprint_sees_every_field_and_nothing_else(small: GraspSet) -> N
         {name: getattr(small, name)[::-1]} for name in ("switches", "codes", "grasps", "subjects", "trials")
     ]
     changes += [{"objects": np.array(["mug"] * 5 + ["cup"])}, {"switch_names": ("a", "b", "c", "d")}]
+    changes += [{"sessions": np.array(["1"] * 5 + ["2"])}, {"independent": True}]
+    changes += [{"taxels": PADS, "taxel_columns": (PAD,)}, {"taxels": PADS[::-1], "taxel_columns": (PAD,)}]
+    changes += [{"taxels": PADS, "taxel_columns": (replace(PAD, unit="kg"),)}]
     changes += [{"joints": (replace(small.joints[0], value_a=-11.0), small.joints[1])}]
     prints = {GraspSet(**fields(small) | change).fingerprint() for change in changes}
     assert len(prints | {small.fingerprint()}) == len(changes) + 1
 
 
-def test_load_is_the_inverse_of_save(small: GraspSet, tmp_path: Path) -> None:
-    small.save(tmp_path / "set.grasps")
-    assert GraspSet.load(str(tmp_path / "set.grasps")).fingerprint() == small.fingerprint()
+@pytest.mark.parametrize("change", [{}, {"taxels": PADS, "taxel_columns": (PAD,)}], ids=["plain", "taxels"])
+def test_load_is_the_inverse_of_save(small: GraspSet, tmp_path: Path, change: dict[str, Any]) -> None:
+    grasp_set = GraspSet(**fields(small) | change)
+    grasp_set.save(tmp_path / "set.grasps")
+    loaded = GraspSet.load(str(tmp_path / "set.grasps"))
+    assert loaded.fingerprint() == grasp_set.fingerprint()
+    assert loaded.taxels.tolist() == grasp_set.taxels.tolist()
+
+
+def test_taxels_are_columns_beside_the_switches(small: GraspSet) -> None:
+    grasp_set = GraspSet(**fields(small) | {"taxels": PADS, "taxel_columns": (PAD,)})
+    assert grasp_set.element_names == (*small.switch_names, "pad")
+    assert grasp_set.rows([1, 0]).taxels.tolist() == [[4095], [0]]
+    assert "4 switches, 1 taxels, 2 joints" in repr(grasp_set)
+    alone = {"switch_names": (), "switches": np.zeros((6, 0)), "joints": (), "codes": np.zeros((6, 0))}
+    assert GraspSet(**fields(grasp_set) | alone).element_names == ("pad",)
+    for change, reason in (
+        ({"taxels": PADS[:5]}, r"taxels has shape \(5, 1\), not \(6, 1\)"),
+        ({"taxel_columns": (replace(PAD, name="index"),)}, "column 'index' occurs twice"),
+    ):
+        with pytest.raises(RecordingError, match=reason):
+            GraspSet(**fields(grasp_set) | change)
+
+
+@given(data=st.data())
+@settings(deadline=None)
+def test_a_trial_is_a_subject_a_type_an_object_a_session_and_a_number(
+    data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet]
+) -> None:
+    grasp_set = data.draw(grasp_sets)
+    grasp_set = grasp_set.rows(data.draw(st.lists(st.integers(0, len(grasp_set) - 1), max_size=20)))
+    sessions = np.array([data.draw(st.sampled_from("12")) for _ in range(len(grasp_set))], np.str_)
+    grasp_set = GraspSet(**fields(grasp_set) | {"sessions": sessions, "independent": data.draw(st.booleans())})
+    each = (grasp_set.subjects, grasp_set.grasps, grasp_set.objects, grasp_set.sessions, grasp_set.trials)
+    keys = list(zip(*(column.tolist() for column in each), strict=True))
+    number = {key: place for place, key in enumerate(dict.fromkeys(keys))}
+    expected = range(len(keys)) if grasp_set.independent else [number[key] for key in keys]
+    assert grasp_set.trial_ids.tolist() == list(expected)
+
+
+def test_a_file_has_format_2_only_where_sessions_taxels_or_the_claim_need_it(small: GraspSet, tmp_path: Path) -> None:
+    formats = []
+    pads = {"taxels": PADS, "taxel_columns": (PAD,)}
+    changes: list[dict[str, Any]] = [{}, {"sessions": np.array(["1"] * 5 + ["2"])}, {"independent": True}, pads]
+    for change in changes:
+        GraspSet(**fields(small) | change).save(tmp_path / "set.grasps")
+        formats.append((tmp_path / "set.grasps").read_bytes()[8])
+    assert formats == [1, 2, 2, 2]
 
 
 def test_a_joint_reads_codes_as_values_by_its_two_points() -> None:
