@@ -97,7 +97,7 @@ def command(
 ) -> int:
     """Show what accuracy costs in time: which switches, joints, rounds, tables, wirings and decisions are worth it.
 
-    Every placement is screened by an honest cross-validation; those near the front are looked at closely, priced for
+    Every placement is screened by a nested cross-validation; those near the front are looked at closely, priced for
     the target, simulated there, and put on one picture. OUTPUT gets frontier.json, frontier.csv, three pictures and
     store.jsonl, from which an interrupted run goes on.
 

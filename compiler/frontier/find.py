@@ -94,7 +94,7 @@ def find_frontier(
 ) -> Frontier:
     """Find what accuracy costs in time: which switches, joints, rounds, tables, wirings and decisions are worth it.
 
-    Every placement is screened by an honest cross-validation; those near the front are looked at closely, priced for
+    Every placement is screened by a nested cross-validation; those near the front are looked at closely, priced for
     the target, and simulated there.
 
     Parameters

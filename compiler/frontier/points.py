@@ -101,7 +101,7 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     number      what `compile --from frontier.json --point` takes
     switches    names of the kept switches, in the order in which they were chosen from all rows
-    rate        honest, repeated folds; left_out: each subject recognised from the others (None: only one subject)
+    rate        nested, repeated folds; left_out: each subject recognised from the others (None: only one subject)
     scan        reading the switches (the mean where it ends early); transfer: the joints
     frame       max(scan, transfer) + classify: the two lie on lines of their own
     flash, ram  bytes of the classifier on its target; of the tables alone on host and pi

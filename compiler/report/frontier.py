@@ -277,7 +277,7 @@ def _notes(frontier: Frontier) -> Iterator[str]:
     yield (
         f"{frontier.combinations:,} combinations of {frontier.source}: {counted(frontier.rows, 'row')}, "
         f"{counted(frontier.subjects, 'subject')}, {counted(frontier.n_switches, 'switch', 'switches')}, "
-        f"{counted(frontier.n_joints, 'joint')}; target {frontier.target}. Rates are honest: {frontier.folds} folds, "
+        f"{counted(frontier.n_joints, 'joint')}; target {frontier.target}. Rates are nested: {frontier.folds} folds, "
         f"{counted(frontier.repeats, 'repeat')}, placements chosen within the training folds; with 95{NBSP}% intervals."
     )
     if frontier.wanted and frontier.picked is not None:

@@ -73,7 +73,7 @@ def confusion_view(title: str, grasps: Sequence[str], counts: NDArray[np.intp]) 
 
 
 def confusions(content: ReportContent) -> Iterator[ConfusionView]:
-    """Yield the build's own matrix, then those of the compositions, honest folds, all subjects together."""
+    """Yield the build's own matrix, then those of the compositions, nested folds, all subjects together."""
     if content.confusion is not None:
         rate = honest_rate(content.manifest)
         folds = "honest folds" if rate is None else counted(rate.folds, "honest fold")
@@ -87,7 +87,7 @@ def confusions(content: ReportContent) -> Iterator[ConfusionView]:
             for row in table.rows:
                 counts = [cell.confusion for cell in row.cells if cell.confusion is not None]
                 if counts:
-                    title = f"{row.name}: {row.what}, honest folds of {whose}"
+                    title = f"{row.name}: {row.what}, nested folds of {whose}"
                     yield confusion_view(title, content.study.grasps, np.sum(counts, axis=0))
 
 
