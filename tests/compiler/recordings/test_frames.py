@@ -1,3 +1,4 @@
+import runpy
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler.evaluation.folds import EvaluationError
+from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.recordings.frames import check_trials, looks_like_frames
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.importer import import_file
@@ -130,3 +132,32 @@ def test_no_shipped_scene_is_taken_for_frames_but_where_its_frames_are_numbered_
     assert looks_like_frames(made) is None
     several = len(made) > made.trial_ids.max() + 1
     assert (looks_like_frames(misnamed(made, "row")) is not None) == several
+
+
+@pytest.fixture(scope="module")
+def apertures(r2g_table: Path) -> GraspSet:
+    """29 adults, 12 frames a trial: blocks of one hand and one action, in which neighbouring trials are alike."""
+    return import_file(r2g_table, COLUMNS / "r2g.toml")[0]
+
+
+@pytest.mark.slow
+def test_real_frames_are_found_and_real_trials_in_blocks_are_none(apertures: GraspSet) -> None:
+    assert apertures.trial_ids.max() + 1 == 1370
+    assert looks_like_frames(apertures) is None
+    assert looks_like_frames(misnamed(apertures, "row"))
+    assert looks_like_frames(apertures.rows(np.unique(apertures.trial_ids, return_index=True)[1])) is None
+
+
+@pytest.mark.slow
+def test_real_frames_in_random_folds_leak_and_persons_apart_show_it(apertures: GraspSet) -> None:
+    leaks = runpy.run_path(str(COLUMNS.parents[1] / "benchmarks" / "leaks.py"))["rates"](apertures)
+    frames = {name.split()[0]: both[1] for name, both in leaks.items()}
+    trials = {name.split()[0]: both[0] for name, both in leaks.items()}
+    assert frames["frames"].mean == pytest.approx(0.995, abs=0.003)
+    assert frames["persons"].mean == pytest.approx(0.80, abs=0.005)
+    assert trials["persons"].what == "new subject, trials"
+    assert trials["persons"].over == 29
+    assert frames["persons"].high < trials["trials"].low < frames["frames"].low
+    # The interval over persons is over twice as wide as one of frames that each count for themselves.
+    alone = Rate.counted(frames["persons"].correct, frames["persons"].total, of="new subject")
+    assert frames["persons"].high - frames["persons"].low > 2.2 * (alone.high - alone.low)
