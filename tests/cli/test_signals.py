@@ -48,9 +48,9 @@ def material(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("material")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        assert run("simulate quick -o set.grasps --repetitions 3 --jobs 1".split()) == 0
-        assert run("simulate crowd -o crowd.grasps --repetitions 1 --jobs 2".split()) == 0
-        assert run("compile set.grasps -o build --rounds 3 --folds 0 --no-report".split()) == 0
+        assert run(["simulate", "quick", "-o", "set.grasps", "--repetitions", "3", "--jobs", "1"]) == 0
+        assert run(["simulate", "crowd", "-o", "crowd.grasps", "--repetitions", "1", "--jobs", "2"]) == 0
+        assert run(["compile", "set.grasps", "-o", "build", "--rounds", "3", "--folds", "0", "--no-report"]) == 0
     return folder
 
 
