@@ -136,10 +136,9 @@ def test_a_frontier_leaves_the_unknown_time_of_joints_out_and_says_so_or_takes_w
     thenar: Thenar, grasps: Path, tmp_path: Path
 ) -> None:
     few = ("--methods", "id3", "--rivals", "none", "--rounds", 5, "--repeats", 1, "--finalists", 1, "--jobs", 1)
-    few += ("--target", "avr328p")
     found = {}
     for name, more in (("left out", ()), ("given", ("--joint-us", 5000))):
-        said = worked(thenar("frontier", grasps, "-o", tmp_path / name, *few, *more))
+        said = worked(thenar("frontier", grasps, "-o", tmp_path / name, *few, "--target", "avr328p", *more))
         assert ("what reading the joints (flex_thumb, flex_index) takes is not known" in said) == (name == "left out")
         points = json.loads((tmp_path / name / "frontier.json").read_text())["points"]
         found[name] = [point for point in points if point["setting"]["inputs"] != "switches"]
