@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from thenar.runtime.manifest import Inputs
 
+from ..evaluation.rates import Rate
 from ..pictures import painting, rendered
 from ..text import counted, duration, percent
 from .labels import FAINT, LINE, Label, Labels
-from .points import Curve, Frontier, Mark, Point, Rate, Tried, front
+from .points import Curve, Frontier, Mark, Point, Tried, front
 from .words import featured, inputs_of, shorten
 
 if TYPE_CHECKING:

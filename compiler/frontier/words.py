@@ -7,13 +7,14 @@ from collections.abc import Iterable, Iterator
 from thenar.runtime.manifest import Options
 from thenar.runtime.names import printable
 
+from ..evaluation.rates import Rate
 from ..text import cells, counted, duration, interval, listed, percent
-from .points import Frontier, Mark, Point, Rate, Recipe, Time
+from .points import Frontier, Mark, Point, Recipe, Time
 
 COLUMNS = (
     *("number", "fronts", "n_switches", "inputs", "method", "parameter", "rounds", "width", "layout"),
-    *("wiring", "clock_hz", "scan", "decision", "rate", "rate_low", "rate_high"),
-    *("left_out", "left_out_low", "left_out_high", "scan_us", "scan_how", "transfer_us", "transfer_how"),
+    *("wiring", "clock_hz", "scan", "decision", "rate_of", "rate", "rate_low", "rate_high", "luck"),
+    *("beside_of", "beside", "beside_low", "beside_high", "scan_us", "scan_how", "transfer_us", "transfer_how"),
     *("classify_us", "classify_how", "frame_us", "frame_how", "latency_mean_us", "latency_p99_us", "missed", "wrong"),
     *("flash", "ram", "ports", "chips", "compile_s", "switches"),
 )
@@ -115,7 +116,7 @@ def _mark(mark: Mark) -> str:
 def csv_bytes(frontier: Frontier) -> bytes:
     """Return `frontier.csv`: UTF-8, a line of COLUMNS, perhaps with TRAINER_COLUMNS, and a line for each point.
 
-    Rates are in 0..1, times in microseconds (compile_s: seconds), a missing `left_out` is empty. `fronts`, `switches`
+    Rates are in 0..1, times in microseconds (compile_s: seconds), a missing `beside` is empty. `fronts`, `switches`
     and `settings` are lists in their cell, parted by semicolons; what holds a semicolon or a quote is quoted as CSV
     quotes.
     """
@@ -126,16 +127,17 @@ def csv_bytes(frontier: Frontier) -> bytes:
     for point in frontier.points:
         setting = point.setting
         trained = () if usual else (setting.trainer, _list(_settings(setting)))
-        rows.writerow(cells((*_values(point), *trained)))
+        rows.writerow(cells((*_values(point, frontier), *trained)))
     return file.getvalue().encode()
 
 
-def _values(point: Point) -> Iterator[object]:
+def _values(point: Point, frontier: Frontier) -> Iterator[object]:
     setting, latency = point.setting, point.latency
     yield from (point.number, _list(point.fronts), len(point.switches), setting.inputs)
     yield from (setting.way.method, setting.way.parameter, setting.rounds, setting.width, setting.layout)
     yield from (setting.wiring, setting.clock_hz, setting.scan, setting.decision)
-    yield from (*_rate(point.rate), *_rate(point.left_out))
+    yield from (frontier.by, *_rate(point.rate), point.luck)
+    yield from (frontier.beside, *_rate(point.beside))
     for time in (point.scan, point.transfer, point.classify, point.frame):
         yield from _time(time)
     yield from (latency.mean_us, latency.p99_us, latency.missed, latency.wrong)

@@ -86,7 +86,7 @@ def frontier_view(
     """
     if hand is not None and not all(hand.knows(point.switches) for point in frontier.points):
         hand = None
-    details = {point.number: _detail(point, frontier.source, hand) for point in frontier.points}
+    details = {point.number: _detail(point, frontier, hand) for point in frontier.points}
     first = featured(frontier) if built is None else frontier.point(built)
     picked = None if first is None else details[first.number]
     title = "Switches of the picked point on the hand"
@@ -159,24 +159,27 @@ def _make_point(marker: ElementTree.Element, said: str, picked: bool) -> None:
     ElementTree.SubElement(marker, "circle", circle)
 
 
-def _detail(point: Point, source: str, hand: HandShape | None) -> Detail:
+def _detail(point: Point, frontier: Frontier, hand: HandShape | None) -> Detail:
     setting = point.setting
     what = (inputs_of(point), setting.way.method, training_of(setting), f"{setting.width} bits")
     words = ", ".join(filter(None, (*what, _wiring(point))))
     return Detail(
         number=point.number,
         said=f"Point {point.number}: {words}; {interval(point.rate)} % in {microseconds(point.frame.us)} µs.",
-        facts=tuple(_facts(point)),
+        facts=tuple(_facts(point, frontier)),
         switches=point.switches,
         on_hand=() if hand is None else tuple(hand.numbers_of(point.switches).tolist()),
-        command=f"thenar compile {shlex.quote(source)} -o build/ --from frontier/frontier.json --point {point.number}",
+        command=(
+            f"thenar compile {shlex.quote(frontier.source)} -o build/ "
+            f"--from frontier/frontier.json --point {point.number}"
+        ),
     )
 
 
-def _facts(point: Point) -> Iterable[tuple[str, str]]:
+def _facts(point: Point, frontier: Frontier) -> Iterable[tuple[str, str]]:
     setting = point.setting
-    yield "Recognition rate, %", interval(point.rate)
-    yield "Subject left out, %", interval(point.left_out)
+    yield f"Accuracy, {frontier.by}, %", interval(point.rate)
+    yield f"Accuracy, {frontier.beside}, %", interval(point.beside)
     yield "Placement", _placement(point)
     yield "Inputs", f"{setting.inputs}, {counted(len(point.switches), 'switch', 'switches')}"
     yield "Wiring", f"{_wiring(point)}; {counted(point.ports, 'port')}, {counted(point.chips, 'chip')}"
