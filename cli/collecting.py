@@ -12,12 +12,12 @@ import click
 from thenar.compiler.recordings.errors import check_names
 from thenar.compiler.recordings.taxonomy import Taxonomy
 from thenar.drivers.calibration import GloveCalibration
-from thenar.drivers.errors import SettingError
+from thenar.drivers.errors import DeviceError, SettingError
 from thenar.runtime.calibration import load_calibration
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.frames import now_us
 from thenar.runtime.harness.wiring import GloveWiring, Harness
-from thenar.runtime.live.sources import DeviceState, Sources, Taken
+from thenar.runtime.live.sources import NOT_YET, DeviceState, Sources, Taken
 from thenar.runtime.live.system import sensor_names_of
 from thenar.runtime.recording.guide import Guide, Journal, Stage, Trial
 from thenar.runtime.recording.session import Collection, Session
@@ -25,12 +25,14 @@ from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.toml_source import read_source
 
-from .common import err
+from .common import err, of_device
 from .ending import ended_by_signals
 from .guide_keys import GuideKeys
 from .guide_view import GuideView
 
 _WAIT_US = 50_000
+# What is just being plugged in gets this long.
+_PATIENCE_US = 3_000_000
 
 
 class Devices(Protocol):
@@ -74,6 +76,9 @@ def collect(
         )
         if journal is not None:
             _check_same_glove(journal, session)
+        _meet(sources, stop)
+        if stop.is_set():
+            return 0
         with Recorder(recording, session, tail=None if journal is None else journal.tail) as recorder:
             guide = Guide(left, recorder, round(countdown_s * 1e6))
             done = 0 if journal is None else len(journal.accepted)
@@ -82,6 +87,16 @@ def collect(
     if recorder.failure is not None:
         raise click.ClickException(f"{recorder.failure}; make room, and the same command goes on")
     return guide.accepted
+
+
+def _meet(sources: Sources, stop: Event) -> None:
+    """Wait until every device is there, or `stop` is set. Raises DeviceError or SettingError about one that is not."""
+    end = now_us() + _PATIENCE_US
+    while not stop.is_set() and (missing := [device for device in sources.devices() if not device.connected]):
+        sources.raise_settings()
+        if now_us() > end and all(device.error != NOT_YET for device in missing):
+            raise DeviceError(f"{of_device(missing[0].name, missing[0].error)}; nothing is recorded")
+        sources.take(_WAIT_US)
 
 
 def lead(guide: Guide, devices: Devices, recorder: Recorder, view: GuideView, stop: Event) -> None:

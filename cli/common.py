@@ -1,18 +1,23 @@
 """What the sub-commands share: paths, the `--json` flag, consoles, and a progress bar for work longer than a second."""
 
+import math
 import os
-from collections.abc import Callable, Container, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from copy import copy
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 import click
 import msgspec
-from rich.console import Console, ConsoleOptions, RenderableType
+from click.shell_completion import CompletionItem
+from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
+from rich.measure import Measurement
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.segment import Segment
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text, TextType
 
 from thenar.drivers.names import shortened
@@ -26,54 +31,150 @@ Found = TypeVar("Found")
 Rest = ParamSpec("Rest")
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-_JSON = "thenar.json"
+_LONGEST_METAVAR = 30
+_UNBOUNDED, _READABLE = 10_000, 24
+_JSON, _OVERWRITE = "thenar.json", "thenar.overwrite"
 
 
-class _OutputFile(click.Path):
-    """A file to write: no folder, in a folder that is there, so that no long work ends in an error."""
+class OutputFile(click.Path):
+    """A file to write, in a folder that is there: the one rule for all commands, checked before any work.
+
+    Its name has one of `endings`, which says the format. A file that is there is replaced with `overwrite_flag` only,
+    unless the command `goes_on` in it.
+    """
+
+    def __init__(self, *endings: str, goes_on: bool = False) -> None:
+        super().__init__(dir_okay=False, writable=True, path_type=Path)
+        self.endings, self._goes_on = endings, goes_on
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Return the path. Raises BadParameter where the rule forbids it."""
         from thenar.runtime.files import is_special
 
         path = Path(os.fsdecode(super().convert(value, param, ctx)))
         if not path.name:
             self.fail("A file to write needs a name.", param, ctx)
+        if not path.name.lower().endswith(self.endings):
+            self.fail(f"{path.name}: a file to write here ends in {_either(self.endings)}.", param, ctx)
         if not path.parent.is_dir():
             self.fail(f"There is no folder '{path.parent}' to write '{path.name}' into: make it first.", param, ctx)
         if not os.access(path.parent, os.W_OK):
             self.fail(f"Nothing may be written into folder '{path.parent}'.", param, ctx)
         if is_special(path):
             self.fail(f"'{path}' is a device or a pipe: name a file.", param, ctx)
+        if path.exists() and not (self._goes_on or _overwrites(ctx)):
+            self.fail(f"{path} is there already: add --overwrite to replace it, or name another file.", param, ctx)
         return path
 
 
-class _PictureFile(_OutputFile):
-    """A picture to write, of a kind that can be drawn."""
+class OutputFolder(click.Path):
+    """A folder to write, which is made if need be; whether thenar may replace what is in it, its writer knows.
+
+    One that is to be `fresh` holds nothing, unless `overwrite_flag` is given.
+    """
+
+    def __init__(self, *, fresh: bool = False) -> None:
+        super().__init__(file_okay=False, writable=True, path_type=Path)
+        self._fresh = fresh
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
-        path = super().convert(value, param, ctx)
-        if path.suffix.lower() not in (".png", ".svg"):
-            self.fail(f"{path.name}: a picture ends in .png or .svg", param, ctx)
+        """Return the path. Raises BadParameter where no folder can be made."""
+        path = Path(os.fsdecode(super().convert(value, param, ctx)))
+        if not str(value):
+            self.fail("A folder to write needs a name.", param, ctx)
+        above = next(parent for parent in (path, *path.absolute().parents) if parent.exists())
+        if not above.is_dir():
+            self.fail(f"'{above}' is no folder: nothing can be written below it.", param, ctx)
+        if not os.access(above, os.W_OK):
+            self.fail(f"Nothing may be written into folder '{above}'.", param, ctx)
+        if self._fresh and above == path and any(path.iterdir()) and not _overwrites(ctx):
+            self.fail(f"{path} is not empty: add --overwrite to replace files in it, or name another.", param, ctx)
         return path
+
+
+class Number(click.FloatRange):
+    """A finite number, which may be held to a range."""
+
+    def _describe_range(self) -> str:
+        # click's own makes "x<=None" of no range at all.
+        return super()._describe_range() if (self.min, self.max) != (None, None) else ""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number. Raises BadParameter for nan and inf, and for what is out of the range."""
+        number = float(super().convert(value, param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"{value} is no finite number.", param, ctx)
+        return number
+
+
+def _overwrites(context: click.Context | None) -> bool:
+    return context is not None and bool(context.meta.get(_OVERWRITE))
+
+
+def _either(names: Sequence[str]) -> str:
+    """Return "a, b or c"."""
+    return " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 class Listed(click.Choice[str]):
-    """One of the names of a registry, which is read when it is first needed and not when a command is defined."""
+    """One of the names of a kind, which are read when they are first needed and not when a command is defined."""
 
-    def __init__(self, names: Callable[[], Iterable[str]]) -> None:
-        self._names, self.case_sensitive = names, True
+    def __init__(self, kind: str, names: Callable[[], Iterable[str]]) -> None:
+        self.kind, self._names, self.case_sensitive = kind, names, True
 
     @cached_property
     def choices(self) -> tuple[str, ...]:  # type: ignore[override]
         """The names."""
         return tuple(self._names())
 
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the name. Raises BadParameter, with the names most like it, if there is none such."""
+        from thenar.runtime.names import nearest
+
+        if value not in self.choices:
+            near = nearest(str(value), self.choices)
+            others = "" if "did you mean" in near else f": choose one of {', '.join(self.choices)}"
+            self.fail(f"there is no {self.kind} {shortened(repr(value))}{others or near}.", param, ctx)
+        return value
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
+        """Return the names where they fit a line of help, and the kind elsewhere."""
+        names = "|".join(self.choices)
+        return f"[{names}]" if len(names) <= _LONGEST_METAVAR else self.kind.upper()
+
+
+class ListOf(Listed):
+    """Several of the names of a kind, with commas between them; where `none` is allowed, that names none."""
+
+    def __init__(self, kind: str, names: Callable[[], Iterable[str]], *, none: bool = False) -> None:
+        super().__init__(kind, names)
+        self._none = none
+
+    def convert(  # type: ignore[override]
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, ...]:
+        """Return the names, each once, in the order given. Raises BadParameter for a wrong one."""
+        if isinstance(value, tuple):
+            return value
+        if self._none and value == "none":
+            return ()
+        return tuple(super(ListOf, self).convert(part, param, ctx) for part in parted(value))
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
+        """Return how the list is written."""
+        return f"{self.kind.upper()},..."
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        """Complete the name after the last comma."""
+        before, comma, last = incomplete.rpartition(",")
+        found = super().shell_complete(ctx, param, last)
+        return [CompletionItem(f"{before}{comma}{item.value}") for item in found]
+
 
 existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
 existing_folder = click.Path(exists=True, file_okay=False, path_type=Path)
-any_path = click.Path(path_type=Path)
-output_file = _OutputFile(dir_okay=False, writable=True, path_type=Path)
-picture_file = _PictureFile(dir_okay=False, writable=True, path_type=Path)
+picture_file = OutputFile(".svg", ".png")
+seed_range = click.IntRange(0, 2**63 - 1)
 
 json_flag = click.option(
     "--json",
@@ -81,6 +182,16 @@ json_flag = click.option(
     expose_value=False,
     callback=lambda context, _option, wanted: context.meta.update({_JSON: wanted}),
     help="Print one JSON document for machines instead.",
+)
+
+# Eager: whether a file may be replaced is known before the file is looked at.
+overwrite_flag = click.option(
+    "--overwrite",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=lambda context, _option, wanted: context.meta.update({_OVERWRITE: wanted}),
+    help="Replace files that are there already.",
 )
 
 
@@ -138,7 +249,7 @@ class _Console(Console):
 
 
 def out() -> Console:
-    """Return the console for results. Wide tables are not cut when piped into a file."""
+    """Return the console for results. Lines are 200 wide where they do not go to a terminal."""
     console = _console()
     return console if console.is_terminal else _console(width=200)
 
@@ -189,11 +300,41 @@ def _json(found: Any) -> bytes:
     return msgspec.json.format(msgspec.json.encode(found), indent=2)
 
 
+class _Whole(Table):
+    """A table that cuts nothing: one that is too wide becomes several, each with the first column."""
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """Yield the lines of each part."""
+        room = options.max_width - 1
+        parts: list[list[Column]] = [[]]
+        for column in self.columns:
+            used = [self._width(each, console, options) for each in (*parts[-1], column)]
+            if len(used) > 2 and sum(used) > room:
+                parts.append([self.columns[0]])
+            parts[-1].append(column)
+        for number, columns in enumerate(parts):
+            part = self._part(columns)
+            part.title = self.title if number == 0 else None
+            yield from Table.__rich_console__(part, console, options)
+
+    def _part(self, columns: Sequence[Column]) -> "_Whole":
+        part = copy(self)
+        part.columns = [replace(column, _index=index) for index, column in enumerate(columns)]
+        return part
+
+    def _width(self, column: Column, console: Console, options: ConsoleOptions) -> int:
+        """Return the width that a column needs with one line: words wrap, but not into a column of single ones."""
+        needed = Measurement.get(console, options.update_width(_UNBOUNDED), self._part([column]))
+        most = needed.maximum if column.no_wrap else max(needed.minimum, min(needed.maximum, _READABLE))
+        return most - 1
+
+
 def table(columns: Iterable[str], numbers: Container[str] = (), title: TextType | None = None) -> Table:
     """Return a table of these columns, of which `numbers` are on the right."""
-    made = Table(title=title)
+    made = _Whole(title=title)
     for column in columns:
-        made.add_column(column, justify="right" if column in numbers else "left")
+        is_number = column in numbers
+        made.add_column(column, justify="right" if is_number else "left", no_wrap=is_number, overflow="fold")
     return made
 
 

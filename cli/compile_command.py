@@ -6,21 +6,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from .common import (
     Listed,
-    any_path,
+    Number,
+    OutputFile,
+    OutputFolder,
     existing_file,
     json_flag,
     keep_apart,
     out,
-    output_file,
+    overwrite_flag,
     progress,
+    seed_range,
     show,
     table,
     warning,
 )
-from .options import Training, asked_settings, trainer_option
+from .options import Grouped, asked_settings, keep_option, method_option, prune_option, trainer_option
 
 if TYPE_CHECKING:
     from thenar.compiler.artifact.documents import BuildReport
@@ -31,7 +35,22 @@ if TYPE_CHECKING:
 
 _BOARD = "board"
 # What a point of a frontier says.
-_SETTLED = ("prune", "inputs", "table_bits", "placement", "keep", "width", "trainer")
+_SETTLED = ("preset", "prune", "inputs", "table_bits", "method", "keep", "width", "trainer")
+# Chosen by measurement: docs/commands.md shows what each brings. None sets both --keep and --prune.
+PRESETS: dict[str, dict[str, str]] = {
+    "smallest": {"method": "elimination", "keep": "8", "table-bits": "8", "rounds": "25"},
+    "fastest": {"method": "elimination", "keep": "8", "inputs": "switches", "table-bits": "8", "rounds": "100"},
+    "best": {"method": "elimination", "keep": "66", "rounds": "300"},
+}
+_GROUPS = {
+    "Basics": ("output", "preset", "method", "keep", "prune", "inputs"),
+    "Training": ("trainer", "rounds", "shrinkage", "tolerance", "max_bins"),
+    "Integer tables": ("table_bits", "width"),
+    "The rate in build.json": ("folds", "seed"),
+    "A point of a frontier": ("from_frontier", "point"),
+    "Wiring": ("glove", "propose", "chip"),
+    "Files": ("report", "hand_length", "overwrite", "json"),
+}
 
 
 def _chips() -> Iterable[str]:
@@ -40,45 +59,71 @@ def _chips() -> Iterable[str]:
     return (*CHIPS, _BOARD)
 
 
-@click.command("compile", cls=Training)
+def _preset(context: click.Context, _: click.Parameter, name: str | None) -> None:
+    """Let the preset's values be the defaults: explicit options win."""
+    given = PRESETS.get(name or "", {})
+    context.default_map = {option.replace("-", "_"): value for option, value in given.items()}
+
+
+@click.command("compile", cls=Grouped, groups=_GROUPS)
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
-@click.option("-o", "--output", type=any_path, required=True, help="Folder of the build; a build there is replaced.")
 @click.option(
-    "--prune", type=click.IntRange(0), default=0, show_default=True, help="ID3 splits no fewer rows than this."
+    "-o", "--output", type=OutputFolder(), required=True, help="Folder of the build. A build there is replaced."
 )
+@click.option(
+    "--preset",
+    type=Listed("preset", lambda: PRESETS),
+    is_eager=True,
+    expose_value=False,
+    callback=_preset,
+    help="Set several options at once; what you give yourself wins. "
+    + "; ".join(
+        f"{name}: {' '.join(f'--{option} {value}' for option, value in given.items())}"
+        for name, given in PRESETS.items()
+    ),
+)
+@method_option()
+@keep_option
+@prune_option
 @click.option(
     "--inputs",
     type=click.Choice(["both", "switches", "joints"]),
     default="both",
     show_default=True,
-    help="What to use.",
+    help="Which inputs the build reads.",
 )
 @trainer_option
-@click.option("--folds", type=int, default=4, show_default=True, help="Folds of the rate in build.json; 0 for none.")
-@click.option("--seed", type=int, default=1, show_default=True, help="Seed of the folds.")
+@click.option(
+    "--folds",
+    type=click.IntRange(0),
+    default=4,
+    show_default=True,
+    help="Folds of the cross-validated rate; 0 for none.",
+)
+@click.option("--seed", type=seed_range, default=1, show_default=True, help="Seed of the folds.")
 @click.option(
     "--table-bits",
     type=click.Choice(["16", "8"]),
     callback=lambda _context, _parameter, bits: int(bits),
     default="16",
     show_default=True,
-    help="8: coarser steps, so that firmware can store a byte an entry.",
+    help="Bits of a table entry. With 8, steps are coarser and firmware is smaller.",
 )
-@click.option("--placement", default="id3", show_default=True, help="How switches are chosen: see below.")
-@click.option("--keep", type=click.IntRange(1), help="How many switches, for placements that take a number.")
-@click.option("--width", type=click.IntRange(4, 16), default=16, show_default=True, help="Bits that every sum fits.")
+@click.option(
+    "--width", type=click.IntRange(4, 16), default=16, show_default=True, help="Bits that hold every sum of scores."
+)
 @click.option("--from", "from_frontier", type=existing_file, help="A frontier.json: build one of its points.")
-@click.option("--point", type=click.IntRange(1), help="Which point of it.  [default: the one that it picked]")
+@click.option("--point", type=click.IntRange(1), help="Number of the point.  [default: the one that was picked]")
 @click.option("--report/--no-report", default=True, show_default=True, help="Write report.html and spec/ as well.")
-@click.option("--hand-length", type=click.FloatRange(100, 300), help="Of whom the glove is for, mm.  [default: 190]")
+@click.option("--hand-length", type=Number(100, 300), metavar="MM", help="Wearer's hand length.  [default: 190]")
 @click.option("--glove", type=existing_file, help="A glove.toml: add the scan map of its wiring to the build.")
-@click.option("--propose", type=output_file, help="Write a glove.toml for the kept switches: on the fewest ports.")
+@click.option("--propose", type=OutputFile(".toml"), help="Write a glove.toml that wires the kept switches.")
 @click.option(
     "--chip",
-    type=Listed(_chips),
-    help="The port expander to propose, or a switch-scanner board.  [default: the first]",
+    type=Listed("chip", _chips),
+    help="Port expander to propose, or board for a switch-scanner board.  [default: mcp23017]",
 )
-@click.option("--overwrite", is_flag=True, help="Let --propose replace a file that is there.")
+@overwrite_flag
 @json_flag
 @click.pass_context
 def command(
@@ -93,18 +138,19 @@ def command(
     glove: Path | None,
     propose: Path | None,
     chip: str | None,
-    overwrite: bool,
     **asked: Any,
 ) -> None:
-    """Choose the switches, train, and write integer tables with their proof.
+    """Choose the switches of SET.grasps, train on them, and write the build: integer tables with their proof.
 
     The folder holds build.json, tables.bin and ensemble.bin, the classifier in C in firmware/, and with --glove
-    scan.json; report.html tells all of it in a browser, spec/ is the reduced glove to cut, solder and run. The same
-    recordings, options and wiring give the same bytes.
+    scan.json. report.html shows all of it in a browser; spec/ describes the reduced glove to cut, solder and run. The
+    same recordings, options and wiring give the same bytes.
 
     \b
     Example:
-        thenar compile set.grasps -o build/ --prune 13
+        thenar compile set.grasps -o build/
+        thenar compile set.grasps -o build/ --preset smallest
+        thenar compile set.grasps -o build/ --method elimination --keep 16
         thenar compile set.grasps -o build/ --glove glove.toml
         thenar compile set.grasps -o build/ --from frontier/frontier.json --point 7
     """
@@ -116,12 +162,12 @@ def command(
     from thenar.runtime.harness.loading import load_harness
     from thenar.simulator.handmaps.handmap import hand_map
 
-    _check_proposal(propose, chip, glove, overwrite=overwrite)
+    _check_proposal(propose, chip, glove)
     _check_point(context, from_frontier, point)
     if hand_length is not None and not report:
         raise click.UsageError("--hand-length is of the hand in spec/, which --no-report leaves out: give one of them.")
     keep_apart(recordings, glove, propose, from_frontier)
-    options = asked_settings(context, asked) | asked
+    options = asked_settings(context, asked) | _placed(context, asked)
     given = None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
     hand = hand_map() if report else None
@@ -155,16 +201,24 @@ def command(
     show(made.manifest, lambda _: _print(made, output, propose))
 
 
-def _check_proposal(propose: Path | None, chip: str | None, glove: Path | None, *, overwrite: bool) -> None:
+def _placed(context: click.Context, asked: dict[str, Any]) -> dict[str, Any]:
+    """Return what was `asked` as options of a build. A preset's --keep is for the preset's own --method."""
+    from thenar.compiler.placement.methods.base import METHODS, PAPERS
+
+    method = asked.pop("method") or PAPERS
+    if context.get_parameter_source("keep") is ParameterSource.DEFAULT_MAP and not METHODS[method].by_number:
+        asked["keep"] = None
+    return asked | {"placement": method}
+
+
+def _check_proposal(propose: Path | None, chip: str | None, glove: Path | None) -> None:
     """Raise UsageError for what does not go with --propose: before the training, not after it."""
     if propose is None:
-        if chip is not None or overwrite:
-            raise click.UsageError("--chip and --overwrite say how to --propose a harness: name the file to write.")
+        if chip is not None:
+            raise click.UsageError("--chip says how to --propose a harness: name the file to write.")
         return
     if glove is not None:
         raise click.UsageError("--glove reads a wiring, --propose writes a new one: give one of them.")
-    if propose.exists() and not overwrite:
-        raise click.UsageError(f"{propose} is there already: name another file, or add --overwrite.")
 
 
 def _check_point(context: click.Context, from_frontier: Path | None, point: int | None) -> None:
@@ -176,10 +230,9 @@ def _check_point(context: click.Context, from_frontier: Path | None, point: int 
             raise click.UsageError("--point is one of a frontier: name its file with --from.")
         return
     for name in (*_SETTLED, *(setting.name for trainer in TRAINERS.values() for setting in trainer.settings)):
-        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
-            raise click.UsageError(
-                f"--{name.replace('_', '-')} is settled by the point that --from names: leave it out."
-            )
+        if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+            option = next(param.opts[-1] for param in context.command.get_params(context) if param.name == name)
+            raise click.UsageError(f"{option} is settled by the point that --from names: leave it out.")
 
 
 def _propose(manifest: "Manifest", path: Path, chip: str) -> None:

@@ -9,7 +9,7 @@ import msgspec
 from thenar.drivers.errors import ThenarError
 from thenar.drivers.names import shortened
 
-from .common import existing_file, keep_apart, picture_file, progress
+from .common import existing_file, keep_apart, overwrite_flag, picture_file, progress
 from .lines import echo
 
 if TYPE_CHECKING:
@@ -40,6 +40,7 @@ def _titled_path(text: str) -> tuple[str, Path]:
 @click.command("draw")
 @click.argument("grasps", type=existing_file, required=False)
 @click.option("-o", "--output", type=picture_file, required=True, help="The picture to write: an .svg or .png file.")
+@overwrite_flag
 @click.option("--numbers", is_flag=True, help="Of all switches: write each one's number in the set, from 0, into it.")
 @click.option("--per-grasp", is_flag=True, help="Of GRASPS: a hand for each grasp type, on one scale.")
 @click.option("--place", "choose", is_flag=True, help="Of GRASPS: the switches that `thenar place` would keep.")

@@ -15,7 +15,17 @@ from typing import TYPE_CHECKING, Literal
 import click
 import msgspec
 
-from .common import check_devices, existing_file, keep_apart, output_file, progress, warning
+from .common import (
+    Number,
+    OutputFile,
+    OutputFolder,
+    check_devices,
+    existing_file,
+    keep_apart,
+    overwrite_flag,
+    progress,
+    warning,
+)
 from .ending import ended_by_signals
 from .lines import echo
 
@@ -54,20 +64,19 @@ class Played(msgspec.Struct, frozen=True):
     "--dir",
     "folder",
     metavar="DIR",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=OutputFolder(),
     default=Path("emulated"),
     show_default=True,
     help="Where the ports are linked, beside a glove.toml that names them and the subject's calibration.",
 )
 @click.option("--subject", metavar="NAME", help="Whose session of a scene to play [default: the first subject's].")
-@click.option(
-    "--period-ms", type=click.FloatRange(1, 60_000), help="Time from one frame to the next [default: the scene's]."
-)
+@click.option("--period-ms", type=Number(1, 60_000), help="Time from one frame to the next [default: the scene's].")
 @click.option("--repeat", is_flag=True, help="Play again and again, until Ctrl-C or the command ends.")
 @click.option(
     "--adapter", type=click.Choice(_ADAPTERS), default="any", show_default=True, help="What the I2C bus can batch."
 )
-@click.option("--log", metavar="FILE.jsonl", type=output_file, help="Note there when which frame was shown.")
+@click.option("--log", metavar="FILE.jsonl", type=OutputFile(".jsonl"), help="Note there when which frame was shown.")
+@overwrite_flag
 def command(
     source: str,
     client: tuple[str, ...],

@@ -10,12 +10,14 @@ from rich.text import Text
 from thenar.compiler.text import interval
 
 from .common import (
+    OutputFile,
+    OutputFolder,
     existing_file,
     jobs_option,
     json_flag,
     keep_apart,
     out,
-    output_file,
+    overwrite_flag,
     parted,
     progress,
     show,
@@ -23,7 +25,7 @@ from .common import (
     warning,
     write_json,
 )
-from .options import Training, asked_settings, method_names, trainer_option
+from .options import Training, asked_settings, method_list, trainer_option
 
 if TYPE_CHECKING:
     from rich.table import Table as Grid
@@ -56,9 +58,6 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
 
 def _scheme(_: click.Context, __: click.Parameter, value: str | None) -> str:
     return value or "stratified"
-
-
-_FOLDER = click.Path(file_okay=False, path_type=Path)
 
 
 @click.command(cls=Training)
@@ -102,7 +101,7 @@ _FOLDER = click.Path(file_okay=False, path_type=Path)
 @jobs_option()
 @click.option(
     "--rivals",
-    callback=method_names,
+    type=method_list,
     default="cmim,mutual-information",
     show_default=True,
     help="Methods to compare ID3 with, by commas.",
@@ -111,8 +110,11 @@ _FOLDER = click.Path(file_okay=False, path_type=Path)
     "--tables", callback=_tables, metavar="NAME,...", default=",".join(TABLES), show_default=True, help="Which tables."
 )
 @click.option("--confusion", is_flag=True, help="Print the confusion matrix of every composition and subject.")
-@click.option("--plot", "folder", type=_FOLDER, metavar="FOLDER", help="Draw the confusion matrices there.")
-@click.option("-o", "--output", type=output_file, metavar="FILE", help="Write the whole result there, as JSON.")
+@click.option(
+    "--plot", "folder", type=OutputFolder(fresh=True), metavar="FOLDER", help="Draw the confusion matrices there."
+)
+@click.option("-o", "--output", type=OutputFile(".json"), metavar="FILE", help="Write the whole result there, as JSON.")
+@overwrite_flag
 @json_flag
 @click.pass_context
 def command(

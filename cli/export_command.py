@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 from msgspec import Struct
 
-from .common import existing_file, json_flag, keep_apart, output_file, progress, show
+from .common import OutputFile, existing_file, json_flag, keep_apart, overwrite_flag, progress, show
 from .lines import echo
 
 
@@ -19,10 +19,17 @@ class Exported(Struct, frozen=True):
 
 @click.command("export")
 @click.argument("grasps", type=existing_file)
-@click.option("-o", "--output", type=output_file, required=True, help="The .csv, .csv.gz or .arff file to write.")
+@click.option(
+    "-o",
+    "--output",
+    type=OutputFile(".csv", ".csv.gz", ".arff"),
+    required=True,
+    help="The .csv, .csv.gz or .arff file to write.",
+)
+@overwrite_flag
 @click.option("--codes", is_flag=True, help="Write the joints' integer codes instead of values in their units.")
 @click.option("--meta", is_flag=True, help="ARFF: write subject, object and trial too (CSV always holds them).")
-@click.option("--columns", type=output_file, help="Also write the columns.toml that imports the table again.")
+@click.option("--columns", type=OutputFile(".toml"), help="Also write the columns.toml that imports the table again.")
 @json_flag
 def command(grasps: Path, output: Path, codes: bool, meta: bool, columns: Path | None) -> None:
     """Export GRASPS, a .grasps file, as CSV or as ARFF for Weka.

@@ -14,11 +14,13 @@ from importlib import import_module
 import click
 
 from thenar.drivers.errors import ThenarError
+from thenar.drivers.names import shortened
 
 from .lines import echo
 
 COMMANDS = (
-    *("simulate", "plan", "import", "export", "info", "place", "draw", "evaluate", "frontier", "compile", "verify"),
+    *("simulate", "plan", "import", "export", "merge", "split", "info", "place", "draw"),
+    *("evaluate", "frontier", "compile", "verify"),
     *("firmware", "spec", "run", "calibrate", "record", "emulate", "doctor", "stability"),
 )
 
@@ -32,8 +34,21 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
 }
 
 
+# Options that have another name now, for the hint.
+RENAMED = {"--placement": "--method"}
+
+
 class _LazyGroup(click.Group):
     """Sub-command NAME is `command` in the module `NAME_command` of this package."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args[0] not in COMMANDS and not args[0].startswith("-") and not ctx.resilient_parsing:
+            from thenar.runtime.names import nearest
+
+            raise click.UsageError(f"No such command {shortened(repr(args[0]))}{nearest(args[0], COMMANDS)}.")
+        return super().resolve_command(ctx, args)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)
@@ -48,7 +63,7 @@ class _LazyGroup(click.Group):
 @click.group(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="thenar")
 def thenar() -> None:
-    """Grasps recorded on a glove in; the few switches worth keeping, and a recogniser that runs on them, out.
+    """Find the few switches that a sensor glove needs, and build the recogniser that runs on them.
 
     \b
     Example, from a table to a running recogniser:
@@ -64,29 +79,39 @@ def thenar() -> None:
 
 def run_group(arguments: Sequence[str]) -> int:
     """Run `thenar` with `arguments` and return its exit code; what the user did wrong is one sentence on stderr."""
+    if arguments[:1] == ["help"]:
+        arguments = [*arguments[1:2], "--help"]
     try:
         code = thenar.main(list(arguments), prog_name="thenar", standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as help_wanted:
         help_wanted.show()
         return 2
-    except click.ClickException as mistake:
-        return _complain(mistake.format_message())
-    except (ThenarError, BrokenExecutor) as mistake:
-        return _complain(str(mistake))
-    except OSError as mistake:
-        return _complain(
-            f"{mistake.filename}: {mistake.strerror}" if mistake.filename else mistake.strerror or str(mistake)
-        )
-    except MemoryError as lack:
-        return _complain(f"not enough memory ({lack}): take fewer rows or columns")
-    except ModuleNotFoundError as lack:
-        return _complain(f"{lack.name} is not installed: pip install '{_brought_by(lack, arguments)}'")
     except (KeyboardInterrupt, click.Abort):
         echo("thenar: interrupted", err=True)
         return 130
     except Exception as fault:
-        return _complain(_kept(fault))
+        echo(f"thenar: {_sentence(fault, arguments)}", err=True)
+        return 2
     return code if isinstance(code, int) else 0
+
+
+def _sentence(fault: Exception, arguments: Sequence[str]) -> str:
+    """Return what to say of an error."""
+    match fault:
+        case click.NoSuchOption() if fault.option_name in RENAMED:
+            return f"{fault.message} Did you mean '{RENAMED[fault.option_name]}'?"
+        case click.ClickException():
+            return fault.format_message()
+        case ThenarError() | BrokenExecutor():
+            return str(fault)
+        case OSError():
+            reason = fault.strerror or str(fault)
+            return f"{fault.filename}: {reason}" if fault.filename else reason
+        case MemoryError():
+            return f"not enough memory ({fault}): take fewer rows or columns"
+        case ModuleNotFoundError():
+            return f"{fault.name} is not installed: pip install '{_brought_by(fault, arguments)}'"
+    return _kept(fault)
 
 
 def _brought_by(lack: ModuleNotFoundError, arguments: Sequence[str]) -> str:
@@ -107,8 +132,3 @@ def _kept(fault: Exception) -> str:
     except OSError as reason:
         return f"{what}, and its traceback could not be written ({reason.strerror}); please report it"
     return f"{what}; please report it with the file {path}, which says where"
-
-
-def _complain(message: str) -> int:
-    echo(f"thenar: {message}", err=True)
-    return 2

@@ -4,9 +4,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from rich.table import Table
 
-from .common import existing_file, json_flag, keep_apart, out, output_file, progress, show, warning
+from .common import (
+    OutputFile,
+    existing_file,
+    json_flag,
+    keep_apart,
+    out,
+    overwrite_flag,
+    progress,
+    show,
+    table,
+    warning,
+)
 from .lines import echo
 
 if TYPE_CHECKING:
@@ -15,7 +25,8 @@ if TYPE_CHECKING:
 
 @click.command("import")
 @click.argument("tables", metavar="TABLE", type=existing_file, nargs=-1, required=True)
-@click.option("-o", "--output", type=output_file, required=True, help="The .grasps file to write.")
+@click.option("-o", "--output", type=OutputFile(".grasps"), required=True, help="The .grasps file to write.")
+@overwrite_flag
 @click.option("--columns", type=existing_file, help="columns.toml: what each column of the table is.")
 @json_flag
 def command(tables: tuple[Path, ...], output: Path, columns: Path | None) -> None:
@@ -31,8 +42,6 @@ def command(tables: tuple[Path, ...], output: Path, columns: Path | None) -> Non
         thenar import trials.csv.gz -o set.grasps --columns columns.toml
         thenar import anna.mcap ben.mcap -o set.grasps
     """
-    if output.suffix != ".grasps":
-        raise click.BadParameter(f"{output.name}: a set of grasps ends in .grasps", param_hint="--output")
     keep_apart(*tables, columns, output)
     from thenar.compiler.recordings.mcap_recording import import_files
 
@@ -46,11 +55,12 @@ def _print(report: "ImportReport", output: Path) -> None:
     for finding in report.warnings:
         warning(finding.message)
     if report.coding:
-        table = Table("joint", "unit", "step", "largest error", "rms error", "values before", "after", title="Coding")
+        numbers = ("step", "largest error", "rms error", "values before", "after")
+        coding = table(("joint", "unit", *numbers), numbers, "Coding")
         for cost in report.coding:
             errors = (f"{cost.step:g}", f"{cost.largest_error:.3g}", f"{cost.rms_error:.3g}")
-            table.add_row(cost.joint, cost.unit, *errors, str(cost.distinct_before), str(cost.distinct_after))
-        out().print(table)
+            coding.add_row(cost.joint, cost.unit, *errors, str(cost.distinct_before), str(cost.distinct_after))
+        out().print(coding)
     echo(
         f"{output}: {report.rows} grasps of {report.grasp_types} types ({report.taxonomy}); "
         f"subjects {report.subjects}, objects {report.objects}, switches {report.switches}, joints {report.joints}"

@@ -4,9 +4,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from rich.table import Table
 
-from .common import existing_file, json_flag, keep_apart, out, picture_file, progress, show
+from .common import existing_file, json_flag, keep_apart, out, overwrite_flag, picture_file, progress, show, table
 from .lines import echo
 
 if TYPE_CHECKING:
@@ -17,6 +16,7 @@ if TYPE_CHECKING:
 @click.command("info")
 @click.argument("grasps", type=existing_file)
 @click.option("--plot", type=picture_file, help="Also draw it: a .png or .svg file to write.")
+@overwrite_flag
 @json_flag
 def command(grasps: Path, plot: Path | None) -> None:
     """Tell what GRASPS, a .grasps file, holds: counts, balance, odd columns and rows, and how separable it is.
@@ -65,10 +65,10 @@ def _print(summary: "Summary", path: Path) -> None:
 
 
 def _print_counts(summary: "Summary") -> None:
-    table = Table("grasp type", "rows", "share", title="Grasp types")
+    grasps = table(("grasp type", "rows", "share"), ("rows", "share"), "Grasp types")
     for grasp in summary.grasps:
-        table.add_row(grasp.name, str(grasp.rows), f"{grasp.rows / summary.rows:.1%}")
-    out().print(table)
+        grasps.add_row(grasp.name, str(grasp.rows), f"{grasp.rows / summary.rows:.1%}")
+    out().print(grasps)
     echo(f"balance (rarest type over commonest): {summary.balance:.2f}")
     for what, counts in (("subjects", summary.subjects), ("objects", summary.objects)):
         echo(f"{what}: " + ", ".join(f"{count.name} ({count.rows})" for count in counts))
@@ -77,16 +77,18 @@ def _print_counts(summary: "Summary") -> None:
 def _print_joints(summary: "Summary") -> None:
     if not summary.joints:
         return
-    table = Table("joint", "unit", "least", "largest", "distinct codes", title="Joints")
+    numbers = ("least", "largest", "distinct codes")
+    joints = table(("joint", "unit", *numbers), numbers, "Joints")
     for joint in summary.joints:
         ends = ("-" if end is None else f"{end:g}" for end in (joint.least, joint.largest))
-        table.add_row(joint.name, joint.unit, *ends, str(joint.codes))
-    out().print(table)
+        joints.add_row(joint.name, joint.unit, *ends, str(joint.codes))
+    out().print(joints)
 
 
 def _print_separability(summary: "Summary") -> None:
-    table = Table("inputs", "distinct frames", "ceiling", "nearest neighbour", "over rows", title="Separability")
+    numbers = ("distinct frames", "ceiling", "nearest neighbour", "over rows")
+    lines = table(("inputs", *numbers), numbers, "Separability")
     for line in summary.separability:
         rate = "-" if line.neighbour_rate is None else f"{line.neighbour_rate:.1%}"
-        table.add_row(line.inputs, str(line.distinct_frames), f"{line.ceiling:.1%}", rate, str(line.neighbour_rows))
-    out().print(table)
+        lines.add_row(line.inputs, str(line.distinct_frames), f"{line.ceiling:.1%}", rate, str(line.neighbour_rows))
+    out().print(lines)

@@ -1,37 +1,69 @@
 """Options of several commands: the placement methods and the trainers, read from their registries."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .common import Listed, parted
+from .common import Command, Listed, ListOf, Number
 
 if TYPE_CHECKING:
     from thenar.compiler.placement.methods.base import Method
     from thenar.compiler.trainers.base import Setting
 
 
-def method_names(_: click.Context, __: click.Parameter, text: str | None) -> tuple[str, ...] | None:
-    """Return the names in `text`, parted by commas; "none" names none. Raises MemberError for a wrong name."""
+def _methods() -> Iterable[str]:
     from thenar.compiler.placement.methods.base import METHODS
 
-    if text is None:
-        return None
-    return tuple(METHODS.named(name).name for name in parted(text) if name not in ("", "none"))
+    return METHODS
+
+
+def _trainers() -> Iterable[str]:
+    from thenar.compiler.trainers.base import TRAINERS
+
+    return TRAINERS
+
+
+method_name, trainer_name = Listed("method", _methods), Listed("trainer", _trainers)
+method_list = ListOf("method", _methods, none=True)
+
+
+def method_option(destination: str = "method", default: str = "id3") -> Callable[[Command], Command]:
+    """Return the option --method, whose value, None where it is not given, the command takes as `destination`."""
+    help_text = f"How switches are chosen: see below.  [default: {default}]"
+    return click.option("--method", destination, type=method_name, metavar="NAME", help=help_text)
+
+
+keep_option = click.option(
+    "--keep", type=click.IntRange(1), metavar="M", help="How many switches to keep: for methods that take it."
+)
+prune_option = click.option(
+    "--prune",
+    type=click.IntRange(0),
+    metavar="S",
+    default=0,
+    show_default=True,
+    help="Prune ID3's tree: nodes of fewer than S rows decide nothing.",
+)
 
 
 class WithMethods(click.Command):
-    """A command whose help ends with all placement methods."""
+    """A command whose help ends with all placement methods, by the option that says how many switches they keep."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write each method's name and what it does."""
         from thenar.compiler.placement.methods.base import METHODS
 
         super().format_epilog(ctx, formatter)
-        with formatter.section("Placement methods"):
-            formatter.write_dl([(name, f"{method.help}{_remarks(method)}.") for name, method in METHODS.items()])
+        for takes, by_number in (("--prune S", False), ("--keep M", True)):
+            lines = [
+                (name, f"{method.help}{_remarks(method)}.")
+                for name, method in METHODS.items()
+                if method.by_number == by_number
+            ]
+            with formatter.section(f"Placement methods that take {takes}"):
+                formatter.write_dl(lines)
 
 
 def _remarks(method: "Method") -> str:
@@ -39,12 +71,6 @@ def _remarks(method: "Method") -> str:
     remarks = [] if method.ours else ["rival"]
     remarks += [f"pip install {method.install}"] if method.install else []
     return f" ({'; '.join(remarks)})" if remarks else ""
-
-
-def _names() -> Iterable[str]:
-    from thenar.compiler.trainers.base import TRAINERS
-
-    return TRAINERS
 
 
 class _TrainerOption(click.Option):
@@ -59,7 +85,7 @@ class _TrainerOption(click.Option):
 
 
 trainer_option = click.option(
-    "--trainer", type=Listed(_names), default="logitboost", show_default=True, cls=_TrainerOption
+    "--trainer", type=trainer_name, default="logitboost", show_default=True, cls=_TrainerOption
 )
 
 
@@ -81,6 +107,25 @@ class Training(WithMethods):
 
         settings = {setting.name: setting for trainer in TRAINERS.values() for setting in trainer.settings}
         return tuple(map(_option, settings.values()))
+
+
+class Grouped(Training):
+    """A command whose help shows its options in `groups`, by title; the rest are in a last one."""
+
+    def __init__(self, *args: Any, groups: Mapping[str, tuple[str, ...]], **named: Any) -> None:
+        super().__init__(*args, **named)
+        self.groups = groups
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options group by group."""
+        params = {str(param.name): param for param in self.get_params(ctx) if isinstance(param, click.Option)}
+        grouped = {name for names in self.groups.values() for name in names}
+        rest = tuple(name for name in params if name not in grouped)
+        for title, names in {**self.groups, "More": rest}.items():
+            records = (params[name].get_help_record(ctx) for name in names if name in params)
+            if lines := [record for record in records if record]:
+                with formatter.section(title):
+                    formatter.write_dl(lines)
 
 
 def asked_settings(context: click.Context, asked: dict[str, Any]) -> dict[str, Any]:
@@ -105,8 +150,8 @@ def asked_settings(context: click.Context, asked: dict[str, Any]) -> dict[str, A
 
 def _option(setting: "Setting") -> click.Option:
     least = setting.least
-    kind: click.ParamType[Any] = click.INT if setting.kind is int else click.FLOAT
-    if least is not None:
-        kind = click.IntRange(int(least)) if setting.kind is int else click.FloatRange(least)
+    kind: click.ParamType[Any] = Number(least)
+    if setting.kind is int:
+        kind = click.INT if least is None else click.IntRange(int(least))
     decls, shown = [f"--{setting.name.replace('_', '-')}", setting.name], setting.default is not None
     return click.Option(decls, type=kind, default=setting.default, show_default=shown, help=setting.what)

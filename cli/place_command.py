@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .common import (
+    OutputFile,
     existing_file,
     jobs_option,
     json_flag,
     keep_apart,
     out,
-    output_file,
+    overwrite_flag,
     picture_file,
     print_json,
     progress,
@@ -22,7 +23,7 @@ from .common import (
     write_json,
 )
 from .lines import echo
-from .options import WithMethods
+from .options import WithMethods, keep_option, method_option, prune_option
 
 if TYPE_CHECKING:
     from thenar.compiler.placement.methods.base import Method
@@ -38,7 +39,7 @@ class _Asked:
 
     grasps: Path
     method: str | None
-    prune: int | None
+    prune: int
     keep: int | None
     exact: bool
     crowd: bool
@@ -69,23 +70,18 @@ class _Asked:
             (self.exact and self.crowd, "--exact judges one placement and --crowd looks for one: take one of them"),
             (
                 self.crowd and not method.by_number,
-                "--crowd takes a method that is told how many switches to --keep",
+                "--crowd takes a method that keeps M switches",
             ),
-            (self.joints and tree, "--joints is for the methods beside the paper's ID3"),
-            (method.by_number and self.prune is not None, "--prune is for ID3: this method takes --keep"),
-            (method.by_number and self.keep is None, "tell this method how many switches to --keep"),
-            (
-                not method.by_number and self.keep is not None,
-                "ID3 takes --prune S: to --keep a number, name a --method",
-            ),
+            (self.joints and tree, "--joints is for other methods than the paper's ID3"),
         ):
             if wrong:
                 raise click.UsageError(reason)
+        method.check_given(self.keep, self.prune)
         if self.glove is not None and (self.crowd or not method.uses_ports):
             from thenar.compiler.placement.methods.base import METHODS
 
             heeding = ", ".join(name for name, each in METHODS.items() if each.uses_ports)
-            raise click.UsageError(f"--glove says what scans cost: take it with a --method that heeds it: {heeding}")
+            raise click.UsageError(f"--glove says what scans cost: take it with a --method that weighs that: {heeding}")
         keep_apart(self.grasps, self.glove, self.draw, self.output)
 
     def ports(self, grasp_set: "GraspSet") -> "PortCosts | None":
@@ -120,7 +116,7 @@ class _Asked:
                 )
             return place(
                 grasp_set,
-                float((self.keep if method.by_number else self.prune) or 0),
+                float(self.prune if self.keep is None else self.keep),
                 method=method.name,
                 joints=self.joints,
                 ports=self.ports(grasp_set) if method.uses_ports else None,
@@ -131,27 +127,29 @@ class _Asked:
 
 @click.command("place", cls=WithMethods)
 @click.argument("grasps", type=existing_file)
-@click.option("--method", metavar="NAME", help="How to choose: see below.  [default: id3]")
-@click.option("--prune", type=click.IntRange(min=0), metavar="S", help="ID3: end nodes of fewer than S rows.")
-@click.option("--keep", type=click.IntRange(min=1), metavar="M", help="Other methods: keep at most M switches.")
-@click.option("--joints", is_flag=True, help="Choose what helps beside the joints (default: switches alone).")
+@method_option(default="id3; elimination with --crowd")
+@keep_option
+@prune_option
+@click.option("--joints", is_flag=True, help="Choose switches that add to the joints.  [default: switches alone]")
 @click.option(
     "--glove",
     type=existing_file,
-    help="A glove.toml: its ports' costs for methods that heed them.  [default: MCP23017]",
+    help="A glove.toml: the costs of its ports, for methods that weigh them.  [default: MCP23017]",
 )
-@click.option("--exact", is_flag=True, help="Also say how far the placement is from the best of as many switches.")
-@click.option("--crowd", is_flag=True, help="One standard placement for many subjects, the worst-served included.")
-@jobs_option("Processes for --crowd.")
-@click.option("--tree", "show_tree", is_flag=True, help="ID3: also print the tree.")
-@click.option("--draw", type=picture_file, help="Also draw ID3's tree, or how a crowd is served: an .svg or .png file.")
-@click.option("-o", "--output", type=output_file, help="Also store the placement: a .json file to write.")
+@click.option("--exact", is_flag=True, help="Also print how far the placement is from the best of the same size.")
+@click.option("--crowd", is_flag=True, help="Choose one standard placement for many subjects.")
+@jobs_option("Worker processes of --crowd.")
+@click.option("--tree", "show_tree", is_flag=True, help="Also print ID3's tree.")
+@click.option("--draw", type=picture_file, help="Also draw ID3's tree, or a crowd's accuracy: an .svg or .png file.")
+@click.option("-o", "--output", type=OutputFile(".json"), help="Also store the placement: a .json file to write.")
+@overwrite_flag
 @json_flag
 def command(**options: Any) -> None:
-    """Choose the switches of GRASPS that tell its grasp types apart: with ID3, those that its tree asks for.
+    """Choose the switches of GRASPS, a .grasps file, that distinguish its grasp types.
 
-    They stand in the order in which the tree asks for them, each with the information it brought and the share of
-    the grasp types' entropy that it and all before it brought. Other methods take a number of switches to keep.
+    The paper's method, ID3, keeps the switches of its tree, printed in the order of their decisions, each with its
+    information gain and the cumulative share of the grasp types' entropy. Other methods keep a given number of
+    switches, best first.
 
     \b
     Example:

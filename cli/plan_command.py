@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import click
 from rich.text import Text
 
-from .common import jobs_option, json_flag, keep_apart, out, output_file, progress, show, table
+from .common import OutputFile, jobs_option, json_flag, keep_apart, out, overwrite_flag, progress, show, table
 
 if TYPE_CHECKING:
     from thenar.simulator.planning.plan import Planned
@@ -14,7 +14,10 @@ if TYPE_CHECKING:
 
 @click.command("plan")
 @click.argument("scene")
-@click.option("-o", "--output", type=output_file, required=True, metavar="POSTURES.json", help="The file to write.")
+@click.option(
+    "-o", "--output", type=OutputFile(".json"), required=True, metavar="POSTURES.json", help="The file to write."
+)
+@overwrite_flag
 @click.option("--anew", is_flag=True, help="Plan everything, also what is planned already.")
 @jobs_option()
 @json_flag

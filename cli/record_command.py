@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import check_devices, existing_file, keep_apart, output_file, progress, warning
+from .common import Number, OutputFile, check_devices, existing_file, keep_apart, progress, seed_range, warning
 from .lines import echo
 
 if TYPE_CHECKING:
@@ -22,13 +22,15 @@ if TYPE_CHECKING:
 @click.option("--repetitions", type=click.IntRange(1), default=100, show_default=True, help="Trials a grasp type.")
 @click.option(
     "--countdown",
-    type=click.FloatRange(0.0),
+    type=Number(0, 3600),
     default=3.0,
     show_default=True,
     help="Seconds before a grasp is captured.",
 )
-@click.option("--seed", type=click.IntRange(0, 2**63 - 1), help="Of the random order; one is drawn otherwise.")
-@click.option("-o", "--output", type=output_file, required=True, help="The .grasps file to write.")
+@click.option("--seed", type=seed_range, help="Of the random order; one is drawn otherwise.")
+@click.option(
+    "-o", "--output", type=OutputFile(".grasps", goes_on=True), required=True, help="The .grasps file to write."
+)
 def command(
     glove: Path,
     taxonomy: str,
@@ -41,7 +43,7 @@ def command(
 ) -> None:
     """Record labelled grasps: which one to take is shown, in random order, and counted down to.
 
-    What the devices deliver goes into OUTPUT with the ending .mcap as it comes. Whatever ends the collection, the same
+    Everything that the devices deliver goes into OUTPUT with the ending .mcap. Whatever ends the collection, the same
     command goes on where it stopped; each time it ends, all trials accepted so far are in OUTPUT.
 
     \b
@@ -56,8 +58,6 @@ def command(
 
     from .collecting import collect
 
-    if output.suffix != ".grasps":
-        raise click.BadParameter(f"{output.name}: a set of grasps ends in .grasps", param_hint="--output")
     recording = output.with_suffix(".mcap")
     keep_apart(glove, objects, output, recording)
     if output.exists() and not recording.exists():

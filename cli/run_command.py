@@ -3,7 +3,7 @@
 import errno
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from itertools import islice
@@ -13,15 +13,16 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from .common import err, existing_file, existing_folder, of_device, out, output_file, warning
+from .common import Number, OutputFile, err, existing_file, existing_folder, of_device, out, overwrite_flag, warning
 from .lines import echo
 
 if TYPE_CHECKING:
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime import Build, Glove
     from thenar.runtime.policy import Policy
+    from thenar.runtime.preshape import Preshape
     from thenar.runtime.published import HealthReport, LiveGrasp
-    from thenar.runtime.sinks import Fanout, SinkReport
+    from thenar.runtime.sinks import SinkReport
 
     from .live_view import LiveView
 
@@ -60,19 +61,18 @@ class _SinkOption(click.Option):
 @click.option(
     "--preshape", metavar="NAME", help="Preshapes to send along: barrett_bh8, parallel_gripper or a .toml file."
 )
-@click.option("--record", metavar="FILE.mcap", type=output_file, help="Record the raw frames, and what came of them.")
+@click.option(
+    "--record", metavar="FILE.mcap", type=OutputFile(".mcap"), help="Record the raw frames, and what came of them."
+)
+@overwrite_flag
 @click.option("--full-scan", is_flag=True, help="Read all ports in every scan, even when the rest cannot matter.")
 @click.option("--status", is_flag=True, help="Once a second, how the glove fares: in the view, and to all sinks.")
 @click.option("--frames", metavar="N", type=click.IntRange(1), help="Stop after so many frames.")
-@click.option("--lead", type=click.FloatRange(0), help="By how much a new grasp type must lead, in score units.")
-@click.option("--dwell-ms", type=click.FloatRange(0, 10_000), help="For how long it must lead.")
-@click.option("--max-lost", type=click.FloatRange(0, 1), help="Share of the build's weight that may be missing.")
-@click.option(
-    "--error-rate", type=click.FloatRange(0, 1), help="Decide by a sequential test of this error rate instead."
-)
-@click.option(
-    "--spacing-ms", type=click.FloatRange(0, 10_000), help="Frames that the sequential test takes are so far apart."
-)
+@click.option("--lead", type=Number(0), help="By how much a new grasp type must lead, in score units.")
+@click.option("--dwell-ms", type=Number(0, 10_000), help="For how long it must lead.")
+@click.option("--max-lost", type=Number(0, 1), help="Share of the build's weight that may be missing.")
+@click.option("--error-rate", type=Number(0, 1), help="Decide by a sequential test of this error rate instead.")
+@click.option("--spacing-ms", type=Number(0, 10_000), help="Frames that the sequential test takes are so far apart.")
 def command(
     build: Path,
     glove: Path | None,
@@ -101,12 +101,10 @@ def command(
         thenar run build/ --glove glove.toml --status
         thenar run build/ --glove glove.toml --sink unix:/run/grasps --preshape barrett_bh8 --record run.mcap
         thenar run build/ --replay run.mcap | head -3
-        thenar run build/ --replay set.grasps
+        thenar run build/ --replay set.grasps --sink jsonl:grasps.jsonl --preshape parallel_gripper
     """
     if (glove is None) == (replay is None):
         raise click.UsageError("name a glove to run on (--glove) or frames to run through (--replay), one of them")
-    if record is not None and record.suffix != ".mcap":
-        raise click.BadParameter(f"{record.name}: a recording ends in .mcap", param_hint="--record")
     from thenar.runtime import Build
 
     _refuse_idle(glove, replay)
@@ -129,12 +127,12 @@ def command(
             loaded, glove, viewed, frames, sinks=sinks or (() if viewed else ("jsonl:-",)), policy=policy, **asked
         )
     elif replay.suffix == ".mcap":
-        _replay_recording(loaded, replay, sinks, policy)
+        _replay_recording(loaded, replay, sinks, preshape, frames, policy)
     else:
-        _replay_set(loaded, replay, sinks, period_us)
+        _replay_set(loaded, replay, sinks, preshape, frames, period_us)
 
 
-_LIVE = ("preshape", "record", "full_scan", "status", "frames")
+_LIVE = ("record", "full_scan", "status")
 _POLICY = ("lead", "dwell_ms", "max_lost", "error_rate", "spacing_ms")
 
 
@@ -253,7 +251,14 @@ def _say(line: str) -> None:
         echo(line, err=True)
 
 
-def _replay_recording(build: "Build", replay: Path, sinks: Sequence[str], policy: "Policy | None") -> None:
+def _replay_recording(
+    build: "Build",
+    replay: Path,
+    sinks: Sequence[str],
+    preshape: str | None,
+    frames: int | None,
+    policy: "Policy | None",
+) -> None:
     """Recognise the frames of a live recording again, at the times at which they were recognised then.
 
     They go to the sinks as the live run sent them, without any as JSON lines to stdout; on stderr, how many came out as
@@ -262,20 +267,18 @@ def _replay_recording(build: "Build", replay: Path, sinks: Sequence[str], policy
     from thenar.runtime.live.replay import replayed
     from thenar.runtime.sinks.jsonl import encode
 
-    same = frames = 0
-    with _opened(sinks) as fanout:
-        for then, now in replayed(build, replay, policy, warning):
+    same = count = 0
+    with _published(build, sinks, preshape, lambda grasp, shape: encode(grasp, shape, None)) as publish:
+        for then, now in islice(replayed(build, replay, policy, warning), frames):
             same += then == now
-            frames += 1
-            if sinks:
-                fanout.publish(now, None, None)
-            else:
-                sys.stdout.buffer.write(encode(now, None, None))
-    sys.stdout.flush()
-    echo(f"{same} of {frames} frames recognised as they were recorded", err=True)
+            count += 1
+            publish(now)
+    echo(f"{same} of {count} frames recognised as they were recorded", err=True)
 
 
-def _replay_set(build: "Build", replay: Path, sinks: Sequence[str], period_us: int) -> None:
+def _replay_set(
+    build: "Build", replay: Path, sinks: Sequence[str], preshape: str | None, frames: int | None, period_us: int
+) -> None:
     """Recognise every row of a set of grasps by itself, each for the sinks, without any as a JSON line on stdout; on
     stderr, the rate.
     """
@@ -283,37 +286,37 @@ def _replay_set(build: "Build", replay: Path, sinks: Sequence[str], period_us: i
 
     from thenar.compiler.recordings.graspset import GraspSet
 
-    grasp_set, correct = GraspSet.load(replay), 0
-    with _opened(sinks) as fanout:
-        for grasp, degraded in _rows(build, grasp_set, period_us):
-            recorded = str(grasp_set.grasps[grasp.number])
-            correct += grasp.grasp == recorded
-            if sinks:
-                fanout.publish(grasp, None, None)
-                continue
-            line = {
-                "time_us": grasp.time_us,
-                "grasp": grasp.grasp,
-                "probability": round(grasp.probability, 6),
-                "margin": grasp.margin,
-                "degraded": degraded,
-                "recorded": recorded,
-            }
-            sys.stdout.buffer.write(msgspec.json.encode(line) + b"\n")
-    sys.stdout.flush()
+    whole, correct = GraspSet.load(replay), 0
+    grasp_set = whole.rows(range(len(whole))[:frames])
+
+    def line(grasp: "LiveGrasp", shape: "Preshape | None") -> bytes:
+        shown = {
+            "time_us": grasp.time_us,
+            "grasp": grasp.grasp,
+            "probability": round(grasp.probability, 6),
+            "margin": grasp.margin,
+            "degraded": grasp.health == "degraded",
+            "recorded": str(grasp_set.grasps[grasp.number]),
+        }
+        return msgspec.json.encode(shown if preshape is None else shown | {"preshape": shape}) + b"\n"
+
+    with _published(build, sinks, preshape, line) as publish:
+        for grasp in _rows(build, grasp_set, period_us):
+            correct += grasp.grasp == grasp_set.grasps[grasp.number]
+            publish(grasp)
     rows = len(grasp_set)
     echo(f"{correct} of {rows} frames recognised as recorded ({correct / max(rows, 1):.1%})", err=True)
 
 
-def _rows(build: "Build", grasp_set: "GraspSet", period_us: int) -> "Iterator[tuple[LiveGrasp, bool]]":
-    """Yield what is recognised in each row, and whether an input of it was missing. Both clocks begin with the set."""
+def _rows(build: "Build", grasp_set: "GraspSet", period_us: int) -> "Iterator[LiveGrasp]":
+    """Yield what is recognised in each row. Both clocks begin with the set."""
     from thenar.compiler.artifact.verify_firmware import select_inputs
     from thenar.runtime.published import LiveGrasp
 
     bits, codes = select_inputs(grasp_set, build.manifest)
     for row, (switches, joints) in enumerate(zip(bits, codes, strict=True)):
         found = build.recognise(switches, joints)
-        grasp = LiveGrasp(
+        yield LiveGrasp(
             time_us=row * period_us,
             unix_us=row * period_us,
             number=row,
@@ -326,21 +329,40 @@ def _rows(build: "Build", grasp_set: "GraspSet", period_us: int) -> "Iterator[tu
             glove_age_us=None,
             latency_us=0,
         )
-        yield grasp, found.degraded
 
 
 @contextmanager
-def _opened(sinks: Sequence[str]) -> "Iterator[Fanout]":
-    """Open sinks for a replay, which wait for their readers; at the end say what was lost, with exit code 1."""
+def _published(
+    build: "Build", sinks: Sequence[str], preshape: str | None, line: "Callable[[LiveGrasp, Preshape | None], bytes]"
+) -> "Iterator[Callable[[LiveGrasp], None]]":
+    """Yield what publishes a replayed grasp with its preshape: to sinks, which wait for their readers, or without any
+    as a `line` on stdout. At the end say what was lost, with exit code 1.
+    """
+    from thenar.runtime.preshape import PreshapeSelector, load_preshapes
     from thenar.runtime.sinks import Fanout, open_sink
 
+    selector = None
+    if preshape is not None:
+        table = load_preshapes(preshape)
+        selector, lacking = PreshapeSelector(table), table.check(build.grasps)
+        if lacking:
+            err().print(f"thenar: {lacking}")
     with ExitStack() as stack:
         opened = []
         for name in sinks:
             opened.append(open_sink(name, wait=True))
             stack.callback(opened[-1].close)
         fanout = Fanout(opened)
-        yield fanout
+
+        def publish(grasp: "LiveGrasp") -> None:
+            shape = None if selector is None else selector.update(grasp)
+            if opened:
+                fanout.publish(grasp, shape, None)
+            else:
+                sys.stdout.buffer.write(line(grasp, shape))
+
+        yield publish
+    sys.stdout.flush()
     _say_what_was_lost(fanout.reports())
     if _spoilt(fanout.reports()):
         click.get_current_context().exit(1)

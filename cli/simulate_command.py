@@ -11,7 +11,20 @@ from rich.text import Text
 
 from thenar.compiler.text import interval
 
-from .common import err, jobs_option, json_flag, keep_apart, out, output_file, progress, show, table, warning
+from .common import (
+    OutputFile,
+    err,
+    jobs_option,
+    json_flag,
+    keep_apart,
+    out,
+    overwrite_flag,
+    progress,
+    seed_range,
+    show,
+    table,
+    warning,
+)
 from .lines import echo
 
 if TYPE_CHECKING:
@@ -28,12 +41,25 @@ _OWN = "dim"  # how own steps look
 
 @click.command("simulate")
 @click.argument("scene", required=False)
-@click.option("-o", "--output", type=output_file, metavar="SET.grasps", help="Simulate, and write the set there.")
+@click.option(
+    "-o", "--output", type=OutputFile(".grasps"), metavar="SET.grasps", help="Simulate, and write the set there."
+)
+@overwrite_flag
 @click.option("--explain", is_flag=True, help="Only say which steps would run, in which order, and what each costs.")
 @click.option("--ablate", is_flag=True, help="Remove each effect in turn: what that does to recognition and time.")
 @click.option("--list", "listing", is_flag=True, help="Only list the scenes that are shipped.")
 @click.option("--repetitions", type=click.IntRange(1, 100_000), help="Of each grasp type by each subject.")
-@click.option("--seed", type=click.IntRange(0, 2**63 - 1), help="Other random numbers; the subjects stay.")
+@click.option(
+    "--more",
+    metavar="N",
+    type=click.IntRange(1, 100_000),
+    help="N fresh grasps of each type by each subject instead: the same hands, habits and glove, trials that go on.",
+)
+@click.option(
+    "--seed",
+    type=seed_range,
+    help="Draw everything anew: habits, calibrations, the glove's parts, all grasps. The sizes of the hands stay.",
+)
 @click.option("--subject", "subjects", multiple=True, metavar="NAME", help="Only this subject; may be given again.")
 @click.option("--keep-unsettled", is_flag=True, help="Keep repetitions in which the hand did not come to rest.")
 @jobs_option("Worker processes. The set does not depend on it.")
@@ -45,6 +71,7 @@ def command(
     ablate: bool,
     listing: bool,
     repetitions: int | None,
+    more: int | None,
     seed: int | None,
     subjects: tuple[str, ...],
     keep_unsettled: bool,
@@ -59,6 +86,7 @@ def command(
         thenar simulate --list
         thenar simulate quick --explain
         thenar simulate quick -o set.grasps
+        thenar simulate quick --more 3 -o fresh.grasps
     """
     from thenar.simulator.scenes.decode import load_scene, own_file, shipped_scenes
 
@@ -66,7 +94,7 @@ def command(
     if scene is None:
         show(shipped_scenes(), _print_scenes)
         return
-    loaded = load_scene(scene).varied(repetitions, seed, subjects)
+    loaded = load_scene(scene).varied(repetitions, seed, subjects, more)
     with _located(scene):
         if output is not None:
             keep_apart(own_file(scene), loaded.postures, output)
@@ -127,8 +155,9 @@ def _print_scenes(scenes: "list[Shipped]") -> None:
 def _print_report(report: "Report", path: Path) -> None:
     """Print what came out, by grasp type and by step, and warn of what did not settle."""
     console = out()
+    fresh = f"after repetition {report.done}, " if report.done else ""
     console.print(
-        f"{path}: {report.rows} rows, simulated: scene {report.scene}, seed {report.seed}, "
+        f"{path}: {report.rows} rows, simulated: scene {report.scene}, seed {report.seed}, {fresh}"
         f"{len(report.subjects)} subject(s), {report.repetitions} grasps in {report.seconds:.1f} s"
     )
     console.print()

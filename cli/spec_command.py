@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import any_path, existing_file, existing_folder, json_flag, out, show, table
+from .common import Number, OutputFolder, existing_file, existing_folder, json_flag, out, show, table
 
 if TYPE_CHECKING:
     from thenar.compiler.glove.layout import BoardPins
@@ -21,10 +21,10 @@ _WIRING = "glove.toml"
 
 @click.command("spec")
 @click.argument("build", type=existing_folder)
-@click.option("--hand-length", type=click.FloatRange(100, 300), metavar="MM", help="From wrist to middle fingertip.")
+@click.option("--hand-length", type=Number(100, 300), metavar="MM", help="From wrist to middle fingertip.")
 @click.option("--glove", type=existing_file, help="The glove.toml of its wiring.  [default: a new one is proposed]")
 @click.option("--board", type=existing_file, help="The board.toml of the scanner board that reads the switches.")
-@click.option("-o", "--output", type=any_path, help="Also write the files: a folder; a spec there is replaced.")
+@click.option("-o", "--output", type=OutputFolder(), help="Also write the files: a folder; a spec there is replaced.")
 @json_flag
 def command(
     build: Path, hand_length: float | None, glove: Path | None, board: Path | None, output: Path | None

@@ -9,7 +9,7 @@ from rich.console import Console, JustifyMethod
 from rich.table import Table
 from rich.text import Text
 
-from .common import jobs_option, json_flag, out, output_file, progress, show
+from .common import OutputFile, jobs_option, json_flag, out, overwrite_flag, progress, show, table
 
 if TYPE_CHECKING:
     from thenar.stability.report import CaseReport, Check, Listed, Report
@@ -41,8 +41,9 @@ def _known(_: click.Context, __: click.Parameter, cases: tuple[str, ...]) -> tup
 @click.option("--list", "listing", is_flag=True, help="Only list the cases, and what could go wrong in each.")
 @jobs_option("Worker processes; they change no result.")
 @click.option(
-    "-o", "--output", type=output_file, metavar="PAGE.html", help="Write a page with table and pictures there."
+    "-o", "--output", type=OutputFile(".html"), metavar="PAGE.html", help="Write a page with table and pictures there."
 )
+@overwrite_flag
 @json_flag
 def command(cases: tuple[str, ...], full: bool, listing: bool, jobs: int, output: Path | None) -> int:
     """Run the hard cases: what could go wrong with the numbers, the truth they are held against, and the worst error.
@@ -98,7 +99,8 @@ def _write(result: "Report", jobs: int, path: Path) -> None:
 
 
 def _print_list(cases: "list[Listed]") -> None:
-    shown = Table("case", "what it is", "what could go wrong", show_lines=True)
+    shown = table(("case", "subject", "what could go wrong"))
+    shown.show_lines = True
     for case in cases:
         shown.add_row(Text(case.name), Text(case.title), Text(case.danger))
     out().print(shown)
@@ -129,14 +131,14 @@ def _print_case(console: Console, case: "CaseReport", widths: tuple[int, ...]) -
     console.print(Text.assemble((case.name, "bold"), f": {case.about.title}"))
     if case.about.danger:
         console.print(Text(f"What could go wrong: {case.about.danger}", "dim"))
-    table = Table(box=None, padding=(0, _GAP, 0, 0), pad_edge=False)
+    checks = Table(box=None, padding=(0, _GAP, 0, 0), pad_edge=False)
     for head, width in zip(_HEADS, widths, strict=True):
         justify: JustifyMethod = "right" if head in _NUMBERS else "left"
-        table.add_column(head, width=width, justify=justify, header_style="dim", overflow="fold")
+        checks.add_column(head, width=width, justify=justify, header_style="dim", overflow="fold")
     for check in case.checks:
-        table.add_row(*_cells(check))
+        checks.add_row(*_cells(check))
     if case.checks:
-        console.print(table)
+        console.print(checks)
     if case.failure is not None:
         console.print(Text(f"FAILED: {case.failure}", "red"))
     console.print()

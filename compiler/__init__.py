@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from .placement.methods.base import METHODS
     from .placement.selectors import ID3Selector, SwitchSelector
     from .recordings.graspset import GraspSet, Joint
+    from .recordings.merging import merge, split
     from .samples import Samples
     from .tables.collapse import ScoreTables
     from .trainers.base import TRAINERS, Setting, Trainer
@@ -51,6 +52,7 @@ _HOMES = {
     ".placement.methods.base": ("METHODS",),
     ".placement.selectors": ("ID3Selector", "SwitchSelector"),
     ".recordings.graspset": ("GraspSet", "Joint"),
+    ".recordings.merging": ("merge", "split"),
     ".samples": ("Samples",),
     ".tables.collapse": ("ScoreTables",),
     ".trainers.base": ("TRAINERS", "Setting", "Trainer"),
@@ -87,6 +89,8 @@ __all__ = [
     "evaluate",
     "find_frontier",
     "grow_id3",
+    "merge",
+    "split",
     "verify",
 ]
 

@@ -5,6 +5,7 @@ a limit, and whatever pySerial or the kernel says of a line that is gone becomes
 """
 
 import errno
+import logging
 import os
 import select
 from time import monotonic
@@ -17,6 +18,8 @@ from .ports import check_node, port_fault
 
 if TYPE_CHECKING:
     from serial import Serial
+
+_LOG = logging.getLogger(__name__)
 
 BITS_A_BYTE = 10  # a start bit, 8 data bits, a stop bit
 _CHUNK = 4096
@@ -173,7 +176,8 @@ def _has_descriptor(port: "Serial") -> bool:
 
 def _lower_latency(port: "Serial") -> None:
     """Ask an FTDI adapter not to wait 16 ms for more bytes before it hands over what it has."""
-    try:
-        port.set_low_latency_mode(True)
-    except (AttributeError, NotImplementedError, OSError, ValueError):
-        return  # another kind of port: nothing lost
+    if hasattr(port, "set_low_latency_mode"):
+        try:
+            port.set_low_latency_mode(True)
+        except (OSError, ValueError) as reason:  # another kind of adapter: nothing lost
+            _LOG.debug("%s: %s", port.port, reason)

@@ -61,7 +61,7 @@ class Glove:
     full_scan : bool
         Whether every scan reads all ports, even when the rest cannot matter.
     status : bool
-        Whether sinks get a report of the glove's health once a second.
+        Whether sinks get a report of the glove's health once a second, and whenever a device comes or goes.
     stop : threading.Event, optional
         Ends the iteration when it is set.
     feed : Feed, optional
@@ -78,7 +78,7 @@ class Glove:
     recorder : Recorder or None
         What writes the recording.
     health : HealthReport or None
-        How the glove fares, worked out anew once a second.
+        How the glove fares, worked out anew once a second, and whenever a device comes or goes.
     lacking : str
         A sentence on grasp types for which `preshapes` names none; "" if there are none.
 
@@ -187,7 +187,7 @@ class Glove:
             moment.angles = self._newest_angles
         self._fanout.publish(grasp, moment.preshape, moment.angles)
         self._health.update(grasp, taken.switches, taken.glove.time_us if taken.glove else None, moment.codes)
-        if now >= self._due_us:
+        if now >= self._due_us or self.sources.changed:
             self._look(now)
         self.frames += 1
         return moment
@@ -201,7 +201,7 @@ class Glove:
         return self._fanout.reports()
 
     def _look(self, now: int) -> None:
-        self._due_us = now + _REPORT_US
+        self._due_us, self.sources.changed = now + _REPORT_US, False
         self.health = self._health.report(now, self.sources.health(), self.sources.overflowed)
         if self._status:
             self._fanout.health(self.health)

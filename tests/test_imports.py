@@ -29,7 +29,14 @@ ALLOWED = {
     "compiler.hand": ("drivers.errors", "runtime.names"),
     "compiler.limits": ("runtime.tables", "drivers.errors"),
     "compiler.publication": ("runtime.files", "drivers.errors"),
-    "compiler.recordings": ("runtime", "drivers.errors", "compiler.recordings", "compiler.pictures", "compiler.text"),
+    "compiler.recordings": (
+        "runtime",
+        "drivers.errors",
+        "compiler.recordings",
+        "compiler.pictures",
+        "compiler.publication",
+        "compiler.text",
+    ),
     "compiler.samples": ("runtime", "drivers.errors", "compiler.limits", "compiler.recordings"),
     "compiler.placement": (
         "runtime",

@@ -32,6 +32,7 @@ from thenar.runtime.tables import IntegerTables, tables_to_bytes
 from ..evaluation.folds import check_cut
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES
 from ..glove.files import NAMES, users_files
+from ..placement.methods.base import METHODS
 from ..placement.ports import PortCosts, ports_of_whole_glove
 from ..publication import check_folder, publish_folder, sweep
 from ..recordings.graspset import GraspSet, Joint
@@ -43,7 +44,7 @@ from ..trainers.base import Training, changed
 from . import CompileError
 from .documents import REPORT_NAME, SPEC_FOLDER, BuildReport, Documents, Progress
 from .ensemble import ensemble_to_bytes
-from .training import Tested, Trained, check_placement, cross_validated, samples_of, train
+from .training import Tested, Trained, cross_validated, samples_of, train
 from .verify_firmware import made_firmware
 
 # A build that was compiled for no harness has no scan map, one that is too large for any microcontroller no firmware,
@@ -173,7 +174,7 @@ def _sound(options: Options) -> Options:
         raise CompileError(f"tables of {options.table_bits} bits: firmware has entries of 8 or 16")
     if not 4 <= options.width <= 16:
         raise CompileError(f"sums of {options.width} bits: tables have 4 to 16")
-    check_placement(options)
+    METHODS.named(options.placement).check_given(options.keep, options.prune)
     values = Training.of(options).settings
     # A name that is equal to a default is left out if it is the very same string.
     return replace(

@@ -93,17 +93,6 @@ def train(samples: Samples, options: Options, report: Report | None = None, port
     return Trained(columns, chosen.gains, chosen.tree, model)
 
 
-def check_placement(options: Options) -> None:
-    """Raise MemberError unless `options` name a method that there is, CompileError unless with its own parameter."""
-    by_number = METHODS.named(options.placement).by_number
-    if by_number and options.keep is None:
-        raise CompileError(f"placement {options.placement!r} needs --keep: how many switches")
-    if by_number and options.prune:
-        raise CompileError(f"placement {options.placement!r} knows no --prune: say with --keep how many switches")
-    if not by_number and options.keep is not None:
-        raise CompileError(f"placement {options.placement!r} is pruned by --prune: it cannot --keep a given number")
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Tested:
     """What came of the folds: the rate, and how often each grasp type (rows) was answered by each (columns), (K, K)."""

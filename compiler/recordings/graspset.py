@@ -8,6 +8,7 @@ grasps    (n,) uint32               index into the taxonomy's types
 subjects, objects (n,) uint32       index into the header's names
 trials    (n,) int64
 sessions  (n,) uint32               index into the header's names; only where there are several, and then in format 2
+taxels    (n, t) uint16             only where there are any, and then in format 2
 """
 
 import hashlib
@@ -127,6 +128,10 @@ class GraspSet:
         Between which the glove was taken off; none given: one session, "1".
     independent : bool
         Whether whoever recorded the rows states that each is a trial of its own, whatever its number is.
+    taxels : (n, t) array of uint16, optional
+        The codes of analog columns of which training makes switches, by a threshold that it learns.
+    taxel_columns : tuple of Joint
+        Their names, and what their codes mean.
 
     Attributes
     ----------
@@ -175,12 +180,17 @@ class GraspSet:
     simulated: str = ""
     sessions: NDArray[np.str_] = field(default_factory=lambda: np.empty(0, np.str_))
     independent: bool = False
+    taxels: NDArray[np.uint16] = field(default_factory=lambda: np.empty(0, np.uint16))
+    taxel_columns: tuple[Joint, ...] = ()
 
     def __post_init__(self) -> None:
         rows = len(self.grasps)
-        check_names("column", (*self.switch_names, *self.joint_names))
-        if not self.switch_names and not self.joints:
+        check_names("column", (*self.element_names, *self.joint_names))
+        if not self.element_names and not self.joints:
             raise RecordingError("a set of grasps needs at least one switch or joint")
+        if not self.taxels.size:
+            object.__setattr__(self, "taxels", np.zeros((rows, len(self.taxel_columns)), np.uint16))
+        self._freeze("taxels", np.uint16, (rows, len(self.taxel_columns)))
         self._freeze("switches", np.bool_, (rows, len(self.switch_names)))
         self._freeze("codes", np.uint16, (rows, len(self.joints)))
         if not self.sessions.size:
@@ -223,7 +233,8 @@ class GraspSet:
     def __repr__(self) -> str:
         types, subjects, objects = (len(np.unique(each)) for each in (self.grasps, self.subjects, self.objects))
         what = f"{len(self)} grasps of {types} types ({shortened(self.taxonomy.name)})"
-        read = f"{len(self.switch_names)} switches, {len(self.joints)} joints"
+        taxels = f"{len(self.taxel_columns)} taxels, " if self.taxel_columns else ""
+        read = f"{len(self.switch_names)} switches, {taxels}{len(self.joints)} joints"
         who = f"{read}, {subjects} subjects, {objects} objects"
         return f"GraspSet: {what}, {who}" + (f"\nsimulated: {shortened(self.simulated)}" if self.simulated else "")
 
@@ -231,6 +242,11 @@ class GraspSet:
     def joint_names(self) -> tuple[str, ...]:
         """The joints' names, in the order of `codes`."""
         return tuple(joint.name for joint in self.joints)
+
+    @property
+    def element_names(self) -> tuple[str, ...]:
+        """The names of what a placement chooses from: the switches, then the taxels."""
+        return (*self.switch_names, *(taxel.name for taxel in self.taxel_columns))
 
     @property
     def trial_ids(self) -> NDArray[np.intp]:
@@ -262,6 +278,8 @@ class GraspSet:
             simulated=self.simulated,
             sessions=self.sessions[pick],
             independent=self.independent,
+            taxels=self.taxels[pick],
+            taxel_columns=self.taxel_columns,
         )
 
     def fingerprint(self) -> str:
@@ -275,12 +293,15 @@ class GraspSet:
         digest.update(self.simulated.encode())
         if self._format > 1:
             digest.update(msgspec.json.encode((self.sessions.tolist(), self.independent)))
+        if self.taxel_columns:
+            digest.update(msgspec.json.encode(self.taxel_columns))
+            digest.update(self.taxels.astype("<u2").tobytes())
         return digest.hexdigest()
 
     @property
     def _format(self) -> int:
-        """The format of its file: 2 where there are sessions, or rows that are stated to be independent."""
-        return 1 + bool(self.independent or (self.sessions != "1").any())
+        """The format of its file: 2 where there are sessions or taxels, or rows that are stated to be independent."""
+        return 1 + bool(self.independent or self.taxel_columns or (self.sessions != "1").any())
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -294,7 +315,11 @@ class GraspSet:
 
     def save(self, path: str | Path) -> None:
         """Write a `.grasps` file, whole or not at all; the same set gives the same bytes."""
-        write_atomically(Path(path), seal(KIND, self._format, _pack(self)))
+        write_atomically(Path(path), self.encoded())
+
+    def encoded(self) -> bytes:
+        """Return the bytes of its `.grasps` file."""
+        return seal(KIND, self._format, _pack(self))
 
 
 KIND = b"THNRGRSP"
@@ -302,7 +327,7 @@ VERSION = 2
 # Rows, columns and grasp types of a set.
 MOST = 10_000_000
 
-_DTYPES = {"switches": "u1", "codes": "<u2", "trials": "<i8"}
+_DTYPES = {"switches": "u1", "codes": "<u2", "taxels": "<u2", "trials": "<i8"}
 _DTYPES |= dict.fromkeys(("grasps", "subjects", "objects", "sessions"), "<u4")
 
 AnyGraspSet = TypeVar("AnyGraspSet", bound=GraspSet)
@@ -318,6 +343,7 @@ class _Header(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
     simulated: str = ""
     sessions: tuple[str, ...] = ()
     independent: bool = False
+    taxels: tuple[Joint, ...] = ()
 
 
 def _pack(grasp_set: GraspSet) -> bytes:
@@ -335,6 +361,7 @@ def _pack(grasp_set: GraspSet) -> bytes:
         simulated=grasp_set.simulated,
         sessions=tuple(sessions.tolist()) if several else (),
         independent=grasp_set.independent,
+        taxels=grasp_set.taxel_columns,
     )
     arrays: dict[str, AnyArray] = {
         "switches": np.packbits(grasp_set.switches, axis=1),
@@ -346,6 +373,8 @@ def _pack(grasp_set: GraspSet) -> bytes:
     }
     if header.sessions:
         arrays["sessions"] = session
+    if header.taxels:
+        arrays["taxels"] = grasp_set.taxels
     return pack(msgspec.json.encode(header), {name: array.astype(_DTYPES[name]) for name, array in arrays.items()})
 
 
@@ -371,16 +400,20 @@ def _unpack(cls: type[AnyGraspSet], size: int, header_bytes: bytes, arrays: dict
         simulated=header.simulated,
         sessions=_names("sessions", header.sessions, arrays, size) if header.sessions else np.empty(0, np.str_),
         independent=header.independent,
+        taxels=arrays["taxels"].astype(np.uint16) if header.taxels else np.empty(0, np.uint16),
+        taxel_columns=header.taxels,
     )
 
 
 def _check_arrays(header: _Header, arrays: dict[str, AnyArray]) -> None:
-    if max(header.rows, len(header.switches) + len(header.joints), len(header.taxonomy.types)) > MOST:
+    columns = len(header.switches) + len(header.joints) + len(header.taxels)
+    if max(header.rows, columns, len(header.taxonomy.types)) > MOST:
         raise RecordingError(f"it has more than {MOST} rows, columns or grasp types")
-    expected = _DTYPES.keys() - (() if header.sessions else {"sessions"})
+    absent = {name for name, there in (("sessions", header.sessions), ("taxels", header.taxels)) if not there}
+    expected = _DTYPES.keys() - absent
     if arrays.keys() != expected:
         raise RecordingError(f"it holds the arrays {sorted(arrays)}, not {sorted(expected)}")
-    widths = {"switches": -(-len(header.switches) // 8), "codes": len(header.joints)}
+    widths = {"switches": -(-len(header.switches) // 8), "codes": len(header.joints), "taxels": len(header.taxels)}
     for name, array in arrays.items():
         shape = (header.rows, widths[name]) if name in widths else (header.rows,)
         if array.dtype != np.dtype(_DTYPES[name]) or array.shape != shape:

@@ -96,7 +96,7 @@ def placement_sentences(content: ReportContent) -> tuple[str, str]:
     else:
         bits = "holds alone, without the others"
     return (
-        f"{how} (--placement {method}).",
+        f"{how} (--method {method}).",
         f"Columns count from 0 in the recordings. Bits are the information on the grasp type that a switch {bits}.",
     )
 

@@ -37,7 +37,8 @@ class Moment(msgspec.Struct):
     switches  the newest frame of the switches; None before the first
     glove     the newest record of the CyberGlove; None before the first
     codes     the joints' codes that were scored; None while the joints are lost
-    preshape  what the robot's hand shall have now; None where it shall be told nothing
+    preshape  what the robot's hand shall have now; None where it shall be told nothing, as before the first grasp has
+              settled (`PreshapeSelector`: 0.1 s)
     angles    the glove's joints; None without a calibration, and while the glove says nothing
     """
 

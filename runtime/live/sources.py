@@ -120,8 +120,8 @@ class Keeper(Generic[T]):
     def _let_go(self) -> None:
         try:
             self._device.close()
-        except OSError:  # it is gone already
-            pass
+        except OSError as gone:
+            _log.debug("%s: closing it: %s", self.state.name, gone)
         except Exception as fault:  # as above
             self._blame(f"{type(fault).__name__}: {fault}")
 
@@ -277,6 +277,8 @@ class Sources:
     scan          which ports of the I2C expanders to read, in which order
     early         what ends scans early where one device reads all switches, given the joints' codes; None: nothing does
 
+    changed       whether a device came, went or failed otherwise since somebody set this to False
+
     take(at_most_us) returns the newest frames, and all that arrived since the last call. It waits for something as long
     as the newest frames stay fresh, and for a period where none is, but no longer than at_most_us, if that is given.
     """
@@ -297,9 +299,14 @@ class Sources:
         if early is not None and len(alone) == 1:
             alone[0].end_early(*early, self._arrivals.glove)
         self.take: Callable[..., Taken] = partial(self._arrivals.take, self._patience_us)
+        self.changed = True
         self._keepers = [
-            Keeper[SwitchFrame | GloveFrame](source.name, source, self._taking(source)) for source in self._devices
+            Keeper[SwitchFrame | GloveFrame](source.name, source, self._taking(source), self._change)
+            for source in self._devices
         ]
+
+    def _change(self) -> None:
+        self.changed = True
 
     def _patience_us(self) -> int:
         return min(filter(None, (self.switch_period_us, self.glove_period_us)), default=_PATIENCE_US)

@@ -89,9 +89,12 @@ class Session(msgspec.Struct, frozen=True, kw_only=True):
     clock_ns: Number = 0
 
 
+_FIELDS = fields(Session)
+
+
 def to_metadata(session: Session) -> dict[str, str]:
     """Return `session` as the keys and texts of a Metadata record."""
-    texts = {field.name: _text(getattr(session, field.name)) for field in fields(Session)}
+    texts = {field.name: _text(getattr(session, field.name)) for field in _FIELDS}
     return {"version": str(VERSION), **texts}
 
 
@@ -103,7 +106,10 @@ def from_metadata(texts: dict[str, str]) -> Session:
         raise McapError(f"its version is {shortened(repr(version), 20)}, not a number: it was not recorded by thenar")
     if int(version) > VERSION:
         raise McapError(f"it is of version {version}, this thenar reads up to {VERSION}: update thenar")
-    session = Session(**{field.name: _value(field, texts) for field in fields(Session) if field.name in _need(texts)})
+    for field in _FIELDS:
+        if field.required and field.name not in texts:
+            raise McapError(f"its metadata lack {field.name!r}: damaged, or not recorded by thenar")
+    session = Session(**{field.name: _value(field, texts) for field in _FIELDS if field.name in texts})
     _check_names(session)
     return session
 
@@ -116,13 +122,6 @@ def _check_names(session: Session) -> None:
     for name in sorted(names):
         if reason := fault(name):
             raise McapError(f"its metadata name {shortened(repr(name))}, which {reason}")
-
-
-def _need(texts: dict[str, str]) -> dict[str, str]:
-    for field in fields(Session):
-        if field.required and field.name not in texts:
-            raise McapError(f"its metadata lack {field.name!r}: damaged, or not recorded by thenar")
-    return texts
 
 
 def _text(value: Any) -> str:

@@ -1,5 +1,6 @@
 """What every sink is, which kinds there are, and several sinks as one."""
 
+import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -12,6 +13,8 @@ from thenar.drivers.members import Members
 from ..names import shortened
 from ..preshape.selector import Preshape
 from ..published import HealthReport, JointAngles, LiveGrasp
+
+_log = logging.getLogger("thenar")
 
 
 class SinkError(ThenarError, OSError):
@@ -143,8 +146,8 @@ def open_sink(where: str, *, wait: bool = False) -> Sink:
 
 
 class Fanout:
-    """Publishes to every one of `sinks`. One that raises, against its promise, is left out from then on, and its report
-    says why.
+    """Publishes to every one of `sinks`. One that raises, against its promise, is left out from then on: its report
+    says why, and the log has the trace.
     """
 
     __slots__ = ("_errors", "_lost", "_sinks")
@@ -185,20 +188,20 @@ class Fanout:
             try:
                 sink.close()
             except Exception as reason:
-                self._errors[number] = _said(reason)
+                self._blame(number, reason)
 
     def _report(self, number: int, sink: Sink) -> SinkReport:
         if not self._errors[number]:
             try:
                 return sink.report()
             except Exception as reason:
-                self._errors[number] = _said(reason)
+                self._blame(number, reason)
         return SinkReport(type(sink).__name__, None, 0, self._lost[number], self._errors[number], over=True)
 
     def _leave_out(self, number: int, reason: Exception) -> None:
-        self._errors[number] = _said(reason)
+        self._blame(number, reason)
         self._lost[number] += 1
 
-
-def _said(reason: Exception) -> str:
-    return f"{type(reason).__name__}: {reason}"
+    def _blame(self, number: int, reason: Exception) -> None:
+        self._errors[number] = f"{type(reason).__name__}: {reason}"
+        _log.error("sink %s: a fault of the program", type(self._sinks[number]).__name__, exc_info=reason)

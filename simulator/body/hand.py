@@ -121,13 +121,9 @@ def about_y(frames: Floats, sine: Floats, cosine: Floats) -> Floats:
 
 def frame(x: Floats, dorsal: Floats) -> Floats:
     """Return axes as columns: x as given, y and z square to it, z as near `dorsal` as can be."""
-    y = _cross(dorsal, x)
+    y = np.cross(dorsal, x)
     y = y / np.sqrt(add_up(y * y))
-    return np.stack([x, y, _cross(x, y)], axis=1)
-
-
-def _cross(a: Floats, b: Floats) -> Floats:
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    return np.stack([x, y, np.cross(x, y)], axis=1)
 
 
 def _product(a: Floats, b: Floats) -> Floats:
@@ -148,9 +144,9 @@ def _thumb() -> tuple[Floats, Floats, Floats]:
     abduction = ca * rest[:, 2] - sa * rest[:, 0]
     flexion = cf * rest[:, 1] - sf * rest[:, 0]
     y = rest[:, 1]
-    abductor = np.stack([_cross(y, abduction), y, abduction], axis=1)
+    abductor = np.stack([np.cross(y, abduction), y, abduction], axis=1)
     z = rest[:, 2]
-    return abductor, np.stack([_cross(flexion, z), flexion, z], axis=1), rest
+    return abductor, np.stack([np.cross(flexion, z), flexion, z], axis=1), rest
 
 
 def _fingers() -> Iterator[Floats]:

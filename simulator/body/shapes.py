@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.elementary import sincos
+from thenar.compiler.elementary import add_up, sincos
 
 Floats = NDArray[np.float64]
 Length = Annotated[float, msgspec.Meta(gt=0.0, le=2000.0)]
@@ -56,10 +56,9 @@ class Cylinder(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="cyl
         radius = np.sqrt(y * y + z * z)
         side = radius - (self.diameter_mm / 2 - self.edge_mm)
         end = np.abs(x) - (self.length_mm / 2 - self.edge_mm)
-        across, along = _corner(np.stack([side, end]))
-        distance = _rounded(np.stack([side, end])) - self.edge_mm
+        distance, (across, along) = _rounded(np.stack([side, end]))
         outward = _unit(np.stack([y, z]), radius, np.array([1.0, 0.0])[:, None, None])
-        return distance, np.stack([along * np.where(x < 0.0, -1.0, 1.0), *(across * outward)], axis=1)
+        return distance - self.edge_mm, np.stack([along * np.where(x < 0.0, -1.0, 1.0), *(across * outward)], axis=1)
 
     def curvature(self, points: Floats) -> Floats:
         """Return how fast the normal turns (m, n) per mm that a point moves across the bar; not at all at its ends."""
@@ -87,9 +86,8 @@ class Box(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="box", ta
         """Return signed distances (m, n) and unit outward normals (m, 3, n)."""
         inner = np.array(self.extent_mm()) / 2 - self.edge_mm
         beyond = np.abs(points) - inner[:, None]
-        stacked = np.moveaxis(beyond, 1, 0)
-        normal = np.moveaxis(_corner(stacked), 0, 1) * np.where(points < 0.0, -1.0, 1.0)
-        return _rounded(stacked) - self.edge_mm, normal
+        distance, out = _rounded(np.moveaxis(beyond, 1, 0))
+        return distance - self.edge_mm, np.moveaxis(out, 0, 1) * np.where(points < 0.0, -1.0, 1.0)
 
     def curvature(self, points: Floats) -> Floats:
         """Return how fast the normal turns (m, n): not at all on a plane."""
@@ -109,9 +107,7 @@ def _check_edge(edge_mm: float, *sides_mm: float) -> None:
 
 
 def _norm(points: Floats) -> Floats:
-    x, y, z = points[:, 0], points[:, 1], points[:, 2]
-    distance: Floats = np.sqrt(x * x + y * y + z * z)
-    return distance
+    return np.sqrt(add_up((points * points).swapaxes(0, 1)))
 
 
 def _unit(vectors: Floats, length: Floats, chosen: Floats) -> Floats:
@@ -121,24 +117,12 @@ def _unit(vectors: Floats, length: Floats, chosen: Floats) -> Floats:
     return unit
 
 
-def _rounded(beyond: Floats) -> Floats:
-    """Return the distance from a corner whose sides lie `beyond` (sides, m, n) away."""
+def _rounded(beyond: Floats) -> tuple[Floats, Floats]:
+    """Return the distance from a corner whose sides lie `beyond` (sides, m, n) away, and its unit gradient by them."""
     outside = np.maximum(beyond, 0.0)
-    total = outside[0] * outside[0]
-    for side in outside[1:]:
-        total = total + side * side
-    distance: Floats = np.sqrt(total) + np.minimum(beyond.max(axis=0), 0.0)
-    return distance
-
-
-def _corner(beyond: Floats) -> Floats:
-    """Return the unit gradient of `_rounded` with respect to each side."""
-    outside = np.maximum(beyond, 0.0)
-    total = outside[0] * outside[0]
-    for side in outside[1:]:
-        total = total + side * side
+    distance = np.sqrt(add_up(outside * outside))
     nearest = np.arange(len(beyond))[:, None, None] == beyond.argmax(axis=0)
-    return _unit(outside, np.sqrt(total), nearest.astype(np.float64))
+    return distance + np.minimum(beyond.max(axis=0), 0.0), _unit(outside, distance, nearest.astype(np.float64))
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,6 +136,10 @@ class Pose:
     def of(cls, numbers: Floats) -> "Pose":
         """Return the poses of (6, n) numbers: mm, and a rotation vector in radians."""
         return cls(numbers[:3].copy(), rotation(numbers[3:]))
+
+    def rows(self, index: NDArray[np.intp] | slice) -> "Pose":
+        """Return some of the poses, in order."""
+        return Pose(self.position[:, index], self.rotation[..., index])
 
     def moved(self, step: Floats) -> "Pose":
         """Return the poses after (6, n): a shift in mm and a small turn about hand axes in radians."""
@@ -192,7 +180,7 @@ def rotation(vector: Floats) -> Floats:
 def rotation_vector(matrix: Floats) -> Floats:
     """Return the rotation vectors (3, n), at most half a turn long, of matrices (3, 3, n)."""
     w, *v = _quaternion(matrix)
-    sine = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    sine = np.sqrt(add_up(np.array(v) ** 2))
     small = sine < 1e-150
     return np.stack(v) * np.where(small, 2.0, 2.0 * _angle(sine, w) / np.where(small, 1.0, sine))
 

@@ -197,7 +197,7 @@ class Command:
             self.hand,
             self.surfaces.rows(index),
             self.angles[:, index],
-            Pose(self.pose.position[:, index], self.pose.rotation[..., index]),
+            self.pose.rows(index),
             self.torque[:, index],
             self.weight[:, index],
             self.skin_points[..., index],

@@ -93,13 +93,8 @@ def torques(condition: Condition, skeleton: Skeleton, pose: Pose) -> Floats:
 def _add_moments(total: Floats, skeleton: Skeleton, capsule: int, centre: Floats, force: Floats) -> None:
     digit, segment = divmod(capsule, 3)
     for joint in range(segment + 2):
-        moment = _cross(centre - skeleton.centres[digit, joint], force)
-        axis = skeleton.axes[digit, joint]
-        total[4 * digit + joint] += axis[0] * moment[0] + axis[1] * moment[1] + axis[2] * moment[2]
-
-
-def _cross(a: Floats, b: Floats) -> Floats:
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+        moment = np.cross(centre - skeleton.centres[digit, joint], force, axis=0)
+        total[4 * digit + joint] += add_up(skeleton.axes[digit, joint] * moment)
 
 
 def split(switches: Switches, depths: Floats, forces: Floats) -> tuple[Floats, Floats]:

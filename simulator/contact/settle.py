@@ -1,7 +1,7 @@
 """Newton's method, until every repetition is at rest."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -226,17 +226,8 @@ class Rest:
 
     def part(self, first: int, last: int) -> "Rest":
         """Return the rest of repetitions first to last - 1."""
-        own = slice(first, last)
-        return Rest(
-            self.angles[:, own],
-            Pose(self.pose.position[:, own], self.pose.rotation[..., own]),
-            self.presses[:, own],
-            self.drags[..., own],
-            self.residual_n[own],
-            self.residual_nmm[own],
-            self.settled[own],
-            self.steps[own],
-        )
+        arrays = {each.name: getattr(self, each.name)[..., first:last] for each in fields(self) if each.name != "pose"}
+        return Rest(pose=self.pose.rows(slice(first, last)), **arrays)
 
 
 def close(cases: Sequence[Case], skin: Skin, most_steps: int, pace: Pace = USUAL) -> list[Rest]:

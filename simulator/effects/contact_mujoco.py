@@ -8,7 +8,7 @@ from msgspec import Meta
 from ..body.layout import murakami160
 from ..contact.model import ContactModel
 from ..errors import SimMissingError
-from ..pipeline.effect import Effect, EffectParameters, Setting
+from ..pipeline.effect import CONTACT_READS, CONTACT_WRITES, Effect, EffectParameters, Setting
 
 
 class Parameters(EffectParameters, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -49,11 +49,8 @@ MEMBER = Effect(
     summary="the hand closes on the object in MuJoCo: rigid bodies, friction, time",
     stage="contact",
     place=2,
-    reads=("posture_deg", "pose", "grip_n"),
-    writes=(
-        *("posture_deg", "pose", "commanded_deg", "commanded_pose", "forces_n"),
-        *("settled", "residual_n", "residual_nmm", "between_n"),
-    ),
+    reads=CONTACT_READS,
+    writes=CONTACT_WRITES,
     conflicts=("contact.quasistatic",),
     parameters=Parameters,
     model=model,

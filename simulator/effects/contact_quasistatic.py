@@ -14,7 +14,7 @@ from ..body.shapes import rotation_vector
 from ..contact.balance import USUAL, Case, Pace, Skin
 from ..contact.model import Contact, ContactModel, Load, split
 from ..contact.settle import Rest, close
-from ..pipeline.effect import Effect, EffectParameters, Setting
+from ..pipeline.effect import CONTACT_READS, CONTACT_WRITES, Effect, EffectParameters, Setting
 
 _Positive = Annotated[float, msgspec.Meta(gt=0.0, le=1000.0)]
 # So many repetitions are solved at a time: enough to outweigh numpy's calls, few enough for the processor's cache.
@@ -105,11 +105,8 @@ MEMBER = Effect(
     summary="hand and object at rest: skin springs, sticking friction, weight",
     stage="contact",
     place=1,
-    reads=("posture_deg", "pose", "grip_n"),
-    writes=(
-        *("posture_deg", "pose", "commanded_deg", "commanded_pose", "forces_n"),
-        *("settled", "residual_n", "residual_nmm", "between_n"),
-    ),
+    reads=CONTACT_READS,
+    writes=CONTACT_WRITES,
     conflicts=("contact.mujoco",),
     parameters=Parameters,
     model=model,

@@ -3,21 +3,15 @@
 Their wires still carry current: in a matrix (switch.ghosting) their closed switches join the columns all the same.
 """
 
-from collections.abc import Callable
 from typing import Annotated
 
-import numpy as np
 from msgspec import Meta
-from numpy.typing import NDArray
 
 from ..body.layout import murakami160
-from ..errors import SceneError
 from ..pipeline.batch import Batch
 from ..pipeline.effect import Effect, EffectParameters, Setting, Step
-from ..pipeline.parts import drawn, port_count, port_of
+from ..pipeline.parts import chooser, port_count, port_of
 from ..streams import Draw
-
-Bits = NDArray[np.bool_]
 
 
 class Parameters(EffectParameters, frozen=True):
@@ -35,27 +29,13 @@ class Parameters(EffectParameters, frozen=True):
 def prepare(parameters: Parameters, setting: Setting) -> Step:
     """Return the step that opens every switch of the dead ports. Raises SceneError where there are no such ports."""
     switches = len(murakami160())
-    dead, port = _chooser(parameters, port_count(switches)), port_of(switches)
+    dead = chooser("port.dead", "port", "dead", port_count(switches), parameters.ports or (), parameters.count)
+    port = port_of(switches)
 
     def step(batch: Batch, draw: Draw) -> None:
         batch.bits = batch.bits & ~dead(draw)[port]
 
     return step
-
-
-def _chooser(parameters: Parameters, there: int) -> Callable[[Draw], Bits]:
-    """Return what tells which of the ports (there,) are dead."""
-    if parameters.ports is not None:
-        if max(parameters.ports) >= there:
-            raise SceneError(
-                f"effects.port.dead.ports: the glove has no port {max(parameters.ports)}: they go from 0 to {there - 1}"
-            )
-        named = np.isin(np.arange(there), parameters.ports)
-        return lambda draw: named
-    count = parameters.count or 1
-    if count > there:
-        raise SceneError(f"effects.port.dead.count: {count} ports cannot be dead: the glove has {there}")
-    return lambda draw: drawn(draw, there, count)
 
 
 MEMBER = Effect(

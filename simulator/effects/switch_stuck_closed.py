@@ -2,7 +2,7 @@
 
 from ..pipeline.batch import Batch
 from ..pipeline.effect import Effect, Setting, Step
-from ..pipeline.parts import StuckParameters, chooser
+from ..pipeline.parts import StuckParameters, stuck
 from ..streams import Draw
 
 
@@ -12,10 +12,10 @@ class Parameters(StuckParameters, frozen=True):
 
 def prepare(parameters: Parameters, setting: Setting) -> Step:
     """Return the step that closes them. Raises SceneError where the glove has no such switch."""
-    stuck = chooser(MEMBER.name, parameters)
+    chosen = stuck(MEMBER.name, parameters)
 
     def step(batch: Batch, draw: Draw) -> None:
-        batch.bits = batch.bits | stuck(draw)
+        batch.bits = batch.bits | chosen(draw)
 
     return step
 

@@ -37,6 +37,13 @@ from .batch import Batch
 Stage = Literal["posture", "contact", "switch", "frame", "sense", "read", "wire"]
 STAGES: tuple[Stage, ...] = ("posture", "contact", "switch", "frame", "sense", "read", "wire")
 
+# What a contact model reads and writes of a batch (`Batch.load`, `Batch.take`).
+CONTACT_READS = ("posture_deg", "pose", "grip_n")
+CONTACT_WRITES = (
+    *("posture_deg", "pose", "commanded_deg", "commanded_pose", "forces_n"),
+    *("settled", "residual_n", "residual_nmm", "between_n"),
+)
+
 Step = Callable[[Batch, Draw], None]
 # What is done with several batches at once, each with its draws.
 Together = Callable[[Sequence[Batch], Sequence[Draw]], None]

@@ -1,6 +1,6 @@
 """Parts of a glove: how switches are wired, and which of them are faulty."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Annotated
 
 import numpy as np
@@ -15,6 +15,7 @@ from ..streams import Draw
 from .effect import EffectParameters
 
 PORT = 16
+_MANY = {"port": "ports", "switch": "switches"}
 
 
 def port_count(switches: int) -> int:
@@ -45,32 +46,31 @@ class StuckParameters(EffectParameters, frozen=True):
             raise ValueError("say which `switches` are stuck or their `count`, not both")
 
 
-def chooser(effect: str, parameters: StuckParameters) -> Callable[[Draw], Bits]:
+def stuck(effect: str, parameters: StuckParameters) -> Callable[[Draw], Bits]:
     """Return what tells which switches (s,) of the glove are stuck. Raises SceneError where it has no such switch."""
-    names = [patch.name for patch in murakami160()]
-    stuck = np.zeros(len(names), dtype=np.bool_)
-    if parameters.switches is not None:
-        stuck[[_number(effect, switch, names) for switch in parameters.switches]] = True
-        return lambda draw: stuck
-    count = parameters.count or 1
-    if count > len(names):
-        raise SceneError(f"effects.{effect}.count: {count} switches cannot be stuck: the glove has {len(names)}")
-    return lambda draw: drawn(draw, len(names), count)
-
-
-def drawn(draw: Draw, there: int, count: int) -> Bits:
-    """Return which `count` of the glove's parts (there,) are drawn: those of the least uniform numbers."""
-    least = np.argsort(draw.per_glove(there).uniform(), kind="stable")[:count]
-    return np.isin(np.arange(there), least)
-
-
-def _number(effect: str, switch: int | str, names: list[str]) -> int:
-    if isinstance(switch, str):
-        if switch not in names:
+    names, numbers = [patch.name for patch in murakami160()], list[int]()
+    for switch in parameters.switches or ():
+        if isinstance(switch, str) and switch not in names:
             raise SceneError(f"effects.{effect}.switches: the glove has no switch {switch!r}{nearest(switch, names)}")
-        return names.index(switch)
-    if not 0 <= switch < len(names):
-        raise SceneError(
-            f"effects.{effect}.switches: the glove has no switch {switch}: they go from 0 to {len(names) - 1}"
-        )
-    return switch
+        numbers.append(names.index(switch) if isinstance(switch, str) else switch)
+    return chooser(effect, "switch", "stuck", len(names), numbers, parameters.count)
+
+
+def chooser(
+    effect: str, part: str, fault: str, there: int, numbers: Sequence[int], count: int | None
+) -> Callable[[Draw], Bits]:
+    """Return what tells which of the glove's parts (there,) have a fault: those of these numbers, or `count` of them
+    (None: one), drawn by the least uniform numbers. Raises SceneError where there are no such parts.
+    """
+    parts = _MANY[part]
+    for number in numbers:
+        if not 0 <= number < there:
+            said = f"the glove has no {part} {number}: they go from 0 to {there - 1}"
+            raise SceneError(f"effects.{effect}.{parts}: {said}")
+    if numbers:
+        named = np.isin(np.arange(there), numbers)
+        return lambda draw: named
+    if (count or 1) > there:
+        raise SceneError(f"effects.{effect}.count: {count} {parts} cannot be {fault}: the glove has {there}")
+    drawn = count or 1
+    return lambda draw: np.isin(np.arange(there), np.argsort(draw.per_glove(there).uniform(), kind="stable")[:drawn])

@@ -75,12 +75,6 @@ class Ledger:
         """The time of all steps together."""
         return sum(entry.nanoseconds for entry in self.entries.values())
 
-    def shares(self) -> Iterator[tuple[str, float]]:
-        """Yield every step with its share of the time, 0 to 1."""
-        total = self.nanoseconds
-        for name, entry in self.entries.items():
-            yield name, entry.nanoseconds / total if total else 0.0
-
     def _add(self, name: str, entry: Cost) -> None:
         self.entries.setdefault(name, Cost(entry.own)).add(entry)
 

@@ -207,6 +207,7 @@ class Report(msgspec.Struct, frozen=True):
     """A simulation: what came out by grasp type, what each step cost, and what did not settle.
 
     simulated       True, so that nobody takes a result for a recording
+    done            repetitions of each grasp type that were made before these
     seconds         from start to end, on all workers
     lost_frames     frames that did not arrive
     kept_unsettled  whether repetitions that did not settle are in the set all the same
@@ -215,6 +216,7 @@ class Report(msgspec.Struct, frozen=True):
     simulated: bool
     scene: str
     seed: int
+    done: int
     subjects: tuple[str, ...]
     repetitions: int
     rows: int
@@ -257,7 +259,7 @@ def _grasp_report(name: str, rows: Rows, notes: Sequence[Notes]) -> GraspReport:
 
 def step_reports(ledger: Ledger) -> Iterator[StepReport]:
     """Yield what each step cost, in the order in which they run."""
-    shares = dict(ledger.shares())
+    total = ledger.nanoseconds
     for name, entry in ledger.entries.items():
         yield StepReport(
             name=name,
@@ -267,6 +269,6 @@ def step_reports(ledger: Ledger) -> Iterator[StepReport]:
             draws=entry.draws,
             seconds=entry.nanoseconds / 1e9,
             us_a_grasp=entry.nanoseconds / 1e3 / entry.grasps,
-            share=shares[name],
+            share=entry.nanoseconds / total if total else 0.0,
             counts=tuple(Count(what, number) for what, number in sorted(entry.counters.items())),
         )

@@ -1,8 +1,8 @@
 """`simulate`: a scene in, a set of grasps and a report out."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, field
+from functools import lru_cache, partial
 from time import perf_counter
 
 import numpy as np
@@ -45,20 +45,25 @@ ORDER = "session.order"  # the draw site of the order of trials
 class Session:
     """The trials of one subject: p conditions in the order of the scene's objects, t trials.
 
-    trials      an array a condition: the trial of each of its repetitions
+    first       (p,)     the number of each condition's first repetition
+    done        trials that were made before
+    trials      an array a condition: the trial of each of its repetitions, counted from these
     planned_deg (p, 20)  the conditions' planned postures
     before      (t,)     the condition of the trial before each trial; of the first: its own
     """
 
     conditions: tuple[Condition, ...]
+    first: tuple[int, ...]
+    done: int
     trials: tuple[Integers, ...]
     planned_deg: Floats
     before: Integers
 
     def batch(self, place: int, repetitions: Integers) -> Batch:
-        """Return some repetitions (n,) of a condition of the session, ready for the pipeline."""
+        """Return some repetitions (n,) of a condition of the session, its first is 0, ready for the pipeline."""
         trials = self.trials[place][repetitions]
-        return Batch(self.conditions[place], repetitions, trials, self.planned_deg[self.before[trials]])
+        numbers = self.first[place] + repetitions
+        return Batch(self.conditions[place], numbers, self.done + trials, self.planned_deg[self.before[trials]])
 
 
 def sessions(scene: Scene, postures: Postures) -> tuple[Session, ...]:
@@ -77,29 +82,27 @@ def conditions_of(scene: Scene, subject: Subject, postures: Postures) -> tuple[C
 
 def session_of(scene: Scene, conditions: tuple[Condition, ...]) -> Session:
     """Return the session of the subject whose conditions these are."""
-    repetitions = [share for _, share in scene.shares() if share]
-    words = [_words(scene.seed, each, count) for each, count in zip(conditions, repetitions, strict=True)]
-    return _shuffled(conditions, words)
-
-
-def _words(seed: int, condition: Condition, repetitions: int) -> NDArray[np.uint64]:
-    site = Site(condition.subject, condition.grasp, condition.thing.name, np.arange(repetitions))
-    return Draw(seed, ORDER, site, Draws()).per_repetition().words
-
-
-def _shuffled(found: tuple[Condition, ...], words: list[NDArray[np.uint64]]) -> Session:
-    """Put all repetitions in the order of one random word each: no other repetition, type or object changes a word."""
+    numbers = [share for _, share in scene.shares() if share]
+    # All repetitions in the order of one random word each: no other repetition, type or object changes a word.
+    words = [_words(scene.seed, each, share) for each, share in zip(conditions, numbers, strict=True)]
     counts = [len(each) for each in words]
-    owner = np.repeat(np.arange(len(found)), counts)
+    owner = np.repeat(np.arange(len(conditions)), counts)
     order = np.argsort(np.concatenate(words), kind="stable")
     trials = np.empty(len(order), dtype=np.int64)
     trials[order] = np.arange(len(order))
     return Session(
-        conditions=found,
+        conditions=conditions,
+        first=tuple(share.start for share in numbers),
+        done=scene.done * scene.types,
         trials=tuple(np.split(trials, np.cumsum(counts)[:-1])),
-        planned_deg=np.stack([condition.held.posture_deg for condition in found]),
+        planned_deg=np.stack([condition.held.posture_deg for condition in conditions]),
         before=owner[np.concatenate([order[:1], order[:-1]])],
     )
+
+
+def _words(seed: int, condition: Condition, repetitions: range) -> NDArray[np.uint64]:
+    site = Site(condition.subject, condition.grasp, condition.thing.name, np.array(repetitions))
+    return Draw(seed, ORDER, site, Draws()).per_repetition().words
 
 
 Progress = Callable[[int, int], None]
@@ -113,23 +116,17 @@ class Simulated:
     report: Report
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Work:
-    """Batches for one worker, each with the number of its condition."""
-
-    scene: Scene
-    without: str | None
-    keep_unsettled: bool
-    batches: tuple[tuple[int, Batch], ...]
+# For one worker: batches, each with the number of its condition.
+_Batches = tuple[tuple[int, Batch], ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Done:
     """What came of them."""
 
-    rows: list[Rows]
-    notes: list[Notes]
-    ledger: Ledger
+    rows: list[Rows] = field(default_factory=list)
+    notes: list[Notes] = field(default_factory=list)
+    ledger: Ledger = field(default_factory=Ledger)
 
 
 def simulate(
@@ -155,10 +152,10 @@ def simulate(
     # What is wrong with the scene shows here and not in a worker.
     setting = compile_pipeline(scene, without).setting
     plan = sessions(scene, Postures.of(scene))
-    works = (_Work(scene, without, keep_unsettled, group) for group in _groups(plan, at_a_time(setting, block)))
+    run = partial(_run, scene, without, keep_unsettled)
     total = sum(len(session.before) for session in plan)
-    made = _gathered(in_workers(_run, works, jobs), total, progress)
-    rows = _in_order(plan, made.rows)
+    made = _gathered(in_workers(run, _groups(plan, at_a_time(setting, block)), jobs), total, progress)
+    rows = joined(made.rows, np.repeat(np.arange(len(plan)), [len(session.conditions) for session in plan]))
     if not len(rows):
         why = _unsettled(scene, made)[0].why
         raise SceneError(f"scene {scene.name}: none of its {total} repetitions can be trusted; of the first, {why}")
@@ -166,7 +163,7 @@ def simulate(
     return Simulated(found, _report(scene, rows, found, made, perf_counter() - start, keep_unsettled=keep_unsettled))
 
 
-def _groups(plan: Sequence[Session], block: int) -> Iterator[tuple[tuple[int, Batch], ...]]:
+def _groups(plan: Sequence[Session], block: int) -> Iterator[_Batches]:
     """Yield groups of about `block` repetitions of one subject: batches with the numbers of their conditions."""
     first = 0
     for session in plan:
@@ -187,12 +184,12 @@ def _pipeline(scene: Scene, without: str | None) -> Pipeline:
     return compile_pipeline(scene, without)
 
 
-def _run(work: _Work) -> _Done:
-    pipeline, scene, done = _pipeline(work.scene, work.without), work.scene, _Done([], [], Ledger())
+def _run(scene: Scene, without: str | None, keep_unsettled: bool, batches: _Batches) -> _Done:
+    pipeline, done = _pipeline(scene, without), _Done()
     every_frame, held = scene.recording.rows == "all", hold_frame(pipeline.setting)
-    pipeline.run([batch for _, batch in work.batches], done.ledger)
-    for number, batch in work.batches:
-        kept = np.flatnonzero(batch.settled | work.keep_unsettled)
+    pipeline.run([batch for _, batch in batches], done.ledger)
+    for number, batch in batches:
+        kept = np.flatnonzero(batch.settled | keep_unsettled)
         done.rows.append(rows_of(batch, kept, number, _codes(scene, batch), held, every_frame=every_frame))
         done.notes.append(notes_of(batch))
     return done
@@ -205,7 +202,7 @@ def _codes(scene: Scene, batch: Batch) -> Codes:
 
 
 def _gathered(answers: Iterator[_Done], total: int, progress: Progress | None) -> _Done:
-    everything, repetitions = _Done([], [], Ledger()), 0
+    everything, repetitions = _Done(), 0
     for done in answers:
         everything.rows.extend(done.rows)
         everything.notes.extend(done.notes)
@@ -216,17 +213,11 @@ def _gathered(answers: Iterator[_Done], total: int, progress: Progress | None) -
     return everything
 
 
-def _in_order(plan: Sequence[Session], blocks: list[Rows]) -> Rows:
-    subjects = np.repeat(np.arange(len(plan)), [len(session.conditions) for session in plan])
-    return joined(blocks, subjects)
-
-
 def _set_of(scene: Scene, plan: Sequence[Session], rows: Rows) -> GraspSet:
     conditions = [condition for session in plan for condition in session.conditions]
     switches = tuple(patch.name for patch in murakami160())
     joints = raw_joints() if scene.glove.codes == "raw" else common_joints()
-    simulated = f"scene {scene.name}, seed {scene.seed}"
-    return grasp_set(rows, conditions, switches, joints, published(scene.taxonomy), simulated)
+    return grasp_set(rows, conditions, switches, joints, published(scene.taxonomy), scene.origin)
 
 
 def _report(scene: Scene, rows: Rows, found: GraspSet, made: _Done, seconds: float, *, keep_unsettled: bool) -> Report:
@@ -234,6 +225,7 @@ def _report(scene: Scene, rows: Rows, found: GraspSet, made: _Done, seconds: flo
         simulated=True,
         scene=scene.name,
         seed=scene.seed,
+        done=scene.done,
         subjects=tuple(subject.name for subject in scene.subjects),
         repetitions=sum(note.repetitions for note in made.notes),
         rows=len(rows),

@@ -98,6 +98,7 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     taxonomy     a published one
     objects      at least one for every grasp type of the taxonomy
     repetitions  of every grasp type by every subject, shared evenly by the type's objects
+    done         repetitions that were made before: these have the numbers, and trials, that follow
     effects      by their rank, at most one contact model among them
     postures     a file of planned postures for objects that are not shipped
     """
@@ -112,19 +113,29 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     glove: Glove = Glove()
     effects: tuple[Listed, ...]
     postures: Path | None = None
+    done: int = 0
 
-    def varied(self, repetitions: int | None = None, seed: int | None = None, subjects: Sequence[str] = ()) -> "Scene":
+    def varied(
+        self,
+        repetitions: int | None = None,
+        seed: int | None = None,
+        subjects: Sequence[str] = (),
+        more: int | None = None,
+    ) -> "Scene":
         """Return the scene with other repetitions, another seed, or only the `subjects` of these names.
 
-        Raises SceneError if it has no such subject.
+        With `more`, it makes so many fresh repetitions instead, by the same hands: those that follow its own. Another
+        seed draws everything anew but the sizes of the hands. Raises SceneError if it has no such subject.
         """
         known = {subject.name: subject for subject in self.subjects}
         for subject in subjects:
             if subject not in known:
                 raise SceneError(f"scene {self.name} has no subject {subject!r}{nearest(subject, list(known))}")
+        own = self.repetitions if repetitions is None else repetitions
         return msgspec.structs.replace(
             self,
-            repetitions=self.repetitions if repetitions is None else repetitions,
+            repetitions=own if more is None else more,
+            done=self.done if more is None else self.done + own,
             seed=self.seed if seed is None else seed,
             subjects=tuple(known[name] for name in known if not subjects or name in subjects),
         )
@@ -134,7 +145,7 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         effects, recording = tuple(effects), self.recording
         return Setting(
             seed=self.seed,
-            session_trials=self.repetitions * len({item.grasp for item in self.objects}),
+            session_trials=(self.done or self.repetitions) * self.types,
             threshold_n=self.glove.threshold_n,
             period_us=round(1e6 / recording.rate_hz),
             first_us=-round(recording.lead_ms * 1000),
@@ -145,12 +156,26 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             on_wire=any(effect.on_wire for effect in effects),
         )
 
-    def shares(self) -> Iterator[tuple[SceneObject, int]]:
-        """Yield every object with its repetitions; of what does not go out, a type's first objects get one each."""
+    @property
+    def types(self) -> int:
+        """How many grasp types are made."""
+        return len({item.grasp for item in self.objects})
+
+    @property
+    def origin(self) -> str:
+        """What made its grasps, as a set says of itself."""
+        numbers = f", {self.repetitions} more after {self.done} repetitions" if self.done else ""
+        return f"scene {self.name}, seed {self.seed}{numbers}"
+
+    def shares(self) -> Iterator[tuple[SceneObject, range]]:
+        """Yield every object with the numbers of its repetitions; of what does not go out, a type's first objects get
+        one each.
+        """
         grasps = [item.grasp for item in self.objects]
         for number, item in enumerate(self.objects):
             count, place = grasps.count(item.grasp), grasps[:number].count(item.grasp)
-            yield item, self.repetitions // count + (place < self.repetitions % count)
+            ends = (self.done, self.done + self.repetitions)
+            yield item, range(*(end // count + (place < end % count) for end in ends))
 
 
 SITE = "population"

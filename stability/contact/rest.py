@@ -22,7 +22,7 @@ from thenar.simulator.pipeline.effect import Setting
 from ..finding import Finding, Worst
 from ..reference.numbers import precisely
 from .grasps import BAR, HAND, Grasp, case_of, hard, held, otherwise
-from .posed import Vector, digits, dot, left_of, length, plus, press_error_n
+from .posed import Vector, digits, exactly, left_of, length, press_error_n
 from .surfaces import MOST_SWITCHES
 
 # MuJoCo takes no friction for less than this (mjMINMU).
@@ -49,17 +49,18 @@ def timed_findings(make: Callable[..., ContactModel], full: bool) -> Iterator[Fi
 @precisely()
 def left_on_ball(load: Load, contact: Contact) -> Vector:
     """Return the force on a ball that nothing balances: contacts along their normals, weight, the weld's spring."""
-    condition, position = load.condition, [mpf(x) for x in contact.pose[0, :3].tolist()]
-    left = [mpf(condition.thing.mass_kg) * mpf(GRAVITY) * mpf(x) for x in condition.held.down.tolist()]
-    left = plus(left, plus(load.pose[0, :3].tolist(), position, -1), mpf(SLIPPERY.weld_n_per_m) / 1000)
+    condition, position = load.condition, exactly(contact.pose[0, :3])
+    left: Vector = mpf(condition.thing.mass_kg) * mpf(GRAVITY) * exactly(condition.held.down)
+    left = left + (exactly(load.pose[0, :3]) - position) * (mpf(SLIPPERY.weld_n_per_m) / 1000)
     angles = [mpmath.radians(mpf(x)) for x in contact.posture_deg[0].tolist()]
-    for axis, press in zip(_axes(condition.hand, angles), contact.capsules_n[0].tolist(), strict=True):
-        away = plus(position, _nearest(*axis, position), -1)
-        left = plus(left, away, mpf(press) / length(away))
+    for (begin, along, end), press in zip(_axes(condition.hand, angles), contact.capsules_n[0].tolist(), strict=True):
+        nearest = begin + along * min(max((position - begin) @ along, mpf(0)), end)
+        away = position - nearest
+        left = left + away * (mpf(press) / length(away))
     return left
 
 
-def _axes(hand: Hand, angles: Vector) -> Iterator[tuple[Vector, Vector, mpf]]:
+def _axes(hand: Hand, angles: list[mpf]) -> Iterator[tuple[Vector, Vector, mpf]]:
     """Yield every capsule's axis: where it begins, its direction, its length.
 
     A digit's ends in its last sphere of skin; the palm's run from their first to their last.
@@ -72,13 +73,8 @@ def _axes(hand: Hand, angles: Vector) -> Iterator[tuple[Vector, Vector, mpf]]:
             end = mpf(skin[-1] if segment == 2 else hand.lengths[capsule].item())
             yield posed[digit].origins[segment], posed[digit].along[segment], end
         else:
-            along = [mpf(x) for x in palm.frames[capsule, :, 0, 0].tolist()]
-            origin = [mpf(x) for x in palm.origins[capsule, :, 0].tolist()]
-            yield plus(origin, along, mpf(skin[0])), along, mpf(skin[-1]) - mpf(skin[0])
-
-
-def _nearest(begin: Vector, along: Vector, end: mpf, point: Vector) -> Vector:
-    return plus(begin, along, min(max(dot(plus(point, begin, -1), along), mpf(0)), end))
+            along = exactly(palm.frames[capsule, :, 0, 0])
+            yield exactly(palm.origins[capsule, :, 0]) + along * mpf(skin[0]), along, mpf(skin[-1]) - mpf(skin[0])
 
 
 Floats = NDArray[np.float64]

@@ -18,7 +18,7 @@ from ..checks.roundings import ROUNDING
 from ..finding import Finding, Worst
 from ..reference.numbers import precisely, turn
 from .grasps import HAND
-from .posed import length, matrix, plus, surface
+from .posed import Matrix, exactly, length, surface
 
 Floats = NDArray[np.float64]
 
@@ -75,17 +75,16 @@ def _surfaces(rng: np.random.Generator, n: int) -> list[Finding]:
         places = points(shape, rng, n)
         found, out = shape.distance(places[..., None])
         size = mpmath.fsum(shape.extent_mm())
-        for place, distance, normal in zip(places.tolist(), found[:, 0].tolist(), out[..., 0].tolist(), strict=True):
+        for place, distance, normal in zip(places.tolist(), found[:, 0].tolist(), exactly(out[..., 0]), strict=True):
             scale = size + mpmath.fsum(abs(mpf(x)) for x in place)
             truth, way = surface(shape, place)
             doubt = max(abs(mpf(distance) - truth) - _LOST_MM, mpf(0))
             distances.see(float(doubt / (ROUNDING * scale)), f"{shape} at {place}")
-            normals.see(float(abs(length([mpf(x) for x in normal]) - 1) / ROUNDING), f"{shape} at {place}")
+            normals.see(float(abs(length(normal) - 1) / ROUNDING), f"{shape} at {place}")
             gap = truth + (mpf(shape.diameter_mm) / 2 if isinstance(shape, Sphere) else mpf(shape.edge_mm))
             if gap > 2 * _LOST_MM:
                 inexact = 0 if isinstance(shape, Sphere) else 4 * size / gap
-                off = length(plus([mpf(x) for x in normal], way, -1))
-                ways.see(float(off / (ROUNDING * (8 + inexact))), f"{shape} at {place}")
+                ways.see(float(length(normal - way) / (ROUNDING * (8 + inexact))), f"{shape} at {place}")
     return [worst.finding() for worst in (distances, normals, ways)]
 
 
@@ -116,21 +115,16 @@ def _turns(rng: np.random.Generator, n: int) -> list[Finding]:
     made = vectors(rng, n)
     found = rotation(made.T)
     again = rotation_vector(found).T
-    for k, (there, once_more) in enumerate(zip(made.tolist(), again.tolist(), strict=True)):
-        truth = _turned(there)
-        at = f"{there}"
-        matrices.see(_apart(matrix(found[..., k].tolist()), truth), at)
-        back.see(_apart(_turned(once_more), truth), at)
+    for k, (there, once_more) in enumerate(zip(made, again, strict=True)):
+        truth, at = _turned(there), f"{there.tolist()}"
+        matrices.see(float(abs(exactly(found[..., k]) - truth).max() / ROUNDING), at)
+        back.see(float(abs(_turned(once_more) - truth).max() / ROUNDING), at)
     return [matrices.finding(), back.finding()]
 
 
-def _turned(vector: list[float]) -> list[list[mpf]]:
-    angle = length([mpf(x) for x in vector])
-    return turn(vector, angle) if angle else turn((1, 0, 0), 0)
-
-
-def _apart(one: list[list[mpf]], other: list[list[mpf]]) -> float:
-    return float(max(abs(a - b) for x, y in zip(one, other, strict=True) for a, b in zip(x, y, strict=True)) / ROUNDING)
+def _turned(vector: Floats) -> Matrix:
+    angle = length(exactly(vector))
+    return np.array(turn(vector.tolist(), angle) if angle else turn((1, 0, 0), 0))
 
 
 @precisely()

@@ -4,7 +4,7 @@ from pathlib import Path
 import click
 import pytest
 
-from thenar.cli.common import keep_apart, output_file, progress
+from thenar.cli.common import OutputFile, keep_apart, progress
 
 
 def test_progress_is_drawn_on_a_terminal_with_the_name_as_it_is(
@@ -37,11 +37,11 @@ def test_one_file_under_two_names_is_found(tmp_path: Path, monkeypatch: pytest.M
 def test_an_output_that_is_a_pipe_or_device_is_refused_before_any_work(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(click.BadParameter, match="is a device or a pipe: name a file"):
-        output_file.convert(str(tmp_path / "pipe"), None, None)
+        OutputFile("pipe").convert(str(tmp_path / "pipe"), None, None)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 def test_a_folder_that_may_not_be_written_into_is_refused_before_any_work(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
     with pytest.raises(click.BadParameter, match="Nothing may be written into folder"):
-        output_file.convert(str(tmp_path / "set.grasps"), None, None)
+        OutputFile(".grasps").convert(str(tmp_path / "set.grasps"), None, None)

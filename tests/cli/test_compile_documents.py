@@ -96,7 +96,7 @@ def test_a_hand_length_needs_switches_whose_places_are_known(thenar: Thenar, set
 
 def test_a_method_that_takes_a_number_keeps_it(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
     build = tmp_path / "build"
-    done(thenar("compile", gloved_file, "-o", build, *QUICK, "--placement", "elimination", "--keep", 2))
+    done(thenar("compile", gloved_file, "-o", build, *QUICK, "--method", "elimination", "--keep", 2))
     document = json.loads((build / "build.json").read_bytes())
     assert len(document["switches"]) == 2
     assert document["options"]["placement"] == "elimination"
@@ -107,10 +107,10 @@ def test_a_method_that_takes_a_number_keeps_it(thenar: Thenar, gloved_file: Path
 @pytest.mark.parametrize(
     ("given", "because"),
     [
-        (("--placement", "elimination"), "needs --keep"),
-        (("--placement", "elimination", "--keep", 2, "--prune", 3), "knows no --prune"),
-        (("--keep", 2), "cannot --keep a given number"),
-        (("--placement", "crystal-ball", "--keep", 2), "there is no placement method 'crystal-ball'"),
+        (("--method", "elimination"), "needs --keep"),
+        (("--method", "elimination", "--keep", 2, "--prune", 3), "takes --keep M and no --prune"),
+        (("--keep", 2), "takes --prune S and no --keep"),
+        (("--method", "crystal-ball", "--keep", 2), "there is no method 'crystal-ball'"),
     ],
 )
 def test_a_method_gets_its_own_parameter(
@@ -134,7 +134,7 @@ def test_a_width_bounds_every_sum(thenar: Thenar, gloved_file: Path, tmp_path: P
 
 def test_the_commands_of_a_report_make_the_build_again(thenar: Thenar, gloved_file: Path, tmp_path: Path) -> None:
     build, again = tmp_path / "build", tmp_path / "again"
-    given = ("--rounds", 3, "--folds", 2, "--placement", "elimination", "--keep", 3, "--width", 12, "--max-bins", 5)
+    given = ("--rounds", 3, "--folds", 2, "--method", "elimination", "--keep", 3, "--width", 12, "--max-bins", 5)
     done(thenar("compile", gloved_file, "-o", build, *given))
     (said,) = re.findall(r"thenar compile SET\.grasps -o build/ --prune.*", (build / "report.html").read_text())
     words = {"SET.grasps": str(gloved_file), "build/": str(again)}

@@ -146,7 +146,7 @@ def test_a_folder_that_is_no_build_is_refused(tmp_path: Path, capsys: pytest.Cap
         (["GRASPS", "--kept", "GRASPS"], "leave GRASPS out"),
         (["--numbers", "--kept", "GRASPS"], "leave --numbers out"),
         (["GRASPS", "--place", "--per-grasp"], "take one of them"),
-        (["-o", "glove.pdf"], "a picture ends in .png or .svg"),
+        (["-o", "glove.pdf"], "ends in .svg or .png"),
         (["-o", "no/such/glove.svg"], "There is no folder 'no/such'"),
     ],
 )
@@ -167,6 +167,6 @@ def test_a_picture_needs_a_name(capsys: pytest.CaptureFixture[str]) -> None:
 def test_nothing_that_is_read_is_written_over(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     listed = tmp_path / "kept.svg"
     listed.write_text(NAMES[0])
-    assert run(["draw", "--kept", str(listed), "-o", str(listed)]) == 2
+    assert run(["draw", "--kept", str(listed), "-o", str(listed), "--overwrite"]) == 2
     assert "is named twice" in capsys.readouterr().err
     assert listed.read_text() == NAMES[0]

@@ -175,7 +175,7 @@ def test_firmware_is_replaced_when_asked_and_the_users_files_stay(thenar: Thenar
     ("arguments", "message"),
     [
         (("--target", "avr328p"), "Name a folder to write with -o"),
-        (("--target", "pdp11", "-o", "made"), "'pdp11' is not one of"),
+        (("--target", "pdp11", "-o", "made"), "there is no target 'pdp11': choose one of host"),
         (("--target", "avr328p", "--mode", "scan", "-o", "made"), "the mode scan needs a board.toml"),
         (("--target", "avr328p", "--mode", "scan", "--measure"), "A board that only scans holds no classifier"),
         (("--target", "avr328p", "--calibration", "{board}", "-o", "made"), "--calibration is for --mode glove"),

@@ -10,7 +10,7 @@ Captured = pytest.CaptureFixture[str]
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("--methods", "nonsense"), "there is no placement method 'nonsense'"),
+        (("--methods", "nonsense"), "there is no method 'nonsense'"),
         (("--budget-us", "5", "--rate", "0.5"), "give one of them"),
         (("--rate", "1.5"), "1.5 is not in the range"),
         (("--dask", "nowhere"), "no Dask scheduler answers at 'nowhere'"),
@@ -28,7 +28,7 @@ def test_what_is_wrong_is_said_in_a_sentence(
 def test_a_file_is_no_folder_and_is_left_alone(set_file: Path, tmp_path: Path, capsys: Captured) -> None:
     (tmp_path / "notes.txt").write_text("mine")
     assert run(["frontier", str(set_file), "-o", str(tmp_path / "notes.txt")]) == 2
-    assert "notes.txt is a file: name a folder" in " ".join(capsys.readouterr().err.split())
+    assert "notes.txt' is a file." in " ".join(capsys.readouterr().err.split())
     assert (tmp_path / "notes.txt").read_text() == "mine"
 
 

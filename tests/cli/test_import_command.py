@@ -65,7 +65,7 @@ def test_a_faulty_table_is_one_sentence_and_exit_code_2(folder: Path, capsys: py
 
 def test_a_set_must_be_called_grasps(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert thenar_import(folder, output="set.csv") == 2
-    assert "set.csv: a set of grasps ends in .grasps" in capsys.readouterr().err
+    assert "set.csv: a file to write here ends in .grasps" in capsys.readouterr().err
 
 
 def test_the_old_set_stays_when_the_import_fails(folder: Path) -> None:
@@ -96,7 +96,7 @@ def test_names_with_brackets_and_colons_are_printed_as_they_are(
 
 def test_the_columns_file_is_never_overwritten(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     columns = (folder / "columns.toml").rename(folder / "c.grasps")
-    assert run(["import", str(folder / "table.csv"), "-o", str(columns), "--columns", str(columns)]) == 2
+    assert run(["import", str(folder / "table.csv"), "-o", str(columns), "--columns", str(columns), "--overwrite"]) == 2
     assert "c.grasps is named twice" in capsys.readouterr().err
     assert columns.read_text() == COLUMNS
 

@@ -57,7 +57,7 @@ def test_a_picture_is_drawn_when_asked_for(grasps: Path, suffix: str, start: byt
 
 def test_a_picture_of_another_kind_is_refused(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["info", str(grasps), "--plot", "set.gif"]) == 2
-    assert "set.gif: a picture ends in .png or .svg" in capsys.readouterr().err
+    assert "set.gif: a file to write here ends in .svg or .png" in capsys.readouterr().err
 
 
 def test_another_file_is_refused_with_the_reason(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -68,7 +68,7 @@ def test_another_file_is_refused_with_the_reason(tmp_path: Path, capsys: pytest.
 
 def test_a_picture_never_replaces_the_set(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
     named = grasps.rename(grasps.with_name("set.png"))
-    assert run(["info", str(named), "--plot", str(named)]) == 2
+    assert run(["info", str(named), "--plot", str(named), "--overwrite"]) == 2
     assert "set.png is named twice" in capsys.readouterr().err
     assert GraspSet.load(named).grasps.tolist() == ["mug", "ball", "mug", "ball"]
 

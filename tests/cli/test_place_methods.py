@@ -72,7 +72,7 @@ def test_a_switch_on_a_port_that_is_read_anyway_is_preferred_as_compile_does(
         how += ["--glove", str(tmp_path / "glove.toml")]
     assert run(["place", str(near_and_far), "--method", "id3-cost", "--json", *how]) == 0
     assert sorted(switch["name"] for switch in json.loads(capsys.readouterr().out)["switches"]) == kept
-    how += ["--placement", "id3-cost", "--inputs", "switches", "--rounds", "5", "--folds", "0", "--no-report", "--json"]
+    how += ["--method", "id3-cost", "--inputs", "switches", "--rounds", "5", "--folds", "0", "--no-report", "--json"]
     assert run(["compile", str(near_and_far), "-o", str(tmp_path / "build"), *how]) == 0
     assert sorted(switch["name"] for switch in json.loads(capsys.readouterr().out)["switches"]) == kept
 
@@ -128,18 +128,18 @@ def test_a_standard_placement_is_printed_stored_and_drawn(
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
-        (["--method", "elimination"], "tell this method how many switches to --keep"),
-        (["--keep", "3"], "ID3 takes --prune S"),
-        (["--method", "cmim", "--keep", "3", "--prune", "4"], "--prune is for ID3"),
-        (["--method", "elimintion", "--keep", "3"], "there is no placement method 'elimintion': choose one of"),
+        (["--method", "elimination"], "method 'elimination' needs --keep M"),
+        (["--keep", "3"], "method 'id3' takes --prune S and no --keep"),
+        (["--method", "cmim", "--keep", "3", "--prune", "4"], "method 'cmim' takes --keep M and no --prune"),
+        (["--method", "elimintion"], "there is no method 'elimintion' (did you mean 'elimination'"),
         (["--method", "cmim", "--keep", "3", "--tree"], "--tree prints the tree of the paper's ID3"),
         (["--method", "cmim", "--keep", "3", "--draw", "a.svg"], "--draw draws ID3's tree, or a --crowd"),
         (["--crowd", "--keep", "3", "--exact"], "--exact judges one placement"),
-        (["--crowd", "--method", "id3", "--keep", "3"], "--crowd takes a method that is told"),
+        (["--crowd", "--method", "id3", "--keep", "3"], "--crowd takes a method that keeps M switches"),
         (["--crowd", "--keep", "3"], "the set has 1 subject(s)"),
-        (["--joints"], "--joints is for the methods"),
+        (["--joints"], "--joints is for other methods"),
         (["--glove", "GLOVE"], "--glove says what scans cost"),
-        (["--method", "elimination", "--keep", "3", "--glove", "GLOVE"], "heeds it: elimination-cost, id3-cost"),
+        (["--method", "elimination", "--keep", "3", "--glove", "GLOVE"], "weighs that: elimination-cost, id3-cost"),
         (["--crowd", "--method", "id3-cost", "--keep", "3", "--glove", "GLOVE"], "--glove says what scans cost"),
     ],
 )

@@ -61,13 +61,6 @@ def test_an_object_of_ones_own_is_planned_and_can_then_be_simulated(
     assert run(["simulate", str(with_new_object), *made]) == 0
 
 
-def test_a_scene_is_not_overwritten_by_its_own_postures(with_new_object: Path, capsys: Captured) -> None:
-    before = with_new_object.read_text()
-    assert run(["plan", str(with_new_object), "-o", str(with_new_object)]) == 2
-    assert "named twice" in capsys.readouterr().err
-    assert with_new_object.read_text() == before
-
-
 def scene_of(name: str, postures: str, change: str, **changes: object) -> str:
     """Return a shipped scene with its objects written out, the one called `change` changed, and a file of postures."""
     objects = [
@@ -135,7 +128,7 @@ def test_an_interrupt_ends_with_130_and_leaves_the_old_postures_alone(tmp_path: 
         "from thenar.cli import run\n"
         "sys.exit(run(sys.argv[1:]))"
     )
-    command = [sys.executable, "-c", program, "plan", "quick", "--anew", "--jobs", "2", "-o", str(old)]
+    command = [sys.executable, "-c", program, "plan", "quick", "--anew", "--jobs", "2", "-o", str(old), "--overwrite"]
     process = subprocess.Popen(
         command, start_new_session=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )

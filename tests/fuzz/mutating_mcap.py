@@ -19,6 +19,8 @@ _LENGTH = Struct("<I")
 _MESSAGE = Struct("<HIQQ")
 _CHUNK = Struct("<QQQI")
 _MESSAGE_OP, _CHUNK_OP, _METADATA_OP, _DATA_END_OP, _FOOTER_OP = 5, 6, 12, 15, 2
+# What is repeated fills no more: chunks of chunks, 500 times over, were files of 300 MB, held in memory to be written.
+_LARGEST = 2_000_000
 _COMPRESSIONS = ("", "", "", "zstd", "lz4", "bz2", "\x1b[2J", "a" * 1000)
 
 
@@ -55,12 +57,12 @@ def records_of(data: bytes) -> list[Record]:
 
 def joined(records: list[Record], sound: bool = True) -> bytes:
     """Return the records as a file; with `sound`, its end and the checksum of its data are right."""
-    data = MAGIC
+    data = bytearray(MAGIC)
     for opcode, content in records:
         if opcode == _DATA_END_OP and sound:
             content = _LENGTH.pack(crc32(data))
         data += _OPENING.pack(opcode, len(content)) + content
-    return data + (MAGIC if sound else b"")
+    return bytes(data) + (MAGIC if sound else b"")
 
 
 def _change(records: list[Record], random: Random) -> None:
@@ -80,9 +82,13 @@ def _change(records: list[Record], random: Random) -> None:
             end = min(at + random.choice((1, 3, 50)), len(records))
             records[at:end] = [_chunk(records[at:end], random)]
         case 5:
-            records[at:at] = [record] * random.choice((2, 500))
+            records[at:at] = [record] * _times(record.content, random.choice((2, 500)))
         case _:
             records[at] = record._replace(content=_content(record, random))
+
+
+def _times(content: bytes, times: int) -> int:
+    return max(1, min(times, _LARGEST // max(len(content), 1)))
 
 
 def _content(record: Record, random: Random) -> bytes:
@@ -158,7 +164,7 @@ def _packed(text: bytes) -> bytes:
 def _chunk(records: list[Record], random: Random) -> Record:
     """Return a chunk of these records, whose sizes, checksum and compression now and then are not what they say."""
     inside = b"".join(_OPENING.pack(opcode, len(content)) + content for opcode, content in records)
-    inside *= random.choice((1, 1, 1, 1, 3, 200))
+    inside *= _times(inside, random.choice((1, 1, 1, 1, 3, 200)))
     size = random.choice((len(inside), len(inside), len(inside), *INTEGERS)) % 2**64
     crc = random.choice((crc32(inside), crc32(inside), 0, 1))
     compression = random.choice(_COMPRESSIONS).encode()

@@ -124,19 +124,18 @@ def played(_build: Build, path: Path) -> int:
 
 @pytest.mark.parametrize(
     "seeds",
-    [pytest.param(range(400), id="a few"), pytest.param(range(400, 6_400), marks=pytest.mark.slow, id="6,000")],
+    [pytest.param(range(400), id="a few"), pytest.param(range(400, 20_400), marks=pytest.mark.slow, id="20,000")],
 )
 def test_no_mutant_raises_anything_but_our_errors(build: Build, whole: bytes, tmp_path: Path, seeds: range) -> None:
     path = tmp_path / "mutant.mcap"
-    made, longest = [0, 0, 0, 0], 0
+    made = [0, 0, 0, 0]
     before_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     for seed in seeds:
-        longest = max(longest, path.write_bytes(mcap_file(whole, Random(seed))))
+        path.write_bytes(mcap_file(whole, Random(seed)))
         made = [one + more for one, more in zip(made, read_in_every_way(build, path), strict=True)]
     # Most mutants are read by most readers: the fuzz goes deep.
     assert all(many > len(seeds) for many in made), made
-    # The budget of docs/formats.md for the longest of them.
-    assert 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kb) < 200_000_000 + 20 * longest, longest
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kb < 200_000
 
 
 def test_a_replay_and_an_emulation_tell_of_damage(build: Build, whole: bytes, tmp_path: Path) -> None:

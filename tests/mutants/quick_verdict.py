@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from hypothesis import Phase, settings
+from joblib.externals.loky import get_reusable_executor
 
 STATISTICS = Path("mutmut-stats.json")  # written by mutmut once all tests have run without a mutant
 
@@ -22,3 +23,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     if STATISTICS.exists():
         seconds = json.loads(STATISTICS.read_text())["duration_by_test"]
         items.sort(key=lambda item: seconds.get(item.nodeid, float("inf")))
+
+
+def pytest_sessionfinish() -> None:
+    """End the worker processes that tests leave idle: mutmut, which waits for any child, takes one for a mutant."""
+    get_reusable_executor(max_workers=1).shutdown(wait=True, kill_workers=True)

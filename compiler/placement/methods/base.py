@@ -106,6 +106,15 @@ class Method:
         """Whether it takes a number of switches; else it takes S."""
         return self.parameter == "switches"
 
+    def check_given(self, keep: int | None, prune: int) -> None:
+        """Raise PlacementError unless what the method takes is given, and nothing else."""
+        if self.by_number and keep is None:
+            raise PlacementError(f"method {self.name!r} needs --keep M: how many switches to keep")
+        if self.by_number and prune:
+            raise PlacementError(f"method {self.name!r} takes --keep M and no --prune")
+        if not self.by_number and keep is not None:
+            raise PlacementError(f"method {self.name!r} takes --prune S and no --keep: choose another --method")
+
     def ladder(self, n_switches: int) -> tuple[int, ...]:
         """Return the parameters that a frontier tries among so many switches."""
         if not self.by_number:

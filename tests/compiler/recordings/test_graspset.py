@@ -13,10 +13,12 @@ from thenar.compiler.recordings import graspset
 from thenar.compiler.recordings.errors import RecordingError
 from thenar.compiler.recordings.graspset import Joint
 
+PAD, PADS = Joint("pad", "N", 0, 0.0, 4095, 20.0), np.array([[0], [4095], [65535], [1], [2], [3]], np.uint16)
+
 
 def fields(grasp_set: GraspSet) -> dict[str, Any]:
     names = ["switches", "switch_names", "codes", "joints", "grasps", "taxonomy", "subjects", "objects", "trials"]
-    names += ["sessions", "independent"]
+    names += ["sessions", "independent", "taxels", "taxel_columns"]
     return {name: getattr(grasp_set, name) for name in names}
 
 
@@ -99,14 +101,35 @@ def test_the_fingerprint_sees_every_field_and_nothing_else(small: GraspSet) -> N
     ]
     changes += [{"objects": np.array(["mug"] * 5 + ["cup"])}, {"switch_names": ("a", "b", "c", "d")}]
     changes += [{"sessions": np.array(["1"] * 5 + ["2"])}, {"independent": True}]
+    changes += [{"taxels": PADS, "taxel_columns": (PAD,)}, {"taxels": PADS[::-1], "taxel_columns": (PAD,)}]
+    changes += [{"taxels": PADS, "taxel_columns": (replace(PAD, unit="kg"),)}]
     changes += [{"joints": (replace(small.joints[0], value_a=-11.0), small.joints[1])}]
     prints = {GraspSet(**fields(small) | change).fingerprint() for change in changes}
     assert len(prints | {small.fingerprint()}) == len(changes) + 1
 
 
-def test_load_is_the_inverse_of_save(small: GraspSet, tmp_path: Path) -> None:
-    small.save(tmp_path / "set.grasps")
-    assert GraspSet.load(str(tmp_path / "set.grasps")).fingerprint() == small.fingerprint()
+@pytest.mark.parametrize("change", [{}, {"taxels": PADS, "taxel_columns": (PAD,)}], ids=["plain", "taxels"])
+def test_load_is_the_inverse_of_save(small: GraspSet, tmp_path: Path, change: dict[str, Any]) -> None:
+    grasp_set = GraspSet(**fields(small) | change)
+    grasp_set.save(tmp_path / "set.grasps")
+    loaded = GraspSet.load(str(tmp_path / "set.grasps"))
+    assert loaded.fingerprint() == grasp_set.fingerprint()
+    assert loaded.taxels.tolist() == grasp_set.taxels.tolist()
+
+
+def test_taxels_are_columns_beside_the_switches(small: GraspSet) -> None:
+    grasp_set = GraspSet(**fields(small) | {"taxels": PADS, "taxel_columns": (PAD,)})
+    assert grasp_set.element_names == (*small.switch_names, "pad")
+    assert grasp_set.rows([1, 0]).taxels.tolist() == [[4095], [0]]
+    assert "4 switches, 1 taxels, 2 joints" in repr(grasp_set)
+    alone = {"switch_names": (), "switches": np.zeros((6, 0)), "joints": (), "codes": np.zeros((6, 0))}
+    assert GraspSet(**fields(grasp_set) | alone).element_names == ("pad",)
+    for change, reason in (
+        ({"taxels": PADS[:5]}, r"taxels has shape \(5, 1\), not \(6, 1\)"),
+        ({"taxel_columns": (replace(PAD, name="index"),)}, "column 'index' occurs twice"),
+    ):
+        with pytest.raises(RecordingError, match=reason):
+            GraspSet(**fields(grasp_set) | change)
 
 
 @given(data=st.data())
@@ -125,12 +148,14 @@ def test_a_trial_is_a_subject_a_type_an_object_a_session_and_a_number(
     assert grasp_set.trial_ids.tolist() == list(expected)
 
 
-def test_a_file_has_format_2_only_where_sessions_or_the_claim_need_it(small: GraspSet, tmp_path: Path) -> None:
+def test_a_file_has_format_2_only_where_sessions_taxels_or_the_claim_need_it(small: GraspSet, tmp_path: Path) -> None:
     formats = []
-    for change in ({}, {"sessions": np.array(["1"] * 5 + ["2"])}, {"independent": True}):
+    pads = {"taxels": PADS, "taxel_columns": (PAD,)}
+    changes: list[dict[str, Any]] = [{}, {"sessions": np.array(["1"] * 5 + ["2"])}, {"independent": True}, pads]
+    for change in changes:
         GraspSet(**fields(small) | change).save(tmp_path / "set.grasps")
         formats.append((tmp_path / "set.grasps").read_bytes()[8])
-    assert formats == [1, 2, 2]
+    assert formats == [1, 2, 2, 2]
 
 
 def test_a_joint_reads_codes_as_values_by_its_two_points() -> None:

@@ -112,7 +112,7 @@ def test_a_placement_without_a_tree_names_its_method_and_shows_no_shares(bare: R
     assert "Together" not in kept_table(content).columns
     assert no_tree(content.manifest) == "No tree: the switches were chosen by elimination."
     how, bits = placement_sentences(content)
-    assert how.endswith("(--placement elimination).")
+    assert how.endswith("(--method elimination).")
     assert "together" not in bits
 
 

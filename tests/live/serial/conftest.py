@@ -50,12 +50,16 @@ class Run:
             wired = msgspec.structs.replace(wired, cyberglove=glove)
         self.glove = stack.enter_context(Glove(scene.truth.build, wired, policy=FRANK, record=record))
         self.system, self.sources, self.recorder = self.glove.system, self.glove.sources, self.glove.recorder
+        # The report that came with the first grasp that rests on all devices.
+        self.first_health = self.glove.health
         self._thread = Thread(target=self._run, name="loop")
         self._thread.start()
         stack.callback(self.end)
 
     def _run(self) -> None:
         for moment in self.glove:
+            if moment.grasp.health == "ok" and self.first_health is None:
+                self.first_health = self.glove.health
             self.scene.grasps.add(moment.grasp)
 
     def end(self) -> None:

@@ -34,6 +34,11 @@ def test_what_is_recognised_is_the_offline_classification_frame_by_frame(
     assert scene.check() >= len(rows)
 
 
+def test_a_grasp_that_rests_on_all_devices_comes_with_the_health_of_all(run: MakeRun) -> None:
+    health = run("both", "glove", "scanner").first_health
+    assert [device.connected for device in health.devices] == [True, True]
+
+
 def test_a_recorded_run_replays_to_the_same_grasps_to_the_last_bit(run: MakeRun, tmp_path: Path) -> None:
     running = run("both", "glove", "scanner", record=tmp_path / "run.mcap")
     for row in range(10):

@@ -3,6 +3,8 @@
 import io
 from collections.abc import Callable
 
+import pytest
+
 from thenar.runtime.preshape import Preshape
 from thenar.runtime.published import HealthReport, LiveGrasp
 from thenar.runtime.sinks import Fanout, JointAngles, JsonLines, Sink, SinkReport
@@ -32,13 +34,19 @@ class Faulty(Sink):
         raise RuntimeError("and that, too")
 
 
-def test_one_that_raises_is_left_out_and_the_others_go_on(make_grasp: MakeGrasp) -> None:
+def test_one_that_raises_is_left_out_and_the_others_go_on(
+    make_grasp: MakeGrasp, caplog: pytest.LogCaptureFixture
+) -> None:
     file, faulty = io.BytesIO(), Faulty(2)
     fanout = Fanout([faulty, JsonLines(file)])
     for number in range(5):
         fanout.publish(make_grasp(number), None, None)
     assert faulty.numbers == [0, 1, 2]
     assert file.getvalue().count(b"\n") == 5
+    (logged,) = caplog.records
+    assert (logged.name, logged.getMessage()) == ("thenar", "sink Faulty: a fault of the program")
+    assert logged.exc_info is not None
+    assert logged.exc_info[0] is KeyError
     own, lines = fanout.reports()
     assert own == SinkReport("Faulty", None, 0, 3, "KeyError: 'own fault'", over=True)
     assert (lines.sent, lines.lost, lines.error) == (5, 0, "")

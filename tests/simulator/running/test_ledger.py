@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.simulator.running.pipeline import Ledger
+from thenar.simulator.running.report import step_reports
 from thenar.simulator.streams import Draws
 
 CALLS = st.lists(
@@ -57,7 +58,7 @@ def test_two_workers_ledgers_merge_into_the_one_of_a_single_worker(
 @given(CALLS)
 def test_shares_make_one_wherever_any_time_passed(calls: list[tuple[str, int, int, int, int, int]]) -> None:
     ledger = entered(calls)
-    total = sum(share for _, share in ledger.shares())
+    total = sum(report.share for report in step_reports(ledger))
     assert abs(total - (1.0 if ledger.nanoseconds else 0.0)) < 1e-12
 
 

@@ -37,7 +37,7 @@ def course(session: Session) -> list[tuple[str, str, int]]:
 @given(st.integers(1, 9), st.integers(0, 2**63 - 1))
 def test_every_repetition_has_one_trial_of_its_own(repetitions: int, seed: int) -> None:
     scene = quick(repetitions=repetitions, seed=seed)
-    wanted = {(item.grasp, item.name, number) for item, count in scene.shares() for number in range(count)}
+    wanted = {(item.grasp, item.name, number) for item, numbers in scene.shares() for number in numbers}
     for session in sessions(scene, POSTURES):
         order = course(session)
         assert len(order) == 14 * repetitions
@@ -112,3 +112,13 @@ def test_one_repetition_alone_is_as_in_a_batch_of_many() -> None:
 def test_an_object_without_a_planned_posture_is_named_with_its_grasp_type(make_scene: Callable[..., Scene]) -> None:
     with pytest.raises(SceneError, match=r"no planned posture of grasp type 'PoS' with object 'bar'.*thenar plan"):
         sessions(make_scene(), Postures("kamakura14", ()))
+
+
+def test_fresh_repetitions_have_trials_beyond_the_session() -> None:
+    fresh = quick(repetitions=3, done=12)
+    for old, new in zip(sessions(QUICK, POSTURES), sessions(fresh, POSTURES), strict=True):
+        assert len(course(new)) == 14 * 3
+        batches = [new.batch(place, np.arange(len(trials))) for place, trials in enumerate(new.trials)]
+        assert np.sort(np.concatenate([batch.trials for batch in batches])).tolist() == list(range(14 * 12, 14 * 15))
+        for batch, trials in zip(batches, old.trials, strict=True):
+            assert batch.repetitions.tolist() == list(range(len(trials), len(trials) + len(batch)))

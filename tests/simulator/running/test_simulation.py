@@ -97,6 +97,33 @@ def test_the_order_of_subjects_changes_nothing_but_the_order_of_rows(quick: Simu
     assert made.rows(back).fingerprint() == quick.grasp_set.fingerprint()
 
 
+def grasps_of(found: Simulated) -> list[tuple[str, str, str, bytes, bytes]]:
+    made = found.grasp_set
+    names = zip(made.subjects.tolist(), made.grasps.tolist(), made.objects.tolist(), strict=True)
+    rows = zip(names, made.switches, made.codes, strict=True)
+    return sorted((*who, bits.tobytes(), codes.tobytes()) for who, bits, codes in rows)
+
+
+def test_more_grasps_of_the_same_hands_are_those_that_a_longer_scene_adds(quick: Simulated) -> None:
+    fresh = simulate(QUICK.varied(more=5), jobs=1, keep_unsettled=True)
+    longer = simulate(QUICK.varied(11), jobs=1, keep_unsettled=True)
+    assert grasps_of(longer) == sorted(grasps_of(quick) + grasps_of(fresh))
+    assert not {*grasps_of(quick)} & {*grasps_of(fresh)}
+    for subject in ("A", "C"):
+        before, after = (each.grasp_set.trials[each.grasp_set.subjects == subject] for each in (quick, fresh))
+        assert after.tolist() == list(range(len(before), len(before) + 3 * 5))
+    assert fresh.grasp_set.simulated == "scene quick, seed 1, 5 more after 6 repetitions"
+    assert (fresh.report.done, fresh.report.repetitions) == (6, 2 * 3 * 5)
+
+
+def test_fresh_grasps_are_another_thing_than_another_seed_which_has_other_habits() -> None:
+    still = QUICK.varied(1)
+    still = msgspec.structs.replace(still, effects=tuple(each for each in QUICK.effects if each.name == "hand.style"))
+    first, fresh, seed = (simulate(each, jobs=1) for each in (still, still.varied(more=2), still.varied(seed=2)))
+    assert {*grasps_of(fresh)} >= {*grasps_of(first)}  # nothing varies between repetitions: the hands are the same
+    assert not {*grasps_of(seed)} & {*grasps_of(first)}
+
+
 def test_another_seed_makes_another_set(quick: Simulated) -> None:
     other = simulate(msgspec.structs.replace(QUICK, seed=QUICK.seed + 1), jobs=1, keep_unsettled=True).grasp_set
     assert (other.switches != quick.grasp_set.switches).any()

@@ -25,13 +25,26 @@ def test_every_grasp_type_gets_all_repetitions_and_its_objects_even_shares(grasp
     shares = list(scene.shares())
     assert [item for item, _ in shares] == list(scene.objects)
     total: Counter[str] = Counter()
-    for item, count in shares:
-        total[item.grasp] += count
+    for item, numbers in shares:
+        total[item.grasp] += len(numbers)
     assert total == dict.fromkeys(grasps, repetitions)
     for grasp in total:
-        counts = [count for item, count in shares if item.grasp == grasp]
+        counts = [len(numbers) for item, numbers in shares if item.grasp == grasp]
         assert counts == sorted(counts, reverse=True)
         assert max(counts) - min(counts) <= 1
+
+
+@given(st.lists(st.sampled_from("abc"), min_size=1, max_size=12), st.integers(1, 20), st.integers(1, 20))
+def test_more_repetitions_go_on_where_those_of_the_scene_end(grasps: list[str], repetitions: int, more: int) -> None:
+    scene = Scene(
+        name="x", seed=1, taxonomy="own", objects=objects(grasps), subjects=(), repetitions=repetitions, effects=()
+    )
+    fresh, both = scene.varied(more=more), scene.varied(repetitions + more)
+    assert fresh == scene.varied(repetitions, more=more)
+    for (_, old), (_, new), (_, whole) in zip(scene.shares(), fresh.shares(), both.shares(), strict=True):
+        assert [*old, *new] == [*whole]
+    assert fresh.setting([]).session_trials == scene.setting([]).session_trials
+    assert fresh.origin == f"scene x, seed 1, {more} more after {repetitions} repetitions"
 
 
 def test_a_setting_has_times_in_microseconds_from_the_first_contact(make_scene: MakeScene) -> None:

@@ -20,7 +20,7 @@ from thenar.simulator.contact.settle import Rest, close
 from thenar.simulator.effects.contact_quasistatic import Parameters
 from thenar.stability.contact.grasps import HAND, Grasp, case_of, hard, held, planned
 from thenar.stability.contact.halving import kept, shipped
-from thenar.stability.contact.posed import centres, digits, left_of, length, surface
+from thenar.stability.contact.posed import centres, digits, exactly, left_of, length, surface
 from thenar.stability.contact.rest import SKIN, is_honest, models
 from thenar.stability.contact.surfaces import MOST_SWITCHES
 from thenar.stability.contact.systems import errors, near_singular
@@ -50,7 +50,7 @@ def test_any_place_off_any_thing_has_its_distance_and_one_way_out(shape: Shape, 
         size = sum(map(exact, shape.extent_mm())) + sum(abs(exact(x)) for x in place.tolist())
         off = abs(exact(distance.item()) - surface(shape, place.tolist())[0])
         assert off <= 9 * mpf(2) ** -53 * size + mpf(10) ** -150
-        assert abs(length([exact(x) for x in normal.tolist()]) - 1) <= 8 * mpf(2) ** -53
+        assert abs(length(exactly(normal)) - 1) <= 8 * mpf(2) ** -53
 
 
 @given(st.integers(0, 2**32), st.integers(1, 4), st.integers(-11, 2))

@@ -1,0 +1,64 @@
+"""`thenar merge`: several .grasps files of one glove into one."""
+
+from pathlib import Path
+
+import click
+from msgspec import Struct
+
+from .common import OutputFile, existing_file, json_flag, keep_apart, overwrite_flag, progress, show
+from .lines import echo
+
+
+class Merged(Struct, frozen=True):
+    """What was written: the set, and what is in it."""
+
+    output: str
+    sets: int
+    grasps: int
+    trials: int
+    subjects: int
+    sessions: int
+
+
+@click.command("merge")
+@click.argument("sets", metavar="SET.grasps...", type=existing_file, nargs=-1, required=True)
+@click.option("-o", "--output", type=OutputFile(".grasps"), required=True, help="The .grasps file to write.")
+@overwrite_flag
+@click.option(
+    "--each",
+    type=click.Choice(["subject", "session", "object"]),
+    help="The rows of each file are a subject, a session or an object of their own, called as the file is.",
+)
+@json_flag
+def command(sets: tuple[Path, ...], output: Path, each: str | None) -> None:
+    """Merge SETs of one glove: the same switches and joints, one taxonomy, or taxonomies of your own.
+
+    A trial that is in two of the files stops the merge, since its rows would be taken for frames of one grasp; --each
+    tells the files apart.
+
+    \b
+    Example:
+        thenar merge anna.grasps ben.grasps -o all.grasps
+        thenar merge monday.grasps friday.grasps -o anna.grasps --each session
+    """
+    from thenar.compiler.recordings.graspset import GraspSet
+    from thenar.compiler.recordings.merging import merge
+
+    keep_apart(*sets, output)
+    with progress(f"merging {len(sets)} sets"):
+        merged = merge({str(path): GraspSet.load(path) for path in sets}, each)  # type: ignore[arg-type]
+    merged.save(output)
+    trials, subjects, sessions = (
+        len({*column.tolist()}) for column in (merged.trial_ids, merged.subjects, merged.sessions)
+    )
+    written = Merged(str(output), len(sets), len(merged), trials, subjects, sessions)
+    show(written, _print, merged.simulated)
+
+
+def _print(merged: Merged, simulated: str) -> None:
+    echo(
+        f"{merged.output}: {merged.grasps} grasps of {merged.sets} sets; "
+        f"trials {merged.trials}, subjects {merged.subjects}, sessions {merged.sessions}"
+    )
+    if simulated:
+        echo(f"simulated: {simulated}")

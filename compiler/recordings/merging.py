@@ -1,0 +1,226 @@
+"""Sets of one glove put together, and one set parted by subject, object or session."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.runtime.names import list_names, shortened
+
+from ..publication import entries, publish_folder
+from .errors import RecordingError
+from .graspset import CODES, GraspSet, Joint
+from .taxonomy import Taxonomy, is_published
+
+By = Literal["subject", "object", "session"]
+# Codes of two lines that are one but for the last bits of their arithmetic are at most so far from whole ones.
+_SAME = 1e-3
+# So many origins fit into the text that says what simulated a set.
+_ORIGINS = 4
+_RECORDED = "recorded grasps"
+
+
+def merge(sets: Mapping[str, GraspSet], each: By | None = None) -> GraspSet:
+    """Return the rows of all `sets`, one set after the other.
+
+    They have the same switches and joints, in any order; the first set's order counts. Codes are shifted where two
+    calibrations differ by whole codes, as those of two imports on one grid do. Taxonomies of the user's own are united.
+
+    Parameters
+    ----------
+    sets : mapping of str to GraspSet
+        The sets by name, in order.
+    each : "subject", "object" or "session", optional
+        Make the rows of each set a subject (or an object, a session) of their own, which the stem of its name names.
+
+    Raises
+    ------
+    RecordingError
+        The message names the two sets, and the column, calibration, taxonomy or trial in which they clash.
+
+    Examples
+    --------
+    >>> from thenar.compiler import merge
+    >>> merge({"monday.grasps": monday, "friday.grasps": friday}, each="session")  # doctest: +SKIP
+    """
+    if not sets:
+        raise RecordingError("no set to merge")
+    own = [found if each is None else _of_its_own(name, found, each) for name, found in sets.items()]
+    if each is not None and len(stems := {Path(name).stem for name in sets}) < len(sets):
+        raise RecordingError(f"{len(sets)} sets have {len(stems)} names: {list_names(list(sets))}: rename some")
+    names, first = list(sets), own[0]
+    for name, other in zip(names[1:], own[1:], strict=True):
+        _check_columns(names[0], first, name, other)
+    taxonomy = _united(names, own)
+    _check_trials(names, own)
+    joints = tuple(_line(names, [_joint(found, joint.name) for found in own]) for joint in first.joints)
+    return GraspSet(
+        switches=np.concatenate([found.switches[:, _places(first.switch_names, found.switch_names)] for found in own]),
+        switch_names=first.switch_names,
+        codes=np.concatenate([_codes(name, found, joints) for name, found in zip(names, own, strict=True)]),
+        joints=joints,
+        grasps=np.concatenate([found.grasps for found in own]),
+        taxonomy=taxonomy,
+        subjects=np.concatenate([found.subjects for found in own]),
+        objects=np.concatenate([found.objects for found in own]),
+        trials=np.concatenate([found.trials for found in own]),
+        simulated=_origin(own),
+        sessions=np.concatenate([found.sessions for found in own]),
+        independent=first.independent,
+    )
+
+
+def split(grasp_set: GraspSet, by: By) -> dict[str, GraspSet]:
+    """Return the set of each subject, object or session, by name in alphabetical order.
+
+    Each keeps all columns and the whole taxonomy, so `merge` gives the rows back, in another order.
+    """
+    column: NDArray[np.str_] = getattr(grasp_set, f"{by}s")
+    return {name: grasp_set.rows(column == name) for name in np.unique(column).tolist()}
+
+
+def split_into(grasp_set: GraspSet, by: By, folder: Path, *, overwrite: bool = False) -> dict[str, Path]:
+    """Write each set of `split` to a file of `folder`, all of them or none; return the files by name.
+
+    A file is called after its name, such as "subject-anna.grasps"; what is not safe in the name of a file becomes an
+    underline. Other files of the folder stay. Raises RecordingError where a file is there already, unless `overwrite`.
+    """
+    parts = split(grasp_set, by)
+    files = _file_names(by, list(parts))
+
+    def theirs(target: Path) -> list[str]:
+        there = entries(target)
+        if not overwrite and (taken := sorted({*there} & {*files.values()})):
+            raise RecordingError(f"{folder} holds {list_names(taken)}: name another folder, or add --overwrite")
+        return [path for path in there if path not in files.values()]
+
+    content = {files[name]: part.encoded() for name, part in parts.items()}
+    publish_folder(content, folder, theirs, RecordingError)
+    return {name: folder / file for name, file in files.items()}
+
+
+def _file_names(by: str, names: list[str]) -> dict[str, str]:
+    """Return a file name for each, safe on every system, and told apart where case does not count."""
+    files: dict[str, str] = {}
+    taken: set[str] = set()
+    for name in names:
+        stem = file = f"{by}-{re.sub(r'[^A-Za-z0-9_-]', '_', name)[:100]}"
+        number = 1
+        while file.lower() in taken:
+            number += 1
+            file = f"{stem}-{number}"
+        taken.add(file.lower())
+        files[name] = f"{file}.grasps"
+    return files
+
+
+def _of_its_own(name: str, found: GraspSet, each: By) -> GraspSet:
+    """Return the set with the stem of its `name` as its only subject, object or session, or before each of several."""
+    names, where = np.unique(getattr(found, f"{each}s"), return_inverse=True)
+    stem = Path(name).stem
+    called = [stem] if len(names) == 1 else [f"{stem} {one}" for one in names.tolist()]
+    column = np.array(called, np.str_)[where]
+    return replace(found, **{f"{each}s": column})  # type: ignore[arg-type]
+
+
+def _check_columns(first_name: str, first: GraspSet, name: str, other: GraspSet) -> None:
+    for what, ours, theirs in (
+        ("switch", first.switch_names, other.switch_names),
+        ("joint", first.joint_names, other.joint_names),
+    ):
+        for lacking, having, of, than in ((theirs, ours, name, first_name), (ours, theirs, first_name, name)):
+            if missing := [column for column in having if column not in {*lacking}]:
+                plural = "es" if what == "switch" else "s"
+                raise RecordingError(
+                    f"{of} lacks {len(missing)} {what}{plural if len(missing) > 1 else ''} that {than} has: "
+                    f"{list_names(missing)}; only sets with the same columns are merged"
+                )
+    if first.independent != other.independent:
+        claims = (first_name, name) if first.independent else (name, first_name)
+        raise RecordingError(f'{claims[0]} states `frames = "independent"`, {claims[1]} does not: import both alike')
+
+
+def _united(names: list[str], sets: list[GraspSet]) -> Taxonomy:
+    taxonomy = sets[0].taxonomy
+    for name, other in zip(names[1:], (found.taxonomy for found in sets[1:]), strict=True):
+        if taxonomy == other:
+            continue
+        if is_published(taxonomy) or is_published(other):
+            raise RecordingError(
+                f"{names[0]} holds grasp types of taxonomy {shortened(taxonomy.name)}, {name} of "
+                f"{shortened(other.name)}: import both with one `taxonomy`"
+            )
+        called = taxonomy.name if taxonomy.name == other.name else "own"
+        taxonomy = Taxonomy(called, tuple(dict.fromkeys((*taxonomy.types, *other.types))))
+    return taxonomy
+
+
+def _check_trials(names: list[str], sets: list[GraspSet]) -> None:
+    """Raise RecordingError where rows of two sets would become one trial."""
+    if sets[0].independent:
+        return
+    owner: dict[tuple[str, str, str, str, int], str] = {}
+    for name, found in zip(names, sets, strict=True):
+        columns = (found.subjects, found.grasps, found.objects, found.sessions, found.trials)
+        trials = dict.fromkeys(zip(*(column.tolist() for column in columns), strict=True), name)
+        if clash := [trial for trial in trials if trial in owner]:
+            subject, grasp, thing, session, number = clash[0]
+            raise RecordingError(
+                f"{len(clash)} trials are in {owner[clash[0]]} and in {name}, the first of subject {subject}, {grasp} "
+                f"with {thing}, session {session}, trial {number}: if each file is a session of its own, add --each "
+                "session; if it is somebody else's, --each subject"
+            )
+        owner |= trials
+
+
+def _joint(found: GraspSet, name: str) -> Joint:
+    return found.joints[found.joint_names.index(name)]
+
+
+def _line(names: list[str], joints: list[Joint]) -> Joint:
+    """Return the one of `joints` on whose line the codes of all others are whole and 0 or more."""
+    first = joints[0]
+    for name, joint in zip(names, joints, strict=True):
+        shift = first.code_a + (joint.value_a - first.value_a) / first.step - joint.code_a
+        drift = abs(joint.step / first.step - 1) * CODES
+        if joint.unit != first.unit or max(abs(shift - np.rint(shift)), drift) > _SAME:
+            raise RecordingError(
+                f"joint {shortened(joint.name)} is calibrated otherwise in {name} than in {names[0]}: code 0 is "
+                f"{joint.value(0):.6g} {shortened(joint.unit)} and a step {joint.step:.6g}, not "
+                f"{first.value(0):.6g} {shortened(first.unit)} and {first.step:.6g}; import both with one "
+                "`calibration`, or one `grid` and `origin`"
+            )
+    # Where values rise with codes the line that begins lowest; where they fall, highest.
+    return min(joints, key=lambda joint: float(joint.value(0)) / first.step)
+
+
+def _codes(name: str, found: GraspSet, joints: tuple[Joint, ...]) -> NDArray[np.uint16]:
+    codes = np.empty((len(found), len(joints)), np.uint16)
+    for column, joint in enumerate(joints):
+        own = _joint(found, joint.name)
+        shift = int(np.rint(joint.code(own.value_a))) - own.code_a
+        moved = found.codes[:, found.joint_names.index(joint.name)].astype(np.int64) + shift
+        if moved.size and moved.max() >= CODES:
+            raise RecordingError(
+                f"{name}: joint {shortened(joint.name)} gets codes above {CODES - 1}: take another grid"
+            )
+        codes[:, column] = moved
+    return codes
+
+
+def _places(wanted: tuple[str, ...], names: tuple[str, ...]) -> list[int]:
+    place = {name: number for number, name in enumerate(names)}
+    return [place[name] for name in wanted]
+
+
+def _origin(sets: list[GraspSet]) -> str:
+    """Return what simulated any of the sets, so that nobody takes them for recordings."""
+    origins = list(dict.fromkeys(origin for found in sets for origin in found.simulated.split("; ")))
+    if len(origins) == 1:
+        return origins[0]
+    more = f"; {len(origins) - _ORIGINS} more" if len(origins) > _ORIGINS else ""
+    return "; ".join(shortened(origin) or _RECORDED for origin in origins[:_ORIGINS]) + more

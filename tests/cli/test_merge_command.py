@@ -1,0 +1,79 @@
+import json
+import subprocess
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thenar.compiler import GraspSet, merge
+
+Thenar = Callable[..., subprocess.CompletedProcess[str]]
+
+
+@pytest.fixture
+def files(small_set: GraspSet, tmp_path: Path) -> tuple[Path, Path]:
+    anna, ben = tmp_path / "anna.grasps", tmp_path / "ben.grasps"
+    small_set.save(anna)
+    replace(small_set, subjects=np.full(60, "B"), simulated="scene x").save(ben)
+    return anna, ben
+
+
+def test_two_sets_become_one_and_part_again(thenar: Thenar, files: tuple[Path, Path], tmp_path: Path) -> None:
+    anna, ben = files
+    whole = tmp_path / "all.grasps"
+    done = thenar("merge", anna, ben, "-o", whole)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"{whole}: 120 grasps of 2 sets; trials 120, subjects 2, sessions 1" in done.stdout
+    assert "simulated: recorded grasps; scene x" in done.stdout
+    sets = {str(path): GraspSet.load(path) for path in files}
+    assert GraspSet.load(whole).fingerprint() == merge(sets).fingerprint()
+    done = thenar("split", whole, "--by", "subject", "-o", tmp_path / "people", "--json")
+    assert [(part["name"], part["grasps"]) for part in json.loads(done.stdout)] == [("A", 60), ("B", 60)]
+    again = {name: GraspSet.load(tmp_path / "people" / f"subject-{name}.grasps") for name in "AB"}
+    assert merge(again).fingerprint() == GraspSet.load(whole).fingerprint()
+    done = thenar("split", whole, "--by", "subject", "-o", tmp_path / "people")
+    assert done.returncode == 2
+    assert "people holds subject-A.grasps, subject-B.grasps: name another folder, or add --overwrite" in done.stderr
+    assert thenar("split", whole, "--by", "subject", "-o", tmp_path / "people", "--overwrite").returncode == 0
+
+
+def test_files_of_one_name_of_trials_are_told_apart_by_their_session(
+    thenar: Thenar, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    GraspSet.load(files[0]).save(tmp_path / "friday.grasps")
+    both = (files[0], tmp_path / "friday.grasps", "-o", tmp_path / "all.grasps")
+    done = thenar("merge", *both)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "60 trials are in" in done.stderr
+    assert "add --each session" in done.stderr
+    assert not (tmp_path / "all.grasps").exists()
+    done = thenar("merge", *both, "--each", "session", "--json")
+    found = {"output": str(tmp_path / "all.grasps"), "sets": 2, "grasps": 120, "trials": 120, "subjects": 1}
+    assert json.loads(done.stdout) == {**found, "sessions": 2}
+    assert {*GraspSet.load(tmp_path / "all.grasps").sessions.tolist()} == {"anna", "friday"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("merge", "{anna}", "{ben}", "-o", "{folder}/all.csv"), "all.csv: a file to write here ends in .grasps"),
+        (("merge", "{anna}", "{anna}", "-o", "{folder}/all.grasps"), "is named twice"),
+        (("merge", "{anna}", "{ben}", "-o", "{anna}"), "add --overwrite to replace it"),
+        (("merge", "{anna}", "{ben}", "-o", "{anna}", "--overwrite"), "is named twice"),
+        (("split", "{anna}", "--by", "trial", "-o", "{folder}/out"), "'trial' is not one of"),
+        (("split", "{anna}", "--by", "subject", "-o", "{folder}/no/such"), "is no folder: make it first"),
+        (("split", "{anna}", "--by", "subject", "-o", "{ben}"), "is a file"),
+    ],
+)
+def test_what_cannot_be_done_is_one_sentence(
+    thenar: Thenar, files: tuple[Path, Path], tmp_path: Path, arguments: tuple[str, ...], sentence: str
+) -> None:
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    filled = [each.format(anna=files[0], ben=files[1], folder=tmp_path) for each in arguments]
+    done = thenar(*filled)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert sentence in done.stderr
+    assert "Traceback" not in done.stderr
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before

@@ -1,0 +1,208 @@
+from dataclasses import replace
+from pathlib import Path
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from thenar.compiler import merge, split
+from thenar.compiler.recordings.errors import RecordingError
+from thenar.compiler.recordings.graspset import GraspSet, Joint
+from thenar.compiler.recordings.merging import By, split_into
+from thenar.compiler.recordings.taxonomy import FEIX_33, own
+
+BY = st.sampled_from(["subject", "object", "session"])
+
+
+def rows_of(grasp_set: GraspSet) -> list[tuple[object, ...]]:
+    """Return what each row says, whatever the order of rows and columns, with joints in their units."""
+    values = [joint.value(codes) for joint, codes in zip(grasp_set.joints, grasp_set.codes.T, strict=True)]
+    inputs = {
+        **dict(zip(grasp_set.switch_names, grasp_set.switches.T, strict=True)),
+        **dict(zip(grasp_set.joint_names, values, strict=True)),
+    }
+    who = (grasp_set.grasps, grasp_set.subjects, grasp_set.objects, grasp_set.sessions, grasp_set.trials)
+    columns = [*who, *(inputs[name] for name in sorted(inputs))]
+    return sorted(zip(*(column.tolist() for column in columns), strict=True))
+
+
+@given(data=st.data(), by=BY)
+@settings(deadline=None)
+def test_the_parts_of_a_set_merge_to_the_same_rows(
+    data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet], by: By
+) -> None:
+    grasp_set = data.draw(grasp_sets)
+    grasp_set = replace(
+        grasp_set, independent=data.draw(st.booleans()), simulated=data.draw(st.sampled_from(["", "x"]))
+    )
+    parts = split(grasp_set, by)
+    assert all({*getattr(part, f"{by}s").tolist()} == {name} for name, part in parts.items())
+    merged = merge(parts)
+    assert rows_of(merged) == rows_of(grasp_set)
+    kept = (merged.taxonomy, merged.joints, merged.switch_names, merged.simulated, merged.independent)
+    assert kept == (
+        grasp_set.taxonomy, grasp_set.joints, grasp_set.switch_names, grasp_set.simulated, grasp_set.independent
+    )  # fmt: skip
+    assert merge({"alone": grasp_set}).fingerprint() == grasp_set.fingerprint()
+
+
+def test_columns_may_come_in_another_order(small: GraspSet) -> None:
+    other = replace(
+        small,
+        switches=small.switches[:, ::-1],
+        switch_names=small.switch_names[::-1],
+        codes=small.codes[:, ::-1],
+        joints=small.joints[::-1],
+        subjects=np.full(6, "C"),
+    )
+    merged = merge({"a": small, "b": other})
+    assert merged.rows(range(6)).fingerprint() == small.fingerprint()
+    assert merged.rows(range(6, 12)).fingerprint() == replace(small, subjects=np.full(6, "C")).fingerprint()
+
+
+@pytest.mark.parametrize(("first", "second"), [(0, 40), (40, 0), (3, 3)])
+@pytest.mark.parametrize("step", [0.1, -0.5])
+def test_codes_on_one_grid_with_another_origin_are_shifted_and_mean_what_they_did(
+    small: GraspSet, first: int, second: int, step: float
+) -> None:
+    def imported(origin: int, subject: str) -> GraspSet:
+        joint = Joint("index", "deg", 0, origin * step, 1000, origin * step + 1000 * step)
+        codes = np.stack([small.codes[:, 0], small.codes[:, 1]], axis=1)
+        return replace(small, joints=(joint, small.joints[1]), codes=codes, subjects=np.full(6, subject))
+
+    sets = {"a": imported(first, "A"), "b": imported(second, "B")}
+    merged = merge(sets)
+    for name, rows in (("a", slice(6)), ("b", slice(6, 12))):
+        before = sets[name].joints[0].value(sets[name].codes[:, 0])
+        np.testing.assert_allclose(merged.joints[0].value(merged.codes[rows, 0]), before, rtol=0, atol=1e-9)
+    assert merged.codes[:, 0].min() == small.codes[:, 0].min()
+
+
+def another(small: GraspSet, **changes: object) -> GraspSet:
+    return replace(small, **{"subjects": np.full(6, "C"), **changes})  # type: ignore[arg-type]
+
+
+INDEX, WRIST = Joint("index", "deg", 0, -10.0, 100, 40.0), Joint("wrist", "deg", 0, 0.0, 1, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"switch_names": ("dead", "thumb", "palm", "heel")}, "b.grasps lacks 1 switch that a.grasps has: palm copy"),
+        (
+            {"switches": np.zeros((6, 2)) > 0, "switch_names": ("dead", "thumb")},
+            "b.grasps lacks 2 switches that a.grasps has: palm, palm copy; only sets with the same columns",
+        ),
+        (
+            {"switches": np.zeros((6, 5)) > 0, "switch_names": ("dead", "thumb", "palm", "palm copy", "new")},
+            "a.grasps lacks 1 switch that b.grasps has: new",
+        ),
+        ({"joints": (INDEX, replace(WRIST, name="elbow"))}, "b.grasps lacks 1 joint that a.grasps has: wrist"),
+        (
+            {"joints": (replace(INDEX, value_a=-10.2, value_b=39.8), WRIST)},
+            "joint index is calibrated otherwise in b.grasps than in a.grasps: code 0 is -10.2 deg and a step 0.5, not "
+            "-10 deg and 0.5",
+        ),
+        ({"joints": (replace(INDEX, value_b=45.0), WRIST)}, "code 0 is -10 deg and a step 0.55, not -10 deg and 0.5"),
+        ({"joints": (replace(INDEX, unit="rad"), WRIST)}, "code 0 is -10 rad"),
+        (
+            {"joints": (replace(INDEX, value_a=-32790.0, value_b=-32740.0), WRIST)},
+            "a.grasps: joint index gets codes ab",
+        ),
+        ({"taxonomy": own(["PoS", "PoH", "Tip"])}, "taxonomy kamakura14, b.grasps of own: import both with one"),
+        ({"taxonomy": FEIX_33, "grasps": np.full(6, "Tripod")}, "taxonomy kamakura14, b.grasps of feix33"),
+        ({"independent": True}, 'b.grasps states `frames = "independent"`, a.grasps does not'),
+        (
+            {"subjects": np.full(6, "A")},
+            "4 trials are in a.grasps and in b.grasps, the first of subject A, PoS with mug, session 1, trial 0: if",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_said_with_both_names(small: GraspSet, changes: dict[str, object], sentence: str) -> None:
+    with pytest.raises(RecordingError) as caught:
+        merge({"a.grasps": small, "b.grasps": another(small, **changes)})
+    assert sentence in str(caught.value)
+
+
+def test_the_same_rows_are_refused_twice_unless_each_row_is_a_trial(small: GraspSet) -> None:
+    alone = replace(small, independent=True)
+    assert len(merge({"a": alone, "b": alone})) == 12
+
+
+@pytest.mark.parametrize("each", ["subject", "session", "object"])
+def test_each_file_can_be_a_subject_a_session_or_an_object(small: GraspSet, each: By) -> None:
+    merged = merge({"x/mon.grasps": small, "y/tue.grasps": small}, each)
+    names = getattr(merged, f"{each}s").tolist()
+    expected = ["mon", "tue"]
+    if each == "subject":
+        expected = ["mon A", "mon B", "tue A", "tue B"]
+    assert sorted(set(names)) == expected
+    assert len(np.unique(merged.trial_ids)) == 12
+    with pytest.raises(RecordingError, match=r"2 sets have 1 names: x/a.grasps, y/a.grasps: rename some"):
+        merge({"x/a.grasps": small, "y/a.grasps": small}, each)
+
+
+def test_taxonomies_of_the_users_own_are_united_in_order(small: GraspSet) -> None:
+    one = another(small, taxonomy=own(["cup", "pen"]), grasps=np.array(["cup", "pen"] * 3))
+    two = replace(one, taxonomy=own(["rod", "pen"]), grasps=np.array(["rod", "pen"] * 3), subjects=np.full(6, "D"))
+    merged = merge({"a": one, "b": two})
+    assert merged.taxonomy == own(["cup", "pen", "rod"])
+    assert merged.grasps.tolist() == ["cup", "pen"] * 3 + ["rod", "pen"] * 3
+
+
+@pytest.mark.parametrize(
+    ("origins", "whole"),
+    [
+        (["", ""], ""),
+        (["scene x", "scene x"], "scene x"),
+        (["", "scene x"], "recorded grasps; scene x"),
+        (["a; b", "b; c"], "a; b; c"),
+        (["a", "b", "c", "d", "e", "f"], "a; b; c; d; 2 more"),
+    ],
+)
+def test_what_was_simulated_stays_simulated(small: GraspSet, origins: list[str], whole: str) -> None:
+    sets = {
+        str(number): replace(small, simulated=origin, subjects=np.full(6, str(number)))
+        for number, origin in enumerate(origins)
+    }
+    assert merge(sets).simulated == whole
+
+
+def test_no_set_is_no_merge() -> None:
+    with pytest.raises(RecordingError, match="no set to merge"):
+        merge({})
+
+
+def test_files_have_safe_names_and_hold_their_part(small: GraspSet, tmp_path: Path) -> None:
+    people = ["a/b", "a b", "A_B", "..", "ä" * 150, "ok"]
+    odd = replace(small, subjects=np.array(people))
+    files = split_into(odd, "subject", tmp_path / "out")
+    assert sorted(path.name for path in files.values()) == sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert {name: path.name for name, path in files.items()} == {
+        "..": "subject-__.grasps",
+        "A_B": "subject-A_B.grasps",
+        "a b": "subject-a_b-2.grasps",
+        "a/b": "subject-a_b-3.grasps",
+        "ok": "subject-ok.grasps",
+        "ä" * 150: f"subject-{'_' * 100}.grasps",
+    }
+    assert all(GraspSet.load(path).subjects.tolist() == [name] for name, path in files.items())
+
+
+def test_other_files_stay_and_files_of_the_same_name_are_only_replaced_on_request(
+    small: GraspSet, tmp_path: Path
+) -> None:
+    folder = tmp_path / "out"
+    folder.mkdir()
+    (folder / "notes.txt").write_text("mine")
+    (folder / "subject-A.grasps").write_text("old")
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    with pytest.raises(RecordingError, match=r"out holds subject-A.grasps: name another folder, or add --overwrite"):
+        split_into(small, "subject", folder)
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+    split_into(small, "subject", folder, overwrite=True)
+    assert sorted(path.name for path in folder.iterdir()) == ["notes.txt", "subject-A.grasps", "subject-B.grasps"]
+    assert (folder / "notes.txt").read_text() == "mine"
+    assert len(GraspSet.load(folder / "subject-A.grasps")) == 4
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
