@@ -89,13 +89,13 @@ def find_frontier(
 ) -> Frontier:
     """Find what accuracy costs in time: which switches, joints, rounds, tables, wirings and decisions are worth it.
 
-    Every placement is screened by an honest cross-validation; those near the front are looked at closely, priced for
+    Every placement is screened by a nested cross-validation; those near the front are looked at closely, priced for
     the target, and simulated there.
 
     Parameters
     ----------
     grasp_set : GraspSet
-        Single trials, of at least two grasp types.
+        Recordings of at least two grasp types; folds part no trial.
     output : Path, optional
         Folder for frontier.json, frontier.csv, three pictures, and the store, from which an interrupted run goes on.
         Without it nothing is written, and nothing is kept.
@@ -123,8 +123,7 @@ def find_frontier(
     Returns
     -------
     Frontier
-        A point's rate is one of those by which the points were chosen, so the best of many is a little lucky; its rate
-        with subjects left out had no say.
+        A point's rate is corrected for the luck of the best of many; see `thenar.compiler.evaluation.luck`.
 
     Raises
     ------
