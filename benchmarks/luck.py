@@ -73,7 +73,7 @@ def played(asked: tuple[int, By, Equipment]) -> tuple[Case, ...]:
     """Return a case for each budget of one seed."""
     seed, by, equipment = asked
     grasp_set = recorded(seed)
-    search = Search(methods=("id3",), rivals=(), repeats=1, screening=10, rounds=10, finalists=3, seed=seed, by=by)
+    search = Search(methods=("id3",), rivals=(), repeats=1, screening=10, rounds=10, finalists=3, seed=seed, by="subject" if by == "new subject" else "trial")
     samples = Samples.of(grasp_set)
     cuts = Cuts.of(samples, search)
     with tempfile.TemporaryDirectory() as folder, Store(Path(folder) / "store", "") as store:

@@ -53,11 +53,11 @@ def _tables(_: click.Context, __: click.Parameter, value: str) -> tuple[str, ...
 
 
 def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, ...]:
-    return ("paper", "honest") if value == "both" else (value,)
+    return ("paper", "nested") if value == "both" else (value,)
 
 
 def _scheme(_: click.Context, __: click.Parameter, value: str | None) -> str:
-    return value or "stratified"
+    return value or "trial"
 
 
 @click.command(cls=Training)
@@ -92,7 +92,7 @@ def _scheme(_: click.Context, __: click.Parameter, value: str | None) -> str:
     "--protocol",
     "protocols",
     callback=_protocols,
-    type=click.Choice(("both", "paper", "honest")),
+    type=click.Choice(("both", "paper", "nested")),
     default="both",
     show_default=True,
     help="Whose rows choose the placement.",
@@ -130,13 +130,13 @@ def command(
     """Cross-validate GRASPS and print the paper's tables: recognition rates in percent, with 95 % intervals.
 
     Every rate comes under two protocols: `paper` chooses the placement from all rows, as the paper did (optimistic);
-    `honest` chooses it inside each training fold. What ID3 is worth shows beside random and information-greedy
+    `nested` chooses it inside each training fold. What ID3 is worth shows beside random and information-greedy
     placements of as many switches.
 
     \b
     Example:
         thenar evaluate set.grasps
-        thenar evaluate set.grasps --by subject --protocol honest --plot pictures/ -o result.json
+        thenar evaluate set.grasps --by subject --protocol nested --plot pictures/ -o result.json
     """
     from thenar.compiler.evaluation.study import Options, evaluate
     from thenar.compiler.recordings.graspset import GraspSet
@@ -189,11 +189,11 @@ def _print(study: "Study", *, confusion: bool) -> None:
 
 
 def _rates(rated: "RateTable") -> "Grid":
-    averaged = ["average"] if len(rated.columns) > 1 else []
+    averaged = ["all"] if len(rated.columns) > 1 else []
     numbers = ("switches", *rated.columns, *averaged)
     grid = table(("", "", *numbers), numbers)
     for row in rated.rows:
-        average = [Text(interval(row.average))] if averaged else []
+        average = [Text(interval(row.rate))] if averaged else []
         rates = [Text(str(cell)) for cell in row.cells]
         grid.add_row(Text(row.name), Text(row.what), str(row.switches), *rates, *average)
     return grid

@@ -74,10 +74,8 @@ def _timed() -> tuple[str, ...]:
 @click.option("--seed", type=seed_range, default=1, show_default=True, help="Seed of folds and stream.")
 @click.option(
     "--by",
-    type=click.Choice(("new-subject", "pooled")),
-    callback=lambda _context, _option, value: value and value.replace("-", " "),
-    help="Choose points by the accuracy on subjects who are left out, or on trials of everybody.  "
-    "[default: new-subject where there are several]",
+    type=click.Choice(("subject", "trial")),
+    help="Choose points by subjects who are left out, or by trials of everybody.  [default: subject, if several]",
 )
 @jobs_option()
 @click.option(

@@ -128,7 +128,7 @@ class Documents:
 
 
 def _study(made: BuildReport, progress: Progress | None) -> "tuple[Study | None, str]":
-    """Return the paper's tables, honest and once, of the build's own folds, trainer and seed; or why there are none.
+    """Return the paper's tables, nested and once, of the build's own folds, trainer and seed; or why there are none.
 
     Last of all: by then, nothing is wrong with the build.
     """
@@ -141,7 +141,7 @@ def _study(made: BuildReport, progress: Progress | None) -> "tuple[Study | None,
         folds=asked.folds,
         repeats=1,
         rounds=asked.rounds,
-        protocols=("honest",),
+        protocols=("nested",),
         tables=("compositions", "generality", "pruning"),
         seed=asked.seed,
         trainer=asked.trainer,

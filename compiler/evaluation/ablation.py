@@ -11,9 +11,10 @@ from ..recordings.graspset import GraspSet
 from ..trainers.base import Training
 from .plan import COMPOSITIONS, FoldFit, Progress, inputs, run_fits
 from .populations import populations
-from .rates import RepeatedRate
+from .rates import Rate, decided, rated
 
 Bits = NDArray[np.bool_]
+Labels = NDArray[np.intp]
 
 FOLDS, ROUNDS, SEED = 4, 100, 1
 
@@ -31,10 +32,13 @@ class Change(msgspec.Struct, frozen=True):
 
 
 class Recognised(msgspec.Struct, frozen=True):
-    """The recognition rate from some inputs, and what removing the effect changed; None for the whole scene."""
+    """The accuracy from some inputs, of trials and of frames (None where each row is a trial), and what removing the
+    effect changed for trials; None for the whole scene.
+    """
 
     inputs: str
-    rate: RepeatedRate
+    rate: Rate
+    frames: Rate | None
     change: Change | None
 
 
@@ -79,13 +83,13 @@ def ablated(
     """
     count = len(_KINDS) * FOLDS * n_subjects
     found: list[Variant] = []
-    whole: tuple[GraspSet, dict[str, Bits]] | None = None
+    whole: tuple[GraspSet, dict[str, Labels]] | None = None
     for number, one in enumerate(made):
         report = None if progress is None else _further(progress, number * count, n_variants * count)
-        correct = _correct(one.grasp_set, jobs, report)
-        rates = tuple(_recognised(name, one.grasp_set, correct, whole) for name in correct)
+        predicted = _predicted(one.grasp_set, jobs, report)
+        rates = tuple(_recognised(name, one.grasp_set, predicted, whole) for name in predicted)
         found.append(Variant(one.without, len(one.grasp_set), one.unsettled, one.us_a_grasp, rates))
-        whole = whole or (one.grasp_set, correct)
+        whole = whole or (one.grasp_set, predicted)
     return tuple(found)
 
 
@@ -93,9 +97,9 @@ def _further(progress: Progress, before: int, total: int) -> Progress:
     return lambda done, _: progress(before + done, total)
 
 
-def _correct(grasp_set: GraspSet, jobs: int, progress: Progress | None) -> dict[str, Bits]:
-    """Return for each kind of inputs which rows (n,) were recognised when they were left out of training."""
-    parts = populations(grasp_set, "stratified", FOLDS, repeats=1, seed=SEED)
+def _predicted(grasp_set: GraspSet, jobs: int, progress: Progress | None) -> dict[str, Labels]:
+    """Return for each kind of inputs the label (n,) that each row was given when it was left out of training."""
+    parts = populations(grasp_set, "trial", FOLDS, repeats=1, seed=SEED)
     sizes = (len(grasp_set.switch_names), len(grasp_set.joints))
     fits = {
         name: [FoldFit(fold, kind.columns((), *sizes), part.grasps) for part in parts for fold in part.folds]
@@ -105,29 +109,33 @@ def _correct(grasp_set: GraspSet, jobs: int, progress: Progress | None) -> dict[
     found = run_fits(
         inputs(grasp_set), grasp_set.labels, everything, Training("logitboost", {"rounds": ROUNDS}), jobs, progress
     )
-    correct = {name: np.zeros(len(grasp_set), dtype=np.bool_) for name in fits}
+    predicted = {name: np.zeros(len(grasp_set), dtype=np.intp) for name in fits}
     for name, some in fits.items():
         for fit in some:
-            correct[name][fit.fold.test] = found[fit] == grasp_set.labels[fit.fold.test]
-    return correct
+            predicted[name][fit.fold.test] = found[fit]
+    return predicted
 
 
 def _recognised(
-    name: str, grasp_set: GraspSet, correct: dict[str, Bits], whole: tuple[GraspSet, dict[str, Bits]] | None
+    name: str, grasp_set: GraspSet, predicted: dict[str, Labels], whole: tuple[GraspSet, dict[str, Labels]] | None
 ) -> Recognised:
-    rate = RepeatedRate.of((int(np.count_nonzero(correct[name])),), len(grasp_set))
+    rates = rated(predicted[name], grasp_set.labels, grasp_set.trial_ids, of="within subject")
     if whole is None:
-        return Recognised(name, rate, None)
-    rows, whole_rows = _common(grasp_set, whole[0])
-    return Recognised(name, rate, change_of(correct[name][rows], whole[1][name][whole_rows]))
+        return Recognised(name, *rates, None)
+    now, before = _hits(grasp_set, predicted[name]), _hits(whole[0], whole[1][name])
+    # One has what did not settle in the other.
+    same = [key for key in now if key in before]
+    change = change_of(np.array([now[key] for key in same]), np.array([before[key] for key in same]))
+    return Recognised(name, *rates, change)
 
 
-def _common(one: GraspSet, other: GraspSet) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the rows (m,) of each set that are of the same repetitions: one has what did not settle in the other."""
-    keys = [{key: row for row, key in enumerate(zip(each.subjects, each.trials, strict=True))} for each in (one, other)]
-    same = [key for key in keys[0] if key in keys[1]]
-    first, second = (np.array([rows[key] for key in same], dtype=np.intp) for rows in keys)
-    return first, second
+def _hits(grasp_set: GraspSet, predicted: Labels) -> dict[tuple[str, int], bool]:
+    """Return which trials, by subject and number, were recognised."""
+    trial = grasp_set.trial_ids
+    _, first = np.unique(trial, return_index=True)
+    hits = decided(predicted[np.newaxis], trial)[0] == grasp_set.labels[first]
+    keys = zip(grasp_set.subjects[first].tolist(), grasp_set.trials[first].tolist(), strict=True)
+    return dict(zip(keys, hits.tolist(), strict=True))
 
 
 def change_of(now: Bits, before: Bits) -> Change:

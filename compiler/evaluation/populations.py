@@ -5,11 +5,22 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..recordings.graspset import GraspSet
-from .folds import EvaluationError, Fold, Rows, block_folds, leave_one_out, weka_folds
+from .folds import EvaluationError, Fold, Rows, block_folds, leave_one_out, trial_folds
+from .rates import Of
 
-Scheme = Literal["stratified", "subject", "object", "block"]
+Scheme = Literal["trial", "subject", "object", "session", "block"]
+
+# What the rates of each scheme are of.
+OF: dict[Scheme, Of] = {
+    "trial": "within subject",
+    "subject": "new subject",
+    "object": "new object",
+    "session": "new session",
+    "block": "within subject",
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,8 +52,9 @@ class Population:
 def populations(grasp_set: GraspSet, scheme: Scheme, n_folds: int, repeats: int, seed: int) -> tuple[Population, ...]:
     """Return a population a subject.
 
-    stratified, block, object: only the subject's own rows are trained on, and all of them are tested once a repeat.
-    subject: the rows of all others are trained on. Only `stratified` has a seed, and so repeats (seed, seed + 1, ...).
+    trial, block, object, session: only the subject's own rows are trained on, and all of them are tested once a repeat.
+    subject: the rows of all others are trained on. Only `trial` has a seed, and so repeats (seed, seed + 1, ...). No
+    scheme has rows of one trial on both sides of a fold.
     Raises EvaluationError naming the subject that cannot be cut so.
     """
     if scheme == "subject":
@@ -59,12 +71,20 @@ _Cut = Callable[[Rows], list[list[Fold]]]
 
 def _cutter(grasp_set: GraspSet, scheme: Scheme, n_folds: int, repeats: int, seed: int) -> _Cut:
     """Return what cuts rows into repeats of folds, numbered within the rows."""
-    if scheme == "object":
-        return lambda rows: [leave_one_out(grasp_set.objects[rows], "object")]
+    if scheme in ("object", "session"):
+        groups = grasp_set.objects if scheme == "object" else grasp_set.sessions
+        return lambda rows: [leave_one_out(groups[rows], scheme)]
     if scheme == "block":
         return lambda rows: [block_folds(grasp_set.trials[rows], n_folds)]
-    labels = grasp_set.labels
-    return lambda rows: [weka_folds(labels[rows], n_folds, seed + repeat) for repeat in range(repeats)]
+    labels, trials = grasp_set.labels, grasp_set.trial_ids
+    return lambda rows: [trial_folds(labels[rows], trials[rows], n_folds, seed + repeat) for repeat in range(repeats)]
+
+
+def groups_of(grasp_set: GraspSet, scheme: Scheme) -> NDArray[np.str_] | None:
+    """Return a name (n,) for what each row is left out with, None if that is its trial; a session is a subject's."""
+    if scheme == "session":
+        return np.char.add(np.char.add(grasp_set.subjects, "\n"), grasp_set.sessions)
+    return {"subject": grasp_set.subjects, "object": grasp_set.objects}.get(scheme)
 
 
 def _of_subject(grasp_set: GraspSet, name: str, cut: _Cut) -> Population:
@@ -80,7 +100,7 @@ def _population(grasp_set: GraspSet, name: str, rows: Rows, repeats: tuple[tuple
     return Population(name, rows, tuple(np.unique(grasp_set.labels[rows]).tolist()), repeats)
 
 
-ProtocolName = Literal["paper", "honest"]
+ProtocolName = Literal["paper", "nested"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,11 +123,11 @@ PAPER = Protocol(
     "paper",
     "The placement is chosen once, from all rows, test rows included, as the paper did: optimistic.",
 )
-HONEST = Protocol(
-    "honest",
+NESTED = Protocol(
+    "nested",
     "The placement is chosen anew inside each training fold; no test row has a say: what to expect of new grasps.",
 )
-PROTOCOLS = (PAPER, HONEST)
+PROTOCOLS = (PAPER, NESTED)
 
 
 def concerns(grasp_set: GraspSet, parts: tuple[Population, ...], scheme: Scheme, n_folds: int) -> tuple[str, ...]:
@@ -122,15 +142,16 @@ def concerns(grasp_set: GraspSet, parts: tuple[Population, ...], scheme: Scheme,
         if len(part.grasps) == 1
     ]
     found = [text for part in parts for text in _untrained(grasp_set, part)]
-    if scheme == "stratified":
+    if scheme == "trial":
         found = [text for part in parts for text in _rare(grasp_set, part, n_folds)] + found
     return tuple(simulated + alone + found)
 
 
 def _rare(grasp_set: GraspSet, part: Population, n_folds: int) -> list[str]:
-    counts = np.bincount(grasp_set.labels[part.rows], minlength=len(grasp_set.taxonomy.types))
+    first = np.unique(grasp_set.trial_ids[part.rows], return_index=True)[1]
+    counts = np.bincount(grasp_set.labels[part.rows][first], minlength=len(grasp_set.taxonomy.types))
     return [
-        f"subject {part.name} has {counts[label]} row(s) of {grasp_set.taxonomy.types[label]}: "
+        f"subject {part.name} has {counts[label]} trial(s) of {grasp_set.taxonomy.types[label]}: "
         f"fewer than the {n_folds} folds, so some folds do not test it"
         for label in part.grasps
         if counts[label] < n_folds

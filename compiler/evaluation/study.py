@@ -6,6 +6,7 @@ from statistics import fmean
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Options as Manifested
 
@@ -15,7 +16,7 @@ from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from ..text import counted, interval
 from ..trainers.base import Training, changed
-from .folds import EvaluationError
+from .folds import EvaluationError, Rows
 from .plan import (
     RIVALS,
     CellPlan,
@@ -29,8 +30,8 @@ from .plan import (
     is_blind,
     run_fits,
 )
-from .populations import PROTOCOLS, Population, ProtocolName, Scheme, concerns, populations
-from .rates import Average, RepeatedRate
+from .populations import OF, PROTOCOLS, Population, ProtocolName, Scheme, concerns, groups_of, populations
+from .rates import Of, Rate, decided, rated
 
 Predictions = Mapping[FoldFit, Labels]
 Confusion = tuple[tuple[int, ...], ...]
@@ -66,13 +67,15 @@ class Spread:
 class Cell:
     """The rate of one row of a table on one population.
 
+    rate       of trials; frames: of frames, None where each row is a trial
     switches   how many switches the classifiers had         draws  spread of the rates of random draws; else None
     no_inputs  fits without any input that varies: they answer the most frequent grasp type of their training rows
-    confusion  (K, K) counts over all repeats, row: true, column: recognised, K as in Study.grasps; None but for
-               compositions
+    confusion  (K, K) counts of trials over all repeats, row: true, column: recognised, K as in Study.grasps; None but
+               for compositions
     """
 
-    rate: RepeatedRate
+    rate: Rate
+    frames: Rate | None
     switches: Spread
     no_inputs: int
     draws: Spread | None
@@ -86,13 +89,16 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A row of a table: its short name, what it is, its switches, its cells and their average."""
+    """A row of a table: its short name, what it is, its switches, its cells, and the rate of all their trials (frames:
+    of all their frames, None where each row is a trial).
+    """
 
     name: str
     what: str
     switches: Spread
     cells: tuple[Cell, ...]
-    average: Average
+    rate: Rate
+    frames: Rate | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,8 +112,8 @@ class RateTable:
 
     @property
     def title(self) -> str:
-        """What the table shows."""
-        return f"{_TITLES[self.name]}: {self.protocol} protocol"
+        """What the table shows, and what its rates are of."""
+        return f"{_TITLES[self.name]}: {self.protocol} protocol, {self.rows[0].rate.what}"
 
     @property
     def note(self) -> str:
@@ -118,15 +124,21 @@ class RateTable:
 
 @dataclass(frozen=True, slots=True)
 class Reader:
-    """Reads rates off predictions: the true labels (n,), the labels that occur, the number of switches, and which fits
-    were blind.
+    """Reads rates off predictions.
+
+    labels, trials  (n,) of each row       n_switches   the set's
+    grasps          labels that occur      predictions  of each fit; blind: the fits that were
+    of              what the rates are of, with the group (n,) that each row is left out with, None: its trial
     """
 
     labels: Labels
+    trials: Rows
     grasps: tuple[int, ...]
     n_switches: int
     predictions: Predictions
     blind: frozenset[FoldFit]
+    of: Of
+    groups: NDArray[np.str_] | None
 
     def table(self, name: TableName, protocol: ProtocolName, plans: Sequence[RowPlan]) -> RateTable:
         """Return the table of these rows."""
@@ -136,32 +148,48 @@ class Reader:
 
     def cell(self, plan: CellPlan, *, confusing: bool) -> Cell:
         """Return the cell of a plan, with its confusion matrix if `confusing`."""
-        correct = tuple(sum(map(self._correct, run)) for run in plan.runs)
-        repeats = len(plan.part.repeats)
-        rate = RepeatedRate.of(correct, plan.part.total, repeats if len(correct) > repeats else 1)
+        rate, frames = self._rates((plan,))
         counts = [sum(column < self.n_switches for column in fit.columns) for fit in plan.fits]
         blind = sum(fit in self.blind for fit in plan.fits)
-        confusion = self._confusion(plan.fits) if confusing else None
-        return Cell(rate, Spread.of(counts), blind, _draws(rate, repeats), confusion)
+        confusion = self._confusion(plan) if confusing else None
+        return Cell(rate, frames, Spread.of(counts), blind, _draws(rate, len(plan.part.repeats)), confusion)
 
     def _row(self, plan: RowPlan, *, confusing: bool) -> Row:
         cells = tuple(self.cell(cell, confusing=confusing) for cell in plan.cells)
         spreads = [cell.switches for cell in cells]
         switches = Spread(min(s.least for s in spreads), fmean(s.mean for s in spreads), max(s.most for s in spreads))
-        return Row(plan.name, plan.what, switches, cells, Average.of(tuple(cell.rate for cell in cells)))
+        rate, frames = (cells[0].rate, cells[0].frames) if len(cells) == 1 else self._rates(plan.cells)
+        return Row(plan.name, plan.what, switches, cells, rate, frames)
 
-    def _correct(self, fit: FoldFit) -> int:
-        return int(np.count_nonzero(self.predictions[fit] == self.labels[fit.fold.test]))
+    def _rates(self, plans: Sequence[CellPlan]) -> tuple[Rate, Rate | None]:
+        """Return the rates of trials and of frames of some cells together; their runs correspond."""
+        rows, predicted = self._predicted(plans)
+        groups = None if self.groups is None else self.groups[rows]
+        repeats = len(plans[0].part.repeats)
+        a_draw = repeats if len(predicted) > repeats else 1
+        return rated(predicted, self.labels[rows], self.trials[rows], of=self.of, groups=groups, repeats_a_draw=a_draw)
 
-    def _confusion(self, fits: list[FoldFit]) -> Confusion:
+    def _predicted(self, plans: Sequence[CellPlan]) -> tuple[Rows, Labels]:
+        """Return the rows (n,) that some cells test, and the label (runs, n) that each run gives them."""
+        rows = np.concatenate([fit.fold.test for plan in plans for fit in plan.runs[0]])
+        predicted = np.zeros((len(plans[0].runs), len(self.labels)), dtype=np.intp)
+        for plan in plans:
+            for run, fits in enumerate(plan.runs):
+                for fit in fits:
+                    predicted[run, fit.fold.test] = self.predictions[fit]
+        return rows, predicted[:, rows]
+
+    def _confusion(self, plan: CellPlan) -> Confusion:
+        rows, predicted = self._predicted((plan,))
+        _, first, trial = np.unique(self.trials[rows], return_index=True, return_inverse=True)
+        true = np.searchsorted(self.grasps, self.labels[rows[first]])
         counts = np.zeros((len(self.grasps), len(self.grasps)), dtype=np.intp)
-        for fit in fits:
-            true = np.searchsorted(self.grasps, self.labels[fit.fold.test])
-            np.add.at(counts, (true, np.searchsorted(self.grasps, self.predictions[fit])), 1)
+        for found in decided(predicted, trial):
+            np.add.at(counts, (true, np.searchsorted(self.grasps, found)), 1)
         return tuple(map(tuple, counts.tolist()))
 
 
-def _draws(rate: RepeatedRate, repeats: int) -> Spread | None:
+def _draws(rate: Rate, repeats: int) -> Spread | None:
     """Return the spread of the draws' own rates, each over its `repeats`; None if there is one draw only."""
     if len(rate.correct) == repeats:
         return None
@@ -180,9 +208,10 @@ class Options:
     """What to evaluate, and how.
 
     subjects    whose rows to use; none given: everybody's
-    scheme      how rows are cut: stratified as in Weka, by block of trial numbers, or leaving out objects or subjects
-    folds       of `stratified` and `block`
-    repeats     of `stratified`, with seeds seed, seed + 1, ...
+    scheme      what is kept whole in a fold: trials (stratified as in Weka), blocks of trial numbers, or, each left out
+                in turn, subjects, objects or sessions
+    folds       of `trial` and `block`
+    repeats     of `trial`, with seeds seed, seed + 1, ...
     prune       S of the placements of the compositions, the generality and the baselines
     prune_list  each S of the table of pooled and pruned placements
     rivals      methods that ID3 is compared with in the baselines, besides random placements
@@ -190,13 +219,13 @@ class Options:
     """
 
     subjects: tuple[str, ...] = ()
-    scheme: Scheme = "stratified"
+    scheme: Scheme = "trial"
     folds: int = 4
     repeats: int = 3
     rounds: int = 100
     prune: int = 0
     prune_list: tuple[int, ...] = (0, 13, 62)
-    protocols: tuple[ProtocolName, ...] = ("paper", "honest")
+    protocols: tuple[ProtocolName, ...] = ("paper", "nested")
     tables: tuple[TableName, ...] = TABLES
     seed: int = 1
     rivals: tuple[str, ...] = RIVALS
@@ -221,6 +250,7 @@ class Study:
 
     fingerprint: str
     rows: int
+    trials: int
     options: Options
     grasps: tuple[str, ...]
     warnings: tuple[str, ...]
@@ -228,16 +258,19 @@ class Study:
     tables: tuple[RateTable, ...]
 
     def __str__(self) -> str:
-        """Return how many rows there are, and how they were cut."""
+        """Return how many trials and frames there are, and how they were cut."""
         options, repeats = self.options, counted(self.options.repeats, "repeat")
         cut = {
-            "stratified": f"{options.folds} stratified folds, {repeats} from seed {options.seed}",
+            "trial": f"{options.folds} stratified folds of whole trials, {repeats} from seed {options.seed}",
             "subject": "one subject left out at a time (the column), all others trained on",
             "object": "one object left out at a time",
+            "session": "one session left out at a time",
             "block": f"{options.folds} blocks of trials",
         }[options.scheme]
         grasps = counted(len(self.grasps), "grasp type")
-        return f"{self.rows:,} rows, {grasps}; {cut}; {options.rounds} rounds; rates in % with 95 % intervals"
+        frames = f" of {self.rows:,} frames" if self.rows > self.trials else ""
+        size = f"{counted(self.trials, 'trial')}{frames}, {grasps}"
+        return f"{size}; {cut}; {options.rounds} rounds; accuracies in % with 95 % intervals"
 
 
 def evaluate(
@@ -277,9 +310,9 @@ def evaluate(
     Examples
     --------
     >>> from thenar.compiler import GraspSet, evaluate
-    >>> tables = {"tables": ("compositions",), "protocols": ("honest",)}
+    >>> tables = {"tables": ("compositions",), "protocols": ("nested",)}
     >>> study = evaluate(GraspSet.load("set.grasps"), jobs=1, folds=2, repeats=1, rounds=2, **tables)
-    >>> 0 <= study.tables[0].rows[0].average.mean <= 1
+    >>> 0 <= study.tables[0].rows[0].rate.mean <= 1
     True
     """
     options = replace(options or Options(), **changes)
@@ -313,10 +346,21 @@ def evaluate(
     predictions = run_fits(X, chosen.labels, fits, training, jobs, progress)
     grasps = tuple(np.unique(chosen.labels).tolist())
     blind = frozenset(fit for fit in predictions if is_blind(X, fit))
-    reader = Reader(chosen.labels, grasps, len(chosen.switch_names), predictions, blind)
+    trials = chosen.trial_ids
+    reader = Reader(
+        chosen.labels,
+        trials,
+        grasps,
+        len(chosen.switch_names),
+        predictions,
+        blind,
+        OF[options.scheme],
+        groups_of(chosen, options.scheme),
+    )
     return Study(
         fingerprint=grasp_set.fingerprint(),
         rows=len(chosen),
+        trials=int(trials.max()) + 1,
         options=options,
         grasps=tuple(chosen.taxonomy.types[label] for label in grasps),
         warnings=concerns(chosen, parts, options.scheme, options.folds),

@@ -3,13 +3,13 @@
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from thenar.runtime.manifest import Inputs, Options, TableBits
 
 from ..placement.methods.base import METHODS, usual
 from ..trainers.base import TRAINERS, Number, Training, changed
-from .points import By, FrontierError, Way
+from .points import FrontierError, Way
 
 # Rivals are only seen beside ours: a few sizes show their curves.
 CURVE_SIZES = (4, 8, 16, 33, 66)
@@ -67,8 +67,9 @@ class Search:
         The most rounds that those on the front are trained for. A trainer without stages has one, and trains once.
     finalists : int
         The most placements that are looked at closely.
-    by : {"new subject", "pooled"}, optional
-        The rate by which points are chosen; none given: that of a new subject where there are several.
+    by : {"subject", "trial"}, optional
+        Whether points are chosen by subjects who are left out, or by trials of everybody; none given: by subjects where
+        there are several.
     trainer : str
         What makes the models.
     settings : mapping
@@ -92,7 +93,7 @@ class Search:
     screening: int = 60
     rounds: int = 300
     finalists: int = 12
-    by: By | None = None
+    by: Literal["subject", "trial"] | None = None
     trainer: str = "logitboost"
     settings: Mapping[str, Number] = field(default_factory=dict, hash=False)
 

@@ -10,7 +10,7 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from ..boosting.stumps import winners
-from ..evaluation.folds import Fold, Rows, leave_one_out, trial_folds
+from ..evaluation.folds import EvaluationError, Fold, Rows, leave_one_out, trial_folds
 from ..evaluation.rates import Rate, decided
 from ..placement.methods.base import METHODS
 from ..placement.ports import PortCosts
@@ -56,13 +56,15 @@ class Cuts:
         trials = np.unique(samples.trials, return_inverse=True)[1]
         people = samples.subjects[np.unique(trials, return_index=True)[1]]
         several = len(np.unique(people)) > 1
+        if search.by == "subject" and not several:
+            raise EvaluationError("leaving a subject out needs two or more subjects: ask for trials in place of subjects")
         rows, groups = np.arange(len(trials)), np.unique(samples.subjects, return_inverse=True)[1] % _MOST_LEFT_OUT
         seeds = range(search.seed, search.seed + search.repeats)
         return cls(
             repeats=tuple(tuple(trial_folds(samples.labels, trials, search.folds, seed)) for seed in seeds),
             subjects=tuple(leave_one_out(groups.astype(np.str_), "subject")) if several else (),
             everything=Fold(rows, rows[:0], "all"),
-            by=search.by or ("new subject" if several else "pooled"),
+            by="new subject" if (search.by or "subject") == "subject" and several else "pooled",
             trials=trials,
             people=people,
         )

@@ -38,9 +38,9 @@ def study_notes(study: Study) -> Iterator[str]:
 
 def _table(table: RateTable) -> PlainTable:
     several = len(table.columns) > 1
-    columns = ("Row", "What", "Switches", *table.columns, *(["average"] * several))
+    columns = ("Row", "What", "Switches", *table.columns, *(["all"] * several))
     rows = tuple(
-        (row.name, row.what, str(row.switches), *map(str, row.cells), *([interval(row.average)] * several))
+        (row.name, row.what, str(row.switches), *map(str, row.cells), *([interval(row.rate)] * several))
         for row in table.rows
     )
     return PlainTable(table.title, columns, rows, words=(0, 1), note=table.note)
@@ -80,7 +80,7 @@ def confusions(content: ReportContent) -> Iterator[ConfusionView]:
     if content.study is None:
         return
     for table in content.study.tables:
-        if (table.name, table.protocol) == ("compositions", "honest"):
+        if (table.name, table.protocol) == ("compositions", "nested"):
             one = len(table.columns) == 1
             whose = f"subject {table.columns[0]}" if one else f"{len(table.columns)} subjects together"
             for row in table.rows:

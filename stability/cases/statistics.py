@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from thenar.compiler.evaluation.folds import Fold, weka_folds
 from thenar.compiler.evaluation.plan import FoldFit, inputs, predictions
 from thenar.compiler.evaluation.populations import Population, Scheme, populations
-from thenar.compiler.evaluation.rates import Average, RepeatedRate
+from thenar.compiler.evaluation.rates import ALIKE, WEIGHT, Rate, clustered
 from thenar.compiler.evaluation.study import Cell, Options, evaluate
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.trainers.base import Training
@@ -18,7 +18,7 @@ from thenar.compiler.trainers.base import Training
 from ..checks.roundings import ROUNDING
 from ..finding import Case, Finding, Worst
 from ..inputs.small_sets import make_set
-from ..reference.intervals import Interval, student, student_quantile, wilson
+from ..reference.intervals import Interval, student, student_quantile, wilson, wilson_of
 from ..reference.numbers import distance, precisely
 
 
@@ -30,7 +30,7 @@ def lopsided() -> dict[str, tuple[GraspSet, Scheme]]:
     return {
         "subjects of one class each": (make_set(apart, frames, subjects=subjects), "subject"),
         "a subject that lacks a class": (make_set(lacking, frames, subjects=subjects), "subject"),
-        "a class of one row in four folds": (make_set(["a", "b"] * 7 + ["a", "c"], frames), "stratified"),
+        "a class of one row in four folds": (make_set(["a", "b"] * 7 + ["a", "c"], frames), "trial"),
         "a class in one block of four": (make_set(["a", "b"] * 6 + ["c"] * 4, frames), "block"),
     }
 
@@ -84,7 +84,7 @@ def findings(full: bool) -> Iterator[Finding]:
     """Hold intervals against 60 digits, and folds and evaluations against what must be true of every one."""
     yield from _wilson(range(1, 150) if full else range(1, 40))
     yield from _repeated(4 if full else 3)
-    yield from _averages(300 if full else 30)
+    yield from _clusters(3000 if full else 300)
     yield from _folds(400 if full else 60)
     yield from _evaluations()
 
@@ -96,8 +96,8 @@ def _wilson(totals: range) -> Iterator[Finding]:
     counts = [(correct, total) for total in totals for correct in range(total + 1)]
     counts += [(correct, n) for n in _TOTALS for correct in {0, 1, n // 2, n - 1, n}]
     for correct, total in counts:
-        rate = RepeatedRate.of((correct,), total)
-        off.see(_apart(rate, wilson(correct, total)), f"{correct} of {total}")
+        rate = Rate.counted((correct,), total, of="pooled")
+        off.see(_apart((rate.low, rate.high), wilson(correct, total)), f"{correct} of {total}")
         if correct in (0, total):
             ends = rate.low == 0 if correct == 0 else rate.high == 1
             odd.see(not (ends and rate.low < rate.high), f"{correct} of {total}")
@@ -117,8 +117,8 @@ def _repeated(repeats: int) -> Iterator[Finding]:
     for n in range(2, repeats + 1):
         for total in (1, 2, 7, 1000):
             for correct in product(sorted({0, 1, total // 2, total - 1, total}), repeat=n):
-                rate = RepeatedRate.of(correct, total)
-                off.see(_apart(rate, _hull(correct, total)), f"{correct} of {total}")
+                rate = Rate.counted(correct, total, of="pooled")
+                off.see(_apart((rate.low, rate.high), _hull(correct, total)), f"{correct} of {total}")
                 outside.see(not 0 <= rate.low <= rate.mean <= rate.high <= 1, f"{correct} of {total}")
     yield off.finding()
     yield outside.finding()
@@ -131,50 +131,51 @@ def _hull(correct: tuple[int, ...], total: int) -> Interval:
     return max(min(low for low, _ in both), mpf(0)), min(max(high for _, high in both), mpf(1))
 
 
-def _apart(found: RepeatedRate | Average, truth: Interval) -> float:
-    return max(distance(found.low, truth[0]), distance(found.high, truth[1]))
+def _apart(found: tuple[float, float], truth: Interval) -> float:
+    return max(distance(end, true) for end, true in zip(found, truth, strict=True))
 
 
-def _averages(draws: int) -> Iterator[Finding]:
-    """Of subjects, those at 0 and at 1 among them: mean -+ the root of the sum of squares of their reaches, over k.
+def _clusters(draws: int) -> Iterator[Finding]:
+    """Units in clusters, of which many are recognised wholly or not at all.
 
-    Roundings of 2^-53: the mean 2, each reach 1, the root 2, the quotient 1, the end 1; none of them exceeds 1.
+    Relative roundings of 2^-53: those of the design effect, in which counts are exact, are 4 of the prior, 2 of the
+    quotient, 2 of the weight and 7 that average both, of n one more; scipy's t is off by up to 64 (a test of the rates
+    holds it). They move an end by no more than they are, for it lies within 0 to 1; Wilson's own roundings add up.
     """
-    off = Worst("ends of the interval of an average", _SIXTY, 7 * ROUNDING, "rate")
-    outside = Worst("averages whose interval leaves 0 to 1, or their mean", "the rule itself", 0, "averages")
-    for pairs, total in _subjects(draws):
-        rates = tuple(RepeatedRate.of(tuple(pair), total) for pair in pairs)
-        average = Average.of(rates)
-        off.see(_apart(average, _mover(rates)), f"{pairs} of {total}")
-        outside.see(not 0 <= average.low <= average.mean <= average.high <= 1, f"{pairs} of {total}")
+    off = Worst(
+        "ends of the interval over clusters", _SIXTY, WILSON_BOUND + (4 + 2 + 2 + 7 + 1 + 64) * ROUNDING, "rate"
+    )
+    outside = Worst("intervals over clusters that leave 0 to 1, or their mean", "the rule itself", 0, "rates")
+    random = np.random.default_rng(10)
+    for number in range(draws):
+        sizes = random.integers(1, [3, 13, 500][number % 3], random.integers(2, 40))
+        recognised = random.binomial(sizes, random.beta(0.3, [0.02, 0.3, 5.0][number // 3 % 3], len(sizes)))
+        found = clustered(recognised.tolist(), sizes.tolist())
+        truth = _over_clusters(recognised.tolist(), sizes.tolist())
+        what = f"{recognised.tolist()} of {sizes.tolist()}"
+        off.see(_apart(found, truth), what)
+        mean = recognised.sum() / sizes.sum()
+        outside.see(not (-WILSON_BOUND <= found[0] <= mean + WILSON_BOUND), what)
+        outside.see(not (mean - WILSON_BOUND <= found[1] <= 1 + WILSON_BOUND), what)
     yield off.finding()
     yield outside.finding()
 
 
-def _subjects(draws: int) -> Iterator[tuple[list[list[int]], int]]:
-    """Yield what subjects recognised in two repeats each, of how many."""
-    # Plain doubles end this one's interval at 1.0000000000000002.
-    yield [[0, 14], *[[23, 23]] * 4], 23
-    random = np.random.default_rng(10)
-    for number in range(draws):
-        total = int(random.choice([1, 2, 12, 23, 1000]))
-        # A third are at 0 and a third at 1, but for one whose repeats disagree.
-        least, most = ((0, 0), (total, total), (0, total))[number % 3]
-        pairs = random.integers(least, most + 1, (random.integers(1, 9), 2))
-        pairs[0] = 0, random.integers(0, total + 1)
-        yield pairs.tolist(), total
-
-
 @precisely()
-def _mover(rates: tuple[RepeatedRate, ...]) -> Interval:
-    k = len(rates)
-    means, lows, highs = (
-        [mpf(each) for each in column] for column in zip(*((r.mean, r.low, r.high) for r in rates), strict=True)
-    )
-    below = sum((m - low) ** 2 for m, low in zip(means, lows, strict=True)) ** mpf("0.5") / k
-    above = sum((high - m) ** 2 for m, high in zip(means, highs, strict=True)) ** mpf("0.5") / k
-    mean = sum(means) / k
-    return max(mean - below, mpf(0)), min(mean + above, mpf(1))
+def _over_clusters(recognised: list[int], sizes: list[int]) -> Interval:
+    """Wilson's interval of as many units as the clusters' are worth; the variance by its definition."""
+    k, total = len(sizes), sum(sizes)
+    if k == total:
+        return wilson(sum(recognised), total)
+    p, alike, misses = mpf(sum(recognised)) / total, mpf(ALIKE), mpf(WEIGHT)
+    effect = 1 + (mpf(total) / k - 1) * alike
+    if 0 < p < 1:
+        residuals = sum((own - p * size) ** 2 for own, size in zip(recognised, sizes, strict=True))
+        found = max(mpf(1), k * residuals / (k - 1) / total / (p * (1 - p)))
+        weight = total * min(p, 1 - p) / found
+        effect = (weight * found + misses * max(effect, found)) / (weight + misses)
+    n, z = total / effect, student_quantile(k - 1, mpf("0.975"))
+    return wilson_of(p, z**2 / n)
 
 
 def _folds(draws: int) -> Iterator[Finding]:

@@ -18,8 +18,13 @@ def wilson(correct: float, total: int, level: float = 0.95) -> Interval:
     A rate's complement has the complement of its interval: the upper end is 1 less the lower one of what is wrong.
     """
     z = normal_quantile((1 + mpf(str(level))) / 2)
-    correct = mpf(correct)
-    return _lower(correct / total, z**2 / total), 1 - _lower((total - correct) / total, z**2 / total)
+    return wilson_of(mpf(correct) / total, z**2 / total)
+
+
+@precisely()
+def wilson_of(rate: mpf, q: mpf) -> Interval:
+    """Return the two p with (rate - p)^2 = q p (1 - p)."""
+    return _lower(rate, q), 1 - _lower(1 - rate, q)
 
 
 def _lower(rate: mpf, q: mpf) -> mpf:

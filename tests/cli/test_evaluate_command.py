@@ -48,14 +48,14 @@ def test_the_papers_tables_are_printed_with_both_protocols_explained(
     printed, complaints = capsys.readouterr()
     for text in (
         "Protocol paper: The placement is chosen once, from all rows",
-        "Protocol honest: The placement is chosen anew inside each training fold",
+        "Protocol nested: The placement is chosen anew inside each training fold",
         "Tables II and V): paper protocol",
-        "Tables III and VI): honest protocol",
+        "Tables III and VI): nested protocol",
         "Tables IV and VII): paper protocol",
-        "ID3 beside other placements of as many switches, selected switches: honest protocol",
+        "ID3 beside other placements of as many switches, selected switches: nested protocol",
         "Angle + NoSel-Co",
         "placement of subject [b]Bob",
-        "48 rows, 3 grasp types; 4 stratified folds, 1 repeat from seed 1",
+        "48 trials, 3 grasp types; 4 stratified folds of whole trials, 1 repeat",
     ):
         assert text in printed
     assert not complaints
@@ -69,7 +69,8 @@ def test_every_rate_has_its_interval_in_percent(grasps: str, capsys: pytest.Capt
     expected = f"{100 * rate['mean']:.1f} [{100 * rate['low']:.1f}, {100 * rate['high']:.1f}]"
     (line,) = (line for line in capsys.readouterr().out.splitlines() if "Angle + All-Co" in line)
     assert expected in line
-    average = result["average"]
+    assert (rate["of"], rate["unit"], result["frames"]) == ("within subject", "trials", None)
+    average = result["rate"]
     last = f"{100 * average['mean']:.1f} [{100 * average['low']:.1f}, {100 * average['high']:.1f}]"
     assert line.rstrip(" │").endswith(last)
     assert last != expected
@@ -84,7 +85,7 @@ def test_json_on_stdout_and_in_the_file_are_one_document(
     assert run(["evaluate", grasps, *QUICK, *arguments, "--json", "-o", str(output)]) == 0
     result = json.loads(capsys.readouterr().out)
     assert result == json.loads(output.read_text())
-    options = {"subjects": ["Ann"], "prune": 3, "prune_list": [5, 0], "seed": 7, "rounds": 2, "scheme": "stratified"}
+    options = {"subjects": ["Ann"], "prune": 3, "prune_list": [5, 0], "seed": 7, "rounds": 2, "scheme": "trial"}
     assert options.items() <= result["options"].items()
     assert {table["name"] for table in result["tables"]} == {"compositions", "pruning"}
     assert result["left_out"] == [{"name": "generality", "reason": "another's placement needs a second subject"}]
@@ -93,18 +94,18 @@ def test_json_on_stdout_and_in_the_file_are_one_document(
 def test_confusion_matrices_are_printed_and_drawn_on_request(
     grasps: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["--tables", "compositions", "--protocol", "honest", "--confusion", "--plot", str(tmp_path / "drawn")]
+    arguments = ["--tables", "compositions", "--protocol", "nested", "--confusion", "--plot", str(tmp_path / "drawn")]
     assert run(["evaluate", grasps, *QUICK, *arguments]) == 0
     printed = capsys.readouterr().out
-    assert "VII NoSel-Co, subject [b]Bob, honest protocol" in printed
+    assert "VII NoSel-Co, subject [b]Bob, nested protocol" in printed
     assert "pinch [tip]" in printed
-    names = [f"confusion-honest-{name}.png" for name in ("I", "II", "III", "IV", "V", "VI", "VII")]
+    names = [f"confusion-nested-{name}.png" for name in ("I", "II", "III", "IV", "V", "VI", "VII")]
     assert sorted(path.name for path in (tmp_path / "drawn").iterdir()) == sorted(names)
 
 
 @pytest.mark.parametrize(("by", "said"), [("subject", "one subject left out"), ("block", "4 blocks of trials")])
 def test_other_cuts_say_what_they_are(grasps: str, by: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["evaluate", grasps, *QUICK, "--by", by, "--protocol", "honest"]) == 0
+    assert run(["evaluate", grasps, *QUICK, "--by", by, "--protocol", "nested"]) == 0
     assert said in capsys.readouterr().out
 
 
@@ -121,7 +122,7 @@ def test_a_grasp_type_too_rare_for_the_folds_is_a_warning_on_stderr(
     make_set(per_type=3).save(tmp_path / "few.grasps")
     assert run(["evaluate", str(tmp_path / "few.grasps"), *QUICK, "--json"]) == 0
     printed, complaints = capsys.readouterr()
-    assert "warning: subject Ann has 3 row(s) of hook: fewer than the 4 folds" in complaints.replace("\n", " ")
+    assert "warning: subject Ann has 3 trial(s) of hook: fewer than the 4 folds" in complaints.replace("\n", " ")
     assert len(json.loads(printed)["warnings"]) == 6
 
 
@@ -161,7 +162,7 @@ def test_an_install_without_the_extra_says_what_is_missing(
 
 def test_help_shows_an_example(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["evaluate", "--help"]) == 0
-    assert "    thenar evaluate set.grasps --by subject --protocol honest" in capsys.readouterr().out
+    assert "    thenar evaluate set.grasps --by subject --protocol nested" in capsys.readouterr().out
 
 
 def descendants(pid: int) -> list[int]:

@@ -120,7 +120,7 @@ def test_of_many_switches_few_are_chosen_without_counting_all_pairs(wide: GraspS
 
 
 def test_the_rivals_of_an_evaluation_take_a_set_of_many_switches(wide: GraspSet) -> None:
-    study = evaluate(wide, Options(folds=2, repeats=1, rounds=1, protocols=("honest",), tables=("baselines",)), jobs=1)
+    study = evaluate(wide, Options(folds=2, repeats=1, rounds=1, protocols=("nested",), tables=("baselines",)), jobs=1)
     assert [row.name for row in study.tables[0].rows] == ["ID3", "CMIM", "top-k", "random"]
 
 

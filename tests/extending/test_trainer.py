@@ -55,8 +55,8 @@ def test_a_trainer_of_another_package_is_chosen_by_its_name_and_makes_a_build_th
     document = json.loads((build / "build.json").read_bytes())
     assert document["options"]["trainer"] == "naive-bayes"
     assert document["options"]["settings"] == {"smoothing": 1.0, "joint_bins": 5.0}
-    training, honest = (rate["correct"] / rate["total"] for rate in document["rates"])
-    assert training >= honest > 0.8
+    training, nested = (rate["correct"] / rate["total"] for rate in document["rates"])
+    assert training >= nested > 0.8
     assert "--trainer naive-bayes --smoothing 1 --joint-bins 5" in (build / "report.html").read_text()
 
     found = json.loads(installed.thenar("verify", str(build), str(recordings), "--json"))
@@ -67,7 +67,7 @@ def test_a_trainer_of_another_package_is_chosen_by_its_name_and_makes_a_build_th
 
 
 def test_the_trainer_is_evaluated_as_the_papers_is(installed: Any, recordings: Path) -> None:
-    given = ("--trainer", "naive-bayes", "--tables", "compositions", "--protocol", "honest", "--repeats", "1")
+    given = ("--trainer", "naive-bayes", "--tables", "compositions", "--protocol", "nested", "--repeats", "1")
     study = json.loads(installed.thenar("evaluate", str(recordings), *given, "--json"))
     assert study["options"]["trainer"] == "naive-bayes"
     (table,) = study["tables"]

@@ -73,7 +73,7 @@ def test_switches_of_nobody_knows_which_glove_have_a_spec_without_a_pattern(
 def test_the_report_has_the_papers_tables_of_the_builds_own_folds(gloved: GraspSet, tmp_path: Path) -> None:
     words = _compile(gloved, tmp_path / "build", folds=3, seed=5)
     assert "Angle + Sel-Co" in words
-    assert "3 stratified folds, 1 repeat from seed 5; 3 rounds" in words
+    assert "3 stratified folds of whole trials, 1 repeat from seed 5; 3 rounds" in words
     assert "This build's own recipe, 3 honest folds" in words
 
 

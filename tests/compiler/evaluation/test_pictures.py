@@ -14,13 +14,13 @@ def test_every_composition_and_protocol_has_its_picture(make_grasps: Callable[..
     options = Options(rounds=2, repeats=1, tables=("compositions", "pruning"))
     study = evaluate(make_grasps(n_joints=0), options, jobs=1)
     drawn = draw_confusions(study, tmp_path / "new" / "folder")
-    names = [f"confusion-{protocol}-{name}.png" for protocol in ("paper", "honest") for name in ("V", "VI", "VII")]
+    names = [f"confusion-{protocol}-{name}.png" for protocol in ("paper", "nested") for name in ("V", "VI", "VII")]
     assert [path.name for path in drawn] == names
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in drawn)
 
 
 def test_a_dollar_in_a_name_is_a_dollar(make_grasps: Callable[..., GraspSet], tmp_path: Path) -> None:
-    options = Options(rounds=2, repeats=1, tables=("compositions",), protocols=("honest",))
+    options = Options(rounds=2, repeats=1, tables=("compositions",), protocols=("nested",))
     study = evaluate(make_grasps(n_switches=0), options, jobs=1)
     named = replace(study, grasps=(r"$\left{$", *study.grasps[1:]))
     (first,), (second,) = (draw_confusions(named, tmp_path / name) for name in ("one", "two"))

@@ -16,7 +16,7 @@ from thenar.compiler.evaluation.plan import (
     TableName,
     available,
 )
-from thenar.compiler.evaluation.populations import HONEST, PAPER, Protocol, populations
+from thenar.compiler.evaluation.populations import NESTED, PAPER, Protocol, populations
 from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
@@ -64,11 +64,11 @@ def test_only_compositions_that_part_the_switches_need_a_placement() -> None:
 
 
 Make = Callable[..., GraspSet]
-both_protocols = pytest.mark.parametrize("protocol", [PAPER, HONEST], ids=lambda protocol: protocol.name)
+both_protocols = pytest.mark.parametrize("protocol", [PAPER, NESTED], ids=lambda protocol: protocol.name)
 
 
 def planner_of(grasps: GraspSet, prune: int = 0, repeats: int = 2) -> Planner:
-    parts = populations(grasps, "stratified", 4, repeats, 1)
+    parts = populations(grasps, "trial", 4, repeats, 1)
     return Planner(parts, Samples.of(grasps, "switches"), len(grasps.joints), prune, (0, 30), 1)
 
 
@@ -92,15 +92,15 @@ def test_every_cell_tests_each_row_of_its_subject_once_a_repeat(planner: Planner
 
 
 def test_what_needs_no_placement_is_the_same_work_under_both_protocols(planner: Planner) -> None:
-    paper, honest = (planner.table("compositions", protocol) for protocol in (PAPER, HONEST))
-    shared = {line.name for line in paper if line.cells == row(honest, line.name).cells}
+    paper, nested = (planner.table("compositions", protocol) for protocol in (PAPER, NESTED))
+    shared = {line.name for line in paper if line.cells == row(nested, line.name).cells}
     assert shared == {"I", "IV", "V"}
 
 
-def test_the_papers_placement_is_one_a_subject_and_the_honest_one_differs_by_fold(planner: Planner) -> None:
+def test_the_papers_placement_is_one_a_subject_and_the_nested_one_differs_by_fold(planner: Planner) -> None:
     for cell in row(planner.table("compositions", PAPER), "VI").cells:
         assert len({fit.columns for fit in cell.fits}) == 1
-    columns = [{fit.columns for fit in cell.fits} for cell in row(planner.table("compositions", HONEST), "VI").cells]
+    columns = [{fit.columns for fit in cell.fits} for cell in row(planner.table("compositions", NESTED), "VI").cells]
     assert max(map(len, columns)) > 1
 
 
@@ -112,13 +112,13 @@ def test_the_diagonal_of_generality_is_composition_six(planner: Planner, protoco
 
 
 def test_off_the_diagonal_both_protocols_take_the_others_placement(planner: Planner) -> None:
-    paper, honest = (planner.table("generality", protocol) for protocol in (PAPER, HONEST))
+    paper, nested = (planner.table("generality", protocol) for protocol in (PAPER, NESTED))
     for i, line in enumerate(paper):
         giver = planner.parts[i]
         given = tuple(sorted(planner.chosen("id3", giver.rows, 0)))
         for j, cell in enumerate(line.cells):
             if i != j:
-                assert cell == honest[i].cells[j]
+                assert cell == nested[i].cells[j]
                 assert {fit.columns for fit in cell.fits} == {given}
 
 
@@ -191,7 +191,7 @@ def test_every_method_sees_exactly_the_rows_given_in_whatever_order(make_grasps:
 
 
 def test_any_method_can_be_a_rival(make_grasps: Make) -> None:
-    table = replace(planner_of(make_grasps()), rivals=("mrmr",)).table("baselines", HONEST)
+    table = replace(planner_of(make_grasps()), rivals=("mrmr",)).table("baselines", NESTED)
     assert [line.name for line in table] == ["ID3", "mrmr", "random"]
 
 

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 
 from thenar.compiler.evaluation.folds import EvaluationError, weka_folds
-from thenar.compiler.evaluation.populations import HONEST, PAPER, Scheme, concerns, populations
+from thenar.compiler.evaluation.populations import NESTED, PAPER, Scheme, concerns, populations
 from thenar.compiler.recordings.graspset import GraspSet
 
 Make = Callable[..., GraspSet]
 
 
-@pytest.mark.parametrize("scheme", ["stratified", "object", "block"])
+@pytest.mark.parametrize("scheme", ["trial", "object", "block"])
 def test_a_subject_is_trained_and_tested_on_own_rows_alone(make_grasps: Make, scheme: Scheme) -> None:
     grasps = make_grasps()
     parts = populations(grasps, scheme, n_folds=4, repeats=2, seed=1)
@@ -35,7 +35,7 @@ def test_leaving_a_subject_out_trains_on_all_others(make_grasps: Make) -> None:
 
 def test_repeats_are_wekas_folds_of_the_following_seeds(make_grasps: Make) -> None:
     grasps = make_grasps(subjects="A")
-    (part,) = populations(grasps, "stratified", n_folds=4, repeats=3, seed=5)
+    (part,) = populations(grasps, "trial", n_folds=4, repeats=3, seed=5)
     for repeat, folds in enumerate(part.repeats):
         for fold, weka in zip(folds, weka_folds(grasps.labels, 4, 5 + repeat), strict=True):
             assert np.array_equal(fold.train, weka.train)
@@ -50,7 +50,7 @@ def test_a_cut_without_chance_is_not_repeated(make_grasps: Make, scheme: Scheme)
 def test_the_classes_are_those_that_the_subject_shows(make_grasps: Make) -> None:
     grasps = make_grasps(subjects="AB")
     without = grasps.rows((grasps.subjects == "A") | (grasps.grasps != "pinch"))
-    shown = {part.name: part.grasps for part in populations(without, "stratified", 4, 1, 1)}
+    shown = {part.name: part.grasps for part in populations(without, "trial", 4, 1, 1)}
     assert shown == {"A": (0, 1, 2, 3), "B": (0, 2, 3)}
 
 
@@ -58,26 +58,26 @@ def test_a_subject_who_cannot_be_cut_is_named(make_grasps: Make) -> None:
     grasps = make_grasps()
     few = grasps.rows([*np.flatnonzero(grasps.subjects == "A"), len(grasps) - 1])
     with pytest.raises(EvaluationError, match="subject B: 1 rows cannot be cut into 4 folds"):
-        populations(few, "stratified", 4, 1, 1)
+        populations(few, "trial", 4, 1, 1)
 
 
 def test_the_paper_lets_test_rows_choose_and_honesty_does_not(make_grasps: Make) -> None:
     grasps = make_grasps()
     everyone = np.arange(len(grasps))
-    for scheme in ("stratified", "object", "block"):
+    for scheme in ("trial", "object", "block"):
         for part in populations(grasps, scheme, 4, 2, 1):
             for fold in part.folds:
                 assert set(PAPER.may_choose(part, fold)) == set(part.rows)
-                assert set(HONEST.may_choose(part, fold)) == set(part.rows) - set(fold.test)
+                assert set(NESTED.may_choose(part, fold)) == set(part.rows) - set(fold.test)
                 assert set(PAPER.may_choose_pooled(everyone, fold)) == set(everyone)
-                assert set(HONEST.may_choose_pooled(everyone, fold)) == set(everyone) - set(fold.test)
+                assert set(NESTED.may_choose_pooled(everyone, fold)) == set(everyone) - set(fold.test)
 
 
-def test_a_left_out_subject_has_no_say_in_an_honest_placement(make_grasps: Make) -> None:
+def test_a_left_out_subject_has_no_say_in_a_nested_placement(make_grasps: Make) -> None:
     grasps = make_grasps()
     for part in populations(grasps, "subject", 4, 1, 1):
         (fold,) = part.folds
-        assert part.name not in grasps.subjects[HONEST.may_choose(part, fold)]
+        assert part.name not in grasps.subjects[NESTED.may_choose(part, fold)]
         assert part.name in grasps.subjects[PAPER.may_choose(part, fold)]
 
 
@@ -88,23 +88,23 @@ def keep_some(grasps: GraspSet, grasp: str, n: int) -> GraspSet:
 
 def test_a_balanced_set_is_of_no_concern(make_grasps: Make) -> None:
     grasps = make_grasps()
-    assert concerns(grasps, populations(grasps, "stratified", 4, 1, 1), "stratified", 4) == ()
+    assert concerns(grasps, populations(grasps, "trial", 4, 1, 1), "trial", 4) == ()
 
 
 def test_a_grasp_type_with_fewer_rows_than_folds_is_named(make_grasps: Make) -> None:
     grasps = keep_some(make_grasps(subjects="A"), "tip", 3)
-    (text,) = concerns(grasps, populations(grasps, "stratified", 4, 1, 1), "stratified", 4)
-    assert text.startswith("subject A has 3 row(s) of tip: fewer than the 4 folds")
+    (text,) = concerns(grasps, populations(grasps, "trial", 4, 1, 1), "trial", 4)
+    assert text.startswith("subject A has 3 trial(s) of tip: fewer than the 4 folds")
 
 
 def test_as_many_rows_as_folds_are_enough(make_grasps: Make) -> None:
     grasps = keep_some(make_grasps(subjects="A"), "tip", 4)
-    assert concerns(grasps, populations(grasps, "stratified", 4, 1, 1), "stratified", 4) == ()
+    assert concerns(grasps, populations(grasps, "trial", 4, 1, 1), "trial", 4) == ()
 
 
 def test_a_single_row_can_never_be_recognised_and_that_is_said(make_grasps: Make) -> None:
     grasps = keep_some(make_grasps(subjects="A"), "tip", 1)
-    texts = concerns(grasps, populations(grasps, "stratified", 4, 1, 1), "stratified", 4)
+    texts = concerns(grasps, populations(grasps, "trial", 4, 1, 1), "trial", 4)
     assert any(
         text.startswith("1 row(s) of tip of subject A are tested by a fold that trains no such") for text in texts
     )
@@ -131,11 +131,11 @@ def test_an_object_of_its_own_grasp_type_is_noticed_when_objects_are_left_out(ma
 def test_a_subject_of_one_grasp_type_is_named(make_grasps: Make) -> None:
     grasps = make_grasps()
     only = grasps.rows(np.flatnonzero((grasps.subjects == "B") | (grasps.grasps == "tip")))
-    (text,) = concerns(only, populations(only, "stratified", 4, 1, 1), "stratified", 4)
+    (text,) = concerns(only, populations(only, "trial", 4, 1, 1), "trial", 4)
     assert text == "subject A: every row is of tip, nothing is to be told apart"
 
 
 def test_rates_of_simulated_grasps_are_called_that(make_grasps: Make) -> None:
     simulated = replace(make_grasps(), simulated="scene quick, seed 1")
-    (text,) = concerns(simulated, populations(simulated, "stratified", 4, 1, 1), "stratified", 4)
+    (text,) = concerns(simulated, populations(simulated, "trial", 4, 1, 1), "trial", 4)
     assert text.startswith("these grasps are simulated (scene quick, seed 1)")

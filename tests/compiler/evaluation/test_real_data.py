@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thenar.compiler.evaluation.rates import RepeatedRate
+from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.evaluation.study import Options, RateTable, Study, evaluate
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import import_file
@@ -30,13 +30,13 @@ def aml(aml_table: Path) -> GraspSet:
     return import_file(aml_table, COLUMNS / "aml.toml")[0]
 
 
-def rates(study: Study, name: str, row: str, protocol: str = "honest") -> tuple[RepeatedRate, ...]:
+def rates(study: Study, name: str, row: str, protocol: str = "nested") -> tuple[Rate, ...]:
     (table,) = (t for t in study.tables if (t.name, t.protocol) == (name, protocol))
     (found,) = (line for line in _rows(table) if line[0] == row)
     return found[1]
 
 
-def _rows(table: RateTable) -> list[tuple[str, tuple[RepeatedRate, ...]]]:
+def _rows(table: RateTable) -> list[tuple[str, tuple[Rate, ...]]]:
     return [(row.name, tuple(cell.rate for cell in row.cells)) for row in table.rows]
 
 
@@ -54,7 +54,7 @@ def test_the_icubs_contact_bits_reach_78_percent_within_their_interval(icub_stud
 
 
 def test_selected_bits_do_as_well_as_all_of_them_and_better_than_the_rest(icub_study: Study) -> None:
-    for protocol in ("paper", "honest"):
+    for protocol in ("paper", "nested"):
         (all_bits,), (selected,), (others,) = (
             rates(icub_study, "compositions", name, protocol) for name in ("V", "VI", "VII")
         )
@@ -68,12 +68,12 @@ def test_id3_beats_random_placements_of_as_many_bits(icub_study: Study) -> None:
 
 
 def test_aml_reaches_90_percent_in_four_folds(aml: GraspSet) -> None:
-    study = evaluate(aml, Options(protocols=("honest",)))
+    study = evaluate(aml, Options(protocols=("nested",)))
     assert np.mean([rate.mean for rate in rates(study, "compositions", "IV")]) >= 0.90
 
 
 def test_aml_reaches_69_percent_within_its_interval_and_84_on_subjects_never_trained_on(aml: GraspSet) -> None:
-    study = evaluate(aml, Options(scheme="subject", protocols=("honest",)))
+    study = evaluate(aml, Options(scheme="subject", protocols=("nested",)))
     first, second = rates(study, "compositions", "IV")
     assert first.mean >= 0.65
     assert first.low <= 0.69 <= first.high

@@ -8,7 +8,7 @@ import pytest
 from thenar.compiler.evaluation.folds import EvaluationError, Fold
 from thenar.compiler.evaluation.plan import CellPlan, FoldFit, RowPlan
 from thenar.compiler.evaluation.populations import Population, Scheme
-from thenar.compiler.evaluation.rates import RepeatedRate
+from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.evaluation.study import TABLES, Options, RateTable, Reader, Row, Study, evaluate
 from thenar.compiler.recordings.graspset import GraspSet
 
@@ -24,7 +24,7 @@ ANSWERS = {
     SECOND[0]: np.array([2, 2, 2]),
     SECOND[1]: np.array([2, 2, 5]),
 }
-READER = Reader(LABELS, (2, 5), 3, ANSWERS, frozenset({SECOND[1]}))
+READER = Reader(LABELS, np.arange(6), (2, 5), 3, ANSWERS, frozenset({SECOND[1]}), "within subject", None)
 CELL = CellPlan(PART, (FIRST, SECOND))
 
 
@@ -50,16 +50,16 @@ def test_more_runs_than_repeats_are_draws_with_a_range_of_their_own() -> None:
     cell = READER.cell(CellPlan(PART, (FIRST, FIRST, SECOND, SECOND)), confusing=False)
     assert cell.draws is not None
     assert (cell.draws.least, cell.draws.most) == pytest.approx((4 / 6, 5 / 6))
-    assert cell.rate == RepeatedRate.of((5, 5, 4, 4), 6, repeats_a_draw=2)
+    assert cell.rate == Rate.counted((5, 5, 4, 4), 6, of="within subject", repeats_a_draw=2)
     assert READER.cell(CELL, confusing=False).draws is None
-    assert READER.cell(CELL, confusing=False).rate == RepeatedRate.of((5, 4), 6)
+    assert READER.cell(CELL, confusing=False).rate == Rate.counted((5, 4), 6, of="within subject")
 
 
-def test_a_row_averages_its_subjects_and_only_compositions_carry_confusions() -> None:
+def test_a_row_counts_all_its_subjects_and_only_compositions_carry_confusions() -> None:
     row = RowPlan("VI", "Sel-Co", (CellPlan(PART, (FIRST, FIRST)), CellPlan(PART, (SECOND, SECOND))))
     table = READER.table("pruning", "paper", (row,))
     assert table.columns == ("A", "A")
-    assert table.rows[0].average.mean == pytest.approx((5 / 6 + 4 / 6) / 2)
+    assert table.rows[0].rate.mean == pytest.approx((5 / 6 + 4 / 6) / 2)
     assert (table.rows[0].switches.least, table.rows[0].switches.most) == (0, 3)
     assert table.rows[0].cells[0].confusion is None
     assert READER.table("compositions", "paper", (row,)).rows[0].cells[0].confusion is not None
@@ -74,7 +74,7 @@ def study(make_grasps: Make) -> Study:
     return evaluate(make_grasps(noise=0.2), QUICK, jobs=1)
 
 
-def table(study: Study, name: str, protocol: str = "honest") -> RateTable:
+def table(study: Study, name: str, protocol: str = "nested") -> RateTable:
     (found,) = (candidate for candidate in study.tables if (candidate.name, candidate.protocol) == (name, protocol))
     return found
 
@@ -85,7 +85,7 @@ def row(table: RateTable, name: str) -> Row:
 
 
 def test_every_table_comes_under_both_protocols_in_the_papers_layout(study: Study) -> None:
-    assert [(t.name, t.protocol) for t in study.tables] == [(name, p) for name in TABLES for p in ("paper", "honest")]
+    assert [(t.name, t.protocol) for t in study.tables] == [(name, p) for name in TABLES for p in ("paper", "nested")]
     for each in study.tables:
         assert each.columns == ("A", "B")
     assert [r.name for r in table(study, "compositions").rows] == ["I", "II", "III", "IV", "V", "VI", "VII"]
@@ -104,7 +104,7 @@ def test_every_rate_has_a_repeat_for_each_seed_over_all_rows_of_the_subject(stud
 
 def test_confusion_matrices_count_every_row_in_every_repeat_and_agree_with_the_rates(study: Study) -> None:
     assert study.grasps == ("hook", "pinch", "power", "tip")
-    for protocol in ("paper", "honest"):
+    for protocol in ("paper", "nested"):
         for line in table(study, "compositions", protocol).rows:
             for cell in line.cells:
                 counts = np.array(cell.confusion)
@@ -136,23 +136,23 @@ def test_the_same_set_and_options_give_the_same_result_on_any_number_of_workers(
 
 
 def test_choosing_from_test_rows_flatters_where_there_is_nothing_to_learn(make_grasps: Make) -> None:
-    # Coin flips say nothing about the grasp: an honest rate is about 1 in 4, and the paper's protocol is above it.
+    # Coin flips say nothing about the grasp: a nested rate is about 1 in 4, and the paper's protocol is above it.
     grasps = make_grasps(n_switches=200, n_joints=0, subjects="A", noise=0.5, per_type=10)
     study = evaluate(grasps, replace(QUICK, rounds=20, repeats=3, tables=("compositions",)), jobs=1)
-    paper, honest = (row(table(study, "compositions", name), "VI").cells[0].rate for name in ("paper", "honest"))
-    assert paper.mean > honest.mean + 0.1
-    assert honest.low <= 0.25 <= honest.high
+    paper, nested = (row(table(study, "compositions", name), "VI").cells[0].rate for name in ("paper", "nested"))
+    assert paper.mean > nested.mean + 0.1
+    assert nested.low <= 0.25 <= nested.high
 
 
 def test_a_perfect_switch_for_each_grasp_is_found_and_enough(make_grasps: Make) -> None:
     grasps = make_grasps(noise=0.0, n_joints=0)
     study = evaluate(grasps, QUICK, jobs=1)
-    assert row(table(study, "compositions"), "VI").average.mean == 1
+    assert row(table(study, "compositions"), "VI").rate.mean == 1
 
 
 def test_without_switches_there_are_the_joints_and_no_placements(make_grasps: Make) -> None:
     study = evaluate(make_grasps(n_switches=0), QUICK, jobs=1)
-    assert [(t.name, t.protocol) for t in study.tables] == [("compositions", "paper"), ("compositions", "honest")]
+    assert [(t.name, t.protocol) for t in study.tables] == [("compositions", "paper"), ("compositions", "nested")]
     assert [(t.name, t.reason) for t in study.left_out] == [
         (name, "a placement needs switches, and the set has none") for name in ("generality", "pruning", "baselines")
     ]
@@ -166,7 +166,7 @@ def test_without_joints_there_are_the_switches(make_grasps: Make) -> None:
 
 def test_a_composition_left_without_inputs_shows_the_rate_of_the_most_frequent_grasp(make_grasps: Make) -> None:
     grasps = make_grasps(n_joints=0, subjects="A")
-    study = evaluate(grasps, replace(QUICK, prune=1000, tables=("compositions",), protocols=("honest",)), jobs=1)
+    study = evaluate(grasps, replace(QUICK, prune=1000, tables=("compositions",), protocols=("nested",)), jobs=1)
     (cell,) = row(table(study, "compositions"), "VI").cells
     assert (cell.switches.most, cell.no_inputs) == (0, 8)
     assert cell.rate.mean <= 0.25
@@ -185,7 +185,7 @@ def test_one_subject_alone_has_nobody_elses_placement(make_grasps: Make) -> None
 
 def test_pruning_the_pool_of_one_subject_by_the_same_s_is_composition_six(make_grasps: Make) -> None:
     study = evaluate(make_grasps(noise=0.2), replace(QUICK, subjects=("A",), prune=10), jobs=1)
-    for protocol in ("paper", "honest"):
+    for protocol in ("paper", "nested"):
         six = row(table(study, "compositions", protocol), "VI").cells[0].rate
         assert row(table(study, "pruning", protocol), "10").cells[0].rate == six
         assert row(table(study, "baselines", protocol), "ID3").cells[0].rate == six
@@ -193,7 +193,7 @@ def test_pruning_the_pool_of_one_subject_by_the_same_s_is_composition_six(make_g
 
 @pytest.mark.parametrize("scheme", ["subject", "object", "block"])
 def test_other_cuts_have_one_repeat_and_a_column_a_subject(make_grasps: Make, scheme: Scheme) -> None:
-    study = evaluate(make_grasps(), replace(QUICK, scheme=scheme, protocols=("honest",)), jobs=1)
+    study = evaluate(make_grasps(), replace(QUICK, scheme=scheme, protocols=("nested",)), jobs=1)
     assert ("generality" in {t.name for t in study.tables}) == (scheme != "subject")
     for each in study.tables:
         assert each.columns == ("A", "B")

@@ -67,7 +67,7 @@ def test_every_section_is_there_and_has_something_to_say(page: Page) -> None:
     ids = [attributes["id"] for _, attributes in page.elements if "id" in attributes]
     assert len(set(ids)) == len(ids)
     assert {link[1:] for link in links if link} <= {name for name in ids if name}
-    for said in ("recognises 4 grasp types", "At worst, over every frame", "A whole scan is", "honest protocol"):
+    for said in ("recognises 4 grasp types", "At worst, over every frame", "A whole scan is", "nested protocol"):
         assert said in page.text
     assert "No frontier was given" not in page.text
 

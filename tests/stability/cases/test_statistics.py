@@ -4,7 +4,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from thenar.compiler.evaluation.folds import block_folds, leave_one_out, weka_folds
-from thenar.compiler.evaluation.rates import Average, RepeatedRate
+from thenar.compiler.evaluation.rates import Rate, clustered
 from thenar.compiler.evaluation.study import Options, evaluate
 from thenar.stability.cases.statistics import WILSON_BOUND, lopsided
 from thenar.stability.inputs.small_sets import make_set
@@ -18,7 +18,7 @@ from thenar.stability.reference.numbers import distance
 @example(10**15, 1.0)
 def test_an_interval_is_wilsons_to_the_last_places(total: int, share: float) -> None:
     correct = min(int(share * total), total)
-    rate = RepeatedRate.of((correct,), total)
+    rate = Rate.counted((correct,), total, of="pooled")
     low, high = wilson(correct, total)
     assert max(distance(rate.low, low), distance(rate.high, high)) <= WILSON_BOUND
     assert 0 <= rate.low <= rate.mean <= rate.high <= 1
@@ -28,7 +28,7 @@ def test_an_interval_is_wilsons_to_the_last_places(total: int, share: float) -> 
 @pytest.mark.parametrize("total", [1, 2, 12, 1000, 10**12])
 @pytest.mark.parametrize("repeats", [1, 2, 5])
 def test_nothing_or_everything_recognised_ends_the_interval_there_and_leaves_it_wide(total: int, repeats: int) -> None:
-    none, everything = RepeatedRate.of((0,) * repeats, total), RepeatedRate.of((total,) * repeats, total)
+    none, everything = (Rate.counted((each,) * repeats, total, of="pooled") for each in (0, total))
     assert none.low == 0 < none.high
     assert everything.low < 1 == everything.high
     # What holds of the one holds of the other, turned round.
@@ -36,21 +36,13 @@ def test_nothing_or_everything_recognised_ends_the_interval_there_and_leaves_it_
     assert none.high == pytest.approx(float(wilson(0, total)[1]), abs=WILSON_BOUND)
 
 
-@given(st.integers(1, 300).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))
-def test_the_average_of_one_rate_is_that_rate(counts: tuple[int, int]) -> None:
-    rate = RepeatedRate.of((counts[0],), counts[1])
-    average = Average.of((rate,))
-    assert average.mean == rate.mean
-    # The end less the mean, and the mean less that: two roundings of at most 2^-53.
-    assert (average.low, average.high) == pytest.approx((rate.low, rate.high), abs=2.0**-52)
-
-
-def test_an_average_of_zeros_and_of_ones_ends_there() -> None:
-    zeros, ones = Average.of((RepeatedRate.of((0,), 12),) * 7), Average.of((RepeatedRate.of((12,), 12),) * 7)
-    assert (zeros.mean, zeros.low) == (0, 0)
-    assert (ones.mean, ones.high) == (1, 1)
-    assert zeros.high == pytest.approx(float(wilson(0, 12)[1]) / 7**0.5)
-    assert 1 - ones.low == pytest.approx(float(1 - wilson(12, 12)[0]) / 7**0.5)
+@pytest.mark.parametrize("sizes", [[1] * 12, [12], [5, 5, 2], [200] * 7, [1, 999]])
+def test_clusters_of_nothing_but_misses_or_hits_end_there(sizes: list[int]) -> None:
+    none, everything = clustered([0] * len(sizes), sizes), clustered(sizes, sizes)
+    assert none[0] == pytest.approx(0, abs=WILSON_BOUND)
+    assert everything[1] == pytest.approx(1, abs=WILSON_BOUND)
+    assert none[1] == pytest.approx(1 - everything[0], abs=4 * WILSON_BOUND)
+    assert none[1] >= float(wilson(0, sum(sizes))[1]) - WILSON_BOUND
 
 
 @settings(deadline=None)
@@ -112,7 +104,7 @@ def test_subjects_of_one_class_each_recognise_nothing_of_each_other() -> None:
     for table in study.tables:
         for row in table.rows:
             assert [cell.rate.correct[0] for cell in row.cells] == [0, 0]
-            assert row.average.low == 0 < row.average.high
+            assert row.rate.low == 0 < row.rate.high
 
 
 def test_a_subject_of_one_row_is_left_out_and_cannot_be_cut_into_folds() -> None:
