@@ -10,7 +10,7 @@ what was subtracted; the gap is the promised rate less the fresh one, before and
 
 import argparse
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -29,9 +29,9 @@ from thenar.compiler.frontier.survey import Cuts, Survey
 from thenar.compiler.frontier.timing.wirings import wirings
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
+from thenar.compiler.tables.quantise import integer_scores
 from thenar.compiler.workers import in_workers
 from thenar.runtime.tables import tables_from_bytes
-from thenar.compiler.tables.quantise import integer_scores
 from thenar.simulator import load_scene, simulate
 
 SCENE, TARGET = "kamakura", "avr2560"
@@ -64,7 +64,10 @@ def recorded(seed: int, repetitions: int = REPETITIONS, more: int | None = None)
 def strangers() -> GraspSet:
     """Return grasps of hands that no case records."""
     sets = [recorded(FIRST_OTHER + number) for number in range(OTHERS)]
-    joined = {name: np.concatenate([getattr(each, name) for each in sets]) for name in ("switches", "codes", "grasps", "subjects", "objects", "trials")}
+    joined = {
+        name: np.concatenate([getattr(each, name) for each in sets])
+        for name in ("switches", "codes", "grasps", "subjects", "objects", "trials")
+    }
     first = sets[0]
     return GraspSet(**joined, switch_names=first.switch_names, joints=first.joints, taxonomy=first.taxonomy)
 
@@ -73,7 +76,16 @@ def played(asked: tuple[int, By, Equipment]) -> tuple[Case, ...]:
     """Return a case for each budget of one seed."""
     seed, by, equipment = asked
     grasp_set = recorded(seed)
-    search = Search(methods=("id3",), rivals=(), repeats=1, screening=10, rounds=10, finalists=3, seed=seed, by="subject" if by == "new subject" else "trial")
+    search = Search(
+        methods=("id3",),
+        rivals=(),
+        repeats=1,
+        screening=10,
+        rounds=10,
+        finalists=3,
+        seed=seed,
+        by="subject" if by == "new subject" else "trial",
+    )
     samples = Samples.of(grasp_set)
     cuts = Cuts.of(samples, search)
     with tempfile.TemporaryDirectory() as folder, Store(Path(folder) / "store", "") as store:
@@ -105,6 +117,16 @@ def cases(seeds: Iterable[int], by: By, jobs: int) -> list[Case]:
     return [case for found in in_workers(played, asked, jobs) for case in found]
 
 
+def told(found: Sequence[Case]) -> str:
+    """Return how many cases are covered, and by how much rates are off, in a line."""
+    columns = [(case.rate.mean - case.fresh, case.luck, case.fresh, case.rate.high - case.rate.low) for case in found]
+    gap, luck, fresh, width = 100 * np.mean(columns, axis=0)
+    return (
+        f"{sum(case.covered for case in found)} of {len(found)} covered; fresh {fresh:.1f} %, promised {gap:+.1f} "
+        f"({gap + luck:+.1f} uncorrected), luck {luck:.1f}, half-width {width / 2:.1f}"
+    )
+
+
 def main() -> None:
     """Print, for each kind of rate, how many cases are covered, and by how much rates are off."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -115,16 +137,7 @@ def main() -> None:
     for by in asked.by:
         found = cases(range(1, asked.cases + 1), by, asked.jobs)
         for number, budget_us in enumerate(BUDGETS_US):
-            mine = found[number :: len(BUDGETS_US)]
-            gap = 100 * np.array([case.rate.mean - case.fresh for case in mine])
-            luck = 100 * np.array([case.luck for case in mine])
-            half = 50 * np.array([case.rate.high - case.rate.low for case in mine])
-            print(
-                f"{by}, best within {budget_us:g} us: {sum(case.covered for case in mine)} of {len(mine)} covered; "
-                f"fresh {100 * np.mean([case.fresh for case in mine]):.1f} %, gap {np.mean(gap + luck):+.1f} uncorrected, "
-                f"{gap.mean():+.1f} corrected (luck {luck.mean():.1f}, up to {luck.max():.1f}), half-width {half.mean():.1f}; "
-                f"uncorrected covered {sum(case.rate.low + case.luck <= case.fresh <= case.rate.high + case.luck for case in mine)}"
-            )
+            print(f"{by}, the best within {budget_us:g} us: {told(found[number :: len(BUDGETS_US)])}")
 
 
 if __name__ == "__main__":

@@ -139,7 +139,7 @@ def lucks(
     judged, *costs = zip(*picked_from, strict=True)
     most = max(each.repeats for each in judged)
     hits = np.array([each.hits * (most // each.repeats) for each in judged])
-    draws = Draws.of(hits, cuts.people if cuts.by == "new subject" else np.arange(hits.shape[1]), most, seed)
+    draws = Draws.of(hits, cuts.people if cuts.by == "new subject" else np.arange(hits.shape[1]), seed)
     found: dict[Judged, float] = {}
     prices: tuple[Callable[[Design], float], ...] = (lambda design: design.frame.us, lambda design: design.n_switches)
     for best, price, cost in zip(fronts, prices, costs, strict=True):

@@ -122,7 +122,9 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
     points = [(max(x, _LOWEST), point) for point in frontier.points if (x := cost.of_point(point)) is not None]
     ends = [(x, end, point) for x, point in points if (end := cost.end(point)) is not None]
     curves = () if cost.is_time else frontier.curves
-    _scale_rates(axes, [*(point.rate for _, point in points), *(mark.rate for _, mark in marks), *_shown(curves)], frontier.by)
+    _scale_rates(
+        axes, [*(point.rate for _, point in points), *(mark.rate for _, mark in marks), *_shown(curves)], frontier.by
+    )
     lowest = axes.get_ylim()[0]
     tried = [
         (max(x, _LOWEST), each)
@@ -176,7 +178,7 @@ def _sheet(frontier: Frontier, title: str) -> tuple["Figure", "Axes"]:
     under = (
         f"{shorten(frontier.source)}: {frontier.trials:,} trials of {counted(frontier.subjects, 'person', 'people')}, "
         f"{len(frontier.grasps)} types; {shorten(frontier.target)}; "
-        f"{frontier.by}, placement inside the fold, points corrected for luck, 95 % intervals"
+        f"placement inside the fold, corrected for luck, 95 % intervals"
     )
     figure.text(left, 1 - 0.30 / _HEIGHT, title, fontsize=13, fontweight="bold", color=_INK)
     figure.text(left, 1 - 0.53 / _HEIGHT, under, fontsize=FONT, color=_GREY)

@@ -57,7 +57,9 @@ class Cuts:
         people = samples.subjects[np.unique(trials, return_index=True)[1]]
         several = len(np.unique(people)) > 1
         if search.by == "subject" and not several:
-            raise EvaluationError("leaving a subject out needs two or more subjects: ask for trials in place of subjects")
+            raise EvaluationError(
+                "leaving a subject out needs two or more subjects: ask for trials in place of subjects"
+            )
         rows, groups = np.arange(len(trials)), np.unique(samples.subjects, return_inverse=True)[1] % _MOST_LEFT_OUT
         seeds = range(search.seed, search.seed + search.repeats)
         return cls(

@@ -14,7 +14,20 @@ from .points import Frontier, Mark, Point, Recipe, Time
 COLUMNS = (
     *("number", "fronts", "n_switches", "inputs", "method", "parameter", "rounds", "width", "layout"),
     *("wiring", "clock_hz", "scan", "decision", "rate_of", "rate", "rate_low", "rate_high", "luck"),
-    *("frames_of", "frames", "frames_low", "frames_high", "beside_of", "beside", "beside_low", "beside_high", "scan_us", "scan_how", "transfer_us", "transfer_how"),
+    *(
+        "frames_of",
+        "frames",
+        "frames_low",
+        "frames_high",
+        "beside_of",
+        "beside",
+        "beside_low",
+        "beside_high",
+        "scan_us",
+        "scan_how",
+        "transfer_us",
+        "transfer_how",
+    ),
     *("classify_us", "classify_how", "frame_us", "frame_how", "latency_mean_us", "latency_p99_us", "missed", "wrong"),
     *("flash", "ram", "ports", "chips", "compile_s", "switches"),
 )
@@ -150,9 +163,9 @@ def _mark(mark: Mark) -> str:
 def csv_bytes(frontier: Frontier) -> bytes:
     """Return `frontier.csv`: UTF-8, a line of COLUMNS, perhaps with TRAINER_COLUMNS, and a line for each point.
 
-    Rates are in 0..1, times in microseconds (compile_s: seconds), missing `frames` and `beside` are empty. `fronts`, `switches`
-    and `settings` are lists in their cell, parted by semicolons; what holds a semicolon or a quote is quoted as CSV
-    quotes.
+    Rates are in 0..1, times in microseconds (compile_s: seconds); `frames` and `beside` are empty where there are none.
+    `fronts`, `switches` and `settings` are lists in their cell, parted by semicolons; what holds a semicolon or a quote
+    is quoted as CSV quotes.
     """
     file = io.StringIO(newline="")
     rows = csv.writer(file, lineterminator="\n")

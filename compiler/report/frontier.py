@@ -218,7 +218,16 @@ def _time(time: Time) -> str:
 
 
 def _points(frontier: Frontier) -> PlainTable:
-    columns = ("Point", "Switches", "Inputs", "Method", *rates_of(frontier), "Frame, µs", "Latency, µs", "99th pct., µs")
+    columns = (
+        "Point",
+        "Switches",
+        "Inputs",
+        "Method",
+        *rates_of(frontier),
+        "Frame, µs",
+        "Latency, µs",
+        "99th pct., µs",
+    )
     rows = tuple(
         (
             str(point.number),
@@ -281,7 +290,8 @@ def _tables(frontier: Frontier) -> Iterator[PlainTable]:
 def _notes(frontier: Frontier) -> Iterator[str]:
     yield summary(frontier)
     yield (
-        f"{frontier.combinations:,} combinations of {frontier.source}: {counted(frontier.rows, 'row')} of {counted(frontier.trials, 'trial')}, "
+        f"{frontier.combinations:,} combinations of {frontier.source}: {counted(frontier.rows, 'row')}, "
+        f"{counted(frontier.trials, 'trial')}, "
         f"{counted(frontier.subjects, 'subject')}, {counted(frontier.n_switches, 'switch', 'switches')}, "
         f"{counted(frontier.n_joints, 'joint')}; target {frontier.target}. {folds_of(frontier)}, placement inside the "
         f"fold, with 95{NBSP}% intervals. {LUCK}"
