@@ -93,7 +93,7 @@ def played(asked: tuple[int, By, Equipment]) -> tuple[Case, ...]:
         survey = Survey(grasp_set, SCENE, samples, None, search, cuts, equipment, answers)
         screened, _ = screen(survey)
         closes = look_closely(survey, finalists(screened, [], search.finalists))
-    several = [design for close in closes for design in designs(close, survey.n_joints)]
+    several = [design for close in closes for design in designs(close, equipment.joints)]
     fronts = best_designs(several)
     luck = lucks(fronts, several, screened, cuts, seed)
     fresh = strangers() if by == "new subject" else recorded(seed, more=MORE)

@@ -10,8 +10,8 @@ from rich.text import Text
 from thenar.compiler.text import duration, interval
 
 from .common import (
-    Listed,
     Number,
+    OneOf,
     OutputFolder,
     err,
     existing_file,
@@ -47,7 +47,7 @@ def _timed() -> tuple[str, ...]:
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option("-o", "--output", type=OutputFolder(), required=True, help="Folder for tables, pictures and the store.")
 @click.option("--glove", type=existing_file, help="A glove.toml: try its wiring as well, and choose by its ports.")
-@click.option("--target", type=Listed("target", _timed), default="host", show_default=True, help="What classifies.")
+@click.option("--target", type=OneOf("target", _timed), default="host", show_default=True, help="What classifies.")
 @click.option(
     "--budget-us",
     type=Number(min=0, min_open=True),
@@ -58,6 +58,11 @@ def _timed() -> tuple[str, ...]:
     "--rate", type=Number(0, 1, min_open=True), help="Pick the fastest point of at least this accuracy, 0 to 1."
 )
 @click.option("--build", type=existing_folder, help="A build of yours: mark it on the pictures.")
+@click.option(
+    "--joint-us",
+    type=Number(0, min_open=True),
+    help="What reading the joints takes.  [default: a CyberGlove's record; of other joints unknown, left out]",
+)
 @click.option("--stream", type=existing_file, help="A set of whole movements: measure decision latency on it.")
 @click.option(
     "--methods",

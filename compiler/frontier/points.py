@@ -17,7 +17,8 @@ MAX_BYTES = 64 << 20
 
 # measured: wall time on this machine. simulated: cycles of the real firmware in a simulator. wire: arithmetic of clocks
 # and baud rates, held against an emulated bus. model: predicted by a model that was held against measured points.
-How = Literal["measured", "simulated", "wire", "model"]
+# given: by the user. unknown: left out of every sum.
+How = Literal["measured", "simulated", "wire", "model", "given", "unknown"]
 Scan = Literal["full", "early"]
 DecisionKind = Literal["single", "dwell", "sequential"]
 # What a rate is of: subjects who are left out, or rows of everybody in random folds of whole trials.
@@ -79,7 +80,7 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
 
 
 class Latency(Struct, frozen=True, forbid_unknown_fields=True):
-    """From a hand's arrival in a grasp until it is decided on, microseconds over a stream.
+    """From a hand's arrival in a grasp until it is decided on, at least a frame, microseconds over a stream.
 
     missed  the share of grasps that were never decided on rightly while they lasted: they are in neither number
     wrong   the share of the time for which grasps were held, decided on once, that another type was decided on
@@ -100,7 +101,7 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     luck        by how much it looked better, as the best of all that was tried (`evaluation.luck`)
     frames      the same of single frames, as it came out (None: a trial has one frame)
     beside      the other of the two, as it came out (None: only one subject)
-    scan        reading the switches (the mean where it ends early); transfer: one record of the CyberGlove
+    scan        reading the switches (the mean where it ends early); transfer: the joints
     frame       max(scan, transfer) + classify: the two lie on lines of their own
     flash, ram  bytes of the classifier on its target; of the tables alone on host and pi
     fronts      on which lines of best points it lies: "frame", "switches", "latency"

@@ -10,10 +10,11 @@ import msgspec
 from markupsafe import Markup
 from msgspec import Struct
 
-from ..frontier.plots import PALETTE, POINT_ID, RING_ID, pictures
+from ..frontier.plots import POINT_ID, RING_ID, pictures
 from ..frontier.points import Frontier, Point, Time
 from ..frontier.words import LUCK, featured, folds_of, inputs_of, rates_of, summary, training_of, way_of, wiring_of
 from ..hand import HandShape
+from ..pictures import PALETTE
 from ..text import DASH, NBSP, counted, interval, microseconds, sentence
 from .content import PlainTable
 from .hand import HandPicture, hand_picture
@@ -33,11 +34,8 @@ _CAPTIONS = {
         "that were missed are not in it; only the best for their kind of decision are on it."
     ),
 }
-# Colours that the style sheet has as well; the others it has for dark screens alone.
-_OF_THE_PAGE = ("ink", "soft", "line", "paper")
-_COLOURS = {
-    colour: f"var(--{name})" if name in _OF_THE_PAGE else f"var(--{name}, {colour})" for name, colour in PALETTE.items()
-}
+# Of two names for a colour, the first.
+_COLOURS = {colour: f"var(--{name})" for name, (colour, _) in reversed(PALETTE.items())}
 _TARGET = "9"  # radius of what can be clicked, in units of the pictures
 
 
@@ -188,7 +186,7 @@ def _facts(point: Point, frontier: Frontier) -> Iterable[tuple[str, str]]:
     yield "Tables", f"{training_of(setting)}, {setting.width} bits{layout}"
     ending = "ends early" if setting.scan == "early" else "full"
     yield "Scan", f"{_time(point.scan)}; {ending}" if point.switches else DASH
-    yield "CyberGlove's record", DASH if setting.inputs == "switches" else _time(point.transfer)
+    yield "Joints", DASH if setting.inputs == "switches" else _time(point.transfer)
     yield "Classify", _time(point.classify)
     yield "Frame", _time(point.frame)
     yield "Decision", setting.decision
@@ -214,7 +212,7 @@ def _latency(point: Point) -> tuple[str, str]:
 
 
 def _time(time: Time) -> str:
-    return f"{microseconds(time.us)} µs ({time.how})"
+    return "unknown, left out" if time.how == "unknown" else f"{microseconds(time.us)} µs ({time.how})"
 
 
 def _points(frontier: Frontier) -> PlainTable:

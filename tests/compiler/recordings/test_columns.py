@@ -60,7 +60,7 @@ def test_every_key_is_read(tmp_path: Path) -> None:
     ("text", "reason"),
     [
         ("", "line 1: the key label is missing"),
-        ("label = 3", "line 1: label: must be text, not 3"),
+        ("label = 3", "line 1: label: must be text or a list, not 3"),
         ('label = "a"\nlables = 1', "line 2: lables: there is no such key here"),
         (
             'label = "a"\n[[joints]]\ncolumns = ["b"]\ngird = 1',
@@ -68,6 +68,17 @@ def test_every_key_is_read(tmp_path: Path) -> None:
         ),
         ('label = "a"\nmissing = "skip"', "line 2: missing: 'skip' is not among its values"),
         ('label = "a"\ndelimiter = ""', "`delimiter` must be one character"),
+        ('label = "a"\ndelimiter = "\'"\nquote = "\'"', "one character that is not the `quote`"),
+        ('label = "a"\ndecimal = ";"', "decimal: ';' is not among its values"),
+        ('label = "a"\nencoding = "base64"', "`encoding` must be one that Python knows, not 'base64'"),
+        ('label = "a"\nencoding = "idna"', "`encoding` must be one that Python knows"),
+        ('label = "a"\nencoding = "a\\u0000b"', "`encoding` must be one that Python knows"),
+        ('label = "a"\nframes = "restart"', "`frames` = 'restart' takes `time`, and no `trial`"),
+        ('label = "a"\nreduce = "mean"', "reduce: 'mean' is not among its values"),
+        ("label = []", "`label` must name a column"),
+        ('label = "a"\n[[taxels]]\ncolumns = ["b"]\nthreshold = inf', "`threshold` must be a finite number or 'otsu'"),
+        ('label = "a"\n[[taxels]]\ncolumns = ["b"]\nthreshold = "max"', "'max' is not among its values"),
+        ('label = "a"\n[[taxels]]\ncolumns = ["b"]', "the key threshold is missing"),
         ('label = "a"\n[[joints]]\ncolumns = ["b"]\ngrid = 0', "`grid` must be above 0, not 0"),
         ('label = "a"\n[[joints]]\ncolumns = ["b"]\ngrid = nan', "`grid` must be above 0"),
         ('label = "a"\n[[joints]]\ncolumns = ["b"]\ncodes = true\ngrid = 1', "`grid` and `origin` are for values"),
@@ -115,7 +126,7 @@ def test_globs_heed_case() -> None:
         (Columns("grasp", switches=("s*", "s1")), "column 's1' is used 2 times"),
         (Columns("grasp", switches=("*",)), "column 'grasp' is used 2 times"),
         (Columns("grasp", subject="grasp", switches=("s*",)), "column 'grasp' is used 2 times"),
-        (Columns("grasp"), "no column is a switch or a joint"),
+        (Columns("grasp"), "no column is an input"),
     ],
 )
 def test_columns_that_do_not_fit_the_table_are_refused(columns: Columns, reason: str) -> None:
