@@ -29,10 +29,10 @@ $(VENV)/installed: pyproject.toml
 
 demo: $(VENV)/installed  ## simulate, draw, evaluate, find the frontier, compile, verify, run: SCENE=quick
 	mkdir -p $(OUT)
-	$(BIN)/thenar simulate "$(SCENE)" -o $(OUT)/set.grasps
-	$(BIN)/thenar draw $(OUT)/set.grasps -o $(OUT)/contacts.svg
-	$(BIN)/thenar draw $(OUT)/set.grasps --place -o $(OUT)/kept.svg
-	$(BIN)/thenar evaluate $(OUT)/set.grasps -o $(OUT)/evaluation.json
+	$(BIN)/thenar simulate "$(SCENE)" -o $(OUT)/set.grasps --overwrite
+	$(BIN)/thenar draw $(OUT)/set.grasps -o $(OUT)/contacts.svg --overwrite
+	$(BIN)/thenar draw $(OUT)/set.grasps --place -o $(OUT)/kept.svg --overwrite
+	$(BIN)/thenar evaluate $(OUT)/set.grasps -o $(OUT)/evaluation.json --overwrite
 	$(BIN)/thenar frontier $(OUT)/set.grasps -o $(OUT)/frontier --methods elimination,id3 --rivals none --rounds 50 --repeats 1 --finalists 4
 	$(BIN)/thenar compile $(OUT)/set.grasps -o $(OUT)/build --propose $(OUT)/glove.toml --chip board --overwrite
 	$(BIN)/thenar verify $(OUT)/build $(OUT)/set.grasps

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from types import FrameType
 
@@ -66,6 +67,10 @@ def material(small_set: GraspSet, tmp_path_factory: pytest.TempPathFactory) -> P
         names = ", ".join(f'"{name}"' for name in small_set.switch_names)
         Path("glove.toml").write_text(f'[[scanner]]\nport = "{folder}/none"\nswitches = [{names}]\n')
         Path("objects.toml").write_text('cup = ["mug"]\n')
+        # Libraries are loaded whole before any work is interrupted.
+        assert run(["info", "set.grasps", "--plot", "set.png"]) == 0
+        for library in ("sklearn", "scipy.stats", "scipy.optimize", "joblib", "threadpoolctl", "jinja2", "ezdxf"):
+            import_module(library)
         Path("folder").mkdir()
         Path("junk").write_bytes(bytes(range(256)))
     return folder
@@ -101,7 +106,7 @@ def _line(command: str, parameter: click.Parameter, value: str) -> list[str]:
 @contextmanager
 def _interrupted_at_work() -> Iterator[None]:
     def interrupt(_number: int, _frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
+        os.kill(os.getpid(), signal.SIGINT)
 
     before = signal.signal(signal.SIGALRM, interrupt)
     signal.setitimer(signal.ITIMER_REAL, AT_WORK_S)
@@ -148,7 +153,6 @@ def test_there_is_a_line_for_every_command() -> None:
 def test_a_value_that_makes_no_sense_is_one_sentence(
     command: str, values: tuple[str, ...], place: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    _tried([command, *" ".join(reversed(LINES[command])).split()], place, capfd)
     for parameter in _parameters(command):
         number = isinstance(parameter.type, click.types.FloatParamType | click.types.IntParamType)
         for value in values:
