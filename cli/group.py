@@ -26,7 +26,7 @@ COMMANDS = (
 
 # What the extras of pyproject.toml bring, by the names that are imported.
 EXTRAS: Mapping[str, tuple[str, ...]] = {
-    "compiler": ("sklearn", "scipy", "joblib", "matplotlib", "threadpoolctl", "jinja2", "ezdxf"),
+    "compiler": ("sklearn", "scipy", "joblib", "matplotlib", "threadpoolctl", "jinja2", "ezdxf", "pandas"),
     "cluster": ("dask", "distributed"),
     "sim": ("mujoco",),
     "stability": ("mpmath", "jinja2"),
