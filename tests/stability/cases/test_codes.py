@@ -159,7 +159,9 @@ def arrays_with(column: str, number: float) -> dict[str, NDArray[np.float64]]:
 
 
 def test_rows_of_nan_are_left_out_where_the_user_says_so_and_infinity_never(tmp_path: Path) -> None:
-    (tmp_path / "columns.toml").write_text('label = "g"\nframes = "independent"\nmissing = "drop"\n[[joints]]\ncolumns = ["j"]\n')
+    (tmp_path / "columns.toml").write_text(
+        'label = "g"\nframes = "independent"\nmissing = "drop"\n[[joints]]\ncolumns = ["j"]\n'
+    )
     (tmp_path / "table.csv").write_text("g,j\na,1\nb,nan\na,3\n")
     grasp_set, report = import_file(tmp_path / "table.csv", tmp_path / "columns.toml")
     assert len(grasp_set) == 2
