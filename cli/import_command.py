@@ -79,7 +79,8 @@ def _found(path: Path, output: Path, yes: bool) -> "tuple[GraspSet, ImportReport
     if proposal.lacks and asked and click.confirm("Is each row a trial of its own?"):
         proposal = proposal.independent()
     written = _write(proposal.toml(), output.parent)
-    echo(f"{written}: what was found", err=wants_json())
+    other = "" if written.name == "columns.toml" else "; columns.toml is there already, and is used with --columns only"
+    echo(f"{written}: what was found{other}", err=wants_json())
     replacing = ["--overwrite"] if output.exists() else []
     again = shlex.join(["thenar", "import", str(path), "-o", str(output), *replacing, "--columns", str(written)])
     if proposal.lacks:
