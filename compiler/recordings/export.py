@@ -150,7 +150,7 @@ def to_csv(grasp_set: GraspSet, codes: bool = False, delimiter: str = ",") -> st
     """
     file, heads, meta = io.StringIO(), heads_of(grasp_set), meta_of(grasp_set)
     writer = csv.writer(file, delimiter=delimiter, lineterminator="\n")
-    names = (heads.label, *(getattr(heads, key) for key in meta), *grasp_set.switch_names, *_coded_names(grasp_set))
+    names = (heads.label, *(getattr(heads, key) for key in meta), *grasp_set.element_names, *grasp_set.joint_names)
     writer.writerow(map(cell, names))
     who = (cells(column.tolist()) for column in (grasp_set.grasps, *meta.values()))
     writer.writerows(zip(*who, *_inputs(grasp_set, codes), strict=True))
@@ -179,7 +179,7 @@ def to_arff(grasp_set: GraspSet, codes: bool = False, meta: bool = False) -> str
     heads, who = heads_of(grasp_set), meta_of(grasp_set) if meta else {}
     attributes = [f"{_quote(getattr(heads, key))} {_kind(column)}" for key, column in who.items()]
     attributes += [f"{_quote(name)} {{0,1}}" for name in grasp_set.switch_names]
-    attributes += [f"{_quote(name)} numeric" for name in _coded_names(grasp_set)]
+    attributes += [f"{_quote(joint.name)} numeric" for joint, _ in _coded(grasp_set)]
     attributes.append(f"{_quote(heads.label)} {_nominal(grasp_set.taxonomy.types)}")
     first = ([_quote(str(value)) for value in column.tolist()] for column in who.values())
     rows = zip(*first, *_inputs(grasp_set, codes), map(_quote, grasp_set.grasps.tolist()), strict=True)
@@ -191,22 +191,18 @@ def _kind(column: NDArray[np.generic]) -> str:
     return _nominal(np.unique(column).tolist()) if column.dtype.kind == "U" else "numeric"
 
 
-def _coded(grasp_set: GraspSet) -> list[tuple[Joint, NDArray[np.uint16]]]:
-    """Return the columns of codes, and what they mean: the joints, then the taxels."""
-    joints = zip(grasp_set.joints, grasp_set.codes.T, strict=True)
-    return [*joints, *zip(grasp_set.taxel_columns, grasp_set.taxels.T, strict=True)]
-
-
-def _coded_names(grasp_set: GraspSet) -> list[str]:
-    return [joint.name for joint, _ in _coded(grasp_set)]
-
-
 def _inputs(grasp_set: GraspSet, codes: bool) -> Iterable[Sequence[str]]:
-    """Yield the cells of each switch, joint and taxel."""
+    """Yield the cells of each switch, taxel and joint."""
     for switch in grasp_set.switches.T:
         yield ["1" if bit else "0" for bit in switch.tolist()]
     for joint, column in _coded(grasp_set):
         yield [str(code) for code in column.tolist()] if codes else _values(joint, column.tolist())
+
+
+def _coded(grasp_set: GraspSet) -> Iterable[tuple[Joint, NDArray[np.uint16]]]:
+    """Yield the taxels and then the joints, each with its codes (n,)."""
+    yield from zip(grasp_set.taxel_columns, grasp_set.taxels.T, strict=True)
+    yield from zip(grasp_set.joints, grasp_set.codes.T, strict=True)
 
 
 def _values(joint: Joint, codes: list[int]) -> list[str]:
