@@ -101,7 +101,7 @@ def played(asked: tuple[int, By, Equipment]) -> tuple[Case, ...]:
     for budget_us in BUDGETS_US:
         best = [design for design in fronts[0] if design.frame.us <= budget_us][-1]
         tables = tables_from_bytes(best.tables.content)
-        columns, codes = list(best.close.screened.columns), fresh.codes[:, : best.joints]
+        columns, codes = list(best.close.screened.columns), fresh.codes[:, : tables.n_joints]
         answers = integer_scores(tables, fresh.switches[:, columns], codes).argmax(axis=1)
         truth = np.array([samples.grasps.index(grasp) for grasp in fresh.grasps.tolist()])
         lucky = luck[best.judged]
