@@ -8,12 +8,15 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from thenar.compiler.text import INDEPENDENT
+
 from .common import (
     Listed,
     Number,
     OutputFile,
     OutputFolder,
     existing_file,
+    jobs_option,
     json_flag,
     keep_apart,
     out,
@@ -98,9 +101,15 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
     type=click.IntRange(0),
     default=4,
     show_default=True,
-    help="Folds of the cross-validated rate; 0 for none.",
+    help="Folds of the pooled rate; 0: measure no rate.",
 )
 @click.option("--seed", type=seed_range, default=1, show_default=True, help="Seed of the folds.")
+@click.option(
+    "--by",
+    type=click.Choice(("trial", "subject", "object", "session")),
+    help="What the folds of the first rate leave out.  [default: subject where there are several, otherwise trial]",
+)
+@jobs_option()
 @click.option(
     "--table-bits",
     type=click.Choice(["16", "8"]),
@@ -135,6 +144,7 @@ def command(
     point: int | None,
     report: bool,
     hand_length: float | None,
+    jobs: int,
     glove: Path | None,
     propose: Path | None,
     chip: str | None,
@@ -186,8 +196,9 @@ def command(
             grasp_set,
             output,
             harness=given if chosen is None else chosen.wired(given),
-            ports=ports_of_whole_glove(given, grasp_set.switch_names),
+            ports=ports_of_whole_glove(given, grasp_set.element_names),
             documents=documents,
+            jobs=jobs,
             progress=told,
             **options,
         )
@@ -261,6 +272,9 @@ def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
     )
     if manifest.switches:
         console.print(f"switches: {', '.join(switch.name for switch in manifest.switches)}", soft_wrap=True)
+    for switch in manifest.switches:
+        if switch.threshold is not None:
+            console.print(f"{switch.name}: {switch.closed}, learnt")
     if manifest.stopped_after:
         console.print(
             f"stopped after {manifest.stopped_after} of {manifest.options.rounds} rounds: the last changed the mean "
@@ -272,8 +286,9 @@ def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
             "the lowest-numbered one that varies was taken"
         )
     for rate in manifest.rates:
-        how = "on the rows trained on" if rate.protocol == "training" else f"in {rate.folds} folds, placement and all"
-        console.print(f"recognised {how}: {rate.correct} of {rate.total} ({rate.rate:.1%})")
+        console.print(f"recognised, {rate}")
+    if manifest.source.independent:
+        console.print(INDEPENDENT)
     console.print(
         f"integers: {proof.scale:.1f} steps a unit, no sum beyond {proof.bound} of 32767, no score off by more than "
         f"{proof.error:g} steps; {proof.covered} of {manifest.source.rows} rows are safe, {proof.changed} change class"

@@ -8,12 +8,13 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.manifest import Of
 from thenar.runtime.manifest import Options as Manifested
 
 from ..limits import check_memory, check_types
 from ..placement.methods.base import METHODS
 from ..recordings.graspset import GraspSet
-from ..samples import Samples
+from ..samples import Samples, decided
 from ..text import counted, interval
 from ..trainers.base import Training, changed
 from .folds import EvaluationError, Rows
@@ -31,7 +32,7 @@ from .plan import (
     run_fits,
 )
 from .populations import OF, PROTOCOLS, Population, ProtocolName, Scheme, concerns, groups_of, populations
-from .rates import Of, Rate, decided, rated
+from .rates import Rate, rated
 
 Predictions = Mapping[FoldFit, Labels]
 Confusion = tuple[tuple[int, ...], ...]

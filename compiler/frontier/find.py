@@ -170,6 +170,8 @@ def _samples(grasp_set: GraspSet, source: str) -> Samples:
             f"{source} holds whole movements, every frame a row: rows of one would be trained on and tested; give a "
             "set of single trials, and this one with --stream"
         )
+    if grasp_set.taxel_columns:
+        raise FrontierError(f"{source} has taxels whose thresholds are learnt: import it with fixed ones")
     return Samples.of(grasp_set)
 
 
@@ -375,12 +377,12 @@ def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
     build = Build.load(folder)
     manifest = build.manifest
     names = [switch.name for switch in manifest.switches]
-    honest = [rate for rate in manifest.rates if rate.protocol == "honest"]
-    if not honest:
+    rate = manifest.headline
+    if rate is None:
         raise FrontierError(
             f"{folder} does not say what it recognises: compile it with --folds 4, or leave --build out"
         )
-    rate, options, fitting = honest[-1], equipment.model.options(build.tables), equipment.fitting(names)
+    options, fitting = equipment.model.options(build.tables), equipment.fitting(names)
     if not options or (names and not fitting):
         raise FrontierError(f"{folder} cannot be built for {equipment.model.target}: leave --build out, or --target")
     joints = [joint.name for joint in manifest.joints]

@@ -1,6 +1,6 @@
 """All that a spec says of a reduced glove, decided once: files and tables only write it down."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from msgspec import Struct
@@ -146,7 +146,7 @@ def glove_spec(
         wires=wires,
         materials=bill_of(circuit, wires),
         expected=expected_of(manifest, read, wired),
-        remarks=tuple(_remarks(switches)),
+        remarks=(*_remarks(switches), *_thresholds(manifest)),
     )
     return GloveSpec(summary, wired, read, circuit, pattern)
 
@@ -197,3 +197,12 @@ def _remarks(switches: Sequence[PlacedSwitch]) -> list[str]:
             "nobody knows where this glove's switches lie: there is no pattern to cut, and lengths of wire are left out"
         )
     return remarks
+
+
+def _thresholds(manifest: Manifest) -> Iterator[str]:
+    for number, switch in enumerate(manifest.switches, start=1):
+        if switch.threshold is not None:
+            yield (
+                f"SW{number} is the taxel {switch.name}: set its comparator or converter to {switch.threshold.value:g} "
+                f"{switch.threshold.taxel.unit}; it is {switch.closed}"
+            )

@@ -72,7 +72,7 @@ def test_a_fitted_classifier_becomes_a_build_that_answers_as_it_does(
     options = made.manifest.options
     assert len(made.manifest.switches) == len(grasp_set.switch_names)
     assert (options.rounds, options.shrinkage, options.max_bins) == (5, 0.5, 4)
-    assert [rate.protocol for rate in made.manifest.rates] == ["training", "honest"]
+    assert [rate.protocol for rate in made.manifest.rates] == ["training", "nested"]
     assert verify(tmp_path / "made", grasp_set).holds
     build = Build.load(tmp_path / "made")
     frames = zip(grasp_set.switches, grasp_set.codes, strict=True)
@@ -108,7 +108,7 @@ def test_a_pipeline_that_selects_columns_becomes_a_build_of_those(
     assert inputs == sorted(inputs)
     found = verify(tmp_path / "build", grasp_set)
     assert found.holds
-    assert found.correct_ensemble == np.count_nonzero(pipeline.predict(X) == grasp_set.labels)
+    assert found.recognised[0].ensemble == np.count_nonzero(pipeline.predict(X) == grasp_set.labels)
 
 
 def test_the_papers_recipe_is_the_same_from_a_pipeline_and_from_compile_build(
