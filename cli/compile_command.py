@@ -27,7 +27,16 @@ from .common import (
     table,
     warning,
 )
-from .options import Grouped, asked_settings, keep_option, method_option, prune_option, trainer_option
+from .options import (
+    Grouped,
+    asked_settings,
+    fitted_hand,
+    keep_option,
+    layout_option,
+    method_option,
+    prune_option,
+    trainer_option,
+)
 
 if TYPE_CHECKING:
     from thenar.compiler.artifact.documents import BuildReport
@@ -49,10 +58,10 @@ _GROUPS = {
     "Basics": ("output", "preset", "method", "keep", "prune", "inputs"),
     "Training": ("trainer", "rounds", "shrinkage", "tolerance", "max_bins"),
     "Integer tables": ("table_bits", "width"),
-    "The rate in build.json": ("folds", "seed"),
+    "The rates in build.json": ("folds", "seed", "by", "jobs"),
     "A point of a frontier": ("from_frontier", "point"),
     "Wiring": ("glove", "propose", "chip"),
-    "Files": ("report", "hand_length", "overwrite", "json"),
+    "Files": ("report", "hand_length", "layout", "overwrite", "json"),
 }
 
 
@@ -125,6 +134,7 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
 @click.option("--point", type=click.IntRange(1), help="Number of the point.  [default: the one that was picked]")
 @click.option("--report/--no-report", default=True, show_default=True, help="Write report.html and spec/ as well.")
 @click.option("--hand-length", type=Number(100, 300), metavar="MM", help="Wearer's hand length.  [default: 190]")
+@layout_option
 @click.option("--glove", type=existing_file, help="A glove.toml: add the scan map of its wiring to the build.")
 @click.option("--propose", type=OutputFile(".toml"), help="Write a glove.toml that wires the kept switches.")
 @click.option(
@@ -145,6 +155,7 @@ def command(
     report: bool,
     hand_length: float | None,
     jobs: int,
+    layout: Path | None,
     glove: Path | None,
     propose: Path | None,
     chip: str | None,
@@ -170,22 +181,19 @@ def command(
     from thenar.compiler.placement.ports import ports_of_whole_glove
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.runtime.harness.loading import load_harness
-    from thenar.simulator.handmaps.handmap import hand_map
 
     _check_proposal(propose, chip, glove)
     _check_point(context, from_frontier, point)
-    if hand_length is not None and not report:
-        raise click.UsageError("--hand-length is of the hand in spec/, which --no-report leaves out: give one of them.")
-    keep_apart(recordings, glove, propose, from_frontier)
+    for name, value in (("--hand-length", hand_length), ("--layout", layout)):
+        if value is not None and not report:
+            raise click.UsageError(f"{name} is of the hand in spec/, which --no-report leaves out: give one of them.")
+    keep_apart(recordings, layout, glove, propose, from_frontier)
     options = asked_settings(context, asked) | _placed(context, asked)
     given = None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
-    hand = hand_map() if report else None
-    if hand is not None and hand_length is not None and hand.fitted(grasp_set.switch_names) is None:
-        raise click.UsageError(
-            "--hand-length: the switches of these recordings are not those of murakami160, and where they lie is not "
-            "known."
-        )
+    hand = fitted_hand(layout, grasp_set.switch_names, None) if report else None
+    if hand_length is not None:
+        fitted_hand(layout, grasp_set.switch_names, hand_length)
     chosen = None if from_frontier is None else picked(from_frontier, point, grasp_set)
     documents = Documents(hand, hand_length) if report else None
     if chosen is not None:
@@ -248,14 +256,13 @@ def _check_point(context: click.Context, from_frontier: Path | None, point: int 
 
 def _propose(manifest: "Manifest", path: Path, chip: str) -> None:
     from thenar.runtime.files import write_atomically
-    from thenar.runtime.harness.wiring import GloveWiring
     from thenar.runtime.harness.writing import harness_to_toml
     from thenar.runtime.names import sound_name
-    from thenar.runtime.scanning.propose import propose_board, propose_harness
+    from thenar.runtime.scanning.propose import propose_board, propose_cyberglove, propose_harness
 
     names = [switch.name for switch in manifest.switches]
     called = sound_name(path.stem, "proposed")
-    glove = GloveWiring(port="/dev/ttyUSB0") if manifest.joints else None
+    glove = propose_cyberglove([joint.name for joint in manifest.joints])
     if chip == _BOARD:
         harness = propose_board(names, name=called, cyberglove=glove)
     else:
@@ -264,6 +271,8 @@ def _propose(manifest: "Manifest", path: Path, chip: str) -> None:
 
 
 def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
+    from thenar.runtime.scanning.propose import own_joints
+
     manifest, proof = made.manifest, made.manifest.proof
     console = out()
     console.print(
@@ -300,6 +309,8 @@ def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
         console.print(
             f"{propose}: a harness for the kept switches; wire the glove so, then compile with --glove {propose}"
         )
+        if joints := own_joints([joint.name for joint in manifest.joints]):
+            console.print(joints)
 
 
 def _print_scan(scan: "ScanMap", harness: "Harness") -> None:

@@ -49,7 +49,7 @@ def command(glove: Path, build: Path | None) -> None:
 
 
 def _calibration(harness: "Harness", build: "Build | None") -> "Iterator[Finding]":
-    """Yield what is wrong with the CyberGlove's calibration: `thenar run` and `record` would end with it."""
+    """Yield what is wrong with the joints: a calibration that does not fit would end `thenar run` and `record`."""
     from thenar.drivers.errors import ThenarError
     from thenar.runtime.calibration import load_calibration
     from thenar.runtime.live.checkup import Finding
@@ -58,7 +58,10 @@ def _calibration(harness: "Harness", build: "Build | None") -> "Iterator[Finding
     named = None if harness.cyberglove is None else harness.cyberglove.calibration
     try:
         if build is not None:
-            System.of(build, harness).recognizer()
+            system = System.of(build, harness)
+            system.recognizer()
+            if system.unread:
+                yield Finding("joints", "", False, 0.0, None, (system.unread,))
         elif named is not None:
             load_calibration(Path(named))
     except ThenarError as wrong:

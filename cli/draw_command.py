@@ -11,8 +11,10 @@ from thenar.drivers.names import shortened
 
 from .common import existing_file, keep_apart, overwrite_flag, picture_file, progress
 from .lines import echo
+from .options import hand_of, layout_option
 
 if TYPE_CHECKING:
+    from thenar.compiler.hand import HandShape
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.simulator.handmaps.draw import Picture
 
@@ -41,6 +43,7 @@ def _titled_path(text: str) -> tuple[str, Path]:
 @click.argument("grasps", type=existing_file, required=False)
 @click.option("-o", "--output", type=picture_file, required=True, help="The picture to write: an .svg or .png file.")
 @overwrite_flag
+@layout_option
 @click.option("--numbers", is_flag=True, help="Of all switches: write each one's number in the set, from 0, into it.")
 @click.option("--per-grasp", is_flag=True, help="Of GRASPS: a hand for each grasp type, on one scale.")
 @click.option("--place", "choose", is_flag=True, help="Of GRASPS: the switches that `thenar place` would keep.")
@@ -57,13 +60,14 @@ def _titled_path(text: str) -> tuple[str, Path]:
 def command(
     grasps: Path | None,
     output: Path,
+    layout: Path | None,
     numbers: bool,
     per_grasp: bool,
     choose: bool,
     prune: int,
     kept: list[tuple[str, Path]],
 ) -> None:
-    """Draw the glove murakami160, palm up, the sides of the digits unfolded beside them, every switch a circle.
+    """Draw a glove, every switch a circle: your own with --layout, else that of the shipped scenes, palm up.
 
     Without GRASPS: all its switches, or with --kept those that placements keep, with their order. Of GRASPS, a .grasps
     file with the glove's switches: how often each closed; or with --place those worth keeping, for each subject and for
@@ -72,21 +76,22 @@ def command(
     \b
     Example:
         thenar draw --numbers -o glove.svg
-        thenar draw set.grasps --per-grasp -o contacts.png
+        thenar draw set.grasps --layout glove.svg --per-grasp -o contacts.png
         thenar draw set.grasps --place -o kept.svg
         thenar draw --kept A=a.json --kept build/ -o kept.svg
     """
     _check_options(grasps, numbers, per_grasp, choose, prune, bool(kept))
-    for source in (grasps, *(path for _, path in kept)):
+    for source in (grasps, layout, *(path for _, path in kept)):
         keep_apart(source, output)
+    hand = hand_of(layout)
     if grasps is None:
-        _write(_without_grasps(numbers, kept), output)
+        _write(_without_grasps(hand, numbers, kept), output)
         return
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.simulator.handmaps.draw import contacts
 
     grasp_set = GraspSet.load(grasps)
-    _write(_placements(grasp_set, prune) if choose else contacts(grasp_set, per_grasp), output)
+    _write(_placements(hand, grasp_set, prune) if choose else contacts(hand, grasp_set, per_grasp), output)
 
 
 def _check_options(
@@ -104,23 +109,22 @@ def _check_options(
         raise click.UsageError("--prune belongs to --place")
 
 
-def _without_grasps(numbers: bool, kept: list[tuple[str, Path]]) -> "Picture":
+def _without_grasps(hand: "HandShape", numbers: bool, kept: list[tuple[str, Path]]) -> "Picture":
     from thenar.simulator.handmaps import draw as handpanels
 
     if not kept:
-        return handpanels.all_switches(numbers)
-    return handpanels.kept([(title, kept_names(path)) for title, path in kept])
+        return handpanels.all_switches(hand, numbers)
+    return handpanels.kept(hand, [(title, kept_names(path)) for title, path in kept])
 
 
-def _placements(grasp_set: "GraspSet", prune: int) -> "Picture":
+def _placements(hand: "HandShape", grasp_set: "GraspSet", prune: int) -> "Picture":
     """Return a hand for each subject and one for all rows pooled, or one hand if there is but one subject."""
     from thenar.compiler.placement.placement import place_by_subject
     from thenar.simulator.handmaps.draw import kept
-    from thenar.simulator.handmaps.handmap import hand_map
 
-    hand_map().numbers_of(grasp_set.switch_names)  # a foreign set is refused before a tree is grown
+    hand.numbers_of(grasp_set.switch_names)  # a foreign set is refused before a tree is grown
     with progress("growing a tree of each hand") as report:
-        return kept([(title, list(found.names)) for title, found in place_by_subject(grasp_set, prune, report)])
+        return kept(hand, [(title, list(found.names)) for title, found in place_by_subject(grasp_set, prune, report)])
 
 
 class KeptError(ThenarError, ValueError):

@@ -57,6 +57,11 @@ def _timed() -> tuple[str, ...]:
     "--rate", type=Number(0, 1, min_open=True), help="Pick the fastest point of at least this accuracy, 0 to 1."
 )
 @click.option("--build", type=existing_folder, help="A build of yours: mark it on the pictures.")
+@click.option(
+    "--joint-us",
+    type=Number(0, min_open=True),
+    help="What reading the joints takes.  [default: a CyberGlove's record; of other joints unknown, left out]",
+)
 @click.option("--stream", type=existing_file, help="A set of whole movements: measure decision latency on it.")
 @click.option(
     "--methods",

@@ -1,5 +1,8 @@
 """`thenar import`: a table of labelled grasps, or recordings, into a .grasps file."""
 
+import os
+import shlex
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,12 +18,15 @@ from .common import (
     progress,
     show,
     table,
+    wants_json,
     warning,
 )
 from .lines import echo
 
 if TYPE_CHECKING:
+    from thenar.compiler.recordings.graspset import GraspSet
     from thenar.compiler.recordings.importer import ImportReport
+    from thenar.compiler.recordings.propose import Proposal
 
 
 @click.command("import")
@@ -28,32 +34,94 @@ if TYPE_CHECKING:
 @click.option("-o", "--output", type=OutputFile(".grasps"), required=True, help="The .grasps file to write.")
 @overwrite_flag
 @click.option("--columns", type=existing_file, help="columns.toml: what each column of the table is.")
+@click.option("-y", "--yes", is_flag=True, help="Import what was found without --columns, and do not ask.")
 @json_flag
-def command(tables: tuple[Path, ...], output: Path, columns: Path | None) -> None:
-    """Import TABLE (.csv, .csv.gz, .arff, .arff.gz or .npz) as labelled grasps.
+def command(tables: tuple[Path, ...], output: Path, columns: Path | None, yes: bool) -> None:
+    """Import TABLE (.csv, .tsv, .txt, .xlsx, .parquet, .h5, .mat, .arff or .npz) as labelled grasps.
 
-    Missing or malformed cells and unknown labels stop the import, naming their rows and columns; what is merely odd
-    (constant switches, rows that two subjects share, ...) is counted in warnings.
+    Without --columns, what each column is is found, shown with the reasons, and written to a columns.toml next to the
+    output, to be corrected; then a terminal is asked whether to go on.
+
+    Malformed cells and unknown labels stop the import, naming their rows and columns; what is merely odd (constant
+    switches, rows that two subjects share, ...) is counted in warnings.
 
     Recordings of `thenar record` (.mcap) say themselves what is in them; several, of several subjects, become one set.
 
     \b
     Example:
+        thenar import glove.csv -o set.grasps
         thenar import trials.csv.gz -o set.grasps --columns columns.toml
         thenar import anna.mcap ben.mcap -o set.grasps
     """
     keep_apart(*tables, columns, output)
     from thenar.compiler.recordings.mcap_recording import import_files
 
-    with progress(f"importing {', '.join(table.name for table in tables)}"):
-        grasp_set, report = import_files(tables, columns)
+    if columns is None and len(tables) == 1 and tables[0].suffix.lower() != ".mcap":
+        grasp_set, report = _found(tables[0], output, yes)
+    else:
+        with progress(f"importing {', '.join(table.name for table in tables)}"):
+            grasp_set, report = import_files(tables, columns)
     grasp_set.save(output)
     show(report, _print, output)
+
+
+def _found(path: Path, output: Path, yes: bool) -> "tuple[GraspSet, ImportReport]":
+    """Import the table in `path` as its columns are found to be, if that is agreed to."""
+    from thenar.compiler.recordings.errors import ColumnsError
+    from thenar.compiler.recordings.importer import import_table
+    from thenar.compiler.recordings.propose import propose_file
+
+    with progress(f"reading {path.name}"):
+        read, proposal = propose_file(path)
+    asked = not yes and os.isatty(0) and not wants_json()
+    if not wants_json():
+        _print_proposal(proposal)
+    if proposal.lacks and asked and click.confirm("Is each row a trial of its own?"):
+        proposal = proposal.independent()
+    written = _write(proposal.toml(), output.parent)
+    echo(f"{written}: what was found", err=wants_json())
+    replacing = ["--overwrite"] if output.exists() else []
+    again = shlex.join(["thenar", "import", str(path), "-o", str(output), *replacing, "--columns", str(written)])
+    if proposal.lacks:
+        raise ColumnsError(f"{proposal.lacks}: do so in {written}, then run: {again}")
+    if asked and not click.confirm("Import it so?"):
+        raise ColumnsError(f"nothing was imported: correct {written}, then run: {again}")
+    if not yes and not asked:
+        raise ColumnsError(f"nobody could be asked whether this is right: look over {written}, then run: {again}")
+    with progress(f"importing {path.name}"):
+        return import_table(read, proposal.columns)
+
+
+def _write(text: str, folder: Path) -> Path:
+    """Write a columns.toml into `folder` under the first name that is free, or has this text; return its path."""
+    from thenar.runtime.files import write_atomically
+
+    paths = (folder / f"columns{f'-{number}' if number > 1 else ''}.toml" for number in count(1))
+    for path in paths:
+        if not os.path.lexists(path):
+            write_atomically(path, text.encode())
+            return path
+        if path.is_file() and path.read_bytes() == text.encode():
+            return path
+    raise AssertionError
+
+
+def _print_proposal(proposal: "Proposal") -> None:
+    from thenar.compiler.recordings.propose import listed
+
+    for remark in proposal.remarks:
+        echo(remark)
+    rows = table(("columns", "read as", "why"), title="What was found")
+    for role in proposal.roles:
+        rows.add_row(listed(role.columns), role.role, role.reason)
+    out().print(rows)
 
 
 def _print(report: "ImportReport", output: Path) -> None:
     for finding in report.warnings:
         warning(finding.message)
+    for note in report.notes:
+        echo(note)
     if report.coding:
         numbers = ("step", "largest error", "rms error", "values before", "after")
         coding = table(("joint", "unit", *numbers), numbers, "Coding")
@@ -63,5 +131,6 @@ def _print(report: "ImportReport", output: Path) -> None:
         out().print(coding)
     echo(
         f"{output}: {report.rows} grasps of {report.grasp_types} types ({report.taxonomy}); "
-        f"subjects {report.subjects}, objects {report.objects}, switches {report.switches}, joints {report.joints}"
+        f"subjects {report.subjects}, objects {report.objects}, switches {report.switches}, joints {report.joints}, "
+        f"trials {report.trials}"
     )

@@ -1,14 +1,16 @@
 """Options of several commands: the placement methods and the trainers, read from their registries."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .common import Command, Listed, ListOf, Number
+from .common import Command, Listed, ListOf, Number, existing_file
 
 if TYPE_CHECKING:
+    from thenar.compiler.hand import HandShape
     from thenar.compiler.placement.methods.base import Method
     from thenar.compiler.trainers.base import Setting
 
@@ -155,3 +157,36 @@ def _option(setting: "Setting") -> click.Option:
         kind = click.INT if least is None else click.IntRange(int(least))
     decls, shown = [f"--{setting.name.replace('_', '-')}", setting.name], setting.default is not None
     return click.Option(decls, type=kind, default=setting.default, show_default=shown, help=setting.what)
+
+
+layout_option = click.option(
+    "--layout", type=existing_file, help="Your glove: a drawing (.svg) or a list (.toml) of where its switches lie."
+)
+
+
+def hand_of(layout: Path | None) -> "HandShape":
+    """Return the glove in the file `layout`, else the one that thenar draws. Raises MapError."""
+    if layout is None:
+        from thenar.simulator.handmaps.handmap import hand_map
+
+        return hand_map()
+    from thenar.compiler.layouts import load_layout
+
+    return load_layout(layout)
+
+
+def fitted_hand(layout: Path | None, names: Sequence[str], length_mm: float | None) -> "HandShape | None":
+    """Return the hand with the switches `names`; None where nobody knows where they lie.
+
+    Raises UsageError for a length that cannot be given to it, MapError for a layout without one of them.
+    """
+    hand = hand_of(layout)
+    if layout is not None and length_mm is not None:
+        raise click.UsageError("--hand-length: the switches of a --layout lie where it says; leave one of them out")
+    if layout is not None:
+        hand.numbers_of(names)
+    elif length_mm is not None and hand.fitted(names) is None:
+        raise click.UsageError(
+            "--hand-length is of the hand that thenar draws, and these switches are not on it: give a --layout instead"
+        )
+    return hand.fitted(names, length_mm)

@@ -184,8 +184,8 @@ def _run_live(
     with ExitStack() as stack:
         stop = stack.enter_context(ended_by_signals())
         glove = Glove(build, str(harness), stop=stop, status=status, **asked)
-        if glove.lacking:
-            err().print(f"thenar: {glove.lacking}")
+        for lacking in filter(None, (glove.system.unread, glove.lacking)):
+            err().print(f"thenar: {lacking}")
         stack.enter_context(glove)
         view = stack.enter_context(LiveView(out(), status)) if viewed else None
         _look_on(glove, view, frames)

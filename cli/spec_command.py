@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 import click
 
 from .common import Number, OutputFolder, existing_file, existing_folder, json_flag, out, show, table
+from .options import fitted_hand, layout_option
 
 if TYPE_CHECKING:
     from thenar.compiler.glove.layout import BoardPins
     from thenar.compiler.glove.spec import SpecSummary
-    from thenar.compiler.hand import HandShape
     from thenar.runtime.build import Build
     from thenar.runtime.harness.wiring import Harness
     from thenar.runtime.manifest import Manifest
@@ -22,12 +22,18 @@ _WIRING = "glove.toml"
 @click.command("spec")
 @click.argument("build", type=existing_folder)
 @click.option("--hand-length", type=Number(100, 300), metavar="MM", help="From wrist to middle fingertip.")
+@layout_option
 @click.option("--glove", type=existing_file, help="The glove.toml of its wiring.  [default: a new one is proposed]")
 @click.option("--board", type=existing_file, help="The board.toml of the scanner board that reads the switches.")
 @click.option("-o", "--output", type=OutputFolder(), help="Also write the files: a folder; a spec there is replaced.")
 @json_flag
 def command(
-    build: Path, hand_length: float | None, glove: Path | None, board: Path | None, output: Path | None
+    build: Path,
+    hand_length: float | None,
+    layout: Path | None,
+    glove: Path | None,
+    board: Path | None,
+    output: Path | None,
 ) -> None:
     """Describe the reduced glove of a BUILD: where its switches lie, how they are wired, what to buy, what to expect.
 
@@ -38,6 +44,7 @@ def command(
     Example:
         thenar spec build/
         thenar spec build/ --hand-length 182 --glove glove.toml -o spec/
+        thenar spec build/ --layout glove.svg -o spec/
     """
     from thenar.compiler.glove.files import check_output, files_of, write_spec
     from thenar.compiler.glove.spec import glove_spec
@@ -46,7 +53,7 @@ def command(
     loaded = Build.load(build)
     if output is not None:
         check_output(output)
-    hand = _hand(loaded.manifest, hand_length)
+    hand = fitted_hand(layout, [switch.name for switch in loaded.manifest.switches], hand_length)
     pins = () if board is None else (_board_pins(board, loaded.manifest),)
     harness = _harness(build, loaded, glove, board)
     spec = glove_spec(loaded.manifest, loaded.scan, harness, hand, pins)
@@ -56,17 +63,6 @@ def command(
         write_spec(files, output)
         written = f"{output}: {', '.join(sorted(files))}"
     show(spec.summary, _print, written)
-
-
-def _hand(manifest: "Manifest", length_mm: float | None) -> "HandShape | None":
-    from thenar.simulator.handmaps.handmap import hand_map
-
-    hand = hand_map().fitted([switch.name for switch in manifest.switches], length_mm)
-    if hand is None and length_mm is not None:
-        raise click.UsageError(
-            "--hand-length: the switches of this build are not those of murakami160, and where they lie is not known"
-        )
-    return hand
 
 
 def _harness(folder: Path, loaded: "Build", glove: Path | None, board: Path | None) -> "Harness | None":

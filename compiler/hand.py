@@ -1,7 +1,7 @@
 """A hand laid flat on paper, with its switches: what pictures, reports and specs know of a glove.
 
-The places come from whoever knows the glove (simulator/handmaps), so that nothing here depends on how hands are
-simulated.
+The places come from whoever knows the glove (simulator/handmaps, or a layout of one's own), so that nothing here
+depends on how hands are simulated.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,10 @@ class MapError(ThenarError, ValueError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandShape:
-    """A right hand, palm up, thumb right, its digits' sides unfolded; all places in mm for a hand of `length_mm`.
+    """A glove laid flat; all places in mm for a hand of `length_mm`.
+
+    The shipped one is a right hand, palm up, thumb right, its digits' sides unfolded. A layout of one's own has no
+    length (None), as it is its own measure; its outline may be empty, and so are strips, creases and labels.
 
     names, places (s, 2)  the switches, and where their middles lie; radius_mm of the circle that stands for one
     parts (s,)            index of each switch's part in part_names: the digits from the thumb on, then the palm
@@ -30,10 +33,11 @@ class HandShape:
     outline (k, 2)        the hand from cuff to cuff; digits: that of each digit; creases: open lines
     strips                outlines of the unfolded sides, left and right of the thumb, then of the index, ...
     labels (digits, 2)    where a digit's name is written, above its tip
+    part_number           what to buy for a switch, and body_mm, how broad it is: "" and 0 where that is open
     """
 
     glove: str
-    length_mm: float
+    length_mm: float | None
     names: tuple[str, ...]
     places: Floats
     radius_mm: float
@@ -45,6 +49,25 @@ class HandShape:
     strips: tuple[Floats, ...]
     creases: tuple[Floats, ...]
     labels: Floats
+    part_number: str = ""
+    body_mm: float = 0.0
+
+    @property
+    def view(self) -> str:
+        """What one sees, in words."""
+        if self.length_mm is None:
+            return f"the glove as {self.glove} has it"
+        return "a right hand, palm up, thumb right, the sides of its digits unfolded"
+
+    @property
+    def wrist(self) -> tuple[float, float]:
+        """Where the wires end: in the middle of the glove's cuff; of a layout of one's own, in the middle below it."""
+        if self.length_mm is not None:
+            x, y = (self.outline[0] + self.outline[-1]) / 2
+            return float(x), float(y)
+        points = np.concatenate([self.outline, self.places])
+        (left, bottom), (right, _) = points.min(axis=0), points.max(axis=0)
+        return float((left + right) / 2), float(bottom)
 
     def fitted(self, names: Sequence[str], length_mm: float | None = None) -> "HandShape | None":
         """Return the hand, of that length, if it has all the switches called `names`; None if not, or without names."""
@@ -54,6 +77,8 @@ class HandShape:
 
     def scaled(self, length_mm: float) -> "HandShape":
         """Return the same hand, of another length: its proportions stay, and so does the size of a switch."""
+        if self.length_mm is None:
+            raise MapError(f"{self.glove} is drawn at its own size: only the glove that thenar draws is made longer")
         factor = length_mm / self.length_mm
         return replace(
             self,
@@ -75,5 +100,7 @@ class HandShape:
         number = {name: number for number, name in enumerate(self.names)}
         strange = next((name for name in names if name not in number), None)
         if strange is not None:
+            if self.length_mm is not None and number.keys().isdisjoint(names):
+                raise MapError(f"where switch {strange!r} lies is not known: --layout takes a drawing of your glove")
             raise MapError(f"{strange!r} is no switch of the glove {self.glove}{nearest(strange, self.names)}")
         return np.array([number[name] for name in names], dtype=np.intp)

@@ -24,7 +24,7 @@ byte is always 1. Time stamps, which may hold zeros, are left switched off.
 
 import logging
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from math import ceil, isfinite
 from typing import Literal
@@ -94,6 +94,11 @@ def masked_sensors(mask: bytes) -> tuple[str, ...]:
 # The order on the wire. The 18-sensor glove has no sensors on the outermost finger joints; the wrist's are always last.
 SENSORS_18 = masked_sensors(MASK_18)
 SENSORS_22 = masked_sensors(MASK_22)
+
+
+def sensors_with(joints: Collection[str]) -> int | None:
+    """Return how many sensors the smallest CyberGlove has that measures all of `joints`; None if there is none."""
+    return next((len(names) for names in (SENSORS_18, SENSORS_22) if joints and set(joints) <= set(names)), None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -93,6 +93,11 @@ def aml_table() -> Path:
     return need(SHARED_DATA / "aml_flex6_grasptypes" / "trials.csv.gz")
 
 
+@pytest.fixture(scope="session")
+def r2g_table() -> Path:
+    return need(SHARED_DATA / "r2g_apertures29" / "frames.csv.gz")
+
+
 # What our children import before anything of ours, or soon after.
 SHADOWED = (
     *("argparse", "collections", "ctypes", "ensurepip", "json", "msgspec", "pickle", "platform", "runpy", "signal"),

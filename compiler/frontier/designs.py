@@ -3,20 +3,20 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from .equipment import NO_TIME
 from .finalists import Close
 from .latency import POLICIES
 from .points import DecisionKind, Latency, Point, Recipe, Scan, Time, front
 from .price import PricedTables, Wired
 from .search import Search
 from .timing.classify_times import Classified
-from .timing.scan_times import transfer_us
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Design:
     """A finalist built in one way: these tables in this layout, their switches read so (None: it reads none).
 
-    joints    how many are read
+    transfer  what reading the joints takes
     measured  what classifying takes, simulated or timed; None: it is as the model has it
     """
 
@@ -25,7 +25,7 @@ class Design:
     classified: Classified
     wired: Wired | None
     scan_kind: Scan
-    joints: int
+    transfer: Time
     measured: Time | None = None
 
     @property
@@ -45,11 +45,6 @@ class Design:
             return Time(0.0, "wire")
         times = self.wired.scan
         return Time(times.early_us if self.scan_kind == "early" else times.full_us, times.how)
-
-    @property
-    def transfer(self) -> Time:
-        """One record of the CyberGlove."""
-        return Time(transfer_us(self.joints), "wire")
 
     @property
     def classify(self) -> Time:
@@ -74,9 +69,9 @@ class Design:
 Latencies = Mapping[tuple[Design, DecisionKind], Latency]
 
 
-def designs(close: Close, joints: int) -> Iterator[Design]:
-    """Yield every way to build a finalist; `joints` it has in all."""
-    read = joints if close.screened.choice.joints else 0
+def designs(close: Close, joints: Time) -> Iterator[Design]:
+    """Yield every way to build a finalist; reading the joints takes `joints`."""
+    read = joints if close.screened.choice.joints else NO_TIME
     for tables in close.priced:
         for classified in tables.classified:
             if not close.screened.columns:

@@ -11,6 +11,7 @@ import numpy as np
 
 from thenar.runtime.build import Build
 from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.names import list_names
 
 from ..limits import check_inputs, check_memory, check_types
 from ..placement.methods.base import BEST, METHODS, PAPERS, usual
@@ -31,7 +32,7 @@ from .screen import QUICK_PRICE_S, Screened, rate_of, screen
 from .search import SHAPES, Candidate, Search, available_inputs, curve_ways, ways
 from .stream import Stream, stream_of
 from .survey import Cuts, Survey, fit_s, path_s
-from .timing.scan_times import scan_times, transfer_us
+from .timing.scan_times import joints_time, scan_times
 from .timing.wirings import wirings
 from .words import csv_bytes
 
@@ -42,6 +43,10 @@ _EARLY = (
     "sequential test needs whole scans."
 )
 _RENEWED = f"{STORE_NAME} was an older thenar's, of another form: everything was computed anew"
+_UNTIMED = (
+    "what reading the joints ({}) takes is not known and is left out of every frame time and latency: give it with "
+    "--joint-us"
+)
 # As it turns out: so many placements come on top of the finalists, for the marks; so many designs of a finalist are on
 # a front; so many of the placements that are tried are different ones; so many layouts are simulated besides.
 _MARKED, _DESIGNS, _DIFFERENT, _CHECKED = 3, 2, 0.8, 30
@@ -81,6 +86,7 @@ def find_frontier(
     search: Search | None = None,
     wanted: Wanted | None = None,
     build: Path | None = None,
+    joint_us: float | None = None,
     stream: GraspSet | None = None,
     jobs: int = -1,
     cluster: str | None = None,
@@ -110,6 +116,9 @@ def find_frontier(
         Which point to pick.
     build : Path, optional
         A build folder, to be marked beside the points.
+    joint_us : float, optional
+        What reading the joints takes, in microseconds, where they are not a CyberGlove's. Without it that time is left
+        out of every frame, and a sentence of `skipped` says so.
     stream : GraspSet, optional
         Other recordings of the same glove, to measure decision latency on; usually the test rows of the first fold.
     jobs : int
@@ -144,12 +153,16 @@ def find_frontier(
     ports = ports_of_whole_glove(harness, grasp_set.switch_names)
     with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:
         cache = Cache(store, report or _unheard, jobs=jobs, cluster=cluster)
-        equipment = equipment_for(target, wirings(harness, target), cache)
+        names = [joint.name for joint in grasp_set.joints]
+        joints = joints_time(names, joint_us, None if harness is None else harness.cyberglove)
+        equipment = equipment_for(target, wirings(harness, target), cache, joints)
+        untimed = (_UNTIMED.format(list_names(names)),) if joints.how == "unknown" else ()
+        renewed = (_RENEWED,) if store.renewed else ()
         survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
         played = _stream(survey, stream)
         own = () if build is None else (own_build(build, grasp_set, equipment),)
         cache.foresee(foreseen(survey))
-        found = _found(survey, played, wanted or Wanted(), own, (*([_RENEWED] if store.renewed else []), *lacking))
+        found = _found(survey, played, wanted or Wanted(), own, (*renewed, *untimed, *lacking))
         if output is not None:
             # The store goes into the new folder as the same file, and nobody else may have it meanwhile.
             publish_folder(_documents(found), output, kept_entries, FrontierError)
@@ -268,7 +281,7 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
         )
     named = choices_to_mark(n_switches, survey.n_joints)
     closes = look_closely(survey, finalists(screened, list(named), search.finalists))
-    every = [design for close in closes for design in designs(close, survey.n_joints)]
+    every = [design for close in closes for design in designs(close, survey.equipment.joints)]
     by_time, by_switches = best_designs(every)
     kept, checks, skipped = measured(with_whole_scans([*by_time, *by_switches]), survey.equipment, survey.cache)
     points = points_of(kept, _latencies(survey, stream, kept), survey.switch_names, search)
@@ -363,7 +376,7 @@ def marks_of(named: dict[Candidate, str], closes: Sequence[Close], survey: Surve
         screened = close.screened
         if screened.choice in named:
             priced = next(tables for tables in close.priced if tables.tabled == tabled)
-            us = priced.fastest_us(survey.n_joints if screened.choice.joints else 0)
+            us = priced.fastest_us(survey.equipment.joints.us if screened.choice.joints else 0.0)
             if us is not None:
                 found.append(Mark(named[screened.choice], len(screened.columns), close.rates[tabled], us))
     return tuple(found)
@@ -389,7 +402,7 @@ def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
     bits = grasp_set.switches[:, _places(names, grasp_set.switch_names, folder)]
     codes = grasp_set.codes[:, _places(joints, [joint.name for joint in grasp_set.joints], folder)]
     scans = [scan_times(names, build.tables, wiring, bits, codes, equipment.beside).full_us for wiring in fitting]
-    frame_us = max(min(scans, default=0.0), transfer_us(len(joints))) + options[0].us
+    frame_us = max(min(scans, default=0.0), equipment.joints.us * bool(joints)) + options[0].us
     return Mark(f"build {folder.name}", len(names), rate_of((rate.correct,), rate.total), frame_us)
 
 

@@ -255,7 +255,7 @@ class Pace(Struct, frozen=True):
     decisions: tuple[DecisionKind, ...]
 
 
-@stored(1)
+@stored(2)
 def latencies(
     samples: Samples, rows: Rows, columns: Columns, stream: Stream, paces: tuple[Pace, ...], training: Training
 ) -> tuple[tuple[Latency, ...], ...]:
@@ -285,10 +285,10 @@ def latency(tables: IntegerTables, columns: Sequence[int], stream: Stream, frame
     columns  the stream's switches that the tables take, in their order; of its joints they take all, or none
 
     A frame shows the glove as it was when the frame began; its answer is there when it ends, frame_us later. A grasp's
-    latency is the time from its arrival until the first answer that is its type, 0 where that was the answer already,
-    decided on while the hand was still closing. Grasps without one before they end are missed, and in neither number;
-    if all are, both numbers are how long the longest lasted. The 99th percentile is one of the latencies (nearest
-    rank).
+    latency is the time from its arrival until the first answer that is its type, and a frame at least: that long where
+    it was the answer already, decided on while the hand was still closing. Grasps without one before they end are
+    missed, and in neither number; if all are, both numbers are how long the longest lasted. The 99th percentile is one
+    of the latencies (nearest rank).
 
     Raises FrontierError where the tables are not for these inputs, the stream has no grasps, or no frame takes a time.
     """
@@ -297,7 +297,7 @@ def latency(tables: IntegerTables, columns: Sequence[int], stream: Stream, frame
     decided = decided_on(tables, columns, stream, step_us, policy)
     begun_us = stream.at_us - stream.at_us[0]
     held = _Held(begun_us[stream.arrivals], begun_us[stream.ends], stream.types[stream.arrivals])
-    return _measured(held, *_waits_and_errors(decided, step_us, held))
+    return _measured(held, *_waits_and_errors(decided, step_us, held), step_us)
 
 
 def decided_on(
@@ -329,9 +329,9 @@ def _waits_and_errors(decided: Decisions, step_us: int, held: _Held) -> tuple[Ti
     return waits_us, wrong_us
 
 
-def _measured(held: _Held, waits_us: Times, wrong_us: Times) -> Latency:
+def _measured(held: _Held, waits_us: Times, wrong_us: Times, step_us: int) -> Latency:
     lasted_us, answered = held.ended_us - held.arrived_us, waits_us >= 0
-    found = np.sort(waits_us[answered])
+    found = np.sort(np.maximum(waits_us[answered], step_us))
     if not len(found):
         return Latency(float(lasted_us.max()), float(lasted_us.max()), 1.0)
     left_us = int((lasted_us - waits_us)[answered].sum())

@@ -18,10 +18,11 @@ from .timing.wirings import AS_WIRED, BOARD, Wiring
 
 @dataclass(frozen=True, slots=True)
 class Picked:
-    """A frontier, and the point of it that is to be built; see `picked`."""
+    """A frontier, the point of it that is to be built, and the names of the set's joints; see `picked`."""
 
     frontier: Frontier
     point: Point
+    joints: tuple[str, ...]
 
     @property
     def options(self) -> dict[str, object]:
@@ -64,7 +65,8 @@ class Picked:
                 )
             if given is not None and setting.wiring == AS_WIRED:
                 return given
-            return Wiring(setting.wiring, setting.clock_hz).harness_of(kept, setting.inputs != "switches")
+            joints = () if setting.inputs == "switches" else self.joints
+            return Wiring(setting.wiring, setting.clock_hz).harness_of(kept, joints)
 
         return harness_of
 
@@ -103,7 +105,7 @@ def picked(path: Path, number: int | None, grasp_set: GraspSet) -> Picked:
         )
     point = found.point(wanted)
     _check(point, grasp_set, f"{path}: point {point.number}")
-    return Picked(found, point)
+    return Picked(found, point, tuple(joint.name for joint in grasp_set.joints))
 
 
 def _check(point: Point, grasp_set: GraspSet, what: str) -> None:

@@ -15,7 +15,8 @@ MAX_BYTES = 64 << 20
 
 # measured: wall time on this machine. simulated: cycles of the real firmware in a simulator. wire: arithmetic of clocks
 # and baud rates, held against an emulated bus. model: predicted by a model that was held against measured points.
-How = Literal["measured", "simulated", "wire", "model"]
+# given: by the user. unknown: left out of every sum.
+How = Literal["measured", "simulated", "wire", "model", "given", "unknown"]
 Scan = Literal["full", "early"]
 DecisionKind = Literal["single", "dwell", "sequential"]
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
@@ -83,7 +84,7 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
 
 
 class Latency(Struct, frozen=True, forbid_unknown_fields=True):
-    """From a hand's arrival in a grasp until it is decided on, microseconds over a stream.
+    """From a hand's arrival in a grasp until it is decided on, at least a frame, microseconds over a stream.
 
     missed  the share of grasps that were never decided on rightly while they lasted: they are in neither number
     wrong   the share of the time for which grasps were held, decided on once, that another type was decided on
@@ -101,7 +102,7 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     number      what `compile --from frontier.json --point` takes
     switches    names of the kept switches, in the order in which they were chosen from all rows
     rate        honest, repeated folds; left_out: each subject recognised from the others (None: only one subject)
-    scan        reading the switches (the mean where it ends early); transfer: one record of the CyberGlove
+    scan        reading the switches (the mean where it ends early); transfer: the joints
     frame       max(scan, transfer) + classify: the two lie on lines of their own
     flash, ram  bytes of the classifier on its target; of the tables alone on host and pi
     fronts      on which lines of best points it lies: "frame", "switches", "latency"

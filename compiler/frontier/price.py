@@ -18,7 +18,7 @@ from .cache import stored
 from .equipment import Equipment
 from .search import Shape
 from .timing.classify_times import Classified
-from .timing.scan_times import ScanTimes, scan_times, transfer_us
+from .timing.scan_times import ScanTimes, scan_times
 
 # Of more rows than this, evenly spaced ones tell how early a scan ends.
 _FRAMES = 1000
@@ -50,12 +50,12 @@ class PricedTables(Struct, frozen=True):
     wired: tuple[Wired, ...]
     seconds: float
 
-    def fastest_us(self, joints: int) -> float | None:
+    def fastest_us(self, joints_us: float) -> float | None:
         """Return the least frame time in any wiring, whole scans; None where nothing fits the target."""
         if not self.classified:
             return None
         scan_us = min((wired.scan.full_us for wired in self.wired), default=0.0)
-        return max(scan_us, transfer_us(joints)) + self.classified[0].us
+        return max(scan_us, joints_us) + self.classified[0].us
 
 
 @stored(1)

@@ -69,7 +69,7 @@ def _frames_us(survey: Survey, choices: Sequence[Candidate]) -> dict[Candidate, 
         calls.append(price.call(QUICK_PRICE_S, rows, names, columns, (_TABLED,), training, survey.equipment, None))
     found = {}
     for choice, (priced,) in zip(choices, survey.cache.ask("times", calls), strict=True):
-        us = priced.fastest_us(survey.n_joints if choice.joints else 0)
+        us = priced.fastest_us(survey.equipment.joints.us if choice.joints else 0.0)
         if us is not None and (priced.wired or choice.way == NO_SWITCHES):
             found[choice] = us
     return found

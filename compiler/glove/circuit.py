@@ -5,7 +5,7 @@ address, reset, the pull-ups of each bus, muxes, and the host's plugs.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from msgspec import Struct
 
@@ -15,7 +15,7 @@ from thenar.drivers.i2c.chips.base import RESET, Package
 from thenar.drivers.i2c.chips.base import SUPPLY as SUPPLY_PINS
 from thenar.runtime.harness.wiring import Harness, MuxChannel
 
-from .layout import GROUND, SUPPLY, End, PlacedSwitch, Unit, Wire, net_of
+from .layout import GROUND, PUSH_BUTTON, SUPPLY, End, PlacedSwitch, Unit, Wire, net_of
 
 _HOST = ("VCC", "GND", "SDA", "SCL")
 _TYPES = {"SDA": "bidirectional", "SCL": "input", "INT": "open_collector", "NC": "no_connect", RESET: "input"}
@@ -222,15 +222,23 @@ def _kind(package: Package, inputs: Sequence[str]) -> Kind:
     )
 
 
-_SWITCH = Kind(
-    "EVQPLDA15",
+_BUTTON = Kind(
+    PUSH_BUTTON,
     "Switch",
     "SW_Push",
     "Button_Switch_SMD:SW_SPST_Panasonic_EVQPL_3PL_5PL_PT_A15",
     two_pins(("1", "2")),
-    part="EVQPLDA15",
+    part=PUSH_BUTTON,
     maker="Panasonic",
     note="light touch switch, 4.9 x 4.9 x 1.5 mm; that its operating force is 1.0 N is not confirmed by a data sheet",
+)
+_OWN_SWITCH = Kind(
+    "switch or pad of your own",
+    "Switch",
+    "SW_SPST",
+    "",
+    two_pins(("1", "2")),
+    note="a contact between its two wires; a pad that is recorded as a voltage needs a comparator at its threshold",
 )
 _DIODE = Kind(
     "Schottky, 30 V",
@@ -246,12 +254,16 @@ _PULL_UP = resistor("10k", "pulls up an input of a chip that has no pull-ups")
 
 
 def glove_circuit(
-    switches: Sequence[PlacedSwitch], ends: Sequence[End], wires: Sequence[Wire], harness: Harness
+    switches: Sequence[PlacedSwitch], ends: Sequence[End], wires: Sequence[Wire], harness: Harness, part_number: str
 ) -> Circuit:
-    """Return the circuit in which switch n of the build is SWn and reaches its `end` through its bundle's connector."""
+    """Return the circuit in which switch n of the build is SWn and reaches its `end` through its bundle's connector.
+
+    part_number is of the switches; "" where it is not known.
+    """
     circuit = Circuit()
+    kind = _BUTTON if part_number == PUSH_BUTTON else replace(_OWN_SWITCH, part=part_number)
     for switch in switches:
-        circuit.put(f"SW{switch.number}", _SWITCH, on_board=False, name=switch.name)
+        circuit.put(f"SW{switch.number}", kind, on_board=False, name=switch.name)
     _add_connectors(circuit, wires)
     units = _units(ends)
     for unit in units:

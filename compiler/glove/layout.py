@@ -12,9 +12,8 @@ from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
 
 from ..hand import HandShape
 
-# Of the switch EVQPLDA15: its body, and the disc that the hand's skin meets (Murakami et al. on their glove).
-BODY_MM = 4.9
-CONTACT_MM = 3.2
+# The switch of Murakami et al.'s glove, and its disc that the hand's skin meets.
+PUSH_BUTTON, CONTACT_MM = "EVQPLDA15", 3.2
 _SIDES = {-1: "left side", 0: "palm side", 1: "right side"}
 GROUND, SUPPLY = "GND", "VCC"
 # The resistor colour code from 1 to 9; black is the return's.
@@ -51,7 +50,7 @@ def place_switches(names: Sequence[str], hand: HandShape | None) -> tuple[Placed
             number=number,
             name=name,
             part=hand.part_names[hand.parts[mine]],
-            side=_SIDES[int(hand.sides[mine])],
+            side=None if hand.length_mm is None else _SIDES[int(hand.sides[mine])],
             x_mm=round(float(hand.places[mine, 0]), 1),
             y_mm=round(float(hand.places[mine, 1]), 1),
         )
@@ -59,11 +58,16 @@ def place_switches(names: Sequence[str], hand: HandShape | None) -> tuple[Placed
     )
 
 
-def crowded(switches: Sequence[PlacedSwitch]) -> list[tuple[int, int, float]]:
+def hole_mm(hand: HandShape) -> float:
+    """Return how broad the hole for a switch is: the push button's disc, or all of a switch whose breadth is known."""
+    return CONTACT_MM if hand.part_number == PUSH_BUTTON or not hand.body_mm else hand.body_mm
+
+
+def crowded(switches: Sequence[PlacedSwitch], body_mm: float) -> list[tuple[int, int, float]]:
     """Return pairs of switches whose middles are nearer than a switch's body is broad, and how near, mm."""
     places = np.array([(each.x_mm, each.y_mm) for each in switches if each.x_mm is not None]).reshape(-1, 2)
     apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
-    first, second = np.nonzero(np.triu(apart < BODY_MM, k=1))
+    first, second = np.nonzero(np.triu(apart < body_mm, k=1))
     return [(int(a) + 1, int(b) + 1, round(float(apart[a, b]), 2)) for a, b in zip(first, second, strict=True)]
 
 
@@ -181,7 +185,7 @@ def wires_of(switches: Sequence[PlacedSwitch], ends: Sequence[End], hand: HandSh
 
     A bundle holds a digit's wires; one unit's, where the places are not known.
     """
-    home = None if hand is None else wrist_of(hand)
+    home = None if hand is None else hand.wrist
     bundles: dict[str, list[End]] = {}
     for end in ends:
         bundles.setdefault(switches[end.switch].part or end.unit.ref, []).append(end)
@@ -194,12 +198,6 @@ def wires_of(switches: Sequence[PlacedSwitch], ends: Sequence[End], hand: HandSh
             connectors += 1
             made += _connected(wires[start : start + _LONGEST_HEADER], f"J{connectors}")
     return tuple(made)
-
-
-def wrist_of(hand: HandShape) -> Place:
-    """Return where the chips sit: in the middle of the glove's cuff."""
-    x, y = (hand.outline[0] + hand.outline[-1]) / 2
-    return float(x), float(y)
 
 
 def marked(colour: str, times: int) -> str:

@@ -95,20 +95,9 @@ def expectations(expected: Expected) -> Iterator[str]:
 
 
 def _building(summary: SpecSummary) -> Iterator[str]:
-    if summary.hand_length_mm is not None:
+    if summary.print_on:
         yield "To cut and sew"
-        yield (
-            f"cutting.svg and cutting.dxf are the right hand of {summary.hand_length_mm:g} mm length laid flat, the "
-            f"palm up, at 1:1 in millimetres, for {summary.print_on}. Print without scaling and measure the bar of "
-            "50 mm. For a left hand, mirror it. Layers: outline, strips (the sides of the digits, unfolded), creases, "
-            f"holes ({CONTACT_MM} mm, where the switch's disc meets the hand), names, scale."
-        )
-        yield (
-            "The pattern is a map: lengths along the digits are true; the digits are spread and the palm is broader "
-            "than the hand, so that the strips find room. Fit the cloth to the hand, and place the switches by the "
-            "joints' creases."
-        )
-        yield "switches.csv: every switch with its place, counted from the middle of the wrist, and the pin it is on."
+        yield from _cutting(summary)
     yield "To wire"
     yield (
         "wiring.csv: a bundle of wires for each digit, and in it a wire for contact 1 of every switch and a common "
@@ -128,6 +117,28 @@ def _building(summary: SpecSummary) -> Iterator[str]:
         "glove.toml: the wiring as thenar run, record, emulate and doctor read it. Device files and ports are the "
         "lines to look at. spec.json: all of this for machines."
     )
+
+
+def _cutting(summary: SpecSummary) -> Iterator[str]:
+    printed = f"at 1:1 in millimetres, for {summary.print_on}. Print without scaling and measure the bar of 50 mm."
+    if summary.hand_length_mm is None:
+        yield (
+            f"cutting.svg and cutting.dxf are the glove of your layout, {printed} Layers: outline, holes (one for each "
+            "switch), names, scale."
+        )
+        yield "switches.csv: every switch with its place, as in your layout, and the pin it is on."
+        return
+    yield (
+        f"cutting.svg and cutting.dxf are the right hand of {summary.hand_length_mm:g} mm length laid flat, the palm "
+        f"up, {printed} For a left hand, mirror it. Layers: outline, strips (the sides of the digits, unfolded), "
+        f"creases, holes ({CONTACT_MM} mm, where the switch's disc meets the hand), names, scale."
+    )
+    yield (
+        "The pattern is a map: lengths along the digits are true; the digits are spread and the palm is broader "
+        "than the hand, so that the strips find room. Fit the cloth to the hand, and place the switches by the "
+        "joints' creases."
+    )
+    yield "switches.csv: every switch with its place, counted from the middle of the wrist, and the pin it is on."
 
 
 def _advice() -> Iterator[str]:

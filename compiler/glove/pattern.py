@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..hand import HandShape
-from .layout import CONTACT_MM, PlacedSwitch
+from .layout import PlacedSwitch, hole_mm
 
 # What most printers leave white at an edge.
 MARGIN_MM = 5.0
@@ -101,7 +101,7 @@ class Pattern:
 
 def pattern_of(switches: Sequence[PlacedSwitch], hand: HandShape, title: str) -> Pattern:
     """Return the pattern: title, hand, a bar of 50 mm to check the print, and the list of switches below."""
-    extent = np.concatenate([hand.outline, *hand.strips, hand.labels])
+    extent = np.concatenate([hand.outline, *hand.strips, hand.labels, hand.places])
     low, high = extent.min(axis=0), extent.max(axis=0)
     columns = max(1, int((high[0] - low[0]) // _COLUMN_MM))
     rows = -(-len(switches) // columns)
@@ -114,7 +114,7 @@ def pattern_of(switches: Sequence[PlacedSwitch], hand: HandShape, title: str) ->
     shapes = (
         Text("names", MARGIN_MM, top, _TITLE_MM, title),
         *_hand(hand, move),
-        *_holes(switches, move),
+        *_holes(switches, move, hole_mm(hand)),
         *_bar(left, MARGIN_MM + rows * _ROW_MM + _GAP_MM),
         *_legend(switches, rows, left),
     )
@@ -122,17 +122,18 @@ def pattern_of(switches: Sequence[PlacedSwitch], hand: HandShape, title: str) ->
 
 
 def _hand(hand: HandShape, move: Floats) -> Iterator[Shape]:
-    yield Line("outline", hand.outline + move, closed=True)
+    if len(hand.outline):
+        yield Line("outline", hand.outline + move, closed=True)
     yield from (Line("strips", strip + move, closed=True) for strip in hand.strips)
     yield from (Line("creases", crease + move, closed=False) for crease in hand.creases)
     for name, (x, y) in zip(hand.part_names, hand.labels + move, strict=False):
         yield Text("names", float(x), float(y), _TEXT_MM, name, centred=True)
 
 
-def _holes(switches: Sequence[PlacedSwitch], move: Floats) -> Iterator[Shape]:
+def _holes(switches: Sequence[PlacedSwitch], move: Floats, across_mm: float) -> Iterator[Shape]:
     for switch in switches:
         x, y = (switch.x_mm or 0.0) + float(move[0]), (switch.y_mm or 0.0) + float(move[1])
-        yield Circle("holes", x, y, CONTACT_MM / 2)
+        yield Circle("holes", x, y, across_mm / 2)
         yield Text("names", x, y, 1.4 if switch.number < 100 else 1.0, str(switch.number), centred=True)
 
 

@@ -8,19 +8,18 @@ from msgspec.structs import replace
 
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.errors import HarnessError
-from thenar.runtime.harness.wiring import GloveWiring, Harness
+from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import Manifest, Recognised
 from thenar.runtime.names import list_names
 from thenar.runtime.scanning.plan import check_harness
 from thenar.runtime.scanning.ports import whole_scan
-from thenar.runtime.scanning.propose import propose_harness
+from thenar.runtime.scanning.propose import own_joints, propose_cyberglove, propose_harness
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import glove_us, scan_us, scanner_us
 
 from ..hand import HandShape
 from .circuit import BillLine, Circuit, bill_of, glove_circuit
 from .layout import (
-    BODY_MM,
     BoardPins,
     End,
     PlacedSwitch,
@@ -34,7 +33,6 @@ from .layout import (
 from .pattern import Pattern, pattern_of
 
 _SENSORS = 18
-_GLOVE_PORT = "/dev/ttyUSB0"
 
 
 class SpecError(ThenarError, ValueError):
@@ -133,8 +131,8 @@ def glove_spec(
     soldered = as_soldered(wired, boards)
     ends = ends_of(soldered, names, boards)
     wires = wires_of(switches, ends, known)
-    circuit = glove_circuit(switches, ends, wires, soldered)
-    title = f"{wired.name}: {len(names)} switches, right hand of {known.length_mm:g} mm" if known else ""
+    circuit = glove_circuit(switches, ends, wires, soldered, "" if known is None else known.part_number)
+    title = f"{wired.name}: {len(names)} switches{_size(known)}"
     pattern = None if known is None else pattern_of(switches, known, title)
     summary = SpecSummary(
         glove=wired.name,
@@ -146,7 +144,7 @@ def glove_spec(
         wires=wires,
         materials=bill_of(circuit, wires),
         expected=expected_of(manifest, read, wired),
-        remarks=(*_remarks(switches), *_thresholds(manifest)),
+        remarks=tuple(_remarks(manifest, wired, switches, known)),
     )
     return GloveSpec(summary, wired, read, circuit, pattern)
 
@@ -155,8 +153,7 @@ def _harness(manifest: Manifest, scan: ScanMap | None, harness: Harness | None, 
     if harness is None:
         if scan is not None:
             raise SpecError("the build was compiled for a wiring of its own: name its glove.toml with --glove")
-        glove = GloveWiring(port=_GLOVE_PORT) if manifest.joints else None
-        return propose_harness(names, cyberglove=glove)
+        return propose_harness(names, cyberglove=propose_cyberglove([joint.name for joint in manifest.joints]))
     if scan is not None:
         check_harness(scan, harness, names)
     wired = set(harness.switches)
@@ -187,22 +184,31 @@ def _readers(ends: Sequence[End]) -> tuple[SwitchReader, ...]:
     )
 
 
-def _remarks(switches: Sequence[PlacedSwitch]) -> list[str]:
-    remarks = [
-        f"SW{first} and SW{second} are {apart} mm apart and their bodies {BODY_MM} mm broad: move one of them aside"
-        for first, second, apart in crowded(switches)
-    ]
-    if switches[0].x_mm is None:
-        remarks.append(
-            "nobody knows where this glove's switches lie: there is no pattern to cut, and lengths of wire are left out"
+def _size(hand: HandShape | None) -> str:
+    return f", right hand of {hand.length_mm:g} mm" if hand is not None and hand.length_mm is not None else ""
+
+
+def _remarks(
+    manifest: Manifest, harness: Harness, switches: Sequence[PlacedSwitch], hand: HandShape | None
+) -> Iterator[str]:
+    """Yield sentences for whoever builds the glove."""
+    if hand is None:
+        yield (
+            "where this glove's switches lie is not known (--layout names a drawing): there is no pattern to cut, and "
+            "lengths of wire are left out"
         )
-    return remarks
-
-
-def _thresholds(manifest: Manifest) -> Iterator[str]:
+    else:
+        for first, second, apart in crowded(switches, hand.body_mm):
+            yield (
+                f"SW{first} and SW{second} are {apart} mm apart and their bodies {hand.body_mm:g} mm broad: move one "
+                "of them aside"
+            )
     for number, switch in enumerate(manifest.switches, start=1):
         if switch.threshold is not None:
             yield (
                 f"SW{number} is the taxel {switch.name}: set its comparator or converter to {switch.threshold.value:g} "
                 f"{switch.threshold.taxel.unit}; it is {switch.closed}"
             )
+    joints = own_joints([joint.name for joint in manifest.joints])
+    if joints and harness.cyberglove is None:
+        yield joints

@@ -1,5 +1,6 @@
-"""`columns.toml`: which column of a table is the label, the subject, a switch, a joint, and how joints become codes."""
+"""`columns.toml`: which column of a table is the label, the subject, a switch, a joint, and how they are read."""
 
+import codecs
 import glob
 import math
 import re
@@ -9,7 +10,7 @@ from dataclasses import dataclass
 from fnmatch import translate
 from itertools import islice
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import msgspec
 
@@ -20,13 +21,15 @@ from thenar.runtime.toml_struct import convert
 from .errors import ColumnsError
 
 DEFAULT_GRID = 0.5
+# Codecs of Python that are no encodings of files.
+_NO_ENCODINGS = {"idna", "punycode", "undefined", "unicode_escape", "raw_unicode_escape", "mbcs", "oem"}
 # A name whose every letter is escaped is three times as long.
 LONGEST_GLOB = 3 * LONGEST_NAME
 # Globs times columns: some seconds.
 COMPARISONS = 20_000_000
 
 
-class Calibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class Calibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """Two points of the straight line between codes and values, as in `Joint`."""
 
     code_a: int
@@ -35,7 +38,7 @@ class Calibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     value_b: float
 
 
-class JointColumns(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class JointColumns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """Joint columns that are coded alike.
 
     codes = true: the table holds integer codes 0..65535, with a `calibration` or without. Otherwise it holds values in
@@ -64,30 +67,97 @@ class JointColumns(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return DEFAULT_GRID if self.grid is None else self.grid
 
 
-class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A columns.toml, key by key. Column lists hold globs (`*`, `?`, `[...]`); the other keys hold one column each."""
+class TaxelColumns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """Analog columns that become switches, closed above a threshold: a number, or "otsu", found column by column."""
 
-    label: str
-    subject: str | None = None
-    object: str | None = None
-    trial: str | None = None
-    switches: tuple[str, ...] = ()
-    joints: tuple[JointColumns, ...] = ()
-    taxonomy: str | tuple[str, ...] = "own"
-    labels: dict[str, str] = {}
-    missing: Literal["error", "drop"] = "error"
-    delimiter: str = ","
+    columns: tuple[str, ...]
+    threshold: float | Literal["otsu"]
 
     def __post_init__(self) -> None:
-        if len(self.delimiter) != 1 or self.delimiter in '\r\n"':
-            raise ValueError(f"`delimiter` must be one character, not {self.delimiter!r}")
+        if self.threshold != "otsu" and not math.isfinite(self.threshold):
+            raise ValueError(f"`threshold` must be a finite number or 'otsu', not {self.threshold}")
+
+
+class TextFormat(NamedTuple):
+    """How a table of text is written: `delimiter` None is the suffix's, a tab in .tsv and a comma elsewhere."""
+
+    delimiter: str | None = None
+    decimal: str = "."
+    encoding: str = "utf-8"
+    quote: str = '"'
+    header: bool = True
+
+
+PLAIN = TextFormat()
+
+
+class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """A columns.toml, key by key. Lists of inputs hold globs (`*`, `?`, `[...]`); other keys hold columns by name.
+
+    A label, subject, object, session or trial may be spread over several columns: what they say together counts.
+    `frames` says how trials are told apart otherwise: "independent" states that each row is one; after "restart" one
+    begins where `time` does not rise, or another label, subject, object or session comes.
+    """
+
+    label: str | tuple[str, ...]
+    subject: str | tuple[str, ...] | None = None
+    object: str | tuple[str, ...] | None = None
+    session: str | tuple[str, ...] | None = None
+    trial: str | tuple[str, ...] | None = None
+    time: str | None = None
+    frames: Literal["independent", "restart"] | None = None
+    taxonomy: str | tuple[str, ...] = "own"
+    switches: tuple[str, ...] = ()
+    missing: Literal["refuse", "drop", "keep"] = "refuse"
+    reduce: Literal["none", "middle", "median", "any"] = "none"
+    delimiter: str | None = None
+    decimal: Literal[".", ","] = "."
+    encoding: str = "utf-8"
+    quote: str = '"'
+    header: bool = True
+    labels: dict[str, str] = {}
+    taxels: tuple[TaxelColumns, ...] = ()
+    joints: tuple[JointColumns, ...] = ()
+
+    def __post_init__(self) -> None:
+        for key, least in (("delimiter", 1), ("quote", 0)):
+            sign = getattr(self, key)
+            if sign is not None and (not least <= len(sign) <= 1 or sign in ("\r", "\n")):
+                raise ValueError(f"`{key}` must be one character, not {shortened(repr(sign))}")
+        if (self.delimiter or ",") == self.quote:
+            raise ValueError(f"`delimiter` must be one character that is not the `quote`, not {self.delimiter!r}")
+        if not _is_encoding(self.encoding):
+            raise ValueError(f"`encoding` must be one that Python knows, not {shortened(repr(self.encoding))}")
+        if self.frames == "restart" and (self.time is None or self.trial is not None):
+            raise ValueError("`frames` = 'restart' takes `time`, and no `trial`")
+        if not self.parts("label"):
+            raise ValueError("`label` must name a column")
+
+    def parts(self, key: str) -> tuple[str, ...]:
+        """The columns that a key of names holds."""
+        value: str | tuple[str, ...] | None = getattr(self, key)
+        return (value,) if isinstance(value, str) else value or ()
+
+    @property
+    def text(self) -> TextFormat:
+        """How the table is written."""
+        return TextFormat(self.delimiter, self.decimal, self.encoding, self.quote, self.header)
+
+
+def _is_encoding(name: str) -> bool:
+    try:
+        codec = codecs.lookup(name)
+        return codec.name not in _NO_ENCODINGS and isinstance(b"".decode(name), str)
+    except (LookupError, ValueError, TypeError):
+        return False
 
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """The columns of one table, by what they are; `joints` beside the entry that says how to code each."""
+    """The columns of one table, by what they are; taxels and joints with the entry that says how to read each."""
 
     switches: tuple[str, ...]
+    taxels: tuple[tuple[str, TaxelColumns], ...]
     joints: tuple[tuple[str, JointColumns], ...]
 
 
@@ -97,32 +167,38 @@ def read_columns(path: Path) -> Columns:
     return convert(source, (), source.tables(), Columns)
 
 
+# The keys that name columns which are no inputs.
+KEYS = ("label", "subject", "object", "session", "trial", "time")
+
+
 def select(columns: Columns, names: Sequence[str]) -> Selection:
     """Find the columns that `columns` speaks of among a table's `names`.
 
-    Raises ColumnsError if a column is missing, used twice, a glob matches nothing, or nothing is a switch or a joint.
+    Raises ColumnsError if a column is missing, used twice, a glob matches nothing, or nothing is an input.
     """
-    meta = {
-        "label": columns.label,
-        "subject": columns.subject,
-        "object": columns.object,
-        "trial": columns.trial,
-    }
     there = set(names)
-    for key, column in meta.items():
-        if column is not None and column not in there:
-            raise ColumnsError(f"{key}: the table has no column {shortened(repr(column))}{nearest(column, names)}")
-    _check_globs([*columns.switches, *(pattern for entry in columns.joints for pattern in entry.columns)], names)
+    for key in KEYS:
+        for column in columns.parts(key):
+            if column not in there:
+                raise ColumnsError(f"{key}: the table has no column {shortened(repr(column))}{nearest(column, names)}")
+    lists = [
+        columns.switches,
+        *(entry.columns for entry in columns.taxels),
+        *(entry.columns for entry in columns.joints),
+    ]
+    _check_globs([pattern for patterns in lists for pattern in patterns], names)
     # One match more than there are columns, and some column is matched twice.
     found = list(islice(_matched(columns, names), len(names) + 1))
-    switches = tuple(name for name, entry in found if entry is None)
-    joints = tuple((name, entry) for name, entry in found if entry is not None)
-    used = Counter([*filter(None, meta.values()), *switches, *(name for name, _ in joints)])
+    used = Counter([*(name for key in KEYS for name in columns.parts(key)), *(name for name, _ in found)])
     if twice := [name for name, times in used.items() if times > 1]:
         raise ColumnsError(f"column {twice[0]!r} is used {used[twice[0]]} times: name it once, or narrow the globs")
-    if not switches and not joints:
-        raise ColumnsError("no column is a switch or a joint: name some under `switches` or `[[joints]]`")
-    return Selection(switches, joints)
+    if not found:
+        raise ColumnsError("no column is an input: name some under `switches`, `[[taxels]]` or `[[joints]]`")
+    return Selection(
+        tuple(name for name, entry in found if entry is None),
+        tuple((name, entry) for name, entry in found if isinstance(entry, TaxelColumns)),
+        tuple((name, entry) for name, entry in found if isinstance(entry, JointColumns)),
+    )
 
 
 def _check_globs(globs: Sequence[str], names: Sequence[str]) -> None:
@@ -136,14 +212,17 @@ def _check_globs(globs: Sequence[str], names: Sequence[str]) -> None:
         )
 
 
-def _matched(columns: Columns, names: Sequence[str]) -> Iterator[tuple[str, JointColumns | None]]:
-    """Yield each column that a glob finds, with the entry of the joint that it is, None for a switch."""
+def _matched(columns: Columns, names: Sequence[str]) -> Iterator[tuple[str, TaxelColumns | JointColumns | None]]:
+    """Yield each column that a glob finds, with the entry of the taxel or joint that it is, None for a switch."""
     there = frozenset(names)
     for pattern in columns.switches:
         yield from ((name, None) for name in _matches("switches", pattern, names, there))
-    for entry in columns.joints:
-        for pattern in entry.columns:
-            yield from ((name, entry) for name in _matches("joints", pattern, names, there))
+    for taxel in columns.taxels:
+        for pattern in taxel.columns:
+            yield from ((name, taxel) for name in _matches("taxels", pattern, names, there))
+    for joint in columns.joints:
+        for pattern in joint.columns:
+            yield from ((name, joint) for name in _matches("joints", pattern, names, there))
 
 
 def _matches(what: str, pattern: str, names: Sequence[str], there: frozenset[str]) -> list[str]:

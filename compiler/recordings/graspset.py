@@ -29,6 +29,7 @@ from thenar.runtime.sealed import seal, unseal
 from .arrays import AnyArray, pack, unpack
 from .errors import LARGEST, RecordingError, check_names, check_room, check_simulated
 from .taxonomy import Taxonomy
+from .trials import groups
 
 CODES = 65536
 # So far from the ends of the doubles that spans and margins of values stay finite, and that steps keep all their bits.
@@ -253,13 +254,7 @@ class GraspSet:
         """The trial of each row, numbered from 0 in the order of first appearance."""
         if self.independent:
             return np.arange(len(self))
-        ids = np.zeros(len(self), np.intp)
-        for column in (self.labels, self.subjects, self.objects, self.sessions, self.trials):
-            _, part = np.unique(column, return_inverse=True)
-            # Numbered densely again at once: the product of all counts may not fit.
-            ids = np.unique(ids * (part.max(initial=0) + 1) + part, return_inverse=True)[1]
-        _, first, ids = np.unique(ids, return_index=True, return_inverse=True)
-        return np.argsort(np.argsort(first))[ids]
+        return groups(self.labels, self.subjects, self.objects, self.sessions, self.trials)
 
     def rows(self, index: ArrayLike) -> "GraspSet":
         """Return the set of the rows that `index` picks (numbers or a mask of n), in that order."""

@@ -1,158 +1,28 @@
 """A table and its columns.toml into a `GraspSet`, and a report of what was found, and what coding cost, on the way."""
 
-import math
-from collections.abc import Callable, Iterator
-from contextlib import suppress
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from functools import partial
 from heapq import nsmallest
 from operator import itemgetter
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.names import SHOWN, fault, list_names, shortened
+from thenar.runtime.names import SHOWN, list_names, shortened
 
-from ..text import text_of
-from .arrays import AnyArray
-from .columns import Columns, JointColumns, Selection, read_columns, select
+from .cells import Parsed, Value, bits, codes, integers, names, numbers
+from .coding import CodingCost, coarse, code_joint
+from .columns import KEYS, Columns, Selection, read_columns, select
 from .errors import TYPES, ColumnsError, RecordingError, TableError, check_room, list_rows
-from .graspset import CODES, GraspSet, Joint
+from .graspset import GraspSet
 from .summary import Finding, find_oddities
-from .table import Column, Table, pieces, read_table
+from .table import Table, read_table
 from .taxonomy import Taxonomy, own, published
-
-MISSING_NUMBERS = frozenset({"", "?", "na", "nan"})
-MISSING_NAMES = frozenset({"", "?"})
-
-_BITS = {"true": 1.0, "false": 0.0}
-_PIECE = 1 << 14
-
-Value = TypeVar("Value", bound=np.generic)
-
-
-@dataclass(frozen=True, slots=True)
-class Parsed(Generic[Value]):
-    """One column: (n,) `values`, and which cells are missing and which are wrong, (n,) bool each."""
-
-    values: NDArray[Value]
-    missing: NDArray[np.bool_]
-    wrong: NDArray[np.bool_]
-
-
-def numbers(column: Column) -> Parsed[np.float64]:
-    """Read `column` as finite numbers; missing: empty, ?, NA, NaN; wrong: anything else, and infinity."""
-    return _parsed(column, {})
-
-
-def bits(column: Column) -> Parsed[np.bool_]:
-    """Read `column` as bits: 0, 1, 0.0, 1.0, true, false; missing as in `numbers`, wrong: anything else."""
-    parsed = _parsed(column, _BITS)
-    values = parsed.values == 1
-    return Parsed(values, parsed.missing, parsed.wrong | ~(parsed.missing | values | (parsed.values == 0)))
-
-
-def integers(column: Column) -> Parsed[np.float64]:
-    """Read `column` as whole numbers within +-2^53; missing as in `numbers`, wrong: anything else."""
-    parsed = numbers(column)
-    values = np.where(parsed.missing | parsed.wrong, 0, parsed.values)
-    return Parsed(values, parsed.missing, parsed.wrong | (values != np.rint(values)) | (np.abs(values) > 2**53))
-
-
-def codes(column: Column) -> Parsed[np.float64]:
-    """Read `column` as codes 0..65535; missing as in `numbers`, wrong: anything else."""
-    parsed = integers(column)
-    return Parsed(parsed.values, parsed.missing, parsed.wrong | (parsed.values < 0) | (parsed.values >= CODES))
-
-
-def names(column: Column, cells: bool = False, size: int = 0) -> Parsed[np.str_]:
-    """Read `column` as names without outer blanks; missing: empty and ?, wrong: by the rule of names. With `cells` they
-    are written as cells of a spreadsheet.
-
-    Numbers are names too, but for NaN, which is missing, and infinity, which is wrong. Whole ones read as such: 3, not
-    3.0. Raises RecordingError where the names are too long for so many rows of a file of `size` bytes.
-    """
-    missing, wrong = (np.zeros(len(column), np.bool_) for _ in range(2))
-    found: list[NDArray[np.str_]] = []
-    start = longest = 0
-    for texts, faulty in _names(column, cells):
-        longest = max(longest, *map(len, texts))
-        check_room(len(column), longest, size)
-        found.append(np.array(texts, np.str_))
-        end = start + len(texts)
-        for mask, these in (missing, MISSING_NAMES), (wrong, faulty):
-            if not these.isdisjoint(texts):
-                mask[start:end] = [text in these for text in texts]
-        start = end
-    return Parsed(np.concatenate(found) if found else np.zeros(0, np.str_), missing, wrong)
-
-
-def _names(column: Column, cells: bool) -> Iterator[tuple[list[str], set[str]]]:
-    """Yield the names in a column, piece by piece, and those of the piece that are wrong."""
-    if isinstance(column, np.ndarray) and column.dtype.kind != "U":
-        values = _floats(column)
-        for start in range(0, len(values), _PIECE):
-            texts = list(map(_name_of_number, values[start : start + _PIECE].tolist()))
-            yield texts, {text for text in texts if text.endswith("inf")}
-        return
-    for piece in pieces(column):
-        texts = [text_of(cell.strip()) if cells else cell.strip() for cell in piece]
-        # Looked up as str: an array of them would lose NULs at their ends.
-        yield texts, {text for text in {*texts} - MISSING_NAMES if fault(text)}
-
-
-def _name_of_number(number: float) -> str:
-    if math.isnan(number):
-        return ""
-    # Adding zero makes -0.0 the 0.0 that it equals.
-    return np.format_float_positional(number + 0.0, trim="-")
-
-
-def _parsed(column: Column, words: dict[str, float]) -> Parsed[np.float64]:
-    """Return the cells as floats, NaN where one is missing or wrong; `words` are read besides numbers."""
-    if isinstance(column, np.ndarray) and column.dtype.kind != "U":
-        values = _floats(column)
-        missing = np.isnan(values)
-    else:
-        values, missing = np.empty(len(column)), np.zeros(len(column), np.bool_)
-        start = 0
-        for texts in pieces(column):
-            end = start + len(texts)
-            values[start:end] = _numbers(texts, words)
-            for row in np.flatnonzero(np.isnan(values[start:end])).tolist():
-                missing[start + row] = texts[row].strip().casefold() in MISSING_NUMBERS
-            start = end
-    return Parsed(values, missing, (np.isnan(values) & ~missing) | np.isinf(values))
-
-
-def _floats(column: AnyArray) -> NDArray[np.float64]:
-    # A number too large for a double becomes infinite, and is refused with its row.
-    with np.errstate(over="ignore"):
-        return column.astype(np.float64)
-
-
-def _numbers(cells: list[str], words: dict[str, float]) -> NDArray[np.float64]:
-    try:
-        # All at once is several times faster; float() would read 1_000 as a thousand.
-        values = np.array(cells, dtype=np.float64)
-        return values if not any("_" in cell for cell in cells) else _one_by_one(cells, words)
-    except ValueError:
-        return _one_by_one(cells, words)
-
-
-def _one_by_one(cells: list[str], words: dict[str, float]) -> NDArray[np.float64]:
-    values = np.full(len(cells), np.nan)
-    for row, cell in enumerate(cells):
-        word = cell.strip().casefold()
-        if word in words:
-            values[row] = words[word]
-        elif word not in MISSING_NUMBERS and "_" not in word:
-            with suppress(ValueError):
-                values[row] = float(word)
-    return values
+from .trials import Frames, fill, groups, in_time, numbered, otsu, restarts
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,103 +33,250 @@ class Readings:
     labels: NDArray[np.str_]
     subjects: NDArray[np.str_]
     objects: NDArray[np.str_]
+    sessions: NDArray[np.str_]
     trials: NDArray[np.int64]
     switches: NDArray[np.bool_]
     joints: NDArray[np.float64]
 
+    def kept(self, pick: NDArray[np.bool_] | NDArray[np.intp]) -> "Readings":
+        """Return the rows that `pick`, a mask or numbers, takes; arrays of two dimensions are overwritten."""
+        return Readings(**{name: _kept(getattr(self, name), pick) for name in self.__slots__})
 
-def read_cells(table: Table, columns: Columns, selection: Selection) -> tuple[Readings, list[Finding]]:
-    """Return what `table` holds, and a finding if rows with missing values were dropped.
+    def trial_ids(self) -> NDArray[np.intp]:
+        """Return a number (n,) for each row: that of its trial."""
+        return groups(self.labels, self.subjects, self.objects, self.sessions, self.trials)
+
+
+class Read(NamedTuple):
+    """What was read of a table: `warnings` of what is odd, `notes` on what was made of it."""
+
+    readings: Readings
+    warnings: list[Finding]
+    notes: list[str]
+
+
+def read_cells(table: Table, columns: Columns, selection: Selection) -> Read:
+    """Return what `table` holds.
 
     Columns that the user does not name are "1" throughout. Raises TableError naming the first wrong or missing cells
     and their number.
     """
-    reader = _Reader(table)
-    labels = reader.names(columns.label)
-    subjects, objects = reader.names(columns.subject), reader.names(columns.object)
-    trials = np.ones(len(table.rows))
-    if columns.trial is not None:
-        trials = reader.read(columns.trial, integers, "whole numbers")
-    # Read into place, and in columns, so that a large table is in memory only once.
-    rows = len(table.rows)
-    switches = np.empty((rows, len(selection.switches)), np.bool_, order="F")
+    reader = _Reader(table, columns)
+    notes: list[str] = []
+    time = np.zeros(len(table.rows))
+    if columns.time is not None:
+        time = reader.read(columns.time, numbers, "finite numbers")
+    readings = Readings(
+        rows=table.rows,
+        labels=reader.names(columns.parts("label")),
+        subjects=reader.names(columns.parts("subject")),
+        objects=reader.names(columns.parts("object")),
+        sessions=reader.names(columns.parts("session")),
+        trials=reader.trials(columns.parts("trial"), notes),
+        switches=_switches(reader, selection, notes),
+        joints=_joints(reader, selection),
+    )
+    keep = reader.complete(columns.missing)
+    warnings = _dropped(readings, keep, reader.missing)
+    missing = {name: _kept(mask, keep) for name, mask in reader.missing.items()}
+    readings, time = readings.kept(keep), _kept(time, keep)
+    if columns.frames == "restart":
+        readings = replace(readings, trials=restarts(readings.trial_ids(), time))
+    independent = columns.frames == "independent"
+    trial_ids = np.arange(len(readings.rows)) if independent else readings.trial_ids()
+    if columns.frames is None and not columns.parts("trial"):
+        _check_told(table.what, trial_ids)
+    if columns.time is not None:
+        order = in_time(trial_ids, time)
+        readings = readings.kept(order)
+        missing = {name: mask[order] for name, mask in missing.items()}
+    warnings += _filled(table.what, readings, selection, missing, trial_ids)
+    return Read(_reduced(readings, columns.reduce, trial_ids, notes), warnings, notes)
+
+
+# Read into place, and in columns, so that a large table is in memory only once.
+
+
+def _switches(reader: "_Reader", selection: Selection, notes: list[str]) -> NDArray[np.bool_]:
+    """Return the switches, those behind thresholds last."""
+    names = [*selection.switches, *selection.taxels]
+    switches = np.empty((len(reader.table.rows), len(names)), np.bool_, order="F")
     for number, name in enumerate(selection.switches):
         switches[:, number] = reader.read(name, bits, "0 or 1")
-    joints = np.empty((rows, len(selection.joints)), order="F")
+    shown = []
+    for number, (name, taxel) in enumerate(selection.taxels, start=len(selection.switches)):
+        values = reader.read(name, numbers, "finite numbers")
+        threshold = otsu(values) if taxel.threshold == "otsu" else taxel.threshold
+        switches[:, number] = values > threshold
+        shown.append(f"{shortened(name)} above {threshold:g}")
+    if shown:
+        notes.append(f"{len(shown)} analog columns became switches, closed {list_names(shown)}")
+    return switches
+
+
+def _joints(reader: "_Reader", selection: Selection) -> NDArray[np.float64]:
+    joints = np.empty((len(reader.table.rows), len(selection.joints)), order="F")
     for number, (name, entry) in enumerate(selection.joints):
         parse, expected = (codes, "codes 0..65535") if entry.codes else (numbers, "finite numbers")
         joints[:, number] = reader.read(name, parse, expected)
-    keep = reader.complete(drop=columns.missing == "drop")
-    readings = Readings(
-        rows=_kept(table.rows, keep),
-        labels=_kept(labels, keep),
-        subjects=_kept(subjects, keep),
-        objects=_kept(objects, keep),
-        trials=_kept(trials, keep).astype(np.int64),
-        switches=_kept(switches, keep),
-        joints=_kept(joints, keep),
-    )
-    return readings, reader.dropped(keep)
+    return joints
 
 
-def _kept(array: NDArray[Value], keep: NDArray[np.bool_]) -> NDArray[Value]:
-    """Return the rows of a 1-D or 2-D `array` that are to be kept; the array itself where all are."""
-    if keep.all():
+def _check_told(what: str, trial_ids: NDArray[np.intp]) -> None:
+    """Raise ColumnsError where rows may be frames of one trial, and nothing says whether they are."""
+    shared = np.bincount(trial_ids)[trial_ids] > 1
+    if shared.any():
+        raise ColumnsError(
+            f"{what}: {int(shared.sum())} rows share subject, grasp type, object and session with others, and nothing "
+            "says which of them are frames of one trial: name the column that does (`trial = ...`, or a list of them), "
+            'or state that each row is a trial of its own (`frames = "independent"`)'
+        )
+
+
+def _kept(array: NDArray[Value], pick: NDArray[np.bool_] | NDArray[np.intp]) -> NDArray[Value]:
+    """Return the rows of a 1-D or 2-D `array` that `pick` takes; the array itself where a mask takes all."""
+    if pick.dtype == np.bool_ and pick.all():
         return array
     if array.ndim == 1:
-        return array[keep]
-    count = int(keep.sum())
+        return array[pick]
+    count = int(pick.sum()) if pick.dtype == np.bool_ else len(pick)
     for column in array.T:
-        column[:count] = column[keep]
+        column[:count] = column[pick]
     return array[:count]
+
+
+def _dropped(readings: Readings, keep: NDArray[np.bool_], missing: dict[str, NDArray[np.bool_]]) -> list[Finding]:
+    """Return what leaving out all rows but those to `keep` costs."""
+    rows = readings.rows[~keep]
+    if not rows.size:
+        return []
+    trial_ids = readings.trial_ids()
+    lost = len(np.unique(trial_ids)) - len(np.unique(trial_ids[keep]))
+    types = sorted(set(readings.labels[~keep & (readings.labels != "")].tolist()) - set(readings.labels[keep].tolist()))
+    lack = list_names([name for name, mask in missing.items() if mask[~keep].any()])
+    message = f"{rows.size} rows with missing values were left out: {list_rows(rows)} (columns {lack})"
+    cost = [f"{lost} of {len(np.unique(trial_ids))} trials"] * bool(lost)
+    cost += [f"grasp type{'s' if len(types) > 1 else ''} {list_names(types)}"] * bool(types)
+    message += f"; so {' and '.join(cost)} are lost" if cost else ""
+    return [Finding("dropped rows", int(rows.size), message, tuple(rows[:SHOWN].tolist()), tuple(missing))]
+
+
+def _filled(
+    what: str,
+    readings: Readings,
+    selection: Selection,
+    missing: dict[str, NDArray[np.bool_]],
+    trial_ids: NDArray[np.intp],
+) -> list[Finding]:
+    """Fill the cells of inputs that are `missing`, in place, and return a finding about them."""
+    inputs = [*selection.switches, *(name for name, _ in selection.taxels)]
+    arrays: dict[str, NDArray[np.bool_] | NDArray[np.float64]] = dict(zip(inputs, readings.switches.T, strict=True))
+    arrays |= zip((name for name, _ in selection.joints), readings.joints.T, strict=True)
+    masks = {name: mask for name, mask in missing.items() if name in arrays and mask.any()}
+    if not masks:
+        return []
+    if empty := [name for name, mask in masks.items() if mask.all()]:
+        raise TableError(f"{what}: column {shortened(repr(empty[0]))} has no values: leave it out")
+    cells = sum(int(mask.sum()) for mask in masks.values())
+    strange = sum(fill(arrays[name], mask, trial_ids) for name, mask in masks.items())
+    rows = readings.rows[np.logical_or.reduce([*masks.values()])]
+    message = (
+        f"{cells} missing cells in {rows.size} rows were filled: {cells - strange} from the nearest frame of their "
+        f"trial, {strange} with their column's median ({list_rows(rows)}; columns {list_names([*masks])})"
+    )
+    return [Finding("filled cells", cells, message, tuple(rows[:SHOWN].tolist()), tuple(masks))]
+
+
+def _reduced(readings: Readings, how: str, trial_ids: NDArray[np.intp], notes: list[str]) -> Readings:
+    """Return one row for each trial, made of its frames; all rows where `how` is "none"."""
+    if how == "none":
+        return readings
+    frames = Frames(trial_ids)
+    reduced = replace(readings, switches=readings.switches[:, :0], joints=readings.joints[:, :0]).kept(frames.middle)
+    if how == "middle":
+        switches, joints = readings.switches[frames.middle], readings.joints[frames.middle]
+    else:
+        switches = _each(frames.any if how == "any" else frames.median, readings.switches, len(frames.middle))
+        joints = _each(frames.median, readings.joints, len(frames.middle))
+    notes.append(f"{len(trial_ids)} frames of {len(frames.middle)} trials were reduced to one row a trial ({how})")
+    return replace(reduced, switches=switches, joints=joints)
+
+
+def _each(make: Callable[[NDArray[Value]], NDArray[Value]], array: NDArray[Value], rows: int) -> NDArray[Value]:
+    made = np.empty((rows, array.shape[1]), array.dtype, order="F")
+    for number, column in enumerate(array.T):
+        made[:, number] = make(column)
+    return made
+
+
+_MISSING = 'missing (missing = "keep" fills them, "drop" leaves their rows out)'
 
 
 class _Reader:
     """Reads columns of one table and keeps account of the cells that are missing or wrong."""
 
-    def __init__(self, table: Table) -> None:
+    def __init__(self, table: Table, columns: Columns) -> None:
         self.table = table
+        # Columns without which a row is not kept: nothing can be put in their place.
+        self.needed = {name for key in KEYS if key != "time" for name in columns.parts(key)}
         self.missing: dict[str, NDArray[np.bool_]] = {}
         self.wrong: dict[str, dict[str, NDArray[np.bool_]]] = {}
 
-    def read(self, name: str, parse: Callable[[Column], Parsed[Value]], expected: str) -> NDArray[Value]:
-        parsed = parse(self.table.columns[name])
+    def read(self, name: str, parse: "Callable[..., Parsed[Value]]", expected: str) -> NDArray[Value]:
+        return self._noted(name, parse(self.table.columns[name], self.table.decimal), expected)
+
+    def _noted(self, name: str, parsed: Parsed[Value], expected: str) -> NDArray[Value]:
         if parsed.missing.any():
             self.missing[name] = parsed.missing
         if parsed.wrong.any():
             self.wrong.setdefault(expected, {})[name] = parsed.wrong
         return parsed.values
 
-    def names(self, column: str | None) -> NDArray[np.str_]:
-        if column is None:
-            return np.full(len(self.table.rows), "1")
+    def names(self, columns: tuple[str, ...]) -> NDArray[np.str_]:
+        """Return what `columns` say together, with blanks between; "1" where there is none."""
+        parts = [self._names(column) for column in columns] or [np.full(len(self.table.rows), "1")]
+        joined = parts[0]
+        for part in parts[1:]:
+            check_room(len(joined), (joined.itemsize + part.itemsize) // 4 + 1, self.table.size)
+            joined = np.char.add(np.char.add(joined, " "), part)
+        return joined
+
+    def _names(self, column: str) -> NDArray[np.str_]:
         parse = partial(names, cells=self.table.cells, size=self.table.size)
         try:
-            return self.read(column, parse, "names that can be printed")
+            return self._noted(column, parse(self.table.columns[column]), "names that can be printed")
         except RecordingError as reason:
             raise TableError(f"{self.table.what}: column {shortened(repr(column))}: {reason}") from reason
 
-    def complete(self, drop: bool) -> NDArray[np.bool_]:
-        """Return which rows miss nothing; raises TableError on wrong cells, and on missing ones unless `drop`."""
+    def trials(self, columns: tuple[str, ...], notes: list[str]) -> NDArray[np.int64]:
+        """Return the number of each row's trial: what one column of whole numbers says, otherwise counted from 1."""
+        if not columns:
+            return np.ones(len(self.table.rows), np.int64)
+        if (
+            len(columns) == 1
+            and not (parsed := integers(self.table.columns[columns[0]], self.table.decimal)).wrong.any()
+        ):
+            return self._noted(columns[0], parsed, "whole numbers").astype(np.int64)
+        trials, texts = numbered([self._names(column) for column in columns])
+        shown = [f"{shortened(repr(text))} is {number}" for number, text in enumerate(texts[:SHOWN], start=1)]
+        what = " and ".join(map(shortened, columns))
+        notes.append(f"the texts of {what} were numbered as trials in natural order: {list_names(shown, len(texts))}")
+        return trials
+
+    def complete(self, missing: str) -> NDArray[np.bool_]:
+        """Return which rows stay; raises TableError on wrong cells, and on missing ones where they are refused."""
         faults = [f"not {expected}: {self._list(columns)}" for expected, columns in self.wrong.items()]
-        if self.missing and not drop:
-            faults.append(f'missing (missing = "drop" leaves their rows out): {self._list(self.missing)}')
+        if self.missing and missing == "refuse":
+            faults.append(f"{_MISSING}: {self._list(self.missing)}")
         if faults:
             raise TableError(f"{self.table.what}: {'; '.join(faults)}")
         keep = np.ones(len(self.table.rows), np.bool_)
-        for missing in self.missing.values():
-            keep &= ~missing
+        for name, mask in self.missing.items():
+            if missing == "drop" or name in self.needed:
+                keep &= ~mask
         if not keep.any():
             raise TableError(f"{self.table.what}: every row misses a value: {self._list(self.missing)}")
         return keep
-
-    def dropped(self, keep: NDArray[np.bool_]) -> list[Finding]:
-        rows = self.table.rows[~keep]
-        if not rows.size:
-            return []
-        lack = list_names(list(self.missing))
-        message = f"{rows.size} rows with missing values were left out: {list_rows(rows)} (columns {lack})"
-        return [Finding("dropped rows", int(rows.size), message, tuple(rows[:SHOWN].tolist()), tuple(self.missing))]
 
     def _list(self, columns: dict[str, NDArray[np.bool_]]) -> str:
         """Return "3 cells, ...": how many cells, and the first of them in the order of rows, then of columns."""
@@ -271,69 +288,12 @@ class _Reader:
         return f"{count} cell{'s' if count > 1 else ''}, {list_names(shown, count)}"
 
 
-# Where the second point of a grid's straight line lies: so far out that its step is the grid to a bit or two.
-_FAR = 1000
-
-
-class CodingCost(msgspec.Struct, frozen=True):
-    """What coding one joint lost: errors in `unit`, distinct values before and after."""
-
-    joint: str
-    unit: str
-    step: float
-    largest_error: float
-    rms_error: float
-    distinct_before: int
-    distinct_after: int
-
-
-def code_joint(
-    name: str, entry: JointColumns, values: NDArray[np.float64], rows: NDArray[np.int64]
-) -> tuple[NDArray[np.uint16], Joint, CodingCost]:
-    """Return the codes (n,) of one column of finite `values` (n,), their calibration, and their cost.
-
-    Raises TableError naming the first of `rows` whose code lies outside 0..65535; RecordingError if the calibration is
-    no straight line.
-    """
-    joint = _joint(name, entry, float(values.min()))
-    codes = values if entry.codes else joint.code(values)
-    outside = (codes < 0) | (codes >= CODES)
-    if outside.any():
-        cause = "check origin and calibration" if (codes < 0).any() else "take a coarser grid"
-        raise TableError(f"joint {name!r}: {list_rows(rows[outside])} would get codes outside 0..{CODES - 1}: {cause}")
-    errors = np.zeros(1) if entry.codes else np.abs(joint.value(codes) - values)
-    step = abs(joint.step)
-    cost = CodingCost(
-        joint=name,
-        unit=joint.unit,
-        step=step,
-        largest_error=float(errors.max()),
-        # In steps, whose squares are neither too large nor too small for a double.
-        rms_error=math.sqrt(float(np.mean((errors / step) ** 2))) * step,
-        distinct_before=len(np.unique(values)),
-        distinct_after=len(np.unique(codes)),
-    )
-    return codes.astype(np.uint16), joint, cost
-
-
-def _joint(name: str, entry: JointColumns, least: float) -> Joint:
-    if entry.calibration is not None:
-        points = entry.calibration
-        return Joint(name, entry.unit, points.code_a, points.value_a, points.code_b, points.value_b)
-    if entry.codes:
-        return Joint(name, entry.unit, 0, 0.0, 1, 1.0)
-    steps = least / entry.step
-    # Where the grid cannot be counted, no Joint will have it either.
-    floor = math.floor(steps) * entry.step if math.isfinite(steps) else least
-    origin = floor if entry.origin is None else entry.origin
-    return Joint(name, entry.unit, 0, origin, _FAR, origin + _FAR * entry.step)
-
-
 class ImportReport(msgspec.Struct, frozen=True):
-    """What `thenar import` says: what is in the set, what coding cost per joint, and what is odd."""
+    """What `thenar import` says: what is in the set, what coding cost per joint, what was made of it, what is odd."""
 
     table: str
     rows: int
+    trials: int
     subjects: int
     objects: int
     grasp_types: int
@@ -341,6 +301,7 @@ class ImportReport(msgspec.Struct, frozen=True):
     switches: int
     joints: int
     coding: tuple[CodingCost, ...]
+    notes: tuple[str, ...]
     warnings: tuple[Finding, ...]
 
 
@@ -350,22 +311,23 @@ def import_file(table: Path, columns: Path) -> tuple[GraspSet, ImportReport]:
     Raises TableError, ColumnsError or RecordingError, naming file, rows and columns; OSError as it comes.
     """
     wanted = read_columns(columns)
-    return import_table(read_table(table, wanted.delimiter), wanted)
+    return import_table(read_table(table, wanted.text), wanted)
 
 
 def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport]:
     """Import `table` as `columns` says; raises TableError, ColumnsError or RecordingError."""
     selection = select(columns, list(table.columns))
-    readings, dropped = read_cells(table, columns, selection)
+    readings, warnings, notes = read_cells(table, columns, selection)
     grasps, taxonomy, aliases = _labels(table, columns, readings)
     joints = [
         code_joint(name, entry, readings.joints[:, column], readings.rows)
         for column, (name, entry) in enumerate(selection.joints)
     ]
+    costs = tuple(cost for _, _, cost in joints)
     empty = np.zeros((len(grasps), 0), np.uint16)
     grasp_set = GraspSet(
         switches=readings.switches,
-        switch_names=selection.switches,
+        switch_names=(*selection.switches, *(name for name, _ in selection.taxels)),
         codes=np.stack([codes for codes, _, _ in joints], axis=1) if joints else empty,
         joints=tuple(joint for _, joint, _ in joints),
         grasps=grasps,
@@ -373,18 +335,29 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
         subjects=readings.subjects,
         objects=readings.objects,
         trials=readings.trials,
+        sessions=readings.sessions,
+        independent=columns.frames == "independent",
     )
-    warnings = (*dropped, *aliases, *find_oddities(grasp_set, readings.rows))
-    return grasp_set, report_of(table.what, grasp_set, tuple(cost for _, _, cost in joints), warnings)
+    warnings += [
+        *aliases,
+        *coarse(zip(costs, readings.joints.T, strict=True)),
+        *find_oddities(grasp_set, readings.rows),
+    ]
+    return grasp_set, report_of(table.what, grasp_set, costs, warnings, notes)
 
 
 def report_of(
-    what: str, grasp_set: GraspSet, coding: tuple[CodingCost, ...], warnings: tuple[Finding, ...]
+    what: str,
+    grasp_set: GraspSet,
+    coding: tuple[CodingCost, ...],
+    warnings: Iterable[Finding],
+    notes: Iterable[str] = (),
 ) -> ImportReport:
     """Return what is to be said of `grasp_set`, which was imported from `what`."""
     return ImportReport(
         table=what,
         rows=len(grasp_set),
+        trials=len(np.unique(grasp_set.trial_ids)),
         subjects=len(np.unique(grasp_set.subjects)),
         objects=len(np.unique(grasp_set.objects)),
         grasp_types=len(np.unique(grasp_set.labels)),
@@ -392,7 +365,8 @@ def report_of(
         switches=len(grasp_set.switch_names),
         joints=len(grasp_set.joints),
         coding=coding,
-        warnings=warnings,
+        notes=tuple(notes),
+        warnings=tuple(warnings),
     )
 
 
@@ -410,12 +384,11 @@ def _labels(table: Table, columns: Columns, readings: Readings) -> tuple[NDArray
     types = [find(label) for label in aliased]
     unknown = np.array([name is None for name in types])[where]
     if unknown.any():
-        label = aliased[where[np.flatnonzero(unknown)[0]]]
+        strange = [label for label, name in zip(aliased, types, strict=True) if name is None]
         raise TableError(
-            f"{table.what}: {unknown.sum()} unknown labels in {shortened(repr(columns.label))}, "
-            f"{list_rows(readings.rows[unknown])}; "
-            f"{shortened(repr(label))} is no grasp type of {taxonomy.name}{taxonomy.suggestion(label)}; "
-            "[labels] can translate it"
+            f"{table.what}: {len(strange)} labels in {shortened(repr(columns.label))} are no grasp types of "
+            f"{taxonomy.name}: {_unknown(strange, taxonomy)}; {unknown.sum()} rows have them, "
+            f"{list_rows(readings.rows[unknown])}; [labels] can translate them"
         )
     unused = sorted(columns.labels.keys() - set(found.tolist()))
     message = f"{len(unused)} entries of [labels] occur in no row: {list_names(unused)}"
@@ -425,6 +398,24 @@ def _labels(table: Table, columns: Columns, readings: Readings) -> tuple[NDArray
         taxonomy,
         [Finding("unused aliases", len(unused), message)] if unused else [],
     )
+
+
+# Labels that a message names, and those of them with what they may mean.
+_NAMED, _SUGGESTED = 30, 3
+
+
+def _unknown(labels: list[str], taxonomy: Taxonomy) -> str:
+    """Return the labels that are no grasp types, all of them as far as a message goes, the first with suggestions."""
+    long = len(labels) > _SUGGESTED
+    shown = [f"{shortened(repr(label))}{taxonomy.suggestion(label)}" for label in labels[:_SUGGESTED]]
+    room, rest = 400, labels[_SUGGESTED:_NAMED]
+    for label in rest if long else ():
+        room -= len(shortened(repr(label)))
+        if room < 0:
+            break
+        shown.append(shortened(repr(label)))
+    more = len(labels) - len(shown)
+    return ", ".join(shown) + (f" and {more} more" if more else "")
 
 
 def _taxonomy(columns: Columns, labels: list[str]) -> Taxonomy:

@@ -18,10 +18,12 @@ from thenar.runtime.recording.messages import switch_matrix
 from thenar.runtime.recording.reader import Reader, check_made
 from thenar.runtime.recording.session import Collection, Label, Session
 
+from .coding import CodingCost, code_joint
 from .columns import Calibration, JointColumns
 from .errors import ColumnsError, TableError, list_rows
 from .graspset import GraspSet, Joint
-from .importer import CodingCost, ImportReport, code_joint, import_file, report_of
+from .importer import ImportReport, import_file, import_table, report_of
+from .propose import propose_file
 from .summary import Finding, find_oddities
 from .taxonomy import Taxonomy
 
@@ -58,6 +60,8 @@ class _Part:
 def import_files(paths: Sequence[Path], columns: Path | None = None) -> tuple[GraspSet, ImportReport]:
     """Import one table as the columns.toml in file `columns` says, or recordings, which say themselves what they hold.
 
+    Without `columns`, what the columns of a table are is found from their names and values.
+
     Raises TableError, ColumnsError, RecordingError or McapError, naming file, rows and columns; OSError as it comes.
     """
     if all(path.suffix.lower() == ".mcap" for path in paths):
@@ -67,7 +71,10 @@ def import_files(paths: Sequence[Path], columns: Path | None = None) -> tuple[Gr
     if len(paths) > 1:
         raise TableError("several recordings (.mcap) can be imported together, but only one table")
     if columns is None:
-        raise ColumnsError(f"{paths[0].name} is a table: say what its columns are with a columns.toml (--columns)")
+        table, proposal = propose_file(paths[0])
+        if proposal.lacks:
+            raise ColumnsError(f"{paths[0].name}: {proposal.lacks}, in a columns.toml")
+        return import_table(table, proposal.columns)
     return import_file(paths[0], columns)
 
 

@@ -57,11 +57,12 @@ def merge(sets: Mapping[str, GraspSet], each: By | None = None) -> GraspSet:
         _check_columns(names[0], first, name, other)
     taxonomy = _united(names, own)
     _check_trials(names, own)
-    joints = tuple(_line(names, [_joint(found, joint.name) for found in own]) for joint in first.joints)
+    joints, codes = _coded(names, [(found.joints, found.codes) for found in own])
+    taxel_columns, taxels = _coded(names, [(found.taxel_columns, found.taxels) for found in own])
     return GraspSet(
         switches=np.concatenate([found.switches[:, _places(first.switch_names, found.switch_names)] for found in own]),
         switch_names=first.switch_names,
-        codes=np.concatenate([_codes(name, found, joints) for name, found in zip(names, own, strict=True)]),
+        codes=codes,
         joints=joints,
         grasps=np.concatenate([found.grasps for found in own]),
         taxonomy=taxonomy,
@@ -71,6 +72,8 @@ def merge(sets: Mapping[str, GraspSet], each: By | None = None) -> GraspSet:
         simulated=_origin(own),
         sessions=np.concatenate([found.sessions for found in own]),
         independent=first.independent,
+        taxels=taxels,
+        taxel_columns=taxel_columns,
     )
 
 
@@ -130,6 +133,7 @@ def _of_its_own(name: str, found: GraspSet, each: By) -> GraspSet:
 def _check_columns(first_name: str, first: GraspSet, name: str, other: GraspSet) -> None:
     for what, ours, theirs in (
         ("switch", first.switch_names, other.switch_names),
+        ("taxel", first.element_names, other.element_names),
         ("joint", first.joint_names, other.joint_names),
     ):
         for lacking, having, of, than in ((theirs, ours, name, first_name), (ours, theirs, first_name, name)):
@@ -177,8 +181,18 @@ def _check_trials(names: list[str], sets: list[GraspSet]) -> None:
         owner |= trials
 
 
-def _joint(found: GraspSet, name: str) -> Joint:
-    return found.joints[found.joint_names.index(name)]
+_Coded = tuple[tuple[Joint, ...], NDArray[np.uint16]]
+
+
+def _coded(names: list[str], sets: list[_Coded]) -> _Coded:
+    """Return the columns of all `sets` in the order of the first, and all codes (n, j), set after set."""
+    own = [{joint.name: (joint, codes[:, place]) for place, joint in enumerate(joints)} for joints, codes in sets]
+    lines = tuple(_line(names, [found[joint.name][0] for found in own]) for joint in sets[0][0])
+    codes = np.zeros((sum(len(codes) for _, codes in sets), len(lines)), np.uint16)
+    for place, line in enumerate(lines):
+        moved = [_moved(name, line, *found[line.name]) for name, found in zip(names, own, strict=True)]
+        codes[:, place] = np.concatenate(moved)
+    return lines, codes
 
 
 def _line(names: list[str], joints: list[Joint]) -> Joint:
@@ -189,7 +203,7 @@ def _line(names: list[str], joints: list[Joint]) -> Joint:
         drift = abs(joint.step / first.step - 1) * CODES
         if joint.unit != first.unit or max(abs(shift - np.rint(shift)), drift) > _SAME:
             raise RecordingError(
-                f"joint {shortened(joint.name)} is calibrated otherwise in {name} than in {names[0]}: code 0 is "
+                f"{shortened(joint.name)} is calibrated otherwise in {name} than in {names[0]}: code 0 is "
                 f"{joint.value(0):.6g} {shortened(joint.unit)} and a step {joint.step:.6g}, not "
                 f"{first.value(0):.6g} {shortened(first.unit)} and {first.step:.6g}; import both with one "
                 "`calibration`, or one `grid` and `origin`"
@@ -198,18 +212,12 @@ def _line(names: list[str], joints: list[Joint]) -> Joint:
     return min(joints, key=lambda joint: float(joint.value(0)) / first.step)
 
 
-def _codes(name: str, found: GraspSet, joints: tuple[Joint, ...]) -> NDArray[np.uint16]:
-    codes = np.empty((len(found), len(joints)), np.uint16)
-    for column, joint in enumerate(joints):
-        own = _joint(found, joint.name)
-        shift = int(np.rint(joint.code(own.value_a))) - own.code_a
-        moved = found.codes[:, found.joint_names.index(joint.name)].astype(np.int64) + shift
-        if moved.size and moved.max() >= CODES:
-            raise RecordingError(
-                f"{name}: joint {shortened(joint.name)} gets codes above {CODES - 1}: take another grid"
-            )
-        codes[:, column] = moved
-    return codes
+def _moved(name: str, line: Joint, own: Joint, codes: NDArray[np.uint16]) -> NDArray[np.int64]:
+    """Return on `line` the codes (n,) that mean what they did on their `own`."""
+    moved = codes.astype(np.int64) + (int(line.code(own.value_a)) - own.code_a)
+    if moved.max(initial=0) >= CODES:
+        raise RecordingError(f"{name}: {shortened(line.name)} gets codes above {CODES - 1}: import with a coarser grid")
+    return moved
 
 
 def _places(wanted: tuple[str, ...], names: tuple[str, ...]) -> list[int]:

@@ -1,9 +1,10 @@
-"""Tables of labelled grasps in: CSV, Weka's ARFF, npz.
+"""Tables of labelled grasps in: text with delimiters, Weka's ARFF, npz; those of other programs by foreign.py.
 
 ARFF has numeric and nominal attributes, quoted names and values, `?` for a missing value. It is read here and not by
 scipy, whose reader loses quotes in nominal values, knows no rows, and is not on a board.
 """
 
+import codecs
 import csv
 import gzip
 import io
@@ -26,25 +27,40 @@ from thenar.runtime.names import list_names, shortened
 
 from ..text import text_of
 from .arrays import AnyArray, read_arrays
+from .columns import PLAIN, TextFormat
 from .errors import COLUMNS, LARGEST, LONGEST_LINE, ROWS, RecordingError, TableError, check_names, unpacked
+from .foreign import READERS, read_foreign
 
 
 @contextmanager
-def open_lines(path: Path) -> Iterator[Iterator[str]]:
-    """Open a text file, gzipped or not, behind its byte order mark; a fault of its content becomes a TableError."""
-    zipped = path.suffix.lower() == ".gz"
+def open_bytes(path: Path) -> Iterator[BinaryIO]:
+    """Open a file of text, gzipped or not; a fault of the packing becomes a TableError."""
     try:
         with open_file(path, TableError) as raw:
             size = os.fstat(raw.fileno()).st_size
             if size > LARGEST:
                 raise TableError(f"{path.name} is larger than {LARGEST} bytes, the most that is read of a table")
-            file = io.BufferedReader(_Unpacked(path.name, raw, unpacked(size))) if zipped else raw
-            with io.TextIOWrapper(file, "utf-8-sig", newline="") as text:
-                yield _lines(path.name, text)
+            zipped = path.suffix.lower() == ".gz"
+            yield io.BufferedReader(_Unpacked(path.name, raw, unpacked(size))) if zipped else raw
     except (gzip.BadGzipFile, EOFError, zlib.error) as reason:
         raise TableError(f"{path.name} is damaged: {reason}") from reason
-    except UnicodeDecodeError as reason:
-        raise TableError(f"{path.name} is not UTF-8 text: {reason.reason}; save it as UTF-8") from reason
+
+
+@contextmanager
+def open_lines(path: Path, encoding: str = "utf-8") -> Iterator[Iterator[str]]:
+    """Open a text file, gzipped or not, behind its byte order mark; a fault of its content becomes a TableError."""
+    known = codecs.lookup(encoding).name
+    try:
+        with (
+            open_bytes(path) as file,
+            io.TextIOWrapper(file, "utf-8-sig" if known == "utf-8" else known, newline="") as text,
+        ):
+            yield _lines(path.name, text)
+    except UnicodeError as reason:
+        why = getattr(reason, "reason", str(reason))
+        raise TableError(
+            f"{path.name} is not {known.upper()} text: {why}; save it as UTF-8, or name its `encoding`"
+        ) from reason
 
 
 class _Unpacked(io.RawIOBase):
@@ -203,8 +219,9 @@ Column = Sequence[str] | AnyArray
 class Table:
     """Named columns of equal length: text as it was read, or numbers, NaN where one is missing.
 
-    `rows` are the rows' numbers as the user sees them: the line in a CSV, counted from 1 elsewhere. `size` is how many
-    bytes its file has. `cells` says that names are written as cells of a spreadsheet.
+    `rows` are the rows' numbers as the user sees them: the line in a CSV or a spreadsheet, counted from 1 elsewhere.
+    `size` is how many bytes its file has. `cells` says that names are written as cells of a spreadsheet, `decimal` what
+    is before the fractions of numbers in text.
     """
 
     what: str
@@ -212,25 +229,40 @@ class Table:
     rows: NDArray[np.int64]
     size: int = 0
     cells: bool = False
+    decimal: str = "."
 
 
-def read_table(path: Path, delimiter: str = ",") -> Table:
-    """Read a table by its suffix: .csv, .csv.gz, .arff, .arff.gz, .npz.
+_TEXTS = (".csv", ".tsv", ".txt", ".csv.gz", ".tsv.gz", ".txt.gz")
+SUFFIXES = (*_TEXTS, ".arff", ".arff.gz", ".npz", *READERS)
+
+
+def is_text(path: Path) -> bool:
+    """Return whether `path` is, by its name, a table of text with delimiters."""
+    return path.name.lower().endswith(_TEXTS)
+
+
+def read_table(path: Path, text: TextFormat = PLAIN) -> Table:
+    """Read a table by its suffix; one of `text` with delimiters as it is written.
 
     Raises TableError naming the file, the row and what is wrong with it; OSError as the operating system gives it.
     """
-    suffixes = "".join(path.suffixes[-2:]).lower()
+    name = path.name.lower()
     try:
-        if path.suffix.lower() == ".npz":
-            table = _read_npz(path)
-        elif suffixes.endswith((".arff", ".arff.gz")):
+        if is_text(path):
+            with open_lines(path, text.encoding) as lines:
+                tabs = name.removesuffix(".gz").endswith(".tsv")
+                table = _read_csv(path.name, lines, text, text.delimiter or ("\t" if tabs else ","))
+        elif name.endswith((".arff", ".arff.gz")):
             with open_lines(path) as lines:
                 table = read_arff(path.name, lines)
-        elif suffixes.endswith((".csv", ".csv.gz")):
-            with open_lines(path) as lines:
-                table = _read_csv(path.name, lines, delimiter)
+        elif name.endswith(".npz"):
+            table = _read_npz(path)
+        elif name.endswith(tuple(READERS)):
+            columns, rows = read_foreign(path)
+            check_names("column", columns)
+            table = Table(path.name, columns, rows)
         else:
-            raise TableError(f"{path.name}: a table ends in .csv, .csv.gz, .arff, .arff.gz or .npz")
+            raise TableError(f"{path.name}: a table ends in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
     except RecordingError as reason:
         raise TableError(f"{path.name}: {reason}") from reason
     if not len(table.rows):
@@ -238,27 +270,38 @@ def read_table(path: Path, delimiter: str = ",") -> Table:
     return replace(table, size=path.stat().st_size)
 
 
-def _read_csv(what: str, lines: Iterator[str], delimiter: str) -> Table:
-    reader = csv.reader(_narrow(what, lines, delimiter), delimiter=delimiter, strict=True)
+def _read_csv(what: str, lines: Iterator[str], text: TextFormat, delimiter: str) -> Table:
+    reader = csv.reader(
+        _narrow(what, lines, delimiter),
+        delimiter=delimiter,
+        strict=True,
+        quotechar=text.quote or None,
+        quoting=csv.QUOTE_MINIMAL if text.quote else csv.QUOTE_NONE,
+    )
     rows = array("q")
     try:
-        filled = filter(None, reader)
-        names = [text_of(name.strip()) for name in next(filled, [])]
+        filled: Iterator[list[str]] = filter(None, reader)
+        first: list[str] = next(filled, [])
+        names = [text_of(name.strip()) if text.header else "" for name in first]
+        names = [name or f"column {number}" for number, name in enumerate(names, start=1)]
         cells = TextRows(len(names))
+        if first and not text.header:
+            filled = chain([first], filled)
         for row in filled:
+            if len(row) > len(names) and not any(row[len(names) :]):
+                del row[len(names) :]
             if len(row) != len(names):
-                raise TableError(f"{what} row {reader.line_num} has {len(row)} cells, its header {len(names)}")
+                top = "header" if text.header else "first row"
+                raise TableError(f"{what} row {reader.line_num} has {len(row)} cells, its {top} {len(names)}")
             rows.append(reader.line_num)
             if len(rows) > ROWS:
                 raise TableError(f"{what} has more than {ROWS} rows, the most that are read of a table")
             cells.append(row)
     except csv.Error as reason:
         raise TableError(f"{what} row {reader.line_num}: {reason}") from reason
-    if "" in names:
-        raise TableError(f"{what}: column {names.index('') + 1} has no name in the header: give it one")
     check_names("column", names)
     columns = dict(zip(names, cells.columns(), strict=True))
-    return Table(what, columns, np.frombuffer(rows, np.int64), cells=True)
+    return Table(what, columns, np.frombuffer(rows, np.int64), cells=True, decimal=text.decimal)
 
 
 def _narrow(what: str, lines: Iterable[str], delimiter: str) -> Iterator[str]:

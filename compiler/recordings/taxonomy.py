@@ -128,8 +128,8 @@ class Taxonomy:
 
 
 def _plain(label: str) -> str:
-    """Return `label` with case, underscores and punctuation levelled: "Sphere_4_finger" -> "sphere 4 finger"."""
-    words = re.sub(r"[\W_]+", " ", label.casefold()).strip()
+    """Return `label` without case, blanks, underscores and punctuation: "Sphere_4-Finger" -> "sphere4finger"."""
+    words = re.sub(r"[\W_]+", "", label.casefold())
     # Without int(), which takes no more than 4,300 digits; other scripts' digits count as ours.
     if words.isdecimal():
         return "".join(str(decimal(digit)) for digit in words).lstrip("0") or "0"
@@ -148,6 +148,13 @@ def published(name: str) -> Taxonomy:
             f"no taxonomy is called {shortened(repr(name))}: take one of {', '.join(_PUBLISHED)}, own, or a list"
         )
     return Taxonomy(name, _PUBLISHED[name])
+
+
+def published_for(labels: Iterable[str]) -> str | None:
+    """Return the name of the one published taxonomy whose types all `labels` name, None where none or several have."""
+    written = [label for label in labels if not _plain(label).isdecimal()]
+    fitting = [name for name in _PUBLISHED if written and all(map(published(name).finder(), labels))]
+    return fitting[0] if len(fitting) == 1 and written else None
 
 
 def is_published(taxonomy: Taxonomy) -> bool:

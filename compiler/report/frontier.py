@@ -184,7 +184,7 @@ def _facts(point: Point) -> Iterable[tuple[str, str]]:
     yield "Tables", f"{training_of(setting)}, {setting.width} bits{layout}"
     ending = "ends early" if setting.scan == "early" else "full"
     yield "Scan", f"{_time(point.scan)}; {ending}" if point.switches else DASH
-    yield "CyberGlove's record", DASH if setting.inputs == "switches" else _time(point.transfer)
+    yield "Joints", DASH if setting.inputs == "switches" else _time(point.transfer)
     yield "Classify", _time(point.classify)
     yield "Frame", _time(point.frame)
     yield "Decision", setting.decision
@@ -210,7 +210,7 @@ def _latency(point: Point) -> tuple[str, str]:
 
 
 def _time(time: Time) -> str:
-    return f"{microseconds(time.us)} µs ({time.how})"
+    return "unknown, left out" if time.how == "unknown" else f"{microseconds(time.us)} µs ({time.how})"
 
 
 def _points(frontier: Frontier) -> PlainTable:

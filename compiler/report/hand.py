@@ -60,6 +60,8 @@ def _view_box(hand: HandShape) -> str:
 
 
 def _path(points: Floats, *, closed: bool) -> str:
+    if not len(points):
+        return ""
     drawn = [points[0]]
     for point in points[1:-1]:
         if np.hypot(*(point - drawn[-1])) >= _NEAREST_MM:

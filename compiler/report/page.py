@@ -87,7 +87,7 @@ def _hand(content: ReportContent) -> HandPicture | None:
         return None
     kept, most = len(content.switch_names), len(content.hand.names)
     summary = (
-        f"A right hand, palm up, thumb right, the sides of its digits unfolded; {kept} of {most} switches are kept and "
-        "numbered in the order in which they were chosen. The table beside it says which they are."
+        f"{content.hand.view}; {kept} of {most} switches are kept and numbered in the order in which they were chosen. "
+        "The table beside it says which they are."
     )
-    return hand_picture(content.hand, content.switch_names, "kept-hand", "Kept switches on the hand", summary)
+    return hand_picture(content.hand, content.switch_names, "kept-hand", "Kept switches on the hand", sentence(summary))

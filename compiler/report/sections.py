@@ -7,6 +7,7 @@ from itertools import accumulate
 import msgspec
 
 from thenar.runtime.manifest import Manifest
+from thenar.runtime.scanning.propose import own_joints
 from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, scan_us, scanner_us
 
 from ..placement.gain import entropy_bits
@@ -38,16 +39,25 @@ def facts(content: ReportContent) -> Iterator[tuple[str, str, str]]:
     for rate in sorted(manifest.rates, key=lambda rate: rate.protocol == "training"):
         yield f"Recognised, {rate.title}", percent(rate.rate, NBSP), rate.basis
     yield "Switches kept", f"{len(manifest.switches)}", f"of {manifest.source.switches}"
-    yield "Joints", f"{len(manifest.joints)}", "of the CyberGlove" if manifest.joints else "none are used"
+    whose = "of a source of your own" if _unread(content) else "of the CyberGlove"
+    yield "Joints", f"{len(manifest.joints)}", whose if manifest.joints else "none are used"
     ended = f"of {manifest.options.rounds}: the tolerance ended the training"
     yield "Rounds", f"{content.rounds}", ended if manifest.stopped_after else "of boosting"
     yield "Tables", f"{content.tables_bytes:,}", "bytes of tables.bin"
     yield "Changed by rounding", f"{manifest.proof.changed}", f"of {counted(manifest.source.rows, 'row')}"
 
 
+def _unread(content: ReportContent) -> str:
+    """Return a sentence on joints that no CyberGlove measures; "" without any, or where one is wired."""
+    wired = content.harness is not None and content.harness.cyberglove is not None
+    return "" if wired else own_joints([joint.name for joint in content.manifest.joints])
+
+
 def warnings(content: ReportContent) -> Iterator[str]:
     """Yield what to beware of."""
     manifest = content.manifest
+    if unread := _unread(content):
+        yield sentence(unread)
     if content.only_answer is not None:
         yield (
             f"Every row is recognised as {content.only_answer}: no input tells grasp types apart by itself, and stumps "

@@ -14,6 +14,7 @@ from ..harness.wiring import GloveWiring, Harness
 from ..policy import Policy
 from ..scanning.decided import EarlyExit
 from ..scanning.plan import check_harness, plan_scan
+from ..scanning.propose import own_joints
 from ..scanning.scanmap import ScanMap
 from ..sources.base import slowest_us
 from ..sources.cyberglove import sensors_of
@@ -42,7 +43,9 @@ class System:
         """
         glove = harness.cyberglove
         calibration = None if glove is None or glove.calibration is None else load_calibration(Path(glove.calibration))
-        return cls(build, harness, cls.map_of(build, harness), sensor_names_of(glove), calibration, policy or Policy())
+        # A source of one's own sends the codes of the build's joints, in their order.
+        names = sensor_names_of(glove) or tuple(joint.name for joint in build.manifest.joints)
+        return cls(build, harness, cls.map_of(build, harness), names, calibration, policy or Policy())
 
     @staticmethod
     def map_of(build: Build, harness: Harness) -> ScanMap:
@@ -57,6 +60,15 @@ class System:
     def switch_names(self) -> tuple[str, ...]:
         """The kept switches, in the order of the frames' bits."""
         return tuple(switch.name for switch in self.build.manifest.switches)
+
+    @property
+    def unread(self) -> str:
+        """A sentence on the build's joints where nothing in the harness reads them; "" where all is read."""
+        joints = [joint.name for joint in self.build.manifest.joints]
+        if not joints or slowest_us(self.harness, self.scan, "joints") is not None:
+            return ""
+        how = own_joints(joints) or "add the [cyberglove] that measures them"
+        return f"nothing in {self.harness.name!r} reads the build's joints, and every grasp is degraded: {how}"
 
     def recognizer(self) -> LiveRecognizer:
         """Return a recogniser of what the devices deliver.

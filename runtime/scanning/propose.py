@@ -3,12 +3,13 @@
 from collections.abc import Iterator, Sequence
 from itertools import islice
 
+from thenar.drivers.cyberglove_protocol import SENSORS, sensors_with
 from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips import CHIPS, Chip
 
 from ..errors import HarnessError
 from ..harness.wiring import MOST_KEYS, BusWiring, ChipWiring, GloveWiring, Harness, MuxChannel, ScannerWiring
-from ..names import nearest
+from ..names import list_names, nearest
 
 # What every board's I2C does, and most chips; slower where the chip is.
 CLOCK_HZ = 400_000
@@ -59,6 +60,24 @@ def propose_board(
         )
     board = ScannerWiring(port=port, switches=tuple(switch_names))
     return Harness(name=name, cyberglove=cyberglove, scanners=(board,) if switch_names else ())
+
+
+def propose_cyberglove(joints: Sequence[str]) -> GloveWiring | None:
+    """Return a CyberGlove that measures joints of these names; None where they are a glove of one's own."""
+    sensors = sensors_with(joints)
+    if sensors is None:
+        return None
+    return GloveWiring(port="/dev/ttyUSB0", sensors=None if sensors == SENSORS else 22)
+
+
+def own_joints(joints: Sequence[str]) -> str:
+    """Return a sentence on what has to read joints that no CyberGlove measures; "" for others, and without joints."""
+    if not joints or sensors_with(joints) is not None:
+        return ""
+    return (
+        f"joints {list_names(joints)} have to be read by a source of your own: the converter of a board ([analog] of "
+        "board.toml), or a source that you add (docs/extending.md)"
+    )
 
 
 def _inputs(chip: Chip) -> list[str]:

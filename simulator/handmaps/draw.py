@@ -17,8 +17,7 @@ from thenar.compiler.hand import HandShape, MapError
 from thenar.compiler.pictures import painting, rendered
 from thenar.compiler.recordings.graspset import GraspSet
 
-from ..body.hand import DIGITS
-from .handmap import PARTS, RADIUS_MM, Floats, hand_map
+from .handmap import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,11 +48,13 @@ class Panel:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """Hands side by side, what full and hollow dots mean ("" for none), and what shade 1 of the colour bar is worth.
+    """The hand, side by side once for each panel, what full and hollow dots mean ("" for none), and what shade 1 of the
+    colour bar is worth.
 
     full: what a full dot means when there is no colour bar, and the bar's title when there is one.
     """
 
+    hand: HandShape
     panels: tuple[Panel, ...]
     full: str
     hollow: str
@@ -61,20 +62,20 @@ class Picture:
     hollow_mark: str = ""  # what the key writes into its hollow dot
 
 
-def all_switches(numbered: bool) -> Picture:
+def all_switches(glove: HandShape, numbered: bool) -> Picture:
     """Return the glove with all its switches, with their numbers in the set (from 0) if `numbered`."""
-    glove = hand_map()
     dots = tuple(Dot(f"{n} {name}", mark=str(n) if numbered else "") for n, name in enumerate(glove.names))
     words = "switch and its number, from 0" if numbered else "switch"
     return Picture(
-        (Panel("murakami160", _counts(glove, np.arange(len(dots)), "switches"), dots),),
+        glove,
+        (Panel(glove.glove, _counts(glove, np.arange(len(dots)), "switches"), dots),),
         "",
         words,
         hollow_mark="7" if numbered else "",
     )
 
 
-def contacts(grasp_set: GraspSet, per_grasp: bool) -> Picture:
+def contacts(glove: HandShape, grasp_set: GraspSet, per_grasp: bool) -> Picture:
     """Return how often each switch closed over all rows or, one hand each, in each grasp type that has rows.
 
     All hands share one scale, up to the largest share. Raises MapError if the set has no rows, no switches, or a switch
@@ -84,7 +85,7 @@ def contacts(grasp_set: GraspSet, per_grasp: bool) -> Picture:
         raise MapError("the set has no switches to draw: it holds joints only")
     if not len(grasp_set):
         raise MapError("a set without rows has no contacts to draw")
-    numbers = hand_map().numbers_of(grasp_set.switch_names)
+    numbers = glove.numbers_of(grasp_set.switch_names)
     groups = [np.arange(len(grasp_set))]
     titles = ["all grasps"]
     if per_grasp:
@@ -94,23 +95,24 @@ def contacts(grasp_set: GraspSet, per_grasp: bool) -> Picture:
     closed = [grasp_set.switches[rows].sum(axis=0) for rows in groups]
     top = max(float((count / len(rows)).max()) for count, rows in zip(closed, groups, strict=True)) or 1.0
     panels = (
-        _contact_panel(title, numbers, count, len(rows), top)
+        _contact_panel(glove, title, numbers, count, len(rows), top)
         for title, count, rows in zip(titles, closed, groups, strict=True)
     )
-    return Picture(tuple(panels), "share of grasps in which the switch closed", "never closed", top)
+    return Picture(glove, tuple(panels), "share of grasps in which the switch closed", "never closed", top)
 
 
-def kept(placements: Sequence[tuple[str, Sequence[str]]]) -> Picture:
+def kept(glove: HandShape, placements: Sequence[tuple[str, Sequence[str]]]) -> Picture:
     """Return the glove once for each (title, names of switches in the order in which they were chosen).
 
     Raises MapError if a name is not a switch of the glove, or stands twice in one placement.
     """
-    panels = tuple(_kept_panel(title, names) for title, names in placements)
-    return Picture(panels, "kept, in the order chosen", "left out")
+    panels = tuple(_kept_panel(glove, title, names) for title, names in placements)
+    return Picture(glove, panels, "kept, in the order chosen", "left out")
 
 
-def _contact_panel(title: str, numbers: NDArray[np.intp], closed: NDArray[np.intp], rows: int, top: float) -> Panel:
-    glove = hand_map()
+def _contact_panel(
+    glove: HandShape, title: str, numbers: NDArray[np.intp], closed: NDArray[np.intp], rows: int, top: float
+) -> Panel:
     dots = [Dot(f"{name}: not in the set", absent=True) for name in glove.names]
     for number, count in zip(numbers.tolist(), closed.tolist(), strict=True):
         hint = f"{glove.names[number]}: closed in {count} of {rows} grasps ({count / rows:.1%})"
@@ -123,8 +125,7 @@ def _type_title(grasp_set: GraspSet, label: int) -> str:
     return name if name == full else f"{name}: {full}"
 
 
-def _kept_panel(title: str, names: Sequence[str]) -> Panel:
-    glove = hand_map()
+def _kept_panel(glove: HandShape, title: str, names: Sequence[str]) -> Panel:
     numbers = glove.numbers_of(names)
     twice = next((name for place, name in enumerate(names) if name in names[:place]), None)
     if twice is not None:
@@ -136,21 +137,22 @@ def _kept_panel(title: str, names: Sequence[str]) -> Panel:
 
 
 def _counts(glove: HandShape, numbers: NDArray[np.intp], what: str) -> str:
-    by_part = np.bincount(glove.parts[numbers], minlength=len(PARTS)).tolist()
-    return f"{len(numbers)} {what}: " + ", ".join(f"{part} {count}" for part, count in zip(PARTS, by_part, strict=True))
+    by_part = np.bincount(glove.parts[numbers], minlength=len(glove.part_names)).tolist()
+    parts = [f"{part} {count}" for part, count in zip(glove.part_names, by_part, strict=True)]
+    return f"{len(numbers)} {what}" + (f": {', '.join(parts)}" if len(parts) > 1 else "")
 
 
 SKIN, SIDE, LINE, CREASE, INK = "#f9f1e9", "#eee3d8", "#57493e", "#c9b09a", "#14304f"
 _COLOURS, _LIGHTEST = "magma_r", 0.07  # a switch that closed at all is no longer white
-_MARGIN_MM = 3.0
+_MARGIN_MM, _USUAL_MM = 3.0, 1.8  # around a hand; the radius of a dot whose edge is as thick as thin lines are
 _LONGEST_TITLE = 40
 _SPELT_OUT = 1.5  # printer's points per mm of the map from which on digits are named in full
 
 
-def bounds() -> tuple[float, float, float, float]:
+def bounds(glove: HandShape) -> tuple[float, float, float, float]:
     """Return left, right, bottom and top of a hand with all that is drawn of it, mm."""
-    glove = hand_map()
-    points = np.concatenate([glove.outline, *glove.strips, glove.labels])
+    reach = np.array([glove.radius_mm, glove.radius_mm])
+    points = np.concatenate([glove.outline, *glove.strips, glove.labels, glove.places - reach, glove.places + reach])
     (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
     # The names of the digits reach out beyond their places.
     return left - 2 * _MARGIN_MM, right + 3 * _MARGIN_MM, bottom - _MARGIN_MM, top + 2 * _MARGIN_MM
@@ -166,14 +168,14 @@ def colour(dot: Dot, graded: bool) -> str:
     return to_hex(colormaps[_COLOURS](_LIGHTEST + (1.0 - _LIGHTEST) * dot.shade)) if graded else INK
 
 
-def paint(axes: "Axes", panel: Panel, number: int, points: float, graded: bool) -> None:
+def paint(axes: "Axes", glove: HandShape, panel: Panel, number: int, points: float, graded: bool) -> None:
     """Draw hand `number` of a page, at `points` of a printer (1/72 inch) per mm; dots' ids are dot-NUMBER-SWITCH."""
-    left, right, bottom, top = bounds()
+    left, right, bottom, top = bounds(glove)
     axes.set(xlim=(left, right), ylim=(bottom, top))
     axes.axis("off")
-    _paint_skin(axes, points)
-    for switch, (dot, place) in enumerate(zip(panel.dots, hand_map().places, strict=True)):
-        paint_dot(axes, dot, place, RADIUS_MM, points, graded, f"{number}-{switch}")
+    _paint_skin(axes, glove, points)
+    for switch, (dot, place) in enumerate(zip(panel.dots, glove.places, strict=True)):
+        paint_dot(axes, dot, place, glove.radius_mm, points, graded, f"{number}-{switch}")
     title = panel.title if len(panel.title) <= _LONGEST_TITLE else f"{panel.title[: _LONGEST_TITLE - 1]}…"
     middle = (left + right) / 2
     axes.text(middle, top, panel.note, fontsize=min(8.0, 4.5 * points), color=LINE, ha="center", va="bottom")
@@ -191,7 +193,7 @@ def paint_dot(
 
     x, y = place.tolist()
     circle = Circle((x, y), 0.25 * radius if dot.absent else radius, facecolor=colour(dot, graded), clip_on=False)
-    circle.set(edgecolor=LINE, linewidth=0.16 * points * radius / RADIUS_MM, zorder=3)
+    circle.set(edgecolor=LINE, linewidth=0.16 * points * radius / _USUAL_MM, zorder=3)
     circle.set_gid(f"dot-{identity}" if identity else None)
     axes.add_patch(circle)
     if not dot.mark:
@@ -202,14 +204,14 @@ def paint_dot(
     text.set_gid(f"mark-{identity}" if identity else None)
 
 
-def _paint_skin(axes: "Axes", points: float) -> None:
-    glove, thin = hand_map(), 0.16 * points
+def _paint_skin(axes: "Axes", glove: HandShape, points: float) -> None:
+    thin = 0.16 * points
     axes.fill(*glove.outline.T, facecolor=SKIN, edgecolor=LINE, linewidth=2.4 * thin, joinstyle="round")
     for outline in glove.strips:
         axes.fill(*outline.T, facecolor=SIDE, edgecolor=LINE, linewidth=thin, joinstyle="round")
     for crease in glove.creases:
         axes.plot(*crease.T, color=CREASE, linewidth=2.0 * thin, solid_capstyle="round")
-    for digit, (x, y) in zip(DIGITS, glove.labels.tolist(), strict=True):
+    for digit, (x, y) in zip(glove.part_names, glove.labels.tolist(), strict=False):
         name = digit if points >= _SPELT_OUT else digit[0].upper()
         size = min(9.0, max(5.0, 4.2 * points))
         axes.text(x, y, name, fontsize=size, color=LINE, ha="center", va="center")
@@ -226,7 +228,7 @@ def draw(picture: Picture, kind: str) -> bytes:
     """Return `picture` as the bytes of a "png" or "svg"; the same picture gives the same bytes. Raises PictureError."""
     columns = next(count for count in range(1, 100) if count * count >= len(picture.panels))
     rows = -(-len(picture.panels) // columns)
-    left, right, bottom, top = bounds()
+    left, right, bottom, top = bounds(picture.hand)
     wide = {1: 8.5, 2: 5.4}.get(columns, max(2.6, 10.4 / columns))  # inches of one hand
     tall = wide * (top - bottom) / (right - left)
     width, height = columns * wide, rows * (tall + _TITLE_INCHES) + _KEY_INCHES
@@ -238,7 +240,7 @@ def draw(picture: Picture, kind: str) -> bytes:
             row, column = divmod(number, columns)
             base = height - (row + 1) * (tall + _TITLE_INCHES)
             axes = figure.add_axes((column * wide / width, base / height, wide / width, tall / height))
-            paint(axes, panel, number, wide * _POINTS / (right - left), picture.bar_top is not None)
+            paint(axes, picture.hand, panel, number, wide * _POINTS / (right - left), picture.bar_top is not None)
         _draw_key(figure, picture)
         data = rendered(figure, kind)
     return _with_hints(data, picture) if kind == "svg" else data
@@ -260,11 +262,12 @@ def _draw_key(figure: "Figure", picture: Picture) -> None:
     for dot, words in dots:
         paint_dot(axes, dot, np.array([x, y]), 0.07, _POINTS, False)
         x = _say(axes, x + 0.14, y, words)
-    axes.fill(
-        [x, x + 0.34, x + 0.34, x], [y - 0.06, y - 0.06, y + 0.06, y + 0.06], facecolor=SIDE, edgecolor=LINE, lw=0.7
-    )
-    x = _say(axes, x + 0.42, y, "side of a digit, unfolded")
-    axes.text(0.28, 0.13, "palm of the right hand", color=LINE, va="center")
+    if picture.hand.strips:
+        axes.fill(
+            [x, x + 0.34, x + 0.34, x], [y - 0.06, y - 0.06, y + 0.06, y + 0.06], facecolor=SIDE, edgecolor=LINE, lw=0.7
+        )
+        x = _say(axes, x + 0.42, y, "side of a digit, unfolded")
+        axes.text(0.28, 0.13, "palm of the right hand", color=LINE, va="center")
     if picture.bar_top is not None:
         _draw_bar(figure, x, picture.full, picture.bar_top)
 

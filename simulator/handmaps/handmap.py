@@ -241,6 +241,8 @@ def hand_map() -> HandShape:
         strips=strips,
         creases=creases(),
         labels=labels,
+        part_number="EVQPLDA15",
+        body_mm=4.9,
     )
 
 

@@ -25,7 +25,9 @@ def test_a_proposed_harness_is_loaded_and_reads_every_kept_switch_in_one_go(
     harness = load_harness(glove)
     kept = tuple(switch.name for switch in Build.load(build).manifest.switches)
     assert (harness.name, harness.switches) == ("glove", kept)
-    assert harness.cyberglove is not None
+    # Its joints are not called as a CyberGlove's.
+    assert harness.cyberglove is None
+    assert "have to be read by a source of your own" in " ".join(done.stdout.split())
 
     done = thenar("compile", set_file, "-o", build, *FEW, "--glove", glove)
     assert done.returncode == 0, done.stderr

@@ -15,9 +15,9 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.drivers.cyberglove_protocol import OVERHEAD, sending_us
+from thenar.drivers.cyberglove_protocol import OVERHEAD, sending_us, sensors_with
 from thenar.drivers.i2c.chips import Reading
-from thenar.runtime.harness.wiring import Harness, ScannerWiring
+from thenar.runtime.harness.wiring import GloveWiring, Harness, ScannerWiring
 from thenar.runtime.scanning.decided import Decided
 from thenar.runtime.scanning.plan import Costs, plan_scan
 from thenar.runtime.scanning.scanmap import ScanMap
@@ -25,13 +25,12 @@ from thenar.runtime.scanning.timing import reading_of, scanner_us
 from thenar.runtime.tables import IntegerTables
 
 from ...firmware.targets import TARGETS
-from ..points import How
+from ..points import How, Time
 from .wirings import Wiring
 
 # So many evenly spaced frames decide on the order of ports; all of them, on how often a scan then ends early.
 _ORDERING = 200
 _BAUD = 115_200
-_SENSORS = (18, 22)
 # One transfer of a Raspberry Pi beside its wire. Doubtful: a kernel trace of a Pi 3 has 20 us from the call to the
 # adapter and 6 us back; others measured 300 us (Pi Zero) with an older library.
 PI_CALL_US = 30.0
@@ -179,7 +178,7 @@ def scan_times(
     """
     if not len(names):
         return ScanTimes(0.0, 0.0, 0, 0, "wire", 0.0)
-    harness = wiring.harness_of(names, joints=bool(tables.n_joints))
+    harness = wiring.harness_of(names)
     rows = np.linspace(0, len(bits) - 1, min(_ORDERING, len(bits))).astype(np.intp)
     scan = plan_scan(names, tables, harness, bits[rows], codes[rows])
     boards = [(board, keys) for board, keys in zip(harness.scanners, scan.scanners, strict=True) if keys]
@@ -229,10 +228,17 @@ def _bus_us(
     return fsum(whole), fsum(weighted), fsum(shares)
 
 
-def transfer_us(joints: int) -> float:
-    """Return what one record of a CyberGlove takes on its line at 115200 baud, with the status byte; 0 without joints.
+def joints_time(joints: Sequence[str], given_us: float | None = None, glove: GloveWiring | None = None) -> Time:
+    """Return what reading joints of these names takes.
 
-    Up to 18 joints are a glove of 18 sensors, more one of 22. What the box takes to digitise the sensors before it
-    sends is not in it: see `shortest_us` of its protocol.
+    It is `given_us`, where that is known; of a CyberGlove's joints, one record at 115200 baud with the status byte,
+    without what the box takes to digitise the sensors before it sends (`shortest_us` of its protocol). A CyberGlove
+    that is wired as `glove` may call its sensors otherwise. Of joints of one's own the time is unknown: 0.
     """
-    return sending_us(_SENSORS[joints > _SENSORS[0]] + OVERHEAD + 1, _BAUD) if joints else 0.0
+    if given_us is not None and joints:
+        return Time(given_us, "given")
+    named = () if glove is None else glove.joints
+    sensors = len(named) if joints and set(joints) <= set(named) else sensors_with(joints)
+    if sensors is None:
+        return Time(0.0, "unknown" if joints else "wire")
+    return Time(sending_us(sensors + OVERHEAD + 1, _BAUD), "wire")

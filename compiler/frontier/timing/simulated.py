@@ -97,7 +97,7 @@ def run_scan(trial: ScanTrial) -> Outcome:
 
 def simulated_scan_us(trial: ScanTrial) -> float:
     """Return the microseconds from scan to scan while no switch changes. Raises FirmwareError."""
-    glove = trial.wiring.harness_of(names_of(trial.switches), joints=False)
+    glove = trial.wiring.harness_of(names_of(trial.switches))
     (bus,) = glove.buses
     numbers = {name: number for number, name in enumerate(glove.switches)}
     tables = random_tables(trial.switches, 0, 2)

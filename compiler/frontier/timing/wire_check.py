@@ -53,7 +53,7 @@ def _new_buses() -> Iterator[BusWiring]:
         for size in _SIZES:
             names = names_of(size)
             if wiring.name != BOARD and wiring.fits(names):
-                yield from wiring.harness_of(names, joints=False).buses
+                yield from wiring.harness_of(names).buses
 
 
 def _renamed(buses: Sequence[BusWiring]) -> tuple[BusWiring, ...]:

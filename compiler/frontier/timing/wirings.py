@@ -8,8 +8,8 @@ from msgspec.structs import replace
 from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.errors import HarnessError
-from thenar.runtime.harness.wiring import GloveWiring, Harness
-from thenar.runtime.scanning.propose import propose_board, propose_harness
+from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.scanning.propose import propose_board, propose_cyberglove, propose_harness
 
 from ...firmware.targets import TARGETS
 
@@ -37,14 +37,14 @@ class Wiring:
     harness: Harness | None = None
     muxes: bool = True
 
-    def harness_of(self, names: Sequence[str], joints: bool) -> Harness:
-        """Return the harness in which the switches `names` are read, with a CyberGlove where `joints` are.
+    def harness_of(self, names: Sequence[str], joints: Sequence[str] = ()) -> Harness:
+        """Return the harness in which the switches `names` are read, with a CyberGlove where `joints` are one's.
 
         The given harness is returned as it is. Raises HarnessError where there is no room for so many switches.
         """
         if self.harness is not None:
             return self.harness
-        glove = GloveWiring(port="/dev/ttyS0") if joints else None
+        glove = propose_cyberglove(joints)
         if self.name == BOARD:
             proposed = propose_board(names, cyberglove=glove)
             return replace(proposed, scanners=tuple(replace(each, baud=self.clock_hz) for each in proposed.scanners))
@@ -55,7 +55,7 @@ class Wiring:
     def fits(self, names: Sequence[str]) -> bool:
         """Return whether there is a place for every one of these switches."""
         try:
-            return set(names) <= set(self.harness_of(names, joints=False).switches)
+            return set(names) <= set(self.harness_of(names).switches)
         except HarnessError:
             return False
 

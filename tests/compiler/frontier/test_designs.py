@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from thenar.compiler.frontier.designs import Design, best_designs, designs, points_of, with_whole_scans
+from thenar.compiler.frontier.equipment import NO_TIME
 from thenar.compiler.frontier.finalists import Close
 from thenar.compiler.frontier.latency import POLICIES
 from thenar.compiler.frontier.points import Latency, Rate, Time, Way
@@ -12,7 +13,8 @@ from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import Candidate, Search, Shape
 from thenar.compiler.frontier.timing.classify_times import Classified
-from thenar.compiler.frontier.timing.scan_times import ScanTimes
+from thenar.compiler.frontier.timing.scan_times import ScanTimes, joints_time
+from thenar.drivers.cyberglove_protocol import SENSORS_18
 
 TABLED = Tabled(10, Shape(16))
 WAIT = Latency(1000.0, 2000.0, 0.0)
@@ -35,49 +37,49 @@ def simulated(design: Design, us: float) -> Design:
 
 
 def test_a_scan_that_may_end_early_looks_at_the_scores_once_a_port_that_it_reads() -> None:
-    whole, early = designs(close_of(), 0)
+    whole, early = designs(close_of(), NO_TIME)
     assert (whole.scan_kind, whole.scan.us, whole.classify.us) == ("full", 500.0, 50.0)
     assert (early.scan_kind, early.scan.us, early.classify.us) == ("early", 200.0, 75.0)
     assert early.frame.us == 275.0
 
 
 def test_where_no_frame_ends_a_scan_early_it_is_not_offered() -> None:
-    assert [design.scan_kind for design in designs(close_of(early_us=500.0), 0)] == ["full"]
+    assert [design.scan_kind for design in designs(close_of(early_us=500.0), NO_TIME)] == ["full"]
 
 
 def test_joints_alone_have_one_design_a_layout_and_wait_for_a_record() -> None:
-    (design,) = designs(close_of(switches=0), 16)
+    (design,) = designs(close_of(switches=0), joints_time(SENSORS_18))
     assert (design.scan.us, design.wired, design.classify.us) == (0.0, None, 50.0)
     assert design.frame.us == pytest.approx(21 * 10 / 115_200 * 1e6 + 50.0)
 
 
 def test_compiling_is_choosing_training_and_making_the_tables() -> None:
-    design = next(designs(close_of(), 0))
+    design = next(designs(close_of(), NO_TIME))
     (point, *_) = points_of([design], dict.fromkeys(((design, kind) for kind in POLICIES), WAIT), NAMES, Search())
     assert point.compile_s == 3.25
 
 
 def test_fronts_hold_the_quickest_and_the_smallest() -> None:
     big, small = close_of(30, 0.95, early_us=100.0), close_of(5, 0.9, early_us=400.0)
-    by_time, by_switches = best_designs([*designs(small, 0), *designs(big, 0)])
+    by_time, by_switches = best_designs([*designs(small, NO_TIME), *designs(big, NO_TIME)])
     assert [design.n_switches for design in by_time] == [30]
     assert [design.n_switches for design in by_switches] == [5, 30]
     assert by_switches[0].scan_kind == "early"
 
 
 def test_a_design_that_ends_early_is_joined_by_the_one_of_whole_scans_once() -> None:
-    whole, early = designs(close_of(), 0)
+    whole, early = designs(close_of(), NO_TIME)
     assert [design.scan_kind for design in with_whole_scans([early, early])] == ["early", "full"]
     assert with_whole_scans([whole, early]) == [whole, early]
 
 
 def test_dwell_and_tests_are_for_whole_scans() -> None:
-    whole, early = designs(close_of(), 0)
+    whole, early = designs(close_of(), NO_TIME)
     assert (whole.decisions, early.decisions) == (tuple(POLICIES), ("single",))
 
 
 def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
-    one, other = next(designs(close_of(20, 0.9), 0)), next(designs(close_of(10, 0.8, layout_us=30.0), 0))
+    one, other = next(designs(close_of(20, 0.9), NO_TIME)), next(designs(close_of(10, 0.8, layout_us=30.0), NO_TIME))
     # The model has the other one faster, the simulator the better one: so the other is beaten on time.
     assert other.frame.us < one.frame.us
     several = [simulated(one, 20.0), simulated(other, 60.0)]
@@ -93,7 +95,7 @@ def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
 
 
 def test_a_decision_that_is_quicker_is_on_its_own_front() -> None:
-    one, other = (next(designs(close_of(n, rate), 0)) for n, rate in ((20, 0.9), (10, 0.8)))
+    one, other = (next(designs(close_of(n, rate), NO_TIME)) for n, rate in ((20, 0.9), (10, 0.8)))
     waits = {(design, kind): WAIT for design in (one, other) for kind in design.decisions}
     waits[other, "sequential"] = replace_latency(WAIT, 10.0)
     points = points_of([one, other], waits, NAMES, Search())
@@ -107,5 +109,5 @@ def replace_latency(latency: Latency, mean_us: float) -> Latency:
 
 
 def test_measured_times_of_early_scans_count_every_look() -> None:
-    _, early = designs(close_of(), 0)
+    _, early = designs(close_of(), NO_TIME)
     assert simulated(early, 100.0).classify == Time(150.0, "simulated")

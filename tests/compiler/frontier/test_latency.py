@@ -148,7 +148,7 @@ def by_definition(tables: IntegerTables, stream: Stream, step_us: int, policy: P
         moments = [begins_us, *(us for us in answered_us if begins_us < us < ends_us), ends_us]
         at_once = [us for us in moments if answer(us) == right]
         if at_once:
-            waits.append(at_once[0] - begins_us)
+            waits.append(max(at_once[0] - begins_us, step_us))
             spans = [(us, nxt) for us, nxt in pairwise(moments) if us >= at_once[0]]
             wrong += sum(nxt - us for us, nxt in spans if answer(us) not in (right, -1))
             left += ends_us - at_once[0]

@@ -7,7 +7,7 @@ import pytest
 
 from thenar.compiler.frontier.cache import Cache, Store
 from thenar.compiler.frontier.designs import Design
-from thenar.compiler.frontier.equipment import Equipment
+from thenar.compiler.frontier.equipment import NO_TIME, Equipment
 from thenar.compiler.frontier.finalists import Close
 from thenar.compiler.frontier.measure import measured
 from thenar.compiler.frontier.points import Rate, Way
@@ -30,7 +30,7 @@ def design_of(model: ClassifyModel) -> Design:
     priced = PricedTables(Tabled(1, Shape(16)), tables_to_bytes(tables), model.options(tables), (wired,), 1.0)
     screened = Screened(Candidate(Way("id3", 6.0), "switches"), tuple(range(6)), Rate(0.9, 0.9, 0.9), 1.0)
     close = Close(screened, {}, {}, None, (priced,), 1.0)
-    return Design(close, priced, priced.classified[0], wired, "early", 0)
+    return Design(close, priced, priced.classified[0], wired, "early", NO_TIME)
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ from thenar.compiler.frontier.points import FrontierError, Way
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.search import Candidate, Search, Shape, available_inputs, curve_ways, ways
 from thenar.compiler.frontier.timing.classify_times import Classified
-from thenar.compiler.frontier.timing.scan_times import ScanTimes, transfer_us
+from thenar.compiler.frontier.timing.scan_times import ScanTimes
 from thenar.compiler.recordings.graspset import GraspSet
 
 QUICK = (Classified("quick", 40.0, "model", 900, 30), Classified("small", 60.0, "model", 500, 30))
@@ -19,8 +19,8 @@ def priced(*scans_us: float, classified: tuple[Classified, ...] = QUICK) -> Pric
 
 def test_a_choice_is_as_fast_as_its_fastest_wiring_and_layout() -> None:
     assert priced(900.0, 300.0).fastest_us(0) == 340.0
-    assert priced(900.0, 300.0).fastest_us(16) == transfer_us(16) + 40.0
-    assert priced().fastest_us(16) == transfer_us(16) + 40.0
+    assert priced(900.0, 300.0).fastest_us(1800.0) == 1840.0
+    assert priced().fastest_us(1800.0) == 1840.0
 
 
 def test_what_fits_no_flash_has_no_time() -> None:

@@ -110,7 +110,7 @@ def manifest_of() -> Callable[..., Manifest]:
             options=Options(0, 1, "both", 1.0, 0, 1),
             grasps=("cup", "pen"),
             switches=tuple(Switch(number, name, 0.1) for number, name in enumerate(names)),
-            joints=(Calibration(0, "j0", "deg", 0, 0.0, 255, 90.0),) if joints else (),
+            joints=(Calibration(0, "thumb_mpj", "deg", 0, 0.0, 255, 90.0),) if joints else (),
             proof=Proof(16, 1.0, 1, 0.5, 1.0, 10, 0),
             rates=(
                 Recognised("training", 0, 1, 10, 10),

@@ -6,7 +6,7 @@ from math import dist
 
 import pytest
 
-from thenar.compiler.glove.layout import COLOURS, marked, wrist_of
+from thenar.compiler.glove.layout import COLOURS, marked
 from thenar.compiler.glove.spec import SpecSummary, glove_spec
 from thenar.compiler.hand import HandShape
 from thenar.runtime.manifest import Manifest
@@ -57,7 +57,7 @@ def test_connectors_have_pins_from_one_on_and_no_more_than_headers_have(summary:
 
 
 def test_a_wire_is_longer_than_the_way_to_its_farthest_switch(summary: SpecSummary, hand: HandShape) -> None:
-    home = wrist_of(hand)
+    home = hand.wrist
     for wire in summary.wires:
         places = [(summary.switches[n - 1].x_mm, summary.switches[n - 1].y_mm) for n in wire.switches]
         straight = max(dist(home, (x, y)) for x, y in places if x is not None and y is not None)

@@ -5,7 +5,6 @@ from collections.abc import Callable
 import pytest
 from msgspec.structs import replace
 
-from thenar.compiler.glove.layout import BODY_MM
 from thenar.compiler.glove.spec import SpecError, glove_spec
 from thenar.compiler.hand import HandShape
 from thenar.drivers.i2c.chips import CHIPS
@@ -83,14 +82,14 @@ def test_switches_closer_than_their_bodies_are_told(manifest_of: Manifests, hand
     small = glove_spec(manifest_of(names), hand=hand.scaled(150.0)).summary.remarks
     assert len(small) == 1
     assert small[0].startswith("SW1 and SW2 are 3.")
-    assert small[0].endswith(f"their bodies {BODY_MM} mm broad: move one of them aside")
+    assert small[0].endswith("their bodies 4.9 mm broad: move one of them aside")
 
 
 def test_a_strange_glove_is_described_without_places(manifest_of: Manifests, hand: HandShape) -> None:
     summary = glove_spec(manifest_of(["index_distal_2", "mine"]), hand=hand).summary
     assert summary.hand_length_mm is None
     assert {(s.part, s.side, s.x_mm, s.y_mm) for s in summary.switches} == {(None, None, None, None)}
-    assert summary.remarks[-1].startswith("nobody knows where this glove's switches lie")
+    assert summary.remarks[-1].startswith("where this glove's switches lie is not known")
 
 
 @pytest.mark.parametrize("kind", sorted(CHIPS))

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.recordings.importer import bits, codes, integers, names, numbers
+from thenar.compiler.recordings.cells import bits, codes, integers, names, numbers
 
 WORDS = ["1.5", " 2 ", "-3e2", "", "?", "NA", "nan", "NaN", "inf", "-inf", "1_000", "x", "0x1"]
 

@@ -60,7 +60,7 @@ def test_every_key_is_read(tmp_path: Path) -> None:
     ("text", "reason"),
     [
         ("", "line 1: the key label is missing"),
-        ("label = 3", "line 1: label: must be text, not 3"),
+        ("label = 3", "line 1: label: must be text or a list, not 3"),
         ('label = "a"\nlables = 1', "line 2: lables: there is no such key here"),
         (
             'label = "a"\n[[joints]]\ncolumns = ["b"]\ngird = 1',
@@ -115,7 +115,7 @@ def test_globs_heed_case() -> None:
         (Columns("grasp", switches=("s*", "s1")), "column 's1' is used 2 times"),
         (Columns("grasp", switches=("*",)), "column 'grasp' is used 2 times"),
         (Columns("grasp", subject="grasp", switches=("s*",)), "column 'grasp' is used 2 times"),
-        (Columns("grasp"), "no column is a switch or a joint"),
+        (Columns("grasp"), "no column is an input"),
     ],
 )
 def test_columns_that_do_not_fit_the_table_are_refused(columns: Columns, reason: str) -> None:

@@ -1,13 +1,15 @@
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
-from thenar.compiler.recordings.columns import Columns, JointColumns
+from thenar.compiler.recordings.columns import Columns, JointColumns, TaxelColumns
 from thenar.compiler.recordings.errors import ColumnsError, TableError
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import ImportReport, import_file, import_table
-from thenar.compiler.recordings.table import Table
+from thenar.compiler.recordings.table import Column, Table
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples" / "columns"
 JOINTS = (JointColumns(("j",)),)
@@ -19,7 +21,9 @@ def table(*labels: str) -> Table:
 
 
 def test_a_taxonomy_of_ones_own_is_the_labels_sorted() -> None:
-    grasp_set, report = import_table(table("mug", "ball", "mug", "ball"), Columns("g", joints=JOINTS))
+    grasp_set, report = import_table(
+        table("mug", "ball", "mug", "ball"), Columns("g", joints=JOINTS, frames="independent")
+    )
     assert grasp_set.taxonomy.types == ("ball", "mug")
     assert grasp_set.labels.tolist() == [1, 0, 1, 0]
     assert (report.rows, report.grasp_types, report.subjects, report.joints, report.switches) == (4, 2, 1, 1, 0)
@@ -36,13 +40,130 @@ def test_labels_of_a_published_taxonomy_may_be_names_abbreviations_and_numbers()
     assert import_table(table(*labels), columns)[0].grasps.tolist() == ["PoS", "PoH", "Lat", "PoS"]
 
 
-def test_unknown_labels_are_counted_named_and_answered_with_the_nearest() -> None:
+def test_all_unknown_labels_are_named_at_once_and_the_first_answered_with_the_nearest() -> None:
+    columns = Columns("g", joints=JOINTS, taxonomy="kamakura14", frames="independent")
     with pytest.raises(TableError) as refused:
-        import_table(table("PoS", "PoX", "PoX", "PoH"), Columns("g", joints=JOINTS, taxonomy="kamakura14"))
-    assert str(refused.value).startswith(
-        "t.csv: 2 unknown labels in 'g', rows 3, 4; 'PoX' is no grasp type of kamakura14"
+        import_table(table("PoS", "PoX", "PoX", "PoH", "mug"), columns)
+    said = str(refused.value)
+    assert said.startswith("t.csv: 2 labels in 'g' are no grasp types of kamakura14: 'PoX' (did you mean ")
+    assert "'mug' (its types: PoS," in said
+    assert said.endswith("; 3 rows have them, rows 3, 4, 6; [labels] can translate them")
+    with pytest.raises(TableError) as refused:
+        import_table(table(*(f"mug {number}" for number in range(500))), columns)
+    assert "'mug 12'" in str(refused.value)
+    assert len(str(refused.value)) < 1000
+
+
+def test_rows_that_may_be_frames_of_one_trial_are_asked_about() -> None:
+    columns = Columns("g", joints=JOINTS)
+    with pytest.raises(ColumnsError, match=r"2 rows share .* \(`trial = \.\.\.`, .* \(`frames = \"independent\"`\)"):
+        import_table(table("a", "b", "a"), columns)
+    grasp_set, report = import_table(table("a", "b", "a"), replace(columns, frames="independent"))
+    assert grasp_set.independent
+    assert (report.trials, grasp_set.trial_ids.tolist()) == (3, [0, 1, 2])
+    assert import_table(table("a", "b"), columns)[1].trials == 2
+
+
+def frames(**cells: Column) -> tuple[GraspSet, ImportReport]:
+    """Import six frames of three trials of a and b, with other cells, or keys of a columns.toml."""
+    keys = {name: cells.pop(name) for name in ("reduce", "missing", "taxels", "time") if name in cells}
+    rows: dict[str, Column] = {
+        "g": ["a", "a", "a", "b", "b", "a"],
+        "rep": ["T1", "T1", "T1", "T1", "T1", "T10"],
+        "t": ["2", "0", "1", "0", "1", "0"],
+        "s": ["0", "0", "1", "1", "0", "0"],
+        "j": ["3", "1", "2", "5", "7", "9"],
+    }
+    settings: Any = {"joints": (JointColumns(("j",), codes=True),), **keys}
+    columns = Columns("g", trial="rep", switches=("s",), **settings)
+    return import_table(Table("t.csv", rows | cells, np.arange(2, 8)), columns)
+
+
+def test_text_trials_are_numbered_in_natural_order_and_it_is_said() -> None:
+    grasp_set, report = frames(rep=["T10", "T10", "001 - Copy", "T2", "T2", "T10"])
+    assert grasp_set.trials.tolist() == [3, 3, 1, 2, 2, 3]
+    assert report.notes == (
+        "the texts of rep were numbered as trials in natural order: '001 - Copy' is 1, 'T2' is 2, 'T10' is 3",
     )
-    assert "did you mean" in str(refused.value)
+    grasp_set, report = frames(rep=["7", "7", "8", "-1", "-1", "9.0"])
+    assert (grasp_set.trials.tolist(), report.notes) == ([7, 7, 8, -1, -1, 9], ())
+
+
+@pytest.mark.parametrize(
+    ("reduce", "joints", "switches"),
+    [
+        ("none", [1, 2, 3, 5, 7, 9], [0, 1, 0, 1, 0, 0]),
+        ("middle", [2, 5, 9], [1, 1, 0]),
+        ("median", [2, 5, 9], [0, 0, 0]),
+        ("any", [2, 5, 9], [1, 1, 0]),
+    ],
+)
+def test_the_frames_of_a_trial_are_put_in_order_and_reduced(
+    reduce: str, joints: list[int], switches: list[int]
+) -> None:
+    grasp_set, report = frames(time="t", reduce=reduce)
+    assert grasp_set.codes[:, 0].tolist() == joints
+    assert grasp_set.switches[:, 0].tolist() == switches
+    assert report.trials == 3
+    assert ("6 frames of 3 trials were reduced to one row a trial" in " ".join(report.notes)) == (reduce != "none")
+
+
+def test_a_trial_begins_where_time_starts_anew() -> None:
+    table = Table(
+        "t.csv", {"g": ["a"] * 5 + ["b"], "t": ["0", "2", "0", "1", "1", "2"], "s": ["0", "1"] * 3}, np.arange(6)
+    )
+    columns = Columns("g", time="t", frames="restart", switches=("s",))
+    assert import_table(table, columns)[0].trial_ids.tolist() == [0, 0, 1, 1, 2, 3]
+
+
+def test_missing_cells_are_kept_filled_from_their_trial_and_it_is_said() -> None:
+    grasp_set, report = frames(missing="keep", j=["3", "", "2", "5", "7", ""], s=["0", "0", "1", "?", "0", "0"])
+    assert grasp_set.codes[:, 0].tolist() == [3, 3, 2, 5, 7, 3]
+    assert grasp_set.switches[:, 0].tolist() == [False, False, True, False, False, False]
+    assert report.warnings[0].message == (
+        "3 missing cells in 3 rows were filled: 2 from the nearest frame of their trial, 1 with their column's median "
+        "(rows 3, 5, 7; columns s, j)"
+    )
+
+
+def test_a_row_without_a_label_or_trial_is_not_kept_and_the_loss_is_counted() -> None:
+    grasp_set, report = frames(missing="keep", g=["a", "a", "a", "b", "", "a"], rep=["1", "1", "1", "", "1", "2"])
+    assert grasp_set.codes[:, 0].tolist() == [3, 1, 2, 9]
+    assert report.warnings[0].message == (
+        "2 rows with missing values were left out: rows 5, 6 (columns g, rep); "
+        "so 2 of 4 trials and grasp type b are lost"
+    )
+    with pytest.raises(TableError, match=r"column 'j' has no values: leave it out"):
+        frames(missing="keep", j=[""] * 6)
+
+
+def test_analog_columns_become_switches_above_a_threshold() -> None:
+    pads = {"p1": ["0", "90", "100", "5", "95", ""], "p2": ["0.5", "0.4", "0.6", "1", "0", "0.41"]}
+    taxels = (TaxelColumns(("p1",), "otsu"), TaxelColumns(("p2",), 0.4))
+    grasp_set, report = frames(missing="keep", taxels=taxels, **pads)
+    assert grasp_set.switch_names == ("s", "p1", "p2")
+    assert grasp_set.switches[:, 1].tolist() == [False, True, True, False, True, True]
+    assert grasp_set.switches[:, 2].tolist() == [True, False, True, True, False, True]
+    assert "2 analog columns became switches, closed p1 above 47.5, p2 above 0.4" in report.notes
+
+
+def test_a_label_and_a_trial_may_be_spread_over_columns() -> None:
+    rows = {"o": ["mug", "mug", "can"], "a": ["lift", "pour", "lift"], "side": ["l", "l", "r"], "n": ["0", "1", "0"]}
+    columns = Columns(("o", "a"), trial=("side", "n"), switches=("s",))
+    grasp_set, _ = import_table(Table("t.csv", {**rows, "s": ["0", "1", "0"]}, np.arange(3)), columns)
+    assert grasp_set.taxonomy.types == ("can lift", "mug lift", "mug pour")
+    assert grasp_set.trials.tolist() == [1, 2, 3]
+
+
+def test_radians_on_a_grid_of_half_a_degree_are_a_warning_with_a_grid_that_keeps_them() -> None:
+    values = np.linspace(0, 1.4, 60)
+    rows: dict[str, Column] = {"g": ["a", "b"] * 30, "j": values}
+    columns = Columns("g", joints=(JointColumns(("j",), "rad"),), frames="independent")
+    (coarse, *_) = import_table(Table("t.csv", rows, np.arange(60)), columns)[1].warnings
+    assert coarse.kind == "coarse grids"
+    assert "j 4 of 60 (grid = 0.001 keeps them)" in coarse.message
+    columns = replace(columns, joints=(JointColumns(("j",), "rad", grid=0.001),))
+    assert import_table(Table("t.csv", rows, np.arange(60)), columns)[1].warnings == ()
 
 
 def test_an_unknown_taxonomy_is_refused() -> None:
@@ -75,7 +196,8 @@ def test_the_icub_recordings_are_read_as_their_readme_describes_them(icub_table:
     assert all(cost.largest_error <= 0.25 and cost.step == 0.5 for cost in report.coding)
     assert grasp_set.joints[0].value(grasp_set.codes[0, 0]) == 21.0
     assert grasp_set.grasps[0] == "blue_bear"
-    (constant,) = report.warnings
+    coarse, constant = report.warnings
+    assert (coarse.kind, coarse.columns) == ("coarse grids", ("enc8",))
     assert (constant.kind, constant.count) == ("constant switches", 11)
 
 

@@ -79,6 +79,20 @@ def test_codes_on_one_grid_with_another_origin_are_shifted_and_mean_what_they_di
     assert merged.codes[:, 0].min() == small.codes[:, 0].min()
 
 
+def test_taxels_are_merged_as_joints_are(small: GraspSet) -> None:
+    pads = tuple(Joint(name, "counts", 0, 0.0, 1, 1.0) for name in ("pad 1", "pad 2"))
+    one = replace(small, taxels=np.arange(12).reshape(6, 2), taxel_columns=pads)
+    two = replace(one, taxels=one.taxels[:, ::-1], taxel_columns=pads[::-1], subjects=np.full(6, "C"))
+    merged = merge({"a": one, "b": two})
+    assert merged.taxel_columns == pads
+    assert merged.taxels.tolist() == one.taxels.tolist() * 2
+    with pytest.raises(RecordingError, match="b lacks 2 taxels that a has: pad 1, pad 2"):
+        merge({"a": one, "b": another(small)})
+    wide = replace(two, taxel_columns=(pads[1], replace(pads[0], value_b=2.0)))
+    with pytest.raises(RecordingError, match="pad 1 is calibrated otherwise in b than in a"):
+        merge({"a": one, "b": wide})
+
+
 def another(small: GraspSet, **changes: object) -> GraspSet:
     return replace(small, **{"subjects": np.full(6, "C"), **changes})  # type: ignore[arg-type]
 
@@ -101,7 +115,7 @@ INDEX, WRIST = Joint("index", "deg", 0, -10.0, 100, 40.0), Joint("wrist", "deg",
         ({"joints": (INDEX, replace(WRIST, name="elbow"))}, "b.grasps lacks 1 joint that a.grasps has: wrist"),
         (
             {"joints": (replace(INDEX, value_a=-10.2, value_b=39.8), WRIST)},
-            "joint index is calibrated otherwise in b.grasps than in a.grasps: code 0 is -10.2 deg and a step 0.5, not "
+            "index is calibrated otherwise in b.grasps than in a.grasps: code 0 is -10.2 deg and a step 0.5, not "
             "-10 deg and 0.5",
         ),
         ({"joints": (replace(INDEX, value_b=45.0), WRIST)}, "code 0 is -10 deg and a step 0.55, not -10 deg and 0.5"),

@@ -3,8 +3,7 @@ import pytest
 
 from thenar.compiler.recordings.columns import Columns, JointColumns, select
 from thenar.compiler.recordings.errors import TableError
-from thenar.compiler.recordings.importer import Readings, read_cells
-from thenar.compiler.recordings.summary import Finding
+from thenar.compiler.recordings.importer import Read, read_cells
 from thenar.compiler.recordings.table import Column, Table
 
 GOOD = {
@@ -16,7 +15,7 @@ GOOD = {
 }
 
 
-def read(columns: Columns, **cells: Column) -> tuple[Readings, list[Finding]]:
+def read(columns: Columns, **cells: Column) -> Read:
     table = Table("t.csv", GOOD | cells, np.array([2, 3, 5]))
     return read_cells(table, columns, select(columns, list(table.columns)))
 
@@ -26,7 +25,7 @@ DROP = Columns("g", subject="who", trial="n", switches=("s",), joints=(JointColu
 
 
 def test_cells_become_arrays() -> None:
-    readings, found = read(ALL)
+    readings, found, _ = read(ALL)
     assert readings.labels.tolist() == ["a", "b", "c"]
     assert readings.subjects.tolist() == ["x", "y", "y"]
     assert readings.trials.tolist() == [1, 2, 3]
@@ -36,18 +35,18 @@ def test_cells_become_arrays() -> None:
 
 
 def test_columns_that_are_not_named_are_one_of_each() -> None:
-    readings, _ = read(Columns("g", switches=("s",)))
+    readings = read(Columns("g", switches=("s",))).readings
     assert readings.subjects.tolist() == readings.objects.tolist() == ["1", "1", "1"]
     assert readings.trials.tolist() == [1, 1, 1]
     assert readings.joints.shape == (3, 0)
-    assert read(Columns("g", joints=ALL.joints))[0].switches.shape == (3, 0)
+    assert read(Columns("g", joints=ALL.joints)).readings.switches.shape == (3, 0)
 
 
 def test_wrong_cells_are_counted_and_named_by_the_users_rows() -> None:
     with pytest.raises(TableError) as refused:
-        read(ALL, s=["0", "2", "no"], j=["x", "1", "inf"], n=["1", "1.5", "2"])
+        read(ALL, s=["0", "2", "no"], j=["x", "1", "inf"], n=["1", "1.5", "2"], g=["a", "b\x07", "c"])
     assert str(refused.value) == (
-        "t.csv: not whole numbers: 1 cell, row 3 'n' ('1.5'); "
+        "t.csv: not names that can be printed: 1 cell, row 3 'g' ('b\\x07'); "
         "not 0 or 1: 2 cells, row 3 's' ('2'), row 5 's' ('no'); "
         "not finite numbers: 2 cells, row 2 'j' ('x'), row 5 'j' ('inf')"
     )
@@ -65,11 +64,14 @@ def test_missing_cells_are_an_error_unless_their_rows_may_be_dropped() -> None:
 
 
 def test_dropped_rows_are_counted_and_named() -> None:
-    readings, (finding,) = read(DROP, j=["", "2", "3"], who=["x", "y", "?"])
+    readings, (finding,), _ = read(DROP, j=["", "2", "3"], who=["x", "y", "?"])
     assert readings.rows.tolist() == [3]
     assert readings.labels.tolist() == ["b"]
     assert (finding.kind, finding.count, finding.rows, finding.columns) == ("dropped rows", 2, (2, 5), ("who", "j"))
-    assert finding.message == "2 rows with missing values were left out: rows 2, 5 (columns who, j)"
+    assert finding.message == (
+        "2 rows with missing values were left out: rows 2, 5 (columns who, j); "
+        "so 2 of 3 trials and grasp types a, c are lost"
+    )
 
 
 def test_a_wrong_cell_is_an_error_even_in_a_row_that_would_be_dropped() -> None:

@@ -11,6 +11,7 @@ from thenar.compiler.recordings.taxonomy import (
     is_published,
     own,
     published,
+    published_for,
 )
 
 PUBLISHED = [KAMAKURA_14, CUTKOSKY_16, FEIX_33]
@@ -44,6 +45,18 @@ def test_labels_of_recordings_are_read_as_feix_wrote_them() -> None:
     assert FEIX_33.find("Sphere_4_finger") == "Sphere 4 Finger"
     assert CUTKOSKY_16.find("disk power") == "Disk (power)"
     assert KAMAKURA_14.find("Power grip standard type") == "PoS"
+    assert {FEIX_33.find(label) for label in ("ExtensionType", "extension-type", "EXTENSION_TYPE")} == {
+        "Extension Type"
+    }
+
+
+def test_labels_that_one_published_taxonomy_alone_names_are_its_types() -> None:
+    assert published_for({"Adduction_Grip", "ExtensionType", "Lateral"}) == "feix33"
+    assert published_for({"PoS", "lat"}) == "kamakura14"
+    assert published_for({"Large diameter"}) is None  # Cutkosky's and Feix's
+    assert published_for({"1", "2"}) is None
+    assert published_for({"PoS", "mug"}) is None
+    assert published_for(set()) is None
 
 
 def test_an_unknown_label_is_answered_with_the_nearest_types() -> None:

@@ -12,7 +12,8 @@ from thenar.compiler.recordings.taxonomy import KAMAKURA_14, own
 from thenar.simulator.handmaps.draw import Dot, Panel, Picture, all_switches, colour, contacts, draw, kept
 from thenar.simulator.handmaps.handmap import hand_map
 
-NAMES = hand_map().names
+HAND = hand_map()
+NAMES = HAND.names
 SVG = "{http://www.w3.org/2000/svg}"
 
 
@@ -43,28 +44,32 @@ def titles(svg: bytes, hand: int = 0) -> dict[int, str]:
 
 
 def test_every_switch_is_drawn_once_and_named_on_hovering() -> None:
-    svg = draw(all_switches(numbered=False), "svg")
+    svg = draw(all_switches(HAND, numbered=False), "svg")
     assert titles(svg) == {number: f"{number} {name}" for number, name in enumerate(NAMES)}
 
 
 def test_numbers_are_written_into_the_circles_on_demand() -> None:
-    assert {dot.mark for dot in all_switches(numbered=False).panels[0].dots} == {""}
-    assert [dot.mark for dot in all_switches(numbered=True).panels[0].dots] == list(map(str, range(160)))
-    assert b'id="mark-0-159"' in draw(all_switches(numbered=True), "svg")
+    assert {dot.mark for dot in all_switches(HAND, numbered=False).panels[0].dots} == {""}
+    assert [dot.mark for dot in all_switches(HAND, numbered=True).panels[0].dots] == list(map(str, range(160)))
+    assert b'id="mark-0-159"' in draw(all_switches(HAND, numbered=True), "svg")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["svg", "png"])
 def test_the_same_picture_gives_the_same_bytes(kind: str, two_types: GraspSet) -> None:
-    assert draw(contacts(two_types, per_grasp=True), kind) == draw(contacts(two_types, per_grasp=True), kind)
+    assert draw(contacts(HAND, two_types, per_grasp=True), kind) == draw(
+        contacts(HAND, two_types, per_grasp=True), kind
+    )
 
 
 def test_other_contacts_give_other_bytes(two_types: GraspSet) -> None:
-    assert draw(contacts(two_types, False), "png") != draw(contacts(two_types.rows([0, 1, 2]), False), "png")
+    assert draw(contacts(HAND, two_types, False), "png") != draw(
+        contacts(HAND, two_types.rows([0, 1, 2]), False), "png"
+    )
 
 
 def test_shades_are_the_shares_of_grasps_in_which_a_switch_closed(two_types: GraspSet) -> None:
-    picture = contacts(two_types, per_grasp=False)
+    picture = contacts(HAND, two_types, per_grasp=False)
     (panel,) = picture.panels
     assert picture.bar_top == 0.75
     assert (panel.dots[5].shade, panel.dots[9].shade, panel.dots[7].shade) == (1.0, 0.25 / 0.75, None)
@@ -74,7 +79,7 @@ def test_shades_are_the_shares_of_grasps_in_which_a_switch_closed(two_types: Gra
 
 
 def test_each_grasp_type_that_has_rows_gets_a_hand_on_one_scale(two_types: GraspSet) -> None:
-    picture = contacts(two_types, per_grasp=True)
+    picture = contacts(HAND, two_types, per_grasp=True)
     assert [panel.title for panel in picture.panels] == ["Lat: Lateral grip", "Tip: Tip grip"]
     lateral, tip = (panel.dots for panel in picture.panels)
     assert (lateral[9].shade, lateral[5].shade) == (1.0, None)
@@ -85,45 +90,45 @@ def test_each_grasp_type_that_has_rows_gets_a_hand_on_one_scale(two_types: Grasp
 
 
 def test_a_set_in_which_nothing_ever_closed_is_all_hollow(two_types: GraspSet) -> None:
-    picture = contacts(grasp_set(np.zeros((2, 1), bool), (NAMES[0],), ["Tip", "Tip"]), per_grasp=False)
+    picture = contacts(HAND, grasp_set(np.zeros((2, 1), bool), (NAMES[0],), ["Tip", "Tip"]), per_grasp=False)
     assert all(dot.shade is None for dot in picture.panels[0].dots)
     assert draw(picture, "png").startswith(b"\x89PNG")
 
 
 def test_kept_switches_are_full_and_bear_their_order() -> None:
-    (panel,) = kept([("A", [NAMES[40], NAMES[3], NAMES[159]])]).panels
+    (panel,) = kept(HAND, [("A", [NAMES[40], NAMES[3], NAMES[159]])]).panels
     full = {number: dot.mark for number, dot in enumerate(panel.dots) if dot.shade is not None}
     assert full == {40: "1", 3: "2", 159: "3"}
     assert panel.note == "3 of 160 kept: thumb 1, index 1, middle 0, ring 0, little 0, palm 1"
-    hints = titles(draw(kept([("A", [NAMES[40]])]), "svg"))
+    hints = titles(draw(kept(HAND, [("A", [NAMES[40]])]), "svg"))
     assert hints[40] == "index_middle_5: kept, number 1"
     assert hints[41] == f"{NAMES[41]}: left out"
 
 
 def test_names_in_titles_are_neither_formulas_nor_markup() -> None:
-    svg = draw(kept([("a < b & $c$", [NAMES[0]])]), "svg")
+    svg = draw(kept(HAND, [("a < b & $c$", [NAMES[0]])]), "svg")
     ElementTree.parse(BytesIO(svg))
     assert b"<!-- a &lt; b &amp; $c$ -->" in svg
     dots = (Dot("a < b & c"), *(Dot("") for _ in NAMES[1:]))
-    assert titles(draw(Picture((Panel("", "", dots),), "", "switch"), "svg"))[0] == "a < b & c"
+    assert titles(draw(Picture(HAND, (Panel("", "", dots),), "", "switch"), "svg"))[0] == "a < b & c"
 
 
 def test_a_switch_kept_twice_is_refused() -> None:
     with pytest.raises(MapError, match=f"pooled: switch '{NAMES[4]}' is kept twice"):
-        kept([("pooled", [NAMES[4], NAMES[5], NAMES[4]])])
+        kept(HAND, [("pooled", [NAMES[4], NAMES[5], NAMES[4]])])
 
 
 def test_sets_that_are_not_of_this_glove_are_refused() -> None:
     bits = np.ones((1, 2), bool)
     with pytest.raises(MapError, match="'s1' is no switch of the glove"):
-        contacts(grasp_set(bits, (NAMES[0], "s1"), ["Tip"]), per_grasp=False)
+        contacts(HAND, grasp_set(bits, (NAMES[0], "s1"), ["Tip"]), per_grasp=False)
     with pytest.raises(MapError, match="without rows"):
-        contacts(grasp_set(bits[:0], (NAMES[0], NAMES[1]), []), per_grasp=False)
+        contacts(HAND, grasp_set(bits[:0], (NAMES[0], NAMES[1]), []), per_grasp=False)
 
 
 def test_only_svg_and_png_are_drawn() -> None:
     with pytest.raises(PictureError, match=r"not in \.pdf"):
-        draw(all_switches(numbered=False), "pdf")
+        draw(all_switches(HAND, numbered=False), "pdf")
 
 
 def test_shades_darken_steadily_in_grey_and_begin_darker_than_hollow() -> None:
@@ -136,6 +141,6 @@ def test_shades_darken_steadily_in_grey_and_begin_darker_than_hollow() -> None:
 
 @pytest.mark.parametrize("hands", [1, 3])
 def test_any_number_of_hands_shares_a_page(hands: int) -> None:
-    picture = Picture(all_switches(False).panels * hands, "", "switch")
+    picture = Picture(HAND, all_switches(HAND, False).panels * hands, "", "switch")
     svg = draw(picture, "svg")
     assert all(len(titles(svg, hand)) == 160 for hand in range(hands))

@@ -15,7 +15,8 @@ from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.recordings.columns import JointColumns
 from thenar.compiler.recordings.errors import RecordingError, TableError
-from thenar.compiler.recordings.importer import code_joint, import_file
+from thenar.compiler.recordings.coding import code_joint
+from thenar.compiler.recordings.importer import import_file
 from thenar.compiler.tables.collapse import HIGHEST_CODE, collapse
 from thenar.compiler.tables.quantise import quantise
 from thenar.runtime.scores import Scorer

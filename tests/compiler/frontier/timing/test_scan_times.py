@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.firmware.targets import timed
+from thenar.compiler.frontier.points import Time
 from thenar.compiler.frontier.timing.python_times import random_tables
 from thenar.compiler.frontier.timing.scan_times import (
     Beside,
@@ -13,12 +14,14 @@ from thenar.compiler.frontier.timing.scan_times import (
     beside_wire,
     board_beside,
     firmware_beside,
+    joints_time,
     measured_call_us,
     scan_times,
-    transfer_us,
 )
 from thenar.compiler.frontier.timing.wirings import BOARD, Wiring
+from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22
 from thenar.runtime.errors import HarnessError
+from thenar.runtime.harness.wiring import GloveWiring
 from thenar.runtime.scanning.decided import EarlyExit
 from thenar.runtime.scanning.plan import Costs, plan_scan
 from thenar.runtime.scanning.propose import propose_harness
@@ -46,7 +49,7 @@ def test_a_full_scan_takes_what_the_runtime_predicts_with_a_system_call_a_transa
 ) -> None:
     tables, names = random_tables(switches, joints, 5), names_of(switches)
     times = scan_times(names, tables, wiring, *frames(switches, joints, 20), CALL)
-    harness = wiring.harness_of(names, joints=True)
+    harness = wiring.harness_of(names)
     scan = plan_scan(names, tables, harness)
     assert times.full_us == pytest.approx(scan_us(scan, harness, CALL.call_us).us)
     assert times.early_us <= times.full_us
@@ -57,7 +60,7 @@ def test_a_full_scan_takes_what_the_runtime_predicts_with_a_system_call_a_transa
 def test_a_scan_that_ends_early_takes_what_scanning_the_frames_one_by_one_comes_to(switches: int) -> None:
     tables, names, wiring = random_tables(switches, 16, 6), names_of(switches), Wiring("mcp23017", 400_000)
     bits, codes = frames(switches, 16)
-    harness = wiring.harness_of(names, joints=True)
+    harness = wiring.harness_of(names)
     # Of no more frames than decide on the order of ports, so that it is the same.
     scan = plan_scan(names, tables, harness, bits, codes)
     costs, ports = Costs(scan.ports, harness), [sum(1 << s for _, s in port.switches) for port in scan.ports]
@@ -94,7 +97,7 @@ def test_on_an_avr_the_firmware_takes_its_time_for_scan_keys_readings_and_bytes(
 def test_a_board_scans_its_keys_and_then_sends_its_whole_frame() -> None:
     wiring, tables, own = Wiring(BOARD, 115_200), random_tables(33, 0, 4), board_beside()
     times = scan_times(names_of(33), tables, wiring, *frames(33, 0))
-    line_us = scanner_us(wiring.harness_of(names_of(33), joints=False).scanners[0])
+    line_us = scanner_us(wiring.harness_of(names_of(33)).scanners[0])
     assert times.full_us == times.early_us == pytest.approx(line_us + own.scan_us + 33 * own.key_us)
     assert (times.ports, times.chips, times.how) == (1, 1, "model")
 
@@ -110,13 +113,25 @@ def test_a_switch_without_a_place_is_an_error() -> None:
         scan_times(names_of(2), random_tables(2, 0, 4), wiring, *frames(2, 0))
 
 
-@pytest.mark.parametrize(("joints", "sensors"), [(1, 18), (16, 18), (18, 18), (19, 22), (22, 22)])
-def test_a_record_has_18_or_22_sensors_a_letter_a_status_and_an_end(joints: int, sensors: int) -> None:
-    assert transfer_us(joints) == pytest.approx((sensors + 3) * 10 / 115_200 * 1e6)
+@pytest.mark.parametrize(
+    ("joints", "sensors"),
+    [(SENSORS_18[:1], 18), (SENSORS_18, 18), (SENSORS_22[::-1], 22), (("index_dij",), 22)],
+)
+def test_a_record_has_18_or_22_sensors_a_letter_a_status_and_an_end(joints: tuple[str, ...], sensors: int) -> None:
+    found = joints_time(joints)
+    assert (found.us, found.how) == (pytest.approx((sensors + 3) * 10 / 115_200 * 1e6), "wire")
 
 
-def test_without_joints_no_record_is_waited_for() -> None:
-    assert transfer_us(0) == 0.0
+def test_joints_of_ones_own_take_what_the_user_says_and_else_an_unknown_time() -> None:
+    assert joints_time(["bend_1", "thumb_mpj"]) == Time(0.0, "unknown")
+    assert joints_time(["bend_1"], 650.0) == Time(650.0, "given")
+    assert joints_time(SENSORS_18, 650.0) == Time(650.0, "given")
+    assert joints_time([]) == joints_time([], 650.0) == Time(0.0, "wire")
+
+
+def test_a_cyberglove_may_be_wired_under_other_names() -> None:
+    names = tuple(f"bend_{number}" for number in range(18))
+    assert joints_time(names[:5], None, GloveWiring(port="/dev/x", joints=names)) == joints_time(SENSORS_18)
 
 
 @pytest.mark.parametrize("target", timed())

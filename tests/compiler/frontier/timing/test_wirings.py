@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 from thenar.compiler.firmware import board as boards
 from thenar.compiler.firmware.board import Board, BoardBus
 from thenar.compiler.frontier.timing.wirings import AS_WIRED, BOARD, CLOCKS_HZ, Wiring, wirings
+from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.checks import faults
@@ -18,14 +19,16 @@ def names_of(count: int) -> list[str]:
     return [f"s{number}" for number in range(count)]
 
 
-@given(sizes, st.booleans())
-def test_every_wiring_that_fits_is_a_sound_harness_of_all_the_switches_at_its_clock(size: int, joints: bool) -> None:
+@given(sizes, st.sampled_from([(), SENSORS_18, SENSORS_22, ("bend_1",)]))
+def test_every_wiring_that_fits_is_a_sound_harness_of_all_the_switches_at_its_clock(
+    size: int, joints: tuple[str, ...]
+) -> None:
     for wiring in wirings(None):
         if wiring.fits(names_of(size)):
             harness = wiring.harness_of(names_of(size), joints)
             assert not list(faults(harness))
             assert sorted(harness.switches) == sorted(names_of(size))
-            assert (harness.cyberglove is not None) == joints
+            assert (harness.cyberglove is not None) == (joints in (SENSORS_18, SENSORS_22))
             rates = [bus.clock_hz for bus in harness.buses] + [board.baud for board in harness.scanners]
             assert rates == [wiring.clock_hz]
 
@@ -34,7 +37,7 @@ def test_every_wiring_that_fits_is_a_sound_harness_of_all_the_switches_at_its_cl
 def test_a_board_accepts_every_wiring_of_an_avr_that_fits(size: int) -> None:
     for wiring in wirings(None, "avr328p"):
         if wiring.fits(names_of(size)):
-            (bus,) = wiring.harness_of(names_of(size), joints=False).buses
+            (bus,) = wiring.harness_of(names_of(size)).buses
             board = Board(part="atmega328p", bus=BoardBus(clock_hz=bus.clock_hz), chips=bus.chips)
             assert not list(boards.faults(board))
 
@@ -54,7 +57,7 @@ def test_the_given_harness_comes_first_and_stays_as_it_is() -> None:
     harness = propose_harness(names_of(20), "pca9555")
     first = wirings(harness)[0]
     assert (first.name, first.clock_hz) == (AS_WIRED, 400_000)
-    assert first.harness_of(names_of(3), joints=True) is harness
+    assert first.harness_of(names_of(3)) is harness
     assert first.fits(names_of(20))
     assert not first.fits(names_of(21))
 
@@ -69,7 +72,7 @@ def test_the_clock_of_a_given_board_is_its_baud() -> None:
         propose_harness(names_of(20), "pcf8575"),
         propose_harness(names_of(160), "mcp23017"),
         propose_board(names_of(20)),
-        Wiring("mcp23017", 1_000_000).harness_of(names_of(20), joints=False),
+        Wiring("mcp23017", 1_000_000).harness_of(names_of(20)),
         Harness(name="empty"),
     ],
     ids=["no registers", "mux", "board", "1 MHz", "nothing"],
@@ -87,7 +90,7 @@ def test_a_mux_slows_a_bus_down_or_there_is_no_room() -> None:
     fast = Wiring("mcp23017", 1_000_000)
     assert fast.fits(names_of(112))
     with pytest.raises(HarnessError, match="TCA9548A"):
-        fast.harness_of(names_of(113), joints=False)
+        fast.harness_of(names_of(113))
     with pytest.raises(HarnessError, match="selects no channels"):
-        Wiring("mcp23017", 400_000, muxes=False).harness_of(names_of(113), joints=False)
+        Wiring("mcp23017", 400_000, muxes=False).harness_of(names_of(113))
     assert not Wiring("mcp23017", 100_000).fits(names_of(1000))

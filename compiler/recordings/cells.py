@@ -1,0 +1,154 @@
+"""The cells of a column as numbers, bits, codes and names; which of them are missing, and which are wrong."""
+
+import math
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.runtime.names import fault
+
+from ..text import text_of
+from .arrays import AnyArray
+from .errors import check_room
+from .graspset import CODES
+from .table import Column, pieces
+
+MISSING_NUMBERS = frozenset({"", "?", "na", "n/a", "#n/a", "nan", "null", "none"})
+MISSING_NAMES = frozenset({"", "?"})
+
+_BITS = {"true": 1.0, "false": 0.0}
+_PIECE = 1 << 14
+
+Value = TypeVar("Value", bound=np.generic)
+
+
+@dataclass(frozen=True, slots=True)
+class Parsed(Generic[Value]):
+    """One column: (n,) `values`, and which cells are missing and which are wrong, (n,) bool each."""
+
+    values: NDArray[Value]
+    missing: NDArray[np.bool_]
+    wrong: NDArray[np.bool_]
+
+
+def numbers(column: Column, decimal: str = ".") -> Parsed[np.float64]:
+    """Read `column` as finite numbers with the sign `decimal` before their fractions.
+
+    Missing: empty, ?, NA, N/A, NaN, null, none; wrong: anything else, and infinity.
+    """
+    return _parsed(column, {}, decimal)
+
+
+def bits(column: Column, decimal: str = ".") -> Parsed[np.bool_]:
+    """Read `column` as bits: 0, 1, 0.0, 1.0, true, false; missing as in `numbers`, wrong: anything else."""
+    parsed = _parsed(column, _BITS, decimal)
+    values = parsed.values == 1
+    return Parsed(values, parsed.missing, parsed.wrong | ~(parsed.missing | values | (parsed.values == 0)))
+
+
+def integers(column: Column, decimal: str = ".") -> Parsed[np.float64]:
+    """Read `column` as whole numbers within +-2^53; missing as in `numbers`, wrong: anything else."""
+    parsed = numbers(column, decimal)
+    values = np.where(parsed.missing | parsed.wrong, 0, parsed.values)
+    return Parsed(values, parsed.missing, parsed.wrong | (values != np.rint(values)) | (np.abs(values) > 2**53))
+
+
+def codes(column: Column, decimal: str = ".") -> Parsed[np.float64]:
+    """Read `column` as codes 0..65535; missing as in `numbers`, wrong: anything else."""
+    parsed = integers(column, decimal)
+    return Parsed(parsed.values, parsed.missing, parsed.wrong | (parsed.values < 0) | (parsed.values >= CODES))
+
+
+def names(column: Column, cells: bool = False, size: int = 0) -> Parsed[np.str_]:
+    """Read `column` as names without outer blanks; missing: empty and ?, wrong: by the rule of names. With `cells` they
+    are written as cells of a spreadsheet.
+
+    Numbers are names too, but for NaN, which is missing, and infinity, which is wrong. Whole ones read as such: 3, not
+    3.0. Raises RecordingError where the names are too long for so many rows of a file of `size` bytes.
+    """
+    missing, wrong = (np.zeros(len(column), np.bool_) for _ in range(2))
+    found: list[NDArray[np.str_]] = []
+    start = longest = 0
+    for texts, faulty in _names(column, cells):
+        longest = max(longest, *map(len, texts))
+        check_room(len(column), longest, size)
+        found.append(np.array(texts, np.str_))
+        end = start + len(texts)
+        for mask, these in (missing, MISSING_NAMES), (wrong, faulty):
+            if not these.isdisjoint(texts):
+                mask[start:end] = [text in these for text in texts]
+        start = end
+    return Parsed(np.concatenate(found) if found else np.zeros(0, np.str_), missing, wrong)
+
+
+def _names(column: Column, cells: bool) -> Iterator[tuple[list[str], set[str]]]:
+    """Yield the names in a column, piece by piece, and those of the piece that are wrong."""
+    if isinstance(column, np.ndarray) and column.dtype.kind != "U":
+        values = _floats(column)
+        for start in range(0, len(values), _PIECE):
+            texts = list(map(_name_of_number, values[start : start + _PIECE].tolist()))
+            yield texts, {text for text in texts if text.endswith("inf")}
+        return
+    for piece in pieces(column):
+        texts = [text_of(cell.strip()) if cells else cell.strip() for cell in piece]
+        # Looked up as str: an array of them would lose NULs at their ends.
+        yield texts, {text for text in {*texts} - MISSING_NAMES if fault(text)}
+
+
+def _name_of_number(number: float) -> str:
+    if math.isnan(number):
+        return ""
+    # Adding zero makes -0.0 the 0.0 that it equals.
+    return np.format_float_positional(number + 0.0, trim="-")
+
+
+# "1.000" is a thousand where a comma is the decimal sign: so it is wrong, not one.
+_COMMA = str.maketrans({",": ".", ".": "_"})
+
+
+def _parsed(column: Column, words: dict[str, float], decimal: str) -> Parsed[np.float64]:
+    """Return the cells as floats, NaN where one is missing or wrong; `words` are read besides numbers."""
+    if isinstance(column, np.ndarray) and column.dtype.kind != "U":
+        values = _floats(column)
+        missing = np.isnan(values)
+    else:
+        values, missing = np.empty(len(column)), np.zeros(len(column), np.bool_)
+        start = 0
+        for texts in pieces(column):
+            end = start + len(texts)
+            values[start:end] = _numbers([text.translate(_COMMA) for text in texts] if decimal == "," else texts, words)
+            for row in np.flatnonzero(np.isnan(values[start:end])).tolist():
+                missing[start + row] = texts[row].strip().casefold() in MISSING_NUMBERS
+            start = end
+    return Parsed(values, missing, (np.isnan(values) & ~missing) | np.isinf(values))
+
+
+def _floats(column: AnyArray) -> NDArray[np.float64]:
+    # A number too large for a double becomes infinite, and is refused with its row.
+    with np.errstate(over="ignore"):
+        return column.astype(np.float64)
+
+
+def _numbers(cells: list[str], words: dict[str, float]) -> NDArray[np.float64]:
+    try:
+        # All at once is several times faster; float() would read 1_000 as a thousand.
+        values = np.array(cells, dtype=np.float64)
+        return values if not any("_" in cell for cell in cells) else _one_by_one(cells, words)
+    except ValueError:
+        return _one_by_one(cells, words)
+
+
+def _one_by_one(cells: list[str], words: dict[str, float]) -> NDArray[np.float64]:
+    values = np.full(len(cells), np.nan)
+    for row, cell in enumerate(cells):
+        word = cell.strip().casefold()
+        if word in words:
+            values[row] = words[word]
+        elif word not in MISSING_NUMBERS and "_" not in word:
+            with suppress(ValueError):
+                values[row] = float(word)
+    return values

@@ -1,0 +1,345 @@
+"""A columns.toml for a table that has none: what each column is, found from its name and its values, with reasons."""
+
+import glob
+import re
+from bisect import bisect_left
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import msgspec
+import numpy as np
+import tomli_w
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from thenar.runtime.names import printable, shortened
+
+from .cells import bits, names, numbers
+from .coding import sound_grid
+from .columns import KEYS, PLAIN, Columns, JointColumns, TaxelColumns, TextFormat
+from .errors import TableError
+from .graspset import CODES
+from .sniff import sniff
+from .table import Table, is_text, read_table
+from .taxonomy import published_for
+from .trials import groups, restarts
+
+# Words in the names of columns, as people write them in several languages.
+_LISTS = {
+    "label": "grasp grip label class gesture posture pose category target action griff griffart greifart "
+    "klasse geste prise classe agarre clase presa y",
+    "subject": "subject subj who wer participant person user wearer proband teilnehmer sujet participante sujeto",
+    "object": "object obj item thing objekt gegenstand objet objeto oggetto",
+    "session": "session day visit sitzung tag jour séance sesión sessione",
+    "trial": "trial rep repetition repeat attempt take run versuch wiederholung durchgang essai répétition ensayo",
+    "time": "time timestamp stamp frame t zeit zeitstempel bild temps tiempo tempo",
+    "unit": "ms s us sec second millisecond no nr number",
+    "note": "n num id idx duration age date gender sex row",
+    "pad": "pad taxel fsr pressure force tactile touch press contact druck kraft pression presión",
+    "joint": "flex bend joint angle enc encoder mcp pip dip cmc abduction winkel biegung",
+}
+# Without the s of a plural, as the words of names are looked up.
+_WORDS = {role: frozenset(word.removesuffix("s") or word for word in words.split()) for role, words in _LISTS.items()}
+# More distinct values than these are no grasp types.
+_TYPES = 200
+# An unknown analog column is at rest in so many of its cells, in the lowest tenth of its range: then it is a pad.
+_AT_REST, _REST = 0.5, 0.1
+# What is said of joints with values, before their grid.
+_NUMBERS = "numbers, coded on a grid of "
+
+
+class Role(msgspec.Struct, frozen=True):
+    """What some columns are taken for, and why."""
+
+    columns: tuple[str, ...]
+    role: str
+    reason: str
+
+
+class Proposal(msgspec.Struct, frozen=True):
+    """What a table's columns are taken for; `lacks` is what only the user can tell, "" where nothing is."""
+
+    columns: Columns
+    roles: tuple[Role, ...]
+    remarks: tuple[str, ...]
+    lacks: str = ""
+
+    def independent(self) -> "Proposal":
+        """Return the proposal with the claim that each row is a trial of its own."""
+        return replace(self, columns=replace(self.columns, frames="independent"), lacks="")
+
+    def toml(self) -> str:
+        """Return the text of the columns.toml, with the reasons."""
+        said = [*self.remarks, *(f"{listed(role.columns)}: {role.role}: {role.reason}" for role in self.roles)]
+        said += [f"TO DO: {self.lacks}"] if self.lacks else []
+        return (
+            "".join(f"# {printable(line)}\n" for line in said) + "\n" + tomli_w.dumps(msgspec.to_builtins(self.columns))
+        )
+
+
+def listed(columns: Sequence[str]) -> str:
+    """Return the names of columns, of more than three the first and the last."""
+    if len(columns) <= 3:
+        return ", ".join(map(shortened, columns))
+    return f"{shortened(columns[0])} ... {shortened(columns[-1])} ({len(columns)})"
+
+
+class _Column(NamedTuple):
+    """What is known of a column: its words; its numbers, None of text; how many values differ, how many are missing."""
+
+    name: str
+    words: frozenset[str]
+    values: NDArray[np.float64] | None
+    bits: bool
+    distinct: int
+    missing: int
+    rows: int
+
+    @property
+    def whole(self) -> bool:
+        """Whether it holds whole numbers."""
+        return self.values is not None and bool((self.values == np.rint(self.values)).all())
+
+    @property
+    def nominal(self) -> bool:
+        """Whether it may say which of several things a row is of."""
+        return bool(self.distinct) and (self.values is None or self.whole)
+
+    @property
+    def counts_rows(self) -> bool:
+        """Whether it is a number of each row."""
+        return self.whole and self.values is not None and self.rows > 2 and bool((np.diff(self.values) == 1).all())
+
+
+def _look(table: Table, name: str) -> _Column:
+    column, rows = table.columns[name], len(table.rows)
+    found = re.findall(r"[A-Z]{2,}(?![^\W\dA-Z_])|[^\W\d_][^\W\dA-Z_]*", name)
+    words = frozenset(word.casefold().removesuffix("s") or word for word in found)
+    parsed = numbers(column, table.decimal)
+    if parsed.wrong.any():
+        switch = bits(column, table.decimal)
+        if not switch.wrong.any():
+            there = switch.values[~switch.missing].astype(np.float64)
+            return _Column(name, words, there, True, 2, int(switch.missing.sum()), rows)
+        read = names(column, table.cells, table.size)
+        texts = np.unique(read.values[~read.missing])
+        return _Column(name, words, None, False, len(texts), int(read.missing.sum()), rows)
+    values = parsed.values[~parsed.missing]
+    distinct = np.unique(values)
+    two = bool(len(distinct)) and bool(np.isin(distinct, (0, 1)).all())
+    return _Column(name, words, values, two, len(distinct), rows - len(values), rows)
+
+
+def propose_file(path: Path) -> tuple[Table, Proposal]:
+    """Return the table in `path`, and what its columns are taken for. Raises TableError; OSError as it comes."""
+    text, remarks = sniff(path) if is_text(path) else (PLAIN, [])
+    table = read_table(path, text)
+    return table, propose(table, text, remarks)
+
+
+def propose(table: Table, text: TextFormat = PLAIN, remarks: Sequence[str] = ()) -> Proposal:
+    """Return what the columns of `table` are taken for. Raises TableError where none is a label, or none an input."""
+    found = [_look(table, name) for name in table.columns]
+    chosen, why = _named(found)
+    if "label" not in chosen:
+        chosen["label"], why["label"] = _label(table.what, found, chosen)
+    frames, lacks = _told(table, found, chosen, why)
+    taken = {name for columns in chosen.values() for name in columns}
+    inputs = _inputs([column for column in found if column.name not in taken])
+    if not any(role.role in ("switches", "taxels", "joints") for role in inputs):
+        raise TableError(f"{table.what}: no column holds numbers that change: it has no inputs")
+    used = taken | {name for role in inputs if role.role != "left out" for name in role.columns}
+    missing = sum(bool(column.missing) for column in found if column.name in used)
+    labels = set(_texts(table, chosen["label"]).tolist()) - {""}
+    taxonomy = published_for(labels) or "own"
+    columns = Columns(
+        **{key: those[0] if len(those) == 1 else those for key, those in chosen.items()},  # type: ignore[arg-type]
+        frames=frames,
+        taxonomy=taxonomy,
+        missing="keep" if missing else "refuse",
+        **text._asdict(),
+        switches=_globs((name for role in inputs if role.role == "switches" for name in role.columns), table.columns),
+        taxels=tuple(
+            TaxelColumns(_globs(role.columns, table.columns), "otsu") for role in inputs if role.role == "taxels"
+        ),
+        joints=tuple(_joints(role, table.columns) for role in inputs if role.role == "joints"),
+    )
+    notes = [f"{missing} columns miss cells, which are filled: see `missing`"] if missing else []
+    notes += [f"the labels are grasp types of {taxonomy}"] if taxonomy != "own" else []
+    roles = [Role(chosen[key], key, why[key]) for key in KEYS if key in chosen]
+    return Proposal(columns, (*roles, *inputs), (*remarks, *notes), lacks)
+
+
+def _named(found: Sequence[_Column]) -> tuple[dict[str, tuple[str, ...]], dict[str, str]]:
+    """Return the columns by what their names say they are, and why."""
+    chosen: dict[str, tuple[str, ...]] = {}
+    for key in ("time", "session", "trial", "subject", "object", "label"):
+        best = [
+            (not column.words <= _WORDS[key] | _WORDS["unit"], column.distinct == column.rows, place)
+            for place, column in enumerate(found)
+            if (column.name,) not in chosen.values() and _may_be(key, column)
+        ]
+        if best:
+            chosen[key] = (found[min(best)[2]].name,)
+    distinct = {column.name: column.distinct for column in found}
+    return chosen, {key: f"its name; {distinct[name]} different" for key, (name,) in chosen.items()}
+
+
+def _may_be(key: str, column: _Column) -> bool:
+    if key == "time":
+        return column.values is not None and column.distinct > 1 and _is_time(column.words)
+    named = column.words <= _WORDS[key] | _WORDS["unit"] if column.bits else True
+    fits = named and column.nominal and (key != "label" or 1 < column.distinct <= _TYPES)
+    return fits and bool(column.words & _WORDS[key])
+
+
+def _is_time(words: frozenset[str]) -> bool:
+    return bool(words & _WORDS["time"]) and words <= _WORDS["time"] | _WORDS["unit"]
+
+
+def _label(what: str, found: Sequence[_Column], chosen: dict[str, tuple[str, ...]]) -> tuple[tuple[str, ...], str]:
+    """Return the column that is most likely the label where none is called so."""
+    if "object" in chosen:
+        return chosen.pop("object"), "no column is called label, grasp or class: the objects are what can be recognised"
+    taken = {name for columns in chosen.values() for name in columns}
+    few = [column for column in found if column.nominal and 1 < column.distinct <= _TYPES and column.name not in taken]
+    texts = [column for column in few if column.values is None]
+    if not texts:
+        raise TableError(f"{what}: no column looks like the grasp type: say in a columns.toml which is it (`label`)")
+    best = min(texts, key=lambda column: column.distinct)
+    return (best.name,), f"no column is called label, grasp or class: it is text, {best.distinct} different"
+
+
+def _texts(table: Table, columns: Iterable[str]) -> NDArray[np.str_]:
+    parts = [names(table.columns[name], table.cells, table.size).values for name in columns]
+    return parts[0] if len(parts) == 1 else np.array([" ".join(row) for row in zip(*parts, strict=True)])
+
+
+def _told(
+    table: Table, found: Sequence[_Column], chosen: dict[str, tuple[str, ...]], why: dict[str, str]
+) -> tuple[Literal["restart"] | None, str]:
+    """Find how trials are told apart; return what `frames` says of it, and what only the user can say."""
+    who = [name for key in ("label", "subject", "object", "session", "trial") for name in chosen.get(key, ())]
+    ids = groups(*(_texts(table, [name]) for name in who))
+    time = _time(table, chosen)
+    if "trial" in chosen:
+        taken = {*who, *chosen.get("time", ())}
+        _add_parts(table, ids, time, [column for column in found if column.name not in taken], chosen, why)
+        return None, ""
+    if ids.max(initial=0) + 1 == len(ids):
+        return None, ""
+    if time is not None:
+        trials = int(restarts(ids, time)[-1])
+        if 2 * trials <= len(ids):
+            why["time"] += f"; it starts anew {trials} times: these are the trials (frames = restart)"
+            return "restart", ""
+    return None, (
+        "no column tells which rows are frames of one trial: name it (trial = ...), or state that each row is a trial "
+        'of its own (frames = "independent")'
+    )
+
+
+def _time(table: Table, chosen: dict[str, tuple[str, ...]]) -> NDArray[np.float64] | None:
+    return numbers(table.columns[chosen["time"][0]], table.decimal).values if "time" in chosen else None
+
+
+def _add_parts(
+    table: Table,
+    ids: NDArray[np.intp],
+    time: NDArray[np.float64] | None,
+    rest: Sequence[_Column],
+    chosen: dict[str, tuple[str, ...]],
+    why: dict[str, str],
+) -> None:
+    """Add to the columns of the trial those without which a time would occur twice in one trial."""
+    if time is None:
+        return
+    twice = len(ids) - len(np.unique(np.stack([ids, groups(time)]), axis=1).T)
+    texts = [column for column in rest if column.values is None and 1 < column.distinct <= _TYPES]
+    for column in sorted(texts, key=lambda column: column.distinct) if twice else ():
+        finer = groups(ids, _texts(table, [column.name]))
+        left = len(ids) - len(np.unique(np.stack([finer, groups(time)]), axis=1).T)
+        if 2 * left < twice:
+            ids, twice = finer, left
+            chosen["trial"] = (column.name, *chosen["trial"])
+            why["trial"] = f"with {column.name}, no time occurs twice in a trial"
+    if len(chosen["trial"]) > 1:
+        why["trial"] += f"; {int(ids.max()) + 1} trials"
+
+
+def _inputs(columns: Sequence[_Column]) -> list[Role]:
+    """Return what the other columns are taken for, those alike together."""
+    found: dict[tuple[str, str], list[str]] = {}
+    stems: dict[str, list[_Column]] = {}
+    for column in columns:
+        if out := _no_input(column):
+            found.setdefault(("left out", out), []).append(column.name)
+        else:
+            stems.setdefault("" if column.bits else _stem(column.name), []).append(column)
+    # Columns that are numbered alike are of one kind, whatever the range of each.
+    for several in stems.values():
+        found.setdefault(_input(several), []).extend(column.name for column in several)
+    order = ["switches", "taxels", "joints", "left out"]
+    return [Role(tuple(alike), *key) for key, alike in sorted(found.items(), key=lambda item: order.index(item[0][0]))]
+
+
+def _stem(name: str) -> str:
+    return name.rstrip("0123456789")
+
+
+def _input(columns: Sequence[_Column]) -> tuple[str, str]:
+    """Return the role of inputs that are alike, and why."""
+    words = frozenset[str]().union(*(column.words for column in columns))
+    each = [column.values for column in columns if column.values is not None]
+    values = np.concatenate(each)
+    if all(column.bits for column in columns):
+        return "switches", "0 and 1 only"
+    if words & _WORDS["pad"]:
+        return "taxels", "pads by their names, closed above a threshold (Otsu)"
+    if not all(column.whole for column in columns) or values.min() < 0 or values.max() >= CODES:
+        return "joints", f"{_NUMBERS}{sound_grid(values):g}"
+    rest = np.mean([np.mean(part <= part.min() + _REST * np.ptp(part)) for part in each])
+    if not words & _WORDS["joint"] and rest > _AT_REST:
+        return "taxels", "at rest in most rows, as a pad is: closed above a threshold (Otsu)"
+    return "joints", "whole numbers, taken as codes"
+
+
+def _no_input(column: _Column) -> str:
+    """Return why a column is no input, "" where it is one."""
+    if not column.distinct:
+        return "empty"
+    if column.values is None:
+        return "text"
+    if column.counts_rows:
+        return "it numbers the rows"
+    if column.bits:
+        return ""
+    if column.distinct == 1:
+        return "it never changes"
+    if column.words & _WORDS["note"] or _is_time(column.words):
+        return "by its name a note on the row"
+    return ""
+
+
+def _joints(role: Role, every: Iterable[str]) -> JointColumns:
+    """Return the entry of joints: of codes, or of values on one grid."""
+    columns = _globs(role.columns, every)
+    if not role.reason.startswith(_NUMBERS):
+        return JointColumns(columns, "counts", codes=True)
+    words = {word for name in role.columns for word in re.findall(r"[a-z]+", name.casefold())}
+    unit = next((unit for unit in ("deg", "rad", "mm", "cm") if unit in words), "units")
+    return JointColumns(columns, unit, grid=float(role.reason.removeprefix(_NUMBERS)))
+
+
+def _globs(columns: Iterable[str], every: Iterable[str]) -> tuple[str, ...]:
+    """Return globs that match exactly `columns` of `every` one: a star where a stem has no others."""
+    there = sorted(every)
+    stems: dict[str, list[str]] = {}
+    for name in columns:
+        stems.setdefault(_stem(name), []).append(name)
+    found: list[str] = []
+    for stem, alike in stems.items():
+        others = bisect_left(there, stem + "\U0010ffff") - bisect_left(there, stem) - len(alike)
+        found += [f"{glob.escape(stem)}*"] if stem and len(alike) > 2 and not others else map(glob.escape, alike)
+    return tuple(found)

@@ -1,0 +1,114 @@
+"""Trials: rows told apart by what several columns say, gaps filled from the same trial, many frames reduced to one."""
+
+import re
+from collections.abc import Sequence
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+Value = TypeVar("Value", bound=np.generic)
+
+_DIGITS = re.compile(r"(\d+)")
+
+
+def natural_key(text: str) -> tuple[list[tuple[int, str]], str]:
+    """Return what `text` is sorted by where numbers count as such: "T2" before "T10"."""
+    parts = enumerate(_DIGITS.split(text.casefold()))
+    # Digits by their length, then as text: int() takes no more than 4,300 of them.
+    return [(len(part.lstrip("0")), part.lstrip("0")) if odd % 2 else (-1, part) for odd, part in parts], text
+
+
+def numbered(columns: Sequence[NDArray[np.str_]]) -> tuple[NDArray[np.int64], list[str]]:
+    """Return a number (n,) from 1 for each row, equal where all `columns` (n,) are, and their texts in that order."""
+    number = groups(*columns)
+    first = np.unique(number, return_index=True)[1]
+    texts = [[str(column[row]) for column in columns] for row in first.tolist()]
+    order = sorted(range(len(texts)), key=lambda row: [natural_key(text) for text in texts[row]])
+    rank = np.empty(len(order), np.int64)
+    rank[order] = np.arange(1, len(order) + 1)
+    return rank[number], [" ".join(texts[row]) for row in order]
+
+
+def groups(*columns: NDArray[np.generic]) -> NDArray[np.intp]:
+    """Return a number (n,) for each row from 0 in the order of first appearance, equal where all `columns` (n,) are."""
+    ids = np.zeros(len(columns[0]), np.intp)
+    for column in columns:
+        _, part = np.unique(column, return_inverse=True)
+        # Numbered densely again at once: the product of all counts may not fit.
+        ids = np.unique(ids * (part.max(initial=0) + 1) + part, return_inverse=True)[1]
+    _, first, ids = np.unique(ids, return_index=True, return_inverse=True)
+    return np.argsort(np.argsort(first))[ids]
+
+
+def restarts(ids: NDArray[np.intp], time: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return numbers (n,) from 1 that rise by one where `ids` (n,) changes, or `time` (n,) does not rise."""
+    return np.cumsum((np.diff(ids, prepend=-1) != 0) | ~(np.diff(time, prepend=-np.inf) > 0)).astype(np.int64)
+
+
+def in_time(trials: NDArray[np.intp], time: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return the rows (n,) such that each trial keeps its places and its frames in them are in the order of `time`."""
+    order = np.empty(len(trials), np.intp)
+    order[np.argsort(trials, kind="stable")] = np.lexsort((time, trials))
+    return order
+
+
+def fill(values: NDArray[np.generic], missing: NDArray[np.bool_], trials: NDArray[np.intp]) -> int:
+    """Fill the `missing` (n,) of `values` (n,), in place, from the nearest frame of the same trial, of two the earlier.
+
+    Where the trial has none, the lower median of all that are there. Returns how many were filled so. Labels are not
+    looked at.
+    """
+    order = np.argsort(trials, kind="stable")
+    there, trial, place = ~missing[order], trials[order], np.arange(len(order))
+    before = np.maximum.accumulate(np.where(there, place, -1))
+    after = np.minimum.accumulate(np.where(there, place, len(order))[::-1])[::-1]
+    has_before = (before >= 0) & (trial[before] == trial)
+    has_after = (after < len(order)) & (trial[np.minimum(after, len(order) - 1)] == trial)
+    nearest = np.where(has_before & (~has_after | (place - before <= after - place)), before, after)
+    known = has_before | has_after
+    present = np.sort(values[~missing])
+    filled = np.full(len(order), present[(len(present) - 1) // 2])
+    filled[known] = values[order][nearest[known]]
+    values[order[~there]] = filled[~there]
+    return int((~there & ~known).sum())
+
+
+class Frames:
+    """The frames of each trial: rows in their order, where each trial starts, and its middle frame."""
+
+    def __init__(self, trials: NDArray[np.intp]) -> None:
+        self.order = np.argsort(trials, kind="stable")
+        self._trials = trials[self.order]
+        self._starts = np.flatnonzero(np.diff(self._trials, prepend=-1))
+        self._middles = self._starts + (np.diff(self._starts, append=len(trials)) - 1) // 2
+        self.middle: NDArray[np.intp] = np.sort(self.order[self._middles])
+        # Trials in the order of their middle frames.
+        self._sorted = np.argsort(self.order[self._middles])
+
+    def median(self, values: NDArray[Value]) -> NDArray[Value]:
+        """Return the lower median (trials,) of `values` (n,): a value that occurred; of switches what most are."""
+        column = values[self.order]
+        middle: NDArray[Value] = column[np.lexsort((column, self._trials))][self._middles]
+        return middle[self._sorted]
+
+    def any(self, bits: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return (trials,) whether any of `bits` (n,) is set."""
+        return np.logical_or.reduceat(bits[self.order], self._starts)[self._sorted]
+
+
+def otsu(values: NDArray[np.float64]) -> float:
+    """Return the threshold that parts `values` into two classes of least variance within (Otsu 1979).
+
+    It lies half-way between two neighbouring ones of the finite `values`; where there is one, it is that.
+    """
+    found, counts = np.unique(values[np.isfinite(values)], return_counts=True)
+    if len(found) < 2:
+        return float(found[0]) if len(found) else 0.0
+    # In units of the range, from its foot: what is squared stays finite.
+    scaled = (found / 2 - found[0] / 2) / (found[-1] / 2 - found[0] / 2)
+    below, total = np.cumsum(counts)[:-1], counts.sum()
+    sums = np.cumsum(scaled * counts)
+    between = (sums[-1] * below - sums[:-1] * total) ** 2 / (below * (total - below))
+    best = int(np.argmax(between))
+    return float(found[best] / 2 + found[best + 1] / 2)

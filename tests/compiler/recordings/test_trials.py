@@ -1,0 +1,99 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from thenar.compiler.recordings.trials import Frames, fill, groups, in_time, natural_key, numbered, otsu, restarts
+
+IDS = hnp.arrays(np.intp, st.integers(1, 30), elements=st.integers(0, 4))
+
+
+@given(st.lists(st.integers(0, 10**6)))
+def test_numbers_in_texts_are_sorted_as_numbers(numbers: list[int]) -> None:
+    texts = [f"Trial {number} - Copy" for number in numbers]
+    assert sorted(texts, key=natural_key) == [f"Trial {number} - Copy" for number in sorted(numbers)]
+    assert sorted(["b1", "a10", "1" * 5000, "A2", ""], key=natural_key) == ["", "1" * 5000, "A2", "a10", "b1"]
+
+
+@given(IDS, st.data())
+def test_rows_get_one_number_exactly_where_all_columns_are_equal(first: np.ndarray, data: st.DataObject) -> None:
+    second = data.draw(hnp.arrays(np.intp, len(first), elements=st.integers(0, 3)))
+    pairs = list(zip(first.tolist(), second.tolist(), strict=True))
+    seen = list(dict.fromkeys(pairs))
+    assert groups(first, second).tolist() == [seen.index(pair) for pair in pairs]
+    numbers, texts = numbered([first.astype(str), second.astype(str)])
+    order = sorted(set(pairs))
+    assert texts == [f"{a} {b}" for a, b in order]
+    assert numbers.tolist() == [order.index(pair) + 1 for pair in pairs]
+
+
+def test_a_trial_begins_with_another_person_and_where_time_does_not_rise() -> None:
+    assert restarts(np.array([0, 0, 0, 1, 1, 1, 0]), np.array([5, 6, 6, 7, 8, 1, 2.0])).tolist() == [
+        1,
+        1,
+        2,
+        3,
+        3,
+        4,
+        5,
+    ]
+
+
+@given(IDS, st.data())
+def test_frames_are_ordered_within_the_places_of_their_trial(ids: np.ndarray, data: st.DataObject) -> None:
+    time = data.draw(hnp.arrays(np.float64, len(ids), elements=st.integers(0, 5)))
+    order = in_time(ids, time)
+    assert sorted(order) == list(range(len(ids)))
+    assert (ids[order] == ids).all()
+    for trial in set(ids.tolist()):
+        rows = order[ids == trial].tolist()
+        assert rows == sorted(rows, key=lambda row: (time[row], row))
+
+
+@given(IDS, st.data())
+def test_a_gap_is_filled_from_the_nearest_frame_of_its_trial_else_with_the_median(
+    ids: np.ndarray, data: st.DataObject
+) -> None:
+    values = data.draw(hnp.arrays(np.int64, len(ids), elements=st.integers(0, 9)))
+    missing = data.draw(hnp.arrays(np.bool_, len(ids)).filter(lambda mask: not mask.all()))
+    expected, strange = values.copy(), 0
+    present = sorted(values[~missing].tolist())
+    for row in np.flatnonzero(missing).tolist():
+        frames = np.flatnonzero(ids == ids[row]).tolist()
+        there = [frame for frame in frames if not missing[frame]]
+        near = min(there, key=lambda frame: (abs(frames.index(frame) - frames.index(row)), frame), default=None)
+        strange += near is None
+        expected[row] = present[(len(present) - 1) // 2] if near is None else values[near]
+    assert fill(values, missing, ids) == strange
+    assert values.tolist() == expected.tolist()
+
+
+@given(IDS, st.data())
+def test_frames_are_reduced_as_one_by_one(ids: np.ndarray, data: st.DataObject) -> None:
+    values = data.draw(hnp.arrays(np.int64, len(ids), elements=st.integers(0, 9)))
+    rows = [np.flatnonzero(ids == trial) for trial in set(ids.tolist())]
+    rows.sort(key=lambda frames: int(frames[(len(frames) - 1) // 2]))
+    frames = Frames(ids)
+    assert frames.middle.tolist() == [each[(len(each) - 1) // 2] for each in rows]
+    assert frames.median(values).tolist() == [sorted(values[each])[(len(each) - 1) // 2] for each in rows]
+    assert frames.any(values > 5).tolist() == [bool((values[each] > 5).any()) for each in rows]
+
+
+@given(hnp.arrays(np.float64, st.integers(2, 40), elements=st.integers(-50, 50)))
+def test_otsus_threshold_leaves_the_least_variance_within(values: np.ndarray) -> None:
+    threshold = otsu(values)
+
+    def within(border: float) -> float:
+        parts = values[values <= border], values[values > border]
+        return sum(float(((part - part.mean()) ** 2).sum()) for part in parts if part.size)
+
+    found = np.unique(values)
+    least = min(map(within, found[:-1]), default=0.0)
+    assert within(threshold) == pytest.approx(least, abs=1e-9)
+    assert len(found) == 1 or threshold not in found
+
+
+def test_otsus_threshold_is_finite_at_the_ends_of_the_doubles() -> None:
+    assert otsu(np.array([-1.7e308, -1.6e308, 1.7e308])) == pytest.approx(5e306)
+    assert (otsu(np.array([np.nan])), otsu(np.array([3.0, np.nan]))) == (0.0, 3.0)
