@@ -279,21 +279,7 @@ def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
         f"{folder}: {len(manifest.grasps)} grasp types from {len(manifest.switches)} of {manifest.source.switches} "
         f"switches and {len(manifest.joints)} joints; tables of {made.tables_bytes} bytes"
     )
-    if manifest.switches:
-        console.print(f"switches: {', '.join(switch.name for switch in manifest.switches)}", soft_wrap=True)
-    for switch in manifest.switches:
-        if switch.threshold is not None:
-            console.print(f"{switch.name}: {switch.closed}, learnt")
-    if manifest.stopped_after:
-        console.print(
-            f"stopped after {manifest.stopped_after} of {manifest.options.rounds} rounds: the last changed the mean "
-            f"loss by less than {manifest.options.tolerance:g}"
-        )
-    if manifest.zero_gain_nodes:
-        console.print(
-            f"at {manifest.zero_gain_nodes} of the placement's decisions no switch gains anything alone: "
-            "the lowest-numbered one that varies was taken"
-        )
+    _print_training(manifest)
     for rate in manifest.rates:
         console.print(f"recognised, {rate}")
     if manifest.source.independent:
@@ -311,6 +297,25 @@ def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
         )
         if joints := own_joints([joint.name for joint in manifest.joints]):
             console.print(joints)
+
+
+def _print_training(manifest: "Manifest") -> None:
+    console = out()
+    if manifest.switches:
+        console.print(f"switches: {', '.join(switch.name for switch in manifest.switches)}", soft_wrap=True)
+    for switch in manifest.switches:
+        if switch.threshold is not None:
+            console.print(f"{switch.name}: {switch.closed}, learnt")
+    if manifest.stopped_after:
+        console.print(
+            f"stopped after {manifest.stopped_after} of {manifest.options.rounds} rounds: the last changed the mean "
+            f"loss by less than {manifest.options.tolerance:g}"
+        )
+    if manifest.zero_gain_nodes:
+        console.print(
+            f"at {manifest.zero_gain_nodes} of the placement's decisions no switch gains anything alone: "
+            "the lowest-numbered one that varies was taken"
+        )
 
 
 def _print_scan(scan: "ScanMap", harness: "Harness") -> None:
