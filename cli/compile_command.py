@@ -280,7 +280,7 @@ def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
         f"switches and {len(manifest.joints)} joints; tables of {made.tables_bytes} bytes"
     )
     _print_training(manifest)
-    for rate in manifest.rates:
+    for rate in sorted(manifest.rates, key=lambda rate: rate.protocol == "training"):
         console.print(f"recognised, {rate}")
     if manifest.source.independent:
         console.print(INDEPENDENT)

@@ -29,8 +29,8 @@ Progress = Callable[[int, int], None]
 class FoldFit:
     """Train on a fold's training rows and these columns, classes `grasps` (ascending labels); then test the fold.
 
-    The first `n_switches` columns are switches, the last `n_taxels` of these are taxels, the others joints. Two fits are
-    one if they are of the same `Fold` object and the same columns.
+    The first `n_switches` columns are switches, of which the last `n_taxels` are taxels; the others are joints. Two
+    fits are one if they are of the same `Fold` object and the same columns.
     """
 
     fold: Fold

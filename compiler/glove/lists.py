@@ -90,7 +90,7 @@ def expectations(expected: Expected) -> Iterator[str]:
         yield f"A scanner board's bitmap takes {us:.0f} us on its line."
     if expected.glove_us is not None:
         yield f"The CyberGlove sends a record every {expected.glove_us:.0f} us at best."
-    for rate in expected.rates:
+    for rate in sorted(expected.rates, key=lambda rate: rate.protocol == "training"):
         yield f"Recognised, {rate}."
 
 
