@@ -116,7 +116,7 @@ def _either(names: Sequence[str]) -> str:
     return " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
-class Listed(click.Choice[str]):
+class OneOf(click.Choice[str]):
     """One of the names of a kind, which are read when they are first needed and not when a command is defined."""
 
     def __init__(self, kind: str, names: Callable[[], Iterable[str]]) -> None:
@@ -143,32 +143,28 @@ class Listed(click.Choice[str]):
         return f"[{names}]" if len(names) <= _LONGEST_METAVAR else self.kind.upper()
 
 
-class ListOf(Listed):
+class ListOf(click.ParamType[tuple[str, ...]]):
     """Several of the names of a kind, with commas between them; where `none` is allowed, that names none."""
 
     def __init__(self, kind: str, names: Callable[[], Iterable[str]], *, none: bool = False) -> None:
-        super().__init__(kind, names)
-        self._none = none
+        self.name, self._one, self._none = f"{kind}s", OneOf(kind, names), none
 
-    def convert(  # type: ignore[override]
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[str, ...]:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, ...]:
         """Return the names, each once, in the order given. Raises BadParameter for a wrong one."""
         if isinstance(value, tuple):
             return value
         if self._none and value == "none":
             return ()
-        return tuple(super(ListOf, self).convert(part, param, ctx) for part in parted(value))
+        return tuple(self._one.convert(part, param, ctx) for part in parted(value))
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
         """Return how the list is written."""
-        return f"{self.kind.upper()},..."
+        return f"{self._one.kind.upper()},..."
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
         """Complete the name after the last comma."""
         before, comma, last = incomplete.rpartition(",")
-        found = super().shell_complete(ctx, param, last)
-        return [CompletionItem(f"{before}{comma}{item.value}") for item in found]
+        return [CompletionItem(f"{before}{comma}{item.value}") for item in self._one.shell_complete(ctx, param, last)]
 
 
 existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)

@@ -11,8 +11,8 @@ from click.core import ParameterSource
 from thenar.compiler.text import INDEPENDENT
 
 from .common import (
-    Listed,
     Number,
+    OneOf,
     OutputFile,
     OutputFolder,
     existing_file,
@@ -84,7 +84,7 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
 )
 @click.option(
     "--preset",
-    type=Listed("preset", lambda: PRESETS),
+    type=OneOf("preset", lambda: PRESETS),
     is_eager=True,
     expose_value=False,
     callback=_preset,
@@ -139,7 +139,7 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
 @click.option("--propose", type=OutputFile(".toml"), help="Write a glove.toml that wires the kept switches.")
 @click.option(
     "--chip",
-    type=Listed("chip", _chips),
+    type=OneOf("chip", _chips),
     help="Port expander to propose, or board for a switch-scanner board.  [default: mcp23017]",
 )
 @overwrite_flag

@@ -28,6 +28,7 @@ from .common import (
 )
 from .ending import ended_by_signals
 from .lines import echo
+from .options import scene_name
 
 if TYPE_CHECKING:
     from thenar.simulator.playing.bench import Bench, Cable
@@ -57,7 +58,7 @@ class Played(msgspec.Struct, frozen=True):
 
 
 @click.command("emulate", context_settings={"ignore_unknown_options": True})
-@click.argument("source", metavar="SCENE|FILE")
+@click.argument("source", metavar="SCENE|FILE", type=scene_name)
 @click.argument("client", nargs=-1, type=click.UNPROCESSED, metavar="[-- COMMAND...]")
 @click.option("--glove", metavar="glove.toml", type=existing_file, required=True, help="The harness to emulate.")
 @click.option(

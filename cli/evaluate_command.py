@@ -10,6 +10,7 @@ from rich.text import Text
 from thenar.compiler.text import interval
 
 from .common import (
+    ListOf,
     OutputFile,
     OutputFolder,
     existing_file,
@@ -41,15 +42,6 @@ def _numbers(_: click.Context, __: click.Parameter, value: str) -> tuple[int, ..
     if not all(part.isascii() and part.isdigit() for part in parts):
         raise click.BadParameter(f"{value!r} is not a list of whole numbers such as 0,13,62")
     return tuple(dict.fromkeys(map(int, parts)))
-
-
-def _tables(_: click.Context, __: click.Parameter, value: str) -> tuple[str, ...]:
-    """Return the tables named in `value`, parted by commas, in the order of the paper."""
-    parts = parted(value)
-    for part in parts:
-        if part not in TABLES:
-            raise click.BadParameter(f"{part!r} is none of {', '.join(TABLES)}")
-    return tuple(name for name in TABLES if name in parts)
 
 
 def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, ...]:
@@ -107,7 +99,7 @@ def _scheme(_: click.Context, __: click.Parameter, value: str | None) -> str:
     help="Methods to compare ID3 with, by commas.",
 )
 @click.option(
-    "--tables", callback=_tables, metavar="NAME,...", default=",".join(TABLES), show_default=True, help="Which tables."
+    "--tables", type=ListOf("table", lambda: TABLES), default=",".join(TABLES), show_default=True, help="Which tables."
 )
 @click.option("--confusion", is_flag=True, help="Print the confusion matrix of every composition and subject.")
 @click.option(
@@ -143,6 +135,7 @@ def command(
 
     training = asked_settings(context, asked)
     named = {name: training.pop(name) for name in ("trainer", "rounds") if name in training}
+    asked["tables"] = tuple(name for name in TABLES if name in asked["tables"])
     options = msgspec.convert(asked | named | {"settings": training}, Options)
     if (confusion or folder is not None) and "compositions" not in options.tables:
         raise click.UsageError("--confusion and --plot show the compositions: name them among --tables")

@@ -22,17 +22,20 @@ class Exported(Struct, frozen=True):
 @click.option(
     "-o",
     "--output",
-    type=OutputFile(".csv", ".csv.gz", ".arff"),
+    type=OutputFile(".csv", ".csv.gz", ".tsv", ".tsv.gz", ".arff", ".parquet"),
     required=True,
-    help="The .csv, .csv.gz or .arff file to write.",
+    help="The .csv, .tsv (each with or without .gz), .arff or .parquet file to write.",
 )
 @overwrite_flag
 @click.option("--codes", is_flag=True, help="Write the joints' integer codes instead of values in their units.")
-@click.option("--meta", is_flag=True, help="ARFF: write subject, object and trial too (CSV always holds them).")
+@click.option("--meta", is_flag=True, help="ARFF: write subject, object, session and trial too, as --columns does.")
 @click.option("--columns", type=OutputFile(".toml"), help="Also write the columns.toml that imports the table again.")
 @json_flag
 def command(grasps: Path, output: Path, codes: bool, meta: bool, columns: Path | None) -> None:
-    """Export GRASPS, a .grasps file, as CSV or as ARFF for Weka.
+    """Export GRASPS, a .grasps file, as CSV, as Parquet, or as ARFF for Weka.
+
+    With --columns the table imports again as the same set: no table says by itself what its codes mean, or that its
+    grasps were simulated.
 
     \b
     Example:

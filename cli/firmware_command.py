@@ -9,7 +9,7 @@ import click
 from rich.table import Table
 
 from .common import (
-    Listed,
+    OneOf,
     OutputFolder,
     existing_file,
     existing_folder,
@@ -52,11 +52,11 @@ class _Command(click.Command):
 
 @click.command("firmware", cls=_Command)
 @click.argument("build", metavar="BUILD", type=existing_folder)
-@click.option("--target", type=Listed("target", _targets), required=True, help="What the firmware is for.")
+@click.option("--target", type=OneOf("target", _targets), required=True, help="What the firmware is for.")
 @click.option("-o", "--output", metavar="DIR", type=OutputFolder(), help="Folder to write the firmware into.")
 @click.option(
     "--mode",
-    type=Listed("mode", _modes),
+    type=OneOf("mode", _modes),
     default="classify",
     show_default=True,
     help="A library that classifies frames; a board that scans switches; or one that also recognises.",

@@ -9,8 +9,8 @@ from rich.text import Text
 from thenar.compiler.text import duration, interval
 
 from .common import (
-    Listed,
     Number,
+    OneOf,
     OutputFolder,
     err,
     existing_file,
@@ -46,7 +46,7 @@ def _timed() -> tuple[str, ...]:
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option("-o", "--output", type=OutputFolder(), required=True, help="Folder for tables, pictures and the store.")
 @click.option("--glove", type=existing_file, help="A glove.toml: try its wiring as well, and choose by its ports.")
-@click.option("--target", type=Listed("target", _timed), default="host", show_default=True, help="What classifies.")
+@click.option("--target", type=OneOf("target", _timed), default="host", show_default=True, help="What classifies.")
 @click.option(
     "--budget-us",
     type=Number(min=0, min_open=True),

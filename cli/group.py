@@ -26,7 +26,7 @@ COMMANDS = (
 
 # What the extras of pyproject.toml bring, by the names that are imported.
 EXTRAS: Mapping[str, tuple[str, ...]] = {
-    "compiler": ("sklearn", "scipy", "joblib", "matplotlib", "threadpoolctl", "jinja2", "ezdxf"),
+    "compiler": ("sklearn", "scipy", "joblib", "matplotlib", "threadpoolctl", "jinja2", "ezdxf", "pandas"),
     "cluster": ("dask", "distributed"),
     "sim": ("mujoco",),
     "stability": ("mpmath", "jinja2"),
@@ -86,9 +86,8 @@ def run_group(arguments: Sequence[str]) -> int:
     except click.exceptions.NoArgsIsHelpError as help_wanted:
         help_wanted.show()
         return 2
-    except (KeyboardInterrupt, click.Abort):
-        echo("thenar: interrupted", err=True)
-        return 130
+    except click.Abort:
+        raise KeyboardInterrupt from None
     except Exception as fault:
         echo(f"thenar: {_sentence(fault, arguments)}", err=True)
         return 2

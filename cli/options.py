@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.shell_completion import CompletionItem
 
-from .common import Command, Listed, ListOf, Number, existing_file
+from .common import Command, ListOf, Number, OneOf, existing_file
 
 if TYPE_CHECKING:
     from thenar.compiler.hand import HandShape
@@ -27,8 +28,24 @@ def _trainers() -> Iterable[str]:
     return TRAINERS
 
 
-method_name, trainer_name = Listed("method", _methods), Listed("trainer", _trainers)
+method_name, trainer_name = OneOf("method", _methods), OneOf("trainer", _trainers)
 method_list = ListOf("method", _methods, none=True)
+
+
+class _Scene(click.ParamType[str]):
+    """A shipped scene's name, or a file."""
+
+    name = "scene"
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        """Complete the names of shipped scenes, and of files."""
+        from thenar.simulator.scenes import shipped
+
+        names = [CompletionItem(name) for name in shipped() if name.startswith(incomplete)]
+        return [*names, CompletionItem(incomplete, type="file")]
+
+
+scene_name = _Scene()
 
 
 def method_option(destination: str = "method", default: str = "id3") -> Callable[[Command], Command]:

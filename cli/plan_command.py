@@ -7,13 +7,14 @@ import click
 from rich.text import Text
 
 from .common import OutputFile, jobs_option, json_flag, keep_apart, out, overwrite_flag, progress, show, table
+from .options import scene_name
 
 if TYPE_CHECKING:
     from thenar.simulator.planning.plan import Planned
 
 
 @click.command("plan")
-@click.argument("scene")
+@click.argument("scene", type=scene_name)
 @click.option(
     "-o", "--output", type=OutputFile(".json"), required=True, metavar="POSTURES.json", help="The file to write."
 )

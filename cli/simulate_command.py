@@ -26,6 +26,7 @@ from .common import (
     warning,
 )
 from .lines import echo
+from .options import scene_name
 
 if TYPE_CHECKING:
     from thenar.compiler.evaluation.ablation import Ablation, Change, Variant
@@ -40,7 +41,7 @@ _OWN = "dim"  # how own steps look
 
 
 @click.command("simulate")
-@click.argument("scene", required=False)
+@click.argument("scene", type=scene_name, required=False)
 @click.option(
     "-o", "--output", type=OutputFile(".grasps"), metavar="SET.grasps", help="Simulate, and write the set there."
 )

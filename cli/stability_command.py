@@ -1,5 +1,6 @@
 """`thenar stability`: every hard case, the truth it is held against, and the error."""
 
+from collections.abc import Iterable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,7 +10,7 @@ from rich.console import Console, JustifyMethod
 from rich.table import Table
 from rich.text import Text
 
-from .common import OutputFile, jobs_option, json_flag, out, overwrite_flag, progress, show, table
+from .common import OneOf, OutputFile, jobs_option, json_flag, out, overwrite_flag, progress, show, table
 
 if TYPE_CHECKING:
     from thenar.stability.report import CaseReport, Check, Listed, Report
@@ -24,19 +25,14 @@ _NARROWEST = 8
 _GAP = 2
 
 
-def _known(_: click.Context, __: click.Parameter, cases: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the cases asked for in the order of the catalogue, each once; all of them where none is named."""
-    from thenar.runtime.names import nearest
+def _names() -> Iterable[str]:
     from thenar.stability.report import NAMES
 
-    for case in cases:
-        if case not in NAMES:
-            raise click.BadParameter(f"there is no case {case!r}{nearest(case, NAMES)}; --list shows them all")
-    return tuple(name for name in NAMES if not cases or name in cases)
+    return NAMES
 
 
 @click.command("stability")
-@click.argument("cases", nargs=-1, metavar="[CASE]...", callback=_known)
+@click.argument("cases", nargs=-1, metavar="[CASE]...", type=OneOf("case", _names))
 @click.option("--full", is_flag=True, help="Try more and harder inputs, such as 10,000 rounds of boosting: minutes.")
 @click.option("--list", "listing", is_flag=True, help="Only list the cases, and what could go wrong in each.")
 @jobs_option("Worker processes; they change no result.")
@@ -58,6 +54,7 @@ def command(cases: tuple[str, ...], full: bool, listing: bool, jobs: int, output
         thenar stability --full -o stability.html
         thenar stability separable weights
     """
+    cases = tuple(name for name in _names() if not cases or name in cases)
     if listing:
         if output is not None or full:
             raise click.UsageError("--list only lists: leave out --output and --full")

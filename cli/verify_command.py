@@ -1,11 +1,11 @@
 """`thenar verify`: is what runs what was trained?"""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from .common import existing_file, existing_folder, json_flag, out, parted, progress, show
+from .common import ListOf, existing_file, existing_folder, json_flag, out, progress, show
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -23,32 +23,12 @@ def _kinds() -> tuple[str, ...]:
     return kinds()
 
 
-class Kinds(click.ParamType[tuple[str, ...]]):
-    """Kinds of targets, with commas between them."""
-
-    name = "targets"
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
-        """Return all kinds there are."""
-        return ",".join(_kinds())
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, ...]:
-        """Return the kinds, each once."""
-        if isinstance(value, tuple):
-            return value
-        kinds = parted(str(value))
-        for kind in kinds:
-            if kind not in _kinds():
-                self.fail(f"there is no target {kind!r}: it takes {', '.join(_kinds())}, with commas between them")
-        return kinds
-
-
 @click.command("verify")
 @click.argument("build", metavar="BUILD", type=existing_folder)
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option(
     "--firmware",
-    type=Kinds(),
+    type=ListOf("target", _kinds),
     default=(),
     help="Also compile the classifier for these, and run it there or in a simulator.",
 )

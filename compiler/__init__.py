@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .placement.id3 import grow_id3
     from .placement.methods.base import METHODS
     from .placement.selectors import ID3Selector, SwitchSelector
+    from .recordings.columns import Columns
     from .recordings.graspset import GraspSet, Joint
     from .recordings.merging import merge, split
     from .samples import Samples
@@ -51,6 +52,7 @@ _HOMES = {
     ".placement.id3": ("grow_id3",),
     ".placement.methods.base": ("METHODS",),
     ".placement.selectors": ("ID3Selector", "SwitchSelector"),
+    ".recordings.columns": ("Columns",),
     ".recordings.graspset": ("GraspSet", "Joint"),
     ".recordings.merging": ("merge", "split"),
     ".samples": ("Samples",),
@@ -66,6 +68,7 @@ __all__ = [
     "BoostingError",
     "Build",
     "BuildReport",
+    "Columns",
     "CompileError",
     "Documents",
     "EvaluationError",
@@ -96,6 +99,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return import_module("importlib.metadata").version("thenar")
     if name not in _HOME_OF:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_HOME_OF[name], __name__), name)

@@ -1,13 +1,13 @@
-"""What all pictures share: names are no formulas, equal pictures are equal bytes, and matplotlib may be missing."""
+"""What pictures share: one palette, names that are no formulas, equal bytes, and a matplotlib that may be missing."""
 
 import io
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import chdir, contextmanager
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 from typing import TYPE_CHECKING
 
 from thenar.runtime.errors import ThenarError
@@ -16,6 +16,25 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FORMATS = ("png", "svg")
+# What each colour is for, on light and on dark screens; files are light. Switches, joints and both are Okabe and Ito's,
+# which the colour-blind distinguish too; the baselines' colours are no inputs'.
+PALETTE: Mapping[str, tuple[str, str]] = MappingProxyType(
+    {
+        **{"paper": ("#ffffff", "#12161b"), "ink": ("#1b1f24", "#e7ebf0"), "soft": ("#57606a", "#a3adb8")},
+        **{"line": ("#d0d7de", "#343c46"), "pale": ("#f5f7f9", "#1b2129"), "link": ("#0550ae", "#79b8ff")},
+        **{"switches": ("#0072b2", "#6cb0ff"), "joints": ("#009e73", "#4cc38a"), "both": ("#d55e00", "#ff9d5c")},
+        **{"rival-1": ("#a86f00", "#e0b04c"), "rival-2": ("#a3457c", "#ec9bc6"), "rival-3": ("#6b6b6b", "#a9a9a9")},
+        **{"picked": ("#d1242f", "#ff6b74"), "hit": ("#1f5fa8", "#4b93dd"), "miss": ("#c2410c", "#e8743b")},
+        **{"leaf": ("#cfe6d4", "#23482f"), "decision": ("#d3e0f2", "#24405f")},
+        **{"skin": ("#f9f1e9", "#2a2622"), "side": ("#eee3d8", "#221f1c"), "outline": ("#57493e", "#b8a594")},
+        **{"crease": ("#c9b09a", "#5e5146"), "kept": ("#14304f", "#cfe3ff"), "on-kept": ("#ffffff", "#10243d")},
+    }
+)
+
+
+def on_paper(name: str) -> str:
+    """Return a colour of PALETTE as files have it."""
+    return PALETTE[name][0]
 
 
 class PictureError(ThenarError, ValueError):

@@ -204,7 +204,7 @@ def set_up(line: SerialLine, wanted: Wanted) -> GloveInfo:
     return GloveInfo(
         baud=line.baud,
         sensors=sensors,
-        names=_names(mask, sensors),
+        names=masked if len(masked := masked_sensors(mask)) == sensors else _NAMES[sensors],
         mask=mask,
         right_hand=None if right is None else right != b"\0",
         text="".join(filter(str.isprintable, text.decode("ascii", "replace"))).strip(),
@@ -247,11 +247,6 @@ def _sensors(dialogue: Dialogue, url: str, expected: int | None) -> int:
             " setting); switch the box off and on"
         )
     return count
-
-
-def _names(mask: bytes, count: int) -> tuple[str, ...]:
-    masked = masked_sensors(mask)
-    return masked if len(masked) == count else _NAMES[count]
 
 
 def _rate_note(told: float, shortest: float) -> tuple[str, ...]:

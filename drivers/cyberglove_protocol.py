@@ -162,33 +162,15 @@ def find_answer(command: Command, received: bytes, *, last: bool = False) -> Ans
 
 
 def _at_start(command: Command, received: bytes, last: bool) -> Answer | None:
-    values = _text(command, received) if command.values is None else _values(command, received)
-    return Answer(values) if values is not None else _error(command, received, last)
-
-
-def _values(command: Command, received: bytes) -> bytes | None:
-    begin = len(command.echo)
-    end = begin + (command.values or 0)
-    if not received.startswith(command.echo) or received[end : end + 1] != b"\0":
-        return None
-    return received[begin:end]
-
-
-def _text(command: Command, received: bytes) -> bytes | None:
-    end = received.find(_TEXT_END)
-    return received[len(command.echo) : end] if received.startswith(command.echo) and end >= 0 else None
-
-
-def _error(command: Command, received: bytes, last: bool) -> Answer | None:
+    begin, values = len(command.echo), command.values
+    end = received.find(_TEXT_END) if values is None else begin + values
+    if received.startswith(command.echo) and end >= 0 and (values is None or received[end : end + 1] == b"\0"):
+        return Answer(received[begin:end])
     found = re.match(rb"(%b)?e([?nygs])(\r\n)?\0" % re.escape(command.echo), received)
-    if found is None or (found[1] and not last and _may_grow(command, found.end())):
+    # With the echo before it, what reads as an error may be the beginning of values.
+    if found is None or (found[1] and not last and values is not None and found.end() <= begin + values):
         return None
     return Answer(b"", _ERRORS[found[2]])
-
-
-def _may_grow(command: Command, size: int) -> bool:
-    """Return whether `size` bytes that read as an error may be the beginning of values."""
-    return command.values is not None and size <= len(command.echo) + command.values
 
 
 def period_words(rate_hz: float | None) -> Words:

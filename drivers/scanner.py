@@ -99,6 +99,8 @@ class Scanner(Closing):
     hello   what the board last said of itself
     faults  what it last said of its own troubles; None: nothing yet
     grasp   what it last recognised by itself; None: nothing yet
+    times   gives readings their times: by `clock.trip_us` the last may be older, and `late_us` late came the last
+            message with a time of its own
     """
 
     def __init__(self, url: str, baud: int = 115200) -> None:
@@ -113,7 +115,7 @@ class Scanner(Closing):
         self._decoder = FrameDecoder()
         self._sequence = self._received_bytes = 0
         self._keys = BoardKeys()
-        self._times = BoardTimes()
+        self.times = BoardTimes()
         self._waiting: deque[Received] = deque()
         self._misfits = self._asked = 0
         self._ask_at = 0.0
@@ -139,25 +141,15 @@ class Scanner(Closing):
     @property
     def counts(self) -> ScannerCounts:
         """What came in since the board was last opened."""
-        keys, times = self._keys, self._times
+        keys, times = self._keys, self.times
         seen = asdict(self._decoder.counts)
         return ScannerCounts(**seen, gaps=keys.gaps, misfits=self._misfits, asked=self._asked, pings=times.pings)
-
-    @property
-    def trip_us(self) -> int:
-        """By how much the last reading may be older than its time: the line's delay, as far as PINGs leave it open."""
-        return self._times.trip_us
-
-    @property
-    def late_us(self) -> int:
-        """How late the last message with a time of its own came in: what the last reading's time allows for."""
-        return self._times.late_us
 
     def read(self, timeout_s: float) -> ScannerReading | None:
         """Return the next reading, None if there was none in time. Raises DeviceError."""
         end = monotonic() + timeout_s
-        if self._times.due:
-            self._send(self._times.ping())
+        if self.times.due:
+            self._send(self.times.ping())
         reading = self._next()
         while reading is None:
             left = end - monotonic()
@@ -211,14 +203,14 @@ class Scanner(Closing):
         end, ping_at = monotonic() + _BOOT_S, 0.0
         while (now := monotonic()) < end:
             if now >= ping_at:
-                self._send(self._times.ping())
+                self._send(self.times.ping())
                 ping_at = now + _GREETING_S
             self._receive(max(0.0, ping_at - now))
             while self._waiting:
                 came_us, received = self._waiting.popleft()
                 if received is not None and received.kind == Hello.KIND:
                     hello = self._meet(received, came_us)
-                    if self._times.answered:
+                    if self.times.answered:
                         return hello
         raise DeviceError(
             f"{self.url}: no scanner board answered at {self.baud} baud in {_BOOT_S:g} s ({self._received_bytes} bytes"
@@ -231,7 +223,7 @@ class Scanner(Closing):
         except MessageError as error:
             raise DeviceError(f"{self.url}: {error}") from error
         self._keys = BoardKeys(hello.rows, hello.columns, hello.flags, received.sequence)
-        self._times.stamp(hello, came_us)
+        self.times.stamp(hello, came_us)
         return hello
 
     def _next(self) -> ScannerReading | None:
@@ -246,7 +238,7 @@ class Scanner(Closing):
         keys = self._keys
         was_trusted = keys.trusted
         message = self._message(received)
-        time_us = self._times.stamp(message, came_us)
+        time_us = self.times.stamp(message, came_us)
         if isinstance(message, Hello):
             self._same(message)
             if received is not None and received.sequence == 0 and not message.token:  # it has booted
@@ -256,7 +248,8 @@ class Scanner(Closing):
         elif isinstance(message, Faults):
             self.faults = message
         elif isinstance(message, Grasp):
-            self.grasp = _recognised(message, time_us)
+            flags, number = message.flags, None if message.grasp == NO_GRASP else message.grasp
+            self.grasp = BoardGrasp(time_us, number, message.margin, bool(flags & DEGRADED), bool(flags & EARLY))
         elif message is not None:
             keys.heard(message)
             if keys.trusted:
@@ -292,8 +285,3 @@ class Scanner(Closing):
             self._ask_at = now + _ASK_AGAIN_S
             self._asked += 1
             self._send(GetState())
-
-
-def _recognised(message: Grasp, time_us: int) -> BoardGrasp:
-    number = None if message.grasp == NO_GRASP else message.grasp
-    return BoardGrasp(time_us, number, message.margin, bool(message.flags & DEGRADED), bool(message.flags & EARLY))

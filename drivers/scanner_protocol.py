@@ -142,11 +142,6 @@ class Fixed:
         return cls(*cls.LAYOUT.unpack(payload))
 
 
-def to_bitmap(closed: int, keys: int) -> bytes:
-    """Return the bytes of `closed`: key k is bit k % 8 of byte k // 8. Raises OverflowError if they are too few."""
-    return closed.to_bytes((keys + 7) // 8, "little")
-
-
 def from_bitmap(payload: bytes, keys: int) -> int:
     """Return which of so many keys are set. Raises MessageError at another length, or where others are set."""
     if len(payload) != (keys + 7) // 8:
@@ -221,19 +216,28 @@ class Hello(Fixed):
 
 
 class _Bitmap:
-    """A message, a dataclass that holds a set of keys and how many keys there are."""
+    """A message, a dataclass of the values of `LAYOUT`, of a set of keys, and of how many keys there are."""
 
     __slots__ = ()
     KIND: ClassVar[int]
+    LAYOUT: ClassVar[Struct] = Struct("<")
 
     def payload(self) -> bytes:
-        """Return what the frame carries. Raises OverflowError where the set holds a key that there is not."""
-        return to_bitmap(*astuple(self))  # type: ignore[call-overload]
+        """Return what the frame carries: key k is bit k % 8 of byte k // 8.
+
+        Raises OverflowError where the set holds a key that there is not.
+        """
+        *values, held, keys = astuple(self)  # type: ignore[call-overload]
+        bitmap: bytes = held.to_bytes((keys + 7) // 8, "little")
+        return self.LAYOUT.pack(*values) + bitmap
 
     @classmethod
     def read(cls, payload: bytes, keys: int) -> Self:
         """Return the message of a board of so many keys. Raises MessageError."""
-        return cls(from_bitmap(payload, keys), keys)  # type: ignore[call-arg]
+        size = cls.LAYOUT.size
+        if len(payload) < size:
+            raise MessageError(f"a {cls.__name__} of {len(payload)} bytes has no room for its time")
+        return cls(*cls.LAYOUT.unpack_from(payload), from_bitmap(payload[size:], keys), keys)  # type: ignore[call-arg]
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,25 +251,15 @@ class State(_Bitmap):
 
 
 @dataclass(frozen=True, slots=True)
-class Heartbeat:
+class Heartbeat(_Bitmap):
     """All keys, and when they were scanned: sent even if nothing happens, so that a lost EVENT heals."""
 
     KIND: ClassVar[int] = 0x04
+    LAYOUT: ClassVar[Struct] = _TIME
 
     time_us: int
     closed: int
     keys: int
-
-    def payload(self) -> bytes:
-        """Return what the frame carries. Raises OverflowError where a key is closed that there is not."""
-        return _TIME.pack(self.time_us) + to_bitmap(self.closed, self.keys)
-
-    @classmethod
-    def read(cls, payload: bytes, keys: int) -> Self:
-        """Return the message of a board of so many keys. Raises MessageError."""
-        if len(payload) < _TIME.size:
-            raise MessageError(f"a Heartbeat of {len(payload)} bytes has no room for its time")
-        return cls(_TIME.unpack_from(payload)[0], from_bitmap(payload[_TIME.size :], keys), keys)
 
 
 @dataclass(frozen=True, slots=True)

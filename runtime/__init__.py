@@ -23,6 +23,8 @@ __all__ = ["Build", "BuildError", "FrameError", "Glove", "Recognition", "SealErr
 
 
 def __getattr__(name: str) -> object:
+    if name == "__version__":
+        return import_module("importlib.metadata").version("thenar")
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_HOMES[name], __name__), name)

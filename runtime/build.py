@@ -83,16 +83,6 @@ class Build:
             )
         return cls(manifest, tables, _load_scan(where, manifest))
 
-    def lanes(self, bits: ArrayLike, codes: ArrayLike) -> tuple[int, ...]:
-        """Return the scores of one frame as K plain integers, all 2^15 too high: enough to compare them."""
-        return self.scorer.lanes(bits, codes)
-
-    def lanes_without(
-        self, bits: ArrayLike, codes: ArrayLike, lost_switches: ArrayLike, lost_joints: ArrayLike
-    ) -> tuple[int, ...]:
-        """Return `lanes` with the mean contribution in place of every switch and joint that a mask calls lost."""
-        return self.scorer.lanes_without(bits, codes, lost_switches, lost_joints)
-
     def scores(self, bits: ArrayLike, codes: ArrayLike) -> NDArray[np.int64]:
         """Return the scores of one frame, (K,) in steps of 1 / `tables.scale`. Raises FrameError."""
         return np.array(self.scorer.lanes(bits, codes)) - LANE_OFFSET

@@ -227,7 +227,7 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
         return next((rate for rate in self.rates if rate.protocol != "training"), None)
 
 
-class SchemaVersion(Struct, frozen=True):
+class _SchemaVersion(Struct, frozen=True):
     """What is read of a JSON file first: whether the rest can be understood."""
 
     schema: int
@@ -235,7 +235,7 @@ class SchemaVersion(Struct, frozen=True):
 
 def manifest_to_bytes(manifest: Manifest) -> bytes:
     """Return the content of `build.json`, its checksum filled in."""
-    return _encode(replace(manifest, checksum=_checksum(manifest)))
+    return encode_document(replace(manifest, checksum=_checksum(manifest)))
 
 
 def manifest_from_bytes(data: bytes, what: str = "build.json") -> Manifest:
@@ -243,15 +243,8 @@ def manifest_from_bytes(data: bytes, what: str = "build.json") -> Manifest:
 
     Raises BuildError if it is oversized, no such document, of a newer schema, or altered.
     """
-    if len(data) > MAX_BYTES:
-        raise BuildError(f"{what} has {len(data)} bytes, a build has at most {MAX_BYTES}")
-    schema = _decode(data, SchemaVersion, what).schema
-    if schema > SCHEMA:
-        raise BuildError(f"{what} has schema {schema}, this thenar reads up to {SCHEMA}: update thenar")
-    if schema < 1:
-        raise BuildError(f"{what} has schema {schema}, the first was 1: it is not a build of thenar")
-    manifest = _decode(data, Manifest, what)
-    if data != _encode(manifest) or manifest.checksum != _checksum(manifest):
+    manifest = decode_document(data, Manifest, what, "a build", MAX_BYTES, SCHEMA)
+    if data != encode_document(manifest) or manifest.checksum != _checksum(manifest):
         raise BuildError(f"{what} is altered: its checksum does not match; compile the build again")
     for wrong in _contradictions(manifest):
         raise BuildError(f"{what} {wrong}: compile the build again")
@@ -302,16 +295,28 @@ def _wrong_names(kind: str, names: Iterable[str], longest: int = LONGEST_NAME) -
             yield f"has {shortened(repr(name))}, one of its {kind}, which {reason}"
 
 
-def _decode(data: bytes, kind: type[_T], what: str) -> _T:
+def decode_document(data: bytes, kind: type[_T], what: str, called: str, largest: int, newest: int) -> _T:
+    """Return a JSON document of a build, which messages call `what`, and what it is `called`.
+
+    Raises BuildError if it has more than `largest` bytes, is no such document, or of a schema beyond `newest`.
+    """
+    if len(data) > largest:
+        raise BuildError(f"{what} has {len(data)} bytes, {called} has at most {largest}")
     try:
-        return msgspec.json.decode(data, type=kind)
+        schema = msgspec.json.decode(data, type=_SchemaVersion).schema
+        if 1 <= schema <= newest:
+            return msgspec.json.decode(data, type=kind)
     except (ValueError, RecursionError) as wrong:
         raise BuildError(f"{what} is not a build's: {wrong}") from None
+    if schema > newest:
+        raise BuildError(f"{what} has schema {schema}, this thenar reads up to {newest}: update thenar")
+    raise BuildError(f"{what} has schema {schema}, the first was 1: it is not a build of thenar")
 
 
-def _encode(manifest: Manifest) -> bytes:
-    return msgspec.json.format(msgspec.json.encode(manifest), indent=2) + b"\n"
+def encode_document(document: Struct) -> bytes:
+    """Return the canonical bytes of a JSON document of a build."""
+    return msgspec.json.format(msgspec.json.encode(document), indent=2) + b"\n"
 
 
 def _checksum(manifest: Manifest) -> str:
-    return hashlib.sha256(_encode(replace(manifest, checksum=""))).hexdigest()
+    return hashlib.sha256(encode_document(replace(manifest, checksum=""))).hexdigest()

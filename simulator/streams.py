@@ -150,24 +150,24 @@ class Draw:
 
     def per_repetition(self, *shape: int) -> Numbers:
         """Return numbers of shape (n, *shape)."""
-        size = int(np.prod(shape))
-        condition = _hash(self.site.grasp, self.site.object)
-        subject = _hash(self.site.subject)
-        rows = self._words(self.site.repetitions.tolist(), condition, subject, size)
+        site, size = self.site, int(np.prod(shape))
+        rows = self._words(site.repetitions.tolist(), _hash(site.grasp, site.object), _hash(site.subject), size)
         return Numbers(rows.reshape(len(rows), *shape))
 
     def per_subject(self, *shape: int) -> Numbers:
         """Return numbers of `shape`, the subject's own."""
-        return Numbers(self._words([_ALL], _ALL, _hash(self.site.subject), int(np.prod(shape))).reshape(shape))
+        return self._common(_hash(self.site.subject), shape)
 
     def per_type(self, *shape: int) -> Numbers:
         """Return numbers of `shape`, the subject's own for this grasp type."""
-        subject = _hash(self.site.subject, self.site.grasp)
-        return Numbers(self._words([_ALL], _ALL, subject, int(np.prod(shape))).reshape(shape))
+        return self._common(_hash(self.site.subject, self.site.grasp), shape)
 
     def per_glove(self, *shape: int) -> Numbers:
         """Return numbers of `shape`, the same for every subject and repetition of the scene."""
-        return Numbers(self._words([_ALL], _ALL, _ALL, int(np.prod(shape))).reshape(shape))
+        return self._common(_ALL, shape)
+
+    def _common(self, subject: int, shape: tuple[int, ...]) -> Numbers:
+        return Numbers(self._words([_ALL], _ALL, subject, int(np.prod(shape))).reshape(shape))
 
     def count(self, what: str, number: int) -> None:
         """Count something of this effect, such as solver steps, for its entry in the ledger."""

@@ -127,19 +127,15 @@ def run_case(name: str, *, full: bool) -> CaseReport:
             for finding in module.findings(full):
                 findings.append(finding)  # noqa: PERF402  one by one: those before a failure stay
     except Exception as fault:  # whatever it is, it is this case's failure, and no other's
-        failure = _told(fault)
+        # "ZeroDivisionError in separable.py, line 40: division by zero"
+        place = traceback.extract_tb(fault.__traceback__)[-1]
+        failure = f"{type(fault).__name__} in {Path(place.filename).name}, line {place.lineno}: {fault}"
     return _reported(name, about, findings, failure)
 
 
 def _reported(name: str, about: Case, findings: Sequence[Finding], failure: str | None) -> CaseReport:
     checks = tuple(Check(finding, finding.holds) for finding in findings)
     return CaseReport(name, about, checks, failure, failure is None and bool(checks) and all(c.holds for c in checks))
-
-
-def _told(fault: Exception) -> str:
-    """Return what was raised and where: "ZeroDivisionError in separable.py, line 40: division by zero"."""
-    place = traceback.extract_tb(fault.__traceback__)[-1]
-    return f"{type(fault).__name__} in {Path(place.filename).name}, line {place.lineno}: {fault}"
 
 
 # What units mean, in the order of the legend. All others count what is wrong, or speak for themselves.
@@ -242,13 +238,8 @@ def _apart(differences: Differences, who: str) -> str:
     parts = differences.parts
     if parts is None:
         return f"{who}: at most {figure(max(differences.largest, default=0.0))}, in all rounds"
-    most = figure(_most(differences, parts))
+    most = figure(max(differences.largest[: parts - 1], default=0.0))
     return f"{who}: at most {most} until they part in round {parts}, then by up to {figure(max(differences.largest))}"
-
-
-def _most(differences: Differences, until: int) -> float:
-    """Return the largest difference before round `until`."""
-    return max(differences.largest[: until - 1], default=0.0)
 
 
 def _count(number: int, noun: str) -> str:

@@ -6,7 +6,6 @@ Weka is not part of thenar and nothing of it is: where java or its jar are missi
 import re
 import shutil
 import subprocess
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -33,48 +32,34 @@ class WekaError(ThenarError, RuntimeError):
     """Weka could not be run, or what it printed is not a model of what it was given."""
 
 
-@dataclass(frozen=True, slots=True)
-class Weka:
-    """An installed Weka."""
+def run_weka(*arguments: str, options: tuple[str, ...] = ()) -> str:
+    """Return what a class of Weka prints under JVM `options`. Raises WekaError if none is installed, or it fails."""
+    java = shutil.which("java")
+    if java is None or not JAR.is_file():
+        raise WekaError("java or Weka is not installed")
+    command = [java, *options, "-cp", str(JAR), *arguments]
+    try:
+        return subprocess.run(command, check=True, capture_output=True, text=True, timeout=_LONGEST_S).stdout
+    except subprocess.CalledProcessError as reason:
+        said = (reason.stderr or reason.stdout).strip().partition("\n")[0]
+        raise WekaError(f"java ended with code {reason.returncode}: {said}") from reason
+    except subprocess.TimeoutExpired as reason:
+        raise WekaError(f"Weka was not done after {_LONGEST_S:g} s") from reason
 
-    java: str
-    jar: Path
 
-    @staticmethod
-    def installed() -> "Weka":
-        """Return the one that is installed. Raises WekaError if there is none."""
-        java = shutil.which("java")
-        if java is None or not JAR.is_file():
-            raise WekaError("java or Weka is not installed")
-        return Weka(java, JAR)
+def weka_stumps(
+    X: NDArray[np.int64], labels: NDArray[np.intp], n_classes: int, rounds: int, options: tuple[str, ...]
+) -> Stumps:
+    """Train Weka's LogitBoost on X (n, d) whole numbers and labels (n,) under JVM `options`; return its stumps.
 
-    def version(self) -> str:
-        """Return the version, such as "3.6.14"."""
-        return self._run("weka.core.Version").partition("\n")[0].strip()
-
-    def boost(
-        self, X: NDArray[np.int64], labels: NDArray[np.intp], n_classes: int, rounds: int, options: tuple[str, ...]
-    ) -> Stumps:
-        """Train Weka's LogitBoost on X (n, d) whole numbers and labels (n,) under JVM `options`; return its stumps.
-
-        They are at full precision: Java prints a double so that it reads back as itself. Raises WekaError.
-        """
-        with TemporaryDirectory(prefix="thenar-weka-") as folder:
-            table = Path(folder) / "set.arff"
-            table.write_text(_arff(X, labels, n_classes))
-            arguments = ("-I", str(rounds), "-no-cv", "-v", "-t", str(table))
-            printed = self._run("weka.classifiers.meta.LogitBoost", *arguments, options=options)
-        return read_stumps(printed, rounds, n_classes, X.shape[1])
-
-    def _run(self, *arguments: str, options: tuple[str, ...] = ()) -> str:
-        command = [self.java, *options, "-cp", str(self.jar), *arguments]
-        try:
-            return subprocess.run(command, check=True, capture_output=True, text=True, timeout=_LONGEST_S).stdout
-        except subprocess.CalledProcessError as reason:
-            said = (reason.stderr or reason.stdout).strip().partition("\n")[0]
-            raise WekaError(f"java ended with code {reason.returncode}: {said}") from reason
-        except subprocess.TimeoutExpired as reason:
-            raise WekaError(f"Weka was not done after {_LONGEST_S:g} s") from reason
+    They are at full precision: Java prints a double so that it reads back as itself. Raises WekaError.
+    """
+    with TemporaryDirectory(prefix="thenar-weka-") as folder:
+        table = Path(folder) / "set.arff"
+        table.write_text(_arff(X, labels, n_classes))
+        arguments = ("-I", str(rounds), "-no-cv", "-v", "-t", str(table))
+        printed = run_weka("weka.classifiers.meta.LogitBoost", *arguments, options=options)
+    return read_stumps(printed, rounds, n_classes, X.shape[1])
 
 
 def read_stumps(printed: str, rounds: int, n_classes: int, n_inputs: int) -> Stumps:
@@ -147,7 +132,7 @@ class NotRun(msgspec.Struct, frozen=True, tag="not run"):
 def beside_weka() -> Beside | NotRun:
     """Return what came of it, or why nothing did."""
     try:
-        return _compare(Weka.installed())
+        return _compare()
     except WekaError as reason:
         return NotRun(str(reason))
 
@@ -168,17 +153,17 @@ def separable_set() -> tuple[NDArray[np.int64], NDArray[np.intp]]:
     return np.hstack([switches, joints]), labels
 
 
-def _compare(weka: Weka) -> Beside:
+def _compare() -> Beside:
     X, labels = separable_set()
     half = len(labels) // 2
     training, held_out = (X[:half], labels[:half]), X[half:]
     processor, java = (
-        weka.boost(*training, CLASSES, ROUNDS, options) for options in (EXP_OF_THE_PROCESSOR, EXP_IN_JAVA)
+        weka_stumps(*training, CLASSES, ROUNDS, options) for options in (EXP_OF_THE_PROCESSOR, EXP_IN_JAVA)
     )
     ours, _ = boost(*training, CLASSES, rounds=ROUNDS)
     answers = {name: _staged(stumps, held_out) for name, stumps in (("p", processor), ("j", java), ("o", ours))}
     return Beside(
-        weka=weka.version(),
+        weka=run_weka("weka.core.Version").partition("\n")[0].strip(),
         rounds=ROUNDS,
         classes=CLASSES,
         inputs=X.shape[1],

@@ -161,7 +161,7 @@ class FirmwareTrial:
         self._build, self._lots = build, (("row", rows), ("extreme frame", extreme), ("random frame", random))
         self._frames = joined(rows, extreme, random)
         pairs = zip(self._frames.bits, self._frames.codes, strict=True)
-        self._scores = np.array([build.lanes(bits, codes) for bits, codes in pairs]) - LANE_OFFSET
+        self._scores = np.array([build.scorer.lanes(bits, codes) for bits, codes in pairs]) - LANE_OFFSET
 
     def check(self, fit: Fit, answer: Answer) -> TargetCheck:
         """Compile the classifier as `fit` says and hold its answers against Python's. Raises FirmwareError."""

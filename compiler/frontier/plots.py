@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from thenar.runtime.manifest import Inputs
 
-from ..pictures import painting, rendered
+from ..pictures import on_paper, painting, rendered
 from ..text import counted, duration, percent
 from .labels import FAINT, LINE, Label, Labels
 from .points import Curve, Frontier, Mark, Point, Rate, Tried, front
@@ -22,29 +22,21 @@ if TYPE_CHECKING:
     Dash = Literal["-"] | tuple[int, tuple[float, ...]]
 
 FONT = 9.0
-_INK, _GREY, _PALE, _WHITE = "#1a1a1a", "#5f5f5f", "#e3e3e3", "#ffffff"
-# Okabe and Ito's colours, which the colour-blind tell apart too, and shapes for who sees no colours.
-_COLOURS: dict[Inputs, str] = {"switches": "#0072b2", "joints": "#009e73", "both": "#d55e00"}
+_INK, _GREY, _PALE, _WHITE, _PICKED = map(on_paper, ("ink", "soft", "line", "paper", "picked"))
+# Besides colours, shapes for who sees none.
+_COLOURS: dict[Inputs, str] = {inputs: on_paper(inputs) for inputs in ("switches", "joints", "both")}
 _SHAPES: dict[Inputs, str] = {"switches": "o", "joints": "^", "both": "s"}
 _NAMES: dict[Inputs, str] = {"switches": "switches alone", "joints": "joints alone", "both": "switches and joints"}
-# Our curves are blue, as switches alone are everywhere; the rivals' colours are no inputs'; dashes tell the rest apart.
-_RIVALS = ("#a86f00", "#a3457c", "#6b6b6b")
+# Our curves are blue, as switches alone are everywhere; dashes distinguish what shares a colour.
+_RIVALS = tuple(on_paper(f"rival-{number}") for number in (1, 2, 3))
 _DASHES: "tuple[Dash, ...]" = ("-", (0, (5, 2)), (0, (1, 1.4)), (0, (6, 1.5, 1, 1.5)), (0, (9, 3)))
-# What the colours mean, for a page that shows the pictures in its own.
-PALETTE: Mapping[str, str] = MappingProxyType(
-    {
-        **{"ink": _INK, "soft": _GREY, "line": _PALE, "paper": _WHITE},
-        **{str(inputs): colour for inputs, colour in _COLOURS.items()},
-        **{f"rival-{number}": colour for number, colour in enumerate(_RIVALS, 1)},
-    }
-)
 # Ids of a point's marker and of the ring around the featured one, in SVG.
 POINT_ID, RING_ID = "point-", "featured"
 
 _WIDTH, _HEIGHT = 9.0, 5.4  # inches
 _LEFT, _RIGHT, _BOTTOM, _TOP = 0.72, 0.18, 0.58, 1.02  # inches around the axes
 _SIZE, _MARK_SIZE, _TRIED_SIZE = 34.0, 52.0, 9.0  # square points
-_LOWEST = 1e-3  # a logarithmic axis has no 0
+_LOWEST = 1.0  # microseconds or switches: a logarithmic axis has no 0, and nothing takes less
 _FEW = 16  # switches: curves may leave the picture below the rate of so many
 _DECISIONS = {"single": "one frame", "dwell": "dwell", "sequential": "sequential test"}
 
@@ -96,7 +88,7 @@ _SWITCHES = _Cost(
 _LATENCY = _Cost(
     title="From the hand's arrival to the decision",
     axis="time until a grasp is decided on: its mean, and a line to the 99th percentile",
-    of_point=lambda point: (point.latency.mean_us or None) if "latency" in point.fronts else None,
+    of_point=lambda point: _waited(point) if "latency" in point.fronts else None,
     of_mark=lambda mark: mark.latency_us,
     of_tried=lambda _: None,
     front="latency",
@@ -104,6 +96,11 @@ _LATENCY = _Cost(
     end=lambda point: point.latency.p99_us if point.latency.p99_us != point.latency.mean_us else None,
     words=lambda point: _DECISIONS[point.setting.decision],
 )
+
+
+def _waited(point: Point) -> float | None:
+    """Return the mean latency, a frame at least (older frontiers have less); None where every grasp was missed."""
+    return None if point.latency.missed >= 1 else max(point.latency.mean_us, point.frame.us)
 
 
 def pictures(frontier: Frontier, kind: Literal["svg", "png"], *, letters: bool = False) -> Mapping[str, bytes]:
@@ -132,7 +129,8 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
         _scale_times(axes, [*(x for x, _ in (*marks, *tried, *points)), *(end for _, end, _ in ends)])
     else:
         _scale_counts(axes, frontier.n_switches)
-    axes.set_xlabel(cost.axis, color=_INK)
+    untimed = cost.is_time and any(point.transfer.how == "unknown" for _, point in points)
+    axes.set_xlabel(cost.axis + "; reading the joints is left out" * untimed, color=_INK)
 
     labels, spoken_of = Labels(axes), featured(frontier)
     _draw_tried(labels, tried)
@@ -146,8 +144,9 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
         if point is spoken_of:
             y = point.rate.mean
             axes.scatter(
-                [x], [y], s=4.5 * _SIZE, marker="o", facecolor="none", edgecolor=_INK, lw=1.6, zorder=5, gid=RING_ID
+                [x], [y], s=4.5 * _SIZE, marker="o", facecolor="none", edgecolor=_PICKED, lw=1.6, zorder=5, gid=RING_ID
             )
+            axes.scatter([], [], s=2 * _SIZE, facecolor="none", edgecolor=_PICKED, lw=1.6, label="picked")
     _draw_key(axes)
     # What takes most room first.
     said = duration if cost.is_time else lambda _: ""
@@ -189,7 +188,7 @@ def _sheet(frontier: Frontier, title: str) -> tuple["Figure", "Axes"]:
 
 def _scale_times(axes: "Axes", us: Iterable[float]) -> None:
     """Make the horizontal axis logarithmic, in times, with room for all of `us`."""
-    known = [max(each, _LOWEST) for each in us] or [100.0, 1000.0]
+    known = list(us) or [100.0, 1000.0]
     low, high = min(known), max(known)
     room = max(1.15, (high / low) ** 0.07)
     axes.set_xscale("log")

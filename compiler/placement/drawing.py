@@ -6,17 +6,18 @@ from typing import TYPE_CHECKING
 
 from thenar.runtime.files import write_atomically
 
-from ..pictures import painting, rendered
+from ..pictures import on_paper, painting, rendered
 from .inputs import PlacementError
 from .placement import Aim, Placement, Standard
-from .tree import Tree, names_for
+from .tree import Node, Tree, answer_to, names_for, sizes_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_LEAF_INCHES, _LEVEL_INCHES, _LARGEST_INCHES = 0.6, 0.9, 200.0
-_LETTER_INCHES = 0.055  # of _FONT_SIZE
-_FONT_SIZE = 6
+_LINE_INCHES, _STEP_INCHES, _KEY_INCHES, _LARGEST_INCHES = 0.17, 0.22, 2.0, 200.0
+_KEY_LINES = 2
+_LETTER_INCHES = 0.062  # of _FONT_SIZE
+_FONT_SIZE = 7
 
 BETTERED: dict[Aim, str] = {
     "plain": "as chosen",
@@ -42,53 +43,50 @@ def draw_placement(placement: Placement, path: Path) -> None:
 def draw_tree(tree: Tree, path: Path, names: Sequence[str] = (), class_names: Sequence[str] = ()) -> None:
     """Write the picture of `tree` to `path`, .svg or .png: decisions with input and gain, leaves with class and rows.
 
-    The same tree gives the same bytes. Raises PictureError for another kind of file or without matplotlib.
+    It is an icicle: a line for each node from the root on, and its children set in below it. The same tree gives the
+    same bytes. Raises PictureError for another kind of file or without matplotlib.
     """
     names, class_names = names_for(tree, names, class_names)
-    leaf_inches = max(_LEAF_INCHES, _LETTER_INCHES * max(map(len, class_names)) + 0.2)
-    size = (leaf_inches * tree.n_leaves + 1.5, _LEVEL_INCHES * tree.depth + 1.2)
+    labels = [answer_to(tree, number) + _label(node, names, class_names) for number, node in enumerate(tree.nodes)]
+    right = max(
+        _LETTER_INCHES * len(label) + _STEP_INCHES * (depth + 1)
+        for label, depth in zip(labels, tree.depths, strict=True)
+    )
+    width, lines = max(right, _KEY_INCHES * 3.5), len(tree.nodes) + _KEY_LINES
     with painting(_FONT_SIZE):
         from matplotlib.figure import Figure
 
-        figure = Figure(figsize=(min(size[0], _LARGEST_INCHES), min(size[1], _LARGEST_INCHES)), dpi=110)
+        tall = min(_LINE_INCHES * lines, _LARGEST_INCHES)
+        figure = Figure(figsize=(min(width, _LARGEST_INCHES), tall), dpi=110, facecolor=on_paper("paper"))
         axes = figure.add_axes((0, 0, 1, 1))
-        axes.set(xlim=(-1, tree.n_leaves), ylim=(-tree.depth - 0.5, 0.5))
+        axes.set(xlim=(0, width), ylim=(lines, 0))
         axes.axis("off")
-        _compose(axes, tree, names, class_names)
+        for place, (words, leaf) in enumerate(
+            (("switch? gain in bits", False), ("grasp type, rows of it / all", True))
+        ):
+            _draw_box(axes, (place * _KEY_INCHES, 0.2, _KEY_INCHES - _STEP_INCHES, 1), words, leaf=leaf)
+        axes.text(2 * _KEY_INCHES, 0.7, "open, closed: the answer that leads there", va="center_baseline")
+        boxes = zip(tree.nodes, tree.depths, sizes_of(tree), labels, strict=True)
+        for line, (node, depth, size, label) in enumerate(boxes, _KEY_LINES):
+            left = _STEP_INCHES * depth
+            _draw_box(axes, (left, line, width - left, size), label, leaf=node.input is None)
         picture = rendered(figure, path.suffix.lower().removeprefix("."))
     write_atomically(path, picture)
 
 
-def _compose(axes: "Axes", tree: Tree, names: Sequence[str], class_names: Sequence[str]) -> None:
-    places = [(across, -depth) for across, depth in zip(_places(tree), tree.depths, strict=True)]
-    for (x, y), node, children in zip(places, tree.nodes, tree.children, strict=True):
-        for value, child in zip(node.values, children, strict=True):
-            to_x, to_y = places[child]
-            axes.plot((x, to_x), (y, to_y), color="0.6", linewidth=0.8, zorder=1)
-            middle = ((x + to_x) / 2, (y + to_y) / 2)
-            axes.text(*middle, str(value), color="0.35", ha="center", va="center", backgroundcolor="white")
-        if node.input is None:
-            words, box = f"{class_names[node.majority]}\n{max(node.counts)}/{node.size}", ("round", "#e3efda")
-        else:
-            gain = "no gain" if node.gains_nothing else f"{node.gain:.3g}"
-            words, box = f"{names[node.input]}\n{gain}", ("square", "#dae3f3")
-        frame = {"boxstyle": box[0], "facecolor": box[1], "edgecolor": "0.5"}
-        axes.text(x, y, words, ha="center", va="center", bbox=frame, zorder=3)
+def _label(node: Node, names: Sequence[str], class_names: Sequence[str]) -> str:
+    if node.input is None:
+        return f"{class_names[node.majority]} {max(node.counts)}/{node.size}"
+    return f"{names[node.input]}? {'no gain' if node.gains_nothing else f'{node.gain:.3g}'}"
 
 
-def _places(tree: Tree) -> list[float]:
-    """Return each node's place across: leaves side by side, a decision over the middle of its children."""
-    places = [0.0] * len(tree.nodes)
-    leaves = iter(range(len(tree.nodes)))
-    for number, node in enumerate(tree.nodes):
-        if node.input is None:
-            places[number] = next(leaves)
-    # In preorder children come after their parents, so backwards they are placed before them.
-    for number in reversed(range(len(tree.nodes))):
-        children = tree.children[number]
-        if children:
-            places[number] = (places[children[0]] + places[children[-1]]) / 2
-    return places
+def _draw_box(axes: "Axes", box: tuple[float, float, float, float], label: str, *, leaf: bool) -> None:
+    from matplotlib.patches import Rectangle
+
+    x, y, width, height = box
+    look = {"facecolor": on_paper("leaf" if leaf else "decision"), "edgecolor": on_paper("paper"), "linewidth": 0.8}
+    axes.add_patch(Rectangle((x, y), width, height, **look))
+    axes.text(x + _STEP_INCHES / 3, y + 0.5, label, color=on_paper("ink"), va="center_baseline")
 
 
 def draw_study(study: Standard, path: Path) -> None:
@@ -104,7 +102,7 @@ def draw_study(study: Standard, path: Path) -> None:
 
 def _draw_study(axes: "Axes", study: Standard) -> None:
     """Draw a pair of lines for every aim: the mean and the worst tenth."""
-    for (aim, words), colour in zip(BETTERED.items(), ("#595959", "#0072b2", "#d55e00"), strict=True):
+    for (aim, words), colour in zip(BETTERED.items(), map(on_paper, ("soft", "switches", "both")), strict=True):
         points = [point for point in study.curve if point.aim == aim]
         sizes = [point.subjects for point in points]
         for what, style in (("mean", "-"), ("worst_tenth", "--")):

@@ -223,6 +223,26 @@ def _tree_text(tree: Tree, names: Sequence[str], class_names: Sequence[str]) -> 
     return "\n".join([*lines, _summary(tree)])
 
 
+def sizes_of(tree: Tree, deepest: int | None = None) -> list[int]:
+    """Return how many nodes each node's subtree has, itself among them; of those on the levels up to `deepest`."""
+    sizes = [int(deepest is None or depth <= deepest) for depth in tree.depths]
+    for number in reversed(range(1, len(tree.nodes))):
+        sizes[tree.parents[number]] += sizes[number]
+    return sizes
+
+
+_ANSWERS = {0: "open", 1: "closed"}
+
+
+def answer_to(tree: Tree, number: int) -> str:
+    """Return "open: " or "closed: ", or the value of an input of more values, that leads to a node; "" at the root."""
+    parent = tree.parents[number]
+    if parent < 0:
+        return ""
+    value = tree.nodes[parent].values[tree.children[parent].index(number)]
+    return f"{_ANSWERS.get(value, str(value))}: "
+
+
 def names_for(tree: Tree, names: Sequence[str], class_names: Sequence[str]) -> tuple[Sequence[str], Sequence[str]]:
     """Return a name for each input and each class, those given or their numbers and labels."""
     names = names or [f"x{number}" for number in range(tree.n_inputs)]

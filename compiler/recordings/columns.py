@@ -106,7 +106,8 @@ class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
     trial: str | tuple[str, ...] | None = None
     time: str | None = None
     frames: Literal["independent", "restart"] | None = None
-    taxonomy: str | tuple[str, ...] = "own"
+    taxonomy: str | tuple[str, ...] | dict[str, tuple[str, ...]] = "own"
+    simulated: str = ""
     switches: tuple[str, ...] = ()
     missing: Literal["refuse", "drop", "keep"] = "refuse"
     reduce: Literal["none", "middle", "median", "any"] = "none"
@@ -130,6 +131,8 @@ class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
             raise ValueError(f"`encoding` must be one that Python knows, not {shortened(repr(self.encoding))}")
         if self.frames == "restart" and (self.time is None or self.trial is not None):
             raise ValueError("`frames` = 'restart' takes `time`, and no `trial`")
+        if isinstance(self.taxonomy, dict) and len(self.taxonomy) != 1:
+            raise ValueError("`taxonomy` as a table holds one name and its list of types")
         if not self.parts("label"):
             raise ValueError("`label` must name a column")
 

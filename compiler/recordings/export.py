@@ -10,14 +10,20 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from thenar.runtime.files import write_atomically
 
-from ..text import cell
+from ..text import cell, cells
 from .errors import TableError
 from .graspset import GraspSet, Joint
 from .taxonomy import is_published
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 class Heads(NamedTuple):
@@ -26,26 +32,40 @@ class Heads(NamedTuple):
     label: str
     subject: str
     object: str
+    session: str
     trial: str
 
 
 def heads_of(grasp_set: GraspSet) -> Heads:
-    """Return "grasp", "subject", "object", "trial", with an underline where an input has that name."""
+    """Return "grasp", "subject", "object", "session", "trial", with an underline where an input has that name."""
     taken = {*grasp_set.switch_names, *grasp_set.joint_names}
-    return Heads(*(_free(name, taken) for name in ("grasp", "subject", "object", "trial")))
+    return Heads(*(_free(name, taken) for name in ("grasp", "subject", "object", "session", "trial")))
+
+
+def meta_of(grasp_set: GraspSet) -> dict[str, NDArray[np.generic]]:
+    """Return the columns of a table that are neither inputs nor the label, by their keys in a columns.toml; a session
+    only where the set has several.
+    """
+    found = {key: getattr(grasp_set, f"{key}s") for key in Heads._fields[1:]}
+    return {key: column for key, column in found.items() if key != "session" or (column != "1").any()}
 
 
 def columns_of(grasp_set: GraspSet, codes: bool = False, meta: bool = True) -> str:
     """Return the text of a columns.toml for the set's exported table; `codes` and `meta` as in `export`.
 
-    Reading the table with it gives the set again (a taxonomy of the user's own is called "own" then).
+    Reading the table with it gives the set again.
     """
-    heads = heads_of(grasp_set)
+    heads, taxonomy = heads_of(grasp_set), grasp_set.taxonomy
     lines = [f"label = {_text(heads.label)}"]
     if meta:
-        lines += [f"{key} = {_text(name)}" for key, name in list(heads._asdict().items())[1:]]
-    taxonomy = grasp_set.taxonomy
-    lines.append(f"taxonomy = {_text(taxonomy.name) if is_published(taxonomy) else _list(taxonomy.types)}")
+        lines += [f"{key} = {_text(getattr(heads, key))}" for key in meta_of(grasp_set)]
+    if grasp_set.independent:
+        lines.append('frames = "independent"')
+    if grasp_set.simulated:
+        lines.append(f"simulated = {_text(grasp_set.simulated)}")
+    types = _text(taxonomy.name) if is_published(taxonomy) else _list(taxonomy.types)
+    named = is_published(taxonomy) or taxonomy.name == "own"
+    lines.append(f"taxonomy = {types if named else f'{{ {_text(taxonomy.name)} = {types} }}'}")
     if grasp_set.switch_names:
         lines.append(f"switches = {_globs(grasp_set.switch_names)}")
     for joints in _alike(grasp_set.joints):
@@ -91,6 +111,10 @@ def _globs(names: Iterable[str]) -> str:
     return _list(map(glob.escape, names))
 
 
+# The formats that a set is exported in.
+SUFFIXES = (".csv", ".csv.gz", ".tsv", ".tsv.gz", ".arff", ".parquet")
+# Under which a DataFrame keeps, in its `attrs`, the text of the columns.toml that makes it a set again.
+COLUMNS_TOML = "thenar"
 # What Weka reads without quotes; everything else it writes in quotes itself.
 _BARE = re.compile(r"[A-Za-z0-9_.+-]+")
 
@@ -98,63 +122,72 @@ _BARE = re.compile(r"[A-Za-z0-9_.+-]+")
 def export(
     grasp_set: GraspSet, path: Path, codes: bool = False, meta: bool = False, columns: Path | None = None
 ) -> None:
-    """Write `grasp_set` as .csv, .csv.gz or .arff, whole or not at all; joints as values, or as `codes`.
+    """Write `grasp_set` to a file of one of SUFFIXES, whole or not at all; joints as values, or as `codes`.
 
-    An ARFF holds subject, object and trial only with `meta`. To `columns` goes the columns.toml that imports the table
-    again. Raises TableError for any other suffix.
+    An ARFF holds subject, object, session and trial only with `meta` or `columns`. To `columns` goes the columns.toml
+    that imports the table again. Raises TableError for any other suffix.
     """
     name = path.name.lower()
     if name.endswith(".arff"):
-        write_atomically(path, to_arff(grasp_set, codes, meta).encode())
-    elif name.endswith(".csv"):
-        write_atomically(path, to_csv(grasp_set, codes).encode())
-    elif name.endswith(".csv.gz"):
-        write_atomically(path, gzip.compress(to_csv(grasp_set, codes).encode(), mtime=0))
+        data = to_arff(grasp_set, codes, meta or columns is not None).encode()
+    elif name.endswith(".parquet"):
+        data = to_dataframe(grasp_set, codes).to_parquet(index=False)
+    elif name.removesuffix(".gz").endswith((".csv", ".tsv")):
+        text = to_csv(grasp_set, codes, "\t" if name.removesuffix(".gz").endswith(".tsv") else ",")
+        data = gzip.compress(text.encode(), mtime=0) if name.endswith(".gz") else text.encode()
     else:
-        raise TableError(f"{path.name}: an exported table ends in .csv, .csv.gz or .arff")
+        raise TableError(f"{path.name}: an exported table ends in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
+    write_atomically(path, data)
     if columns is not None:
-        write_atomically(columns, columns_of(grasp_set, codes, meta or not name.endswith(".arff")).encode())
+        write_atomically(columns, columns_of(grasp_set, codes).encode())
 
 
-def to_csv(grasp_set: GraspSet, codes: bool = False) -> str:
+def to_csv(grasp_set: GraspSet, codes: bool = False, delimiter: str = ",") -> str:
     """Return grasp type, subject, object, trial, switches and joints as CSV with one header row.
 
     A name that a spreadsheet would take for a formula has an apostrophe before it, which importing takes away.
     """
-    file = io.StringIO()
-    writer = csv.writer(file, lineterminator="\n")
-    writer.writerow(map(cell, (*heads_of(grasp_set), *grasp_set.switch_names, *grasp_set.joint_names)))
-    subjects, objects, trials = _meta(grasp_set)
-    grasps, subjects, objects = (list(map(cell, names)) for names in (grasp_set.grasps.tolist(), subjects, objects))
-    writer.writerows(zip(grasps, subjects, objects, trials, *_inputs(grasp_set, codes), strict=True))
+    file, heads, meta = io.StringIO(), heads_of(grasp_set), meta_of(grasp_set)
+    writer = csv.writer(file, delimiter=delimiter, lineterminator="\n")
+    names = (heads.label, *(getattr(heads, key) for key in meta), *grasp_set.switch_names, *grasp_set.joint_names)
+    writer.writerow(map(cell, names))
+    who = (cells(column.tolist()) for column in (grasp_set.grasps, *meta.values()))
+    writer.writerows(zip(*who, *_inputs(grasp_set, codes), strict=True))
     return file.getvalue()
+
+
+def to_dataframe(grasp_set: GraspSet, codes: bool = False) -> "pd.DataFrame":
+    """Return the set as a DataFrame, as `GraspSet.to_dataframe` describes it."""
+    import pandas as pd
+
+    heads = heads_of(grasp_set)
+    columns: dict[str, object] = {
+        heads.label: pd.Categorical.from_codes(grasp_set.labels, categories=list(grasp_set.taxonomy.types)),
+        **{getattr(heads, key): column for key, column in meta_of(grasp_set).items()},
+        **dict(zip(grasp_set.switch_names, grasp_set.switches.T, strict=True)),
+    }
+    for joint, column in zip(grasp_set.joints, grasp_set.codes.T, strict=True):
+        columns[joint.name] = column if codes else joint.value(column)
+    frame = pd.DataFrame(columns)
+    frame.attrs[COLUMNS_TOML] = columns_of(grasp_set, codes)
+    return frame
 
 
 def to_arff(grasp_set: GraspSet, codes: bool = False, meta: bool = False) -> str:
     """Return the set as ARFF: switches nominal {0,1}, joints numeric, the grasp type nominal and last."""
-    heads = heads_of(grasp_set)
-    attributes = _meta_attributes(grasp_set, heads) if meta else []
+    heads, who = heads_of(grasp_set), meta_of(grasp_set) if meta else {}
+    attributes = [f"{_quote(getattr(heads, key))} {_kind(column)}" for key, column in who.items()]
     attributes += [f"{_quote(name)} {{0,1}}" for name in grasp_set.switch_names]
     attributes += [f"{_quote(name)} numeric" for name in grasp_set.joint_names]
     attributes.append(f"{_quote(heads.label)} {_nominal(grasp_set.taxonomy.types)}")
-    subjects, objects, trials = _meta(grasp_set)
-    first = (map(_quote, subjects), map(_quote, objects), trials) if meta else ()
+    first = ([_quote(str(value)) for value in column.tolist()] for column in who.values())
     rows = zip(*first, *_inputs(grasp_set, codes), map(_quote, grasp_set.grasps.tolist()), strict=True)
     lines = ["@relation grasps", "", *(f"@attribute {attribute}" for attribute in attributes), "", "@data"]
     return "\n".join([*lines, *map(",".join, rows), ""])
 
 
-def _meta(grasp_set: GraspSet) -> tuple[list[str], list[str], list[str]]:
-    return grasp_set.subjects.tolist(), grasp_set.objects.tolist(), grasp_set.trials.astype(str).tolist()
-
-
-def _meta_attributes(grasp_set: GraspSet, heads: Heads) -> list[str]:
-    subjects, objects = (sorted(set(names)) for names in _meta(grasp_set)[:2])
-    return [
-        f"{_quote(heads.subject)} {_nominal(subjects)}",
-        f"{_quote(heads.object)} {_nominal(objects)}",
-        f"{_quote(heads.trial)} numeric",
-    ]
+def _kind(column: NDArray[np.generic]) -> str:
+    return _nominal(np.unique(column).tolist()) if column.dtype.kind == "U" else "numeric"
 
 
 def _inputs(grasp_set: GraspSet, codes: bool) -> Iterable[Sequence[str]]:

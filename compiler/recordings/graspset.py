@@ -13,8 +13,10 @@ taxels    (n, t) uint16             only where there are any, and then in format
 
 import hashlib
 from dataclasses import dataclass, field
+from html import escape
+from importlib import import_module
 from pathlib import Path
-from typing import Self, TypeVar
+from typing import TYPE_CHECKING, Self, TypeVar
 
 import msgspec
 import numpy as np
@@ -30,6 +32,11 @@ from .arrays import AnyArray, pack, unpack
 from .errors import LARGEST, RecordingError, check_names, check_room, check_simulated
 from .taxonomy import Taxonomy
 from .trials import groups
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from .columns import Columns
 
 CODES = 65536
 # So far from the ends of the doubles that spans and margins of values stay finite, and that steps keep all their bits.
@@ -239,6 +246,19 @@ class GraspSet:
         who = f"{read}, {subjects} subjects, {objects} objects"
         return f"GraspSet: {what}, {who}" + (f"\nsimulated: {shortened(self.simulated)}" if self.simulated else "")
 
+    def _repr_html_(self) -> str:
+        """Return it as a notebook shows it: the line, and rows and trials of each grasp type."""
+        first = np.unique(self.trial_ids, return_index=True)[1]
+        counts = (
+            np.bincount(labels, minlength=len(self.taxonomy.types)) for labels in (self.labels[first], self.labels)
+        )
+        body = "".join(
+            f"<tr><td>{escape(name)}</td><td>{trials}</td><td>{rows}</td></tr>"
+            for name, trials, rows in zip(self.taxonomy.types, *counts, strict=True)
+        )
+        head = "<tr><th>grasp type</th><th>trials</th><th>rows</th></tr>"
+        return f"<p>{escape(repr(self)).replace(chr(10), '<br>')}</p><table>{head}{body}</table>"
+
     @property
     def joint_names(self) -> tuple[str, ...]:
         """The joints' names, in the order of `codes`."""
@@ -297,6 +317,60 @@ class GraspSet:
     def _format(self) -> int:
         """The format of its file: 2 where there are sessions or taxels, or rows that are stated to be independent."""
         return 1 + bool(self.independent or self.taxel_columns or (self.sessions != "1").any())
+
+    @classmethod
+    def from_dataframe(cls, frame: "pd.DataFrame", columns: "Columns | str | Path | None" = None) -> "GraspSet":
+        """Return the set in a DataFrame of one row a frame; its index is left out.
+
+        Parameters
+        ----------
+        frame : pandas.DataFrame
+            Any dtypes: switches are bool, or 0 and 1; joints are numbers; names are text, numbers or categories. NaN,
+            None and NA are missing values.
+        columns : Columns, str or Path, optional
+            What the columns are: `thenar.compiler.Columns`, or the path of a columns.toml. A frame of `to_dataframe`
+            says so itself, in its `attrs`; of any other it is found as `thenar import` finds it, from names and values.
+
+        Raises
+        ------
+        TableError, ColumnsError, RecordingError
+            As an import of the same table: the message names the rows, as `iloc` counts them, and the columns.
+
+        Examples
+        --------
+        >>> import pandas as pd
+        >>> from thenar.compiler import Columns, GraspSet
+        >>> frame = pd.DataFrame({"grasp": ["pinch", "hook"], "thumb": [True, False], "n": [1, 2]})
+        >>> GraspSet.from_dataframe(frame, Columns(label="grasp", switches=("thumb",), trial="n"))
+        GraspSet: 2 grasps of 2 types (own), 1 switches, 0 joints, 1 subjects, 1 objects
+        """
+        # The modules that read and write tables make sets, and so import this one.
+        found: GraspSet = import_module(".dataframes", __package__).from_dataframe(frame, columns)
+        return found
+
+    def to_dataframe(self, codes: bool = False) -> "pd.DataFrame":
+        """Return the set as a pandas DataFrame, from which `from_dataframe` makes the same set.
+
+        Parameters
+        ----------
+        codes : bool
+            Give the joints' integer codes (uint16) instead of their values (float64).
+
+        Returns
+        -------
+        pandas.DataFrame
+            One row a frame: "grasp" (a category of the taxonomy's types, in their order), "subject" and "object" (str),
+            "session" (str; only where there are several), "trial" (int64), the switches (bool) and the joints, in the
+            set's order. Where an input has one of these names, the column has an underline behind it.
+            `attrs["thenar"]` is the text of a columns.toml: roles, calibrations, taxonomy, what simulated the grasps.
+            Parquet keeps it.
+
+        Examples
+        --------
+        >>> grasp_set.to_dataframe().groupby("subject")["grasp"].value_counts()  # doctest: +SKIP
+        """
+        frame: pd.DataFrame = import_module(".export", __package__).to_dataframe(self, codes)
+        return frame
 
     @classmethod
     def load(cls, path: str | Path) -> Self:

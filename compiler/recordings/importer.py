@@ -337,6 +337,7 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
         trials=readings.trials,
         sessions=readings.sessions,
         independent=columns.frames == "independent",
+        simulated=columns.simulated,
     )
     warnings += [
         *aliases,
@@ -422,6 +423,9 @@ def _taxonomy(columns: Columns, labels: list[str]) -> Taxonomy:
     try:
         if isinstance(columns.taxonomy, tuple):
             return own(columns.taxonomy)
+        if isinstance(columns.taxonomy, dict):
+            ((name, types),) = columns.taxonomy.items()
+            return Taxonomy(name, types)
         return own(sorted(set(labels))) if columns.taxonomy == "own" else published(columns.taxonomy)
     except RecordingError as reason:
         raise ColumnsError(f"taxonomy: {reason}") from reason

@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,8 +44,9 @@ def merge(sets: Mapping[str, GraspSet], each: By | None = None) -> GraspSet:
 
     Examples
     --------
-    >>> from thenar.compiler import merge
-    >>> merge({"monday.grasps": monday, "friday.grasps": friday}, each="session")  # doctest: +SKIP
+    >>> from thenar.compiler import GraspSet, merge
+    >>> files = ("monday.grasps", "friday.grasps")
+    >>> merge({file: GraspSet.load(file) for file in files}, each="session")  # doctest: +SKIP
     """
     if not sets:
         raise RecordingError("no set to merge")
@@ -81,8 +82,20 @@ def split(grasp_set: GraspSet, by: By) -> dict[str, GraspSet]:
     """Return the set of each subject, object or session, by name in alphabetical order.
 
     Each keeps all columns and the whole taxonomy, so `merge` gives the rows back, in another order.
+
+    Parameters
+    ----------
+    grasp_set : GraspSet
+        The set to part.
+    by : "subject", "object" or "session"
+        Of what each part has one.
+
+    Raises
+    ------
+    RecordingError
+        If `by` is another word.
     """
-    column: NDArray[np.str_] = getattr(grasp_set, f"{by}s")
+    column = _column(grasp_set, by)
     return {name: grasp_set.rows(column == name) for name in np.unique(column).tolist()}
 
 
@@ -123,11 +136,18 @@ def _file_names(by: str, names: list[str]) -> dict[str, str]:
 
 def _of_its_own(name: str, found: GraspSet, each: By) -> GraspSet:
     """Return the set with the stem of its `name` as its only subject, object or session, or before each of several."""
-    names, where = np.unique(getattr(found, f"{each}s"), return_inverse=True)
+    names, where = np.unique(_column(found, each), return_inverse=True)
     stem = Path(name).stem
     called = [stem] if len(names) == 1 else [f"{stem} {one}" for one in names.tolist()]
     column = np.array(called, np.str_)[where]
     return replace(found, **{f"{each}s": column})  # type: ignore[arg-type]
+
+
+def _column(grasp_set: GraspSet, by: By) -> NDArray[np.str_]:
+    if by not in get_args(By):
+        raise RecordingError(f"{by!r} is none of {list_names(get_args(By))}")
+    column: NDArray[np.str_] = getattr(grasp_set, f"{by}s")
+    return column
 
 
 def _check_columns(first_name: str, first: GraspSet, name: str, other: GraspSet) -> None:

@@ -10,10 +10,11 @@ import msgspec
 from markupsafe import Markup
 from msgspec import Struct
 
-from ..frontier.plots import PALETTE, POINT_ID, RING_ID, pictures
+from ..frontier.plots import POINT_ID, RING_ID, pictures
 from ..frontier.points import Frontier, Point, Time
 from ..frontier.words import featured, inputs_of, summary, training_of, way_of, wiring_of
 from ..hand import HandShape
+from ..pictures import PALETTE
 from ..text import DASH, NBSP, counted, interval, microseconds, sentence
 from .content import PlainTable
 from .hand import HandPicture, hand_picture
@@ -33,11 +34,8 @@ _CAPTIONS = {
         "that were missed are not in it; only the best for their kind of decision are on it."
     ),
 }
-# Colours that the style sheet has as well; the others it has for dark screens alone.
-_OF_THE_PAGE = ("ink", "soft", "line", "paper")
-_COLOURS = {
-    colour: f"var(--{name})" if name in _OF_THE_PAGE else f"var(--{name}, {colour})" for name, colour in PALETTE.items()
-}
+# Of two names for a colour, the first.
+_COLOURS = {colour: f"var(--{name})" for name, (colour, _) in reversed(PALETTE.items())}
 _TARGET = "9"  # radius of what can be clicked, in units of the pictures
 
 

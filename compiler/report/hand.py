@@ -10,13 +10,15 @@ from ..hand import Floats, HandShape
 _MARGIN_MM = 4.0
 _NEAREST_MM = 0.5  # points of an outline nearer to the last one drawn are left out
 _LABELS_MM = 7.0
+_LEAST_LETTER = 8.4 / 370  # of a drawing so wide, in pixels: smaller letters cannot be read
 
 
 @dataclass(frozen=True, slots=True)
 class HandPicture:
     """A hand to draw; `ident` begins the ids of its elements, title and summary are what a screen reader says.
 
-    view_box is SVG's; outline, strips and creases are values of `d`. Of a digit, labels hold the name and its place; of
+    view_box is SVG's; radius is of a dot, letter the least size of its number on a narrow screen; outline, strips and
+    creases are values of `d`. Of a digit, labels hold the name and its place; of
     a switch, dots hold the name, its place, and which of the kept ones it is, from 1; "" if none.
     """
 
@@ -24,6 +26,8 @@ class HandPicture:
     title: str
     summary: str
     view_box: str
+    radius: str
+    letter: str
     outline: str
     strips: tuple[str, ...]
     creases: tuple[str, ...]
@@ -33,12 +37,14 @@ class HandPicture:
 
 def hand_picture(hand: HandShape, kept: Sequence[str], ident: str, title: str, summary: str) -> HandPicture:
     """Return the picture of `hand` with the switches called `kept`, all of which it knows, numbered in their order."""
-    order = {name: str(place) for place, name in enumerate(kept, 1)}
+    order, box = {name: str(place) for place, name in enumerate(kept, 1)}, _view_box(hand)
     return HandPicture(
         ident=ident,
         title=title,
         summary=summary,
-        view_box=_view_box(hand),
+        view_box=" ".join(map(_mm, box)),
+        radius=f"{hand.radius_mm:.2f}",
+        letter=_mm(box[2] * _LEAST_LETTER),
         outline=_path(hand.outline, closed=True),
         strips=tuple(_path(strip, closed=True) for strip in hand.strips),
         creases=tuple(_path(crease, closed=False) for crease in hand.creases),
@@ -52,11 +58,11 @@ def hand_picture(hand: HandShape, kept: Sequence[str], ident: str, title: str, s
     )
 
 
-def _view_box(hand: HandShape) -> str:
+def _view_box(hand: HandShape) -> tuple[float, float, float, float]:
     points = np.concatenate([hand.outline, *hand.strips, hand.places, hand.labels])
     (left, bottom), (right, top) = points.min(axis=0) - _MARGIN_MM, points.max(axis=0) + _MARGIN_MM
     # The names of the digits reach out beyond their places.
-    return " ".join(map(_mm, (left - _LABELS_MM, -top, right - left + 2 * _LABELS_MM, top - bottom)))
+    return left - _LABELS_MM, -top, right - left + 2 * _LABELS_MM, top - bottom
 
 
 def _path(points: Floats, *, closed: bool) -> str:

@@ -9,12 +9,13 @@ import msgspec
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from ..pictures import PALETTE
 from ..text import sentence
 from . import results, sections
 from .content import ReportContent
 from .frontier import Detail, frontier_view
 from .hand import HandPicture, hand_picture
-from .tree import TreeView, tree_view
+from .tree import LINE, STEP, WORDS, TreeView, tree_view
 
 
 def report_html(content: ReportContent) -> bytes:
@@ -34,9 +35,10 @@ def report_html(content: ReportContent) -> bytes:
         results=results,
         hand=_hand(content),
         tree=_tree(content),
+        icicle_size=(STEP, LINE, WORDS),
         confusions=tuple(results.confusions(content)),
         frontier=frontier,
-        style=_file(environment, "report.css"),
+        style=_colours() + _file(environment, "report.css"),
         script=script,
         script_sha256=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
         points=_json(() if frontier is None else frontier.details),
@@ -62,6 +64,12 @@ def _file(environment: Environment, name: str) -> Markup:
     """Return a file of the templates' folder, as it is."""
     assert environment.loader is not None
     return Markup(environment.loader.get_source(environment, name)[0])
+
+
+def _colours() -> Markup:
+    """Return the palette as variables of the style sheet, for light screens and paper, and for dark screens."""
+    light, dark = ("".join(f" --{name}: {pair[side]};" for name, pair in PALETTE.items()) for side in (0, 1))
+    return Markup(f":root {{{light} }}\n@media screen and (prefers-color-scheme: dark) {{ :root {{{dark} }} }}\n")
 
 
 def _json(details: Iterable[Detail]) -> Markup:

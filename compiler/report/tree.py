@@ -1,15 +1,15 @@
-"""The tree as an icicle, every node as wide as it has rows, and as a list within lists, as far as one sees anything."""
+"""The tree as an icicle, a line for each node and its children within it, and as a list within lists."""
 
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..placement.tree import Tree, node_text
+from ..placement.tree import Tree, answer_to, node_text, sizes_of
 
 MOST_NODES = 300
-_WIDE = 1000.0  # of the icicle
-_LETTER = 6.4  # on average, in the same units
-_ANSWERS = {0: "open", 1: "closed"}
+# Of the icicle, in pixels: how far a level is set in, a line, and what is left for the words of the deepest level.
+STEP, LINE, WORDS = 22, 18, 280
+_LETTERS = 40  # as many as have room there
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +17,7 @@ class ShownNode:
     """A node of the icicle and the list.
 
     number     its number in the tree
-    depth, x, width   where it lies on the icicle; label: its name there, "" where it has no room
+    depth, line, lines  where it lies on the icicle, and how tall it is; label: its name there
     words      what it asks or says, of how many rows, and the answer that leads to it
     opens      whether its children follow, in a list of their own; is_open: whether one sees them at once
     closes     how many lists end after it
@@ -27,8 +27,8 @@ class ShownNode:
 
     number: int
     depth: int
-    x: float
-    width: float
+    line: int
+    lines: int
     label: str
     words: str
     opens: bool
@@ -53,39 +53,29 @@ def tree_view(tree: Tree, names: Sequence[str], grasps: Sequence[str]) -> TreeVi
     shown = [number for number, depth in enumerate(tree.depths) if depth <= deepest]
     ends = [tree.depths[number] for number in shown[1:]] + [0]
     class_names = [grasps[int(label)] for label in tree.classes]
-    below, lefts = _below(tree), _lefts(tree)
+    sizes, lines = sizes_of(tree), sizes_of(tree, deepest)
     nodes = []
-    for number, following in zip(shown, ends, strict=True):
+    for line, (number, following) in enumerate(zip(shown, ends, strict=True)):
         node, depth = tree.nodes[number], tree.depths[number]
         opens = node.input is not None and depth < deepest
-        width = _WIDE * node.size / tree.nodes[0].size
-        answer = _answer(tree, number)
+        answer = answer_to(tree, number)
         name = answer + (class_names[node.majority] if node.input is None else f"{names[node.input]}?")
         nodes.append(
             ShownNode(
                 number=number,
                 depth=depth,
-                x=round(_WIDE * lefts[number] / tree.nodes[0].size, 2),
-                width=round(width, 2),
-                label=name if _LETTER * (len(name) + 1) < width else "",
+                line=line,
+                lines=lines[number],
+                label=name if len(name) <= _LETTERS else f"{name[: _LETTERS - 1]}…",
                 words=answer + node_text(node, names, class_names),
                 opens=opens,
                 is_open=depth < 2,
                 closes=0 if opens else depth - following,
-                below=0 if opens else below[number],
+                below=0 if opens else sizes[number] - 1,
                 is_leaf=node.input is None,
             )
         )
     return TreeView(tuple(nodes), deepest + 1, _sentence(tree, deepest))
-
-
-def _answer(tree: Tree, number: int) -> str:
-    """Return "open: " or "closed: ", whichever leads to the node; nothing at the root."""
-    parent = tree.parents[number]
-    if parent < 0:
-        return ""
-    value = tree.nodes[parent].values[tree.children[parent].index(number)]
-    return f"{_ANSWERS.get(value, str(value))}: "
 
 
 def _deepest(tree: Tree) -> int:
@@ -96,24 +86,6 @@ def _deepest(tree: Tree) -> int:
         deepest += 1
         total += counts[deepest]
     return deepest
-
-
-def _below(tree: Tree) -> list[int]:
-    below = [0] * len(tree.nodes)
-    for number in reversed(range(1, len(tree.nodes))):
-        below[tree.parents[number]] += 1 + below[number]
-    return below
-
-
-def _lefts(tree: Tree) -> list[int]:
-    """Return how many of the root's rows lie to the left of each node, in the order of the answers."""
-    lefts = [0] * len(tree.nodes)
-    for number, children in enumerate(tree.children):
-        left = lefts[number]
-        for child in children:
-            lefts[child] = left
-            left += tree.nodes[child].size
-    return lefts
 
 
 def _sentence(tree: Tree, deepest: int) -> str:

@@ -154,7 +154,10 @@ class Server:
             EmulatedNode(
                 testbed,
                 bus["device"],
-                Adapter(Wire([_station(**chip) for chip in bus["chips"]], bus["clock_hz"]), bus["adapter"]),
+                Adapter(
+                    Wire([Station(_model(*chip.pop("model")), **chip) for chip in bus["chips"]], bus["clock_hz"]),
+                    bus["adapter"],
+                ),
                 bus["paced"],
             )
             for bus in buses
@@ -208,10 +211,6 @@ _FAULTS: dict[str, Callable[..., None]] = {
     "stick": Adapter.stick,
     "heal": Adapter.heal,
 }
-
-
-def _station(model: tuple[str, str, str], address: int, mux: int | None, channel: int | None) -> Station:
-    return Station(_model(*model), address, mux, channel)
 
 
 def _model(folder: str, module: str, name: str) -> type[Device]:

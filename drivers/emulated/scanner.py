@@ -161,7 +161,9 @@ class ScannerBoard:
         if self.rate.state_us:
             sent = self._due_state(now)
         else:
-            sent = [self._sent(event) for event in self._events(before ^ self._closed, now) if not first]
+            changed = 0 if first else before ^ self._closed
+            keys = [key for key in range(changed.bit_length()) if changed >> key & 1]
+            sent = [self._sent(Event(self._clock(now), key, self._closed >> key & 1)) for key in keys]
         beats = first or bool(self.rate.heartbeat_us and now >= self._heartbeat_at)
         return sent + self._all_keys(now, lost=self._lost != lost, beats=beats)
 
@@ -181,10 +183,6 @@ class ScannerBoard:
         if self.rate.heartbeat_us:
             self._heartbeat_at = _after(self._heartbeat_at, self.rate.heartbeat_us, now)
         return self._sent(Heartbeat(self._clock(now), self._closed, self.rows * self.columns))
-
-    def _events(self, changed: Mask, now: int) -> list[Event]:
-        keys = [key for key in range(changed.bit_length()) if changed >> key & 1]
-        return [Event(self._clock(now), key, self._closed >> key & 1) for key in keys]
 
     def _hello(self, token: int, now: int) -> Hello:
         flags = 0 if self.diodes else WITHOUT_DIODES

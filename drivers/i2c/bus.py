@@ -7,7 +7,7 @@ from time import monotonic
 from ..closing import Closing
 from ..errors import DeviceError, SettingError
 from .chips import Chip, Reading
-from .keeper import ChipState, Keeper, PlacedChip, Route
+from .keeper import Keeper, PlacedChip, Route
 from .node import MOST_MESSAGES, REFUSED, Node, Query, Run, Way
 from .tca9548a import ADDRESSES, CHANNELS
 
@@ -160,7 +160,7 @@ class PortRead:
 
 
 class I2cBus(Closing):
-    """The chips on one device node. To be used by one thread at a time.
+    """The chips on one device node: `chips`, and how each is doing. To be used by one thread at a time.
 
     Raises SettingError for two chips that would answer at one address, or a mux that cannot be.
     """
@@ -174,9 +174,9 @@ class I2cBus(Closing):
         """
         self.device, self.clock_hz = device, clock_hz
         _refuse_clashes(device, chips)
-        self._members = tuple(PlacedChip(device, at.chip, at.address, at.used, _route(at)) for at in chips)
+        self.chips = tuple(PlacedChip(device, at.chip, at.address, at.used, _route(at)) for at in chips)
         self._node = Node(device)
-        self._keeper = Keeper(self._node, self._members, check_every_s)
+        self._keeper = Keeper(self._node, self.chips, check_every_s)
 
     def open(self) -> None:
         """Set up every chip and find out what the adapter can batch. A chip that is missing is absent, and no error.
@@ -185,19 +185,16 @@ class I2cBus(Closing):
         """
         self._keeper.begin()
         # Registers, not ports, each twice: what batches of two chips and of two reads of one chip come to.
-        control = [_control(member) for member in self._members]
+        control = [_control(member) for member in self.chips]
         trial = Scan(self._node, self._keeper, [port for port in control for _ in range(2)])
         for _ in Way:
             trial.read()
 
     def prepare(self, ports: Sequence[PortRead]) -> Scan:
         """Return what reads these ports, in this order, as often as it is asked."""
-        return Scan(self._node, self._keeper, [self._port(port) for port in ports])
-
-    @property
-    def chips(self) -> tuple[ChipState, ...]:
-        """How each chip is doing."""
-        return tuple(member.state for member in self._members)
+        read = ((self.chips[port.chip], port.reading) for port in ports)
+        made = [Port(chip, Query(chip.address, one.command, one.length), one.high) for chip, one in read]
+        return Scan(self._node, self._keeper, made)
 
     @property
     def way(self) -> str:
@@ -219,11 +216,6 @@ class I2cBus(Closing):
         self._node.close()
         self._keeper.revision += 1
 
-    def _port(self, port: PortRead) -> Port:
-        member = self._members[port.chip]
-        reading = port.reading
-        return Port(member, Query(member.address, reading.command, reading.length), reading.high)
-
 
 def _control(member: PlacedChip) -> Port:
     watched = member.watched
@@ -243,12 +235,10 @@ def _refuse_clashes(device: str, chips: Sequence[ChipAt]) -> None:
     for at in chips:
         at.chip.check_address(at.address)
         address, route = at.address, _route(at)
-        if (at.mux is None) != (at.channel is None) or (route and not _possible(route)):
+        if (at.mux is None) != (at.channel is None) or (
+            route and not (route.mux in ADDRESSES and route.channel in CHANNELS)
+        ):
             raise SettingError(f"{device}: a tca9548a is at 0x70 to 0x77 and has channels 0 to 7; this is none: {at}")
         if (address, route) in seen or (route and address in direct):
             raise SettingError(f"{device}: two chips would answer at 0x{address:02X}: give one of them another address")
         seen.add((address, route))
-
-
-def _possible(route: Route) -> bool:
-    return route.mux in ADDRESSES and route.channel in CHANNELS

@@ -133,22 +133,13 @@ def _behaves_like(node: Node, chip: Chip, address: int) -> bool:
     return True
 
 
-@dataclass(frozen=True, slots=True)
-class ChipState:
-    """How a chip is doing. `errors` counts what failed, retries that helped included; `last_error` stays."""
-
-    kind: str
-    address: int
-    mux: int | None
-    channel: int | None
-    present: bool
-    errors: int
-    last_error: str
-
-
 @dataclass(eq=False, slots=True)
 class PlacedChip:
-    """A chip in its place on the bus at `device`. `due` is when it is seen to next; `checked` counts its checks."""
+    """A chip in its place on the bus at `device`, and how it is doing, which its keeper alone changes.
+
+    `errors` counts what failed, retries that helped included; `last_error` stays. `due` is when it is seen to next;
+    `checked` counts its checks.
+    """
 
     device: str
     chip: Chip
@@ -170,12 +161,6 @@ class PlacedChip:
     def named(self) -> str:
         """The chip and where it is, for messages."""
         return place(self.device, self.chip.name, self.address, self.route)
-
-    @property
-    def state(self) -> ChipState:
-        """What others may know."""
-        mux, channel = (self.route.mux, self.route.channel) if self.route else (None, None)
-        return ChipState(self.chip.name, self.address, mux, channel, self.present, self.errors, self.last_error)
 
     def blame(self, error: str) -> None:
         """Count a failure."""

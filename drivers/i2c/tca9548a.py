@@ -7,7 +7,6 @@ CHANNELS = range(8)
 CLOCK_HZ = 400_000
 
 # Address and control byte: what one selection costs, and what reading the register back costs.
-WIRE_BYTES = 2
 SCL_PERIODS = 20
 
 PACKAGE = Package(

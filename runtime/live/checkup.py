@@ -95,7 +95,8 @@ def _recognising(grasp: BoardGrasp | None) -> tuple[str, ...]:
 
 def _bus(harness: Harness, number: int, scan: ScanMap) -> tuple[Finding, ...]:
     device = I2cDevice(harness, number, scan)
-    times = scan_us(_of_bus(scan, number), harness)
+    ports = tuple(port for port in scan.ports if port.bus == number)
+    times = scan_us(msgspec.structs.replace(scan, ports=ports), harness)
     try:
         device.open()
         found = [_chip(device, place, time) for place, time in enumerate(times.chips)]
@@ -131,10 +132,6 @@ def _told(finding: Finding) -> Finding:
 
 
 _ADVICE = "does its clock run as fast as glove.toml says, and is the computer busy?"
-
-
-def _of_bus(scan: ScanMap, number: int) -> ScanMap:
-    return msgspec.structs.replace(scan, ports=tuple(port for port in scan.ports if port.bus == number))
 
 
 def _gap(read: Callable[[], object]) -> float | None:

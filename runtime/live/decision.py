@@ -172,10 +172,12 @@ class SequentialTest:
         """
         if self.held is not None and time_us - self._decided_us > self.longest_us:
             self.held = None
-        if whole != self._whole and (whole or not self._lasts(time_us)):
+        under_way = bool(self._sums) and time_us - self._began_us <= self.longest_us
+        if whole != self._whole and (whole or not (self.held is not None or under_way)):
             self.forget()
             self._whole = whole
-        if whole == self._whole and self._counts(time_us):
+        last_us = self._counted_us
+        if whole == self._whole and (last_us is None or time_us - last_us >= max(self.spacing_us, 1)):
             self._counted_us = time_us
             self._add(time_us, standing.lanes)
         return self.held
@@ -183,13 +185,6 @@ class SequentialTest:
     def forget(self) -> None:
         """Drop evidence and answer: too little can be read."""
         self.held, self._sums, self._counted_us = None, (), None
-
-    def _lasts(self, time_us: int) -> bool:
-        """Return whether there is an answer, or a test under way that is not too old."""
-        return self.held is not None or (bool(self._sums) and time_us - self._began_us <= self.longest_us)
-
-    def _counts(self, time_us: int) -> bool:
-        return self._counted_us is None or time_us - self._counted_us >= max(self.spacing_us, 1)
 
     def _add(self, time_us: int, lanes: tuple[int, ...]) -> None:
         if not self._sums or time_us - self._began_us > self.longest_us:

@@ -54,14 +54,13 @@ class Readable(Protocol[T_co]):
 
 @dataclass(frozen=True, slots=True)
 class DeviceState:
-    """How a device fares: `error` says what is or was wrong last, since_us when this state began, opened how often it
-    was opened, faults how often an exception ended its reading that only a fault of the program explains.
+    """How a device fares: `error` says what is or was wrong last, opened how often it was opened, faults how often an
+    exception ended its reading that only a fault of the program explains.
     """
 
     name: str
     connected: bool
     error: str
-    since_us: int
     opened: int
     faults: int = 0
 
@@ -76,7 +75,7 @@ class Keeper(Generic[T]):
         self, name: str, device: Readable[T], take: Callable[[T], None], changed: Callable[[], None] = lambda: None
     ) -> None:
         """changed() is called whenever the state changes."""
-        self.state = DeviceState(name, connected=False, error=NOT_YET, since_us=now_us(), opened=0)
+        self.state = DeviceState(name, connected=False, error=NOT_YET, opened=0)
         self.failure: SettingError | None = None
         self._device, self._take, self._changed = device, take, changed
         self._logged: set[str] = set()
@@ -143,7 +142,7 @@ class Keeper(Generic[T]):
         old = self.state
         if (old.connected, old.error) != (connected, error):
             _log.info("%s: %s", old.name, error or "connected")
-            self.state = DeviceState(old.name, connected, error, now_us(), old.opened + connected, old.faults)
+            self.state = DeviceState(old.name, connected, error, old.opened + connected, old.faults)
             self._changed()
 
 

@@ -38,10 +38,6 @@ class PreshapeTable:
     name: str
     chosen: Mapping[str, Preshape]
 
-    def find(self, grasp: str) -> Preshape | None:
-        """Return the preshape for a grasp type, or None where the table does not name it."""
-        return self.chosen.get(grasp)
-
     def check(self, grasps: Iterable[str]) -> str:
         """Return what is missing for a build that recognises `grasps`, as a sentence for the user, or nothing.
 

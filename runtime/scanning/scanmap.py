@@ -4,13 +4,12 @@ It names chips by their place in the harness that it was made for, whose fingerp
 fields in the order of the structs below, indented by two, one newline at the end. `build.json` holds their SHA-256.
 """
 
-from typing import Annotated, TypeVar
+from typing import Annotated
 
-import msgspec
 from msgspec import Meta, Struct
 
 from ..errors import BuildError
-from ..manifest import SchemaVersion
+from ..manifest import decode_document, encode_document
 from ..names import fault, shortened
 
 SCHEMA = 1
@@ -19,7 +18,6 @@ MAX_BYTES = 4 << 20
 Number = Annotated[int, Meta(ge=0, le=65535)]
 # A bit of an answer, or a key of a board, and the number of the build's switch that it shows.
 Pair = tuple[Number, Number]
-_T = TypeVar("_T")
 
 
 class Port(Struct, frozen=True, forbid_unknown_fields=True):
@@ -56,7 +54,7 @@ class ScanMap(Struct, frozen=True, forbid_unknown_fields=True):
 
 def scanmap_to_bytes(scan: ScanMap) -> bytes:
     """Return the content of `scan.json`."""
-    return msgspec.json.format(msgspec.json.encode(scan), indent=2) + b"\n"
+    return encode_document(scan)
 
 
 def scanmap_from_bytes(data: bytes, what: str = "scan.json") -> ScanMap:
@@ -64,14 +62,7 @@ def scanmap_from_bytes(data: bytes, what: str = "scan.json") -> ScanMap:
 
     Raises BuildError if it is oversized, no such document, of a newer schema, not canonical, or reads a thing twice.
     """
-    if len(data) > MAX_BYTES:
-        raise BuildError(f"{what} has {len(data)} bytes, a scan map has at most {MAX_BYTES}")
-    schema = _decode(data, SchemaVersion, what).schema
-    if schema > SCHEMA:
-        raise BuildError(f"{what} has schema {schema}, this thenar reads up to {SCHEMA}: update thenar")
-    if schema < 1:
-        raise BuildError(f"{what} has schema {schema}, the first was 1: it is not of a build")
-    scan = _decode(data, ScanMap, what)
+    scan = decode_document(data, ScanMap, what, "a scan map", MAX_BYTES, SCHEMA)
     if data != scanmap_to_bytes(scan):
         raise BuildError(f"{what} is altered: these are not the bytes that thenar writes; compile the build again")
     _check_once(scan, what)
@@ -95,10 +86,3 @@ def _check_once(scan: ScanMap, what: str) -> None:
     for numbers in (scan.switches, *(tuple(bit for bit, _ in pairs) for pairs in sources)):
         if len(set(numbers)) < len(numbers):
             raise BuildError(f"{what} reads a bit or a switch twice: compile the build again")
-
-
-def _decode(data: bytes, kind: type[_T], what: str) -> _T:
-    try:
-        return msgspec.json.decode(data, type=kind)
-    except (ValueError, RecursionError) as wrong:
-        raise BuildError(f"{what} is not a build's: {wrong}") from None

@@ -11,6 +11,7 @@ ROS 2 node.
 """
 
 from collections.abc import Callable
+from functools import cache
 from typing import TYPE_CHECKING
 
 from msgspec import json
@@ -20,7 +21,7 @@ from ..published import HealthReport, JointAngles, LiveGrasp
 from .base import Sink, SinkError, SinkKind, SinkPlace, SinkReport
 
 if TYPE_CHECKING:
-    from ..ros.messages import PackedAngles, PackedString
+    from ..ros.messages import PackedAngles
 
 
 class RosTopics(Sink):
@@ -56,7 +57,7 @@ class RosTopics(Sink):
                 f"ros:{name}?public lets other machines read"
             ) from None
         self._closed = False
-        self._strings: dict[str, PackedString] = {}
+        self._string = cache(messages.PackedString)
         self._state: PackedAngles | None = None
         self._told: tuple[Preshape | None, int] = (None, 0)
         self._sent = self._lost = 0
@@ -87,11 +88,6 @@ class RosTopics(Sink):
             self._tell(preshape)
         if angles is not None:
             self._angles.write(self._packed(grasp.unix_us, angles))
-
-    def _string(self, text: str) -> "PackedString":
-        if text not in self._strings:
-            self._strings[text] = self._messages.PackedString(text)
-        return self._strings[text]
 
     def _tell(self, preshape: Preshape) -> None:
         """Publish `preshape` unless everybody who listens was told it."""

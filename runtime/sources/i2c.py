@@ -95,7 +95,9 @@ class I2cDevice(Source):
 
     def counts(self) -> tuple[Count, ...]:
         """Return how many transfers there were, how many scans were too slow to count, and each chip's failures."""
-        failures = (Count(f"failures of {chip.kind} at 0x{chip.address:02X}", chip.errors) for chip in self.bus.chips)
+        failures = (
+            Count(f"failures of {chip.chip.name} at 0x{chip.address:02X}", chip.errors) for chip in self.bus.chips
+        )
         return (Count("transfers", self.bus.transfers), Count("held up", self._held_up), *failures)
 
     def trouble(self) -> str:

@@ -54,7 +54,7 @@ class ScannerDevice(Source):
             if over := self._pauses.over(reading.time_us, known):
                 self._debouncer.forget(over)
             closed = self._debouncer.update(reading.time_us, closed, known) & known
-        trip_us = self.driver.trip_us
+        trip_us = self.driver.times.clock.trip_us
         # A frame may be older than two periods by the round trip of a good line, no more.
         self.longest_us = PERIODS * self.period_us + min(trip_us, self._usual_us)
         self._time_us = max(self._time_us, reading.time_us - trip_us)

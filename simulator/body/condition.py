@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ..streams import Site
 from .hand import Hand
 from .shapes import Shape
 
@@ -54,3 +55,7 @@ class Condition:
     grasp: str
     thing: Thing
     held: Held
+
+    def site(self, repetitions: NDArray[np.int64]) -> Site:
+        """Return whose draws some repetitions (n,) draw."""
+        return Site(self.subject, self.grasp, self.thing.name, repetitions)

@@ -122,13 +122,9 @@ def common_joints() -> tuple[Joint, ...]:
 
 def raw_joints() -> tuple[Joint, ...]:
     """Return what the bare bytes mean on the typical subject: 16 joints."""
-    ends = zip(SENSORS[:USED], *(end.tolist() for end in _ends()), strict=False)
-    return tuple(Joint(sensor, "deg", _LEAST, low, _MOST, high) for sensor, low, high in ends)
-
-
-def _ends() -> tuple[Floats, Floats]:
     nominal = Calibration.nominal()
-    return nominal.low_deg, nominal.high_deg
+    ends = zip(SENSORS[:USED], nominal.low_deg.tolist(), nominal.high_deg.tolist(), strict=False)
+    return tuple(Joint(sensor, "deg", _LEAST, low, _MOST, high) for sensor, low, high in ends)
 
 
 def _by_sensor(own: dict[str, float], kinds: dict[str, float]) -> Floats:

@@ -218,18 +218,12 @@ def command(cases: Sequence[Case]) -> Command:
     frames = skeleton.frames[hand.sphere_capsules]
     relative = touch - skeleton.origins[hand.sphere_capsules]
     own = np.stack([dot(frames[:, :, k], relative) for k in range(3)], axis=1)
-    torque = np.concatenate([_torque(case) for case in cases], axis=1)
-    weight = np.stack([_weight(case.condition) for case in cases], axis=1).repeat(counts, axis=1)
-    return Command(hand, shapes, angles, pose, torque, weight, own, pose.inward(touch))
-
-
-def _torque(case: Case) -> Floats:
-    skeleton = case.condition.hand.skeleton(case.angles)
-    return torques(case.condition, skeleton, Pose.of(case.numbers)) * case.grip_n
-
-
-def _weight(condition: Condition) -> Floats:
-    return condition.thing.mass_kg * GRAVITY * condition.held.down
+    turning = [
+        torques(case.condition, hand.skeleton(case.angles), Pose.of(case.numbers)) * case.grip_n for case in cases
+    ]
+    pulling = [case.condition.thing.mass_kg * GRAVITY * case.condition.held.down for case in cases]
+    weight = np.stack(pulling, axis=1).repeat(counts, axis=1)
+    return Command(hand, shapes, angles, pose, np.concatenate(turning, axis=1), weight, own, pose.inward(touch))
 
 
 Bits = NDArray[np.bool_]
@@ -322,14 +316,17 @@ class Balance:
         self.on_joints = self.command.torque - spring + pushed
 
     @cached_property
+    def _left(self) -> tuple[Floats, Floats, Floats]:
+        joints: Floats = np.abs(self.on_joints).max(axis=0)
+        return length(self.on_object[:3]), length(self.on_object[3:]), joints
+
+    @cached_property
     def unrest(self) -> Floats:
         """How far (n,) the forces are from balance: moments count over 30 mm."""
-        force, moment = length(self.on_object[:3]), length(self.on_object[3:])
-        joints: Floats = np.abs(self.on_joints).max(axis=0)
+        force, moment, joints = self._left
         return np.maximum(np.maximum(force, moment / _LEVER_MM), joints / _LEVER_MM)
 
     def at_rest(self, pace: Pace) -> Bits:
         """Return which repetitions (n,) have come to rest; none that holds a NaN."""
-        force, moment = length(self.on_object[:3]), length(self.on_object[3:])
-        joints: Floats = np.abs(self.on_joints).max(axis=0)
+        force, moment, joints = self._left
         return (force < pace.rest_n) & (moment < pace.rest_nmm) & (joints < pace.rest_nmm)

@@ -208,18 +208,9 @@ _TURN = slice(JOINTS + 3, JOINTS + 7)  # of qpos, where a turn takes four number
 _SPEED, _LEVER, _UNBALANCED_N, _UNBALANCED_SHARE = 0.1, 0.03, 0.1, 0.02
 
 
-@dataclass(frozen=True, slots=True)
-class Settled:
-    """One repetition at rest: angles (20,) in radians, pose (6,), capsules_n (20,), what nothing balances, and whether
-    MuJoCo warned of nothing and joints and object stand still.
-    """
-
-    angles: Floats
-    pose: Floats
-    capsules_n: Floats
-    residual_n: float
-    residual_nmm: float
-    settled: bool
+# One repetition at rest: angles (20,) in radians, pose (6,), capsules_n (20,), the force and the moment that nothing
+# balances, and whether MuJoCo warned of nothing and joints and object stand still.
+Settled = tuple[Floats, Floats, Floats, float, float, bool]
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,9 +232,7 @@ class MujocoContact:
         moments = load.grip_n * torques(condition, hand.skeleton(angles), Pose.of(load.pose.T))
         pair = Pair(hand, condition.thing, condition.held.down, self.dynamics)
         rests = [pair.rest(*told) for told in zip(angles.T, load.pose, moments.T, strict=True)]
-        angles = np.array([rest.angles for rest in rests])
-        pose = np.array([rest.pose for rest in rests])
-        capsules_n = np.array([rest.capsules_n for rest in rests])
+        angles, pose, capsules_n, residual_n, residual_nmm, at_rest = map(np.array, zip(*rests, strict=True))
         switches = Switches(hand, self.layout)
         gaps = Pose.of(pose.T).distance(shape, switches.tops(hand.skeleton(angles.T)))[0]
         forces_n, between_n = split(switches, self.dynamics.reach_mm - gaps, capsules_n.T)
@@ -253,9 +242,9 @@ class MujocoContact:
             forces_n=forces_n.T,
             capsules_n=capsules_n,
             between_n=between_n,
-            settled=np.array([rest.settled for rest in rests]),
-            residual_n=np.array([rest.residual_n for rest in rests]),
-            residual_nmm=np.array([rest.residual_nmm for rest in rests]),
+            settled=at_rest,
+            residual_n=residual_n,
+            residual_nmm=residual_nmm,
             steps=len(rests) * self.dynamics.steps,
         )
 
@@ -285,7 +274,7 @@ class Pair:
         mujoco.mj_step(model, data, self._dynamics.steps)
         mujoco.mj_forward(model, data)
         if data.warning.number.any() or not np.isfinite(data.qacc).all():
-            return Settled(angles, pose, np.zeros(len(CAPSULES)), np.inf, np.inf, settled=False)
+            return angles, pose, np.zeros(len(CAPSULES)), np.inf, np.inf, False
         return self._read()
 
     def _read(self) -> Settled:
@@ -295,19 +284,12 @@ class Pair:
         turn = data.xmat[-1].reshape(3, 3)
         moment = moment + np.add.reduce(turn.T * data.qfrc_spring[_BALL][:, None], axis=0)
         residual_n, residual_nmm = _length(force), _length(moment) / N_MM
-        return Settled(
-            angles=data.qpos[:JOINTS].copy(),
-            pose=_pose(data.qpos),
-            capsules_n=capsules_n,
-            residual_n=residual_n,
-            residual_nmm=residual_nmm,
-            settled=self._stands_still() and residual_n <= _UNBALANCED_N + _UNBALANCED_SHARE * float(capsules_n.sum()),
-        )
-
-    def _stands_still(self) -> bool:
-        speeds = np.abs(self._data.qvel)
+        speeds = np.abs(data.qvel)
         speeds[_SLIDES] /= _LEVER
-        return float(speeds.max()) <= _SPEED
+        balanced = residual_n <= _UNBALANCED_N + _UNBALANCED_SHARE * float(capsules_n.sum())
+        stands_still = float(speeds.max()) <= _SPEED
+        angles = data.qpos[:JOINTS].copy()
+        return angles, _pose(data.qpos), capsules_n, residual_n, residual_nmm, stands_still and balanced
 
     def _contacts(self) -> tuple[Floats, Floats, Floats]:
         """Return the normal forces on the capsules (20,), and on the object the contacts' force and their moment about

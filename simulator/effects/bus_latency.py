@@ -4,7 +4,6 @@ from typing import Annotated
 
 import numpy as np
 from msgspec import Meta
-from numpy.typing import NDArray
 
 from thenar.compiler.elementary import log
 
@@ -31,11 +30,6 @@ def prepare(parameters: Parameters, setting: Setting) -> Step:
 
     Raises SceneError where all ports together take longer than there is from one frame to the next.
     """
-    _check_scan(parameters, setting)
-    return _jittered(parameters, drawn_rows(setting)) if parameters.jitter_us else _steady(parameters)
-
-
-def _check_scan(parameters: Parameters, setting: Setting) -> None:
     there = port_count(len(murakami160()))
     scan_us = there * (parameters.us_per_port + parameters.jitter_us)
     if scan_us > setting.period_us:
@@ -43,18 +37,13 @@ def _check_scan(parameters: Parameters, setting: Setting) -> None:
             f"effects.bus.latency: {there} ports take {scan_us:g} us on average, and there are {setting.period_us} us"
             " from one frame to the next: lower us_per_port, jitter_us or recording.rate_hz"
         )
+    rows = drawn_rows(setting)
 
-
-def _steady(parameters: Parameters) -> Step:
-    def step(batch: Batch, draw: Draw) -> None:
-        batch.delay_us = (port_of(batch.on_us.shape[1]) + 1) * parameters.us_per_port
-
-    return step
-
-
-def _jittered(parameters: Parameters, rows: NDArray[np.intp]) -> Step:
     def step(batch: Batch, draw: Draw) -> None:
         switches = batch.on_us.shape[1]
+        if not parameters.jitter_us:
+            batch.delay_us = (port_of(switches) + 1) * parameters.us_per_port
+            return
         chances = draw.per_repetition(len(rows), port_count(switches)).uniform()[:, rows]
         longer = np.rint(-parameters.jitter_us * log(chances)).astype(np.int64)
         batch.delay_us = np.cumsum(parameters.us_per_port + longer, axis=2)[:, :, port_of(switches)]

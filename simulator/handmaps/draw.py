@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.compiler.hand import HandShape, MapError
-from thenar.compiler.pictures import painting, rendered
+from thenar.compiler.pictures import on_paper, painting, rendered
 from thenar.compiler.recordings.graspset import GraspSet
 
 from .handmap import Floats
@@ -142,7 +142,7 @@ def _counts(glove: HandShape, numbers: NDArray[np.intp], what: str) -> str:
     return f"{len(numbers)} {what}" + (f": {', '.join(parts)}" if len(parts) > 1 else "")
 
 
-SKIN, SIDE, LINE, CREASE, INK = "#f9f1e9", "#eee3d8", "#57493e", "#c9b09a", "#14304f"
+SKIN, SIDE, LINE, CREASE, INK = map(on_paper, ("skin", "side", "outline", "crease", "kept"))
 _COLOURS, _LIGHTEST = "magma_r", 0.07  # a switch that closed at all is no longer white
 _MARGIN_MM, _USUAL_MM = 3.0, 1.8  # around a hand; the radius of a dot whose edge is as thick as thin lines are
 _LONGEST_TITLE = 40

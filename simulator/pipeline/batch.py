@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ..body.condition import Condition
 from ..contact.model import Contact, Load
+from ..streams import Site
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,6 +93,10 @@ class Batch:
 
     def __len__(self) -> int:
         return len(self.repetitions)
+
+    def site(self) -> Site:
+        """Return whose draws its effects draw."""
+        return self.condition.site(self.repetitions)
 
     def load(self) -> Load:
         """Return what the batch tells its hands."""

@@ -56,10 +56,6 @@ def _check_rate(setting: Setting) -> None:
         )
 
 
-def _receive(parameters: EffectParameters, setting: Setting) -> Step:
-    return receive
-
-
 def receive(batch: Batch, draw: Draw) -> None:
     """Decode what arrived, as a driver does, and take for each frame the newest there is by the time it is due.
 
@@ -161,5 +157,5 @@ RECEIVE = Effect(
     reads=("traffic", "bits", "settled"),
     writes=("bits", "raw", "lost", "settled"),
     on_wire=True,
-    prepare=_receive,
+    prepare=lambda _parameters, _setting: receive,
 )

@@ -208,7 +208,8 @@ def _works(scene: Scene, known: Postures) -> Iterator[Work]:
     shortest, longest = EVERY_MM * math.floor(min(hands) / EVERY_MM), EVERY_MM * math.ceil(max(hands) / EVERY_MM)
     lacking: dict[object, SceneObject] = {}
     for item in scene.objects:
-        if not _covered(item, known, hands):
+        entry = known.entry(item.grasp, item.thing())
+        if entry is None or not (entry.covers(min(hands)) and entry.covers(max(hands))):
             lacking.setdefault((item.grasp, item.shape), item)
     prehensions = shipped_prehensions(scene.taxonomy) if lacking else {}
     for item in lacking.values():
@@ -218,11 +219,6 @@ def _works(scene: Scene, known: Postures) -> Iterator[Work]:
                 f"{item.name!r} cannot be planned"
             )
         yield Work(item.grasp, prehensions[item.grasp], item.thing(), shortest, longest)
-
-
-def _covered(item: SceneObject, known: Postures, hands_mm: Sequence[float]) -> bool:
-    entry = known.entry(item.grasp, item.thing())
-    return entry is not None and entry.covers(min(hands_mm)) and entry.covers(max(hands_mm))
 
 
 def _successes(answers: Sequence[Planned | PlanError], works: Sequence[Work]) -> list[Planned]:

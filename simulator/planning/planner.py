@@ -7,7 +7,7 @@ Least squares over 20 joint angles and 6 numbers of the object's pose, from the 
 for planning only: postures are kept as data).
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -198,7 +198,8 @@ def plan(hand: Hand, grasp: str, prehension: Prehension, thing: Thing, near: Hel
         plans = [] if near is None else [_descend(misfit, _start_near(misfit, near))]
         if not any(one.holds() for one in plans):
             plans += [_descend(misfit, start) for start in _starts(misfit)]
-    best = _best(plans)
+    # The plan of the least cost among those that hold; if none does, what comes nearest to holding.
+    best = min(plans, key=lambda one: (not one.holds(), one.cost if one.holds() else one.excess()))
     if not best.holds():
         raise PlanError(_refusal(hand, grasp, thing, best))
     return best
@@ -209,11 +210,6 @@ def measure(hand: Hand, held: Held, shape: Shape) -> tuple[float, float]:
     centres = hand.spheres(hand.skeleton(np.radians(held.posture_deg)[:, None]))
     gap = Pose.of(held.pose[:, None]).distance(shape, centres)[0][:, 0] - hand.sphere_radii
     return float(gap[[pad.sphere for pad in held.pads]].max()), float(-gap.min())
-
-
-def _best(plans: Iterable[Plan]) -> Plan:
-    """Return the plan of the least cost among those that hold; if none does, what comes nearest to holding."""
-    return min(plans, key=lambda one: (not one.holds(), one.cost if one.holds() else one.excess()))
 
 
 def _refusal(hand: Hand, grasp: str, thing: Thing, best: Plan) -> str:

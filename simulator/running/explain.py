@@ -108,7 +108,9 @@ def explain(scene: Scene, jobs: int = -1) -> Explanation:
     """
     pipeline = compile_pipeline(scene)
     session = middle_session(scene)
-    ledger = _measured(pipeline, session)
+    pipeline.run(sample(session, 1)[:1], Ledger())  # what is done once, such as importing
+    ledger = Ledger()
+    pipeline.run(sample(session, at_a_time(pipeline.setting, _MEASURED)), ledger)
     first = ledger.entries[pipeline.stops[0].effect.name]
     steps = tuple(_step(stop, ledger.entries[stop.effect.name], ledger.nanoseconds) for stop in pipeline.stops)
     repetitions, workers = len(session.before) * len(scene.subjects), workers_of(jobs)
@@ -125,14 +127,6 @@ def explain(scene: Scene, jobs: int = -1) -> Explanation:
         workers=workers,
         expected_s=us_a_grasp * repetitions / workers / 1e6,
     )
-
-
-def _measured(pipeline: Pipeline, session: Session) -> Ledger:
-    """Return what some repetitions of all conditions of a session cost."""
-    pipeline.run(sample(session, 1)[:1], Ledger())  # what is done once, such as importing
-    ledger = Ledger()
-    pipeline.run(sample(session, at_a_time(pipeline.setting, _MEASURED)), ledger)
-    return ledger
 
 
 def _step(stop: Stop, entry: Cost, all_ns: int) -> StepPlan:

@@ -19,7 +19,7 @@ from ..pipeline.batch import Batch
 from ..pipeline.effect import EFFECTS, Effect, Place, Setting, Step, Together, in_order
 from ..pipeline.glove import STEPS
 from ..scenes.scene import Scene
-from ..streams import Draw, Draws, Site
+from ..streams import Draw, Draws
 
 
 @dataclass(slots=True)
@@ -107,15 +107,10 @@ class Pipeline:
         repetitions = sum(map(len, batches))
         for stop in self.stops:
             draws = Draws()
-            sites = [Draw(self.setting.seed, stop.effect.name, _site(batch), draws) for batch in batches]
+            sites = [Draw(self.setting.seed, stop.effect.name, batch.site(), draws) for batch in batches]
             began = perf_counter_ns()
             stop.act(batches, sites)
             ledger.enter(stop.effect.name, stop.own, len(batches), repetitions, perf_counter_ns() - began, draws)
-
-
-def _site(batch: Batch) -> Site:
-    condition = batch.condition
-    return Site(condition.subject, condition.grasp, condition.thing.name, batch.repetitions)
 
 
 def _each(step: Step) -> Together:

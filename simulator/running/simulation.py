@@ -20,8 +20,8 @@ from ..pipeline.batch import Batch, Integers
 from ..pipeline.effect import at_a_time, hold_frame
 from ..planning.postures import Postures
 from ..scenes.scene import Scene, Subject
-from ..streams import Draw, Draws, Site
-from .pipeline import Ledger, Pipeline, compile_pipeline
+from ..streams import Draw, Draws
+from .pipeline import Ledger, compile_pipeline
 from .report import (
     Codes,
     Notes,
@@ -83,8 +83,9 @@ def conditions_of(scene: Scene, subject: Subject, postures: Postures) -> tuple[C
 def session_of(scene: Scene, conditions: tuple[Condition, ...]) -> Session:
     """Return the session of the subject whose conditions these are."""
     numbers = [share for _, share in scene.shares() if share]
+    sites = [each.site(np.array(share)) for each, share in zip(conditions, numbers, strict=True)]
     # All repetitions in the order of one random word each: no other repetition, type or object changes a word.
-    words = [_words(scene.seed, each, share) for each, share in zip(conditions, numbers, strict=True)]
+    words = [Draw(scene.seed, ORDER, site, Draws()).per_repetition().words for site in sites]
     counts = [len(each) for each in words]
     owner = np.repeat(np.arange(len(conditions)), counts)
     order = np.argsort(np.concatenate(words), kind="stable")
@@ -98,11 +99,6 @@ def session_of(scene: Scene, conditions: tuple[Condition, ...]) -> Session:
         planned_deg=np.stack([condition.held.posture_deg for condition in conditions]),
         before=owner[np.concatenate([order[:1], order[:-1]])],
     )
-
-
-def _words(seed: int, condition: Condition, repetitions: range) -> NDArray[np.uint64]:
-    site = Site(condition.subject, condition.grasp, condition.thing.name, np.array(repetitions))
-    return Draw(seed, ORDER, site, Draws()).per_repetition().words
 
 
 Progress = Callable[[int, int], None]
@@ -179,9 +175,7 @@ def _groups(plan: Sequence[Session], block: int) -> Iterator[_Batches]:
         first += len(session.conditions)
 
 
-@lru_cache(maxsize=1)
-def _pipeline(scene: Scene, without: str | None) -> Pipeline:
-    return compile_pipeline(scene, without)
+_pipeline = lru_cache(maxsize=1)(compile_pipeline)
 
 
 def _run(scene: Scene, without: str | None, keep_unsettled: bool, batches: _Batches) -> _Done:

@@ -101,7 +101,9 @@ def _noise(rounds: int) -> Iterator[Finding]:
     rises = Worst("rise of the loss, where it must fall", "convexity", 1.0, "x rounding")
     for hard, shrinkage in noisy_sets():
         stumps, falling = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds, shrinkage=shrinkage)
-        _see_losses(hard, falling, below)
+        least = float(entropy_left(hard))
+        above = least - loss_rounding(hard.n_classes, least)
+        below.see(float(sum(loss < above for loss in falling)), hard.name, len(falling))
         before = None
         for number, moment in enumerate(moments(hard, stumps)):
             at = f"{hard.name}, round {number}"
@@ -122,9 +124,3 @@ def noisy_sets() -> Iterator[tuple[HardSet, float]]:
         for classes, shrinkage in ((2, 1.0), (5, 0.25), (5, 1.0)):
             hard = noisy(classes, 60, percent / 100, seed=percent)
             yield replace(hard, X=hard.X[:, :4], n_switches=4), shrinkage
-
-
-def _see_losses(hard: HardSet, losses: tuple[float, ...], below: Worst) -> None:
-    least = float(entropy_left(hard))
-    allowed = least - loss_rounding(hard.n_classes, least)
-    below.see(float(sum(loss < allowed for loss in losses)), hard.name, len(losses))

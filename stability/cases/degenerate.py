@@ -14,7 +14,6 @@ from thenar.compiler.boosting.stumps import Stumps, winners
 from thenar.compiler.elementary import softmax
 from thenar.compiler.evaluation.study import Options, evaluate
 from thenar.compiler.placement.placement import place
-from thenar.compiler.recordings.graspset import GraspSet
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.build import Build
 
@@ -37,6 +36,7 @@ _ONE_ROW = make_set(["a"], [[1, 0]], [[3]])
 _ONE_CLASS = make_set(["a"] * 8, _FRAMES * 2, [[3], [4], [5], [6]] * 2)
 _CONSTANT = make_set(["a"] + ["b"] * 11, [[1, 1]] * 12, [[65535]] * 12)
 
+UNSOLVABLE = {"one row": _ONE_ROW, "one class": _ONE_CLASS, "constants": _CONSTANT}
 # Sets whose rows a sum of stumps can tell apart, and does.
 SOLVABLE = {
     "two rows": make_set(["a", "b"], [[1, 0], [0, 1]]),
@@ -173,8 +173,3 @@ def _nothing_to_see() -> Finding:
                 # 11 of the 12 rows are of type b, and in any 9 of them it is the most frequent.
                 off.see(max(abs(correct - 11) for correct in cell.rate.correct), f"{table.name} {row.name}")
     return off.finding()
-
-
-def all_sets() -> dict[str, GraspSet]:
-    """Return every set of this case by its name: the tests send them through the commands."""
-    return {"one row": _ONE_ROW, "one class": _ONE_CLASS, "constants": _CONSTANT, **SOLVABLE}

@@ -32,7 +32,9 @@ def findings(full: bool) -> Iterator[Finding]:
     yield _worst("exp", EXP_ULPS, exp, logistic.exp, _exp_arguments(rng, 2000 * more))
     yield _worst("exp next to underflow", EXP_ULPS, exp, logistic.exp, rng.uniform(-746, -708, 1000 * more))
     yield _worst("log", LOG_ULPS, log, logistic.log, _log_arguments(rng, 2000 * more))
-    angles = _angles(rng, 1000 * more)
+    # Next to multiples of a quarter of pi, where digits cancel or one kernel follows another, and anywhere.
+    quarters = _beside(np.arange(1, 1270, 7) * np.pi / 4)
+    angles = np.concatenate([quarters, -np.arange(1, 9) * 1e-8, rng.uniform(-1e3, 1e3, 1000 * more)])
     yield _worst("sine", SINCOS_ULPS, lambda x: sincos(x)[0], linear.sin, angles)
     yield _worst("cosine", SINCOS_ULPS, lambda x: sincos(x)[1], linear.cos, angles)
     matrices = list(hard_scores(rng, 20 * more))
@@ -87,13 +89,6 @@ def _log_arguments(rng: np.random.Generator, n: int) -> Floats:
     many = np.ldexp(rng.uniform(0.5, 1, n), rng.integers(-1073, 1024, n))
     near = rng.uniform(0.7, 1.42, n)
     return np.concatenate([_beside(powers), _beside(powers * np.sqrt(0.5)), beside_one, extremes, many, near])
-
-
-def _angles(rng: np.random.Generator, n: int) -> Floats:
-    """Next to multiples of a quarter of pi, where digits cancel or one kernel follows another, and anywhere."""
-    return np.concatenate(
-        [_beside(np.arange(1, 1270, 7) * np.pi / 4), -np.arange(1, 9) * 1e-8, rng.uniform(-1e3, 1e3, n)]
-    )
 
 
 def _labelled(rng: np.random.Generator, matrices: Iterable[Floats]) -> Iterator[Labelled]:

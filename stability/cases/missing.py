@@ -158,7 +158,11 @@ class Lost(NamedTuple):
 
 def findings(full: bool) -> Iterator[Finding]:
     """Lose every subset of joints and of ports, of 8 and of 16 switches, in recorded and in the worst frames."""
-    small, recorded = _small(full), 24 if full else 8
+    if full:
+        small = small_build(small_set(8, rows=150, switches=48, joints=4, types=5, noise=0.15), rounds=40)
+    else:
+        small = small_build(small_set(8, rows=100, switches=32, joints=2, types=4, noise=0.1), rounds=20)
+    recorded = 24 if full else 8
     hard = list(worst_frames(small.build.tables))
     bits = np.vstack([small.bits[:recorded], *(of_frame for of_frame, _ in hard)])
     codes = np.vstack([small.codes[:recorded], *(of_frame for _, of_frame in hard)])
@@ -171,15 +175,9 @@ def findings(full: bool) -> Iterator[Finding]:
     yield from _told(small, cases)
 
 
-def _small(full: bool) -> SmallBuild:
-    if full:
-        return small_build(small_set(8, rows=150, switches=48, joints=4, types=5, noise=0.15), rounds=40)
-    return small_build(small_set(8, rows=100, switches=32, joints=2, types=4, noise=0.1), rounds=20)
-
-
 def _scores(small: SmallBuild, loss: Loss, bits: Bits, codes: Codes) -> NDArray[np.int64]:
     frames = zip(bits, codes, strict=True)
-    lanes = [small.build.lanes_without(*frame, loss.switches, loss.joints) for frame in frames]
+    lanes = [small.build.scorer.lanes_without(*frame, loss.switches, loss.joints) for frame in frames]
     return np.array(lanes) - LANE_OFFSET
 
 

@@ -79,7 +79,9 @@ def _settings(here: Built, full: bool) -> Iterator[tuple[str, list[Setting]]]:
         return
     yield "BLAS threads 1 and 2", [_threads(1), _threads(2)]
     yield "BLAS kernels", [_set("OPENBLAS_CORETYPE", kernel) for kernel in _kernels(here)]
-    yield "numpy's SIMD limited", _limited(here)
+    # Instruction sets are taken away from the newest on, until none is left.
+    limits = (" ".join(here.simd[kept:]) for kept in range(len(here.simd)))
+    yield "numpy's SIMD limited", [_set("NPY_DISABLE_CPU_FEATURES", limit) for limit in limits]
     yield "libm without FMA and AVX2", [_set("GLIBC_TUNABLES", _PLAIN_LIBM)]
     yield "hash order", [_set("PYTHONHASHSEED", seed) for seed in ("0", "1", "4294967295")]
     yield "all of these at once", [plainest(here)]
@@ -101,7 +103,10 @@ def _failed(ran: Ran) -> Finding:
 
 def held(check: str, here: Built, others: list[Ran]) -> Finding:
     """Count the files that differ from this process's. Bound 0: there is no rounding between the bytes of two files."""
-    wrong = [(ran, _differing(here, ran.built)) for ran in others]
+    wrong = []
+    for ran in others:
+        there = dict(ran.built.files) if ran.built is not None else {}
+        wrong.append((ran, [name for name, digest in here.files if there.get(name) != digest]))
     moved = sum(ran.built is not None and ran.built.plain != here.plain for ran in others)
     return Finding(
         check=check,
@@ -112,12 +117,6 @@ def held(check: str, here: Built, others: list[Ran]) -> Finding:
         tried=len(others) * len(here.files),
         worst="; ".join(f"{ran.name}: {ran.ending or ', '.join(files)}" for ran, files in wrong if files),
     )
-
-
-def _differing(here: Built, other: Built | None) -> list[str]:
-    """Return the names of the files that the other process made differently, or not at all."""
-    there = dict(other.files) if other is not None else {}
-    return [name for name, digest in here.files if there.get(name) != digest]
 
 
 def _threads(count: int) -> Setting:
@@ -135,11 +134,6 @@ def _kernels(built: Built) -> tuple[str, ...]:
     chosen = {kernel.partition(" ")[0] for kernel in built.kernels}
     newest = max((_X86_KERNELS.index(kernel) for kernel in chosen if kernel in _X86_KERNELS), default=0)
     return _X86_KERNELS[: newest + 1]
-
-
-def _limited(built: Built) -> list[Setting]:
-    """Return settings that take numpy's instruction sets away from the newest on, until none is left."""
-    return [_set("NPY_DISABLE_CPU_FEATURES", " ".join(built.simd[kept:])) for kept in range(len(built.simd))]
 
 
 def plainest(built: Built) -> Setting:

@@ -184,7 +184,8 @@ def _witnesses(seeds: range) -> Finding:
     # Both sides are exact: rows of some 75 bits between their highest and lowest place, times a scale of 53, fit into
     # the 199 bits that 60 digits are.
     worst = Worst("worst frame of every pair of classes", "60 digits and the scorer, in that frame", 0, "steps")
-    for case in (_compiled(), *_tables(seeds)):
+    small = small_build(small_set(7, rows=200, switches=24, joints=3, types=6, noise=0.15), rounds=40)
+    for case in (Quantised("a compiled build", small.tables, small.build.tables), *_tables(seeds)):
         rounding, both = Rounding(case.tables, case.integers), BothWays(case.tables, case.integers)
         for leader, rival in permutations(range(case.integers.n_classes), 2):
             frame = rounding.worst(leader, rival)
@@ -240,11 +241,6 @@ def _half_steps(full: bool) -> Finding:
         loss = Rounding(case.tables, case.integers).worst_of_all().loss
         worst.see(float(abs(loss - (switches + 1))), case.name)
     return worst.finding()
-
-
-def _compiled() -> Quantised:
-    small = small_build(small_set(7, rows=200, switches=24, joints=3, types=6, noise=0.15), rounds=40)
-    return Quantised("a compiled build", small.tables, small.build.tables)
 
 
 def _tables(seeds: range) -> Iterator[Quantised]:

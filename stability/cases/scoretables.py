@@ -1,7 +1,9 @@
 """From ensembles of thousands of rounds to score tables and whole steps."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -32,14 +34,11 @@ def ensembles(rng: np.random.Generator, n: int, rounds: int) -> Iterator[tuple[s
         shape = rounds, classes, 3
         shrinkage = (1.0, 0.1, 1e-5)[number % 3]
         yield "answers of +-3", _stumps(rng, rng.choice([-3.0, 3.0], shape), shrinkage)
-        yield (
-            "answers of all sizes",
-            _stumps(rng, rng.choice([-3.0, 3.0], shape) * 10.0 ** rng.uniform(-20, 0, shape), shrinkage),
-        )
-        yield (
-            "one round again and again",
-            _repeated(_stumps(rng, rng.uniform(-3, 3, (1, classes, 3)), shrinkage), rounds),
-        )
+        sizes = rng.choice([-3.0, 3.0], shape) * 10.0 ** rng.uniform(-20, 0, shape)
+        yield "answers of all sizes", _stumps(rng, sizes, shrinkage)
+        once = _stumps(rng, rng.uniform(-3, 3, (1, classes, 3)), shrinkage)
+        again = {part: getattr(once, part).repeat(rounds, axis=0) for part in ("columns", "thresholds", "values")}
+        yield "one round again and again", replace(once, **again)
         subnormal = np.ldexp(rng.integers(-9, 10, (20, classes, 3)).astype(np.float64), -1074)
         yield "answers next to nothing", _stumps(rng, subnormal, 1.0)
 
@@ -55,11 +54,6 @@ def _stumps(rng: np.random.Generator, values: NDArray[np.float64], shrinkage: fl
     columns = rng.integers(0, SWITCHES + JOINTS, shape)
     thresholds = np.where(columns < SWITCHES, rng.choice(BITS, shape), rng.choice(CODES, shape))
     return Stumps(SWITCHES + JOINTS, columns.astype(np.int32), thresholds, values, shrinkage)
-
-
-def _repeated(once: Stumps, rounds: int) -> Stumps:
-    columns, thresholds = once.columns.repeat(rounds, axis=0), once.thresholds.repeat(rounds, axis=0)
-    return Stumps(once.n_inputs, columns, thresholds, once.values.repeat(rounds, axis=0), once.shrinkage)
 
 
 CASE = Case(
@@ -95,10 +89,9 @@ def scores_of(hard: list[tuple[str, Stumps]], bits: NDArray[np.bool_], codes: ND
     X = np.hstack([bits, codes])
     for name, stumps in hard:
         at, K = f"{stumps.n_rounds} rounds, {stumps.n_classes} classes: {name}", stumps.n_classes
-        columns, thresholds, values = stumps.columns.tolist(), stumps.thresholds.tolist(), stumps.values.tolist()
         largest = mpmath.fsum(np.abs(stumps.values).max(axis=(1, 2)).tolist()) * stumps.shrinkage
         for row, got in zip(X.tolist(), stumps.scores(X).tolist(), strict=True):
-            exact = truth.scores(columns, thresholds, values, stumps.shrinkage, row)
+            exact = truth.scores(*_listed(stumps), row)
             with precisely():
                 steps = (K + 4) * (ROUNDING * largest + stumps.n_rounds * SMALLEST)
                 for ours, true in zip(got, exact, strict=True):
@@ -107,9 +100,9 @@ def scores_of(hard: list[tuple[str, Stumps]], bits: NDArray[np.bool_], codes: ND
     yield from (worst.finding(), mean.finding())
 
 
-def _exact_tables(stumps: Stumps) -> tuple[list[mpf], list[list[mpf]], list[tables.Joint]]:
-    columns, thresholds, values = stumps.columns.tolist(), stumps.thresholds.tolist(), stumps.values.tolist()
-    return tables.score_tables(columns, thresholds, values, stumps.shrinkage, stumps.n_inputs, SWITCHES)
+def _listed(stumps: Stumps) -> tuple[Any, Any, Any, float]:
+    """Return an ensemble as the reference takes it."""
+    return stumps.columns.tolist(), stumps.thresholds.tolist(), stumps.values.tolist(), stumps.shrinkage
 
 
 def _sizes(stumps: Stumps) -> Floats:
@@ -129,7 +122,8 @@ def tables_of(hard: list[tuple[str, Stumps]]) -> Iterator[Finding]:
     thresholds = Worst("thresholds of score tables", "whole numbers", 0.0, "joints")
     for name, stumps in hard:
         at = f"{stumps.n_rounds} rounds, {stumps.n_classes} classes: {name}"
-        ours, (bias, switch_rows, joints) = collapse(stumps, SWITCHES), _exact_tables(stumps)
+        bias, switch_rows, joints = tables.score_tables(*_listed(stumps), stumps.n_inputs, SWITCHES)
+        ours = collapse(stumps, SWITCHES)
         sizes, tiny = _sizes(stumps), 6 * stumps.n_rounds * stumps.n_classes * SMALLEST
         parts = [(ours.bias, bias, (6 + SWITCHES) * sizes[:SWITCHES].sum(axis=0))]
         parts += [(a, b, 6 * size) for a, b, size in zip(ours.switch_rows, switch_rows, sizes, strict=False)]

@@ -55,7 +55,6 @@ def _trained(runs: list[tuple[HardSet, int, bool]]) -> Iterator[Finding]:
     At 60 digits, after 1, 2, 4, 8 and so on.
     """
     outside = Worst("P, w, w z and answers finite and in range", "the rules themselves", 0.0, "rounds")
-    # A share rounds once; K - 1 additions lie under it.
     sums = Worst("shares of a row add up to 1", "exact sums", 1.0, "x rounding")
     rises = Worst("rise of the loss, where it must fall", "convexity", 1.0, "x rounding")
     told = Worst("losses told of a round that are not the ensemble's", "the ensemble", 0.0, "losses")
@@ -68,10 +67,13 @@ def _trained(runs: list[tuple[HardSet, int, bool]]) -> Iterator[Finding]:
         for number, moment in enumerate(moments(hard, stumps)):
             at = f"{hard.name}, round {number}"
             outside.see(float(not _in_range(hard, moment)), at)
-            sums.see(_sum_error(moment), at)
+            # P = e/S: S, a sum of K numbers, rounds K - 1 times and the quotient once; the sum of P K - 1 times again.
+            off = np.abs(moment.shares.sum(axis=0) - 1.0).max()
+            sums.see(float(off / (2 * hard.n_classes * ROUNDING)), at)
             told.see(float(moment.loss != fallen[number]), at)
             if before is not None and must_fall:
-                rises.see(_rise(hard, before, moment), at)
+                rise = max(0.0, moment.loss - before.loss)
+                rises.see(rise / rise_rounding(hard.n_classes, before, moment), at)
             if number & (number - 1) == 0:
                 losses.see(_loss_error(hard, moment), at)
             before = moment
@@ -94,17 +96,6 @@ def _in_range(hard: HardSet, moment: Moment) -> bool:
         and np.array_equal(np.abs(responses), np.where(hard.member, 1.0 - shares, shares))
         and not weights[settled].any()
     )
-
-
-def _sum_error(moment: Moment) -> float:
-    """Return |sum of P - 1| of the worst row, in units of 2 K roundings."""
-    shares = moment.shares
-    # P = e/S: S, a sum of K numbers, rounds K - 1 times and the quotient once; the sum taken here K - 1 times again.
-    return float(np.abs(shares.sum(axis=0) - 1.0).max() / (2 * len(shares) * ROUNDING))
-
-
-def _rise(hard: HardSet, before: Moment, after: Moment) -> float:
-    return max(0.0, after.loss - before.loss) / rise_rounding(hard.n_classes, before, after)
 
 
 def _loss_error(hard: HardSet, moment: Moment) -> float:
@@ -142,13 +133,12 @@ def _stopped(sets: list[HardSet]) -> Iterator[Finding]:
             small = np.flatnonzero(changes < tolerance)
             due = int(small[0]) + 1 if small.size else 100
             holds = stumps.n_rounds == due and stumps.stopped_early == bool(small.size)
-            holds &= short == losses[: due + 1] and _same(stumps, long.first(due))
+            holds &= short == losses[: due + 1] and all(
+                getattr(stumps, part).tobytes() == getattr(long.first(due), part).tobytes()
+                for part in ("values", "columns")
+            )
             worst.see(float(not holds), f"{hard.name}, tolerance {tolerance:g}")
     yield worst.finding()
-
-
-def _same(one: Stumps, other: Stumps) -> bool:
-    return one.values.tobytes() == other.values.tobytes() and one.columns.tobytes() == other.columns.tobytes()
 
 
 def _rising(n: int) -> Iterator[tuple[HardSet, Stumps, tuple[float, ...]]]:
@@ -170,14 +160,9 @@ def _told(trainings: Iterator[tuple[HardSet, Stumps, tuple[float, ...]]]) -> Fin
     worst = Worst("the loss, where it may rise (2 classes, many declared)", "60 digits", 1.0, "x rounding")
     for hard, stumps, losses in trainings:
         scores = [np.zeros((len(hard.X), hard.n_classes)), *stumps.staged_scores(hard.X)]
-        for number in _around(losses):
+        rise = int(np.diff(losses).argmax())
+        for number in (rise, rise + 1):
             truth = mean_loss(scores[number].tolist(), hard.labels.tolist())
             error = distance(losses[number], truth)
             worst.see(error / loss_rounding(hard.n_classes, float(truth)), f"{hard.n_classes} classes, round {number}")
     return worst.finding()
-
-
-def _around(losses: tuple[float, ...]) -> list[int]:
-    """Return the rounds before and after the largest rise."""
-    rise = int(np.diff(losses).argmax())
-    return [rise, rise + 1]

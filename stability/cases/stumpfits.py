@@ -1,7 +1,7 @@
 """The best stump of a round, its thresholds and answers; and whole trainings, round by round."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -36,11 +36,11 @@ class Problem:
 def problems(rng: np.random.Generator, n: int, z_max: float) -> Iterator[Problem]:
     """Yield n problems of every kind, 5 to 80 rows of 2 to 6 columns each."""
     for _ in range(n):
-        for kind in (_ordinary, _decades, _settled, _clamped, _one_heavy, _light_branch, _subnormal):
+        for name, kind in KINDS.items():
             rows = int(rng.integers(5, 80))
             X = columns(rng, rows)[:, : int(rng.integers(2, 7))]
             weights, ratios = kind(rng, rows, z_max)
-            yield Problem(kind.__name__.strip("_").replace("_", " "), X, weights, weights * ratios)
+            yield Problem(name, X, weights, weights * ratios)
 
 
 def neighbours(rng: np.random.Generator, n: int) -> Iterator[list[float]]:
@@ -81,34 +81,28 @@ def _ratios(rng: np.random.Generator, n: int, z_max: float) -> Floats:
     return rng.choice([-1.0, 1.0], n) * rng.uniform(1.0, z_max, n)
 
 
-def _ordinary(rng: np.random.Generator, n: int, z_max: float) -> tuple[Floats, Floats]:
-    return rng.random(n), _ratios(rng, n, z_max)
-
-
-def _decades(rng: np.random.Generator, n: int, z_max: float) -> tuple[Floats, Floats]:
-    return np.power(10.0, rng.uniform(-300, 0, n)), _ratios(rng, n, z_max)
-
-
-def _settled(rng: np.random.Generator, n: int, z_max: float) -> tuple[Floats, Floats]:
-    return np.ldexp(1.0, -rng.integers(30, 53, n)), rng.choice([-1.0, 1.0], n)
-
-
-def _clamped(rng: np.random.Generator, n: int, z_max: float) -> tuple[Floats, Floats]:
-    return np.full(n, 1 / z_max), rng.choice([-z_max, z_max], n)
-
-
-def _one_heavy(rng: np.random.Generator, n: int, z_max: float) -> tuple[Floats, Floats]:
-    return np.where(np.arange(n) == n // 2, 1.0, rng.random(n) * 2.0**-52), _ratios(rng, n, z_max)
-
-
 def _light_branch(rng: np.random.Generator, n: int, z_max: float) -> tuple[Floats, Floats]:
     """Most rows of some 2^-38 of the weight, where a branch is next to being taken for empty, and of opposite sign."""
     light = np.arange(n) >= 3
     return np.where(light, 2.0**-38 * rng.uniform(0.25, 4, n) / n, 1.0), np.where(light, -z_max, 1.0)
 
 
-def _subnormal(rng: np.random.Generator, n: int, z_max: float) -> tuple[Floats, Floats]:
-    return np.ldexp(rng.integers(0, 1000, n).astype(np.float64), -1074), rng.choice([-1.0, 1.0, z_max], n)
+# Weights and responses over weights of n rows.
+KINDS: dict[str, Callable[[np.random.Generator, int, float], tuple[Floats, Floats]]] = {
+    "ordinary": lambda rng, n, z_max: (rng.random(n), _ratios(rng, n, z_max)),
+    "decades": lambda rng, n, z_max: (np.power(10.0, rng.uniform(-300, 0, n)), _ratios(rng, n, z_max)),
+    "settled": lambda rng, n, _: (np.ldexp(1.0, -rng.integers(30, 53, n)), rng.choice([-1.0, 1.0], n)),
+    "clamped": lambda rng, n, z_max: (np.full(n, 1 / z_max), rng.choice([-z_max, z_max], n)),
+    "one heavy": lambda rng, n, z_max: (
+        np.where(np.arange(n) == n // 2, 1.0, rng.random(n) * 2.0**-52),
+        _ratios(rng, n, z_max),
+    ),
+    "light branch": _light_branch,
+    "subnormal": lambda rng, n, z_max: (
+        np.ldexp(rng.integers(0, 1000, n).astype(np.float64), -1074),
+        rng.choice([-1.0, 1.0, z_max], n),
+    ),
+}
 
 
 REFERENCE = "60 digits"

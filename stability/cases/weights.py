@@ -34,13 +34,15 @@ def drift(rounds: int) -> Iterator[Finding]:
     for hard, shrinkage in ((noisy(33, 66, 0.5, seed=3), 1.0), (noisy(14, 42, 0.5, seed=4), 0.1)):
         stumps, _ = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds, shrinkage=shrinkage)
         rows = hard.X[:2]
+        ensemble = stumps.columns.tolist(), stumps.thresholds.tolist(), stumps.values.tolist(), stumps.shrinkage
         steps = _steps(stumps, rows)
         allowed, got = step_rounding(stumps, steps), stumps.scores(rows).T
         for row in range(len(rows)):
             at = f"{hard.name}, shrinkage {shrinkage:g}, row {row}, {rounds} rounds"
             own, ours = allowed[:, row], got[:, row].tolist()
             means.see(mean_score(got[:, row : row + 1]) / float(own.mean()), at)
-            scores.see(worst_share(ours, _true_scores(stumps, rows[row].tolist()), own.tolist()), at)
+            truth = ensembles.scores(*ensemble, rows[row].tolist())
+            scores.see(worst_share(ours, truth, own.tolist()), at)
             added.see(worst_share(ours, *true_sums(centred_steps(steps[:, :, row], shrinkage))), at)
     yield from (worst.finding() for worst in (means, scores, added))
 
@@ -76,13 +78,6 @@ def step_rounding(stumps: Stumps, answers: Floats) -> Floats:
     final = np.abs(centred(answers.sum(axis=0), stumps.shrinkage))
     bound: Floats = ROUNDING * (total + final)
     return bound
-
-
-@precisely()
-def _true_scores(stumps: Stumps, row: Sequence[float]) -> list[mpf]:
-    return ensembles.scores(
-        stumps.columns.tolist(), stumps.thresholds.tolist(), stumps.values.tolist(), stumps.shrinkage, row
-    )
 
 
 @precisely()

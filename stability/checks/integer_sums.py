@@ -1,11 +1,10 @@
 """Sums of int16 rows: how far they get, whether the largest tables add up right, and which of equal scores wins."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thenar.compiler.tables.furthest import furthest
 from thenar.runtime.build import Build
@@ -119,20 +118,16 @@ def _filled(tables: IntegerTables) -> IntegerTables:
 def _every_sum(tables: IntegerTables) -> int:
     """Return the furthest that any frame, whole or with inputs missing, gets from zero, in the order that is worst."""
     choices = [[tables.bias.tolist()]]
-    choices += [[[0] * tables.n_classes, row, mean] for row, mean in _listed(tables.switch_rows, tables.switch_means)]
-    choices += [
-        [*rows.tolist(), mean.tolist()] for rows, mean in zip(tables.joint_rows, tables.joint_means, strict=True)
-    ]
+    switches = zip(tables.switch_rows.tolist(), tables.switch_means.tolist(), strict=True)
+    choices += [[[0] * tables.n_classes, row, mean] for row, mean in switches]
+    joints = zip(tables.joint_rows, tables.joint_means.tolist(), strict=True)
+    choices += [[*rows.tolist(), mean] for rows, mean in joints]
     furthest_of_all = 0
     for terms in product(*choices):
         for column in zip(*terms, strict=True):
             onward = sum(value for value in column if value > 0)
             furthest_of_all = max(furthest_of_all, onward, onward - sum(column))
     return furthest_of_all
-
-
-def _listed(*arrays: NDArray[np.int16]) -> Iterator[tuple[list[int], ...]]:
-    return zip(*(array.tolist() for array in arrays), strict=True)
 
 
 def ties(full: bool) -> Finding:

@@ -51,7 +51,10 @@ def held(shape: Shape = BAR, mass_kg: float = 0.1, grip_n: float = 15.0, hand: H
 
 def hard(full: bool) -> Iterator[Grasp]:
     """Yield the hard grasps, those of many hands and objects in full only."""
-    for name, grasp in (*_touching(), *_of_sizes(), *_of_masses(), *_of_grips(), *_of_hands()):
+    masses, grips = (0.0, _SMALLEST, 1e-9, 5.0, 1e3, 1e12), (0.0, _SMALLEST, 1e-9, 1e3, 1e12)
+    of_masses = ((f"{mass:g} kg", held(mass_kg=mass)) for mass in masses)
+    of_grips = ((f"a grip of {grip:g} N", held(grip_n=grip)) for grip in grips)
+    for name, grasp in (*_touching(), *_of_sizes(), *of_masses, *of_grips, *_of_hands()):
         yield Grasp(name, grasp.load)
     yield from planned(1 if full else 14)
 
@@ -88,14 +91,6 @@ def _of_sizes() -> Iterator[tuple[str, Grasp]]:
         yield f"a ball of {size:g} mm", held(Sphere(size))
         yield f"a disk {size:g} mm thick", held(Cylinder(40.0, size, 0.0))
         yield f"a card {size:g} mm thick", held(Box(80.0, 50.0, size, 0.0))
-
-
-def _of_masses() -> Iterator[tuple[str, Grasp]]:
-    yield from ((f"{mass:g} kg", held(mass_kg=mass)) for mass in (0.0, _SMALLEST, 1e-9, 5.0, 1e3, 1e12))
-
-
-def _of_grips() -> Iterator[tuple[str, Grasp]]:
-    yield from ((f"a grip of {grip:g} N", held(grip_n=grip)) for grip in (0.0, _SMALLEST, 1e-9, 1e3, 1e12))
 
 
 def _of_hands() -> Iterator[tuple[str, Grasp]]:

@@ -164,7 +164,8 @@ def _nothing(name: str, model: ContactModel) -> Finding:
     )
     for what, one, other in pairs:
         first, second = model.solve([one, other])
-        wrong.see(float(not _same(first, second)), what)
+        same = all(np.array_equal(getattr(first, field), getattr(second, field)) for field in _FIELDS)
+        wrong.see(float(not same), what)
     return wrong.finding()
 
 
@@ -187,10 +188,6 @@ def _on_the_surface(name: str, make: Callable[..., ContactModel], full: bool) ->
             borne = fsum([*found.forces_n[0].tolist(), float(found.between_n[0]), *(-found.capsules_n[0]).tolist()])
             lost.see(abs(borne) / fsum(found.capsules_n[0].tolist()) * 2.0**53, switches.layout[switch].name)
     return lost.finding()
-
-
-def _same(one: Contact, other: Contact) -> bool:
-    return all(np.array_equal(getattr(one, field), getattr(other, field)) for field in _FIELDS)
 
 
 def _balanced(grasps: Sequence[Grasp]) -> Iterator[Finding]:

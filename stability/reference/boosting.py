@@ -78,7 +78,9 @@ def branch_values(
     """Return what left, right and missing answer: C/W within +-z_max; without weight, the mean of all rows."""
     branches = _branches(x, weights, responses, threshold)
     total = mpmath.fsum(weight for weight, _ in branches), mpmath.fsum(response for _, response in branches)
-    left, right, missing = (_mean(branch if branch[0] else total, mpf(z_max)) for branch in branches)
+    filled = [branch if branch[0] else total for branch in branches]
+    means = [response / weight if weight else mpf(0) for weight, response in filled]
+    left, right, missing = (min(max(mean, -mpf(z_max)), mpf(z_max)) for mean in means)
     return left, right, missing
 
 
@@ -103,8 +105,8 @@ def _splits(number: int, x: Numbers, weights: Numbers, responses: Numbers) -> It
     missing = _sums(rows.pop(math.inf, []), weights, responses)
     values = sorted(rows)
     sums = [_sums(rows[value], weights, responses) for value in values]
-    left = list(accumulate(sums, _plus))
-    right = list(accumulate(sums[::-1], _plus))[::-1]
+    left, right = (list(accumulate(of, lambda a, b: (a[0] + b[0], a[1] + b[1]))) for of in (sums, sums[::-1]))
+    right.reverse()
     for i in range(len(values) - 1):
         yield _explained([left[i], right[i + 1], missing]), number, values[i], values[i + 1]
 
@@ -120,17 +122,8 @@ def _sums(rows: Sequence[int], weights: Numbers, responses: Numbers) -> Sums:
     return mpmath.fsum(weights[row] for row in rows), mpmath.fsum(responses[row] for row in rows)
 
 
-def _plus(one: Sums, other: Sums) -> Sums:
-    return one[0] + other[0], one[1] + other[1]
-
-
 def _explained(branches: Sequence[Sums]) -> mpf:
     return mpmath.fsum(response**2 / weight for weight, response in branches if weight)
-
-
-def _mean(branch: Sums, z_max: mpf) -> mpf:
-    weight, response = branch
-    return min(max(response / weight, -z_max), z_max) if weight else mpf(0)
 
 
 Rows = Sequence[Sequence[float]]
@@ -178,22 +171,6 @@ def answer(x: float, threshold: float, branches: Sequence[float]) -> float:
     if math.isnan(x):
         return branches[2]
     return branches[0] if x <= threshold else branches[1]
-
-
-def boost(
-    X: Rows,
-    labels: Sequence[int],
-    n_classes: int,
-    rounds: int,
-    shrinkage: float = 1,
-    z_max: float = 3,
-    weights: Sequence[float] | None = None,
-) -> tuple[list[mpf], list[list[mpf]]]:
-    """Return (the loss before the first and after every round, F (n, K) after the last) of a whole training."""
-    training = boost_rounds(X, labels, n_classes, rounds, shrinkage, z_max, weights)
-    start = [[mpf(0)] * n_classes for _ in labels]
-    first = mean_loss(start, labels, weights)
-    return [first, *(each.loss for each in training)], training[-1].scores if training else start
 
 
 def boost_rounds(

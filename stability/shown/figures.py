@@ -19,10 +19,9 @@ from thenar.compiler.tables.quantise import quantise
 from thenar.compiler.tables.worstcase import Rounding
 from thenar.compiler.workers import in_workers
 from thenar.runtime.scores import Scorer
-from thenar.runtime.tables import IntegerTables
 
 from ..checks.integer_sums import first_best
-from ..checks.rounds import Moment, mean_score, moments
+from ..checks.rounds import mean_score, moments
 from ..inputs.hard_data import Floats, HardSet, noisy, separable
 from ..inputs.small_sets import small_set
 from ..report import besides
@@ -204,12 +203,11 @@ class Ranges(msgspec.Struct, frozen=True):
 def ranges_of(hard: HardSet, rounds: int) -> Ranges:
     """Train on `hard` and return the ranges."""
     stumps, _ = boost(hard.X, hard.labels, hard.n_classes, rounds=rounds, weights=hard.weights)
-    numbers = [_numbers(moment) for moment in moments(hard, stumps)][1:]
-    return Ranges(hard.name, *(list(series) for series in zip(*numbers, strict=True)))
-
-
-def _numbers(moment: Moment) -> tuple[float, ...]:
-    return (*_ends(moment.shares), *_ends(moment.weights), moment.loss, mean_score(moment.scores))
+    numbers = [
+        (*_ends(moment.shares), *_ends(moment.weights), moment.loss, mean_score(moment.scores))
+        for moment in moments(hard, stumps)
+    ]
+    return Ranges(hard.name, *(list(series) for series in zip(*numbers[1:], strict=True)))
 
 
 def _ends(numbers: Floats) -> tuple[float, float]:
@@ -254,7 +252,8 @@ def widths(full: bool) -> list[Width]:
     for bits in WIDTHS:
         integers = quantise(tables, trained.switches, trained.codes, bits)
         worst = Rounding(tables, integers).worst_of_all().loss
-        answers = _answers(integers, unseen)
+        scorer, frames = Scorer(integers), zip(unseen.switches, unseen.codes, strict=True)
+        answers = np.array([first_best(scorer.lanes(*frame)) for frame in frames])
         found.append(
             Width(
                 bits=bits,
@@ -273,12 +272,6 @@ def widths(full: bool) -> list[Width]:
 
 def _inputs(grasps: GraspSet) -> NDArray[np.uint16]:
     return np.hstack([grasps.switches, grasps.codes])
-
-
-def _answers(integers: IntegerTables, grasps: GraspSet) -> NDArray[np.intp]:
-    scorer = Scorer(integers)
-    frames = zip(grasps.switches, grasps.codes, strict=True)
-    return np.array([first_best(scorer.lanes(bits, codes)) for bits, codes in frames])
 
 
 Progress = Callable[[int, int], None]

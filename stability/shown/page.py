@@ -23,15 +23,8 @@ class Picture:
 def page(report: Report, pictures: tuple[Picture, ...]) -> str:
     """Return the page. The same report and pictures give the same text."""
     environment = Environment(autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
-    environment.filters |= {
-        "summary": summary,
-        "besides": besides,
-        "failures": failures,
-        "legend": legend,
-        "error": error_of,
-        "bound": bound_of,
-        "verdict": verdict,
-    }
+    filters = (summary, besides, failures, legend, error_of, bound_of, verdict)
+    environment.filters |= {each.__name__: each for each in filters}
     template = environment.from_string(files(__package__).joinpath("page.html.j2").read_text("utf-8"))
     inline = [(picture, _inline(picture)) for picture in pictures]
     return template.render(report=report, pictures=inline)

@@ -94,7 +94,7 @@ def test_options_that_do_not_go_together_are_refused(thenar: Thenar, set_file: P
         (("--chip", "mcp23017"), "says how to --propose a harness"),
         (
             ("--propose", tmp_path / "new.toml", "--chip", "mcp23018"),
-            "there is no chip 'mcp23018' (did you mean 'mcp23017'",
+            "there is no chip 'mcp23018'",
         ),
         (("--glove", tmp_path / "nowhere.toml"), "does not exist"),
     ]

@@ -139,7 +139,7 @@ def test_a_grasp_type_too_rare_for_the_folds_is_a_warning_on_stderr(
         (["-o", "no/such/result.json"], "There is no folder 'no/such'"),
         (["--plot", __file__], "is a file"),
         (["--prune-list", "0,x"], "'0,x' is not a list of whole numbers such as 0,13,62"),
-        (["--tables", "composition"], "'composition' is none of compositions, generality, pruning, baselines"),
+        (["--tables", "composition"], "there is no table 'composition' (did you mean 'compositions'"),
     ],
 )
 def test_a_users_mistake_ends_with_2_and_a_sentence(

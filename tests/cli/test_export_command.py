@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,12 +27,11 @@ def grasps(tmp_path: Path) -> Path:
     return tmp_path / "set.grasps"
 
 
-@pytest.mark.parametrize("suffix", ["csv", "csv.gz", "arff"])
+@pytest.mark.parametrize("suffix", ["csv", "csv.gz", "tsv", "tsv.gz", "arff", "parquet"])
 @pytest.mark.parametrize("flags", [[], ["--codes"]])
 def test_an_exported_table_imports_again(grasps: Path, suffix: str, flags: list[str]) -> None:
     table, columns, again = (str(grasps.with_name(name)) for name in (f"t.{suffix}", "columns.toml", "again.grasps"))
-    meta = ["--meta"] if suffix == "arff" else []
-    assert run(["export", str(grasps), "-o", table, "--columns", columns, *flags, *meta]) == 0
+    assert run(["export", str(grasps), "-o", table, "--columns", columns, *flags]) == 0
     assert run(["import", table, "-o", again, "--columns", columns]) == 0
     assert GraspSet.load(again).fingerprint() == GraspSet.load(grasps).fingerprint()
 
@@ -50,16 +50,21 @@ def test_values_are_written_unless_codes_are_asked_for(grasps: Path) -> None:
     assert table.read_text().splitlines()[1] == "mug,A,x,1,0,1,3"
 
 
-def test_an_arff_without_meta_imports_with_its_columns_file(grasps: Path) -> None:
-    table, columns, again = (str(grasps.with_name(name)) for name in ("t.arff", "columns.toml", "again.grasps"))
+def test_simulated_grasps_stay_simulated_on_the_way_through_a_table(grasps: Path) -> None:
+    table, columns, again = (str(grasps.with_name(name)) for name in ("t.csv", "columns.toml", "again.grasps"))
+    replace(GraspSet.load(grasps), simulated='scene "x", seed 1').save(grasps)
     assert run(["export", str(grasps), "-o", table, "--columns", columns]) == 0
     assert run(["import", table, "-o", again, "--columns", columns]) == 0
-    assert GraspSet.load(again).subjects.tolist() == ["1", "1"]
+    assert GraspSet.load(again).simulated == 'scene "x", seed 1'
+    assert Path(again).read_bytes() == grasps.read_bytes()
 
 
 def test_a_table_of_another_kind_is_refused(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["export", str(grasps), "-o", str(grasps.with_name("t.xlsx"))]) == 2
-    assert "t.xlsx: a file to write here ends in .csv, .csv.gz or .arff." in capsys.readouterr().err
+    assert (
+        "t.xlsx: a file to write here ends in .csv, .csv.gz, .tsv, .tsv.gz, .arff or .parquet."
+        in capsys.readouterr().err
+    )
 
 
 def test_a_damaged_set_is_refused_with_the_reason(grasps: Path, capsys: pytest.CaptureFixture[str]) -> None:

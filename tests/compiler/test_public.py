@@ -3,6 +3,7 @@
 import doctest
 import inspect
 from collections.abc import Callable
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 import thenar.compiler
+import thenar.runtime
 from thenar.compiler import (
     Build,
     CompileError,
@@ -35,6 +37,10 @@ def test_every_name_is_listed_once_and_loads() -> None:
     assert all(getattr(thenar.compiler, name) is not None for name in thenar.compiler.__all__)
     with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
         _ = thenar.compiler.nothing
+
+
+def test_rooms_say_which_thenar_they_are_of() -> None:
+    assert thenar.compiler.__version__ == thenar.runtime.__version__ == version("thenar")
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -86,7 +86,7 @@ def test_every_set_of_keys_comes_through_whole_and_in_order(
             reading = until(scanner, lambda reading, closed=closed: reading.closed == closed)  # type: ignore[misc]
             assert reading.known == EVERY
             # An event has a time of its own. A bitmap has none: it counts as late as the last message that has one.
-            assert began <= reading.time_us + (scanner.late_us if state_us else 0)
+            assert began <= reading.time_us + (scanner.times.late_us if state_us else 0)
             assert reading.time_us <= now_us()
         assert scanner.counts.gaps == 0
 
@@ -451,7 +451,7 @@ def test_a_flood_of_zeros_or_of_noise_ends_no_later_than_asked(tmp_path: Path) -
 
 def age_us(scanner: Scanner, reading: ScannerReading) -> int:
     """How old the reading is at most, as far as the driver knows."""
-    return now_us() - reading.time_us + scanner.trip_us
+    return now_us() - reading.time_us + scanner.times.clock.trip_us
 
 
 @pytest.mark.parametrize("settings", [{"heartbeat_us": 10_000}, {"heartbeat_us": 10_000, "state_us": 5000}])
@@ -490,7 +490,7 @@ def test_a_delay_that_begins_while_the_board_is_read_shows_for_as_long_as_it_las
 def test_the_trip_of_a_good_line_is_that_of_a_ping(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:
     start(1, 40, heartbeat_us=10_000)
     with driver(line) as scanner:
-        found = [until(scanner, lambda _: True) and scanner.trip_us for _ in range(100)]
+        found = [until(scanner, lambda _: True) and scanner.times.clock.trip_us for _ in range(100)]
         # PING and HELLO, less the HEARTBEAT, whose way is the shortest there is.
         on_the_wire_us = (8 + 41 - 15) * 10 * 1_000_000 // BAUD
         assert on_the_wire_us <= min(found) < 20_000

@@ -29,7 +29,6 @@ from thenar.drivers.scanner_protocol import (
     State,
     frame,
     from_board,
-    to_bitmap,
 )
 
 SharedLibrary = Callable[..., ctypes.CDLL]
@@ -102,8 +101,8 @@ class Board:
 
     def scan(self, closed: int, clock_us: int, *, unread: int = 0, whole: bool = True) -> bytes:
         keys = self.config.keys
-        known = to_bitmap(((1 << keys) - 1) & ~unread, keys)
-        self.library.thenar_board_scanned(to_bitmap(closed, keys), known, whole, clock_us % WRAP)
+        known = State(((1 << keys) - 1) & ~unread, keys).payload()
+        self.library.thenar_board_scanned(State(closed, keys).payload(), known, whole, clock_us % WRAP)
         return self.sent()
 
     def grasp(self, grasp: int, margin: int, flags: int, clock_us: int) -> bytes:

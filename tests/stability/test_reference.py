@@ -16,7 +16,6 @@ from scipy import special, stats
 
 from thenar.stability.reference.boosting import (
     best_splits,
-    boost,
     boost_rounds,
     branch_values,
     exp,
@@ -289,7 +288,8 @@ def test_a_step_is_centred(answers: list[float], shrinkage: float) -> None:
 
 def test_two_separable_classes_follow_their_recursion() -> None:
     # Uncapped, a member's z is 1/P and the other class's mirror image: F grows by (1 + e^-2F)/2 a round.
-    losses, F = boost([[0.0], [1.0], [1.0]], [0, 1, 1], 2, 12)
+    training = boost_rounds([[0.0], [1.0], [1.0]], [0, 1, 1], 2, 12)
+    losses, F = [mean_loss([[0, 0]] * 3, [0, 1, 1]), *(each.loss for each in training)], training[-1].scores
     with precisely():
         f, truth = mpf(0), [mpmath.log(2)]
         for _ in range(12):
@@ -330,7 +330,7 @@ def test_ten_rounds_are_wekas(weka_data: Path, name: str) -> None:
         # Of a nominal column of more than two values Weka tries the splits "is it v?", one after the other.
         values = range(n_values) if n_values > 2 else ()
         columns += [np.where(np.isnan(column), np.nan, column != value) for value in values] or [column]
-    _, F = boost(np.column_stack(columns).tolist(), arrays["y"][rows].tolist(), n_classes, 10)
+    F = boost_rounds(np.column_stack(columns).tolist(), arrays["y"][rows].tolist(), n_classes, 10)[-1].scores
     got = np.array([[float(p) for p in softmax(row)] for row in F])
     assert np.abs(got - arrays["default/I10/half/P_train"]).max() < 1e-9
 

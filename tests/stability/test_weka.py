@@ -19,11 +19,11 @@ from thenar.stability.weka import (
     ROWS_A_CLASS,
     Beside,
     NotRun,
-    Weka,
     WekaError,
     beside_weka,
     read_stumps,
     separable_set,
+    weka_stumps,
 )
 
 PRINTED = """\
@@ -81,7 +81,7 @@ def test_without_weka_it_is_not_run_and_says_so(monkeypatch: pytest.MonkeyPatch,
 def test_a_jvm_that_refuses_is_quoted(weka: Callable[..., str]) -> None:
     X, labels = separable_set()
     with pytest.raises(WekaError, match="java ended with code 1: Unrecognized VM option 'UseNothingOfTheKind'"):
-        Weka.installed().boost(X, labels, CLASSES, 1, ("-XX:-UseNothingOfTheKind",))
+        weka_stumps(X, labels, CLASSES, 1, ("-XX:-UseNothingOfTheKind",))
 
 
 def test_the_stumps_read_give_wekas_own_probabilities(weka: Callable[..., str], tmp_path: Path) -> None:
@@ -94,7 +94,7 @@ def test_the_stumps_read_give_wekas_own_probabilities(weka: Callable[..., str], 
     )
     lines = [line.split() for line in printed.splitlines() if re.match(r" +\d+ +\d+:", line)]
     theirs = np.array([[float(share.lstrip("*")) for share in line[-1].split(",")] for line in lines])
-    stumps = Weka.installed().boost(X, labels, CLASSES, 10, EXP_OF_THE_PROCESSOR)
+    stumps = weka_stumps(X, labels, CLASSES, 10, EXP_OF_THE_PROCESSOR)
     ours = softmax(np.ascontiguousarray(stumps.scores(X).T)).T
     assert theirs.shape == (2 * half, CLASSES)
     assert np.abs(ours - theirs).max() <= 0.0005 + 1e-9  # Weka prints three digits
@@ -129,5 +129,5 @@ def test_thenar_trained_in_any_order_of_rows_answers_the_same_to_the_last_bit(co
 def test_weka_leaves_nothing_behind(weka: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     X, labels = separable_set()
-    Weka.installed().boost(X, labels, CLASSES, 1, EXP_IN_JAVA)
+    weka_stumps(X, labels, CLASSES, 1, EXP_IN_JAVA)
     assert list(tmp_path.iterdir()) == []

@@ -36,7 +36,7 @@ def test_every_byte_is_answered_as_the_runtime_answers_it(
     bits = np.random.default_rng(2).random((255, 9)) < 0.5
     for byte, closed in zip(range(1, 256), bits, strict=True):
         record = bytes([byte, 256 - byte, (byte * 7) % 255 + 1])
-        assert raw.lanes(closed, list(record)) == build.lanes(closed, codes.codes(record))
+        assert raw.scorer.lanes(closed, list(record)) == build.scorer.lanes(closed, codes.codes(record))
     assert [(joint.code_a, joint.code_b) for joint in raw.manifest.joints] == [(1, 255)] * 3
 
 

@@ -41,10 +41,12 @@ def _grasp_sets(draw: st.DrawFn) -> GraspSet:
     columns = draw(st.lists(NAMES, min_size=1, max_size=20, unique=True))
     split = draw(st.integers(0, len(columns)))
     joints = tuple(draw(_joints(name)) for name in columns[split:])
-    types = st.lists(NAMES, min_size=1, max_size=5, unique=True).map(own)
+    types = st.lists(NAMES, min_size=1, max_size=5, unique=True).flatmap(
+        lambda names: st.sampled_from([own(names), Taxonomy("the lab's", tuple(names))])
+    )
     taxonomy: Taxonomy = draw(st.one_of(st.sampled_from([KAMAKURA_14, CUTKOSKY_16, FEIX_33]), types))
     random = np.random.default_rng(draw(st.integers(0, 2**32)))
-    people, things = (draw(st.lists(NAMES, min_size=1, max_size=3)) for _ in range(2))
+    people, things, visits = (draw(st.lists(NAMES, min_size=1, max_size=3)) for _ in range(3))
     return GraspSet(
         switches=random.random((rows, split)) < 0.5,
         switch_names=tuple(columns[:split]),
@@ -55,6 +57,9 @@ def _grasp_sets(draw: st.DrawFn) -> GraspSet:
         subjects=random.choice(people, rows),
         objects=random.choice(things, rows),
         trials=random.integers(-(2**53), 2**53, rows),
+        simulated=draw(st.one_of(st.just(""), NAMES)),
+        sessions=random.choice(draw(st.sampled_from([visits, ["1"]])), rows),
+        independent=draw(st.booleans()),
     )
 
 

@@ -37,7 +37,7 @@ def test_its_globs_pick_the_sets_columns_in_the_sets_order(
 def test_heads_are_never_names_of_inputs(data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet]) -> None:
     grasp_set = data.draw(grasp_sets)
     heads = heads_of(grasp_set)
-    assert len({*heads, *grasp_set.switch_names, *grasp_set.joint_names}) == 4 + len(grasp_set.switch_names) + len(
+    assert len({*heads, *grasp_set.switch_names, *grasp_set.joint_names}) == 5 + len(grasp_set.switch_names) + len(
         grasp_set.joints
     )
 

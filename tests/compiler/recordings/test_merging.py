@@ -122,7 +122,7 @@ INDEX, WRIST = Joint("index", "deg", 0, -10.0, 100, 40.0), Joint("wrist", "deg",
         ({"joints": (replace(INDEX, unit="rad"), WRIST)}, "code 0 is -10 rad"),
         (
             {"joints": (replace(INDEX, value_a=-32790.0, value_b=-32740.0), WRIST)},
-            "a.grasps: joint index gets codes ab",
+            "a.grasps: index gets codes above 65535",
         ),
         ({"taxonomy": own(["PoS", "PoH", "Tip"])}, "taxonomy kamakura14, b.grasps of own: import both with one"),
         ({"taxonomy": FEIX_33, "grasps": np.full(6, "Tripod")}, "taxonomy kamakura14, b.grasps of feix33"),
@@ -181,6 +181,12 @@ def test_what_was_simulated_stays_simulated(small: GraspSet, origins: list[str],
         for number, origin in enumerate(origins)
     }
     assert merge(sets).simulated == whole
+
+
+def test_a_set_is_parted_by_three_things_only(small: GraspSet) -> None:
+    for part in (lambda: split(small, "trial"), lambda: merge({"a": small}, "trial")):  # type: ignore[arg-type]
+        with pytest.raises(RecordingError, match="'trial' is none of subject, object, session"):
+            part()
 
 
 def test_no_set_is_no_merge() -> None:

@@ -97,7 +97,7 @@ def _content(grasp_set: GraspSet, folder: Path, hand: HandShape | None) -> Repor
 @pytest.fixture(scope="session")
 def bare(tmp_path_factory: pytest.TempPathFactory, hand: HandShape) -> ReportContent:
     """Return a build of the glove that thenar draws, without a frontier."""
-    grasp_set = _make_set(hand.names, TYPES, ("thumb", "index"))
+    grasp_set = _make_set(hand.names, TYPES, ("thumb_mpj", "index_mpj"))
     return _content(grasp_set, tmp_path_factory.mktemp("bare") / "build", hand)
 
 

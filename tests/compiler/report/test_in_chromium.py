@@ -203,12 +203,26 @@ def test_colours_follow_the_readers_system_in_page_hand_and_charts(opened: Reade
     opened.wait(lambda: opened.script(look) == light)
 
 
-def test_a_narrow_screen_need_not_be_scrolled_sideways(opened: Reader) -> None:
+# Tables that go beyond the page or cannot be seen, and letters of drawings smaller than 8 pixels.
+_BROAD = """return [...document.querySelectorAll('table')].filter((table) => {
+        const box = table.getBoundingClientRect();
+        return box.right > document.documentElement.clientWidth + 0.5 || box.width === 0; })
+    .map((table) => table.caption.textContent)"""
+_SMALL = """return [...document.querySelectorAll('svg text')].filter((text) => text.textContent.trim())
+    .filter((text) => { const at = text.getScreenCTM();
+        return parseFloat(getComputedStyle(text).fontSize) * Math.hypot(at.a, at.b) < 8; })
+    .map((text) => text.textContent)"""
+
+
+def test_a_narrow_screen_shows_all_tables_and_letters_that_can_be_read(opened: Reader) -> None:
     metrics = {"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": True}
     opened.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
     try:
         opened.wait(lambda: opened.script("return document.documentElement.clientWidth") == 400)
+        opened.script("for (const each of document.querySelectorAll('details')) each.open = true")
         assert opened.script("return document.documentElement.scrollWidth") == 400
+        assert opened.script(_BROAD) == []
+        assert opened.script(_SMALL) == []
     finally:
         opened.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 

@@ -6,7 +6,6 @@ The first line holds device, chips and how often they are checked; every further
 
 import json
 import sys
-from dataclasses import asdict
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
@@ -51,7 +50,9 @@ class Client:
 
     def state(self) -> dict[str, Any]:
         return {
-            "chips": [asdict(chip) for chip in self._bus.chips],
+            "chips": [
+                {name: getattr(chip, name) for name in ("present", "errors", "last_error")} for chip in self._bus.chips
+            ],
             "way": self._bus.way,
             "trouble": self._bus.trouble,
             "transfers": self._bus.transfers,

@@ -120,7 +120,7 @@ def test_without_diodes_all_rows_are_recognised_and_keys_that_may_be_ghosts_are_
     found = scene.grasps.wait(lambda g: read_us(g) >= since_us + SETTLE_US and g.lost, since_us)
     assert set(found.lost) == set(corners)
     nothing = np.zeros(len(truth.switch_names), bool), np.zeros(0, np.uint16)
-    lanes = truth.build.lanes_without(*nothing, np.isin(truth.switch_names, corners), np.zeros(0, bool))
+    lanes = truth.build.scorer.lanes_without(*nothing, np.isin(truth.switch_names, corners), np.zeros(0, bool))
     assert found.candidate == truth.build.grasps[lanes.index(max(lanes))]
     assert "short" not in running.board.said
 

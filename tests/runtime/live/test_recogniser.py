@@ -292,7 +292,7 @@ def definition_winner(build: Build, arrivals: list[Arrival]) -> str:
     switches, glove = newest([arrival[1] for arrival in arrivals]), newest([arrival[2] for arrival in arrivals])
     codes = [glove.sensors[SENSORS.index(f"j{number}")] for number in range(JOINTS)]
     present = np.zeros(JOINTS, bool)
-    lanes = build.lanes_without(flags(switches.closed), np.array(codes), flags(switches.lost), present)
+    lanes = build.scorer.lanes_without(flags(switches.closed), np.array(codes), flags(switches.lost), present)
     return build.grasps[int(np.argmax(lanes))]
 
 

@@ -70,7 +70,7 @@ def test_a_name_that_a_terminal_would_obey_is_refused(own: Path, good: str) -> N
 def test_the_barrett_hand_spreads_as_graspit_does_and_opens_its_fingers(grasps: tuple[str, ...], spread: int) -> None:
     table = load_preshapes("barrett_bh8")
     for grasp in grasps:
-        preshape = table.find(grasp)
+        preshape = table.chosen.get(grasp)
         assert preshape is not None
         stands = dict(zip(preshape.joint_names, preshape.positions, strict=True))
         assert (
@@ -82,7 +82,7 @@ def test_the_barrett_hand_spreads_as_graspit_does_and_opens_its_fingers(grasps: 
 
 
 def test_the_barrett_hand_has_eight_joints_in_the_urdfs_words() -> None:
-    preshape = load_preshapes("barrett_bh8").find("PoS")
+    preshape = load_preshapes("barrett_bh8").chosen.get("PoS")
     assert preshape is not None
     assert preshape.joint_names == (
         *(f"finger_1/{part}_joint" for part in ("prox", "med", "dist")),
@@ -108,7 +108,7 @@ def test_a_shipped_table_names_no_grasp_type_that_no_taxonomy_has(name: str) -> 
 
 def test_where_the_literature_gives_nothing_the_table_says_so() -> None:
     table = load_preshapes("barrett_bh8")
-    assert table.find("Light tool") is None
+    assert table.chosen.get("Light tool") is None
     assert table.check(CUTKOSKY_16.types) == (
         "preshapes Barrett BH8: none for Light tool: nothing is sent to the hand on those"
     )
@@ -121,7 +121,7 @@ def test_a_table_for_another_taxonomy_is_refused() -> None:
 
 def test_the_parallel_gripper_opens_wider_for_a_cylinder_than_for_a_needle() -> None:
     table = load_preshapes("parallel_gripper")
-    wide, narrow = table.find("PoS"), table.find("Tip")
+    wide, narrow = table.chosen.get("PoS"), table.chosen.get("Tip")
     assert wide is not None
     assert narrow is not None
     assert wide.positions[0] < narrow.positions[0] <= 0.8
@@ -129,14 +129,14 @@ def test_the_parallel_gripper_opens_wider_for_a_cylinder_than_for_a_needle() -> 
 
 def test_ones_own_table_is_in_rad_and_metres_afterwards(own: Path) -> None:
     table = load_preshapes(own)
-    preshape = table.find("CMF")
+    preshape = table.chosen.get("CMF")
     assert preshape is not None
     assert preshape.name == "open"
     assert preshape.joint_names == ("turns", "slides")
     assert preshape.positions == pytest.approx((math.pi / 4, 0.04))
     assert preshape.time_from_start_s == 0.25
-    assert table.find("PoS") is preshape
-    assert table.find("Lat") is None
+    assert table.chosen.get("PoS") is preshape
+    assert table.chosen.get("Lat") is None
 
 
 @pytest.mark.parametrize(

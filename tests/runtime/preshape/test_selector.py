@@ -29,7 +29,7 @@ def answers(frames: Sequence[LiveGrasp], settle_ms: float = SETTLE_MS) -> list[P
 
 
 def called(one: LiveGrasp) -> Preshape | None:
-    return TABLE.find(one.grasp) if one.probability >= 0.8 and one.health != "unknown" else None
+    return TABLE.chosen.get(one.grasp) if one.probability >= 0.8 and one.health != "unknown" else None
 
 
 def held_after(frames: Sequence[LiveGrasp]) -> Preshape | None:
@@ -66,7 +66,7 @@ lives = st.lists(
 def test_what_is_held_is_the_newest_preshape_that_was_called_for_without_a_break(frames: list[LiveGrasp]) -> None:
     for number, answer in enumerate(answers(frames)):
         one = frames[number]
-        told = one.health != "unknown" and TABLE.find(one.grasp) is not None
+        told = one.health != "unknown" and TABLE.chosen.get(one.grasp) is not None
         assert answer is (held_after(frames[: number + 1]) if told else None)
 
 

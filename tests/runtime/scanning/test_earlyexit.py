@@ -184,7 +184,7 @@ def test_on_every_recorded_frame_the_early_answer_is_the_full_scans(recorded: Fr
         left_out += len(ports) - 1 - last
         for lost_ports in patterns(range(last + 1, len(ports))):
             lost = np.isin(np.arange(count), [switch for port in lost_ports for switch in ports[port]])
-            lanes = build.lanes_without(frame_bits, frame_codes, lost, present)
+            lanes = build.scorer.lanes_without(frame_bits, frame_codes, lost, present)
             assert build.grasps[winner(lanes)] == full
     share = left_out / (len(bits) * len(ports))
     print(f"early exit, {width} switches a port: {share:.1%} of {len(ports)} ports left out, {len(bits)} frames")

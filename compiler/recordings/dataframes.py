@@ -1,0 +1,71 @@
+"""A pandas DataFrame into a `GraspSet`; the way back is in export.py."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thenar.runtime.names import shortened
+from thenar.runtime.toml_source import TomlText
+from thenar.runtime.toml_struct import convert
+
+from .columns import Columns, read_columns
+from .errors import ColumnsError, TableError, check_names
+from .export import COLUMNS_TOML
+from .graspset import GraspSet
+from .importer import import_table
+from .propose import propose
+from .table import Column, Table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_WHAT = "the DataFrame"
+
+
+def from_dataframe(frame: "pd.DataFrame", columns: Columns | str | Path | None = None) -> GraspSet:
+    """Return the set in a DataFrame, as `GraspSet.from_dataframe` describes it."""
+    table = table_of(frame)
+    if columns is None:
+        columns = _said(frame) or _proposed(table)
+    return import_table(table, columns if isinstance(columns, Columns) else read_columns(Path(columns)))[0]
+
+
+def _said(frame: "pd.DataFrame") -> Columns | None:
+    """Return what a frame says of its columns itself."""
+    text = frame.attrs.get(COLUMNS_TOML)
+    if not isinstance(text, str):
+        return None
+    source = TomlText(f"attrs[{COLUMNS_TOML!r}] of {_WHAT}", text, ColumnsError)
+    return convert(source, (), source.tables(), Columns)
+
+
+def _proposed(table: Table) -> Columns:
+    proposal = propose(table)
+    if proposal.lacks:
+        raise ColumnsError(f"{_WHAT}: {proposal.lacks}; say so in `columns`: a Columns, or the path of a columns.toml")
+    return proposal.columns
+
+
+def table_of(frame: "pd.DataFrame") -> Table:
+    """Return the table in a DataFrame, whose rows count from 0, as `iloc` counts them. Its index is left out.
+
+    Raises TableError where it has no rows, or columns of one name.
+    """
+    if not len(frame):
+        raise TableError(f"{_WHAT} has no rows")
+    names = [str(name).strip() for name in frame.columns]
+    check_names(f"{_WHAT}: column", names)
+    columns = {name: _column(frame.iloc[:, number], name) for number, name in enumerate(names)}
+    return Table(_WHAT, columns, np.arange(len(frame)), size=int(frame.memory_usage(deep=True).sum()))
+
+
+def _column(series: "pd.Series", name: str) -> Column:
+    """Return numbers and bits as float64, NaN where one is missing, and all else as text, empty where it is missing."""
+    from pandas.api.types import is_complex_dtype, is_numeric_dtype
+
+    if is_complex_dtype(series):
+        raise TableError(f"{_WHAT}: column {shortened(repr(name))} holds complex numbers: split or drop it")
+    if is_numeric_dtype(series):
+        return series.to_numpy(np.float64, na_value=np.nan)  # type: ignore[no-any-return]
+    return ["" if gone else str(value) for value, gone in zip(series, series.isna(), strict=True)]

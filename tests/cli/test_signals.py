@@ -1,0 +1,138 @@
+"""Ctrl-C, SIGTERM and SIGHUP, sent to real processes in the middle of their work: all of it ends, and nothing is left."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from time import monotonic
+
+import pytest
+
+from thenar.cli import run
+
+# Touches the file "ready" when the work of a command has made its first step, or has handed out its first piece.
+PROGRAM = """
+import pathlib, sys
+import thenar.cli.common as common
+from contextlib import contextmanager
+ready = pathlib.Path("ready")
+@contextmanager
+def telling(what):
+    yield lambda done, total: ready.touch()
+common.progress = telling
+import thenar.compiler.workers as workers
+held = workers._interrupts_held
+@contextmanager
+def handing_out():
+    with held(): yield
+    ready.touch()
+workers._interrupts_held = handing_out
+from thenar.cli import main
+main()
+"""
+COMMANDS = {
+    "simulate": "simulate crowd -o new.grasps --jobs 2",
+    "plan": "plan quick --anew -o new.json --jobs 2",
+    "place": "place crowd.grasps --crowd --keep 4 --method elimination --jobs 2",
+    "evaluate": "evaluate set.grasps --repeats 50 -o new.json --jobs 2",
+    "compile": "compile set.grasps -o new --rounds 100000 --folds 10",
+    "verify": "verify build set.grasps --firmware host",
+    "frontier": "frontier set.grasps -o new --jobs 2",
+}
+
+
+@pytest.fixture(scope="module")
+def material(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("material")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        assert run("simulate quick -o set.grasps --repetitions 3 --jobs 1".split()) == 0
+        assert run("simulate crowd -o crowd.grasps --repetitions 1 --jobs 2".split()) == 0
+        assert run("compile set.grasps -o build --rounds 3 --folds 0 --no-report".split()) == 0
+    return folder
+
+
+@pytest.fixture
+def folder(tmp_path: Path, material: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "work").mkdir()
+    (tmp_path / "temporary").mkdir()
+    for path in material.iterdir():
+        (tmp_path / "work" / path.name).symlink_to(path)
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "temporary"))
+    monkeypatch.setenv("JOBLIB_TEMP_FOLDER", str(tmp_path / "temporary"))
+    monkeypatch.chdir(tmp_path / "work")
+    return tmp_path
+
+
+def _of_group(group: int) -> Iterator[str]:
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            fields = (process / "stat").read_text(errors="replace").rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(fields[2]) == group and fields[0] != "Z":
+            yield process.name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("line", COMMANDS.values(), ids=COMMANDS)
+@pytest.mark.parametrize(
+    ("number", "to_all", "said", "code"),
+    [
+        (signal.SIGINT, True, "thenar: interrupted", 130),
+        (signal.SIGTERM, False, "thenar: terminated", 143),
+        (signal.SIGTERM, True, "thenar: terminated", 143),
+    ],
+    ids=["ctrl-c", "sigterm", "sigterm to all"],
+)
+def test_a_signal_ends_all_of_it_and_leaves_nothing(
+    line: str, number: signal.Signals, to_all: bool, said: str, code: int, folder: Path
+) -> None:
+    before = {path.name for path in Path().iterdir()}
+    process = subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, *line.split()],
+        start_new_session=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        late = monotonic() + 60
+        while not Path("ready").exists():
+            assert process.poll() is None, process.communicate()
+            assert monotonic() < late
+            os.sched_yield()
+        (os.killpg if to_all else os.kill)(process.pid, number)
+        printed, complaints = process.communicate(timeout=60)
+        left = list(_of_group(process.pid))
+    finally:
+        for one in list(_of_group(process.pid)):
+            os.kill(int(one), signal.SIGKILL)
+    assert (process.returncode, printed, complaints.strip()) == (code, "", said)
+    # Its store, from which the same command goes on, is all that a frontier leaves.
+    kept = {"ready", "new"} if line.startswith("frontier") else {"ready"}
+    assert {path.name for path in Path().iterdir()} - before <= kept
+    assert left == []
+    assert list((folder / "temporary").iterdir()) == []
+    assert [name for name in os.listdir("/dev/shm") if f"-{process.pid}-" in name or f"_{process.pid}_" in name] == []
+
+
+def test_a_hangup_that_nohup_ignores_stays_ignored() -> None:
+    program = (
+        "import os, signal, sys\n"
+        "signal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
+        "from thenar.cli import run\n"
+        "import thenar.cli.group as group\n"
+        "group.run_group = lambda arguments: os.kill(os.getpid(), signal.SIGHUP) or 0\n"
+        "sys.exit(run([]))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_handlers_are_put_back() -> None:
+    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)]
+    assert run(["--version"]) == 0
+    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)] == before

@@ -1,0 +1,142 @@
+"""Sets to and from DataFrames. What a user may have done to a frame is done by pandas itself."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import hypothesis.strategies as st
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+
+from thenar.compiler import Columns, GraspSet
+from thenar.compiler.recordings.columns import JointColumns
+from thenar.compiler.recordings.errors import ColumnsError, RecordingError, TableError
+
+
+@given(data=st.data(), codes=st.booleans())
+@settings(deadline=None)
+def test_a_set_comes_back_from_its_frame(
+    data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet], codes: bool
+) -> None:
+    grasp_set = data.draw(grasp_sets)
+    frame = grasp_set.to_dataframe(codes)
+    assert GraspSet.from_dataframe(frame).fingerprint() == grasp_set.fingerprint()
+    assert len(frame) == len(grasp_set)
+
+
+def test_a_frame_has_the_documented_columns_and_types(small: GraspSet) -> None:
+    frame = small.to_dataframe()
+    inputs = ["dead", "thumb", "palm", "palm copy", "index", "wrist"]
+    assert [*frame.columns] == ["grasp", "subject", "object", "trial", *inputs]
+    assert [*frame["grasp"].cat.categories] == [*small.taxonomy.types]
+    assert frame["trial"].dtype == np.int64
+    assert {frame[name].dtype for name in small.switch_names} == {np.dtype(np.bool_)}
+    assert {frame[name].dtype for name in small.joint_names} == {np.dtype(np.float64)}
+    assert all(isinstance(name, str) for name in frame["subject"])
+    assert frame["index"].tolist() == [-9.5, -9.0, -9.0, -9.5, -8.5, -8.0]
+    assert small.to_dataframe(codes=True)["index"].dtype == np.uint16
+    several = replace(small, sessions=np.array(["1", "2"] * 3)).to_dataframe()
+    assert several["session"].tolist() == ["1", "2"] * 3
+    clash = replace(small, switch_names=("grasp", "grasp_", "trial", "session")).to_dataframe()
+    assert [*clash.columns][:4] == ["grasp__", "subject", "object", "trial_"]
+
+
+def test_rows_that_pandas_picks_and_sorts_are_those_of_the_set(small: GraspSet) -> None:
+    frame = small.to_dataframe()
+    part = frame[frame["subject"] == "A"].sort_values("trial", ascending=False)
+    assert GraspSet.from_dataframe(part).fingerprint() == small.rows([5, 2, 1, 0]).fingerprint()
+
+
+def test_any_types_of_a_users_frame_are_read() -> None:
+    frame = pd.DataFrame(
+        {
+            "what": pd.Categorical(["hook", "pinch", "hook"]),
+            "who": pd.array([7, 8, 7], dtype="Int64"),
+            "n": ["1", "2", "3"],
+            "bit": pd.array([True, False, True], dtype="boolean"),
+            "number": [1, 0, 0],
+            "text": ["True", "0", "1.0"],
+            "raw": np.array([3, 200, 65535], np.uint16),
+            "angle": pd.array([0.5, 1.0, -0.5], dtype="Float32"),
+        },
+        index=[10, 20, 30],
+    )
+    columns = Columns(
+        label="what",
+        subject="who",
+        trial="n",
+        switches=("bit", "number", "text"),
+        joints=(JointColumns(("raw",), codes=True), JointColumns(("angle",))),
+    )
+    found = GraspSet.from_dataframe(frame, columns)
+    assert found.subjects.tolist() == ["7", "8", "7"]
+    assert found.trials.tolist() == [1, 2, 3]
+    assert found.switches.tolist() == [[True, True, True], [False, False, False], [True, False, True]]
+    assert found.codes.tolist() == [[3, 2], [200, 3], [65535, 1 - 1]]
+    assert [joint.value(code) for joint, code in zip(found.joints[1:], found.codes[:1, 1], strict=True)] == [0.5]
+    assert found.taxonomy.types == ("hook", "pinch")
+
+
+def test_the_columns_may_be_a_file(small: GraspSet, tmp_path: Path) -> None:
+    frame = small.to_dataframe()
+    text = frame.attrs.pop("thenar")
+    (tmp_path / "columns.toml").write_text(text)
+    for path in (tmp_path / "columns.toml", str(tmp_path / "columns.toml")):
+        assert GraspSet.from_dataframe(frame, path).fingerprint() == small.fingerprint()
+
+
+def test_what_the_columns_are_is_found_as_an_import_finds_it() -> None:
+    frame = pd.DataFrame({"grasp": ["hook", "pinch"] * 6, "subject": list("aabbccddeeff"), "trial": [1] * 12})
+    frame["pad 1"], frame["pad 2"] = frame["grasp"] == "hook", frame["grasp"] == "pinch"
+    found = GraspSet.from_dataframe(frame)
+    assert (found.switch_names, len(found), len({*found.subjects.tolist()})) == (("pad 1", "pad 2"), 12, 6)
+    with pytest.raises(ColumnsError, match=r"the DataFrame: .*; say so in `columns`"):
+        GraspSet.from_dataframe(frame.drop(columns="trial").assign(subject="a"))
+
+
+def test_parquet_keeps_what_a_frame_says(small: GraspSet, tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    small.to_dataframe().to_parquet(tmp_path / "table.parquet")
+    assert GraspSet.from_dataframe(pd.read_parquet(tmp_path / "table.parquet")).fingerprint() == small.fingerprint()
+
+
+@pytest.mark.parametrize("gone", [np.nan, None, pd.NA])
+def test_missing_values_are_missing_whatever_pandas_calls_them(small: GraspSet, gone: object) -> None:
+    frame = small.to_dataframe()
+    frame["subject"] = frame["subject"].astype(object)
+    frame.loc[2, "subject"] = gone
+    with pytest.raises(TableError, match=r"the DataFrame: missing .*: 1 cell, row 2 'subject' \(''\)"):
+        GraspSet.from_dataframe(frame)
+    wrist = small.to_dataframe()
+    wrist.loc[4, "wrist"] = np.nan
+    with pytest.raises(TableError, match="row 4 'wrist'"):
+        GraspSet.from_dataframe(wrist)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "error", "sentence"),
+    [
+        (lambda frame: frame.iloc[:0], TableError, "the DataFrame has no rows"),
+        (lambda frame: frame.rename(columns={"thumb": "palm"}), RecordingError, "column 'palm' occurs twice"),
+        (lambda frame: frame.drop(columns="thumb"), ColumnsError, "'thumb' matches no column of the table"),
+        (lambda frame: frame.assign(wrist=1j), TableError, "column 'wrist' holds complex numbers"),
+        (lambda frame: frame.assign(grasp="Hug"), TableError, "'Hug'"),
+        (lambda frame: frame.assign(index=np.inf), TableError, "not finite numbers"),
+    ],
+)
+def test_what_cannot_be_read_is_one_sentence(
+    small: GraspSet, spoil: object, error: type[Exception], sentence: str
+) -> None:
+    with pytest.raises(error) as caught:
+        GraspSet.from_dataframe(spoil(small.to_dataframe()))  # type: ignore[operator]
+    assert sentence in str(caught.value)
+
+
+def test_a_notebook_shows_rows_and_trials_of_each_type(small: GraspSet) -> None:
+    odd = replace(small, trials=np.array([0, 1, 1, 0, 1, 1]), simulated="a <b>")
+    shown = odd._repr_html_()
+    assert "GraspSet: 6 grasps of 3 types (kamakura14), 4 switches" in shown
+    assert "<br>simulated: a &lt;b&gt;" in shown
+    for name, trials, rows in (("PoS", 2, 2), ("PoH", 1, 2), ("Tip", 2, 2), ("Add", 0, 0)):
+        assert f"<tr><td>{name}</td><td>{trials}</td><td>{rows}</td></tr>" in shown
