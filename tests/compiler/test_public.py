@@ -117,9 +117,12 @@ def test_a_pipeline_that_selects_columns_becomes_a_build_of_those(
     assert found.recognised[0].ensemble == np.count_nonzero(pipeline.predict(X) == grasp_set.labels)
 
 
+@pytest.mark.parametrize("subjects", [1, 3])
 def test_the_papers_recipe_is_the_same_from_a_pipeline_and_from_compile_build(
-    grasp_set: GraspSet, X: np.ndarray, tmp_path: Path
+    make_set: Callable[..., GraspSet], tmp_path: Path, subjects: int
 ) -> None:
+    grasp_set = make_set(subjects=subjects, frames=2)
+    X = Samples.of(grasp_set).inputs
     switches = slice(0, len(grasp_set.switch_names))
     chosen = ColumnTransformer([("switches", ID3Selector(min_samples=5), switches)], remainder="passthrough")
     pipeline = make_pipeline(chosen, LogitBoostClassifier(rounds=4)).fit(X, grasp_set.labels)
@@ -127,6 +130,9 @@ def test_the_papers_recipe_is_the_same_from_a_pipeline_and_from_compile_build(
     same = compile_build(grasp_set, tmp_path / "same", prune=5, rounds=4, folds=3).manifest
     assert made.options == same.options
     assert made.rates == same.rates
+    assert [rate.of for rate in made.rates if rate.unit == "trials"][1:] == (
+        ["within subject"] if subjects == 1 else ["new subject", "pooled"]
+    )
     assert sorted(made.switches, key=lambda switch: switch.column) == sorted(
         same.switches, key=lambda switch: switch.column
     )

@@ -120,7 +120,8 @@ def test_a_claim_of_independent_rows_is_carried_into_the_build(make_set: Make, t
 
 
 def test_the_rates_are_those_of_builds_of_each_folds_training_rows(make_set: Make, tmp_path: Path) -> None:
-    whole, options = make_set(subjects=3), {"rounds": ROUNDS, "prune": 5, "width": 5}
+    options: dict[str, Any] = {"rounds": ROUNDS, "prune": 5, "width": 5}
+    whole = make_set(subjects=3)
     rates = compile_build(whole, tmp_path / "build", **options).manifest.rates[1:]
     for rate, cut in zip(rates, cuts_of(whole, Options()), strict=True):
         correct = 0

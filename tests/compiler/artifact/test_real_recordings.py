@@ -15,7 +15,7 @@ from thenar.compiler.recordings.importer import import_file
 from thenar.compiler.tables.collapse import collapse, model_scores
 from thenar.compiler.tables.quantise import quantise
 from thenar.runtime import Build
-from thenar.runtime.manifest import Inputs, Options
+from thenar.runtime.manifest import Inputs, Of, Options
 
 COLUMNS = Path(__file__).parents[3] / "examples" / "columns"
 
@@ -28,7 +28,7 @@ COLUMNS = Path(__file__).parents[3] / "examples" / "columns"
     ],
 )
 def test_a_build_of_real_recordings_holds_and_recognises(
-    request: pytest.FixtureRequest, tmp_path: Path, table: str, columns: str, expected: dict[str, float]
+    request: pytest.FixtureRequest, tmp_path: Path, table: str, columns: str, expected: dict[Of, float]
 ) -> None:
     grasp_set, _ = import_file(request.getfixturevalue(table), COLUMNS / f"{columns}.toml")
     manifest = compile_build(grasp_set, tmp_path / "build").manifest
