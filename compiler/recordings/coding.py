@@ -90,7 +90,9 @@ def sound_grid(values: NDArray[np.float64]) -> float:
     if not 0 < span <= LARGEST_VALUE:
         return 1.0
     finest = _round_up(max(span / (CODES - 2), far * 1e-8, 1 / LARGEST_VALUE))
-    for exponent in range(0, math.ceil(math.log10(max(span / _OWN_STEPS, finest)) - 1e-9) - 1, -1):
+    for exponent in range(
+        min(0, math.floor(math.log10(span))), math.ceil(math.log10(max(span / _OWN_STEPS, finest)) - 1e-9) - 1, -1
+    ):
         steps = values / float(f"1e{exponent}")
         if np.allclose(steps, np.rint(steps), 0, 1e-6):
             return float(f"1e{exponent}")

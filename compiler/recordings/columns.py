@@ -149,8 +149,9 @@ class Columns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defa
 
 def _is_encoding(name: str) -> bool:
     try:
-        codec = codecs.lookup(name)
-        return codec.name not in _NO_ENCODINGS and isinstance(b"".decode(name), str)
+        known = codecs.lookup(name).name not in _NO_ENCODINGS
+        # Codecs from bytes to bytes refuse to decode.
+        return known and bool(b"  ".decode(name, "replace"))
     except (LookupError, ValueError, TypeError):
         return False
 

@@ -22,12 +22,14 @@ class Format(NamedTuple):
 
     seeds   healthy files    mutate  another file, from one and a source of randomness
     read    does with a file, in a folder of its own, what users do: raises ThenarError or OSError, or nothing
+    weight  share of all mutants; less where each is read in a process of its own
     """
 
     name: str
     seeds: Callable[[], Sequence[bytes]]
     mutate: Callable[[bytes, Random], bytes]
     read: Callable[[bytes, Path], None]
+    weight: float = 1.0
 
 
 SWITCHES = tuple(f"finger_{number}" for number in range(6))

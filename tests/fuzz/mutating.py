@@ -317,7 +317,9 @@ _SHAPES = (
 _METHODS = (ZIP_STORED, ZIP_STORED, ZIP_DEFLATED, ZIP_BZIP2, ZIP_LZMA)
 
 
-class _Member(NamedTuple):
+class Member(NamedTuple):
+    """A file in a zip."""
+
     name: str
     content: bytes
     method: int
@@ -330,42 +332,43 @@ def npz_file(data: bytes, random: Random) -> bytes:
         return altered(data, random)
     for _ in range(random.choice((1, 1, 2))):
         _change_member(members, random)
-    return _zip(members)
+    return zip_file(members)
 
 
-def _members(data: bytes) -> list[_Member]:
+def _members(data: bytes) -> list[Member]:
     """Return what is in a zip; nothing where that is a lot, or cannot be read."""
     try:
         with ZipFile(BytesIO(data)) as file:
             infos = file.infolist()
             if sum(info.file_size for info in infos) > _LARGEST:
                 return []
-            return [_Member(info.filename, file.read(info), info.compress_type) for info in infos]
+            return [Member(info.filename, file.read(info), info.compress_type) for info in infos]
     except Exception:  # whatever a mutant makes of zipfile
         return []
 
 
-def _change_member(members: list[_Member], random: Random) -> None:
+def _change_member(members: list[Member], random: Random) -> None:
     at = random.randrange(len(members))
     name, content, method = members[at]
     match random.randrange(10):
         case 0:
-            members[at] = _Member(random.choice((*TEXTS, members[0].name, "x.npy")), content, method)
+            members[at] = Member(random.choice((*TEXTS, members[0].name, "x.npy")), content, method)
         case 1:
-            members[at] = _Member(name, content, random.choice(_METHODS))
+            members[at] = Member(name, content, random.choice(_METHODS))
         case 2:
             members.insert(at, members[at])
         case 3 if len(members) > 1:
             del members[at]
         case 4:
-            members[at] = _Member(name, content + bytes(random.choice((1, 1000, 20_000_000))), ZIP_DEFLATED)
+            members[at] = Member(name, content + bytes(random.choice((1, 1000, 20_000_000))), ZIP_DEFLATED)
         case 5:
-            members[at] = _Member(name, _json_in_array(content, random), method)
+            members[at] = Member(name, _json_in_array(content, random), method)
         case _:
-            members[at] = _Member(name, npy_file(content, random), method)
+            members[at] = Member(name, npy_file(content, random), method)
 
 
-def _zip(members: list[_Member]) -> bytes:
+def zip_file(members: list[Member]) -> bytes:
+    """Return a zip that is the same on every day."""
     file = BytesIO()
     with ZipFile(file, "w") as archive:
         for name, content, method in members:

@@ -5,16 +5,20 @@ from collections.abc import Callable
 from functools import cache
 from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 from material import GRASPS, SENSORS, Format, grasp_set
-from mutating import npz_file, sealed, table_file, toml_file, zipped
+from mutating import Member, altered, npz_file, sealed, table_file, toml_file, zip_file, zipped
 
 from thenar.compiler.placement.placement import place
+from thenar.compiler.recordings.columns import read_columns
 from thenar.compiler.recordings.export import to_arff, to_csv
 from thenar.compiler.recordings.graspset import GraspSet
-from thenar.compiler.recordings.importer import import_file
+from thenar.compiler.recordings.importer import import_file, import_table
+from thenar.compiler.recordings.propose import propose_file
 from thenar.compiler.recordings.summary import summarise
 
 _COLUMNS = f"""\
@@ -111,7 +115,64 @@ def _set(data: bytes, folder: Path) -> None:
     _use(GraspSet.load(path))
 
 
+def _proposed(data: bytes, folder: Path) -> None:
+    """Import a table as it is found to be."""
+    path = folder / "table.csv"
+    path.write_bytes(data)
+    table, proposal = propose_file(path)
+    (folder / "columns.toml").write_text(proposal.toml(), encoding="utf-8")
+    columns = read_columns(folder / "columns.toml")
+    assert columns == proposal.columns
+    if not proposal.lacks:
+        _use(import_table(table, columns)[0])
+
+
+def _latin() -> bytes:
+    """Return a table with semicolons, decimal commas and Latin-1."""
+    lines = _csv().decode().replace("anna", "Jörg").splitlines()
+    return "".join(line.replace(",", ";") + f";0,{number}\n" for number, line in enumerate(lines)).encode("latin-1")
+
+
+@cache
+def _foreign(suffix: str) -> bytes:
+    """Return the grasps as another program writes them, the same bytes on every day."""
+    import h5py
+    import pandas
+    from scipy.io import savemat
+
+    frame = pandas.read_csv(BytesIO(to_csv(grasp_set()).encode()))
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / f"table{suffix}"
+        if suffix == ".xlsx":
+            frame.to_excel(path, index=False)
+            with ZipFile(path) as dated:
+                return zip_file(
+                    [
+                        Member(name, dated.read(name), ZIP_DEFLATED)
+                        for name in dated.namelist()
+                        if "docProps" not in name
+                    ]
+                )
+        if suffix == ".parquet":
+            frame.to_parquet(path)
+        elif suffix == ".h5":
+            with h5py.File(path, "w") as file:
+                for name, column in frame.items():
+                    file[str(name)] = column.to_numpy(object if column.dtype == "str" else None)
+        else:
+            savemat(path, {name: column.to_numpy(object) for name, column in frame.items()}, oned_as="column")
+            return b"MATLAB 5.0 MAT-file".ljust(116) + path.read_bytes()[116:]
+        return path.read_bytes()
+
+
+def _of(suffix: str) -> Format:
+    mutate = npz_file if suffix == ".xlsx" else altered
+    return Format(suffix[1:], lambda: [_foreign(suffix)], mutate, _table(suffix), weight=0.03)
+
+
 FORMATS = (
+    Format("csv without columns.toml", lambda: [_csv(), _latin()], table_file, _proposed),
+    *map(_of, (".xlsx", ".parquet", ".h5", ".mat")),
     Format("csv", lambda: [_csv()], table_file, _table(".csv")),
     Format("csv.gz", lambda: [gzip.compress(_csv(), mtime=0)], zipped(table_file), _table(".csv.gz")),
     Format("arff", lambda: [_arff()], table_file, _table(".arff")),

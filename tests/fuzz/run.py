@@ -14,6 +14,7 @@ import os
 import sys
 from contextlib import nullcontext, redirect_stderr
 from io import StringIO
+from math import ceil
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
@@ -60,9 +61,9 @@ def main() -> int:
     try:
         print(f"{fuzzer.replay()} inputs of the corpus replayed", flush=True)
         if asked.mutants is not None:
-            share = -(-asked.mutants // len(formats))
+            share = asked.mutants / sum(form.weight for form in formats)
             for form in formats:
-                fuzzer.mutate(form, asked.first, share)
+                fuzzer.mutate(form, asked.first, ceil(share * form.weight))
         else:
             _by_time(fuzzer, asked.minutes, asked.first, guided)
     except KeyboardInterrupt:

@@ -17,8 +17,8 @@ from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.table import read_table
 from thenar.compiler.recordings.taxonomy import FEIX_33
 
-SWITCHES = 'label = "g"\nswitches = ["s*"]\n'
-JOINTS = 'label = "g"\n[[joints]]\ncolumns = ["s*"]\n'
+SWITCHES = 'label = "g"\nframes = "independent"\nswitches = ["s*"]\n'
+JOINTS = 'label = "g"\nframes = "independent"\n[[joints]]\ncolumns = ["s*"]\n'
 DROP = 'missing = "drop"\n' + JOINTS
 NAMED = 'subject = "u"\nobject = "o"\n' + SWITCHES
 

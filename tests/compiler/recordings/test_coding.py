@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.recordings.coding import code_joint
+from thenar.compiler.recordings.coding import code_joint, sound_grid
 from thenar.compiler.recordings.columns import Calibration, JointColumns
 from thenar.compiler.recordings.errors import RecordingError, TableError
 
@@ -79,3 +79,28 @@ def test_the_cost_of_coding_is_told_in_any_unit(size: float) -> None:
     _, _, cost = code_joint("j", JointColumns(("j",), grid=size), values, rows(values))
     assert cost.largest_error == pytest.approx(0.5 * size)
     assert cost.rms_error == pytest.approx(size * math.sqrt((0.25**2 + 0.5**2 + 0.25**2) / 4))
+
+
+@given(st.lists(st.floats(-1e290, 1e290), min_size=1, max_size=30).map(np.array))
+def test_a_sound_grid_gives_every_value_a_code(values: np.ndarray) -> None:
+    grid = sound_grid(values)
+    if 0 < np.ptp(values):
+        codes, joint, _ = code_joint("j", JointColumns(("j",), grid=grid), values, rows(values))
+        assert np.abs(joint.value(codes) - values).max() <= grid * 0.5001
+
+
+@given(st.lists(st.integers(-5000, 5000), min_size=2, max_size=30, unique=True), st.integers(0, 4))
+def test_decimals_keep_all_that_they_tell(numbers: list[int], digits: int) -> None:
+    values = np.array([float(f"{number}e-{digits}") for number in numbers])
+    codes, joint, cost = code_joint("j", JointColumns(("j",), grid=sound_grid(values)), values, rows(values))
+    assert cost.distinct_after == len(numbers)
+    assert joint.value(codes) == pytest.approx(values, abs=1e-9)
+
+
+@pytest.mark.parametrize(("largest", "grid"), [(1.5, 0.001), (90.0, 0.05), (3.3, 0.002), (1.5e-6, 1e-9), (4e12, 2e9)])
+def test_noise_gets_a_thousand_steps(largest: float, grid: float) -> None:
+    values = np.random.default_rng(1).random(5000) * largest
+    assert sound_grid(values) == grid
+    outlier = np.append(values, 30 * largest)
+    assert sound_grid(outlier) == grid
+    assert (sound_grid(np.array([3.0])), sound_grid(np.array([2.0, 2.0]))) == (1.0, 1.0)

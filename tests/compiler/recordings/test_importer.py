@@ -64,7 +64,7 @@ def test_rows_that_may_be_frames_of_one_trial_are_asked_about() -> None:
     assert import_table(table("a", "b"), columns)[1].trials == 2
 
 
-def frames(**cells: Column) -> tuple[GraspSet, ImportReport]:
+def frames(**cells: Any) -> tuple[GraspSet, ImportReport]:
     """Import six frames of three trials of a and b, with other cells, or keys of a columns.toml."""
     keys = {name: cells.pop(name) for name in ("reduce", "missing", "taxels", "time") if name in cells}
     rows: dict[str, Column] = {

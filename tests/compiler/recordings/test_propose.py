@@ -197,8 +197,13 @@ def test_frames_that_nothing_tells_apart_are_asked_about() -> None:
 
 
 def test_the_columns_toml_holds_the_reasons_and_any_names(tmp_path: Path) -> None:
-    odd = {'a "b" [c]*': ["x", "y"], "p[1]": np.array([0, 1]), "p[2]": np.array([1, 0]), "ä\u200b": ["u", "v"]}
-    found = looked_at(**{"grasp": ["x", "y"], **odd})
+    odd: dict[str, Column] = {
+        'a "b" [c]*': ["x", "y"],
+        "p[1]": np.array([0, 1]),
+        "p[2]": np.array([1, 0]),
+        "ä\u200b": ["u", "v"],
+    }
+    found = looked_at(grasp=["x", "y"], **odd)
     text = found.toml()
     assert "# grasp: label: its name; 2 different\n" in text
     assert "\u200b" not in text.partition("\n\n")[0]

@@ -159,11 +159,11 @@ def arrays_with(column: str, number: float) -> dict[str, NDArray[np.float64]]:
 
 
 def test_rows_of_nan_are_left_out_where_the_user_says_so_and_infinity_never(tmp_path: Path) -> None:
-    (tmp_path / "columns.toml").write_text('label = "g"\nmissing = "drop"\n[[joints]]\ncolumns = ["j"]\n')
+    (tmp_path / "columns.toml").write_text('label = "g"\nframes = "independent"\nmissing = "drop"\n[[joints]]\ncolumns = ["j"]\n')
     (tmp_path / "table.csv").write_text("g,j\na,1\nb,nan\na,3\n")
     grasp_set, report = import_file(tmp_path / "table.csv", tmp_path / "columns.toml")
     assert len(grasp_set) == 2
-    assert "1 rows with missing values were left out: row 3 (columns j)" in [each.message for each in report.warnings]
+    assert "1 rows with missing values were left out: row 3 (columns j)" in report.warnings[0].message
     (tmp_path / "table.csv").write_text("g,j\na,1\nb,inf\na,3\n")
     with pytest.raises(TableError, match=r"not finite numbers: 1 cell, row 3 'j' \('inf'\)"):
         import_file(tmp_path / "table.csv", tmp_path / "columns.toml")
