@@ -1,6 +1,7 @@
 """Builds of recordings with analog pads, whose thresholds are learnt: inside the folds, and written for the board."""
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -62,10 +63,8 @@ def test_a_build_says_at_which_value_each_kept_pad_switches(padded: GraspSet, tm
     assert rising.startswith("closed above ")
     assert " N (codes above " in rising
     assert falling.startswith("closed below ")
-    text = (tmp_path / "build" / "spec" / "README.txt").read_text()
-    assert f"the taxel pad0: set its comparator or converter to {pads['pad0'].threshold.value:g}" in " ".join(
-        text.split()
-    )  # type: ignore[union-attr]
+    text = " ".join((tmp_path / "build" / "spec" / "README.txt").read_text().split())
+    assert re.search(r"the taxel pad0: set its comparator or converter to \d+\.\d+ N; it is " + re.escape(rising), text)
     assert rising in (tmp_path / "build" / "report.html").read_text()
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -66,7 +67,13 @@ def test_thresholds_of_all_rows_would_have_been_optimistic(make_set: Make) -> No
     columns = tuple(Joint(f"pad{number}", "N", 0, 0.0, 4095, 20.0) for number in range(40))
     padded = replace(noise, switches=noise.switches[:, :0], switch_names=(), taxels=pads, taxel_columns=columns)
     leaking = plain_by(padded, taxel_thresholds(Samples.of(padded)))
-    asked = {"jobs": 1, "repeats": 2, "rounds": 10, "tables": ("compositions",), "protocols": ("nested",)}
+    asked: dict[str, Any] = {
+        "jobs": 1,
+        "repeats": 2,
+        "rounds": 10,
+        "tables": ("compositions",),
+        "protocols": ("nested",),
+    }
     rates = [{row.name: row.rate for row in evaluate(each, **asked).tables[0].rows}["V"] for each in (padded, leaking)]
     assert rates[0].low <= 0.25 <= rates[0].high
     assert rates[1].mean > rates[0].mean + 0.1
