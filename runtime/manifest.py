@@ -193,7 +193,7 @@ class Recognised(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=
 
     def __str__(self) -> str:
         """Return "new subject: 73.2 % [60.1, 83.4], 123 of 168 trials in 7 nested folds"."""
-        return f"{self.title}: {100 * self.rate:.1f} % {self.basis}"
+        return f"{self.title}: {100 * self.rate:.1f} %{',' if self.low is None else ''} {self.basis}"
 
 
 class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True):
