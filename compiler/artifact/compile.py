@@ -36,6 +36,7 @@ from ..placement.methods.base import METHODS
 from ..placement.ports import PortCosts, ports_of_whole_glove
 from ..placement.thresholds import with_switches
 from ..publication import check_folder, publish_folder, sweep
+from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet, Joint
 from ..samples import Columns, Samples
 from ..tables.compare import Comparison, compare
@@ -169,6 +170,8 @@ def compile_build(
     target = check_target(Path(folder))
     asked = _sound(changed(options or Options(), changes))
     samples = samples_of(grasp_set, asked)
+    if asked.folds:
+        check_trials(grasp_set, CompileError)
     cuts = cuts_of(grasp_set, asked)
     steps = _Steps(progress, sum(len(cut.folds) for cut in cuts))
     ports = ports or ports_of_whole_glove(None, grasp_set.element_names)

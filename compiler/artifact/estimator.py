@@ -23,6 +23,7 @@ from ..firmware.targets.base import Mode
 from ..placement.methods.base import METHODS, PAPERS
 from ..placement.placement import information_alone
 from ..placement.selectors import SwitchSelector
+from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
 from ..tables.collapse import Model, ScoreTables
@@ -160,6 +161,8 @@ def compile(  # noqa: A001
     options = Options(
         inputs=inputs, folds=folds, seed=seed, table_bits=table_bits, width=width, placement="estimator", by=by
     )
+    if folds:
+        check_trials(grasp_set, CompileError)
     cuts = cuts_of(grasp_set, options)
     options, gains = _placed_by(estimator, _trained_by(classifier, options))
     trained = replace(trained, gains=gains or information_alone(samples, trained.columns))

@@ -179,7 +179,7 @@ def _samples(grasp_set: GraspSet) -> Samples:
     check_inputs(n_types, len(grasp_set.switch_names), len(grasp_set.joints), FrontierError)
     check_memory(len(grasp_set), n_types, FrontierError)
     if grasp_set.taxel_columns:
-        raise FrontierError(f"{source} has taxels whose thresholds are learnt: import it with fixed ones")
+        raise FrontierError("the recordings have taxels, whose thresholds are learnt: import them with fixed ones")
     return Samples.of(grasp_set)
 
 
@@ -388,8 +388,9 @@ def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
     build = Build.load(folder)
     manifest = build.manifest
     names = [switch.name for switch in manifest.switches]
-    rate = manifest.headline
-    if rate is None:
+    # As the frontier's own rates are.
+    pooled = [rate for rate in manifest.rates if rate.protocol != "training" and not rate.of.startswith("new")]
+    if not pooled:
         raise FrontierError(
             f"{folder} does not say what it recognises: compile it with --folds 4, or leave --build out"
         )
@@ -401,7 +402,9 @@ def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
     codes = grasp_set.codes[:, _places(joints, [joint.name for joint in grasp_set.joints], folder)]
     scans = [scan_times(names, build.tables, wiring, bits, codes, equipment.beside).full_us for wiring in fitting]
     frame_us = max(min(scans, default=0.0), equipment.joints.us * bool(joints)) + options[0].us
-    return Mark(f"build {folder.name}", len(names), Rate.counted((rate.correct,), rate.total, of="pooled"), frame_us)
+    return Mark(
+        f"build {folder.name}", len(names), Rate.counted((pooled[0].correct,), pooled[0].total, of="pooled"), frame_us
+    )
 
 
 def _places(names: Sequence[str], there: Sequence[str], folder: Path) -> list[int]:

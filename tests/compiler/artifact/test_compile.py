@@ -119,6 +119,17 @@ def test_a_claim_of_independent_rows_is_carried_into_the_build(make_set: Make, t
     assert [(rate.unit, rate.total) for rate in manifest.rates] == [("trials", 192)] * 2
 
 
+def test_frames_that_are_numbered_as_trials_are_refused_before_any_work(make_set: Make, tmp_path: Path) -> None:
+    framed = make_set(rows=64, frames=6)
+    drift = np.random.default_rng(1).integers(0, 3, framed.codes.shape).astype(np.uint16)
+    numbered = replace(framed, codes=framed.codes + drift, trials=np.arange(len(framed)))
+    with pytest.raises(CompileError, match="count as trials"):
+        compile_build(numbered, tmp_path / "build", rounds=1, progress=lambda *_: pytest.fail("worked in vain"))
+    claimed = replace(numbered, independent=True)
+    assert compile_build(claimed, tmp_path / "build", rounds=1).manifest.source.independent
+    assert compile_build(numbered, tmp_path / "build", rounds=1, folds=0).manifest.headline is None
+
+
 def test_the_rates_are_those_of_builds_of_each_folds_training_rows(make_set: Make, tmp_path: Path) -> None:
     options: dict[str, Any] = {"rounds": ROUNDS, "prune": 5, "width": 5}
     whole = make_set(subjects=3)
