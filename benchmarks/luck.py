@@ -12,7 +12,7 @@ import argparse
 import sys
 import tempfile
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -37,8 +37,8 @@ from thenar.simulator import load_scene, simulate
 
 SCENE, TARGET = "kamakura", "avr2560"
 # Of every grasp type by every subject: recorded; fresh ones of the same hands; hands that nobody recorded.
-REPETITIONS, MORE, OTHERS = 6, 16, 12
-BUDGETS_US = (1000.0, 5000.0)
+REPETITIONS, MORE, OTHERS = 12, 16, 8
+BUDGETS_US = (700.0, 5000.0)
 FIRST_OTHER = 100_000
 
 
@@ -57,8 +57,9 @@ class Case:
 
 
 def recorded(seed: int, repetitions: int = REPETITIONS, more: int | None = None) -> GraspSet:
-    """Return grasps of one seed; with `more`, as many fresh ones of the same hands."""
-    return simulate(load_scene(SCENE).varied(repetitions, seed, more=more), jobs=1).grasp_set
+    """Return the switches of grasps of one seed; with `more`, of as many fresh ones of the same hands."""
+    found = simulate(load_scene(SCENE).varied(repetitions, seed, more=more), jobs=1).grasp_set
+    return replace(found, codes=found.codes[:, :0], joints=())
 
 
 @cache
@@ -80,6 +81,7 @@ def played(asked: tuple[int, By, Equipment]) -> tuple[Case, ...]:
     search = Search(
         methods=("id3",),
         rivals=(),
+        folds=6,
         repeats=1,
         screening=10,
         rounds=10,

@@ -45,7 +45,7 @@ class OutputFile(click.Path):
 
     def __init__(self, *endings: str, goes_on: bool = False) -> None:
         super().__init__(dir_okay=False, writable=True, path_type=Path)
-        self.endings, self._goes_on = endings, goes_on
+        self.endings, self.goes_on = endings, goes_on
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         """Return the path. Raises BadParameter where the rule forbids it."""
@@ -62,7 +62,7 @@ class OutputFile(click.Path):
             self.fail(f"Nothing may be written into folder '{path.parent}'.", param, ctx)
         if is_special(path):
             self.fail(f"'{path}' is a device or a pipe: name a file.", param, ctx)
-        if path.exists() and not (self._goes_on or _overwrites(ctx)):
+        if path.exists() and not (self.goes_on or overwrites(ctx)):
             self.fail(f"{path} is there already: add --overwrite to replace it, or name another file.", param, ctx)
         return path
 
@@ -87,7 +87,7 @@ class OutputFolder(click.Path):
             self.fail(f"'{above}' is no folder: nothing can be written below it.", param, ctx)
         if not os.access(above, os.W_OK):
             self.fail(f"Nothing may be written into folder '{above}'.", param, ctx)
-        if self._fresh and above == path and any(path.iterdir()) and not _overwrites(ctx):
+        if self._fresh and above == path and any(path.iterdir()) and not overwrites(ctx):
             self.fail(f"{path} is not empty: add --overwrite to replace files in it, or name another.", param, ctx)
         return path
 
@@ -107,7 +107,8 @@ class Number(click.FloatRange):
         return number
 
 
-def _overwrites(context: click.Context | None) -> bool:
+def overwrites(context: click.Context | None) -> bool:
+    """Return whether files that are there may be replaced."""
     return context is not None and bool(context.meta.get(_OVERWRITE))
 
 

@@ -23,6 +23,7 @@ from .common import (
     existing_file,
     keep_apart,
     overwrite_flag,
+    overwrites,
     progress,
     warning,
 )
@@ -110,6 +111,7 @@ def command(
     worn = harness.cyberglove
     calibration = None if worn is None or worn.calibration is None else Path(worn.calibration)
     keep_apart(glove, Path(source), calibration, folder / _HARNESS, folder / _CALIBRATION, log)
+    _check_folder(folder)
     performance, cable = _performance(source, subject, period_ms)
     if missing := [name for name in harness.switches if name not in performance.switch_names]:
         warning(f"{source} has no switch {list_names(missing)}: open all the time")
@@ -127,6 +129,14 @@ def command(
     if child is not None:
         code = child.returncode
         click.get_current_context().exit(code if code >= 0 else _KILLED - code)
+
+
+def _check_folder(folder: Path) -> None:
+    """Raise UsageError if `folder` holds files by the names of ours, and others: then they may be the user's."""
+    there = {path.name for path in folder.iterdir() if not path.is_symlink()} if folder.is_dir() else set()
+    ours = there & {_HARNESS, _CALIBRATION}
+    if ours and there - ours and not overwrites(click.get_current_context()):
+        raise click.UsageError(f"{folder / min(ours)} is there already: add --overwrite, or name another --dir")
 
 
 def _performance(source: str, subject: str | None, period_ms: float | None) -> tuple["Performance", "CableOf"]:
@@ -212,10 +222,7 @@ def _beside(client: tuple[str, ...], emulated: Path, bench: "Bench", stop: Event
 
 
 def _play(bench: "Bench", performance: "Performance", note: "Log", stop: Event, *, repeat: bool) -> None:
-    from thenar.simulator.playing.performance import Player
-
-    player = Player(performance, bench.show, note)
-    while player.play(stop) and repeat:
+    while performance.play(bench.show, note, stop) and repeat:
         pass
 
 

@@ -8,6 +8,7 @@ import click
 from rich.text import Text
 
 from thenar.compiler.text import duration, interval
+from thenar.drivers.names import printable
 
 from .common import (
     Number,
@@ -135,7 +136,7 @@ def command(
         found = find_frontier(
             GraspSet.load(recordings),
             output,
-            source=recordings.name,
+            source=printable(recordings.name),
             harness=harness,
             search=search,
             wanted=wanted,

@@ -16,8 +16,8 @@ from .cluster import on_cluster
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
 
-# More processes are asked for by a slip only, and would take the machine with them.
-MOST_JOBS = 1024
+# More processes than four a core are asked for by a slip only, and would take the machine with them.
+MOST_JOBS = 4 * (os.cpu_count() or 1)
 
 _SAFE_PATH = "PYTHONSAFEPATH"
 # Where a process cannot be waited for by a stranger, it is looked for so often.
@@ -71,12 +71,14 @@ def workers_of(jobs: int) -> int:
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Let a Ctrl-C wait. Processes started meanwhile never get it, so none complains of it: this one ends them."""
+    """Let a Ctrl-C wait, and what ends a command like one. Processes started meanwhile never get these signals, so none
+    complains of them: this one ends them.
+    """
     from multiprocessing import resource_tracker
 
     # loky asks for this helper process of Python's, and its start would lift the block.
     resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP})
     try:
         yield
     finally:

@@ -35,7 +35,7 @@ _CAPTIONS = {
     ),
 }
 # Of two names for a colour, the first.
-_COLOURS = {colour: f"var(--{name})" for name, (colour, _) in reversed(PALETTE.items())}
+_COLOURS = {colour: f"var(--{name})" for name, (colour, _) in reversed(list(PALETTE.items()))}
 _TARGET = "9"  # radius of what can be clicked, in units of the pictures
 
 

@@ -1,4 +1,4 @@
-"""Ctrl-C, SIGTERM and SIGHUP, sent to real processes in the middle of their work: all of it ends, and nothing is left."""
+"""Ctrl-C, SIGTERM and SIGHUP, sent to real processes at work: all of it ends, and nothing is left."""
 
 import os
 import signal
@@ -48,9 +48,9 @@ def material(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("material")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        assert run("simulate quick -o set.grasps --repetitions 3 --jobs 1".split()) == 0
-        assert run("simulate crowd -o crowd.grasps --repetitions 1 --jobs 2".split()) == 0
-        assert run("compile set.grasps -o build --rounds 3 --folds 0 --no-report".split()) == 0
+        assert run(["simulate", "quick", "-o", "set.grasps", "--repetitions", "3", "--jobs", "1"]) == 0
+        assert run(["simulate", "crowd", "-o", "crowd.grasps", "--repetitions", "1", "--jobs", "2"]) == 0
+        assert run(["compile", "set.grasps", "-o", "build", "--rounds", "3", "--folds", "0", "--no-report"]) == 0
     return folder
 
 
@@ -116,7 +116,8 @@ def test_a_signal_ends_all_of_it_and_leaves_nothing(
     assert {path.name for path in Path().iterdir()} - before <= kept
     assert left == []
     assert list((folder / "temporary").iterdir()) == []
-    assert [name for name in os.listdir("/dev/shm") if f"-{process.pid}-" in name or f"_{process.pid}_" in name] == []
+    marks = (f"-{process.pid}-", f"_{process.pid}_")
+    assert [path for path in Path("/dev/shm").iterdir() if any(mark in path.name for mark in marks)] == []
 
 
 def test_a_hangup_that_nohup_ignores_stays_ignored() -> None:

@@ -1,0 +1,101 @@
+"""What was typed wrongly is answered with what comes nearest to it; what is half typed, a shell completes."""
+
+from pathlib import Path
+
+import click
+import pytest
+from click.shell_completion import ShellComplete
+
+from thenar.cli import run
+from thenar.cli.group import COMMANDS, thenar
+from thenar.compiler.placement.methods.base import METHODS
+from thenar.compiler.trainers.base import TRAINERS
+from thenar.simulator.scenes import shipped
+
+
+@pytest.mark.parametrize(
+    ("line", "nearest"),
+    [
+        ("evalute", "evaluate"),
+        ("imprt", "import"),
+        ("compile {set} -o new --preset smalest", "smallest"),
+        ("compile {set} -o new --trainer logitbost", "logitboost"),
+        ("compile {set} -o new --metod id3", "--method"),
+        ("compile {set} -o new --placement id3", "--method"),
+        ("compile {set} -o new --roundz 3", "--rounds"),
+        ("place {set} --method eliminaton", "elimination"),
+        ("frontier {set} -o new --methods id3,cmin", "cmim"),
+        ("frontier {set} -o new --target avr382p", "avr328p"),
+        ("evaluate {set} --tables composition", "compositions"),
+        ("verify . {set} --firmware hots", "host"),
+        ("simulate quik -o new.grasps", "quick"),
+        ("stability weigths", "weights"),
+    ],
+)
+def test_a_typo_is_answered_with_the_nearest_name(
+    line: str,
+    nearest: str,
+    set_file: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(line.format(set=set_file).split()) == 2
+    said = capsys.readouterr().err
+    assert "id you mean " in said
+    assert f"'{nearest}'" in said.partition("id you mean ")[2]
+    assert said.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_where_nothing_is_near_all_names_are_listed(set_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["place", str(set_file), "--method", "foo"]) == 2
+    assert f"there is no method 'foo': choose one of {', '.join(METHODS)}." in capsys.readouterr().err
+
+
+def test_help_is_a_command_too(capsys: pytest.CaptureFixture[str]) -> None:
+    for words, command in ((["help"], []), (["help", "place"], ["place"])):
+        assert run(words) == 0
+        asked = capsys.readouterr().out
+        assert run([*command, "--help"]) == 0
+        assert capsys.readouterr().out == asked
+
+
+def completed(*words: str) -> list[str]:
+    """Return what completes the last of `words`."""
+    shell = ShellComplete(thenar, {}, "thenar", "_THENAR_COMPLETE")
+    return [item.value for item in shell.get_completions(list(words[:-1]), words[-1]) if item.type == "plain"]
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("",), [*COMMANDS]),
+        (("ev",), ["evaluate"]),
+        (("simulate", ""), [*shipped()]),
+        (("plan", "kam"), ["kamakura", "kamakura-def"]),
+        (("emulate", "qu"), ["quick"]),
+        (("place", "set.grasps", "--method", ""), [*METHODS]),
+        (("frontier", "--methods", "id3,cm"), ["id3,cmim"]),
+        (("evaluate", "--rivals", "mr"), ["mrmr"]),
+        (("compile", "--trainer", ""), [*TRAINERS]),
+        (("compile", "--preset", "f"), ["fastest"]),
+        (("compile", "--meth"), ["--method"]),
+        (("firmware", "--target", "cortex"), ["cortex-m0plus", "cortex-m4"]),
+        (("verify", "build", "set.grasps", "--firmware", "host,a"), ["host,avr"]),
+        (("stability", "weig"), ["weights"]),
+    ],
+)
+def test_a_shell_completes_what_is_half_typed(words: tuple[str, ...], expected: list[str]) -> None:
+    assert completed(*words) == expected
+
+
+def test_every_command_completes_its_options() -> None:
+    for command in COMMANDS:
+        context = click.Context(thenar)
+        found = thenar.get_command(context, command)
+        assert found is not None
+        # A flag and its opposite are both there; a parameter that is given once is not offered twice.
+        options = {each.opts[-1] for each in found.get_params(click.Context(found)) if isinstance(each, click.Option)}
+        assert options <= {*completed(command, "--")}
