@@ -41,7 +41,7 @@ class Rate:
     Units of one cluster (frames of a trial, trials of a left out subject) are alike. There n is total / d, and z is
     Student's t of over - 1 degrees of freedom (as Korn and Graubard 1998, Survey Methodology 24). The design effect d
     is the cluster-robust variance of p over p (1 - p) / total, at least 1. Few misses tell little about d: so it is
-    averaged with that of a correlation of ALIKE within clusters, which weighs WEIGHT misses. `benchmarks/coverage.py`
+    averaged with that of a correlation of ALIKE within clusters, which weighs WEIGHT misses. `benchmarks/intervals.py`
     shows how often the interval covers the truth.
 
     Repeats share their units: the interval is over the units' means. It also holds Student's interval over the
