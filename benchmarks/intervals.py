@@ -13,7 +13,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.evaluation.rates import Unit, clustered
+from thenar.compiler.evaluation.rates import clustered
+from thenar.runtime.manifest import Unit
 
 ACCURACIES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98)
 FRAMES = ((1, 1.0), (2, 1.5), (8, 1.0), (8, 2.0), (8, 5.0), (15, 5.0), (50, 1.0), (50, 5.0))
