@@ -18,6 +18,7 @@ from ..limits import check_inputs, check_memory, check_types
 from ..placement.methods.base import BEST, METHODS, PAPERS, usual
 from ..placement.ports import ports_of_whole_glove
 from ..publication import check_folder, entries, publish_folder
+from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from .cache import Cache, Report, Store
@@ -42,6 +43,7 @@ _EARLY = (
     "Scans that end early are tried with decisions on single frames: a dwell with a lead reads on for longer, and a "
     "sequential test needs whole scans."
 )
+_CLAIMED = "Each row counts as a trial of its own, as its recorder states."
 _RENEWED = f"{STORE_NAME} was an older thenar's, of another form: everything was computed anew"
 _UNTIMED = (
     "what reading the joints ({}) takes is not known and is left out of every frame time and latency: give it with "
@@ -101,7 +103,7 @@ def find_frontier(
     Parameters
     ----------
     grasp_set : GraspSet
-        Recordings of at least two grasp types; folds part no trial.
+        Recordings of at least two grasp types; no fold parts a trial.
     output : Path, optional
         Folder for frontier.json, frontier.csv, three pictures, and the store, from which an interrupted run goes on.
         Without it nothing is written, and nothing is kept.
@@ -180,6 +182,7 @@ def _samples(grasp_set: GraspSet) -> Samples:
     check_memory(len(grasp_set), n_types, FrontierError)
     if grasp_set.taxel_columns:
         raise FrontierError("the recordings have taxels, whose thresholds are learnt: import them with fixed ones")
+    check_trials(grasp_set, FrontierError)
     return Samples.of(grasp_set)
 
 
@@ -282,6 +285,7 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
     luck = lucks((by_time, by_switches), every, screened, survey.cuts, search.seed)
     points = points_of(kept, _latencies(survey, stream, kept), luck, survey.switch_names, search)
     picked, tried = wanted.pick(points), _tried(screened, closes, search)
+    claimed = [_CLAIMED] if survey.grasp_set.independent else []
     early = [_EARLY] if any(design.scan_kind == "early" for design in kept) else []
     return Frontier(
         schema=SCHEMA,
@@ -304,7 +308,7 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
         curves=curves,
         marks=(*marks_of(named, closes, survey), *own),
         checks=checks,
-        skipped=(*lacking, *skipped, *early, stream.what),
+        skipped=(*lacking, *claimed, *skipped, *early, stream.what),
         picked=None if picked is None else picked.number,
         wanted=wanted.words,
     )
