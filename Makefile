@@ -8,7 +8,7 @@ OUT    := out
 CORES = $(shell $(PYTHON) -c "import os; print(os.cpu_count())")
 WORKERS = $(shell expr $(CORES) \* 3 / 2)
 
-# The scene that `make demo` simulates: a shipped one by its name, or a file.
+# The scene that `make demo` simulates: a shipped one by its name, or a file. With TABLE=table.csv it imports that.
 SCENE ?= quick
 
 # Tests start hundreds of programs, each of which would compile all that it imports.
@@ -27,22 +27,29 @@ $(VENV)/installed: pyproject.toml
 	$(BIN)/python -m pip install --quiet --editable ".[compiler,cluster,sim,stability,ros]" --group dev
 	touch $@
 
-demo: $(VENV)/installed  ## simulate, draw, evaluate, find the frontier, compile, verify, run: SCENE=quick
+demo: $(VENV)/installed  ## recordings, rates, frontier, build, report, run: SCENE=quick, or TABLE=examples/home_glove.csv
 	mkdir -p $(OUT)
+ifdef TABLE
+	$(BIN)/thenar import "$(TABLE)" -o $(OUT)/set.grasps --yes --overwrite
+else
 	$(BIN)/thenar simulate "$(SCENE)" -o $(OUT)/set.grasps --overwrite
 	$(BIN)/thenar draw $(OUT)/set.grasps -o $(OUT)/contacts.svg --overwrite
 	$(BIN)/thenar draw $(OUT)/set.grasps --place -o $(OUT)/kept.svg --overwrite
-	$(BIN)/thenar evaluate $(OUT)/set.grasps -o $(OUT)/evaluation.json --overwrite
-	$(BIN)/thenar frontier $(OUT)/set.grasps -o $(OUT)/frontier --methods elimination,id3 --rivals none --rounds 50 --repeats 1 --finalists 4
-	$(BIN)/thenar compile $(OUT)/set.grasps -o $(OUT)/build --propose $(OUT)/glove.toml --chip board --overwrite
+endif
+	$(BIN)/thenar evaluate $(OUT)/set.grasps -o $(OUT)/evaluation.json --overwrite $(if $(TABLE),--repeats 1 --tables compositions)
+	$(BIN)/thenar frontier $(OUT)/set.grasps -o $(OUT)/frontier --methods elimination,id3 --rivals none --rounds 50 --repeats 1 --finalists 4 --budget-us 5000
+	$(BIN)/thenar compile $(OUT)/set.grasps -o $(OUT)/build --from $(OUT)/frontier/frontier.json --propose $(OUT)/glove.toml --chip board --overwrite
 	$(BIN)/thenar verify $(OUT)/build $(OUT)/set.grasps
 	$(BIN)/thenar run $(OUT)/build --replay $(OUT)/set.grasps > $(OUT)/grasps.jsonl
+ifndef TABLE
 	$(BIN)/thenar emulate "$(SCENE)" --glove $(OUT)/glove.toml --dir $(OUT)/emulated --period-ms 150 -- \
 	    $(BIN)/thenar run $(OUT)/build --glove $(OUT)/emulated/glove.toml --frames 2000 > $(OUT)/live.jsonl
-	@echo "Simulated grasps are in $(OUT)/set.grasps, the build is in $(OUT)/build, one recognised grasp a line in $(OUT)/grasps.jsonl,"
-	@echo "live ones, from a glove that was emulated, in $(OUT)/live.jsonl;"
+	@echo "Grasps are simulated; live ones, from a glove that was emulated, in $(OUT)/live.jsonl;"
+	@echo "hand maps: $(OUT)/contacts.svg (which switches close), $(OUT)/kept.svg (which are kept)."
+endif
+	@echo "The grasps are in $(OUT)/set.grasps, the build is in $(OUT)/build, one recognised grasp a line in $(OUT)/grasps.jsonl;"
 	@echo "what accuracy costs in time: $(OUT)/frontier/frontier.svg; the build on one page: $(OUT)/build/report.html; its glove: $(OUT)/build/spec;"
-	@echo "hand maps: $(OUT)/contacts.svg (which switches close), $(OUT)/kept.svg (which are kept); the rates: $(OUT)/evaluation.json."
+	@echo "the rates: $(OUT)/evaluation.json."
 
 test: $(VENV)/installed  ## the tests, some six minutes on two cores
 	$(BIN)/python -m pytest -m "not slow" -n $(WORKERS)

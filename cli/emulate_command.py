@@ -222,10 +222,7 @@ def _beside(client: tuple[str, ...], emulated: Path, bench: "Bench", stop: Event
 
 
 def _play(bench: "Bench", performance: "Performance", note: "Log", stop: Event, *, repeat: bool) -> None:
-    from thenar.simulator.playing.performance import Player
-
-    player = Player(performance, bench.show, note)
-    while player.play(stop) and repeat:
+    while performance.play(bench.show, note, stop) and repeat:
         pass
 
 

@@ -1,5 +1,6 @@
 """`thenar frontier`: what accuracy costs in time."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,9 +33,9 @@ if TYPE_CHECKING:
     from thenar.compiler.frontier.points import Check, Frontier, Point
 
 
-_SEARCHED = ("repeats", "finalists", "seed")
+_SEARCHED = ("repeats", "finalists", "seed", "by")
 _WORDS = ("inputs", "placement", "rounds, bits", "wiring", "scan", "decision")
-_NUMBERS = ("rate %", "left out %", "frame", "latency, 99 %", "flash", "RAM")
+_NUMBERS = ("luck", "frame", "latency, 99 %", "flash", "RAM")
 
 
 def _timed() -> tuple[str, ...]:
@@ -77,6 +78,11 @@ def _timed() -> tuple[str, ...]:
     "--finalists", type=click.IntRange(1), default=12, show_default=True, help="Placements to look at closely."
 )
 @click.option("--seed", type=seed_range, default=1, show_default=True, help="Seed of folds and stream.")
+@click.option(
+    "--by",
+    type=click.Choice(("subject", "trial")),
+    help="Choose points by subjects who are left out, or by trials of everybody.  [default: subject, if several]",
+)
 @jobs_option()
 @click.option(
     "--dask", "cluster", metavar="ADDRESS", help="Work on the cluster of this Dask scheduler, such as tcp://host:8786."
@@ -98,7 +104,7 @@ def command(
 ) -> int:
     """Show what accuracy costs in time: which switches, joints, rounds, tables, wirings and decisions are worth it.
 
-    Every placement is screened by an honest cross-validation; those near the front are looked at closely, priced for
+    Every placement is screened by a nested cross-validation; those near the front are looked at closely, priced for
     the target, simulated there, and put on one picture. OUTPUT gets frontier.json, frontier.csv, three pictures and
     store.jsonl, from which an interrupted run goes on.
 
@@ -157,13 +163,11 @@ def _print(found: "Frontier", output: Path) -> None:
 
 def print_frontier(frontier: "Frontier") -> None:
     """Print the points, the picked one bold; then checks, what was left out, and what the picture says."""
-    from thenar.compiler.frontier.words import summary
+    from thenar.compiler.frontier.words import LUCK, folds_of, summary
 
     console = out()
     console.print(_grid(frontier))
-    console.print(
-        Text("rates with 95 % intervals; left out: each subject from the others; flash and RAM in bytes", "dim")
-    )
+    console.print(Text(f"{folds_of(frontier)}. Accuracy in % with 95 % intervals. {LUCK} Flash, RAM: bytes.", "dim"))
     for check in frontier.checks:
         console.print(Text(_check(check)))
     for missing in frontier.skipped:
@@ -173,10 +177,13 @@ def print_frontier(frontier: "Frontier") -> None:
 
 
 def _grid(frontier: "Frontier") -> "Table":
-    counts = ("point", "switches")
-    grid = table((*counts, *_WORDS, *_NUMBERS), (*counts, *_NUMBERS), Text(_title(frontier)))
+    from thenar.compiler.frontier.words import rates_of
+
+    counts, rates = ("point", "switches"), rates_of(frontier)
+    grid = table((*counts, *_WORDS, *rates, *_NUMBERS), (*counts, *rates, *_NUMBERS), Text(_title(frontier)))
     for point in frontier.points:
-        grid.add_row(*_cells(point), style="bold" if point.number == frontier.picked else None)
+        rated = [interval(rate(point)) for rate in rates.values()]
+        grid.add_row(*_cells(point, rated), style="bold" if point.number == frontier.picked else None)
     return grid
 
 
@@ -185,7 +192,7 @@ def _title(frontier: "Frontier") -> str:
     return f"The best of {frontier.combinations:,} combinations, {frontier.source} on {frontier.target}{wanted}"
 
 
-def _cells(point: "Point") -> tuple[Text, ...]:
+def _cells(point: "Point", rated: Sequence[str]) -> tuple[Text, ...]:
     from thenar.compiler.frontier.words import is_usual, training_of, way_of, wiring_of
 
     setting = point.setting
@@ -198,8 +205,8 @@ def _cells(point: "Point") -> tuple[Text, ...]:
         wiring_of(setting),
         setting.scan if setting.clock_hz else "",
         setting.decision,
-        interval(point.rate),
-        interval(point.left_out) if point.left_out is not None else "",
+        *rated,
+        f"{100 * point.luck:.1f}",
         f"{duration(point.frame.us)} {point.frame.how}",
         f"{duration(point.latency.mean_us)}, {duration(point.latency.p99_us)}",
         f"{point.flash:,}",

@@ -26,7 +26,10 @@ COMMANDS = (
 
 # What the extras of pyproject.toml bring, by the names that are imported.
 EXTRAS: Mapping[str, tuple[str, ...]] = {
-    "compiler": ("sklearn", "scipy", "joblib", "matplotlib", "threadpoolctl", "jinja2", "ezdxf", "pandas"),
+    "compiler": (
+        *("sklearn", "scipy", "joblib", "matplotlib", "threadpoolctl", "jinja2", "ezdxf", "clevercsv"),
+        *("python_calamine", "pyarrow", "pandas", "h5py", "defusedxml", "svgelements"),
+    ),
     "cluster": ("dask", "distributed"),
     "sim": ("mujoco",),
     "stability": ("mpmath", "jinja2"),

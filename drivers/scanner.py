@@ -14,6 +14,7 @@ from .scanner_protocol import (
     NO_GRASP,
     Faults,
     Frame,
+    FrameCounts,
     FrameDecoder,
     FromBoard,
     GetState,
@@ -63,22 +64,18 @@ class BoardGrasp(NamedTuple):
     early: bool
 
 
-@dataclass(frozen=True, slots=True)
-class ScannerCounts:
+@dataclass(slots=True)
+class ScannerCounts(FrameCounts):
     """What came in since the board was opened.
 
-    Sound frames; damaged, too short and too long ones; gaps in the numbers of the sound ones; misfits, which were sound
-    but said what this board cannot say. And how often the state was asked for, something being amiss, and the time.
+    Besides frames: gaps in the numbers of the sound ones; misfits, which were sound but said what this board cannot
+    say. And how often the state was asked for, something being amiss, and the time.
     """
 
-    frames: int
-    damaged: int
-    short: int
-    overlong: int
-    gaps: int
-    misfits: int
-    asked: int
-    pings: int
+    gaps: int = 0
+    misfits: int = 0
+    asked: int = 0
+    pings: int = 0
 
 
 # When it came in, in the host's monotonic microseconds, and a sound frame, or None for something that was none.

@@ -16,9 +16,8 @@ from hashlib import blake2b
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.elementary import log, polynomial
+from thenar.compiler.elementary import Floats, log, polynomial
 
-Floats = NDArray[np.float64]
 Words = NDArray[np.uint64]
 
 

@@ -4,6 +4,9 @@ import math
 
 import msgspec
 
+# What most errors are held against.
+REFERENCE = "60 digits"
+
 
 class Finding(msgspec.Struct, frozen=True):
     """One line of the table.

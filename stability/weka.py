@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import Stumps, winners
-from thenar.compiler.elementary import softmax
+from thenar.compiler.elementary import Floats, softmax
 from thenar.drivers.errors import ThenarError
 
 JAR = Path("/usr/share/java/weka.jar")  # where Debian's package puts it
@@ -83,8 +83,6 @@ def _arff(X: NDArray[np.int64], labels: NDArray[np.intp], n_classes: int) -> str
     lines += [",".join([*map(str, row), f"c{label}"]) for row, label in zip(X.tolist(), labels.tolist(), strict=True)]
     return "\n".join([*lines, ""])
 
-
-Floats = NDArray[np.float64]
 
 # Distributions further apart than this have parted: what docs/weka-parity.md calls agreement.
 PARTED = 1e-9

@@ -7,15 +7,21 @@ from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
+from sklearn.model_selection import GroupKFold, StratifiedKFold, cross_val_score
+from sklearn.neighbors import KNeighborsClassifier
+from sklearn.preprocessing import StandardScaler
 
+from thenar.compiler import GraspSet
 from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.drivers.scanner_protocol import DEGRADED, NO_GRASP
 from thenar.runtime import Build
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
-NAMES = sorted(path.name for path in EXAMPLES.glob("*.py"))
+TABLE = EXAMPLES / "home_glove.csv"
+NAMES = sorted(path.name for path in EXAMPLES.glob("*.py") if path.stem != TABLE.stem)
 MOST_LINES = 25
 THENAR = [sys.executable, "-m", "thenar.cli"]
 HARNESS = """\
@@ -150,3 +156,39 @@ def test_replay_recognises_a_recording_as_it_was(bench: Path) -> None:
     assert run(bench, *example("replay.py", "build", "run.mcap")).endswith(
         "200 of 200 frames recognised as they were recorded\n"
     )
+
+
+def test_the_sample_table_is_what_its_script_makes(tmp_path: Path) -> None:
+    run(tmp_path, *example("home_glove.py", "made.csv"))
+    assert (tmp_path / "made.csv").read_bytes() == TABLE.read_bytes()
+    assert TABLE.stat().st_size < 400_000
+
+
+@pytest.fixture(scope="module")
+def home_glove(tmp_path_factory: pytest.TempPathFactory) -> GraspSet:
+    """Return the set that an import of the sample table makes without a word about its columns."""
+    folder = tmp_path_factory.mktemp("home")
+    run(folder, *THENAR, "import", str(TABLE), "-o", "set.grasps", "--yes")
+    return GraspSet.load(folder / "set.grasps")
+
+
+def test_the_sample_table_imports_as_it_is(home_glove: GraspSet) -> None:
+    assert (len(home_glove.element_names), len(home_glove.joints)) == (24, 5)
+    assert (home_glove.taxonomy.name, len({*home_glove.grasps.tolist()})) == ("feix33", 8)
+    people, things = ({*column.tolist()} for column in (home_glove.subjects, home_glove.objects))
+    assert (len(people), len(things)) == (6, 16)
+    assert np.bincount(home_glove.trial_ids).tolist() == [8] * (6 * 16 * 3)
+
+
+def test_folds_that_part_the_frames_of_a_trial_flatter_on_the_sample_table(home_glove: GraspSet) -> None:
+    X = StandardScaler().fit_transform(home_glove.codes)
+    frames, trials, people = (
+        cross_val_score(KNeighborsClassifier(1), X, home_glove.labels, cv=folds, groups=groups).mean()
+        for folds, groups in (
+            (StratifiedKFold(4, shuffle=True, random_state=1), None),
+            (GroupKFold(4), home_glove.trial_ids),
+            (GroupKFold(6), home_glove.subjects),
+        )
+    )
+    assert frames > 0.95
+    assert max(trials, people) < 0.65

@@ -24,9 +24,9 @@ from ..workers import in_workers
 
 # Bytes; a frontier of the largest set answers a few million questions.
 LARGEST = 1 << 30
-HEADER = b'{"thenar":"store of answers","schema":2}\n'
-# Its questions were asked in another form: none of its answers can be found again.
-OLD_HEADER = HEADER.replace(b"2}", b"1}")
+HEADER = b'{"thenar":"store of answers","schema":3}\n'
+# Their questions and answers have another form: none of them can be found again.
+OLD_HEADERS = (HEADER.replace(b"3}", b"1}"), HEADER.replace(b"3}", b"2}"))
 
 # Where a function runs: on the cluster, if there is one; in workers on this machine, whose tools it asks; in this very
 # process, because it measures this machine, whose name is then part of the question.
@@ -196,7 +196,7 @@ class Store:
         """Take the answers in `data`; return how many of its bytes are worth keeping."""
         if HEADER.startswith(data):
             return 0  # new, or killed while the header was written
-        self.renewed = data.startswith(OLD_HEADER)
+        self.renewed = data.startswith(OLD_HEADERS)
         if self.renewed:
             return 0
         if not data.startswith(HEADER):

@@ -1,14 +1,20 @@
 """From finalists to points: every way to build each of them, how each decides, and those that are on a front."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from ..evaluation.luck import Draws
+from ..evaluation.rates import Rate
 from .equipment import NO_TIME
 from .finalists import Close
 from .latency import POLICIES
 from .points import DecisionKind, Latency, Point, Recipe, Scan, Time, front
 from .price import PricedTables, Wired
-from .search import Search
+from .screen import Screened
+from .search import Search, Shape
+from .survey import Cuts, Judged
 from .timing.classify_times import Classified
 
 
@@ -29,9 +35,14 @@ class Design:
     measured: Time | None = None
 
     @property
+    def judged(self) -> Judged:
+        """What these tables recognise, as the points are chosen by it."""
+        return self.close.tables[self.tables.tabled]
+
+    @property
     def rate(self) -> float:
-        """What these tables recognise."""
-        return self.close.rates[self.tables.tabled].mean
+        """The share of it."""
+        return self.judged.rate.mean
 
     @property
     def n_switches(self) -> int:
@@ -95,6 +106,44 @@ def best_designs(several: Sequence[Design]) -> tuple[list[Design], list[Design]]
     return by_time, front(cheapest, lambda design: design.n_switches, lambda design: design.rate)
 
 
+def lucks(
+    fronts: tuple[Sequence[Design], Sequence[Design]],
+    several: Sequence[Design],
+    screened: Sequence[Screened],
+    cuts: Cuts,
+    seed: int,
+) -> dict[Judged, float]:
+    """Return by how much tables on the fronts of frame time and of the number of switches look better than they are.
+
+    A point is the best of all that cost less than the next point of its front: it was picked from these, tables of
+    finalists and placements that were screened alone. Of two fronts the greater luck counts.
+    """
+    quickest: dict[tuple[Close, Shape], float] = {}
+    for design in several:
+        key = (design.close, design.tables.tabled.shape)
+        quickest[key] = min(design.frame.us, quickest.get(key, np.inf))
+    closes = list(dict.fromkeys(design.close for design in several))
+    chosen = {close.screened.choice for close in closes}
+    picked_from = [
+        (judged, quickest[close, tabled.shape], len(close.screened.columns))
+        for close in closes
+        for tabled, judged in close.tables.items()
+        if (close, tabled.shape) in quickest
+    ]
+    picked_from += [(one.judged, one.frame_us, len(one.columns)) for one in screened if one.choice not in chosen]
+    judged, *costs = zip(*picked_from, strict=True)
+    most = max(each.repeats for each in judged)
+    hits = np.array([each.hits * (most // each.repeats) for each in judged])
+    draws = Draws.of(hits, cuts.people if cuts.by == "new subject" else np.arange(hits.shape[1]), seed)
+    found: dict[Judged, float] = {}
+    prices: tuple[Callable[[Design], float], ...] = (lambda design: design.frame.us, lambda design: design.n_switches)
+    for best, price, cost in zip(fronts, prices, costs, strict=True):
+        limits = [*(price(design) for design in best[1:]), np.inf]
+        for design, luck in zip(best, draws.luck(np.array(cost), limits), strict=True):
+            found[design.judged] = max(luck, found.get(design.judged, 0.0))
+    return found
+
+
 def _effort(design: Design) -> tuple[float, ...]:
     parts = (design.wired.scan.chips, design.wired.scan.ports) if design.wired else (0, 0)
     return (*parts, design.scan.us, design.classified.flash, design.tables.tabled.rounds)
@@ -117,17 +166,18 @@ def _identity(design: Design) -> tuple[object, ...]:
 
 
 def points_of(
-    several: Sequence[Design], latencies: Latencies, names: Sequence[str], search: Search
+    several: Sequence[Design], latencies: Latencies, luck: Mapping[Judged, float], names: Sequence[str], search: Search
 ) -> tuple[Point, ...]:
     """Return those that are on a front, numbered from the fastest frame on.
 
+    luck   by how much the rate of each is to be corrected
     names  of all switches of the set
     """
     fronts = _fronts(several, latencies)
     ordered = sorted(several, key=lambda design: (design.frame.us, design.n_switches))
     found = [(design, kind) for design in ordered for kind in design.decisions if fronts[design, kind]]
     return tuple(
-        _point(number, design, kind, latencies[design, kind], fronts[design, kind], names, search)
+        _point(number, design, kind, latencies[design, kind], luck[design.judged], fronts[design, kind], names, search)
         for number, (design, kind) in enumerate(found, 1)
     )
 
@@ -144,11 +194,18 @@ def _fronts(several: Sequence[Design], latencies: Latencies) -> dict[tuple[Desig
     return found
 
 
+def corrected(rate: Rate, luck: float) -> Rate:
+    """Return the rate of a point that was picked for it."""
+    mean, low, high = (max(each - luck, 0.0) for each in (rate.mean, rate.low, rate.high))
+    return replace(rate, mean=mean, low=low, high=high)
+
+
 def _point(
     number: int,
     design: Design,
     kind: DecisionKind,
     latency: Latency,
+    luck: float,
     fronts: tuple[str, ...],
     names: Sequence[str],
     search: Search,
@@ -171,8 +228,10 @@ def _point(
             **search.trained,
         ),
         switches=tuple(names[column] for column in close.screened.columns),
-        rate=close.rates[tabled],
-        left_out=None if close.left_out is None else close.left_out[tabled],
+        rate=corrected(design.judged.rate, luck),
+        luck=luck,
+        frames=close.frames.get(tabled),
+        beside=close.beside.get(tabled),
         scan=design.scan,
         transfer=design.transfer,
         classify=design.classify,

@@ -1,19 +1,19 @@
 """Finalists: which placements are worth a close look, and that look: all rounds and shapes of tables, in all folds."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 from math import log
 
-import numpy as np
-
 from thenar.runtime.manifest import Inputs
 
-from .points import STEP, Rate, front
+from ..evaluation.folds import Fold
+from ..evaluation.rates import Rate
+from .points import STEP, By, front
 from .price import PricedTables, Tabled, price
-from .screen import Screened, rate_of
+from .screen import Screened
 from .search import SHAPES, Candidate, Search, Shape
-from .survey import Survey, Tally
+from .survey import Cuts, Judged, Survey, Tally
 
 # Of what the best recognises; the least gain that counts on a front of rates that were screened; what is level.
 _USEFUL, _STEP, _LEVEL = 0.75, 0.003, 0.005
@@ -27,15 +27,16 @@ _DEEPER = 0.002
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Close:
-    """A finalist: what it recognises after every stage (by the ensemble) and with each of the tables; with a subject
-    left out, by the same tables (None: only one subject); what the tables worth building cost; how long choosing its
-    switches took.
+    """A finalist: what it recognises after every stage (by the ensemble) and with each of the tables; by the same
+    tables single frames (none: a trial has one), and trials in the other folds (none: only one subject); what the
+    tables worth building cost; how long choosing its switches took.
     """
 
     screened: Screened
     stages: dict[int, Rate]
-    rates: dict[Tabled, Rate]
-    left_out: dict[Tabled, Rate] | None
+    tables: dict[Tabled, Judged]
+    frames: dict[Tabled, Rate]
+    beside: dict[Tabled, Rate]
     priced: tuple[PricedTables, ...]
     choosing_s: float
 
@@ -48,8 +49,8 @@ def finalists(screened: Sequence[Screened], wanted: Sequence[Candidate], most: i
     always the one whose share of errors and frame time are least like those of any chosen. Choices of the same inputs
     and switches count once; those that recognise less than three quarters of what the best does are of no use.
     """
-    enough = _USEFUL * max((one.rate.mean for one in screened), default=0.0)
-    useful = [one for one in _different(screened) if one.rate.mean >= enough]
+    enough = _USEFUL * max((one.mean for one in screened), default=0.0)
+    useful = [one for one in _different(screened) if one.mean >= enough]
     pool = _fronts(useful)
     queues = [_spread([one for one in pool if one.choice.inputs == kind]) for kind in _kinds(pool)]
     turns = [one for turn in zip_longest(*queues) for one in turn if one is not None]
@@ -63,10 +64,10 @@ def _kinds(screened: Sequence[Screened]) -> list[Inputs]:
 
 def _fronts(screened: Sequence[Screened]) -> list[Screened]:
     """Return what is on a front, in its order."""
-    found = front(screened, lambda one: one.frame_us, lambda one: one.rate.mean, _STEP)
+    found = front(screened, lambda one: one.frame_us, lambda one: one.mean, _STEP)
     for kind in _kinds(screened):
         mine = [one for one in screened if one.choice.inputs == kind]
-        found += front(mine, lambda one: len(one.columns), lambda one: one.rate.mean, _STEP)
+        found += front(mine, lambda one: len(one.columns), lambda one: one.mean, _STEP)
     known = {id(one) for one in found}
     return [one for one in screened if id(one) in known]
 
@@ -75,8 +76,8 @@ def _spread(mine: list[Screened]) -> list[Screened]:
     """Return all of `mine` in the order in which they are worth a closer look."""
     if not mine:
         return []
-    best = max(mine, key=lambda one: one.rate.mean)
-    level = [one for one in mine if one.rate.mean >= best.rate.mean - _LEVEL]
+    best = max(mine, key=lambda one: one.mean)
+    level = [one for one in mine if one.mean >= best.mean - _LEVEL]
     order = list(dict.fromkeys([best, min(level, key=lambda one: len(one.columns))]))
     left = [one for one in mine if one not in order]
     while left:
@@ -91,7 +92,7 @@ def _unlike(one: Screened, other: Screened) -> float:
 
 def _errors(one: Screened) -> float:
     """Return how many errors are made, on a scale on which halving them counts the same everywhere."""
-    return log(1.0 - one.rate.mean + _FEWEST)
+    return log(1.0 - one.mean + _FEWEST)
 
 
 def _different(screened: Sequence[Screened]) -> list[Screened]:
@@ -107,34 +108,32 @@ def look_closely(survey: Survey, chosen: Sequence[Screened]) -> tuple[Close, ...
     search, cuts, choices = survey.search, survey.cuts, [one.choice for one in chosen]
     survey.choose("finalists' placements", choices, cuts.others)
     fits = survey.fit("finalists", choices, cuts.screening, search.stages, search.tabled, SHAPES)
-    depths = {choice: depth_of(search, [fits[choice, fold] for fold in cuts.screening]) for choice in choices}
+    rows = len(cuts.trials)
+    depths = {choice: depth_of(search, [fits[choice, fold] for fold in cuts.screening], rows) for choice in choices}
     for depth in dict.fromkeys(depths.values()):
         alike = [choice for choice in choices if depths[choice] == depth]
         fits |= survey.fit(further(depth), alike, cuts.others, depth.stages, depth.tabled, SHAPES)
-    rated = []
-    for one in chosen:
-        depth = depths[one.choice]
-        repeats = [[fits[one.choice, fold] for fold in folds] for folds in cuts.repeats]
-        left_out = [[fits[one.choice, fold] for fold in cuts.subjects]] if cuts.subjects else None
-        rates, alone = _tabled(depth, repeats), None if left_out is None else _tabled(depth, left_out)
-        rated.append((one, _staged(depth, repeats), rates, alone))
+    judged = {
+        choice: _judged(cuts, depth, {fold: fits[choice, fold] for fold in (*cuts.screening, *cuts.others)})
+        for choice, depth in depths.items()
+    }
     calls = [
         price.call(
             PRICE_S,
             survey.inputs(one.choice.joints),
             tuple(survey.switch_names[column] for column in one.columns),
             one.columns,
-            tuple(dict.fromkeys([*worthwhile(rates), papers_tables(search)])),
+            tuple(dict.fromkeys([*worthwhile(judged[one.choice][1]), papers_tables(search)])),
             search.training,
             survey.equipment,
             cuts.screening[0],
         )
-        for one, _, rates, _ in rated
+        for one in chosen
     ]
     prices = survey.cache.ask("prices", calls)
     return tuple(
-        Close(one, stages, rates, left_out, priced, survey.choosing_s(one.choice))
-        for (one, stages, rates, left_out), priced in zip(rated, prices, strict=True)
+        Close(one, *judged[one.choice], priced, survey.choosing_s(one.choice))
+        for one, priced in zip(chosen, prices, strict=True)
     )
 
 
@@ -153,38 +152,51 @@ def further(search: Search) -> str:
     return f"finalists, {search.stages[-1]} rounds"
 
 
-def depth_of(search: Search, fits: Sequence[Tally]) -> Search:
-    """Return how far a placement is worth following, by what the folds of the first repeat say."""
+def depth_of(search: Search, fits: Sequence[Tally], rows: int) -> Search:
+    """Return how far a placement is worth following, by the folds of the first repeat, of `rows` rows."""
     few = papers_depth(search)
-    correct = np.sum([fit.correct for fit in fits], axis=0)
-    total = sum(fit.total for fit in fits)
-    return search if correct.max() > correct[: len(few.stages)].max() + _DEEPER * total else few
+    correct = [
+        sum(int.from_bytes(fit.stages[number]).bit_count() for fit in fits) for number in range(len(search.stages))
+    ]
+    gained = max(correct) - max(correct[: len(few.stages)])
+    return search if gained > _DEEPER * rows else few
 
 
-def worthwhile(rates: dict[Tabled, Rate]) -> tuple[Tabled, ...]:
+def worthwhile(tables: Mapping[Tabled, Judged]) -> tuple[Tabled, ...]:
     """Return, for each shape, the tables of the fewest rounds that recognise as well as any of that shape."""
     found = []
-    for shape in dict.fromkeys(tabled.shape for tabled in rates):
-        mine = {tabled: rate.mean for tabled, rate in rates.items() if tabled.shape == shape}
+    for shape in dict.fromkeys(tabled.shape for tabled in tables):
+        mine = {tabled: judged.rate.mean for tabled, judged in tables.items() if tabled.shape == shape}
         best = max(mine.values())
         found.append(min((tabled for tabled in mine if mine[tabled] >= best - STEP), key=lambda tabled: tabled.rounds))
     return tuple(found)
 
 
-def _staged(search: Search, repeats: Sequence[Sequence[Tally]]) -> dict[int, Rate]:
-    return {
-        stage: _rate(repeats, [[fit.correct[number] for fit in fits] for fits in repeats])
-        for number, stage in enumerate(search.stages)
-    }
-
-
-def _tabled(search: Search, repeats: Sequence[Sequence[Tally]]) -> dict[Tabled, Rate]:
-    return {
-        Tabled(rounds, Shape(*shape)): _rate(repeats, [[fit.deployed[row][column] for fit in fits] for fits in repeats])
+def _judged(
+    cuts: Cuts, search: Search, fits: Mapping[Fold, Tally]
+) -> tuple[dict[int, Rate], dict[Tabled, Judged], dict[Tabled, Rate], dict[Tabled, Rate]]:
+    """Return what a finalist recognises, as Close has it: after every stage; with each of the tables, of trials and of
+    frames; and with them in the other folds.
+    """
+    places = {
+        Tabled(rounds, Shape(*shape)): (row, column)
         for row, rounds in enumerate(search.tabled)
         for column, shape in enumerate(SHAPES)
     }
 
+    def tables(by: By) -> dict[Tabled, Judged]:
+        return {
+            each: cuts.judged(by, {fold: fit.tables[row][column] for fold, fit in fits.items()})
+            for each, (row, column) in places.items()
+        }
 
-def _rate(repeats: Sequence[Sequence[Tally]], correct: Sequence[Sequence[int]]) -> Rate:
-    return rate_of(tuple(map(sum, correct)), sum(fit.total for fit in repeats[0]))
+    stages = {
+        stage: cuts.judged(cuts.by, {fold: fit.stages[number] for fold, fit in fits.items()}).rate
+        for number, stage in enumerate(search.stages)
+    }
+    frames = {
+        each: cuts.frames({fold: fit.frames[row][column] for fold, fit in fits.items()})
+        for each, (row, column) in (places.items() if len(cuts.people) < len(cuts.trials) else ())
+    }
+    beside = {} if cuts.beside is None else {each: judged.rate for each, judged in tables(cuts.beside).items()}
+    return stages, tables(cuts.by), frames, beside

@@ -13,6 +13,7 @@ from thenar.runtime.build import Build
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.names import list_names
 
+from ..evaluation.rates import Rate
 from ..limits import check_inputs, check_memory, check_types
 from ..placement.methods.base import BEST, METHODS, PAPERS, usual
 from ..placement.ports import ports_of_whole_glove
@@ -20,15 +21,14 @@ from ..publication import check_folder, entries, publish_folder
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from .cache import Cache, Report, Store
-from .designs import Design, Latencies, best_designs, designs, points_of, with_whole_scans
+from .designs import Design, Latencies, best_designs, designs, lucks, points_of, with_whole_scans
 from .equipment import Equipment, equipment_for
 from .finalists import PRICE_S, Close, finalists, further, look_closely, papers_depth, papers_tables
 from .latency import Pace, latencies
 from .measure import TRIAL_S, measured
-from .movements import holds_movements
 from .plots import PICTURES, pictures
 from .points import SCHEMA, Frontier, FrontierError, Mark, Point, Tried, Way, frontier_to_bytes
-from .screen import QUICK_PRICE_S, Screened, rate_of, screen
+from .screen import QUICK_PRICE_S, Screened, screen
 from .search import SHAPES, Candidate, Search, available_inputs, curve_ways, ways
 from .stream import Stream, stream_of
 from .survey import Cuts, Survey, fit_s, path_s
@@ -71,7 +71,8 @@ class Wanted:
         single = [point for point in points if point.setting.decision == "single"]
         if self.budget_us is not None:
             quick = [point for point in single if point.frame.us <= self.budget_us]
-            return max(quick, key=lambda point: (point.rate.mean, -point.frame.us), default=None)
+            # As its luck was found: by the rates that the points were chosen by.
+            return max(quick, key=lambda point: (point.rate.mean + point.luck, -point.frame.us), default=None)
         good = [point for point in single if self.rate is not None and point.rate.mean >= self.rate]
         return min(good, key=lambda point: (point.frame.us, -point.rate.mean), default=None)
 
@@ -94,13 +95,13 @@ def find_frontier(
 ) -> Frontier:
     """Find what accuracy costs in time: which switches, joints, rounds, tables, wirings and decisions are worth it.
 
-    Every placement is screened by an honest cross-validation; those near the front are looked at closely, priced for
+    Every placement is screened by a nested cross-validation; those near the front are looked at closely, priced for
     the target, and simulated there.
 
     Parameters
     ----------
     grasp_set : GraspSet
-        Single trials, of at least two grasp types.
+        Recordings of at least two grasp types; folds part no trial.
     output : Path, optional
         Folder for frontier.json, frontier.csv, three pictures, and the store, from which an interrupted run goes on.
         Without it nothing is written, and nothing is kept.
@@ -131,8 +132,7 @@ def find_frontier(
     Returns
     -------
     Frontier
-        A point's rate is one of those by which the points were chosen, so the best of many is a little lucky; its rate
-        with subjects left out had no say.
+        A point's rate is corrected for the luck of the best of many; see `thenar.compiler.evaluation.luck`.
 
     Raises
     ------
@@ -147,9 +147,9 @@ def find_frontier(
     >>> found = find_frontier(GraspSet.load("set.grasps"), Path("frontier"))  # doctest: +SKIP
     >>> found.points[0].frame.us  # doctest: +SKIP
     """
-    samples = _samples(grasp_set, source)
+    samples = _samples(grasp_set)
     search, lacking = _installed(search or Search(methods=usual(ours=True, wired=harness is not None)))
-    cuts = Cuts.of(samples.labels, grasp_set.subjects, search)
+    cuts = Cuts.of(samples, search)
     ports = ports_of_whole_glove(harness, grasp_set.switch_names)
     with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:
         cache = Cache(store, report or _unheard, jobs=jobs, cluster=cluster)
@@ -169,7 +169,7 @@ def find_frontier(
     return found
 
 
-def _samples(grasp_set: GraspSet, source: str) -> Samples:
+def _samples(grasp_set: GraspSet) -> Samples:
     """Return the rows of a set, checked before any work."""
     n_types = len(np.unique(grasp_set.labels))
     if n_types < 2:
@@ -178,11 +178,6 @@ def _samples(grasp_set: GraspSet, source: str) -> Samples:
     # All switches at once are tried as well.
     check_inputs(n_types, len(grasp_set.switch_names), len(grasp_set.joints), FrontierError)
     check_memory(len(grasp_set), n_types, FrontierError)
-    if holds_movements(grasp_set):
-        raise FrontierError(
-            f"{source} holds whole movements, every frame a row: rows of one would be trained on and tested; give a "
-            "set of single trials, and this one with --stream"
-        )
     return Samples.of(grasp_set)
 
 
@@ -282,7 +277,8 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
     every = [design for close in closes for design in designs(close, survey.equipment.joints)]
     by_time, by_switches = best_designs(every)
     kept, checks, skipped = measured(with_whole_scans([*by_time, *by_switches]), survey.equipment, survey.cache)
-    points = points_of(kept, _latencies(survey, stream, kept), survey.switch_names, search)
+    luck = lucks((by_time, by_switches), every, screened, survey.cuts, search.seed)
+    points = points_of(kept, _latencies(survey, stream, kept), luck, survey.switch_names, search)
     picked, tried = wanted.pick(points), _tried(screened, closes, search)
     early = [_EARLY] if any(design.scan_kind == "early" for design in kept) else []
     return Frontier(
@@ -291,7 +287,9 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
         source=survey.source,
         fingerprint=survey.grasp_set.fingerprint(),
         rows=len(survey.samples.labels),
-        subjects=len(np.unique(survey.grasp_set.subjects)),
+        trials=len(survey.cuts.people),
+        subjects=len(np.unique(survey.cuts.people)),
+        by=survey.cuts.by,
         n_switches=n_switches,
         n_joints=survey.n_joints,
         grasps=survey.samples.grasps,
@@ -339,7 +337,7 @@ def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latenc
 
 def _tried(screened: Sequence[Screened], closes: Sequence[Close], search: Search) -> tuple[Tried, ...]:
     """Return everything that was screened, and the finalists after every stage of their training."""
-    first = [(one, search.screened, one.rate) for one in screened]
+    first = [(one, search.screened, one.judged.rate) for one in screened]
     then = [(close.screened, rounds, rate) for close in closes for rounds, rate in close.stages.items()]
     staged = search.staged
     return tuple(
@@ -376,7 +374,7 @@ def marks_of(named: dict[Candidate, str], closes: Sequence[Close], survey: Surve
             priced = next(tables for tables in close.priced if tables.tabled == tabled)
             us = priced.fastest_us(survey.equipment.joints.us if screened.choice.joints else 0.0)
             if us is not None:
-                found.append(Mark(named[screened.choice], len(screened.columns), close.rates[tabled], us))
+                found.append(Mark(named[screened.choice], len(screened.columns), close.tables[tabled].rate, us))
     return tuple(found)
 
 
@@ -401,7 +399,7 @@ def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
     codes = grasp_set.codes[:, _places(joints, [joint.name for joint in grasp_set.joints], folder)]
     scans = [scan_times(names, build.tables, wiring, bits, codes, equipment.beside).full_us for wiring in fitting]
     frame_us = max(min(scans, default=0.0), equipment.joints.us * bool(joints)) + options[0].us
-    return Mark(f"build {folder.name}", len(names), rate_of((rate.correct,), rate.total), frame_us)
+    return Mark(f"build {folder.name}", len(names), Rate.counted((rate.correct,), rate.total, of="pooled"), frame_us)
 
 
 def _places(names: Sequence[str], there: Sequence[str], folder: Path) -> list[int]:

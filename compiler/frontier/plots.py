@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from thenar.runtime.manifest import Inputs
 
+from ..evaluation.rates import Rate
 from ..pictures import on_paper, painting, rendered
 from ..text import counted, duration, percent
 from .labels import FAINT, LINE, Label, Labels
-from .points import Curve, Frontier, Mark, Point, Rate, Tried, front
+from .points import Curve, Frontier, Mark, Point, Tried, front
 from .words import featured, inputs_of, shorten
 
 if TYPE_CHECKING:
@@ -118,7 +119,9 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
     points = [(max(x, _LOWEST), point) for point in frontier.points if (x := cost.of_point(point)) is not None]
     ends = [(x, end, point) for x, point in points if (end := cost.end(point)) is not None]
     curves = () if cost.is_time else frontier.curves
-    _scale_rates(axes, [*(point.rate for _, point in points), *(mark.rate for _, mark in marks), *_shown(curves)])
+    _scale_rates(
+        axes, [*(point.rate for _, point in points), *(mark.rate for _, mark in marks), *_shown(curves)], frontier.by
+    )
     lowest = axes.get_ylim()[0]
     tried = [
         (max(x, _LOWEST), each)
@@ -172,9 +175,9 @@ def _sheet(frontier: Frontier, title: str) -> tuple["Figure", "Axes"]:
     figure = Figure(figsize=(_WIDTH, _HEIGHT), dpi=144, facecolor=_WHITE)
     left, right, bottom, top = _LEFT / _WIDTH, _RIGHT / _WIDTH, _BOTTOM / _HEIGHT, _TOP / _HEIGHT
     under = (
-        f"{shorten(frontier.source)}: {frontier.rows:,} grasps of {counted(frontier.subjects, 'person', 'people')}, "
+        f"{shorten(frontier.source)}: {frontier.trials:,} trials of {counted(frontier.subjects, 'person', 'people')}, "
         f"{len(frontier.grasps)} types; {shorten(frontier.target)}; "
-        f"{frontier.folds} folds x {frontier.repeats}, placement inside the fold, 95 % intervals"
+        f"placement inside the fold, corrected for luck, 95 % intervals"
     )
     figure.text(left, 1 - 0.30 / _HEIGHT, title, fontsize=13, fontweight="bold", color=_INK)
     figure.text(left, 1 - 0.53 / _HEIGHT, under, fontsize=FONT, color=_GREY)
@@ -218,7 +221,7 @@ def _scale_counts(axes: "Axes", most: int) -> None:
     axes.minorticks_off()
 
 
-def _scale_rates(axes: "Axes", shown: Sequence[Rate]) -> None:
+def _scale_rates(axes: "Axes", shown: Sequence[Rate], by: str) -> None:
     """Make the vertical axis one of rates, from the least of `shown` to the greatest, whiskers and all."""
     low = min((rate.low for rate in shown), default=0.0)
     high = max((rate.high for rate in shown), default=1.0)
@@ -226,7 +229,7 @@ def _scale_rates(axes: "Axes", shown: Sequence[Rate]) -> None:
     bottom, top = axes.set_ylim(max(low - room, -0.02), high + 1.6 * room)
     ticks = [tick for tick in axes.get_yticks() if max(bottom, -1e-9) <= tick <= min(top, 1 + 1e-9)]
     axes.set_yticks(ticks, [f"{100 * tick:.3g} %" for tick in ticks])
-    axes.set_ylabel("grasps recognised", color=_INK)
+    axes.set_ylabel(f"accuracy: trials, {by}", color=_INK)
 
 
 def _draw_key(axes: "Axes") -> None:

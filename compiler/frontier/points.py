@@ -10,7 +10,9 @@ from thenar.drivers.errors import ThenarError
 from thenar.runtime.manifest import Inputs, Name, Options, TableBits, Value
 from thenar.runtime.names import fault, shortened
 
-SCHEMA = 1
+from ..evaluation.rates import Rate
+
+SCHEMA = 2
 MAX_BYTES = 64 << 20
 
 # measured: wall time on this machine. simulated: cycles of the real firmware in a simulator. wire: arithmetic of clocks
@@ -19,6 +21,8 @@ MAX_BYTES = 64 << 20
 How = Literal["measured", "simulated", "wire", "model", "given", "unknown"]
 Scan = Literal["full", "early"]
 DecisionKind = Literal["single", "dwell", "sequential"]
+# What a rate is of: subjects who are left out, or rows of everybody in random folds of whole trials.
+By = Literal["new subject", "pooled"]
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 Count = Annotated[int, Meta(ge=0, le=2**53)]
 # Microseconds; a day has 1e11 of them.
@@ -33,14 +37,6 @@ STEP = 0.0005
 
 class FrontierError(ThenarError, ValueError):
     """A frontier cannot be computed as asked, or a file is none."""
-
-
-class Rate(Struct, frozen=True, forbid_unknown_fields=True):
-    """A recognition rate and its 95 % interval, in 0..1."""
-
-    mean: Share
-    low: Share
-    high: Share
 
 
 class Time(Struct, frozen=True, forbid_unknown_fields=True):
@@ -101,7 +97,10 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     number      what `compile --from frontier.json --point` takes
     switches    names of the kept switches, in the order in which they were chosen from all rows
-    rate        honest, repeated folds; left_out: each subject recognised from the others (None: only one subject)
+    rate        of new subjects, or pooled: what the point was chosen by, less its luck
+    luck        by how much it looked better, as the best of all that was tried (`evaluation.luck`)
+    frames      the same of single frames, as it came out (None: a trial has one frame)
+    beside      the other of the two, as it came out (None: only one subject)
     scan        reading the switches (the mean where it ends early); transfer: the joints
     frame       max(scan, transfer) + classify: the two lie on lines of their own
     flash, ram  bytes of the classifier on its target; of the tables alone on host and pi
@@ -112,7 +111,9 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     setting: Recipe
     switches: tuple[str, ...]
     rate: Rate
-    left_out: Rate | None
+    luck: Share
+    frames: Rate | None
+    beside: Rate | None
     scan: Time
     transfer: Time
     classify: Time
@@ -172,6 +173,7 @@ class Mark(Struct, frozen=True, forbid_unknown_fields=True):
 class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """All that `thenar frontier` found.
 
+    by       what points are chosen by, and each `rate` is of; a point's `beside` is of the other
     picked   number of the point that suits the budget or the rate asked for; None where nothing was asked
     skipped  sentences: what could not be measured here, and what was left out
     """
@@ -181,7 +183,9 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     source: str
     fingerprint: str
     rows: Count
+    trials: Count
     subjects: Count
+    by: By
     n_switches: Count
     n_joints: Count
     grasps: tuple[str, ...]
@@ -197,6 +201,13 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     skipped: tuple[str, ...]
     picked: int | None = None
     wanted: str = ""
+
+    @property
+    def beside(self) -> By | None:
+        """What the other rate of each point is of."""
+        if self.subjects < 2:
+            return None
+        return "pooled" if self.by == "new subject" else "new subject"
 
     def point(self, number: int) -> Point:
         """Return the point of that number. Raises FrontierError."""
@@ -239,6 +250,8 @@ def frontier_from_bytes(data: bytes, what: str = "frontier.json") -> Frontier:
     schema = _decode(data, _Version, what).schema
     if schema > SCHEMA:
         raise FrontierError(f"{what} has schema {schema}, this thenar reads up to {SCHEMA}: update thenar")
+    if schema < SCHEMA:
+        raise FrontierError(f"{what} is an older thenar's, whose rates were of rows: run thenar frontier again")
     frontier = _decode(data, Frontier, what)
     for name in {*frontier.grasps, *(name for point in frontier.points for name in point.switches)}:
         if reason := fault(name):
@@ -254,6 +267,11 @@ def _contradictions(frontier: Frontier) -> Iterator[str]:
         yield "does not number its points 1, 2, 3 and so on"
     if frontier.picked is not None and not 1 <= frontier.picked <= len(frontier.points):
         yield f"picked point {frontier.picked}, which it does not have"
+    rates = [rate for point in frontier.points for rate in (point.rate, point.frames, point.beside)]
+    rates += [each.rate for each in frontier.tried] + [mark.rate for mark in frontier.marks]
+    rates += [rate for curve in frontier.curves for rate in curve.rates]
+    if not all(rate is None or 0 <= rate.low <= rate.mean <= rate.high <= 1 for rate in rates):
+        yield "has a rate that is no share"
     if any(len(curve.sizes) != len(curve.rates) for curve in frontier.curves):
         yield "has a curve of more sizes than rates, or fewer"
     for point in frontier.points:

@@ -3,13 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..evaluation.rates import Rate as Counted
 from ..placement.methods.base import METHODS
 from ..samples import Columns
-from .points import Curve, Rate
+from .points import Curve
 from .price import Tabled, price
 from .search import NO_SWITCHES, Candidate, Shape, available_inputs, curve_ways, ways
-from .survey import Survey
+from .survey import Judged, Survey
 
 # How long a frame takes hardly depends on how many rounds there were: tables of few tell it.
 _TABLED = Tabled(12, Shape(16))
@@ -22,14 +21,13 @@ class Screened:
 
     choice: Candidate
     columns: Columns
-    rate: Rate
+    judged: Judged
     frame_us: float
 
-
-def rate_of(correct: tuple[int, ...], total: int) -> Rate:
-    """Return the rate of so many rows of `total` recognised in each repeat, with its 95 % interval."""
-    counted = Counted.counted(correct, total, of="pooled")
-    return Rate(counted.mean, counted.low, counted.high)
+    @property
+    def mean(self) -> float:
+        """The rate."""
+        return self.judged.rate.mean
 
 
 def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
@@ -47,8 +45,7 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
     fits = survey.fit("screening", shown, cuts.screening, (search.screened,))
     rates = {}
     for choice in shown:
-        mine = [fits[choice, fold] for fold in cuts.screening]
-        rates[choice] = rate_of((sum(fit.correct[-1] for fit in mine),), sum(fit.total for fit in mine))
+        rates[choice] = cuts.judged(cuts.by, {fold: fits[choice, fold].stages[-1] for fold in cuts.screening})
     frames = _frames_us(survey, choices)
     screened = tuple(
         Screened(choice, survey.columns(choice, cuts.everything), rate, frames[choice])
@@ -75,11 +72,11 @@ def _frames_us(survey: Survey, choices: Sequence[Candidate]) -> dict[Candidate, 
     return found
 
 
-def _curve(survey: Survey, name: str, rates: dict[Candidate, Rate]) -> Curve:
+def _curve(survey: Survey, name: str, rates: dict[Candidate, Judged]) -> Curve:
     """Return a method's rates by the mean number of switches that it kept in the folds, switches alone."""
     folds, points = survey.cuts.screening, {}
-    for choice, rate in rates.items():
+    for choice, judged in rates.items():
         if choice.way.method == name and choice.inputs == "switches":
-            points[sum(len(survey.columns(choice, fold)) for fold in folds) / len(folds)] = rate
+            points[sum(len(survey.columns(choice, fold)) for fold in folds) / len(folds)] = judged.rate
     sizes = tuple(sorted(points))
     return Curve(name, METHODS[name].help, METHODS[name].ours, sizes, tuple(points[size] for size in sizes))

@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from thenar.runtime.manifest import Inputs, Options, TableBits
 
@@ -67,6 +67,9 @@ class Search:
         The most rounds that those on the front are trained for. A trainer without stages has one, and trains once.
     finalists : int
         The most placements that are looked at closely.
+    by : {"subject", "trial"}, optional
+        Whether points are chosen by subjects who are left out, or by trials of everybody; none given: by subjects where
+        there are several.
     trainer : str
         What makes the models.
     settings : mapping
@@ -90,6 +93,7 @@ class Search:
     screening: int = 60
     rounds: int = 300
     finalists: int = 12
+    by: Literal["subject", "trial"] | None = None
     trainer: str = "logitboost"
     settings: Mapping[str, Number] = field(default_factory=dict, hash=False)
 

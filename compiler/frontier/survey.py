@@ -1,7 +1,7 @@
-"""What a frontier is computed from: rows and their folds; in these switches are chosen and classifiers trained."""
+"""The rows of a frontier and their folds, in which switches are chosen and classifiers trained."""
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -10,7 +10,8 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from ..boosting.stumps import winners
-from ..evaluation.folds import Fold, Rows, check_cut, leave_one_out, weka_folds
+from ..evaluation.folds import EvaluationError, Fold, Rows, leave_one_out, trial_folds
+from ..evaluation.rates import Rate, decided
 from ..placement.methods.base import METHODS
 from ..placement.ports import PortCosts
 from ..recordings.graspset import GraspSet
@@ -20,7 +21,7 @@ from ..tables.quantise import integer_scores, quantise
 from ..trainers.base import Training
 from .cache import Cache, stored
 from .equipment import Equipment
-from .points import Way
+from .points import By, Way
 from .search import NO_SWITCHES, Candidate, Search, Shape
 
 # Expected seconds of one core, for so many rows: they only say how the time that is left is told.
@@ -28,35 +29,101 @@ _ROWS = 3000
 _ROUND_S, _TABLE_S = 0.009, 0.06
 
 
+# With more subjects, several are left out together.
+_MOST_LEFT_OUT = 10
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Cuts:
-    """All ways in which rows are parted: repeats of stratified folds, and each subject against the others."""
+    """The folds of a set, which keep every trial whole, and how rows (n,) make m trials.
+
+    repeats   stratified folds, which rate points "pooled"; of each seed
+    subjects  folds whose subjects are new to them; none where there is one subject
+    by        which of these points are chosen by
+    trials    (n,) the trial of each row, 0 to m - 1; people (m,) the subject of each trial
+    """
 
     repeats: tuple[tuple[Fold, ...], ...]
     subjects: tuple[Fold, ...]
     everything: Fold
+    by: By
+    trials: Rows
+    people: Rows
 
     @classmethod
-    def of(cls, labels: Rows, subjects: NDArray[np.str_], search: Search) -> "Cuts":
-        """Return those of rows (n,). Raises EvaluationError if there are too few."""
-        check_cut(len(labels), search.folds, "rows")
+    def of(cls, samples: Samples, search: Search) -> "Cuts":
+        """Return the folds that a search asks for. Raises EvaluationError if there is too little to cut."""
+        trials = np.unique(samples.trials, return_inverse=True)[1]
+        people = samples.subjects[np.unique(trials, return_index=True)[1]]
+        several = len(np.unique(people)) > 1
+        if search.by == "subject" and not several:
+            raise EvaluationError(
+                "leaving a subject out needs two or more subjects: ask for trials in place of subjects"
+            )
+        rows, groups = np.arange(len(trials)), np.unique(samples.subjects, return_inverse=True)[1] % _MOST_LEFT_OUT
         seeds = range(search.seed, search.seed + search.repeats)
-        rows = np.arange(len(labels))
         return cls(
-            repeats=tuple(tuple(weka_folds(labels, search.folds, seed)) for seed in seeds),
-            subjects=tuple(leave_one_out(subjects, "subject")) if len(np.unique(subjects)) > 1 else (),
+            repeats=tuple(tuple(trial_folds(samples.labels, trials, search.folds, seed)) for seed in seeds),
+            subjects=tuple(leave_one_out(groups.astype(np.str_), "subject")) if several else (),
             everything=Fold(rows, rows[:0], "all"),
+            by="new subject" if (search.by or "subject") == "subject" and several else "pooled",
+            trials=trials,
+            people=people,
         )
+
+    def folds(self, by: By) -> tuple[tuple[Fold, ...], ...]:
+        """Return the folds of each repeat that such a rate is of."""
+        return (self.subjects,) if by == "new subject" else self.repeats
+
+    @property
+    def beside(self) -> By | None:
+        """The other rate, if there are several subjects."""
+        if not self.subjects:
+            return None
+        return "pooled" if self.by == "new subject" else "new subject"
 
     @property
     def screening(self) -> tuple[Fold, ...]:
-        """The folds of the first repeat."""
-        return self.repeats[0]
+        """The first repeat of those by which points are chosen."""
+        return self.folds(self.by)[0]
 
     @property
     def others(self) -> tuple[Fold, ...]:
         """Every other fold that is tested."""
-        return (*(fold for folds in self.repeats[1:] for fold in folds), *self.subjects)
+        every = (*(fold for folds in self.repeats for fold in folds), *self.subjects)
+        return tuple(fold for fold in every if fold not in self.screening)
+
+    def judged(self, by: By, packed: Mapping[Fold, bytes]) -> "Judged":
+        """Return the rate of that name, by the packed bits of each fold's trials, of the repeats that are there."""
+        repeats = [folds for folds in self.folds(by) if packed.keys() >= set(folds)]
+        hits = np.zeros((len(repeats), len(self.people)), np.intp)
+        for own, folds in zip(hits, repeats, strict=True):
+            for fold in folds:
+                tested = np.unique(self.trials[fold.test])
+                own[tested] = np.unpackbits(np.frombuffer(packed[fold], np.uint8), count=len(tested))
+        everyone = np.arange(len(self.people))
+        groups = self.people if by == "new subject" else None
+        rate = Rate.predicted(hits, np.ones_like(everyone), everyone, of=by, groups=groups)
+        return Judged(rate, hits.sum(axis=0), len(repeats))
+
+    def frames(self, packed: Mapping[Fold, bytes]) -> Rate:
+        """Return the rate of single frames by which points are chosen, by the packed bits of each fold's rows."""
+        by, repeats = self.by, self.folds(self.by)
+        hits = np.zeros((len(repeats), len(self.trials)), np.intp)
+        for own, folds in zip(hits, repeats, strict=True):
+            for fold in folds:
+                own[fold.test] = np.unpackbits(np.frombuffer(packed[fold], np.uint8), count=len(fold.test))
+        groups = self.people[self.trials] if by == "new subject" else None
+        return Rate.predicted(hits, np.ones_like(self.trials), self.trials, of=by, unit="frames", groups=groups)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """A rate of trials, and in how many of `repeats` each trial (m,) was recognised."""
+
+    rate: Rate
+    hits: NDArray[np.intp]
+    repeats: int
 
 
 class Ladder(Struct, frozen=True):
@@ -67,13 +134,15 @@ class Ladder(Struct, frozen=True):
 
 
 class Tally(Struct, frozen=True):
-    """How many of `total` test rows were recognised: after every stage, and by the tables of each shape after each
-    tabled stage (stages x shapes).
+    """Which trials of a fold were recognised, by their numbers, eight to the byte.
+
+    stages  after every stage           tables  by the tables of each shape after each tabled stage (stages x shapes)
+    frames  the same tables' test rows, one by one; "" where each row is a trial of its own
     """
 
-    total: int
-    correct: tuple[int, ...]
-    deployed: tuple[tuple[int, ...], ...]
+    stages: tuple[bytes, ...]
+    tables: tuple[tuple[bytes, ...], ...]
+    frames: tuple[tuple[bytes, ...], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +262,7 @@ def choose_path(
     return Ladder(columns, time.perf_counter() - began)
 
 
-@stored(1)
+@stored(2)
 def fit_stages(
     samples: Samples,
     fold: Fold,
@@ -210,21 +279,28 @@ def fit_stages(
     kept = samples.keeping(columns)
     train, test = kept.rows(fold.train), kept.rows(fold.test)
     if not (train.inputs != train.inputs[0]).any():
-        same = int(np.count_nonzero(test.labels == np.bincount(train.labels).argmax()))
-        return Tally(len(test.labels), (same,) * len(stages), ((same,) * len(shapes),) * len(tabled))
+        same = np.full(len(test.labels), np.bincount(train.labels).argmax())
+        trials, frames = _packed(same, test)
+        return Tally((trials,) * len(stages), *(((each,) * len(shapes),) * len(tabled) for each in (trials, frames)))
     rounds = (*stages, *tabled)
     models = dict(zip(rounds, training.stages(train, rounds), strict=True))
     answers = (winners(model_scores(models[stage], test.switches, test.codes)) for stage in stages)
-    correct = tuple(int(np.count_nonzero(answer == test.labels)) for answer in answers)
+    by_stage = tuple(_packed(answer, test)[0] for answer in answers)
     scores = [collapse(models[stage], kept.n_switches) for stage in tabled]
-    deployed = tuple(tuple(_recognised(each, shape, train, test) for shape in shapes) for each in scores)
-    return Tally(len(test.labels), correct, deployed)
+    told = [[_packed(_answered(each, shape, train, test), test) for shape in shapes] for each in scores]
+    return Tally(by_stage, *(tuple(tuple(each[which] for each in row) for row in told) for which in (0, 1)))
 
 
-def _recognised(scores: ScoreTables, shape: Shape, train: Samples, test: Samples) -> int:
+def _answered(scores: ScoreTables, shape: Shape, train: Samples, test: Samples) -> Rows:
     # The rows trained on have a say in what stands in for lost inputs, which nothing here looks at; in scores only
     # where entries are narrow.
     seen = train if shape.table_bits < 16 else train.rows(np.arange(1))
     tables = quantise(scores, seen.switches, seen.codes, shape.width, shape.table_bits)
-    answers = integer_scores(tables, test.switches, test.codes).argmax(axis=1)
-    return int(np.count_nonzero(answers == test.labels))
+    return np.asarray(integer_scores(tables, test.switches, test.codes).argmax(axis=1))
+
+
+def _packed(answers: Rows, test: Samples) -> tuple[bytes, bytes]:
+    """Return which trials, in the order of their numbers, and which rows were recognised; see Tally."""
+    _, first, trials = np.unique(test.trials, return_index=True, return_inverse=True)
+    right = np.packbits(decided(answers[None], trials)[0] == test.labels[first]).tobytes()
+    return right, np.packbits(answers == test.labels).tobytes() if len(first) < len(trials) else b""

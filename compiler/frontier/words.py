@@ -2,18 +2,32 @@
 
 import csv
 import io
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from thenar.runtime.manifest import Options
 from thenar.runtime.names import printable
 
+from ..evaluation.rates import Rate
 from ..text import cells, counted, duration, interval, listed, percent
-from .points import Frontier, Mark, Point, Rate, Recipe, Time
+from .points import Frontier, Mark, Point, Recipe, Time
 
 COLUMNS = (
     *("number", "fronts", "n_switches", "inputs", "method", "parameter", "rounds", "width", "layout"),
-    *("wiring", "clock_hz", "scan", "decision", "rate", "rate_low", "rate_high"),
-    *("left_out", "left_out_low", "left_out_high", "scan_us", "scan_how", "transfer_us", "transfer_how"),
+    *("wiring", "clock_hz", "scan", "decision", "rate_of", "rate", "rate_low", "rate_high", "luck"),
+    *(
+        "frames_of",
+        "frames",
+        "frames_low",
+        "frames_high",
+        "beside_of",
+        "beside",
+        "beside_low",
+        "beside_high",
+        "scan_us",
+        "scan_how",
+        "transfer_us",
+        "transfer_how",
+    ),
     *("classify_us", "classify_how", "frame_us", "frame_how", "latency_mean_us", "latency_p99_us", "missed", "wrong"),
     *("flash", "ram", "ports", "chips", "compile_s", "switches"),
 )
@@ -91,10 +105,44 @@ def summary(frontier: Frontier) -> str:
         return f"Of {frontier.combinations:,} combinations none is a point of the frontier."
     said = (
         f"Point {point.number}: {_inputs(frontier, point)}, read and classified in {duration(point.frame.us)} "
-        f"on {frontier.target}, recognise {interval(point.rate)} % of the grasps"
+        f"on {frontier.target}, reach {interval(point.rate)} % accuracy ({point.rate.what})"
     )
     against = [_mark(mark) for mark in frontier.marks]
-    return f"{said}, against {listed(against)}." if against else f"{said}."
+    return ". ".join(filter(None, (f"{said}, against {listed(against)}" if against else said, luck_of(point)))) + "."
+
+
+LUCK = (
+    "A point is the best of many, so its rate is corrected for luck by a bootstrap over what was tried; the rates of "
+    "marks, of placements as they were screened and of the curves are not."
+)
+
+
+def folds_of(frontier: Frontier) -> str:
+    """Return how the rates came about by which points are chosen: "new subject: each of 3 subjects left out"."""
+    if frontier.by == "new subject":
+        return f"New subject, trials: the {counted(frontier.subjects, 'subject')} left out in turn"
+    repeats = counted(frontier.repeats, "repeat")
+    return f"Pooled, trials: {counted(frontier.folds, 'fold')} of whole trials, {repeats}"
+
+
+def luck_of(point: Point) -> str:
+    """Return by how much the rate of a point was corrected, and why, in a sentence without a full stop; perhaps ""."""
+    if round(100 * point.luck, 1) == 0:
+        return ""
+    return (
+        f"Cross-validation gave {percent(point.rate.mean + point.luck)}; {100 * point.luck:.1f} points are subtracted, "
+        "because the best of many is picked by its luck, too"
+    )
+
+
+def rates_of(frontier: Frontier) -> dict[str, Callable[[Point], Rate | None]]:
+    """Return the rates that each point has, by what they are of: that by which points are chosen first."""
+    found: dict[str, Callable[[Point], Rate | None]] = {f"{frontier.by}, trials": lambda point: point.rate}
+    if any(point.frames is not None for point in frontier.points):
+        found[f"{frontier.by}, frames"] = lambda point: point.frames
+    if frontier.beside is not None:
+        found[f"{frontier.beside}, trials"] = lambda point: point.beside
+    return found
 
 
 def _inputs(frontier: Frontier, point: Point) -> str:
@@ -115,9 +163,9 @@ def _mark(mark: Mark) -> str:
 def csv_bytes(frontier: Frontier) -> bytes:
     """Return `frontier.csv`: UTF-8, a line of COLUMNS, perhaps with TRAINER_COLUMNS, and a line for each point.
 
-    Rates are in 0..1, times in microseconds (compile_s: seconds), a missing `left_out` is empty. `fronts`, `switches`
-    and `settings` are lists in their cell, parted by semicolons; what holds a semicolon or a quote is quoted as CSV
-    quotes.
+    Rates are in 0..1, times in microseconds (compile_s: seconds); `frames` and `beside` are empty where there are none.
+    `fronts`, `switches` and `settings` are lists in their cell, parted by semicolons; what holds a semicolon or a quote
+    is quoted as CSV quotes.
     """
     file = io.StringIO(newline="")
     rows = csv.writer(file, lineterminator="\n")
@@ -135,7 +183,7 @@ def _values(point: Point) -> Iterator[object]:
     yield from (point.number, _list(point.fronts), len(point.switches), setting.inputs)
     yield from (setting.way.method, setting.way.parameter, setting.rounds, setting.width, setting.layout)
     yield from (setting.wiring, setting.clock_hz, setting.scan, setting.decision)
-    yield from (*_rate(point.rate), *_rate(point.left_out))
+    yield from (*_rate(point.rate), point.luck, *_rate(point.frames), *_rate(point.beside))
     for time in (point.scan, point.transfer, point.classify, point.frame):
         yield from _time(time)
     yield from (latency.mean_us, latency.p99_us, latency.missed, latency.wrong)
@@ -143,7 +191,7 @@ def _values(point: Point) -> Iterator[object]:
 
 
 def _rate(rate: Rate | None) -> tuple[object, ...]:
-    return ("", "", "") if rate is None else (rate.mean, rate.low, rate.high)
+    return ("", "", "", "") if rate is None else (rate.what, rate.mean, rate.low, rate.high)
 
 
 def _time(time: Time) -> tuple[object, ...]:

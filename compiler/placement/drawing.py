@@ -84,8 +84,8 @@ def _draw_box(axes: "Axes", box: tuple[float, float, float, float], label: str, 
     from matplotlib.patches import Rectangle
 
     x, y, width, height = box
-    look = {"facecolor": on_paper("leaf" if leaf else "decision"), "edgecolor": on_paper("paper"), "linewidth": 0.8}
-    axes.add_patch(Rectangle((x, y), width, height, **look))
+    colour = on_paper("leaf" if leaf else "decision")
+    axes.add_patch(Rectangle((x, y), width, height, facecolor=colour, edgecolor=on_paper("paper"), linewidth=0.8))
     axes.text(x + _STEP_INCHES / 3, y + 0.5, label, color=on_paper("ink"), va="center_baseline")
 
 

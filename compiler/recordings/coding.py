@@ -5,11 +5,12 @@ from collections.abc import Iterable
 
 import msgspec
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from thenar.runtime.names import list_names
 
-from .columns import JointColumns
+from .columns import JointColumns, TaxelColumns
 from .errors import TableError, list_rows
 from .graspset import CODES, LARGEST_VALUE, Joint
 from .summary import Finding
@@ -38,6 +39,9 @@ def code_joint(
     Raises TableError naming the first of `rows` whose code lies outside 0..65535; RecordingError if the calibration is
     no straight line.
     """
+    if isinstance(entry, TaxelColumns) and not entry.is_coded:
+        whole = bool((values == np.rint(values)).all()) and values.min() >= 0 and values.max() < CODES
+        entry = replace(entry, codes=True) if whole else replace(entry, grid=sound_grid(values))
     joint = _joint(name, entry, float(values.min()))
     codes = values if entry.codes else joint.code(values)
     outside = (codes < 0) | (codes >= CODES)

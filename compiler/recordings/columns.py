@@ -67,15 +67,28 @@ class JointColumns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
         return DEFAULT_GRID if self.grid is None else self.grid
 
 
-class TaxelColumns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Analog columns that become switches, closed above a threshold: a number, or "otsu", found column by column."""
+class TaxelColumns(JointColumns, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True):
+    """Analog columns that become switches, closed above a threshold: a number, "otsu", found column by column, or
+    "learnt", found by training.
 
-    columns: tuple[str, ...]
-    threshold: float | Literal["otsu"]
+    Until then the latter are codes, as joints are; where nothing is said of them, whole numbers are taken as codes,
+    and others are put on a sound grid.
+    """
+
+    threshold: float | Literal["otsu", "learnt"]
+    unit: str = "counts"
 
     def __post_init__(self) -> None:
-        if self.threshold != "otsu" and not math.isfinite(self.threshold):
-            raise ValueError(f"`threshold` must be a finite number or 'otsu', not {self.threshold}")
+        super().__post_init__()
+        if not isinstance(self.threshold, str) and not math.isfinite(self.threshold):
+            raise ValueError(f"`threshold` must be a finite number, 'otsu' or 'learnt', not {self.threshold}")
+        if self.threshold != "learnt" and self.is_coded:
+            raise ValueError("`codes`, `grid`, `origin` and `calibration` are for a threshold that is 'learnt'")
+
+    @property
+    def is_coded(self) -> bool:
+        """Whether it is said how the columns become codes."""
+        return self.codes or not (self.grid is None and self.origin is None and self.calibration is None)
 
 
 class TextFormat(NamedTuple):
@@ -163,6 +176,12 @@ class Selection:
     switches: tuple[str, ...]
     taxels: tuple[tuple[str, TaxelColumns], ...]
     joints: tuple[tuple[str, JointColumns], ...]
+    learnt: tuple[tuple[str, TaxelColumns], ...] = ()
+
+    @property
+    def coded(self) -> tuple[tuple[str, JointColumns], ...]:
+        """The columns that become codes: the joints, then the taxels whose threshold is learnt."""
+        return (*self.joints, *self.learnt)
 
 
 def read_columns(path: Path) -> Columns:
@@ -198,10 +217,14 @@ def select(columns: Columns, names: Sequence[str]) -> Selection:
         raise ColumnsError(f"column {twice[0]!r} is used {used[twice[0]]} times: name it once, or narrow the globs")
     if not found:
         raise ColumnsError("no column is an input: name some under `switches`, `[[taxels]]` or `[[joints]]`")
+    taxels = [(name, entry) for name, entry in found if isinstance(entry, TaxelColumns)]
     return Selection(
-        tuple(name for name, entry in found if entry is None),
-        tuple((name, entry) for name, entry in found if isinstance(entry, TaxelColumns)),
-        tuple((name, entry) for name, entry in found if isinstance(entry, JointColumns)),
+        switches=tuple(name for name, entry in found if entry is None),
+        taxels=tuple((name, entry) for name, entry in taxels if entry.threshold != "learnt"),
+        joints=tuple(
+            (name, entry) for name, entry in found if entry is not None and not isinstance(entry, TaxelColumns)
+        ),
+        learnt=tuple((name, entry) for name, entry in taxels if entry.threshold == "learnt"),
     )
 
 
@@ -216,7 +239,7 @@ def _check_globs(globs: Sequence[str], names: Sequence[str]) -> None:
         )
 
 
-def _matched(columns: Columns, names: Sequence[str]) -> Iterator[tuple[str, TaxelColumns | JointColumns | None]]:
+def _matched(columns: Columns, names: Sequence[str]) -> Iterator[tuple[str, JointColumns | None]]:
     """Yield each column that a glob finds, with the entry of the taxel or joint that it is, None for a switch."""
     there = frozenset(names)
     for pattern in columns.switches:

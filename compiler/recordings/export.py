@@ -38,7 +38,7 @@ class Heads(NamedTuple):
 
 def heads_of(grasp_set: GraspSet) -> Heads:
     """Return "grasp", "subject", "object", "session", "trial", with an underline where an input has that name."""
-    taken = {*grasp_set.switch_names, *grasp_set.joint_names}
+    taken = {*grasp_set.element_names, *grasp_set.joint_names}
     return Heads(*(_free(name, taken) for name in ("grasp", "subject", "object", "session", "trial")))
 
 
@@ -69,17 +69,18 @@ def columns_of(grasp_set: GraspSet, codes: bool = False, meta: bool = True) -> s
     if grasp_set.switch_names:
         lines.append(f"switches = {_globs(grasp_set.switch_names)}")
     for joints in _alike(grasp_set.joints):
-        lines += ["", *_entry(joints, codes)]
+        lines += ["", "[[joints]]", *_entry(joints, codes)]
+    for taxels in _alike(grasp_set.taxel_columns):
+        lines += ["", "[[taxels]]", 'threshold = "learnt"', *_entry(taxels, codes)]
     return "\n".join([*lines, ""])
 
 
 def _entry(joints: list[Joint], codes: bool) -> list[str]:
-    """Return the [[joints]] entry of joints that are calibrated alike."""
+    """Return the entry of joints, or of taxels, that are calibrated alike."""
     joint = joints[0]
     points = {key: getattr(joint, key) for key in ("code_a", "value_a", "code_b", "value_b")}
     calibration = ", ".join(f"{key} = {number!r}" for key, number in points.items())
     return [
-        "[[joints]]",
         f"columns = {_globs(joint.name for joint in joints)}",
         f"unit = {_text(joint.unit)}",
         *(["codes = true"] if codes else []),
@@ -149,7 +150,7 @@ def to_csv(grasp_set: GraspSet, codes: bool = False, delimiter: str = ",") -> st
     """
     file, heads, meta = io.StringIO(), heads_of(grasp_set), meta_of(grasp_set)
     writer = csv.writer(file, delimiter=delimiter, lineterminator="\n")
-    names = (heads.label, *(getattr(heads, key) for key in meta), *grasp_set.switch_names, *grasp_set.joint_names)
+    names = (heads.label, *(getattr(heads, key) for key in meta), *grasp_set.element_names, *grasp_set.joint_names)
     writer.writerow(map(cell, names))
     who = (cells(column.tolist()) for column in (grasp_set.grasps, *meta.values()))
     writer.writerows(zip(*who, *_inputs(grasp_set, codes), strict=True))
@@ -166,7 +167,7 @@ def to_dataframe(grasp_set: GraspSet, codes: bool = False) -> "pd.DataFrame":
         **{getattr(heads, key): column for key, column in meta_of(grasp_set).items()},
         **dict(zip(grasp_set.switch_names, grasp_set.switches.T, strict=True)),
     }
-    for joint, column in zip(grasp_set.joints, grasp_set.codes.T, strict=True):
+    for joint, column in _coded(grasp_set):
         columns[joint.name] = column if codes else joint.value(column)
     frame = pd.DataFrame(columns)
     frame.attrs[COLUMNS_TOML] = columns_of(grasp_set, codes)
@@ -178,7 +179,7 @@ def to_arff(grasp_set: GraspSet, codes: bool = False, meta: bool = False) -> str
     heads, who = heads_of(grasp_set), meta_of(grasp_set) if meta else {}
     attributes = [f"{_quote(getattr(heads, key))} {_kind(column)}" for key, column in who.items()]
     attributes += [f"{_quote(name)} {{0,1}}" for name in grasp_set.switch_names]
-    attributes += [f"{_quote(name)} numeric" for name in grasp_set.joint_names]
+    attributes += [f"{_quote(joint.name)} numeric" for joint, _ in _coded(grasp_set)]
     attributes.append(f"{_quote(heads.label)} {_nominal(grasp_set.taxonomy.types)}")
     first = ([_quote(str(value)) for value in column.tolist()] for column in who.values())
     rows = zip(*first, *_inputs(grasp_set, codes), map(_quote, grasp_set.grasps.tolist()), strict=True)
@@ -191,11 +192,17 @@ def _kind(column: NDArray[np.generic]) -> str:
 
 
 def _inputs(grasp_set: GraspSet, codes: bool) -> Iterable[Sequence[str]]:
-    """Yield the cells of each switch and each joint."""
+    """Yield the cells of each switch, taxel and joint."""
     for switch in grasp_set.switches.T:
         yield ["1" if bit else "0" for bit in switch.tolist()]
-    for joint, column in zip(grasp_set.joints, grasp_set.codes.T, strict=True):
+    for joint, column in _coded(grasp_set):
         yield [str(code) for code in column.tolist()] if codes else _values(joint, column.tolist())
+
+
+def _coded(grasp_set: GraspSet) -> Iterable[tuple[Joint, NDArray[np.uint16]]]:
+    """Yield the taxels and then the joints, each with its codes (n,)."""
+    yield from zip(grasp_set.taxel_columns, grasp_set.taxels.T, strict=True)
+    yield from zip(grasp_set.joints, grasp_set.codes.T, strict=True)
 
 
 def _values(joint: Joint, codes: list[int]) -> list[str]:

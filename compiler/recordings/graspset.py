@@ -354,14 +354,14 @@ class GraspSet:
         Parameters
         ----------
         codes : bool
-            Give the joints' integer codes (uint16) instead of their values (float64).
+            Give the integer codes (uint16) of joints and taxels instead of their values (float64).
 
         Returns
         -------
         pandas.DataFrame
             One row a frame: "grasp" (a category of the taxonomy's types, in their order), "subject" and "object" (str),
-            "session" (str; only where there are several), "trial" (int64), the switches (bool) and the joints, in the
-            set's order. Where an input has one of these names, the column has an underline behind it.
+            "session" (str; only where there are several), "trial" (int64), the switches (bool), taxels and joints, in
+            the set's order. Where an input has one of these names, the column has an underline behind it.
             `attrs["thenar"]` is the text of a columns.toml: roles, calibrations, taxonomy, what simulated the grasps.
             Parquet keeps it.
 

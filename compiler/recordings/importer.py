@@ -106,7 +106,7 @@ def _switches(reader: "_Reader", selection: Selection, notes: list[str]) -> NDAr
     shown = []
     for number, (name, taxel) in enumerate(selection.taxels, start=len(selection.switches)):
         values = reader.read(name, numbers, "finite numbers")
-        threshold = otsu(values) if taxel.threshold == "otsu" else taxel.threshold
+        threshold = otsu(values) if isinstance(taxel.threshold, str) else taxel.threshold
         switches[:, number] = values > threshold
         shown.append(f"{shortened(name)} above {threshold:g}")
     if shown:
@@ -115,8 +115,9 @@ def _switches(reader: "_Reader", selection: Selection, notes: list[str]) -> NDAr
 
 
 def _joints(reader: "_Reader", selection: Selection) -> NDArray[np.float64]:
-    joints = np.empty((len(reader.table.rows), len(selection.joints)), order="F")
-    for number, (name, entry) in enumerate(selection.joints):
+    """Return what becomes codes: the joints, then the taxels whose threshold is learnt."""
+    joints = np.empty((len(reader.table.rows), len(selection.coded)), order="F")
+    for number, (name, entry) in enumerate(selection.coded):
         parse, expected = (codes, "codes 0..65535") if entry.codes else (numbers, "finite numbers")
         joints[:, number] = reader.read(name, parse, expected)
     return joints
@@ -171,7 +172,7 @@ def _filled(
     """Fill the cells of inputs that are `missing`, in place, and return a finding about them."""
     inputs = [*selection.switches, *(name for name, _ in selection.taxels)]
     arrays: dict[str, NDArray[np.bool_] | NDArray[np.float64]] = dict(zip(inputs, readings.switches.T, strict=True))
-    arrays |= zip((name for name, _ in selection.joints), readings.joints.T, strict=True)
+    arrays |= zip((name for name, _ in selection.coded), readings.joints.T, strict=True)
     masks = {name: mask for name, mask in missing.items() if name in arrays and mask.any()}
     if not masks:
         return []
@@ -319,17 +320,20 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
     selection = select(columns, list(table.columns))
     readings, warnings, notes = read_cells(table, columns, selection)
     grasps, taxonomy, aliases = _labels(table, columns, readings)
-    joints = [
+    coded = [
         code_joint(name, entry, readings.joints[:, column], readings.rows)
-        for column, (name, entry) in enumerate(selection.joints)
+        for column, (name, entry) in enumerate(selection.coded)
     ]
-    costs = tuple(cost for _, _, cost in joints)
+    costs = tuple(cost for _, _, cost in coded)
+    joints, taxels = coded[: len(selection.joints)], coded[len(selection.joints) :]
     empty = np.zeros((len(grasps), 0), np.uint16)
     grasp_set = GraspSet(
         switches=readings.switches,
         switch_names=(*selection.switches, *(name for name, _ in selection.taxels)),
         codes=np.stack([codes for codes, _, _ in joints], axis=1) if joints else empty,
         joints=tuple(joint for _, joint, _ in joints),
+        taxels=np.stack([codes for codes, _, _ in taxels], axis=1) if taxels else empty,
+        taxel_columns=tuple(joint for _, joint, _ in taxels),
         grasps=grasps,
         taxonomy=taxonomy,
         subjects=readings.subjects,

@@ -161,7 +161,9 @@ def propose(table: Table, text: TextFormat = PLAIN, remarks: Sequence[str] = ())
         **text._asdict(),
         switches=_globs((name for role in inputs if role.role == "switches" for name in role.columns), table.columns),
         taxels=tuple(
-            TaxelColumns(_globs(role.columns, table.columns), "otsu") for role in inputs if role.role == "taxels"
+            TaxelColumns(_globs(role.columns, table.columns), threshold="otsu")
+            for role in inputs
+            if role.role == "taxels"
         ),
         joints=tuple(_joints(role, table.columns) for role in inputs if role.role == "joints"),
     )

@@ -12,7 +12,7 @@ from msgspec import Struct
 
 from ..frontier.plots import POINT_ID, RING_ID, pictures
 from ..frontier.points import Frontier, Point, Time
-from ..frontier.words import featured, inputs_of, summary, training_of, way_of, wiring_of
+from ..frontier.words import LUCK, featured, folds_of, inputs_of, rates_of, summary, training_of, way_of, wiring_of
 from ..hand import HandShape
 from ..pictures import PALETTE
 from ..text import DASH, NBSP, counted, interval, microseconds, sentence
@@ -35,7 +35,7 @@ _CAPTIONS = {
     ),
 }
 # Of two names for a colour, the first.
-_COLOURS = {colour: f"var(--{name})" for name, (colour, _) in reversed(PALETTE.items())}
+_COLOURS = {colour: f"var(--{name})" for name, (colour, _) in reversed(list(PALETTE.items()))}
 _TARGET = "9"  # radius of what can be clicked, in units of the pictures
 
 
@@ -84,7 +84,7 @@ def frontier_view(
     """
     if hand is not None and not all(hand.knows(point.switches) for point in frontier.points):
         hand = None
-    details = {point.number: _detail(point, frontier.source, hand) for point in frontier.points}
+    details = {point.number: _detail(point, frontier, hand) for point in frontier.points}
     first = featured(frontier) if built is None else frontier.point(built)
     picked = None if first is None else details[first.number]
     title = "Switches of the picked point on the hand"
@@ -157,24 +157,28 @@ def _make_point(marker: ElementTree.Element, said: str, picked: bool) -> None:
     ElementTree.SubElement(marker, "circle", circle)
 
 
-def _detail(point: Point, source: str, hand: HandShape | None) -> Detail:
+def _detail(point: Point, frontier: Frontier, hand: HandShape | None) -> Detail:
     setting = point.setting
     what = (inputs_of(point), setting.way.method, training_of(setting), f"{setting.width} bits")
     words = ", ".join(filter(None, (*what, _wiring(point))))
     return Detail(
         number=point.number,
-        said=f"Point {point.number}: {words}; {interval(point.rate)} % in {microseconds(point.frame.us)} µs.",
-        facts=tuple(_facts(point)),
+        said=f"Point {point.number}: {words}; {point.rate} in {microseconds(point.frame.us)} µs.",
+        facts=tuple(_facts(point, frontier)),
         switches=point.switches,
         on_hand=() if hand is None else tuple(hand.numbers_of(point.switches).tolist()),
-        command=f"thenar compile {shlex.quote(source)} -o build/ --from frontier/frontier.json --point {point.number}",
+        command=(
+            f"thenar compile {shlex.quote(frontier.source)} -o build/ "
+            f"--from frontier/frontier.json --point {point.number}"
+        ),
     )
 
 
-def _facts(point: Point) -> Iterable[tuple[str, str]]:
+def _facts(point: Point, frontier: Frontier) -> Iterable[tuple[str, str]]:
     setting = point.setting
-    yield "Recognition rate, %", interval(point.rate)
-    yield "Subject left out, %", interval(point.left_out)
+    for what, rate in rates_of(frontier).items():
+        yield f"Accuracy in %, {what}", interval(rate(point))
+    yield "Subtracted for luck", f"{100 * point.luck:.1f} points"
     yield "Placement", _placement(point)
     yield "Inputs", f"{setting.inputs}, {counted(len(point.switches), 'switch', 'switches')}"
     yield "Wiring", f"{_wiring(point)}; {counted(point.ports, 'port')}, {counted(point.chips, 'chip')}"
@@ -212,14 +216,23 @@ def _time(time: Time) -> str:
 
 
 def _points(frontier: Frontier) -> PlainTable:
-    columns = ("Point", "Switches", "Inputs", "Method", "Rate, %", "Frame, µs", "Latency, µs", "99th pct., µs")
+    columns = (
+        "Point",
+        "Switches",
+        "Inputs",
+        "Method",
+        *rates_of(frontier),
+        "Frame, µs",
+        "Latency, µs",
+        "99th pct., µs",
+    )
     rows = tuple(
         (
             str(point.number),
             str(len(point.switches)),
             point.setting.inputs,
             _placement(point),
-            interval(point.rate),
+            *(interval(rate(point)) for rate in rates_of(frontier).values()),
             microseconds(point.frame.us),
             *_latency(point),
             f"{100 * point.latency.missed:.1f}",
@@ -227,7 +240,7 @@ def _points(frontier: Frontier) -> PlainTable:
         )
         for point in frontier.points
     )
-    caption = f"Points of the frontier; rates with 95{NBSP}% intervals"
+    caption = f"Points of the frontier; accuracy in % with 95{NBSP}% intervals"
     return PlainTable(caption, (*columns, "Missed, %", "Flash, bytes"), rows, words=(0, 2, 3))
 
 
@@ -238,7 +251,7 @@ def _tables(frontier: Frontier) -> Iterator[PlainTable]:
             (mark.name, str(mark.n_switches), interval(mark.rate), microseconds(mark.frame_us))
             for mark in frontier.marks
         )
-        yield PlainTable("To compare with", ("What", "Switches", "Rate, %", "Frame, µs"), marks)
+        yield PlainTable("To compare with", ("What", "Switches", f"{frontier.by}, %", "Frame, µs"), marks)
     if frontier.curves:
         sizes = sorted({size for curve in frontier.curves for size in curve.sizes})
         rows = []
@@ -247,7 +260,7 @@ def _tables(frontier: Frontier) -> Iterator[PlainTable]:
             cells = (f"{100 * rates[size].mean:.1f}" if size in rates else "" for size in sizes)
             rows.append((f"{curve.method}{' (ours)' if curve.ours else ''}", curve.what, *cells))
         columns = ("Method", "What it is", *(f"{size:g}" for size in sizes))
-        caption = "Recognition rate in %, switches alone, against the number of switches"
+        caption = f"Accuracy in % ({frontier.by}, trials), switches alone, against the number of switches"
         yield PlainTable(caption, columns, tuple(rows), words=(0, 1))
     if frontier.tried:
         tried = tuple(
@@ -261,7 +274,7 @@ def _tables(frontier: Frontier) -> Iterator[PlainTable]:
             )
             for each in frontier.tried
         )
-        columns = ("Placement", "Inputs", "Switches", "Rounds", "Rate, %", "Frame, µs")
+        columns = ("Placement", "Inputs", "Switches", "Rounds", f"{frontier.by}, %", "Frame, µs")
         yield PlainTable("Placements that were screened", columns, tried)
     if frontier.checks:
         checks = tuple(
@@ -276,9 +289,10 @@ def _notes(frontier: Frontier) -> Iterator[str]:
     yield summary(frontier)
     yield (
         f"{frontier.combinations:,} combinations of {frontier.source}: {counted(frontier.rows, 'row')}, "
+        f"{counted(frontier.trials, 'trial')}, "
         f"{counted(frontier.subjects, 'subject')}, {counted(frontier.n_switches, 'switch', 'switches')}, "
-        f"{counted(frontier.n_joints, 'joint')}; target {frontier.target}. Rates are honest: {frontier.folds} folds, "
-        f"{counted(frontier.repeats, 'repeat')}, placements chosen within the training folds; with 95{NBSP}% intervals."
+        f"{counted(frontier.n_joints, 'joint')}; target {frontier.target}. {folds_of(frontier)}, placement inside the "
+        f"fold, with 95{NBSP}% intervals. {LUCK}"
     )
     if frontier.wanted and frontier.picked is not None:
         yield f"Point {frontier.picked} was picked for {frontier.wanted}."

@@ -223,7 +223,8 @@ def options_set(manifest: Manifest) -> Pairs:
     foreign = set().union(*names.values()) - names.get(options.trainer, set()) | {"settings"}
     fields = [field.name for field in msgspec.structs.fields(options) if field.name not in foreign]
     values = {name: getattr(options, name) for name in fields} | options.settings
-    return tuple((f"--{name.replace('_', '-')}", _plain(value)) for name, value in values.items() if value is not None)
+    called = {name: "method" if name == "placement" else name.replace("_", "-") for name in values}
+    return tuple((f"--{called[name]}", _plain(value)) for name, value in values.items() if value is not None)
 
 
 def commands(content: ReportContent) -> tuple[str, str]:

@@ -25,7 +25,8 @@ class EmulatedCyberGlove(Closing):
     not_ready  how many times ?G shall say 1 before it says 3
     doubts     how it shall behave where the sources disagree
 
-    What is done to it takes effect with the next record. Raises SettingError for another number of sensors.
+    `state` is the glove and what its box was told, `box` whether it streams. What is done to them takes effect with the
+    next record. Raises SettingError for another number of sensors.
     """
 
     def __init__(
@@ -38,8 +39,8 @@ class EmulatedCyberGlove(Closing):
         doubts: Doubts | None = None,
     ) -> None:
         self._line = line
-        self._state = GloveState(sensors, not_ready)
-        self._box = CyberGloveBox(self._state, text, doubts or Doubts())
+        self.state = GloveState(sensors, not_ready)
+        self.box = CyberGloveBox(self.state, text, doubts or Doubts())
         self._changed = Condition()
         self._heard: deque[bytes] = deque()
         self._closing = False
@@ -52,30 +53,7 @@ class EmulatedCyberGlove(Closing):
 
     def set(self, sensors: bytes) -> None:
         """Let the sensors have these values, one byte of 1 to 255 a sensor. Raises SettingError if they cannot."""
-        self._state.set(sensors)
-
-    @property
-    def plugged(self) -> bool:
-        """Whether the glove hangs on its box; without it, records end in 'eg'."""
-        return self._state.plugged
-
-    @plugged.setter
-    def plugged(self, plugged: bool) -> None:
-        self._state.plugged = plugged
-
-    @property
-    def streaming(self) -> bool:
-        """Whether it streams."""
-        return self._box.streaming
-
-    @property
-    def light(self) -> bool:
-        """Whether the light at the wrist is on."""
-        return self._state.is_on("L")
-
-    def turn_switch(self, on: bool) -> None:
-        """Turn the switch at the wrist; the light follows, as long as the box was not told otherwise."""
-        self._state.turn_switch(on)
+        self.state.set(sensors)
 
     def close(self) -> None:
         """Fall silent and hear no more. The line stays."""
@@ -92,9 +70,9 @@ class EmulatedCyberGlove(Closing):
 
     def _run(self) -> None:
         while not self._closing:
-            if self._box.streaming:
+            if self.box.streaming:
                 self._stream()
-            for data in self._heard_until(self._next if self._box.streaming else None):
+            for data in self._heard_until(self._next if self.box.streaming else None):
                 self._hear(data)
 
     def _heard_until(self, end: float | None) -> list[bytes]:
@@ -107,35 +85,35 @@ class EmulatedCyberGlove(Closing):
         return heard
 
     def _hear(self, data: bytes) -> None:
-        was_streaming = self._box.streaming
-        for reply in self._box.feed(data):
+        was_streaming = self.box.streaming
+        for reply in self.box.feed(data):
             if isinstance(reply, bytes):
                 self._line.send(reply)
             else:
                 self._act(reply)
-        if self._box.streaming and not was_streaming:
-            self._next = monotonic() + digitising_us(self._count(), self._state.is_on("F")) / 1e6
+        if self.box.streaming and not was_streaming:
+            self._next = monotonic() + digitising_us(self._count(), self.state.is_on("F")) / 1e6
 
     def _act(self, action: Action) -> None:
         if action is Action.RESTARTED:
             self._wait(_RESTART_S)
             self._heard.clear()
             return
-        self._wait(digitising_us(self._count(), self._state.is_on("F")) / 1e6)
+        self._wait(digitising_us(self._count(), self.state.is_on("F")) / 1e6)
         as_text = action is Action.POLLED_AS_TEXT
-        self._send(self._box.polled_as_text() if as_text else self._state.record(streamed=False, ticks=self._ticks()))
+        self._send(self.box.polled_as_text() if as_text else self.state.record(streamed=False, ticks=self._ticks()))
 
     def _stream(self) -> None:
         """Send a record when it is due, and say when the next is: by the told period or the shortest there can be."""
         if monotonic() < self._next:
             return
-        settings = self._state.settings
+        settings = self.state.settings
         words = int.from_bytes(settings["T"][:2], "big"), int.from_bytes(settings["T"][2:], "big")
         told = told_us(words)
         shortest = shortest_us(
-            self._count(), self._line.baud, status=self._state.is_on("U"), filtered=self._state.is_on("F")
+            self._count(), self._line.baud, status=self.state.is_on("U"), filtered=self.state.is_on("F")
         )
-        self._send(self._state.record(streamed=True, too_fast=0 < told < shortest, ticks=self._ticks()))
+        self._send(self.state.record(streamed=True, too_fast=0 < told < shortest, ticks=self._ticks()))
         # A host too busy to wake this thread in time is not repaid with a burst.
         self._next = max(self._next + max(told, shortest) / 1e6, monotonic())
 
@@ -148,7 +126,7 @@ class EmulatedCyberGlove(Closing):
             self._changed.wait_for(lambda: self._closing, seconds)
 
     def _count(self) -> int:
-        return self._state.settings["N"][0]
+        return self.state.settings["N"][0]
 
     def _ticks(self) -> int:
         return int((monotonic() - self._started) * TICKS_HZ)

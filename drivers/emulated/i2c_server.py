@@ -21,8 +21,7 @@ gi.require_version("UMockdev", "1.0")
 from gi.repository import GLib, UMockdev  # noqa: E402
 
 from ..i2c.chips.base import Device  # noqa: E402
-from .i2c_adapter import I2C_BLOCK, Adapter, TransferFault  # noqa: E402
-from .i2c_wire import Message, Station, Wire  # noqa: E402
+from .i2c_wire import I2C_BLOCK, Adapter, Message, Station, TransferFault, Wire  # noqa: E402
 
 I2C_SLAVE, I2C_SLAVE_FORCE, I2C_FUNCS, I2C_RDWR, I2C_SMBUS = 0x703, 0x706, 0x705, 0x707, 0x720
 _READS = 0x0001

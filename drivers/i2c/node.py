@@ -13,7 +13,7 @@ from ..names import shortened
 from ..ports import check_node, device_fault
 
 if TYPE_CHECKING:
-    from smbus2 import SMBus, i2c_msg
+    from smbus2 import SMBus
 
 # No acknowledge: bcm2835 and designware, i2c-gpio, i2c-stub.
 NOBODY_THERE = frozenset({errno.EREMOTEIO, errno.ENXIO, errno.ENODEV})
@@ -163,13 +163,13 @@ class Node:
         if self.way is Way.SMBUS:
             (query,) = queries
             return lambda: [self._by_smbus(bus, query)]
+        from smbus2 import i2c_msg
         from smbus2.smbus2 import I2C_RDWR, i2c_rdwr_ioctl_data
 
+        answers = [i2c_msg.read(query.address, query.length) for query in queries]
         messages: list[i2c_msg] = []
-        answers: list[i2c_msg] = []
-        for query in queries:
-            _append(query, messages, answers)
-
+        for query, answer in zip(queries, answers, strict=True):
+            messages += [i2c_msg.write(query.address, query.command), answer] if query.command else [answer]
         # What i2c_rdwr of smbus2 makes anew at every call.
         transfer = i2c_rdwr_ioctl_data.create(*messages)  # type: ignore[arg-type]  # smbus2 says a list, and takes them apart
 
@@ -198,16 +198,6 @@ class Node:
         if query.length == 2:
             return bus.read_word_data(query.address, command).to_bytes(2, "little")
         return bytes(bus.read_i2c_block_data(query.address, command, query.length))
-
-
-def _append(query: Query, messages: "list[i2c_msg]", answers: "list[i2c_msg]") -> None:
-    from smbus2 import i2c_msg
-
-    if query.command:
-        messages.append(i2c_msg.write(query.address, query.command))
-    answer = i2c_msg.read(query.address, query.length)
-    messages.append(answer)
-    answers.append(answer)
 
 
 def _cause(error: OSError) -> str:

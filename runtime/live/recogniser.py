@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import msgspec
 import numpy as np
@@ -18,16 +17,6 @@ from ..published import UNKNOWN, Health, JointAngles, LiveGrasp
 from ..scores import LiveScores
 from ..tables import IntegerTables
 from .decision import Decision, SequentialTest, Standing
-
-
-class Decider(Protocol):
-    """What turns frames into a grasp type: `Decision` or `SequentialTest`."""
-
-    def update(self, time_us: int, standing: Standing, *, whole: bool) -> int | None:
-        """Return the class decided on. After a whole frame, one with no input lost, it rests on whole frames alone."""
-
-    def forget(self) -> None:
-        """Decide on nothing."""
 
 
 class Moment(msgspec.Struct):
@@ -158,7 +147,7 @@ class LiveRecognizer:
         )
 
 
-def _decider(build: Build, policy: Policy) -> Decider:
+def _decider(build: Build, policy: Policy) -> Decision | SequentialTest:
     scale = build.tables.scale
     if policy.error_rate is None:
         return Decision(policy.lead_steps(scale), policy.dwell_us, policy.hold_us)

@@ -89,18 +89,21 @@ def _check_name(source: TomlText, place: Place, name: str) -> None:
         raise source.error(place, f"{shortened(repr(name))} {reason}")
 
 
+def _check_once(source: TomlText, place: Place, kind: str, name: str, seen: set[str]) -> None:
+    _check_name(source, place, name)
+    if name in seen:
+        raise source.error(place, f"{kind} {name!r} is there already")
+    seen.add(name)
+
+
 def _check_joints(source: TomlText, content: _File) -> None:
     if not content.joints:
         raise source.error(("joints",), "must name at least one joint")
     seen: set[str] = set()
     for number, joint in enumerate(content.joints):
-        place: Place = ("joints", number)
-        _check_name(source, (*place, "name"), joint.name)
-        if joint.name in seen:
-            raise source.error((*place, "name"), f"joint {joint.name!r} is there already")
-        seen.add(joint.name)
+        _check_once(source, ("joints", number, "name"), "joint", joint.name, seen)
         if joint.range[0] > joint.range[1]:
-            raise source.error((*place, "range"), "must be the lowest position and then the highest")
+            raise source.error(("joints", number, "range"), "must be the lowest position and then the highest")
 
 
 def _check_preshapes(source: TomlText, content: _File) -> None:
@@ -108,10 +111,7 @@ def _check_preshapes(source: TomlText, content: _File) -> None:
     grasps: dict[str, str] = {}
     for number, entry in enumerate(content.preshapes):
         place: Place = ("preshapes", number)
-        _check_name(source, (*place, "name"), entry.name)
-        if entry.name in names:
-            raise source.error((*place, "name"), f"preshape {entry.name!r} is there already")
-        names.add(entry.name)
+        _check_once(source, (*place, "name"), "preshape", entry.name, names)
         _check_positions(source, (*place, "positions"), entry, content.joints)
         for index, grasp in enumerate(entry.grasps):
             _check_name(source, (*place, "grasps", index), grasp)

@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.compiler.elementary import Floats
+
 from ..streams import Site
 from .hand import Hand
 from .shapes import Shape
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

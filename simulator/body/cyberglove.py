@@ -10,13 +10,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.compiler.elementary import Floats
 from thenar.compiler.recordings.graspset import Joint
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 
 from ..streams import Draw, Draws, Site
 from .hand import DOF, FAN_DEG
 
-Floats = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 
 # In wire order.

@@ -19,9 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.elementary import add_up, sincos
-
-Floats = NDArray[np.float64]
+from thenar.compiler.elementary import Floats, add_up, sincos
 
 DIGITS = ("thumb", "index", "middle", "ring", "little")
 

@@ -11,11 +11,9 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.elementary import sincos
+from thenar.compiler.elementary import Floats, sincos
 
 from .hand import CAPSULES, TIP_SPHERE, Hand, Skeleton
-
-Floats = NDArray[np.float64]
 
 # How far a contact stands out of the skin (Panasonic EVQPLDA15, as the paper describes it).
 STANDS_OUT_MM = 0.4

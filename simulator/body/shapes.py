@@ -11,9 +11,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.elementary import add_up, sincos
+from thenar.compiler.elementary import Floats, add_up, sincos
 
-Floats = NDArray[np.float64]
 Length = Annotated[float, msgspec.Meta(gt=0.0, le=2000.0)]
 
 # Nearer than this, squares lose their bits, and which way is out is no matter of distance any more.

@@ -20,14 +20,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.elementary import add_up
+from thenar.compiler.elementary import Floats, add_up
 
 from ..body.condition import Condition
 from ..body.hand import LIMITS_DEG, Hand
 from ..body.shapes import Cylinder, Pose, Shape
 from .model import GRAVITY, STIFFNESS, torques
-
-Floats = NDArray[np.float64]
 
 
 def dot(a: Floats, b: Floats) -> Floats:

@@ -12,14 +12,12 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.elementary import add_up
+from thenar.compiler.elementary import Floats, add_up
 
 from ..body.condition import Condition
 from ..body.hand import CAPSULES, Skeleton
 from ..body.layout import Switches
 from ..body.shapes import Pose
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,15 +12,14 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+
+from thenar.compiler.elementary import Floats
 
 from ..body.condition import Thing
 from ..body.hand import CAPSULES, DOF, LIMITS_DEG, Hand, Skeleton
 from ..body.layout import Patch, Switches
 from ..body.shapes import Box, Cylinder, Pose, Shape, Sphere
 from .model import GRAVITY, STIFFNESS, Contact, Load, split, torques
-
-Floats = NDArray[np.float64]
 
 JOINTS = len(DOF)
 OBJECT = "object"

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.elementary import add_up
+from thenar.compiler.elementary import Floats, add_up
 
 from ..body.shapes import Pose
 from .balance import (
@@ -27,8 +27,6 @@ from .balance import (
     wrench,
 )
 from .model import STIFFNESS
-
-Floats = NDArray[np.float64]
 
 
 def cholesky(matrix: Floats) -> Floats:

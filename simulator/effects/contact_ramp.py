@@ -13,13 +13,14 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
+from thenar.compiler.elementary import Floats
+
 from ..contact.model import Contact, ContactModel, Load
 from ..errors import SceneError
 from ..pipeline.batch import NEVER, Batch
 from ..pipeline.effect import Effect, EffectParameters, Setting, Together
 from ..streams import Draw
 
-Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Bits = NDArray[np.bool_]
 

@@ -4,15 +4,12 @@ from typing import Annotated
 
 import numpy as np
 from msgspec import Meta
-from numpy.typing import NDArray
 
-from thenar.compiler.elementary import add_up, sincos
+from thenar.compiler.elementary import Floats, add_up, sincos
 
 from ..pipeline.batch import Batch
 from ..pipeline.effect import Effect, EffectParameters, Setting, Step
 from ..streams import Draw
-
-Floats = NDArray[np.float64]
 
 
 class Parameters(EffectParameters, frozen=True):

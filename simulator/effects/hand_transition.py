@@ -9,7 +9,8 @@ from typing import Annotated
 
 import numpy as np
 from msgspec import Meta
-from numpy.typing import NDArray
+
+from thenar.compiler.elementary import Floats
 
 from ..body.cyberglove import sensors_deg
 from ..body.hand import DOF, LIMITS_DEG
@@ -17,8 +18,6 @@ from ..errors import SceneError
 from ..pipeline.batch import Batch
 from ..pipeline.effect import Effect, EffectParameters, Setting, Step, frame_times
 from ..streams import Draw
-
-Floats = NDArray[np.float64]
 
 _FLEXES = np.array([not name.endswith("abduction") for name in DOF])
 _BUMP = 3.0**9 / 2.0**6  # makes t^6 (1 - t)^3 one at its top, t = 2/3

@@ -11,12 +11,13 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
+from thenar.compiler.elementary import Floats
+
 from ..pipeline.batch import NEVER, Batch
 from ..pipeline.effect import Effect, EffectParameters, Setting, Step
 from ..streams import Draw
 
 Bits = NDArray[np.bool_]
-Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 _MOST_PAIRS = 5

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.compiler.elementary import Floats
+
 from ..body.condition import Condition
 from ..contact.model import Contact, Load
 from ..streams import Site
@@ -28,7 +30,6 @@ class Traffic:
     scanner: int
 
 
-Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Bits = NDArray[np.bool_]
 

@@ -9,13 +9,14 @@ from itertools import pairwise
 
 import numpy as np
 
+from thenar.compiler.elementary import Floats
 from thenar.compiler.workers import in_workers
 
 from ..body.condition import Held, Thing
 from ..body.hand import Hand, Size
 from ..errors import PlanError, SceneError
 from ..scenes.scene import Scene, SceneObject
-from .planner import TOLERANCE_MM, Floats, Plan, measure, plan
+from .planner import TOLERANCE_MM, Plan, measure, plan
 from .postures import Entry, HeldAt, Postures
 from .prehension import Prehension, load_prehensions
 

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.compiler.elementary import Floats
+
 from ..body.condition import Held, Pad, Thing
 from ..body.hand import LIMITS_DEG, Hand, Skeleton
 from ..body.shapes import Cylinder, Pose, Shape, Sphere, rotation_vector
@@ -20,7 +22,6 @@ from ..errors import PlanError
 from .postures import FRICTION
 from .prehension import Prehension, pad_side, pad_sphere
 
-Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 # What a residual of 1 stands for. All ours.

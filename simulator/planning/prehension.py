@@ -11,8 +11,8 @@ from typing import Annotated
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from thenar.compiler.elementary import Floats
 from thenar.runtime.names import nearest
 from thenar.runtime.toml_source import Place, TomlText, read_source
 from thenar.runtime.toml_struct import as_table, check_finite, convert
@@ -20,7 +20,6 @@ from thenar.runtime.toml_struct import as_table, check_finite, convert
 from ..body.hand import CAPSULES, DIGITS, LIMITS_DEG, Hand, Size
 from ..errors import SceneError
 
-Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
 Angles = tuple[float, float, float, float]
 

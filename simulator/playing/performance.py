@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
 from time import monotonic_ns
-from typing import Protocol
 
 import msgspec
 import numpy as np
@@ -28,6 +27,8 @@ Bits = NDArray[np.bool_]
 Bytes = NDArray[np.uint8]
 
 _WIRE = "wire."
+# Takes of every frame that is shown its number, its grasp type, and the monotonic clock in microseconds.
+Log = Callable[[int, str, int], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,6 +51,19 @@ class Performance:
 
     def __len__(self) -> int:
         return len(self.switches)
+
+    def play(self, show: Callable[[list[bool], bytes], None], log: Log, stop: Event) -> bool:
+        """Show all frames once, each `period_us` after the one before, whatever showing them takes: lateness does not
+        add up. Returns False if `stop` was set before the last one had its time.
+        """
+        start_us = monotonic_ns() // 1000
+        for row in range(len(self)):
+            now_us = monotonic_ns() // 1000
+            if stop.wait(max(start_us + row * self.period_us - now_us, 0) / 1e6):
+                return False
+            show(self.switches[row].tolist(), self.sensors[row].tobytes())
+            log(row, str(self.grasps[row]), monotonic_ns() // 1000)
+        return not stop.wait(self.period_us / 1e6)
 
 
 def of_scene(scene: Scene, subject: str | None = None, jobs: int = -1, progress: Progress | None = None) -> Performance:
@@ -194,36 +208,3 @@ def _ticks(reader: Reader, rest: bytes, period_us: int) -> Iterator[Moment]:
         if entry.time_us >= due_us:
             yield closed, sensors, grasp
             due_us += period_us
-
-
-Show = Callable[[list[bool], bytes], None]
-
-
-class Log(Protocol):
-    """Who is told of every frame when it is shown: its number, its grasp type, the monotonic clock in microseconds."""
-
-    def __call__(self, row: int, grasp: str, time_us: int) -> None:
-        """Take note."""
-
-
-@dataclass(frozen=True, slots=True)
-class Player:
-    """Shows the frames of `performance` one after the other, each `period_us` after the one before, whatever showing
-    them takes: lateness does not add up.
-    """
-
-    performance: Performance
-    show: Show
-    log: Log
-
-    def play(self, stop: Event) -> bool:
-        """Play all frames once. Returns False if `stop` was set before the last one had its time."""
-        performance = self.performance
-        start_us = monotonic_ns() // 1000
-        for row in range(len(performance)):
-            now_us = monotonic_ns() // 1000
-            if stop.wait(max(start_us + row * performance.period_us - now_us, 0) / 1e6):
-                return False
-            self.show(performance.switches[row].tolist(), performance.sensors[row].tobytes())
-            self.log(row, str(performance.grasps[row]), monotonic_ns() // 1000)
-        return not stop.wait(performance.period_us / 1e6)

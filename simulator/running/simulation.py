@@ -6,8 +6,8 @@ from functools import lru_cache, partial
 from time import perf_counter
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thenar.compiler.elementary import Floats
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.taxonomy import published
 from thenar.compiler.workers import in_workers
@@ -35,8 +35,6 @@ from .report import (
     rows_of,
     step_reports,
 )
-
-Floats = NDArray[np.float64]
 
 ORDER = "session.order"  # the draw site of the order of trials
 

@@ -7,6 +7,7 @@ from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -152,7 +153,8 @@ def _imported(values: Sequence[float], grid: float) -> tuple[GraspSet, ImportRep
 
 
 def _columns(joint: JointColumns, trial: str | None = None) -> Columns:
-    return Columns(label="grasp", trial=trial, switches=("switch",), joints=(joint,))
+    frames: Literal["independent"] | None = None if trial else "independent"
+    return Columns(label="grasp", trial=trial, frames=frames, switches=("switch",), joints=(joint,))
 
 
 def _csv(folder: Path, rows: Sequence[Sequence[str]], heads: Sequence[str] = ("grasp", "switch", "joint")) -> Path:

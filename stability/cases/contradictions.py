@@ -15,7 +15,7 @@ from thenar.compiler.boosting.stumps import winners
 
 from ..checks.class_rounds import see_round
 from ..checks.rounds import entropy_left, idle_loss, loss_rounding, moments, resting_error, rise_rounding
-from ..finding import Case, Finding, Worst
+from ..finding import REFERENCE, Case, Finding, Worst
 from ..inputs.hard_data import HardSet, contradictory, imbalanced, noisy, repeated
 from ..reference.boosting import mean_loss
 from ..reference.numbers import distance
@@ -24,7 +24,6 @@ CASE = Case(
     title="Contradictions",
     danger="frames that belong to several classes make boosting swing; one row among 10^6 is rounded away",
 )
-REFERENCE = "60 digits"
 
 
 def findings(full: bool) -> Iterator[Finding]:

@@ -7,10 +7,10 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from thenar.compiler.elementary import add_exactly, add_up, exp, log, sincos, softmax, softmax_and_loss
+from thenar.compiler.elementary import Floats, add_exactly, add_up, exp, log, sincos, softmax, softmax_and_loss
 
 from ..checks.roundings import ROUNDING, loss_error, part_of, share_error
-from ..finding import Case, Finding, Worst
+from ..finding import REFERENCE, Case, Finding, Worst
 from ..inputs.hard_data import hard_scores
 from ..reference import boosting as logistic
 from ..reference import numbers as linear
@@ -20,9 +20,7 @@ CASE = Case(
     title="Elementary functions",
     danger="an exp or log a few last places off, or a share that leaves 0..1, is in every probability from then on",
 )
-REFERENCE = "60 digits"
 
-Floats = NDArray[np.float64]
 Labelled = tuple[Floats, NDArray[np.intp], Floats | None]  # scores (K, n), labels and weights (n,)
 
 

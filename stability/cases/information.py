@@ -11,7 +11,7 @@ from thenar.compiler.placement.cooccurrence import Cooccurrence
 from thenar.compiler.placement.gain import best_position, compare_scores, entropy_bits, gain_bits
 
 from ..checks.roundings import ROUNDING, part_of
-from ..finding import Case, Finding, Worst
+from ..finding import REFERENCE, Case, Finding, Worst
 from ..inputs.hard_data import BitSet, Counts, bit_set, close_pairs, equal_pairs, hand_made, node_of, random_table
 from ..reference import information as truth
 from ..reference.numbers import precisely
@@ -20,7 +20,6 @@ CASE = Case(
     title="Information gain",
     danger="a gain that rounding made decides which switch is kept; a gain of one count in 10^9 is taken for none",
 )
-REFERENCE = "60 digits"
 WHOLE_NUMBERS = "products of whole numbers"
 
 Pair = tuple[int, int | None]  # a bit, and what is given

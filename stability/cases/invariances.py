@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import TIE, Stumps
+from thenar.compiler.elementary import Floats
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.placement.tree import Tree
 from thenar.compiler.tables.collapse import HIGHEST_CODE, ScoreTables, collapse
@@ -24,7 +25,7 @@ from thenar.runtime.tables import IntegerTables
 from ..checks.class_rounds import ClassRound, Step, branches, class_rounds, grown, step_of
 from ..checks.rounds import counted
 from ..finding import Case, Finding, Worst
-from ..inputs.hard_data import Floats, HardSet, contradictory, intervals, noisy, separable, words
+from ..inputs.hard_data import HardSet, contradictory, intervals, noisy, separable, words
 from ..reference.numbers import precisely
 
 

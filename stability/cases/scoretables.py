@@ -11,11 +11,12 @@ from mpmath import mpf
 from numpy.typing import NDArray
 
 from thenar.compiler.boosting.stumps import Stumps
+from thenar.compiler.elementary import Floats
 from thenar.compiler.tables.collapse import ScoreTables, collapse
 from thenar.compiler.tables.quantise import balance, quantise
 
 from ..checks.roundings import ROUNDING, SMALLEST, part_of
-from ..finding import Case, Finding, Worst
+from ..finding import REFERENCE, Case, Finding, Worst
 from ..inputs.hard_tables import half_a_step_off
 from ..reference import boosting as truth
 from ..reference import tables
@@ -60,10 +61,7 @@ CASE = Case(
     title="Score tables",
     danger="scores drift over thousands of rounds, tables say something else than the stumps they are made of",
 )
-REFERENCE = "60 digits"
 X_ROUNDING = "x rounding"
-
-Floats = NDArray[np.float64]
 
 
 def findings(full: bool) -> Iterator[Finding]:

@@ -16,7 +16,7 @@ from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.trainers.base import Training
 
 from ..checks.roundings import ROUNDING
-from ..finding import Case, Finding, Worst
+from ..finding import REFERENCE, Case, Finding, Worst
 from ..inputs.small_sets import make_set
 from ..reference.intervals import Interval, student, student_quantile, wilson, wilson_of
 from ..reference.numbers import distance, precisely
@@ -76,7 +76,6 @@ WILSON_BOUND = (5 + 9 + 4 + 2) * ROUNDING
 # Student's reach is t s / sqrt n: scipy's t is off by 4 ulp for up to 3 degrees of freedom (8 roundings; a test of the
 # rates holds it), the rest by 4.
 STUDENT_ROUNDINGS = 8 + 4
-_SIXTY = "60 digits"
 _TOTALS = (1, 2, 3, 5, 12, 33, 100, 999, 65536, 10**6, 10**9, 10**12)
 
 
@@ -91,7 +90,7 @@ def findings(full: bool) -> Iterator[Finding]:
 
 def _wilson(totals: range) -> Iterator[Finding]:
     """One repeat: of every count up to some, and next to both ends of large ones."""
-    off = Worst("ends of Wilson's interval", _SIXTY, WILSON_BOUND, "rate")
+    off = Worst("ends of Wilson's interval", REFERENCE, WILSON_BOUND, "rate")
     odd = Worst("rates of 0 and 1 whose interval does not end there, or has no width", "the rule itself", 0, "rates")
     counts = [(correct, total) for total in totals for correct in range(total + 1)]
     counts += [(correct, n) for n in _TOTALS for correct in {0, 1, n // 2, n - 1, n}]
@@ -112,7 +111,7 @@ def _repeated(repeats: int) -> Iterator[Finding]:
     """
     worst_t = float(student_quantile(1, mpf("0.975")))
     bound = WILSON_BOUND + (STUDENT_ROUNDINGS * worst_t + 2 * worst_t) * ROUNDING
-    off = Worst("ends of the interval of repeats", _SIXTY, bound, "rate")
+    off = Worst("ends of the interval of repeats", REFERENCE, bound, "rate")
     outside = Worst("intervals that leave 0 to 1, or their own mean", "the rule itself", 0, "rates")
     for n in range(2, repeats + 1):
         for total in (1, 2, 7, 1000):
@@ -143,7 +142,7 @@ def _clusters(draws: int) -> Iterator[Finding]:
     holds it). They move an end by no more than they are, for it lies within 0 to 1; Wilson's own roundings add up.
     """
     off = Worst(
-        "ends of the interval over clusters", _SIXTY, WILSON_BOUND + (4 + 2 + 2 + 7 + 1 + 64) * ROUNDING, "rate"
+        "ends of the interval over clusters", REFERENCE, WILSON_BOUND + (4 + 2 + 2 + 7 + 1 + 64) * ROUNDING, "rate"
     )
     outside = Worst("intervals over clusters that leave 0 to 1, or their mean", "the rule itself", 0, "rates")
     random = np.random.default_rng(10)

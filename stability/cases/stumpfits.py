@@ -13,14 +13,13 @@ from thenar.compiler.boosting.binning import bin_columns, midpoints
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumpfit import FittedStumps, Targets, fit_stumps
 from thenar.compiler.boosting.stumps import Stumps
+from thenar.compiler.elementary import Floats
 
 from ..checks.class_rounds import ClassRound, Step, branches, choice_error, class_rounds, grown, see_stump, step_of
-from ..finding import Case, Finding, Worst
+from ..finding import REFERENCE, Case, Finding, Worst
 from ..reference import boosting as truth
 from ..reference.boosting import Round, boost_rounds
 from ..reference.numbers import precisely
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,9 +102,6 @@ KINDS: dict[str, Callable[[np.random.Generator, int, float], tuple[Floats, Float
         rng.choice([-1.0, 1.0, z_max], n),
     ),
 }
-
-
-REFERENCE = "60 digits"
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,14 +5,13 @@ from collections.abc import Iterable, Iterator
 import mpmath
 import numpy as np
 from mpmath import mpf
-from numpy.typing import NDArray
 
 from thenar.compiler.boosting.boost import weights_and_responses
 from thenar.compiler.boosting.exactsums import on_grids
-from thenar.compiler.elementary import softmax
+from thenar.compiler.elementary import Floats, softmax
 
 from ..checks.roundings import ROUNDING, SMALLEST, share_error
-from ..finding import Case, Finding, Worst
+from ..finding import REFERENCE, Case, Finding, Worst
 from ..inputs.hard_data import hard_scores
 from ..reference import boosting as logistic
 from ..reference.numbers import precisely
@@ -21,10 +20,7 @@ CASE = Case(
     title="Weights and working responses",
     danger="1/P where P is 0, weights that underflow or turn negative, responses beyond their clamp",
 )
-REFERENCE = "60 digits"
 Z_MAXES = (1.5, 2.0, 3.0, 4.0, 10.0, 100.0)
-
-Floats = NDArray[np.float64]
 
 
 def findings(full: bool) -> Iterator[Finding]:

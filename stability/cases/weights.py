@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import Stumps, centred
-from thenar.compiler.elementary import add_up
+from thenar.compiler.elementary import Floats, add_up
 
 from ..checks.class_rounds import see_round
 from ..checks.roundings import ROUNDING
 from ..checks.rounds import Moment, mean_score, moments
-from ..finding import Case, Finding, Worst
-from ..inputs.hard_data import Floats, HardSet, contradictory, imbalanced, intervals, noisy, separable
+from ..finding import REFERENCE, Case, Finding, Worst
+from ..inputs.hard_data import HardSet, contradictory, imbalanced, intervals, noisy, separable
 from ..reference import boosting as ensembles
 from ..reference.numbers import precisely
 
@@ -103,7 +103,6 @@ CASE = Case(
     title="Weights",
     danger="weights underflow, or one holds everything, and answers are made of rounding; scores drift away",
 )
-REFERENCE = "60 digits"
 
 
 def findings(full: bool) -> Iterator[Finding]:

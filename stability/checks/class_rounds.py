@@ -20,9 +20,10 @@ from mpmath import mpf
 from numpy.typing import NDArray
 
 from thenar.compiler.boosting.stumps import Stumps
+from thenar.compiler.elementary import Floats
 
 from ..finding import Worst
-from ..inputs.hard_data import Floats, HardSet
+from ..inputs.hard_data import HardSet
 from ..reference import boosting as truth
 from ..reference.boosting import softmax, target
 from ..reference.numbers import precisely

@@ -12,9 +12,9 @@ from mpmath import mpf
 
 from thenar.compiler.boosting.boost import weights_and_responses
 from thenar.compiler.boosting.stumps import Stumps
-from thenar.compiler.elementary import softmax_and_loss
+from thenar.compiler.elementary import Floats, softmax_and_loss
 
-from ..inputs.hard_data import Floats, HardSet
+from ..inputs.hard_data import HardSet
 from ..reference.information import entropy_bits
 from ..reference.numbers import precisely
 from .roundings import ROUNDING, share_error

@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thenar.compiler.elementary import Floats
 from thenar.simulator.body.condition import Condition, Held, Pad, Thing
 from thenar.simulator.body.hand import Hand, Size
 from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere
@@ -18,8 +18,6 @@ from thenar.simulator.contact.model import Load
 from thenar.simulator.planning.postures import Postures
 from thenar.simulator.scenes.decode import load_scene
 from thenar.simulator.scenes.scene import SURVEYS
-
-Floats = NDArray[np.float64]
 
 HAND = Hand(Size(185.0, 83.0))
 # Deviations of 1 and 99 of 100 from the mean; the smallest hand is a woman's, the largest a man's.

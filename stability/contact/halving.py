@@ -12,6 +12,7 @@ from importlib.util import find_spec
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.compiler.elementary import Floats
 from thenar.simulator.body.layout import murakami160
 from thenar.simulator.contact.balance import USUAL, Pace
 from thenar.simulator.contact.model import Contact, Load
@@ -26,7 +27,6 @@ from thenar.simulator.scenes.decode import load_scene
 from ..finding import Finding, Worst
 from .rest import models
 
-Floats = NDArray[np.float64]
 Bits = NDArray[np.bool_]
 
 THRESHOLD_N = 1.0

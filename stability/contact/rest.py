@@ -7,7 +7,6 @@ from math import fsum
 import mpmath
 import numpy as np
 from mpmath import mpf
-from numpy.typing import NDArray
 
 from thenar.simulator.body.hand import CAPSULES, Hand
 from thenar.simulator.body.layout import Switches, murakami160
@@ -19,7 +18,7 @@ from thenar.simulator.effects import contact_mujoco, contact_quasistatic
 from thenar.simulator.effects.contact_mujoco import Parameters
 from thenar.simulator.pipeline.effect import Setting
 
-from ..finding import Finding, Worst
+from ..finding import REFERENCE, Finding, Worst
 from ..reference.numbers import precisely
 from .grasps import BAR, HAND, Grasp, case_of, hard, held, otherwise
 from .posed import Vector, digits, exactly, left_of, length, press_error_n
@@ -77,9 +76,6 @@ def _axes(hand: Hand, angles: list[mpf]) -> Iterator[tuple[Vector, Vector, mpf]]
             yield exactly(palm.origins[capsule, :, 0]) + along * mpf(skin[0]), along, mpf(skin[-1]) - mpf(skin[0])
 
 
-Floats = NDArray[np.float64]
-
-REFERENCE = "60 digits"
 RULE = "the rule itself"
 _STATE = ("posture_deg", "pose", "forces_n", "capsules_n", "between_n")
 _FIELDS = (*_STATE, "residual_n", "residual_nmm")

@@ -7,22 +7,19 @@ from itertools import product
 import mpmath
 import numpy as np
 from mpmath import mpf
-from numpy.typing import NDArray
 
+from thenar.compiler.elementary import Floats
 from thenar.simulator.body.hand import CAPSULES
 from thenar.simulator.body.layout import Switches, murakami160
 from thenar.simulator.body.shapes import Box, Cylinder, Shape, Sphere, rotation, rotation_vector
 from thenar.simulator.contact.model import split
 
 from ..checks.roundings import ROUNDING
-from ..finding import Finding, Worst
+from ..finding import REFERENCE, Finding, Worst
 from ..reference.numbers import precisely, turn
 from .grasps import HAND
 from .posed import Matrix, exactly, length, surface
 
-Floats = NDArray[np.float64]
-
-REFERENCE = "60 digits"
 # On any one segment of the glove.
 MOST_SWITCHES = max(Counter(patch.capsule for patch in murakami160()).values())
 _TINY = (5e-324, 1e-200, 1e-155, 1e-149, 1e-15, 1e-12, 1e-9)

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import mpmath
 import numpy as np
 from mpmath import mpf
-from numpy.typing import NDArray
 
+from thenar.compiler.elementary import Floats
 from thenar.simulator.contact.balance import Balance, Skin, command
 from thenar.simulator.contact.settle import solve_arrow, stiffness
 
@@ -16,8 +16,6 @@ from ..checks.roundings import ROUNDING
 from ..finding import Finding, Worst
 from ..reference.numbers import precisely, solve
 from .grasps import case_of, hard
-
-Floats = NDArray[np.float64]
 
 SIZE = 26
 # The stiffest skin that a scene may ask for: beside it, the soft hold on the object is next to nothing.

@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.compiler.elementary import Floats
 from thenar.compiler.placement.gain import NodeCounts
 from thenar.compiler.tables.collapse import HIGHEST_CODE
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

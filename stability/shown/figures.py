@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import winners
+from thenar.compiler.elementary import Floats
 from thenar.compiler.pictures import painting, rendered
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.tables.collapse import collapse
@@ -22,7 +23,7 @@ from thenar.runtime.scores import Scorer
 
 from ..checks.integer_sums import first_best
 from ..checks.rounds import mean_score, moments
-from ..inputs.hard_data import Floats, HardSet, noisy, separable
+from ..inputs.hard_data import HardSet, noisy, separable
 from ..inputs.small_sets import small_set
 from ..report import besides
 from ..report import figure as worded

@@ -55,7 +55,10 @@ def test_no_point_of_the_frame_front_is_beaten_by_another(found: Frontier) -> No
     front = [point for point in found.points if "frame" in point.fronts]
     assert front
     for point in front:
-        assert not any(other.frame.us < point.frame.us and other.rate.mean >= point.rate.mean for other in front)
+        assert not any(
+            other.frame.us < point.frame.us and other.rate.mean + other.luck >= point.rate.mean + point.luck
+            for other in front
+        )
 
 
 def test_the_picked_point_is_the_fastest_that_recognises_enough(found: Frontier) -> None:
@@ -63,6 +66,7 @@ def test_the_picked_point_is_the_fastest_that_recognises_enough(found: Frontier)
     picked = found.point(found.picked)
     good = [each for each in found.points if each.rate.mean >= 0.5 and each.setting.decision == "single"]
     assert picked.frame.us == min(each.frame.us for each in good)
+    assert (found.by, picked.rate.what) == ("pooled", "pooled, trials")
 
 
 def test_running_again_asks_nothing_twice(

@@ -17,7 +17,7 @@ def test_a_point_is_a_line_of_the_table(examples: Any, capsys: pytest.CaptureFix
     assert [line.strip("│").split("│")[0].strip() for line in lines] == [str(number) for number in range(1, 12)]
     assert [cell.strip() for cell in lines[4].strip("│").split("│")] == [
         *("5", "33", "switches", "elimination 33", "100, 8", "mcp23017 1 MHz", "early", "sequential"),
-        *("92.9 [92.1, 93.7]", "89.5 [88.6, 90.4]", "440 us model", "2.91 ms, 7.4 ms", "8,844", "114"),
+        *("92.9 [92.1, 93.7]", "94.7 [94.0, 95.4]", "0.4", "440 us model", "2.91 ms, 7.4 ms", "8,844", "114"),
     ]
 
 
@@ -29,6 +29,19 @@ def test_errors_of_models_what_was_skipped_and_the_sentence_follow(
     assert "off by 1.1% in the mean, 3.4% at worst" in told
     assert "qemu-system-arm is missing" in told
     assert "Point 5: 33 of 160 switches" in told
+
+
+def test_rates_say_what_they_are_of_and_that_points_are_corrected(
+    examples: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told = " ".join("\n".join(_printed(examples.example_frontier(), capsys)).split())
+    assert "New subject, trials: the 3 subjects left out in turn. Accuracy in % with 95 % intervals." in told
+    assert "A point is the best of many, so its rate is corrected for luck" in told
+    assert "Cross-validation gave 93.3 %; 0.4 points are subtracted" in told
+    pooled = examples.example_frontier(by="pooled")
+    assert "Pooled, trials: 4 folds of whole trials, 3 repeats." in " ".join(
+        "\n".join(_printed(pooled, capsys)).split()
+    )
 
 
 def test_names_are_no_markup(examples: Any, capsys: pytest.CaptureFixture[str]) -> None:

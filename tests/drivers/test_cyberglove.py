@@ -55,7 +55,7 @@ def test_a_glove_is_found_and_read(line: PtyLine, sensors: int, mode: str) -> No
         assert info.notes == ()
         for _ in range(5):
             assert read(glove) == Record(VALUES[sensors], streamed=mode == "stream", status=0x81)
-        assert emulated.streaming == (mode == "stream")
+        assert emulated.box.streaming == (mode == "stream")
         glove.close()
 
 
@@ -151,21 +151,21 @@ def test_light_and_switch(line: PtyLine) -> None:
         seen = []
         for on in (True, False):
             glove.light(on)
-            seen.append((emulated.light, read(glove).status))
+            seen.append((emulated.state.is_on("L"), read(glove).status))
         assert seen == [(True, 0x85), (False, 0x81)]
         for on in (False, True):
-            emulated.turn_switch(on)
+            emulated.state.turn_switch(on)
             assert glove.switch() == on
         assert read(glove).status == 0x87
 
 
 def test_a_glove_that_is_unplugged_and_plugged_in_again_says_so(line: PtyLine) -> None:
     with EmulatedCyberGlove(line) as emulated, CyberGlove(str(line.link)) as glove:
-        emulated.plugged = False
+        emulated.state.plugged = False
         assert read(glove, lambda record: record.fault is not None) == Record(
             bytes([100] * 18), True, "unplugged", 0x80
         )
-        emulated.plugged = True
+        emulated.state.plugged = True
         read(glove, lambda record: record.fault is None)
         assert glove.counts.unplugged >= 1
 
@@ -195,12 +195,12 @@ def test_a_box_that_is_not_ready_yet_is_waited_for(line: PtyLine, not_ready: int
 
 def test_a_box_that_never_is_ready_is_read_with_a_note(line: PtyLine) -> None:
     with EmulatedCyberGlove(line) as emulated:
-        emulated.plugged = False
+        emulated.state.plugged = False
         glove = CyberGlove(str(line.link))
         (note,) = glove.open().notes
         assert "?G says 1, not 3" in note
         assert read(glove).fault == "unplugged"
-        emulated.plugged = True
+        emulated.state.plugged = True
         assert read(glove, lambda record: record.fault is None)
         glove.close()
 
@@ -211,7 +211,7 @@ def test_a_stream_left_on_is_stopped_and_set_up_anew(line: PtyLine) -> None:
         with SerialLine(str(line.link), 115_200) as crashed:
             crashed.write(b"D\1S")
             assert crashed.read(SOON_S)
-        assert emulated.streaming
+        assert emulated.box.streaming
         with CyberGlove(str(line.link)) as glove:
             assert read(glove).sensors == VALUES[18]
             assert glove.ask("D") == b"\0"
@@ -327,7 +327,7 @@ def test_any_answer_may_get_lost_while_it_is_set_up(line: PtyLine, lost: int) ->
         assert (info.mask, info.right_hand, info.text, info.status) == (MASK_18, True, "CyberGlove 2.4", True)
         assert info.notes == ()
         assert read(glove) == Record(bytes([100] * 18), status=0x81)
-        assert emulated.streaming
+        assert emulated.box.streaming
         glove.close()
 
 
@@ -524,7 +524,7 @@ def test_a_closed_glove_says_so_and_streams_no_more(line: PtyLine) -> None:
         with SerialLine(str(line.link), 115_200) as after:
             after.drain(0.1)
             assert after.read(0.05) == b""
-        assert not emulated.streaming
+        assert not emulated.box.streaming
 
 
 def test_a_glove_behind_tcp_is_read(line: PtyLine) -> None:

@@ -17,6 +17,7 @@ from mutating import Mutate, altered, json_file, npz_file, sealed
 
 from thenar.cli.draw_command import kept_names
 from thenar.compiler.artifact.verify import verify
+from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.firmware.generate import Firmware, sums, write_folder
 from thenar.compiler.frontier import points
 from thenar.compiler.frontier.cache import HEADER, Store
@@ -157,7 +158,7 @@ def _folder(data: bytes, folder: Path) -> None:
 
 
 def _frontier() -> list[bytes]:
-    rate = points.Rate(0.9, 0.85, 0.95)
+    rate = Rate("new subject", "trials", (9,), 10, 2, 0.9, 0.85, 0.95)
     us = points.Time(12.5, "wire")
     ways = (points.Way("elimination", 4.0), points.Way("id3", 2.0), points.Way("elimination", 3.0))
     wirings = (("mcp23017", 400_000), ("as wired", 400_000), ("board", 1_000_000))
@@ -171,7 +172,9 @@ def _frontier() -> list[bytes]:
         source="set.grasps",
         fingerprint=grasp_set().fingerprint(),
         rows=36,
+        trials=36,
         subjects=2,
+        by="new subject",
         n_switches=len(SWITCHES),
         n_joints=3,
         grasps=GRASPS,
@@ -185,7 +188,9 @@ def _frontier() -> list[bytes]:
                 setting=setting,
                 switches=SWITCHES[: number + 1],
                 rate=rate,
-                left_out=rate,
+                luck=0.01,
+                frames=rate,
+                beside=rate,
                 scan=us,
                 transfer=us,
                 classify=us,

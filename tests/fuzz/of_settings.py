@@ -113,7 +113,6 @@ def _preshapes(data: bytes, folder: Path) -> None:
     path = folder / "hand.toml"
     path.write_bytes(data)
     table = load_preshapes(path)
-    table.find("PoS")
     table.check(("PoS", *GRASPS))
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import msgspec
 
+from thenar.compiler.evaluation.rates import Of, Rate
 from thenar.compiler.frontier.points import (
     SCHEMA,
     Check,
@@ -18,7 +19,6 @@ from thenar.compiler.frontier.points import (
     Latency,
     Mark,
     Point,
-    Rate,
     Recipe,
     Scan,
     Time,
@@ -114,7 +114,9 @@ def example_frontier(**changes: object) -> Frontier:
         source="kamakura.grasps",
         fingerprint="5f3a9c0e" * 8,
         rows=4200,
+        trials=4200,
         subjects=3,
+        by="new subject",
         n_switches=N_SWITCHES,
         n_joints=N_JOINTS,
         grasps=GRASPS,
@@ -134,10 +136,10 @@ def example_frontier(**changes: object) -> Frontier:
     return frontier_from_bytes(frontier_to_bytes(msgspec.structs.replace(frontier, **changes)))
 
 
-def rate(mean: float) -> Rate:
-    """Return a rate with the interval that 4200 rows give, or nearly so."""
+def rate(mean: float, of: Of = "new subject") -> Rate:
+    """Return a rate with the interval that 4200 independent trials give, or nearly so."""
     half = 1.96 * (mean * (1 - mean) / 4200) ** 0.5
-    return Rate(mean, max(0.0, mean - half), min(1.0, mean + half))
+    return Rate(of, "trials", (round(4200 * mean),), 4200, 3, mean, max(0.0, mean - half), min(1.0, mean + half))
 
 
 def _points() -> tuple[Point, ...]:
@@ -189,7 +191,9 @@ def _point(
         setting=setting,
         switches=tuple(SWITCHES[(41 * place + 3) % N_SWITCHES] for place in range(kept)),
         rate=rate(mean),
-        left_out=rate(mean - 0.03 - 0.002 * (number % 3)),
+        luck=0.004,
+        frames=None,
+        beside=rate(mean + (1 - mean) / 4, "pooled"),
         scan=Time(scan_us, "wire"),
         transfer=Time(transfer_us, "wire"),
         classify=Time(classify_us, "simulated" if number % 3 == 1 else "model"),

@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.cluster import ClusterError
-from thenar.compiler.frontier.cache import HEADER, OLD_HEADER, Cache, Call, Store, StoreError, stored
+from thenar.compiler.frontier.cache import HEADER, OLD_HEADERS, Cache, Call, Store, StoreError, stored
 
 
 def question(number: int) -> bytes:
@@ -116,7 +116,7 @@ def test_zeros_that_a_loss_of_power_left_at_the_end_are_cut_off(tmp_path: Path) 
 
 
 @pytest.mark.parametrize(
-    "content", [b"a,b\n1,2\n", b'{"key": 1}\n', HEADER.replace(b"2}", b"3}"), b"\n", bytes(100), b"\xff\xfe"]
+    "content", [b"a,b\n1,2\n", b'{"key": 1}\n', HEADER.replace(b"3}", b"4}"), b"\n", bytes(100), b"\xff\xfe"]
 )
 def test_a_foreign_file_is_refused_and_not_touched(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "mine.csv"
@@ -126,10 +126,11 @@ def test_a_foreign_file_is_refused_and_not_touched(tmp_path: Path, content: byte
     assert path.read_bytes() == content
 
 
+@pytest.mark.parametrize("older", OLD_HEADERS)
 @pytest.mark.parametrize("rest", [b"", b'{"key":"aa","crc":1,"answer":1}\n'])
-def test_a_store_of_the_older_form_is_emptied_and_says_so(tmp_path: Path, rest: bytes) -> None:
+def test_a_store_of_an_older_form_is_emptied_and_says_so(tmp_path: Path, older: bytes, rest: bytes) -> None:
     path = tmp_path / "store"
-    path.write_bytes(OLD_HEADER + rest)
+    path.write_bytes(older + rest)
     with Store(path, "set") as store:
         assert (store.renewed, len(store)) == (True, 0)
         store.put(question(0), Answer((0.0,)))

@@ -2,16 +2,19 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.designs import Design, best_designs, designs, points_of, with_whole_scans
 from thenar.compiler.frontier.equipment import NO_TIME
 from thenar.compiler.frontier.finalists import Close
 from thenar.compiler.frontier.latency import POLICIES
-from thenar.compiler.frontier.points import Latency, Rate, Time, Way
+from thenar.compiler.frontier.points import Latency, Time, Way
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import Candidate, Search, Shape
+from thenar.compiler.frontier.survey import Judged
 from thenar.compiler.frontier.timing.classify_times import Classified
 from thenar.compiler.frontier.timing.scan_times import ScanTimes, joints_time
 from thenar.drivers.cyberglove_protocol import SENSORS_18
@@ -21,15 +24,19 @@ WAIT = Latency(1000.0, 2000.0, 0.0)
 NAMES = [f"s{number}" for number in range(40)]
 
 
+def judged(rate: float) -> Judged:
+    return Judged(Rate.counted((round(1000 * rate),), 1000, of="pooled"), np.arange(1000) < 1000 * rate, 1)
+
+
 def close_of(switches: int = 20, rate: float = 0.9, early_us: float = 200.0, layout_us: float = 50.0) -> Close:
     scan = ScanTimes(500.0, early_us, 4, 2, "wire", 1.5)
     wired = (Wired("mcp23017", 400_000, scan),) if switches else ()
     tables = PricedTables(TABLED, b"", (Classified("plain", layout_us, "model", 900, 30),), wired, 1.25)
     way = Way("id3", float(switches))
     screened = Screened(
-        Candidate(way, "switches" if switches else "joints"), tuple(range(switches)), Rate(rate, rate, rate), 1.0
+        Candidate(way, "switches" if switches else "joints"), tuple(range(switches)), judged(rate), layout_us
     )
-    return Close(screened, {}, {TABLED: Rate(rate, rate, rate)}, None, (tables,), 2.0)
+    return Close(screened, {}, {TABLED: judged(rate)}, {}, {}, (tables,), 2.0)
 
 
 def simulated(design: Design, us: float) -> Design:
@@ -55,7 +62,9 @@ def test_joints_alone_have_one_design_a_layout_and_wait_for_a_record() -> None:
 
 def test_compiling_is_choosing_training_and_making_the_tables() -> None:
     design = next(designs(close_of(), NO_TIME))
-    (point, *_) = points_of([design], dict.fromkeys(((design, kind) for kind in POLICIES), WAIT), NAMES, Search())
+    (point, *_) = points_of(
+        [design], dict.fromkeys(((design, kind) for kind in POLICIES), WAIT), {design.judged: 0.0}, NAMES, Search()
+    )
     assert point.compile_s == 3.25
 
 
@@ -84,7 +93,7 @@ def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
     assert other.frame.us < one.frame.us
     several = [simulated(one, 20.0), simulated(other, 60.0)]
     waits = {(design, kind): WAIT for design in several for kind in design.decisions}
-    points = points_of(several, waits, NAMES, Search())
+    points = points_of(several, waits, {each.judged: 0.01 for each in several}, NAMES, Search())
     assert [point.frame.us for point in points] == sorted(point.frame.us for point in points)
     fronts = {(len(point.switches), point.setting.decision): point.fronts for point in points}
     assert fronts[20, "single"] == ("frame", "switches", "latency")
@@ -94,11 +103,22 @@ def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
     assert points[0].classify == Time(20.0, "simulated")
 
 
+def test_a_points_rate_and_its_interval_are_less_its_luck() -> None:
+    design = next(designs(close_of(20, 0.9), NO_TIME))
+    waits = dict.fromkeys(((design, kind) for kind in POLICIES), WAIT)
+    (point, *_) = points_of([design], waits, {design.judged: 0.25}, NAMES, Search())
+    found = design.judged.rate
+    assert (point.rate.mean, point.rate.low, point.rate.high) == pytest.approx(
+        (found.mean - 0.25, found.low - 0.25, found.high - 0.25)
+    )
+    assert (point.luck, point.rate.correct) == (0.25, found.correct)
+
+
 def test_a_decision_that_is_quicker_is_on_its_own_front() -> None:
     one, other = (next(designs(close_of(n, rate), NO_TIME)) for n, rate in ((20, 0.9), (10, 0.8)))
     waits = {(design, kind): WAIT for design in (one, other) for kind in design.decisions}
     waits[other, "sequential"] = replace_latency(WAIT, 10.0)
-    points = points_of([one, other], waits, NAMES, Search())
+    points = points_of([one, other], waits, {each.judged: 0.0 for each in (one, other)}, NAMES, Search())
     (found,) = (each for each in points if len(each.switches) == 10 and each.setting.decision == "sequential")
     assert found.fronts == ("latency",)
     assert found.latency.mean_us == 10.0

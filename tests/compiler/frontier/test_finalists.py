@@ -1,17 +1,23 @@
+import numpy as np
 import pytest
 
+from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.finalists import depth_of, finalists, papers_depth, papers_tables, worthwhile
-from thenar.compiler.frontier.points import Rate, Way
+from thenar.compiler.frontier.points import Way
 from thenar.compiler.frontier.price import Tabled
-from thenar.compiler.frontier.screen import Screened, rate_of
+from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import NO_SWITCHES, Candidate, Search, Shape
-from thenar.compiler.frontier.survey import Tally
+from thenar.compiler.frontier.survey import Judged, Tally
 from thenar.runtime.manifest import Inputs
+
+
+def judged(rate: float) -> Judged:
+    return Judged(Rate.counted((round(10_000 * rate),), 10_000, of="pooled"), np.arange(1), 1)
 
 
 def _screened(size: int, rate: float, frame_us: float, inputs: Inputs = "switches", method: str = "id3") -> Screened:
     choice = Candidate(Way(method, float(size)), inputs)
-    return Screened(choice, tuple(range(size)), Rate(rate, rate, rate), frame_us)
+    return Screened(choice, tuple(range(size)), judged(rate), frame_us)
 
 
 def test_joints_are_read_unless_switches_stand_alone() -> None:
@@ -60,14 +66,8 @@ def test_a_placement_that_is_slow_but_small_is_a_finalist() -> None:
     assert set(finalists([quick, small], [], 2)) == {quick, small}
 
 
-def test_a_rate_has_the_interval_of_its_rows() -> None:
-    rate = rate_of((90,), 100)
-    assert rate.mean == 0.9
-    assert 0.82 < rate.low < 0.9 < rate.high < 0.95
-
-
-def rates_of(shape: Shape, *rates: tuple[int, float]) -> dict[Tabled, Rate]:
-    return {Tabled(rounds, shape): Rate(rate, rate, rate) for rounds, rate in rates}
+def rates_of(shape: Shape, *rates: tuple[int, float]) -> dict[Tabled, Judged]:
+    return {Tabled(rounds, shape): judged(rate) for rounds, rate in rates}
 
 
 def test_of_every_shape_the_fewest_rounds_that_do_as_well_are_worth_a_price() -> None:
@@ -84,19 +84,23 @@ def test_the_papers_tables_have_a_hundred_rounds_or_as_many_as_there_are() -> No
         assert papers_tables(search).rounds in search.tabled
 
 
+def right(count: int) -> bytes:
+    return np.packbits(np.arange(500) < count).tobytes()
+
+
 @pytest.mark.parametrize(("late", "rounds"), [(0, 100), (2, 100), (3, 300)])
 def test_rounds_beyond_the_papers_are_followed_where_they_win_more_than_a_fifth_of_a_percent(
     late: int, rounds: int
 ) -> None:
     search = Search(methods=("id3",), rivals=())
     correct = [450 + (late if stage > 100 else 0) for stage in search.stages]
-    fits = [Tally(500, tuple(correct), ()), Tally(500, tuple(450 for _ in correct), ())]
-    assert depth_of(search, fits).rounds == rounds
+    fits = [Tally(tuple(map(right, counts)), (), ()) for counts in (correct, [450] * len(correct))]
+    assert depth_of(search, fits, 1000).rounds == rounds
 
 
 def test_a_search_of_few_rounds_is_followed_to_its_end() -> None:
     search = Search(methods=("id3",), rivals=(), rounds=50)
-    assert depth_of(search, [Tally(10, tuple(range(len(search.stages))), ())]) == search
+    assert depth_of(search, [Tally(tuple(map(right, range(len(search.stages)))), (), ())], 10) == search
 
 
 def test_what_is_followed_less_far_is_the_beginning_of_what_is() -> None:

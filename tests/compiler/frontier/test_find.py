@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from thenar.compiler.artifact.compile import compile_build
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.evaluation.folds import weka_folds
-from thenar.compiler.frontier.cache import OLD_HEADER
+from thenar.compiler.frontier.cache import OLD_HEADERS
 from thenar.compiler.frontier.find import find_frontier
 from thenar.compiler.frontier.points import Frontier, FrontierError, Point, frontier_from_bytes
 from thenar.compiler.frontier.search import Search
@@ -37,7 +37,7 @@ pytestmark = pytest.mark.slow
 def asked(folder: Path, grasp_set: GraspSet, **changes: Any) -> Request:
     """Return arguments of find_frontier; `changes` are of its search or of itself."""
     search: dict[str, Any] = {"methods": ("elimination", "id3"), "rivals": ("mrmr",), "rounds": 6}
-    search |= {"repeats": 1, "finalists": 2, "seed": 1}
+    search |= {"repeats": 1, "finalists": 2, "seed": 1, "by": None}
     search |= {name: changes.pop(name) for name in list(changes) if name in search}
     return {"grasp_set": grasp_set, "output": folder / "out", "search": Search(**search), "jobs": 1} | changes
 
@@ -74,7 +74,12 @@ def test_every_point_is_on_a_front_and_none_beats_those_of_its_own(first: tuple[
     for name, price in (("frame", lambda p: p.frame.us), ("switches", lambda p: len(p.switches))):
         front = [point for point in points if name in point.fronts]
         assert front
-        assert not any(price(a) < price(b) and a.rate.mean >= b.rate.mean for a in front for b in front)
+        assert not any(price(a) < price(b) and chosen_by(a) >= chosen_by(b) for a in front for b in front)
+
+
+def chosen_by(point: Point) -> float:
+    """Return the rate before its correction."""
+    return point.rate.mean + point.luck
 
 
 def test_scans_that_end_early_decide_on_single_frames(first: tuple[Request, Frontier]) -> None:
@@ -83,8 +88,12 @@ def test_scans_that_end_early_decide_on_single_frames(first: tuple[Request, Fron
 
 
 def test_subjects_are_left_out_where_there_are_several(first: tuple[Request, Frontier]) -> None:
-    assert first[1].subjects == 2
-    assert all(point.left_out is not None for point in first[1].points)
+    found = first[1]
+    assert (found.subjects, found.by, found.trials) == (2, "new subject", found.rows)
+    every = [*found.points, *found.tried, *found.marks]
+    assert {each.rate.what for each in every} == {"new subject, trials"}
+    assert {point.beside and point.beside.what for point in found.points} == {"pooled, trials"}
+    assert {point.rate.over for point in found.points} == {2}
 
 
 def rows_recognised(grasp_set: GraspSet, point: Point, train: Rows, test: Rows) -> int:
@@ -117,13 +126,30 @@ def test_rates_are_those_of_rows_that_neither_placement_nor_training_saw(tmp_pat
             sum(rows_recognised(grasp_set, point, fold.train, fold.test) for fold in weka_folds(labels, 4, seed))
             for seed in (1, 2)
         ]
-        assert point.rate.mean == pytest.approx(np.mean(repeats) / len(grasp_set))
+        assert point.beside is not None
+        assert point.beside.mean == pytest.approx(np.mean(repeats) / len(grasp_set))
         others = [np.flatnonzero(grasp_set.subjects == subject) for subject in ("S0", "S1", "S2")]
         alone = [
             rows_recognised(grasp_set, point, np.setdiff1d(np.arange(len(grasp_set)), test), test) for test in others
         ]
-        assert point.left_out is not None
-        assert point.left_out.mean == pytest.approx(sum(alone) / len(grasp_set))
+        assert chosen_by(point) == pytest.approx(sum(alone) / len(grasp_set))
+        assert point.rate.correct == (sum(alone),)
+
+
+def test_frames_of_a_trial_are_on_one_side_of_every_fold(tmp_path: Path, make_set: Make) -> None:
+    """Every row ten times: with copies on both sides of a fold every rate would be 100 %, over 960 units."""
+    grasp_set = make_set(subjects=2)
+    request = {"methods": ("id3",), "rivals": (), "by": "trial"}
+    repeated = found_of(asked(tmp_path / "ten", grasp_set.rows(np.repeat(np.arange(96), 10)), **request))
+    assert (repeated.rows, repeated.trials, repeated.by) == (960, 96, "pooled")
+    assert repeated.points
+    for point in repeated.points:
+        assert point.frames is not None
+        assert (point.rate.total, point.frames.total, point.frames.what) == (96, 960, "pooled, frames")
+        # Equal frames of a trial are recognised together.
+        assert point.frames.mean == pytest.approx(chosen_by(point))
+        assert point.frames.over == 96
+        assert point.rate.mean < 1
 
 
 def test_no_placement_without_switches_is_tried_but_the_joints_alone(first: tuple[Request, Frontier]) -> None:
@@ -157,7 +183,7 @@ def test_a_store_of_the_older_form_is_computed_anew_and_that_is_said(tmp_path: P
     request = asked(tmp_path, make_set(), methods=("id3",), rivals=())
     first = found_of(request)
     store = request["output"] / "store.jsonl"
-    store.write_bytes(OLD_HEADER + store.read_bytes().split(b"\n", 1)[1])
+    store.write_bytes(OLD_HEADERS[-1] + store.read_bytes().split(b"\n", 1)[1])
     again = found_of(request)
     assert again.skipped[0] == "store.jsonl was an older thenar's, of another form: everything was computed anew"
     assert len(again.skipped) == len(first.skipped) + 1
@@ -210,7 +236,8 @@ def test_a_set_may_lack_switches_or_joints(
     found = found_of(asked(tmp_path, make_set(switches=switches, joints=joints)))
     assert {each.inputs for each in found.tried} == inputs
     assert found.points
-    assert all(point.left_out is None for point in found.points)
+    assert (found.by, found.beside) == ("pooled", None)
+    assert all(point.beside is None for point in found.points)
     if joints == 0:
         assert "paper, S = 62" in [mark.name for mark in found.marks]
 
@@ -293,7 +320,8 @@ def test_two_workers_of_a_cluster_find_the_same(tmp_path: Path, make_set: Make) 
 
 def _timeless(found: Frontier) -> tuple[object, ...]:
     points = [
-        (each.setting, each.switches, each.rate, each.left_out, each.frame, each.latency) for each in found.points
+        (each.setting, each.switches, each.rate, each.luck, each.beside, each.frame, each.latency)
+        for each in found.points
     ]
     rest = (found.tried, found.curves, found.marks, found.combinations, found.picked)
     return (points, *rest)

@@ -3,17 +3,20 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.cache import Cache, Store
 from thenar.compiler.frontier.designs import Design
 from thenar.compiler.frontier.equipment import NO_TIME, Equipment
 from thenar.compiler.frontier.finalists import Close
 from thenar.compiler.frontier.measure import measured
-from thenar.compiler.frontier.points import Rate, Way
+from thenar.compiler.frontier.points import Way
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import Candidate, Shape
+from thenar.compiler.frontier.survey import Judged
 from thenar.compiler.frontier.timing.checks import unchecked
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel
 from thenar.compiler.frontier.timing.python_times import PythonCost, random_tables
@@ -28,8 +31,9 @@ def design_of(model: ClassifyModel) -> Design:
     scan = ScanTimes(500.0, 200.0, 4, 2, "wire", 1.5)
     wired = Wired("mcp23017", 400_000, scan)
     priced = PricedTables(Tabled(1, Shape(16)), tables_to_bytes(tables), model.options(tables), (wired,), 1.0)
-    screened = Screened(Candidate(Way("id3", 6.0), "switches"), tuple(range(6)), Rate(0.9, 0.9, 0.9), 1.0)
-    close = Close(screened, {}, {}, None, (priced,), 1.0)
+    judged = Judged(Rate.counted((9,), 10, of="pooled"), np.arange(10), 1)
+    screened = Screened(Candidate(Way("id3", 6.0), "switches"), tuple(range(6)), judged, 1.0)
+    close = Close(screened, {}, {}, {}, {}, (priced,), 1.0)
     return Design(close, priced, priced.classified[0], wired, "early", NO_TIME)
 
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from thenar.compiler.frontier.plots import PICTURES, POINT_ID, pictures
-from thenar.compiler.frontier.points import Frontier, Mark, Point
+from thenar.compiler.frontier.points import Frontier, Latency, Mark, Point, Time
 from thenar.compiler.pictures import PictureError, painting
 
 NASTY = r"$\left{<&> -- ü = ]]> 'x'"
@@ -210,3 +210,26 @@ def test_other_kinds_of_files_are_refused(examples: Any) -> None:
     kind: Any = "gif"
     with pytest.raises(PictureError, match="gif"):
         pictures(examples.example_frontier(), kind)
+
+
+def test_latencies_are_frames_at_least_and_the_axis_ends_where_they_do(examples: Any) -> None:
+    found, replace = examples.example_frontier(), msgspec.structs.replace
+    none, never = Latency(0.0, 0.0, 0.0), Latency(1e9, 1e9, 1.0)
+    points = [point for point in found.points if "latency" in point.fronts]
+    late = {points[0].number: none, points[1].number: never}
+    changed = [replace(point, latency=late.get(point.number, point.latency)) for point in found.points]
+    figure = _drawn(replace(found, points=tuple(changed), picked=points[-1].number), "latency")
+    low, high = figure.axes[0].get_xlim()
+    shown = [point for point in changed if "latency" in point.fronts and point.latency.missed < 1]
+    waits = [max(point.latency.mean_us, point.frame.us) for point in shown]
+    assert points[0].frame.us / 2 < low <= min(waits)
+    assert high < 2 * max(*(point.latency.p99_us for point in shown), *(mark.latency_us or 0 for mark in found.marks))
+
+
+def test_a_frontier_whose_joints_take_an_unknown_time_says_so_on_the_axis(examples: Any) -> None:
+    found, replace = examples.example_frontier(), msgspec.structs.replace
+    assert "left out" not in _drawn(found, "frontier").axes[0].get_xlabel()
+    points = tuple(replace(point, transfer=Time(0.0, "unknown")) for point in found.points)
+    unknown = replace(found, points=points)
+    assert "reading the joints is left out" in _drawn(unknown, "frontier").axes[0].get_xlabel()
+    assert "left out" not in _drawn(unknown, "switches").axes[0].get_xlabel()

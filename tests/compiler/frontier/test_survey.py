@@ -1,6 +1,7 @@
 """One training serves all numbers of rounds, one path all parameters: each answer is that of doing it alone."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import winners
+from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.frontier.search import SHAPES, Search, Shape
 from thenar.compiler.frontier.survey import Cuts, Tally, choose_path, fit_stages
 from thenar.compiler.placement.id3 import grow_id3
@@ -33,7 +35,11 @@ def cuts(grasp_set: GraspSet) -> Cuts:
 
 
 def cuts_of(grasp_set: GraspSet) -> Cuts:
-    return Cuts.of(Samples.of(grasp_set).labels, grasp_set.subjects, SEARCH)
+    return Cuts.of(Samples.of(grasp_set), SEARCH)
+
+
+def counted(packed: bytes) -> int:
+    return int.from_bytes(packed).bit_count()
 
 
 def fit_of(samples: Samples, cuts: Cuts, stages: tuple[int, ...], columns: tuple[int, ...] = COLUMNS) -> Tally:
@@ -44,11 +50,11 @@ def fit_of(samples: Samples, cuts: Cuts, stages: tuple[int, ...], columns: tuple
 def test_every_stage_is_as_if_trained_for_it_alone(grasp_set: GraspSet, cuts: Cuts, inputs: Any) -> None:
     fold, stages, samples = cuts.screening[0], (1, 4, 9), Samples.of(grasp_set, inputs)
     fit, X = fit_of(samples, cuts, stages), samples.kept(COLUMNS)
-    for stage, correct in zip(stages, fit.correct, strict=True):
+    for stage, correct in zip(stages, fit.stages, strict=True):
         stumps, _ = boost(X[fold.train], samples.labels[fold.train], 4, rounds=stage)
         answers = winners(stumps.scores(X[fold.test]))
-        assert correct == np.count_nonzero(answers == samples.labels[fold.test])
-    assert fit.total == len(fold.test)
+        # Each row of the set is a trial of its own, numbered as the rows are.
+        assert correct == np.packbits((answers == samples.labels[fold.test])[np.argsort(fold.test)]).tobytes()
 
 
 def test_tables_answer_as_they_will_when_deployed(samples: Samples, cuts: Cuts) -> None:
@@ -56,14 +62,14 @@ def test_tables_answer_as_they_will_when_deployed(samples: Samples, cuts: Cuts) 
     fit = fit_of(samples, cuts, stages)
     X, kept = samples.kept(COLUMNS), len(COLUMNS)
     bits, codes = X[:, :kept].astype(bool), X[:, kept:]
-    for stage, row in zip(stages, fit.deployed, strict=True):
+    for stage, row in zip(stages, fit.tables, strict=True):
         stumps, _ = boost(X[fold.train], samples.labels[fold.train], 4, rounds=stage)
         for shape, correct in zip(SHAPES, row, strict=True):
             scores = collapse(stumps, kept)
             scorer = Scorer(quantise(scores, bits[fold.train], codes[fold.train], shape.width, shape.table_bits))
             lanes = [scorer.lanes(bits[test], codes[test]) for test in fold.test]
             answers = [lane.index(max(lane)) for lane in lanes]
-            assert correct == np.count_nonzero(answers == samples.labels[fold.test])
+            assert counted(correct) == np.count_nonzero(answers == samples.labels[fold.test])
 
 
 def test_without_an_input_that_varies_the_most_frequent_type_is_answered(grasp_set: GraspSet, cuts: Cuts) -> None:
@@ -71,8 +77,9 @@ def test_without_an_input_that_varies_the_most_frequent_type_is_answered(grasp_s
     fit = fit_of(samples, cuts, (1, 3), columns=())
     most = np.bincount(samples.labels[fold.train]).argmax()
     same = int(np.count_nonzero(samples.labels[fold.test] == most))
-    assert fit.correct == (same, same)
-    assert fit.deployed == ((same,) * len(SHAPES),) * 2
+    assert [counted(packed) for packed in fit.stages] == [same, same]
+    assert {counted(packed) for row in fit.tables for packed in row} == {same}
+    assert [len(row) for row in fit.tables] == [len(SHAPES)] * 2
 
 
 def test_a_path_holds_the_placement_of_every_parameter(samples: Samples, cuts: Cuts) -> None:
@@ -100,12 +107,29 @@ def test_the_same_set_is_cut_alike(make_set: Callable[..., GraspSet]) -> None:
         assert np.array_equal(one.test, other.test)
 
 
-def test_nobody_left_out_is_trained_on(make_set: Callable[..., GraspSet]) -> None:
-    grasp_set = make_set(subjects=3)
-    cuts = cuts_of(grasp_set)
-    assert len(cuts.subjects) == 3
-    for fold in cuts.subjects:
-        assert set(grasp_set.subjects[fold.train]).isdisjoint(grasp_set.subjects[fold.test])
+def frames_of(grasp_set: GraspSet, each: int) -> GraspSet:
+    """Return the set with every row `each` times, the frames of one trial; in another order."""
+    rows = np.random.default_rng(5).permutation(np.repeat(np.arange(len(grasp_set)), each))
+    return grasp_set.rows(rows)
+
+
+def test_nobody_left_out_is_trained_on_and_a_tenth_at_most_is_tested_of_many(make_set: Callable[..., GraspSet]) -> None:
+    for subjects, folds in ((3, 3), (10, 10), (24, 10)):
+        grasp_set = make_set(rows=480, subjects=subjects)
+        cuts = cuts_of(grasp_set)
+        assert (len(cuts.subjects), cuts.by, cuts.beside) == (folds, "new subject", "pooled")
+        assert cuts.screening == cuts.subjects
+        for fold in cuts.subjects:
+            assert set(grasp_set.subjects[fold.train]).isdisjoint(grasp_set.subjects[fold.test])
+
+
+def test_points_are_chosen_by_what_is_asked_for(make_set: Callable[..., GraspSet]) -> None:
+    samples = Samples.of(make_set(subjects=3))
+    by_trial = Cuts.of(samples, replace(SEARCH, by="trial"))
+    assert (by_trial.by, by_trial.beside, by_trial.screening) == ("pooled", "new subject", by_trial.repeats[0])
+    assert Cuts.of(samples, replace(SEARCH, by="subject")).by == "new subject"
+    with pytest.raises(EvaluationError, match="needs two or more subjects"):
+        Cuts.of(Samples.of(make_set()), replace(SEARCH, by="subject"))
 
 
 def test_every_fold_tests_rows_that_it_does_not_train_on(make_set: Callable[..., GraspSet]) -> None:
@@ -114,6 +138,46 @@ def test_every_fold_tests_rows_that_it_does_not_train_on(make_set: Callable[...,
     assert len((*cuts.screening, *cuts.others)) == 2 * SEARCH.folds + 2
     for fold in (*cuts.screening, *cuts.others):
         assert np.array_equal(np.sort(np.concatenate([fold.train, fold.test])), np.arange(len(grasp_set)))
+
+
+def test_no_trial_is_parted(make_set: Callable[..., GraspSet]) -> None:
+    grasp_set = frames_of(make_set(subjects=2), 5)
+    cuts = cuts_of(grasp_set)
+    assert (len(cuts.trials), len(cuts.people)) == (480, 96)
+    for fold in (*cuts.screening, *cuts.others):
+        assert set(cuts.trials[fold.train]).isdisjoint(cuts.trials[fold.test])
+
+
+def test_a_trial_is_recognised_as_most_of_its_frames_are(make_set: Callable[..., GraspSet]) -> None:
+    """Counted here once more: each row's answer, and the label that most frames of a trial are given."""
+    grasp_set = make_set(rows=288, subjects=3)
+    grasp_set = replace(grasp_set, trials=np.arange(288) // 4 % 24 // 2, objects=np.array(["thing"] * 288))
+    samples, cuts = Samples.of(grasp_set), cuts_of(grasp_set)
+    assert len(cuts.people) < len(cuts.trials)
+    fits = {fold: fit_stages(samples, fold, COLUMNS, (3,), (3,), SHAPES, SEARCH.training) for fold in cuts.subjects}
+    right_trials, right_rows = 0, 0
+    for fold in cuts.subjects:
+        X = samples.kept(COLUMNS)
+        stumps, _ = boost(X[fold.train], samples.labels[fold.train], 4, rounds=3)
+        answers = winners(stumps.scores(X[fold.test]))
+        right_rows += int(np.count_nonzero(answers == samples.labels[fold.test]))
+        for trial in np.unique(cuts.trials[fold.test]):
+            mine = cuts.trials[fold.test] == trial
+            right_trials += int(np.bincount(answers[mine]).argmax() == samples.labels[fold.test][mine][0])
+    judged = cuts.judged("new subject", {fold: fit.stages[0] for fold, fit in fits.items()})
+    assert (judged.rate.correct, judged.rate.total, judged.rate.over) == ((right_trials,), len(cuts.people), 3)
+    assert (judged.hits.sum(), judged.repeats, judged.rate.what) == (right_trials, 1, "new subject, trials")
+    frames = cuts.frames({fold: fit.frames[0][0] for fold, fit in fits.items()})
+    assert (frames.correct, frames.total, frames.what) == ((right_rows,), 288, "new subject, frames")
+
+
+def test_a_rate_is_of_the_repeats_that_were_fitted(make_set: Callable[..., GraspSet]) -> None:
+    cuts = cuts_of(make_set())
+    wrong = {fold: np.packbits(np.zeros(len(fold.test), bool)).tobytes() for fold in cuts.repeats[0]}
+    right = {fold: np.packbits(np.ones(len(fold.test), bool)).tobytes() for fold in cuts.repeats[1]}
+    assert (cuts.judged("pooled", wrong).rate.mean, cuts.judged("pooled", wrong).repeats) == (0.0, 1)
+    both = cuts.judged("pooled", wrong | right)
+    assert (both.rate.correct, both.repeats, set(both.hits.tolist())) == ((0, 96), 2, {1})
 
 
 def test_a_shape_names_width_and_entries() -> None:

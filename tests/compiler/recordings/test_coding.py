@@ -84,7 +84,7 @@ def test_the_cost_of_coding_is_told_in_any_unit(size: float) -> None:
 @given(st.lists(st.floats(-1e290, 1e290), min_size=1, max_size=30).map(np.array))
 def test_a_sound_grid_gives_every_value_a_code(values: np.ndarray) -> None:
     grid = sound_grid(values)
-    if 0 < np.ptp(values):
+    if np.ptp(values) > 0:
         codes, joint, _ = code_joint("j", JointColumns(("j",), grid=grid), values, rows(values))
         assert np.abs(joint.value(codes) - values).max() <= grid * 0.5001
 

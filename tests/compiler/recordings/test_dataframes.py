@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 
-from thenar.compiler import Columns, GraspSet
+from thenar.compiler import Columns, GraspSet, Joint
 from thenar.compiler.recordings.columns import JointColumns
 from thenar.compiler.recordings.errors import ColumnsError, RecordingError, TableError
 
@@ -36,6 +36,11 @@ def test_a_frame_has_the_documented_columns_and_types(small: GraspSet) -> None:
     assert all(isinstance(name, str) for name in frame["subject"])
     assert frame["index"].tolist() == [-9.5, -9.0, -9.0, -9.5, -8.5, -8.0]
     assert small.to_dataframe(codes=True)["index"].dtype == np.uint16
+    pads = replace(
+        small, taxels=np.arange(6, dtype=np.uint16).reshape(6, 1), taxel_columns=(Joint("pad", "V", 0, 0.0, 2, 1.0),)
+    )
+    assert [*pads.to_dataframe().columns][4:] == [*inputs[:4], "pad", *inputs[4:]]
+    assert pads.to_dataframe()["pad"].tolist() == [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]
     several = replace(small, sessions=np.array(["1", "2"] * 3)).to_dataframe()
     assert several["session"].tolist() == ["1", "2"] * 3
     clash = replace(small, switch_names=("grasp", "grasp_", "trial", "session")).to_dataframe()

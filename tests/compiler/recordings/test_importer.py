@@ -7,6 +7,7 @@ from msgspec.structs import replace
 
 from thenar.compiler.recordings.columns import Columns, JointColumns, TaxelColumns
 from thenar.compiler.recordings.errors import ColumnsError, TableError
+from thenar.compiler.recordings.export import export
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import ImportReport, import_file, import_table
 from thenar.compiler.recordings.table import Column, Table
@@ -139,12 +140,24 @@ def test_a_row_without_a_label_or_trial_is_not_kept_and_the_loss_is_counted() ->
 
 def test_analog_columns_become_switches_above_a_threshold() -> None:
     pads = {"p1": ["0", "90", "100", "5", "95", ""], "p2": ["0.5", "0.4", "0.6", "1", "0", "0.41"]}
-    taxels = (TaxelColumns(("p1",), "otsu"), TaxelColumns(("p2",), 0.4))
+    taxels = (TaxelColumns(("p1",), threshold="otsu"), TaxelColumns(("p2",), threshold=0.4))
     grasp_set, report = frames(missing="keep", taxels=taxels, **pads)
     assert grasp_set.switch_names == ("s", "p1", "p2")
     assert grasp_set.switches[:, 1].tolist() == [False, True, True, False, True, True]
     assert grasp_set.switches[:, 2].tolist() == [True, False, True, True, False, True]
     assert "2 analog columns became switches, closed p1 above 47.5, p2 above 0.4" in report.notes
+
+
+def test_columns_whose_threshold_is_learnt_are_kept_as_codes(tmp_path: Path) -> None:
+    pads = {"p1": ["0", "90", "100", "5", "95", ""], "p2": ["0.5", "0.4", "0.6", "1", "0", "0.41"]}
+    grasp_set, _ = frames(missing="keep", taxels=(TaxelColumns(("p*",), threshold="learnt"),), **pads)
+    assert grasp_set.element_names == ("s", "p1", "p2")
+    assert grasp_set.taxels[:, 0].tolist() == [0, 90, 100, 5, 95, 90]
+    assert grasp_set.taxel_columns[1].value(grasp_set.taxels[:, 1]) == pytest.approx([0.5, 0.4, 0.6, 1, 0, 0.41])
+    for codes in (False, True):
+        export(grasp_set, tmp_path / "t.csv", codes, columns=tmp_path / "c.toml")
+        again, _ = import_file(tmp_path / "t.csv", tmp_path / "c.toml")
+        assert again.fingerprint() == grasp_set.fingerprint()
 
 
 def test_a_label_and_a_trial_may_be_spread_over_columns() -> None:

@@ -81,7 +81,7 @@ def test_codes_on_one_grid_with_another_origin_are_shifted_and_mean_what_they_di
 
 def test_taxels_are_merged_as_joints_are(small: GraspSet) -> None:
     pads = tuple(Joint(name, "counts", 0, 0.0, 1, 1.0) for name in ("pad 1", "pad 2"))
-    one = replace(small, taxels=np.arange(12).reshape(6, 2), taxel_columns=pads)
+    one = replace(small, taxels=np.arange(12, dtype=np.uint16).reshape(6, 2), taxel_columns=pads)
     two = replace(one, taxels=one.taxels[:, ::-1], taxel_columns=pads[::-1], subjects=np.full(6, "C"))
     merged = merge({"a": one, "b": two})
     assert merged.taxel_columns == pads

@@ -82,13 +82,13 @@ def test_what_is_done_to_the_glove_shows_in_its_records(line: PtyLine, client: S
         for number in range(5):
             values = bytes([100 + number] * 22)
             glove.set(values)
-            glove.plugged = number != 3
-            glove.turn_switch(number == 4)
+            glove.state.plugged = number != 3
+            glove.state.turn_switch(number == 4)
             client.write(b"G")
             fault: RecordFault | None = "unplugged" if number == 3 else None
             status = 0x80 | (number != 3) | 0x06 * (number == 4)
             assert records(client, 1, decoder) == [Record(values, streamed=False, fault=fault, status=status)]
-        assert glove.light
+        assert glove.state.is_on("L")
         assert glove.records == 5
 
 
@@ -106,7 +106,7 @@ def test_closed_it_sends_nothing_and_the_line_stays(line: PtyLine, client: Seria
     with EmulatedCyberGlove(line) as glove:
         client.write(b"S")
         assert records(client, 1)
-        assert glove.streaming
+        assert glove.box.streaming
     client.drain(0.05)
     assert client.read(0.05) == b""
     line.send(b"still there")

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.emulated.i2c_adapter import (
+from thenar.drivers.emulated.i2c_wire import (
     ADAPTERS,
     BYTE,
     BYTE_DATA,
@@ -12,9 +12,12 @@ from thenar.drivers.emulated.i2c_adapter import (
     QUICK,
     WORD_DATA,
     Adapter,
+    Message,
+    NakError,
+    Station,
     TransferFault,
+    Wire,
 )
-from thenar.drivers.emulated.i2c_wire import Message, NakError, Station, Wire
 from thenar.drivers.i2c.chips import CHIPS
 
 

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.emulated.i2c_adapter import Adapter
-from thenar.drivers.emulated.i2c_wire import Message, Station, Wire
+from thenar.drivers.emulated.i2c_wire import Adapter, Message, Station, Wire
 from thenar.drivers.errors import DeviceError
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.drivers.i2c.keeper import ImpostorError, Keeper, PlacedChip, read_back, set_up, whats_there

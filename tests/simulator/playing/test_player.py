@@ -4,7 +4,7 @@ from threading import Event
 import numpy as np
 
 from thenar.drivers.calibration import GloveCalibration
-from thenar.simulator.playing.performance import Performance, Player
+from thenar.simulator.playing.performance import Performance
 
 
 def performance(frames: int, period_us: int) -> Performance:
@@ -21,8 +21,7 @@ def performance(frames: int, period_us: int) -> Performance:
 
 def test_every_frame_is_shown_once_in_order_and_never_early() -> None:
     played, shown, log = performance(20, 2000), list[tuple[list[bool], bytes]](), list[tuple[int, str, int]]()
-    player = Player(played, lambda bits, raw: shown.append((bits, raw)), lambda *line: log.append(line))
-    assert player.play(Event())
+    assert played.play(lambda bits, raw: shown.append((bits, raw)), lambda *line: log.append(line), Event())
     assert [bits for bits, _ in shown] == played.switches.tolist()
     assert [raw for _, raw in shown] == [row.tobytes() for row in played.sensors]
     assert [(row, grasp) for row, grasp, _ in log] == list(enumerate(played.grasps.tolist()))
@@ -34,5 +33,4 @@ def test_every_frame_is_shown_once_in_order_and_never_early() -> None:
 def test_stopping_ends_it_at_once_and_it_says_so() -> None:
     stop = Event()
     played = performance(1000, 60_000_000)
-    player = Player(played, lambda *_: stop.set(), lambda *_: None)
-    assert not player.play(stop)
+    assert not played.play(lambda *_: stop.set(), lambda *_: None, stop)

@@ -13,9 +13,9 @@ from thenar.cli import run
 from thenar.compiler.boosting.binning import midpoints
 from thenar.compiler.boosting.boost import boost
 from thenar.compiler.boosting.stumps import winners
+from thenar.compiler.recordings.coding import code_joint
 from thenar.compiler.recordings.columns import JointColumns
 from thenar.compiler.recordings.errors import RecordingError, TableError
-from thenar.compiler.recordings.coding import code_joint
 from thenar.compiler.recordings.importer import import_file
 from thenar.compiler.tables.collapse import HIGHEST_CODE, collapse
 from thenar.compiler.tables.quantise import quantise
@@ -159,7 +159,9 @@ def arrays_with(column: str, number: float) -> dict[str, NDArray[np.float64]]:
 
 
 def test_rows_of_nan_are_left_out_where_the_user_says_so_and_infinity_never(tmp_path: Path) -> None:
-    (tmp_path / "columns.toml").write_text('label = "g"\nframes = "independent"\nmissing = "drop"\n[[joints]]\ncolumns = ["j"]\n')
+    (tmp_path / "columns.toml").write_text(
+        'label = "g"\nframes = "independent"\nmissing = "drop"\n[[joints]]\ncolumns = ["j"]\n'
+    )
     (tmp_path / "table.csv").write_text("g,j\na,1\nb,nan\na,3\n")
     grasp_set, report = import_file(tmp_path / "table.csv", tmp_path / "columns.toml")
     assert len(grasp_set) == 2

@@ -85,7 +85,8 @@ def test_logitboost_itself_can_raise_the_loss_of_two_classes_of_many_and_60_digi
     X = [[0, 1], [1, 1], [2, 0], [2, 2], [3, 3], [4, 3], [4, 4], [5, 1], [5, 3], [5, 6], [6, 2], [7, 3]]
     labels = [1, 1, 1, 0, 1, 0, 0, 1, 1, 0, 1, 0]
     _, losses = boost(np.array(X), np.array(labels), 12, rounds=6)
-    truth, _ = ensembles.boost(X, labels, 12, 6)
+    start = ensembles.mean_loss([[0.0] * 12] * len(X), labels)
+    truth = [start, *(each.loss for each in ensembles.boost_rounds(X, labels, 12, 6))]
     assert max(np.diff(losses)) > 0.05
     assert losses == pytest.approx([float(loss) for loss in truth], rel=1e-12)
 

@@ -1,0 +1,144 @@
+"""How often the interval that a frontier promises for the point that it picks covers that point's rate on fresh grasps.
+
+Usage:
+    python benchmarks/luck.py [--cases 100] [--jobs -1] [--by "new subject"]
+
+Each case records scene kamakura under a seed of its own, a few repetitions of it, searches, picks the best point within
+a budget, and lets its tables, trained on all rows, classify fresh grasps: of the same hands, or of other ones. Luck is
+what was subtracted; the gap is the promised rate less the fresh one, before and after that.
+"""
+
+import argparse
+import tempfile
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from thenar.compiler.evaluation.rates import Rate
+from thenar.compiler.frontier.cache import Cache, Store
+from thenar.compiler.frontier.designs import best_designs, corrected, designs, lucks
+from thenar.compiler.frontier.equipment import Equipment, equipment_for
+from thenar.compiler.frontier.finalists import finalists, look_closely
+from thenar.compiler.frontier.points import By
+from thenar.compiler.frontier.screen import screen
+from thenar.compiler.frontier.search import Search
+from thenar.compiler.frontier.survey import Cuts, Survey
+from thenar.compiler.frontier.timing.wirings import wirings
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.samples import Samples
+from thenar.compiler.tables.quantise import integer_scores
+from thenar.compiler.workers import in_workers
+from thenar.runtime.tables import tables_from_bytes
+from thenar.simulator import load_scene, simulate
+
+SCENE, TARGET = "kamakura", "avr2560"
+# Of every grasp type by every subject: recorded; fresh ones of the same hands; hands that nobody recorded.
+REPETITIONS, MORE, OTHERS = 8, 30, 12
+BUDGETS_US = (1000.0, 5000.0)
+FIRST_OTHER = 100_000
+
+
+@dataclass(frozen=True)
+class Case:
+    """Recordings of one seed, and what their best point within a budget promised and reached."""
+
+    rate: Rate
+    luck: float
+    fresh: float
+
+    @property
+    def covered(self) -> bool:
+        """Whether the promised interval holds the fresh rate."""
+        return self.rate.low <= self.fresh <= self.rate.high
+
+
+def recorded(seed: int, repetitions: int = REPETITIONS, more: int | None = None) -> GraspSet:
+    """Return grasps of one seed; with `more`, as many fresh ones of the same hands."""
+    return simulate(load_scene(SCENE).varied(repetitions, seed, more=more), jobs=1).grasp_set
+
+
+@cache
+def strangers() -> GraspSet:
+    """Return grasps of hands that no case records."""
+    sets = [recorded(FIRST_OTHER + number) for number in range(OTHERS)]
+    joined = {
+        name: np.concatenate([getattr(each, name) for each in sets])
+        for name in ("switches", "codes", "grasps", "subjects", "objects", "trials")
+    }
+    first = sets[0]
+    return GraspSet(**joined, switch_names=first.switch_names, joints=first.joints, taxonomy=first.taxonomy)
+
+
+def played(asked: tuple[int, By, Equipment]) -> tuple[Case, ...]:
+    """Return a case for each budget of one seed."""
+    seed, by, equipment = asked
+    grasp_set = recorded(seed)
+    search = Search(
+        methods=("id3",),
+        rivals=(),
+        repeats=1,
+        screening=10,
+        rounds=10,
+        finalists=3,
+        seed=seed,
+        by="subject" if by == "new subject" else "trial",
+    )
+    samples = Samples.of(grasp_set)
+    cuts = Cuts.of(samples, search)
+    with tempfile.TemporaryDirectory() as folder, Store(Path(folder) / "store", "") as store:
+        answers = Cache(store, lambda _done, _all: None, jobs=1)
+        survey = Survey(grasp_set, SCENE, samples, None, search, cuts, equipment, answers)
+        screened, _ = screen(survey)
+        closes = look_closely(survey, finalists(screened, [], search.finalists))
+    several = [design for close in closes for design in designs(close, equipment.joints)]
+    fronts = best_designs(several)
+    luck = lucks(fronts, several, screened, cuts, seed)
+    fresh = strangers() if by == "new subject" else recorded(seed, more=MORE)
+    found = []
+    for budget_us in BUDGETS_US:
+        best = [design for design in fronts[0] if design.frame.us <= budget_us][-1]
+        tables = tables_from_bytes(best.tables.content)
+        columns, codes = list(best.close.screened.columns), fresh.codes[:, : best.joints]
+        answers = integer_scores(tables, fresh.switches[:, columns], codes).argmax(axis=1)
+        truth = np.array([samples.grasps.index(grasp) for grasp in fresh.grasps.tolist()])
+        lucky = luck[best.judged]
+        found.append(Case(corrected(best.judged.rate, lucky), lucky, float((answers == truth).mean())))
+    return tuple(found)
+
+
+def cases(seeds: Iterable[int], by: By, jobs: int) -> list[Case]:
+    """Return the cases of these seeds, in any order."""
+    with tempfile.TemporaryDirectory() as folder, Store(Path(folder) / "store", "") as store:
+        equipment = equipment_for(TARGET, wirings(None, TARGET), Cache(store, lambda _done, _all: None, jobs=1))
+    asked = [(seed, by, equipment) for seed in seeds]
+    return [case for found in in_workers(played, asked, jobs) for case in found]
+
+
+def told(found: Sequence[Case]) -> str:
+    """Return how many cases are covered, and by how much rates are off, in a line."""
+    columns = [(case.rate.mean - case.fresh, case.luck, case.fresh, case.rate.high - case.rate.low) for case in found]
+    gap, luck, fresh, width = 100 * np.mean(columns, axis=0)
+    return (
+        f"{sum(case.covered for case in found)} of {len(found)} covered; fresh {fresh:.1f} %, promised {gap:+.1f} "
+        f"({gap + luck:+.1f} uncorrected), luck {luck:.1f}, half-width {width / 2:.1f}"
+    )
+
+
+def main() -> None:
+    """Print, for each kind of rate, how many cases are covered, and by how much rates are off."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--cases", type=int, default=100)
+    parser.add_argument("--jobs", type=int, default=-1)
+    parser.add_argument("--by", choices=("new subject", "pooled"), nargs="*", default=("new subject", "pooled"))
+    asked = parser.parse_args()
+    for by in asked.by:
+        found = cases(range(1, asked.cases + 1), by, asked.jobs)
+        for number, budget_us in enumerate(BUDGETS_US):
+            print(f"{by}, the best within {budget_us:g} us: {told(found[number :: len(BUDGETS_US)])}")
+
+
+if __name__ == "__main__":
+    main()

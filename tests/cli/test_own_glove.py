@@ -1,0 +1,150 @@
+"""A glove of one's own, with pads and flex sensors, through every command: nothing says that it is another glove."""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from thenar.compiler.recordings.graspset import GraspSet, Joint
+from thenar.compiler.recordings.taxonomy import own
+from thenar.runtime.harness.loading import load_harness
+from thenar.runtime.manifest import manifest_from_bytes
+
+Thenar = Callable[..., Any]
+PADS = tuple(f"pad_{finger}_{number}" for finger in ("thumb", "index", "palm") for number in (1, 2, 3))
+FLEX = ("flex_thumb", "flex_index")
+QUICK = ("--rounds", 5, "--folds", 2)
+FOREIGN = re.compile(r"cyber ?glove|push.?button|EVQPLDA|murakami", re.IGNORECASE)
+LAYOUT = (
+    '<svg xmlns="http://www.w3.org/2000/svg" width="200mm" height="250mm" viewBox="0 0 200 250">'
+    '<path id="outline" d="M 20 240 L 10 20 L 150 20 L 160 240 Z"/>'
+    + "".join(
+        f'<circle id="{name}" cx="{40 + 30 * (place % 3)}" cy="{60 + 40 * (place // 3)}" r="5"/>'
+        for place, name in enumerate(PADS)
+    )
+    + "</svg>"
+)
+
+
+@pytest.fixture(scope="module")
+def grasps(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    random, rows, types = np.random.default_rng(3), 120, ("cup", "pen", "rod")
+    labels = np.arange(rows) % 3
+    closed, centres = random.random((3, len(PADS))) < 0.5, random.integers(500, 3500, (3, len(FLEX)))
+    noisy = centres[labels] + random.normal(0, 500, (rows, len(FLEX)))
+    path = tmp_path_factory.mktemp("own") / "own.grasps"
+    GraspSet(
+        switches=closed[labels] ^ (random.random((rows, len(PADS))) < 0.1),
+        switch_names=PADS,
+        codes=np.clip(noisy, 0, 4095).astype(np.uint16),
+        joints=tuple(Joint(name, "V", 0, 0.0, 4095, 3.3) for name in FLEX),
+        grasps=np.array(types)[labels],
+        taxonomy=own(types),
+        subjects=np.where(np.arange(rows) // 3 % 2, "A", "B"),
+        objects=np.full(rows, "thing"),
+        trials=np.arange(rows) // 6,
+    ).save(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def layout(grasps: Path) -> Path:
+    path = grasps.with_name("glove.svg")
+    path.write_text(LAYOUT)
+    return path
+
+
+def worked(done: Any) -> str:
+    """Return what a command printed, once it has worked and named no glove that this is not."""
+    assert done.returncode == 0, done.stderr
+    assert not FOREIGN.search(done.stdout + done.stderr), done.stdout + done.stderr
+    return " ".join((done.stdout + done.stderr).split())
+
+
+def foreign(folder: Path) -> list[str]:
+    """Return the files, but those of firmware, that name a glove that this is not."""
+    files = [path for path in folder.rglob("*") if path.is_file() and "firmware" not in path.parts]
+    assert files
+    return [path.name for path in files if FOREIGN.search(path.read_text(errors="replace"))]
+
+
+def test_a_build_its_report_and_its_spec_are_of_this_glove(
+    thenar: Thenar, grasps: Path, layout: Path, tmp_path: Path
+) -> None:
+    build, glove = tmp_path / "build", tmp_path / "glove.toml"
+    said = worked(thenar("compile", grasps, "-o", build, *QUICK, "--layout", layout, "--propose", glove))
+    assert "joints flex_thumb, flex_index have to be read by a source of your own" in said
+    assert load_harness(glove).cyberglove is None
+    worked(thenar("compile", grasps, "-o", build, *QUICK, "--layout", layout, "--glove", glove))
+    report = (build / "report.html").read_text()
+    assert "Joints flex_thumb, flex_index have to be read by a source of your own" in report
+    assert report.count('class="dot') >= len(PADS)
+    said = worked(thenar("spec", build, "--layout", layout, "-o", tmp_path / "spec"))
+    assert "switch or pad of your own" in said
+    assert "have to be read by a source of your own" in said
+    kept = [switch.name for switch in manifest_from_bytes((build / "build.json").read_bytes()).switches]
+    places = {each["name"]: (each["x_mm"], each["y_mm"]) for each in json.loads(_spec(tmp_path))["switches"]}
+    assert places == {name: (40.0 + 30 * (n % 3), 190.0 - 40 * (n // 3)) for n, name in enumerate(PADS) if name in kept}
+    assert "<svg" in (tmp_path / "spec" / "cutting.svg").read_text()
+    assert foreign(tmp_path) == []
+
+
+def _spec(folder: Path) -> str:
+    return (folder / "spec" / "spec.json").read_text()
+
+
+def test_the_live_commands_say_that_nothing_reads_the_joints(thenar: Thenar, grasps: Path, tmp_path: Path) -> None:
+    build, glove = tmp_path / "build", tmp_path / "glove.toml"
+    worked(thenar("compile", grasps, "-o", build, *QUICK, "--no-report", "--propose", glove))
+    looked = thenar("doctor", glove, "--build", build)
+    assert looked.returncode == 1
+    for done in (looked, thenar("run", build, "--glove", glove, "--frames", 1)):
+        words = " ".join((done.stdout + done.stderr).split())
+        assert "nothing in 'glove' reads the build's joints" in words
+        assert "have to be read by a source of your own" in words
+        assert not FOREIGN.search(words)
+
+
+def test_without_a_layout_nothing_is_drawn_and_with_one_everything_is(
+    thenar: Thenar, grasps: Path, layout: Path, tmp_path: Path
+) -> None:
+    refused = thenar("draw", grasps, "-o", tmp_path / "no.svg")
+    assert refused.returncode == 2
+    assert "where switch 'pad_thumb_1' lies is not known: --layout takes a drawing" in refused.stderr
+    build = tmp_path / "build"
+    refused = thenar("compile", grasps, "-o", build, *QUICK, "--hand-length", 180)
+    assert refused.returncode == 2
+    assert "give a --layout instead" in refused.stderr
+    layout.with_name("few.toml").write_text("[places]\npad_thumb_1 = [1, 2]\n")
+    refused = thenar("compile", grasps, "-o", build, *QUICK, "--layout", layout.with_name("few.toml"))
+    assert refused.returncode == 2
+    assert "'pad_thumb_2' is no switch of the glove few.toml" in refused.stderr
+    assert not build.exists()
+    for options in (["--per-grasp"], ["--place"], []):
+        worked(thenar("draw", grasps, "--layout", layout, *options, "-o", tmp_path / "a.svg", "--overwrite"))
+        picture = (tmp_path / "a.svg").read_text()
+        assert "pad_thumb_1" in picture
+        assert not FOREIGN.search(picture)
+
+
+@pytest.mark.slow
+def test_a_frontier_leaves_the_unknown_time_of_joints_out_and_says_so_or_takes_what_it_is_told(
+    thenar: Thenar, grasps: Path, tmp_path: Path
+) -> None:
+    few = ("--methods", "id3", "--rivals", "none", "--rounds", 5, "--repeats", 1, "--finalists", 1, "--jobs", 1)
+    found = {}
+    for name, more in (("left out", ()), ("given", ("--joint-us", 5000))):
+        said = worked(thenar("frontier", grasps, "-o", tmp_path / name, *few, "--target", "avr328p", *more))
+        assert ("what reading the joints (flex_thumb, flex_index) takes is not known" in said) == (name == "left out")
+        points = json.loads((tmp_path / name / "frontier.json").read_text())["points"]
+        found[name] = [point for point in points if point["setting"]["inputs"] != "switches"]
+        assert found[name]
+        assert foreign(tmp_path / name) == []
+    assert {point["transfer"]["how"] for point in found["left out"]} == {"unknown"}
+    assert {(point["transfer"]["how"], point["transfer"]["us"]) for point in found["given"]} == {("given", 5000.0)}
+    assert all(point["frame"]["us"] >= 5000.0 for point in found["given"])
+    assert all(point["latency"]["mean_us"] >= round(point["frame"]["us"]) for point in found["given"])

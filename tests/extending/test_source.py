@@ -1,0 +1,57 @@
+import json
+import socket
+import time
+from collections.abc import Callable
+from pathlib import Path
+from threading import Event, Thread
+from typing import Any
+
+import numpy as np
+import pytest
+
+from thenar.compiler import GraspSet, compile_build
+from thenar.compiler.recordings.graspset import Joint
+from thenar.compiler.recordings.taxonomy import own
+
+ROWS, HIGH = 60, {"cup": (200, 30), "pen": (30, 200), "rod": (200, 200)}
+
+
+def test_a_source_of_joints_of_ones_own_recognises_live(
+    install: Callable[[str, str], Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = list(HIGH)
+    labels = np.arange(ROWS) % 3
+    grasp_set = GraspSet(
+        switches=np.zeros((ROWS, 0), bool),
+        switch_names=(),
+        codes=np.array([HIGH[name] for name in names])[labels].astype(np.uint16),
+        joints=tuple(Joint(f"flex_{number}", "raw", 1, 1.0, 255, 255.0) for number in (1, 2)),
+        grasps=np.array(names)[labels],
+        taxonomy=own(names),
+        subjects=np.full(ROWS, "A"),
+        objects=np.full(ROWS, "thing"),
+        trials=np.arange(ROWS),
+    )
+    build = compile_build(grasp_set, tmp_path / "build", rounds=10, folds=0, inputs="joints").folder
+    (tmp_path / "mine.toml").write_text('name = "mine"\n')
+    package, done = install("source.py", "thenar.sources"), Event()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    monkeypatch.setenv("FLEX_PORT", str(port))
+
+    def send() -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
+            while not done.is_set():
+                line.sendto(bytes(HIGH["pen"]), ("127.0.0.1", port))
+                time.sleep(0.01)
+
+    sender = Thread(target=send)
+    sender.start()
+    try:
+        told = package.thenar("run", str(build), "--glove", str(tmp_path / "mine.toml"), "--frames", "60")
+    finally:
+        done.set()
+        sender.join()
+    lines = [json.loads(line) for line in told.splitlines()]
+    assert (lines[-1]["grasp"], lines[-1]["health"]) == ("pen", "ok")
