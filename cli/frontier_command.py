@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 _SEARCHED = ("repeats", "finalists", "seed", "by")
 _WORDS = ("inputs", "placement", "rounds, bits", "wiring", "scan", "decision")
-_NUMBERS = ("luck", "frame", "latency, 99 %", "flash", "RAM")
+_NUMBERS = ("frame", "latency, 99 %", "flash", "RAM")
 
 
 def _timed() -> tuple[str, ...]:
@@ -61,7 +61,7 @@ def _timed() -> tuple[str, ...]:
 @click.option("--build", type=existing_folder, help="Mark this build on the pictures.")
 @click.option(
     "--joint-us",
-    type=Number(0, min_open=True),
+    type=Number(0, 60_000_000, min_open=True),
     help="What reading the joints takes.  [default: a CyberGlove's record; of other joints unknown, left out]",
 )
 @click.option("--stream", type=existing_file, help="Measure decision latency on this set of whole movements.")
@@ -180,7 +180,8 @@ def _grid(frontier: "Frontier") -> "Table":
     from thenar.compiler.frontier.words import rates_of
 
     counts, rates = ("point", "switches"), rates_of(frontier)
-    grid = table((*counts, *_WORDS, *rates, *_NUMBERS), (*counts, *rates, *_NUMBERS), Text(_title(frontier)))
+    numbers = (*(f"{what} %" for what in rates), *_NUMBERS)
+    grid = table((*counts, *_WORDS, *numbers), (*counts, *numbers), Text(_title(frontier)))
     for point in frontier.points:
         rated = [interval(rate(point)) for rate in rates.values()]
         grid.add_row(*_cells(point, rated), style="bold" if point.number == frontier.picked else None)
@@ -206,7 +207,6 @@ def _cells(point: "Point", rated: Sequence[str]) -> tuple[Text, ...]:
         setting.scan if setting.clock_hz else "",
         setting.decision,
         *rated,
-        f"{100 * point.luck:.1f}",
         f"{duration(point.frame.us)} {point.frame.how}",
         f"{duration(point.latency.mean_us)}, {duration(point.latency.p99_us)}",
         f"{point.flash:,}",

@@ -11,7 +11,8 @@ from thenar.compiler.evaluation.folds import Fold, weka_folds
 from thenar.compiler.evaluation.plan import FoldFit, inputs, predictions
 from thenar.compiler.evaluation.populations import Population, Scheme, populations
 from thenar.compiler.evaluation.rates import ALIKE, WEIGHT, Rate, clustered
-from thenar.compiler.evaluation.study import Cell, Options, evaluate
+from thenar.compiler.evaluation.study import Options, evaluate
+from thenar.compiler.evaluation.tables import Cell
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.trainers.base import Training
 
