@@ -15,8 +15,9 @@ from sklearn.neighbors import KNeighborsClassifier
 
 from thenar.compiler.evaluation.folds import Fold, leave_one_out, trial_folds, weka_folds
 from thenar.compiler.evaluation.plan import inputs
-from thenar.compiler.evaluation.rates import Of, Rate, rated
+from thenar.compiler.evaluation.rates import Rate, rated
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.runtime.manifest import Of
 
 
 def predicted(grasp_set: GraspSet, folds: list[Fold]) -> NDArray[np.intp]:

@@ -104,7 +104,7 @@ def played(asked: tuple[int, By, Equipment]) -> Case:
     best = [design for design in fronts[0] if design.frame.us <= BUDGET_US or design is fronts[0][0]][-1]
     tables = tables_from_bytes(best.tables.content)
     columns = list(best.close.screened.columns)
-    answers = integer_scores(tables, fresh.switches[:, columns], fresh.codes).argmax(axis=1)
+    answers = integer_scores(tables, fresh.switches[:, columns], fresh.codes[:, : tables.n_joints]).argmax(axis=1)
     truth = np.array([samples.grasps.index(grasp) for grasp in fresh.grasps.tolist()])
     lucky = luck[best.judged]
     return Case(corrected(best.judged.rate, lucky), lucky, float((answers == truth).mean()))

@@ -61,7 +61,7 @@ def _timed() -> tuple[str, ...]:
 @click.option("--build", type=existing_folder, help="A build of yours: mark it on the pictures.")
 @click.option(
     "--joint-us",
-    type=Number(0, min_open=True),
+    type=Number(0, 60_000_000, min_open=True),
     help="What reading the joints takes.  [default: a CyberGlove's record; of other joints unknown, left out]",
 )
 @click.option("--stream", type=existing_file, help="A set of whole movements: measure decision latency on it.")

@@ -5,13 +5,14 @@ from functools import partial
 
 import numpy as np
 
+from thenar.runtime.manifest import Of, Unit
+
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from ..trainers.base import Training
 from ..workers import in_workers
 from .plan import ANGLE, ANGLE_SELECTED, SELECTED, Composition, Planner, Progress, inputs, predictions
 from .populations import NESTED, OF, Population, Scheme, groups_of, populations
-from .rates import Of, Unit
 from .tables import Reader
 
 

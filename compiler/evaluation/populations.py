@@ -7,9 +7,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.manifest import Of
+
 from ..recordings.graspset import GraspSet
 from .folds import EvaluationError, Fold, Rows, block_folds, leave_one_out, trial_folds
-from .rates import Of
 
 Scheme = Literal["trial", "subject", "object", "session", "block"]
 

@@ -3,15 +3,16 @@
 from dataclasses import dataclass
 from math import sqrt
 from statistics import fmean, stdev
-from typing import Literal, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from thenar.runtime.manifest import Of, Unit
+
+from ..samples import decided
 from ..text import interval
 
-Of = Literal["pooled", "within subject", "new subject", "new object", "new session"]
-Unit = Literal["trials", "frames"]
 UNITS: tuple[Unit, ...] = ("trials", "frames")
 
 LEVEL = 0.95
@@ -167,18 +168,6 @@ def rated(
         for unit in UNITS
     )
     return by_trial, by_frame if by_frame.total > by_trial.total else None
-
-
-def decided(predicted: NDArray[np.intp], trial: Rows) -> NDArray[np.intp]:
-    """Return the label (r, T) that most frames of each trial are given, the lowest of several.
-
-    predicted  (r, n) labels        trial  (n,) numbers of trials, 0 to T - 1, each with a frame
-    """
-    labels, given = np.unique(predicted, return_inverse=True)
-    given = given.reshape(predicted.shape)
-    n_trials = int(trial.max()) + 1
-    counts = [np.bincount(trial * len(labels) + one, minlength=n_trials * len(labels)) for one in given]
-    return np.asarray(labels[np.reshape(counts, (len(given), n_trials, -1)).argmax(axis=2)])
 
 
 def clustered(recognised: list[int], sizes: list[int], repeats: int = 1) -> tuple[float, float]:

@@ -184,7 +184,7 @@ def evaluate(
         chosen.labels,
         trials,
         grasps,
-        len(chosen.switch_names),
+        len(chosen.element_names),
         predictions,
         blind,
         OF[options.scheme],
@@ -229,7 +229,7 @@ def _of_subjects(grasp_set: GraspSet, subjects: tuple[str, ...]) -> GraspSet:
 def _check_all_switches(grasp_set: GraspSet, parts: tuple[Population, ...]) -> None:
     """Raise EvaluationError where a training on all switches has no room in memory: before placements are chosen."""
     switches = grasp_set.switches
-    varying = int(np.count_nonzero(switches.any(axis=0) & ~switches.all(axis=0)))
+    varying = int(np.count_nonzero(switches.any(axis=0) & ~switches.all(axis=0))) + len(grasp_set.taxel_columns)
     for part in parts:
         rows = max((len(fold.train) for fold in part.folds), default=0)
         check_memory(rows, len(part.grasps), EvaluationError, varying)
@@ -237,7 +237,7 @@ def _check_all_switches(grasp_set: GraspSet, parts: tuple[Population, ...]) -> N
 
 def _why_not(name: TableName, grasp_set: GraspSet, parts: tuple[Population, ...], scheme: Scheme) -> str | None:
     """Return why a table has no meaning for the set and the cut, or None."""
-    if name != "compositions" and not grasp_set.switch_names:
+    if name != "compositions" and not grasp_set.element_names:
         return "a placement needs switches, and the set has none"
     if name == "generality" and len(parts) < 2:
         return "another's placement needs a second subject"

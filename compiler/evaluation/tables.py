@@ -8,11 +8,14 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.manifest import Of
+
+from ..samples import decided
 from ..text import interval
 from .folds import Rows
 from .plan import CellPlan, FoldFit, Labels, RowPlan, TableName
 from .populations import ProtocolName
-from .rates import Of, Rate, decided, rated
+from .rates import Rate, rated
 
 Predictions = Mapping[FoldFit, Labels]
 Confusion = tuple[tuple[int, ...], ...]

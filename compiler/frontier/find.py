@@ -180,6 +180,8 @@ def _samples(grasp_set: GraspSet) -> Samples:
     # All switches at once are tried as well.
     check_inputs(n_types, len(grasp_set.switch_names), len(grasp_set.joints), FrontierError)
     check_memory(len(grasp_set), n_types, FrontierError)
+    if grasp_set.taxel_columns:
+        raise FrontierError("the recordings have taxels, whose thresholds are learnt: import them with fixed ones")
     check_trials(grasp_set, FrontierError)
     return Samples.of(grasp_set)
 
@@ -390,12 +392,13 @@ def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
     build = Build.load(folder)
     manifest = build.manifest
     names = [switch.name for switch in manifest.switches]
-    honest = [rate for rate in manifest.rates if rate.protocol == "honest"]
-    if not honest:
+    # As the frontier's own rates are.
+    pooled = [rate for rate in manifest.rates if rate.protocol != "training" and not rate.of.startswith("new")]
+    if not pooled:
         raise FrontierError(
             f"{folder} does not say what it recognises: compile it with --folds 4, or leave --build out"
         )
-    rate, options, fitting = honest[-1], equipment.model.options(build.tables), equipment.fitting(names)
+    options, fitting = equipment.model.options(build.tables), equipment.fitting(names)
     if not options or (names and not fitting):
         raise FrontierError(f"{folder} cannot be built for {equipment.model.target}: leave --build out, or --target")
     joints = [joint.name for joint in manifest.joints]
@@ -403,7 +406,9 @@ def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
     codes = grasp_set.codes[:, _places(joints, [joint.name for joint in grasp_set.joints], folder)]
     scans = [scan_times(names, build.tables, wiring, bits, codes, equipment.beside).full_us for wiring in fitting]
     frame_us = max(min(scans, default=0.0), equipment.joints.us * bool(joints)) + options[0].us
-    return Mark(f"build {folder.name}", len(names), Rate.counted((rate.correct,), rate.total, of="pooled"), frame_us)
+    return Mark(
+        f"build {folder.name}", len(names), Rate.counted((pooled[0].correct,), pooled[0].total, of="pooled"), frame_us
+    )
 
 
 def _places(names: Sequence[str], there: Sequence[str], folder: Path) -> list[int]:

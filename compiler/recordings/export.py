@@ -50,15 +50,11 @@ def meta_of(grasp_set: GraspSet) -> dict[str, NDArray[np.generic]]:
     return {key: column for key, column in found.items() if key != "session" or (column != "1").any()}
 
 
-def columns_of(grasp_set: GraspSet, codes: bool = False, meta: bool = True) -> str:
-    """Return the text of a columns.toml for the set's exported table; `codes` and `meta` as in `export`.
-
-    Reading the table with it gives the set again.
-    """
+def columns_of(grasp_set: GraspSet, codes: bool = False) -> str:
+    """Return the text of the columns.toml that makes the set again of its exported table; `codes` as in `export`."""
     heads, taxonomy = heads_of(grasp_set), grasp_set.taxonomy
     lines = [f"label = {_text(heads.label)}"]
-    if meta:
-        lines += [f"{key} = {_text(getattr(heads, key))}" for key in meta_of(grasp_set)]
+    lines += [f"{key} = {_text(getattr(heads, key))}" for key in meta_of(grasp_set)]
     if grasp_set.independent:
         lines.append('frames = "independent"')
     if grasp_set.simulated:

@@ -11,7 +11,6 @@ from ..evaluation.study import Study
 from ..evaluation.tables import RateTable, both
 from ..text import NBSP, counted, percent, sentence
 from .content import PlainTable, ReportContent
-from .sections import honest_rate
 
 # Wider tables cannot be read; the list of what is mistaken most often can.
 WIDEST = 40
@@ -75,9 +74,9 @@ def confusion_view(title: str, grasps: Sequence[str], counts: NDArray[np.intp]) 
 def confusions(content: ReportContent) -> Iterator[ConfusionView]:
     """Yield the build's own matrix, then those of the compositions, nested folds, all subjects together."""
     if content.confusion is not None:
-        rate = honest_rate(content.manifest)
-        folds = "honest folds" if rate is None else counted(rate.folds, "honest fold")
-        yield confusion_view(f"This build's own recipe, {folds}", content.manifest.grasps, content.confusion)
+        rate = content.manifest.headline
+        folds = "" if rate is None else f", {rate.title}, {counted(rate.folds, 'nested fold')}"
+        yield confusion_view(f"This build's own recipe{folds}", content.manifest.grasps, content.confusion)
     if content.study is None:
         return
     for table in content.study.tables:

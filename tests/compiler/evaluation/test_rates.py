@@ -9,7 +9,8 @@ from mpmath import mpf
 from scipy.special import stdtrit
 from scipy.stats import binomtest, t
 
-from thenar.compiler.evaluation.rates import Rate, clustered, decided, rated
+from thenar.compiler.evaluation.rates import Rate, clustered, rated
+from thenar.compiler.samples import decided
 from thenar.stability.reference.intervals import student_quantile
 from thenar.stability.reference.numbers import ulps
 

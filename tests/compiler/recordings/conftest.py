@@ -39,8 +39,8 @@ def _joints(draw: st.DrawFn, name: str) -> Joint:
 def _grasp_sets(draw: st.DrawFn) -> GraspSet:
     rows = draw(st.integers(1, 12))
     columns = draw(st.lists(NAMES, min_size=1, max_size=20, unique=True))
-    split = draw(st.integers(0, len(columns)))
-    joints = tuple(draw(_joints(name)) for name in columns[split:])
+    split, end = sorted(draw(st.tuples(*[st.integers(0, len(columns))] * 2)))
+    taxels, joints = (tuple(draw(_joints(name)) for name in names) for names in (columns[split:end], columns[end:]))
     types = st.lists(NAMES, min_size=1, max_size=5, unique=True).flatmap(
         lambda names: st.sampled_from([own(names), Taxonomy("the lab's", tuple(names))])
     )
@@ -60,6 +60,8 @@ def _grasp_sets(draw: st.DrawFn) -> GraspSet:
         simulated=draw(st.one_of(st.just(""), NAMES)),
         sessions=random.choice(draw(st.sampled_from([visits, ["1"]])), rows),
         independent=draw(st.booleans()),
+        taxels=random.integers(0, 65536, (rows, len(taxels)), dtype=np.uint16),
+        taxel_columns=taxels,
     )
 
 

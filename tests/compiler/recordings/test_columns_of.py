@@ -26,7 +26,7 @@ def test_its_globs_pick_the_sets_columns_in_the_sets_order(
     data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet], folder: Path
 ) -> None:
     grasp_set = data.draw(grasp_sets)
-    names = [*heads_of(grasp_set), *grasp_set.switch_names, *grasp_set.joint_names]
+    names = [*heads_of(grasp_set), *grasp_set.element_names, *grasp_set.joint_names]
     selection = select(read(columns_of(grasp_set), folder), names)
     assert selection.switches == grasp_set.switch_names
     assert tuple(name for name, _ in selection.joints) == grasp_set.joint_names
@@ -37,9 +37,8 @@ def test_its_globs_pick_the_sets_columns_in_the_sets_order(
 def test_heads_are_never_names_of_inputs(data: st.DataObject, grasp_sets: st.SearchStrategy[GraspSet]) -> None:
     grasp_set = data.draw(grasp_sets)
     heads = heads_of(grasp_set)
-    assert len({*heads, *grasp_set.switch_names, *grasp_set.joint_names}) == 5 + len(grasp_set.switch_names) + len(
-        grasp_set.joints
-    )
+    inputs = (*grasp_set.element_names, *grasp_set.joint_names)
+    assert len({*heads, *inputs}) == 5 + len(inputs)
 
 
 def test_neighbours_of_one_calibration_share_an_entry(small: GraspSet, tmp_path: Path) -> None:
@@ -58,10 +57,3 @@ def test_neighbours_of_one_calibration_share_an_entry(small: GraspSet, tmp_path:
     )
     (entry,) = read(columns_of(alike), tmp_path).joints
     assert entry.columns == ("index", wrist.name)
-
-
-def test_without_meta_only_the_label_is_named(small: GraspSet, tmp_path: Path) -> None:
-    columns = read(columns_of(small, codes=True, meta=False), tmp_path)
-    assert (columns.label, columns.subject, columns.object, columns.trial) == ("grasp", None, None, None)
-    assert all(entry.codes for entry in columns.joints)
-    assert columns.taxonomy == "kamakura14"
