@@ -8,12 +8,15 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from thenar.compiler.text import INDEPENDENT
+
 from .common import (
     Number,
     OneOf,
     OutputFile,
     OutputFolder,
     existing_file,
+    jobs_option,
     json_flag,
     keep_apart,
     out,
@@ -55,7 +58,7 @@ _GROUPS = {
     "Basics": ("output", "preset", "method", "keep", "prune", "inputs"),
     "Training": ("trainer", "rounds", "shrinkage", "tolerance", "max_bins"),
     "Integer tables": ("table_bits", "width"),
-    "The rate in build.json": ("folds", "seed"),
+    "The rates in build.json": ("folds", "seed", "by", "jobs"),
     "A point of a frontier": ("from_frontier", "point"),
     "Wiring": ("glove", "propose", "chip"),
     "Files": ("report", "hand_length", "layout", "overwrite", "json"),
@@ -107,9 +110,15 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
     type=click.IntRange(0),
     default=4,
     show_default=True,
-    help="Folds of the cross-validated rate; 0 for none.",
+    help="Folds of the pooled rate; 0: measure no rate.",
 )
 @click.option("--seed", type=seed_range, default=1, show_default=True, help="Seed of the folds.")
+@click.option(
+    "--by",
+    type=click.Choice(("trial", "subject", "object", "session")),
+    help="What the folds of the first rate leave out.  [default: subject where there are several, otherwise trial]",
+)
+@jobs_option()
 @click.option(
     "--table-bits",
     type=click.Choice(["16", "8"]),
@@ -145,6 +154,7 @@ def command(
     point: int | None,
     report: bool,
     hand_length: float | None,
+    jobs: int,
     layout: Path | None,
     glove: Path | None,
     propose: Path | None,
@@ -194,8 +204,9 @@ def command(
             grasp_set,
             output,
             harness=given if chosen is None else chosen.wired(given),
-            ports=ports_of_whole_glove(given, grasp_set.switch_names),
+            ports=ports_of_whole_glove(given, grasp_set.element_names),
             documents=documents,
+            jobs=jobs,
             progress=told,
             **options,
         )
@@ -268,21 +279,11 @@ def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
         f"{folder}: {len(manifest.grasps)} grasp types from {len(manifest.switches)} of {manifest.source.switches} "
         f"switches and {len(manifest.joints)} joints; tables of {made.tables_bytes} bytes"
     )
-    if manifest.switches:
-        console.print(f"switches: {', '.join(switch.name for switch in manifest.switches)}", soft_wrap=True)
-    if manifest.stopped_after:
-        console.print(
-            f"stopped after {manifest.stopped_after} of {manifest.options.rounds} rounds: the last changed the mean "
-            f"loss by less than {manifest.options.tolerance:g}"
-        )
-    if manifest.zero_gain_nodes:
-        console.print(
-            f"at {manifest.zero_gain_nodes} of the placement's decisions no switch gains anything alone: "
-            "the lowest-numbered one that varies was taken"
-        )
-    for rate in manifest.rates:
-        how = "on the rows trained on" if rate.protocol == "training" else f"in {rate.folds} folds, placement and all"
-        console.print(f"recognised {how}: {rate.correct} of {rate.total} ({rate.rate:.1%})")
+    _print_training(manifest)
+    for rate in sorted(manifest.rates, key=lambda rate: rate.protocol == "training"):
+        console.print(f"recognised, {rate}")
+    if manifest.source.independent:
+        console.print(INDEPENDENT)
     console.print(
         f"integers: {proof.scale:.1f} steps a unit, no sum beyond {proof.bound} of 32767, no score off by more than "
         f"{proof.error:g} steps; {proof.covered} of {manifest.source.rows} rows are safe, {proof.changed} change class"
@@ -296,6 +297,25 @@ def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
         )
         if joints := own_joints([joint.name for joint in manifest.joints]):
             console.print(joints)
+
+
+def _print_training(manifest: "Manifest") -> None:
+    console = out()
+    if manifest.switches:
+        console.print(f"switches: {', '.join(switch.name for switch in manifest.switches)}", soft_wrap=True)
+    for switch in manifest.switches:
+        if switch.threshold is not None:
+            console.print(f"{switch.name}: {switch.closed}, learnt")
+    if manifest.stopped_after:
+        console.print(
+            f"stopped after {manifest.stopped_after} of {manifest.options.rounds} rounds: the last changed the mean "
+            f"loss by less than {manifest.options.tolerance:g}"
+        )
+    if manifest.zero_gain_nodes:
+        console.print(
+            f"at {manifest.zero_gain_nodes} of the placement's decisions no switch gains anything alone: "
+            "the lowest-numbered one that varies was taken"
+        )
 
 
 def _print_scan(scan: "ScanMap", harness: "Harness") -> None:

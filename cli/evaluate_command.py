@@ -7,8 +7,6 @@ import click
 import msgspec
 from rich.text import Text
 
-from thenar.compiler.text import interval
-
 from .common import (
     ListOf,
     OutputFile,
@@ -31,7 +29,8 @@ from .options import Training, asked_settings, method_list, trainer_option
 if TYPE_CHECKING:
     from rich.table import Table as Grid
 
-    from thenar.compiler.evaluation.study import Cell, RateTable, Study
+    from thenar.compiler.evaluation.study import Study
+    from thenar.compiler.evaluation.tables import Cell, RateTable
 
 TABLES = ("compositions", "generality", "pruning", "baselines")
 
@@ -48,10 +47,6 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     return ("paper", "nested") if value == "both" else (value,)
 
 
-def _scheme(_: click.Context, __: click.Parameter, value: str | None) -> str:
-    return value or "trial"
-
-
 @click.command(cls=Training)
 @click.argument("grasps", type=existing_file)
 @click.option("--subject", "subjects", multiple=True, metavar="NAME", help="Only this subject; may be given again.")
@@ -59,9 +54,10 @@ def _scheme(_: click.Context, __: click.Parameter, value: str | None) -> str:
 @click.option(
     "--by",
     "scheme",
-    callback=_scheme,
-    type=click.Choice(("subject", "object", "block")),
-    help="Leave out a subject, an object, or a range of trials (as many as folds) at a time, instead of random rows.",
+    type=click.Choice(("trial", "subject", "object", "session", "block")),
+    default="trial",
+    show_default=True,
+    help="What a fold tests: trials at random or by their number (block), or a subject, object or session left out.",
 )
 @click.option(
     "--repeats",
@@ -87,7 +83,7 @@ def _scheme(_: click.Context, __: click.Parameter, value: str | None) -> str:
     type=click.Choice(("both", "paper", "nested")),
     default="both",
     show_default=True,
-    help="Whose rows choose the placement.",
+    help="Rows that choose the placement: all (paper), or those of each training fold (nested).",
 )
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of the first repeat.")
 @jobs_option()
@@ -100,6 +96,13 @@ def _scheme(_: click.Context, __: click.Parameter, value: str | None) -> str:
 )
 @click.option(
     "--tables", type=ListOf("table", lambda: TABLES), default=",".join(TABLES), show_default=True, help="Which tables."
+)
+@click.option(
+    "--permute",
+    type=click.IntRange(min=0, max=100_000),
+    default=0,
+    metavar="M",
+    help="Permutation test: evaluate M times with shuffled labels, for the chance level and a p-value.",
 )
 @click.option("--confusion", is_flag=True, help="Print the confusion matrix of every composition and subject.")
 @click.option(
@@ -119,15 +122,19 @@ def command(
     output: Path | None,
     **asked: Any,
 ) -> None:
-    """Cross-validate GRASPS and print the paper's tables: recognition rates in percent, with 95 % intervals.
+    """Cross-validate GRASPS and print the paper's tables: accuracies in percent, with 95 % intervals.
 
     Every rate comes under two protocols: `paper` chooses the placement from all rows, as the paper did (optimistic);
     `nested` chooses it inside each training fold. What ID3 is worth shows beside random and information-greedy
     placements of as many switches.
 
+    A fold never has frames of one trial on both sides. Accuracies are of trials, each recognised as most of its frames
+    are; where trials have several frames, the accuracy of single frames is added.
+
     \b
     Example:
         thenar evaluate set.grasps
+        thenar evaluate set.grasps --by subject --permute 100
         thenar evaluate set.grasps --by subject --protocol nested --plot pictures/ -o result.json
     """
     from thenar.compiler.evaluation.study import Options, evaluate
@@ -171,22 +178,32 @@ def _print(study: "Study", *, confusion: bool) -> None:
     for missing in study.left_out:
         console.print(f"no table of {missing.name}: {missing.reason}")
     console.print(str(study))
-    if not confusion:
-        return
+    if study.permuted is not None:
+        console.print(str(study.permuted))
+    if confusion:
+        _print_confusions(study)
+
+
+def _print_confusions(study: "Study") -> None:
+    console = out()
     for each in study.tables:
         for row in each.rows if each.name == "compositions" else ():
             for name, cell in zip(each.columns, row.cells, strict=True):
                 console.print()
-                console.print(Text(f"{row.name} {row.what}, subject {name}, {each.protocol} protocol", "bold"))
+                console.print(
+                    Text(f"{row.name} {row.what}, subject {name}, {each.protocol} protocol, {cell.rate.what}", "bold")
+                )
                 console.print(_matrix(study.grasps, cell))
 
 
 def _rates(rated: "RateTable") -> "Grid":
     averaged = ["all"] if len(rated.columns) > 1 else []
     numbers = ("switches", *rated.columns, *averaged)
+    from thenar.compiler.evaluation.tables import both
+
     grid = table(("", "", *numbers), numbers)
     for row in rated.rows:
-        average = [Text(interval(row.rate))] if averaged else []
+        average = [Text(both(row.rate, row.frames))] if averaged else []
         rates = [Text(str(cell)) for cell in row.cells]
         grid.add_row(Text(row.name), Text(row.what), str(row.switches), *rates, *average)
     return grid

@@ -39,8 +39,8 @@ if TYPE_CHECKING:
 def command(tables: tuple[Path, ...], output: Path, columns: Path | None, yes: bool) -> None:
     """Import TABLE (.csv, .tsv, .txt, .xlsx, .parquet, .h5, .mat, .arff or .npz) as labelled grasps.
 
-    Without --columns, what each column is is found, shown with the reasons, and written to a columns.toml next to the
-    output, to be corrected; then a terminal is asked whether to go on.
+    Without --columns, it finds what each column is, shows that with reasons, and writes it to a columns.toml next to
+    the output, to be corrected; on a terminal it then asks whether to go on.
 
     Malformed cells and unknown labels stop the import, naming their rows and columns; what is merely odd (constant
     switches, rows that two subjects share, ...) is counted in warnings.
@@ -79,7 +79,8 @@ def _found(path: Path, output: Path, yes: bool) -> "tuple[GraspSet, ImportReport
     if proposal.lacks and asked and click.confirm("Is each row a trial of its own?"):
         proposal = proposal.independent()
     written = _write(proposal.toml(), output.parent)
-    echo(f"{written}: what was found", err=wants_json())
+    other = "" if written.name == "columns.toml" else "; columns.toml is there already, and is used with --columns only"
+    echo(f"{written}: what was found{other}", err=wants_json())
     replacing = ["--overwrite"] if output.exists() else []
     again = shlex.join(["thenar", "import", str(path), "-o", str(output), *replacing, "--columns", str(written)])
     if proposal.lacks:

@@ -22,7 +22,8 @@ def command(grasps: Path, plot: Path | None) -> None:
     """Tell what GRASPS, a .grasps file, holds: counts, balance, odd columns and rows, and how separable it is.
 
     The ceiling is the rate of the best possible memory: no classifier that sees only these inputs is right more often
-    on these rows. The neighbour rate is that of the nearest other row, with joints in standard deviations.
+    on these rows. The neighbour rate is that of frames by the nearest frame of another trial, with joints in standard
+    deviations.
 
     \b
     Example:

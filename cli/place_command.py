@@ -90,12 +90,12 @@ class _Asked:
         from thenar.runtime.harness.loading import load_harness
 
         harness = None if self.glove is None else load_harness(self.glove)
-        lacking = set() if harness is None else set(grasp_set.switch_names) - set(harness.switches)
+        lacking = set() if harness is None else set(grasp_set.element_names) - set(harness.switches)
         if lacking:
             raise click.UsageError(
                 f"{self.glove} has no place for {min(lacking)!r} of {self.grasps}: name the whole glove's glove.toml."
             )
-        return ports_of_whole_glove(harness, grasp_set.switch_names)
+        return ports_of_whole_glove(harness, grasp_set.element_names)
 
     def found(self) -> "Placement":
         """Return the placement."""
@@ -261,7 +261,7 @@ def _print_served(study: "Standard") -> None:
     from thenar.compiler.placement.drawing import BETTERED
 
     columns = ("subjects", "placement", "mean, %", "worst tenth, %", "lowest, %")
-    served = table(columns, title=f"Recognition of {study.held_out} held-out subjects")
+    served = table(columns, title=f"Trials recognised of {study.held_out} held-out subjects (new subject)")
     for point in study.curve:
         rates = (point.served.mean, point.served.worst_tenth, point.served.lowest)
         served.add_row(str(point.subjects), BETTERED[point.aim], *(f"{100 * rate:.1f}" for rate in rates))

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from itertools import islice
+from operator import eq
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -67,12 +68,12 @@ class _SinkOption(click.Option):
 @overwrite_flag
 @click.option("--full-scan", is_flag=True, help="Read all ports in every scan, even when the rest cannot matter.")
 @click.option("--status", is_flag=True, help="Once a second, how the glove fares: in the view, and to all sinks.")
-@click.option("--frames", metavar="N", type=click.IntRange(1), help="Stop after so many frames.")
-@click.option("--lead", type=Number(0), help="By how much a new grasp type must lead, in score units.")
-@click.option("--dwell-ms", type=Number(0, 10_000), help="For how long it must lead.")
+@click.option("--frames", metavar="N", type=click.IntRange(1), help="Stop after N frames.")
+@click.option("--lead", type=Number(0), help="Lead in score units that a new grasp type needs.")
+@click.option("--dwell-ms", type=Number(0, 10_000), help="Time for which it has to keep the lead.")
 @click.option("--max-lost", type=Number(0, 1), help="Share of the build's weight that may be missing.")
 @click.option("--error-rate", type=Number(0, 1), help="Decide by a sequential test of this error rate instead.")
-@click.option("--spacing-ms", type=Number(0, 10_000), help="Frames that the sequential test takes are so far apart.")
+@click.option("--spacing-ms", type=Number(0, 10_000), help="Minimum spacing of frames in the sequential test.")
 def command(
     build: Path,
     glove: Path | None,
@@ -286,7 +287,7 @@ def _replay_set(
 
     from thenar.compiler.recordings.graspset import GraspSet
 
-    whole, correct = GraspSet.load(replay), 0
+    whole, found = GraspSet.load(replay), list[str]()
     grasp_set = whole.rows(range(len(whole))[:frames])
 
     def line(grasp: "LiveGrasp", shape: "Preshape | None") -> bytes:
@@ -302,10 +303,24 @@ def _replay_set(
 
     with _published(build, sinks, preshape, line) as publish:
         for grasp in _rows(build, grasp_set, period_us):
-            correct += grasp.grasp == grasp_set.grasps[grasp.number]
+            found.append(grasp.grasp)
             publish(grasp)
     rows = len(grasp_set)
+    correct = sum(map(eq, found, grasp_set.grasps.tolist()))
     echo(f"{correct} of {rows} frames recognised as recorded ({correct / max(rows, 1):.1%})", err=True)
+    if (trials := len(set(grasp_set.trial_ids.tolist()))) < rows:
+        correct = _trials_recognised(grasp_set, found)
+        echo(f"{correct} of {trials} trials, each as most of its frames are ({correct / trials:.1%})", err=True)
+
+
+def _trials_recognised(grasp_set: "GraspSet", found: list[str]) -> int:
+    import numpy as np
+
+    from thenar.compiler.samples import decided
+
+    _, first, trial = np.unique(grasp_set.trial_ids, return_index=True, return_inverse=True)
+    names, answers = np.unique(found, return_inverse=True)
+    return int(np.count_nonzero(names[decided(answers[np.newaxis], trial)[0]] == grasp_set.grasps[first]))
 
 
 def _rows(build: "Build", grasp_set: "GraspSet", period_us: int) -> "Iterator[LiveGrasp]":

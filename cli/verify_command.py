@@ -81,7 +81,13 @@ def _print(found: "Verification") -> None:
             f"scan map: {found.scan.mean_read:.2f} of {found.scan.ports} ports read on average until a row is decided; "
             f"rows that change class by that: {found.scan.changed}"
         )
-    console.print(f"recognised: {found.correct_ensemble} by the ensemble, {found.correct_integers} by the integers")
+    whose = "rows trained on" if found.same_recordings else "rows of other recordings"
+    for counted in found.recognised:
+        rate = f"{100 * counted.rate:.1f} % [{100 * counted.low:.1f}, {100 * counted.high:.1f}]"
+        console.print(
+            f"recognised by the integers, {whose}: {rate}, {counted.integers:,} of {counted.total:,} {counted.unit}; "
+            f"by the ensemble {counted.ensemble:,}"
+        )
     console.print(f"rows that change class: {len(found.changed)}")
     for row in found.changed[:_SHOWN]:
         line = f"  row {row.row}: {row.ensemble} becomes {row.integers}, recorded {row.recorded}"

@@ -35,6 +35,8 @@ class Samples:
     trials, subjects : ndarray of intp, shape (n,), optional
         The number of each row's trial and subject: what is chosen by inner folds must not part them. None given: each
         row is a trial of its own, of one subject.
+    taxels : ndarray of uint16, shape (n, t), optional
+        Codes of which training makes switches first, by thresholds that it learns: placement/thresholds.py.
 
     Raises
     ------
@@ -55,18 +57,22 @@ class Samples:
     grasps: tuple[str, ...]
     trials: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
     subjects: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
+    taxels: NDArray[np.uint16] = field(default_factory=lambda: np.empty(0, np.uint16))
 
     def __post_init__(self) -> None:
         if not self.trials.size:
             object.__setattr__(self, "trials", np.arange(len(self.labels)))
         if not self.subjects.size:
             object.__setattr__(self, "subjects", np.zeros(len(self.labels), np.intp))
-        rows = {len(part) for part in (self.switches, self.codes, self.labels, self.trials, self.subjects)}
-        if len(rows) != 1 or self.switches.ndim != 2 or self.codes.ndim != 2 or self.labels.ndim != 1:
+        if not self.taxels.size:
+            object.__setattr__(self, "taxels", np.empty((len(self.labels), 0), np.uint16))
+        parts = (self.switches, self.codes, self.labels, self.trials, self.subjects, self.taxels)
+        rows = set(map(len, parts))
+        if len(rows) != 1 or [part.ndim for part in parts] != [2, 2, 1, 1, 1, 2]:
             raise SamplesError(
                 f"switches {self.switches.shape}, codes {self.codes.shape}, labels {self.labels.shape}, trials "
-                f"{self.trials.shape} and subjects {self.subjects.shape} must be (n, s), (n, j), (n,), (n,) and (n,) "
-                "of the same n rows"
+                f"{self.trials.shape}, subjects {self.subjects.shape} and taxels {self.taxels.shape} must be (n, s), "
+                "(n, j), (n,), (n,), (n,) and (n, t) of the same n rows"
             )
         if not rows.pop():
             raise SamplesError("nothing can be learnt from a set without rows")
@@ -85,6 +91,7 @@ class Samples:
             grasps=tuple(grasp_set.taxonomy.types[label] for label in found),
             trials=grasp_set.trial_ids,
             subjects=np.unique(grasp_set.subjects, return_inverse=True)[1],
+            taxels=grasp_set.taxels[:, : None if inputs != "joints" else 0],
         )
 
     @property
@@ -106,6 +113,7 @@ class Samples:
             self.grasps,
             self.trials[chosen],
             self.subjects[chosen],
+            self.taxels[chosen],
         )
 
     def keeping(self, columns: Columns) -> "Samples":
@@ -114,9 +122,23 @@ class Samples:
 
     @property
     def inputs(self) -> NDArray[np.uint16]:
-        """The inputs as one matrix (n, s + j): the switches' bits, then the joints' codes."""
+        """The inputs as one matrix (n, s + j): the switches' bits, then the joints' codes. There may be no taxels."""
+        if self.taxels.shape[1]:
+            raise SamplesError("taxels are no inputs: make switches of them by thresholds first")
         return np.hstack([self.switches, self.codes], dtype=np.uint16)
 
     def kept(self, columns: Columns) -> NDArray[np.uint16]:
         """Return what is trained on, (n, kept + j): the switches `columns` in their order, then the joints' codes."""
         return self.keeping(columns).inputs
+
+
+def decided(predicted: NDArray[np.intp], trial: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the label (r, T) that most frames of each trial are given, the lowest of several.
+
+    predicted  (r, n) labels        trial  (n,) numbers of trials, 0 to T - 1, each with a frame
+    """
+    labels, given = np.unique(predicted, return_inverse=True)
+    given = given.reshape(predicted.shape)
+    n_trials = int(trial.max()) + 1
+    counts = [np.bincount(trial * len(labels) + one, minlength=n_trials * len(labels)) for one in given]
+    return np.asarray(labels[np.reshape(counts, (len(given), n_trials, -1)).argmax(axis=2)])

@@ -57,6 +57,9 @@ def listed(parts: Sequence[str]) -> str:
     return ", ".join(parts[:-1]) + (" and " if len(parts) > 1 else "") + "".join(parts[-1:])
 
 
+INDEPENDENT = "each row counts as a trial: whoever recorded them states that they are independent"
+
+
 def sentence(words: str) -> str:
     """Return words from within a sentence as a sentence."""
     return f"{words[:1].upper()}{words[1:].removesuffix('.')}."

@@ -20,6 +20,8 @@ Answer = TypeVar("Answer")
 MOST_JOBS = 4 * (os.cpu_count() or 1)
 
 _SAFE_PATH = "PYTHONSAFEPATH"
+# Rows times rounds of boosting: about a second's work.
+_LITTLE = 200_000
 # Where a process cannot be waited for by a stranger, it is looked for so often.
 _LOOK_S = 0.5
 
@@ -58,6 +60,11 @@ def in_workers(
             raise BrokenExecutor(
                 "a worker process ended before its work was done, perhaps for want of memory: --jobs 1 takes none"
             ) from reason
+
+
+def little(work: int, jobs: int) -> int:
+    """Return `jobs`, or 1 where so little work (rows times rounds of boosting) is done before processes are up."""
+    return 1 if work < _LITTLE else jobs
 
 
 def workers_of(jobs: int) -> int:

@@ -20,11 +20,16 @@ MAX_BYTES = 16 << 20
 
 Inputs = Literal["both", "switches", "joints"]
 TableBits = Literal[8, 16]
+By = Literal["trial", "subject", "object", "session"]
+Of = Literal["pooled", "within subject", "new subject", "new object", "new session"]
+Protocol = Literal["training", "honest", "nested"]
+Unit = Literal["trials", "frames"]
 Count = Annotated[int, Meta(ge=0, le=2**53)]
 Code = Annotated[int, Meta(ge=0, le=65535)]
 # Bounds of errors and margins in steps, and of gains in bits and the values of joints.
 Amount = Annotated[float, Meta(ge=0.0, le=1e9)]
 Value = Annotated[float, Meta(ge=-1e300, le=1e300)]
+Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 _T = TypeVar("_T")
 Name = Annotated[str, Meta(min_length=1)]
@@ -37,8 +42,8 @@ def _written(default: _T) -> _T:
 
 
 class Origin(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """The recordings: SHA-256 of their content, number of rows, taxonomy, number of switches to choose from; and what
-    simulated them, which recordings leave out.
+    """The recordings: SHA-256 of their content, number of rows, taxonomy, number of switches to choose from; what
+    simulated them, which recordings leave out; and whether each row is stated to be a trial of its own.
     """
 
     fingerprint: Digest
@@ -46,6 +51,7 @@ class Origin(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     taxonomy: str
     switches: Count
     simulated: str = ""
+    independent: bool = False
 
 
 class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -61,7 +67,9 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     inputs : {"both", "switches", "joints"}
         Which of the recordings' inputs are used.
     folds, seed : int
-        Of the cross-validation whose rate goes into the build; 0 folds: none.
+        Of the pooled cross-validation; 0 folds: no rate is measured but that of the rows trained on.
+    by : {"trial", "subject", "object", "session"} or None
+        What the folds of the first rate leave out; None: a subject where there are several, and trials otherwise.
     table_bits : {16, 8}
         With 8, steps are coarse enough for firmware with 8-bit entries.
     placement, keep : str, int or None
@@ -86,16 +94,7 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     width: Annotated[int, Meta(ge=4, le=16)] = 16
     trainer: Name = "logitboost"
     settings: dict[Name, Value] = {}
-
-
-class Switch(Struct, frozen=True, forbid_unknown_fields=True):
-    """A kept switch: its column in the recordings, from 0, its name, and the information (bits) that it brought: to the
-    tree of ID3, or alone where another method chose it.
-    """
-
-    column: Count
-    name: Name
-    gain: Value
+    by: By | None = None
 
 
 class Calibration(Struct, frozen=True, forbid_unknown_fields=True):
@@ -108,6 +107,36 @@ class Calibration(Struct, frozen=True, forbid_unknown_fields=True):
     value_a: Value
     code_b: Code
     value_b: Value
+
+
+class Threshold(Struct, frozen=True, forbid_unknown_fields=True):
+    """What makes a switch of a taxel: it is closed at codes above `code`. `value`, in the unit of `taxel`, is midway to
+    the next code.
+    """
+
+    code: Code
+    value: Value
+    taxel: Calibration
+
+
+class Switch(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """A kept switch: its column in the recordings, from 0, its name, and the information (bits) that it brought: to the
+    tree of ID3, or alone where another method chose it; of a taxel, which follow the switches, also the threshold.
+    """
+
+    column: Count
+    name: Name
+    gain: Value
+    threshold: Threshold | None = None
+
+    @property
+    def closed(self) -> str:
+        """When a taxel is closed, in words: "closed above 0.41 N (codes above 83)"; of a switch ""."""
+        if self.threshold is None:
+            return ""
+        taxel, code = self.threshold.taxel, self.threshold.code
+        above = "above" if (taxel.value_b > taxel.value_a) == (taxel.code_b > taxel.code_a) else "below"
+        return f"closed {above} {self.threshold.value:g} {taxel.unit} (codes above {code})"
 
 
 class Proof(Struct, frozen=True, forbid_unknown_fields=True):
@@ -125,19 +154,46 @@ class Proof(Struct, frozen=True, forbid_unknown_fields=True):
     changed: Count
 
 
-class Recognised(Struct, frozen=True, forbid_unknown_fields=True):
-    """A recognition rate as counts. `protocol` says how it was measured, `folds` and `seed` with which split."""
+class Recognised(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """A recognition rate as counts, of trials (the majority of a trial's frames) or of frames.
 
-    protocol: Literal["training", "honest"]
+    protocol  "training": of the rows trained on; "nested": of folds, the placement chosen anew in each; "honest": the
+              same, in builds of older versions, by the ensemble instead of the integers
+    folds     how many; seed: of those that are cut at random
+    of        what is new about the rows tested
+    low, high the 95 % interval; None in builds of older versions
+    """
+
+    protocol: Protocol
     folds: Count
     seed: int
     correct: Count
     total: Annotated[int, Meta(ge=1, le=2**53)]
+    of: Of = "pooled"
+    unit: Unit = "frames"
+    low: Share | None = None
+    high: Share | None = None
 
     @property
     def rate(self) -> float:
         """Correct rows as a share of all."""
         return self.correct / self.total
+
+    @property
+    def title(self) -> str:
+        """What it is of: "new subject", "pooled", or "rows trained on"."""
+        return "rows trained on" if self.protocol == "training" else self.of
+
+    @property
+    def basis(self) -> str:
+        """Its interval in percent, its counts, and its folds: "[60.1, 83.4], 123 of 168 trials in 7 nested folds"."""
+        ends = "" if self.low is None or self.high is None else f"[{100 * self.low:.1f}, {100 * self.high:.1f}], "
+        folds = f" in {self.folds} nested folds" if self.folds else ""
+        return f"{ends}{self.correct:,} of {self.total:,} {self.unit}{folds}"
+
+    def __str__(self) -> str:
+        """Return "new subject: 73.2 % [60.1, 83.4], 123 of 168 trials in 7 nested folds"."""
+        return f"{self.title}: {100 * self.rate:.1f} %{',' if self.low is None else ''} {self.basis}"
 
 
 class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True):
@@ -164,6 +220,11 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     stopped_after: Count = 0
     zero_gain_nodes: Count = 0
     scan_sha256: Digest | None = None
+
+    @property
+    def headline(self) -> Recognised | None:
+        """The rate to expect of new grasps; None where none was measured."""
+        return next((rate for rate in self.rates if rate.protocol != "training"), None)
 
 
 class _SchemaVersion(Struct, frozen=True):
@@ -201,13 +262,15 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
             yield f"names two {kind} alike"
         yield from _wrong_names(kind, names)
     source = manifest.source
-    yield from _wrong_names("units", (joint.unit for joint in manifest.joints))
+    taxels = [switch.threshold.taxel for switch in manifest.switches if switch.threshold is not None]
+    yield from _wrong_names("units", (each.unit for each in (*manifest.joints, *taxels)))
+    yield from _wrong_names("taxels", (taxel.name for taxel in taxels))
     options = manifest.options
     texts = (manifest.thenar, source.taxonomy, options.placement, options.trainer, *options.settings)
     yield from _wrong_names("texts", texts)
     yield from _wrong_names("texts", filter(None, [source.simulated]), 2 * LONGEST_NAME)
     yield from _wrong_columns(manifest)
-    for joint in manifest.joints:
+    for joint in (*manifest.joints, *taxels):
         if joint.code_a == joint.code_b or joint.value_a == joint.value_b:
             yield "gives a joint two points that make no line"
     proof = manifest.proof

@@ -3,6 +3,7 @@
 import hashlib
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, get_args
@@ -19,9 +20,9 @@ from thenar.runtime.manifest import (
     Options,
     Origin,
     Proof,
-    Recognised,
     Switch,
     TableBits,
+    Threshold,
     manifest_from_bytes,
     manifest_to_bytes,
 )
@@ -29,22 +30,31 @@ from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.scanmap import scanmap_to_bytes
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
-from ..evaluation.folds import check_cut
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES
 from ..glove.files import NAMES, users_files
 from ..placement.methods.base import METHODS
 from ..placement.ports import PortCosts, ports_of_whole_glove
+from ..placement.thresholds import with_switches
 from ..publication import check_folder, publish_folder, sweep
+from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet, Joint
 from ..samples import Columns, Samples
-from ..tables.collapse import collapse
 from ..tables.compare import Comparison, compare
-from ..tables.quantise import quantise
 from ..trainers.base import Training, changed
 from . import CompileError
 from .documents import REPORT_NAME, SPEC_FOLDER, BuildReport, Documents, Progress
 from .ensemble import ensemble_to_bytes
-from .training import Tested, Trained, cross_validated, samples_of, train
+from .training import (
+    Tested,
+    Trained,
+    answers_of,
+    cross_validated,
+    cuts_of,
+    integers_of,
+    rates_of,
+    samples_of,
+    train,
+)
 from .verify_firmware import made_firmware
 
 # A build that was compiled for no harness has no scan map, one that is too large for any microcontroller no firmware,
@@ -105,6 +115,7 @@ def compile_build(
     harness: Wired | None = None,
     ports: PortCosts | None = None,
     documents: Documents | None = None,
+    jobs: int = -1,
     progress: Progress | None = None,
     **changes: Any,
 ) -> BuildReport:
@@ -126,6 +137,8 @@ def compile_build(
         What reading each switch costs, for methods that ask; None: on a glove of as few MCP23017 as will do.
     documents : Documents, optional
         A report and the spec of the glove, to go into the folder.
+    jobs : int
+        Worker processes for the folds; -1: all cores. The build is the same for any number of them.
     progress : callable, optional
         Called with (done, total) as work is done.
     **changes
@@ -158,14 +171,15 @@ def compile_build(
     asked = _sound(changed(options or Options(), changes))
     samples = samples_of(grasp_set, asked)
     if asked.folds:
-        check_cut(len(grasp_set), asked.folds, "rows")
-    steps = _Steps(progress, asked.folds)
-    ports = ports or ports_of_whole_glove(None, grasp_set.switch_names)
+        check_trials(grasp_set, CompileError)
+    cuts = cuts_of(grasp_set, asked)
+    steps = _Steps(progress, sum(len(cut.folds) for cut in cuts))
+    ports = ports or ports_of_whole_glove(None, grasp_set.element_names)
     trained = train(samples, asked, steps.trained, ports)
     joints = tuple(range(samples.codes.shape[1]))
     made = Making(grasp_set, samples, joints, asked, trained, harness)
-    tested = cross_validated(samples, asked, steps.tested, ports) if asked.folds else None
-    return made.publish(target, tested, documents, progress)
+    tested = cross_validated(samples, cuts, asked, partial(answers_of, samples, asked, ports), jobs, steps.tested)
+    return made.publish(target, tested, documents, jobs, progress)
 
 
 def _sound(options: Options) -> Options:
@@ -223,10 +237,9 @@ class Making:
     ) -> None:
         self.grasp_set, self.samples, self.joints = grasp_set, samples, joints
         self.options, self.trained = options, trained
-        kept = samples.keeping(trained.columns)
-        tables = collapse(trained.model, kept.n_switches)
-        self.integers = quantise(tables, kept.switches, kept.codes, options.width, options.table_bits)
-        names = [grasp_set.switch_names[column] for column in trained.columns]
+        kept = with_switches(samples, trained.thresholds).keeping(trained.columns)
+        self.integers = integers_of(trained, samples, options)
+        names = [grasp_set.element_names[column] for column in trained.columns]
         self.harness = harness(names) if callable(harness) else harness
         self.scan = None
         if self.harness is not None:
@@ -234,7 +247,12 @@ class Making:
         self.comparison = compare(trained.model, self.integers, kept.switches, kept.codes)
 
     def publish(
-        self, target: Path, tested: Tested | None, documents: Documents | None, progress: Progress | None
+        self,
+        target: Path,
+        tested: Tested | None,
+        documents: Documents | None,
+        jobs: int,
+        progress: Progress | None,
     ) -> BuildReport:
         """Write the build as `target`, with the `documents` that are asked for."""
         files = {TABLES_NAME: tables_to_bytes(self.integers), ENSEMBLE_NAME: ensemble_to_bytes(self.trained.model)}
@@ -259,7 +277,7 @@ class Making:
         )
         files |= {path: text.encode() for path, text in firmware.items()}
         if documents is not None:
-            files |= documents.files(report, progress)
+            files |= documents.files(report, jobs, progress)
         publish(files | {MANIFEST_NAME: described}, target)
         return report
 
@@ -271,8 +289,7 @@ class Making:
         """Return what `build.json` says, not sealed yet; `files` are name -> content of what lies beside it."""
         digests = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
         grasp_set, options = self.grasp_set, self.options
-        correct = int(np.count_nonzero(self.comparison.deployed == self.samples.labels))
-        rates = [Recognised("training", 0, options.seed, correct, len(self.samples.labels))]
+        rates = rates_of("training", self.samples, self.comparison.deployed, options.seed)
         switches = zip(self.trained.columns, self.trained.gains, strict=True)
         return Manifest(
             schema=SCHEMA,
@@ -284,19 +301,27 @@ class Making:
                 fingerprint=grasp_set.fingerprint(),
                 rows=len(grasp_set),
                 taxonomy=grasp_set.taxonomy.name,
-                switches=len(grasp_set.switch_names),
+                switches=len(grasp_set.element_names),
                 simulated=grasp_set.simulated,
+                independent=grasp_set.independent,
             ),
             options=options,
             grasps=self.samples.grasps,
-            switches=tuple(Switch(column, grasp_set.switch_names[column], gain) for column, gain in switches),
+            switches=tuple(self._switch(column, gain) for column, gain in switches),
             joints=tuple(_calibration(column, grasp_set.joints[column]) for column in self.joints),
             proof=_proof(self.integers, self.comparison, options.width),
-            rates=tuple(rates if tested is None else [*rates, tested.rate]),
+            rates=rates if tested is None else (*rates, *tested.rates),
             stopped_after=self.trained.stopped_after,
             zero_gain_nodes=self.trained.zero_gain_nodes,
             scan_sha256=digests.get(SCAN_NAME),
         )
+
+    def _switch(self, column: int, gain: float) -> Switch:
+        name, taxel = self.grasp_set.element_names[column], column - len(self.grasp_set.switch_names)
+        if taxel < 0:
+            return Switch(column, name, gain)
+        joint, code = self.grasp_set.taxel_columns[taxel], self.trained.thresholds[taxel]
+        return Switch(column, name, gain, Threshold(code, float(joint.value(code + 0.5)), _calibration(taxel, joint)))
 
 
 def _calibration(column: int, joint: Joint) -> Calibration:

@@ -17,6 +17,7 @@ from ..evaluation.folds import EvaluationError
 from ..hand import HandShape
 from ..recordings.graspset import GraspSet
 from ..tables.compare import Comparison, worst_case
+from ..workers import little
 from .training import Trained
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from ..frontier.points import Frontier
 
 REPORT_NAME, SPEC_FOLDER = "report.html", "spec"
-_SMALL = 5000  # rows times rounds
+_TRAININGS = 40  # about so many for the paper's tables
 
 Progress = Callable[[int, int], None]
 
@@ -87,22 +88,22 @@ class Documents:
     frontier: "Frontier | None" = None
     point: int | None = None
 
-    def files(self, made: BuildReport, progress: Progress | None = None) -> Mapping[str, bytes]:
-        """Return path in the build's folder -> content."""
+    def files(self, made: BuildReport, jobs: int = -1, progress: Progress | None = None) -> Mapping[str, bytes]:
+        """Return path in the build's folder -> content; `jobs` processes work on the paper's tables."""
         from ..glove.files import spec_files
 
-        files = {REPORT_NAME: self._report(made, progress)}
+        files = {REPORT_NAME: self._report(made, jobs, progress)}
         if names := [switch.name for switch in made.manifest.switches]:
             hand = None if self.hand is None else self.hand.fitted(names, self.hand_length)
             spec = spec_files(made.manifest, made.scan, made.harness, hand)
             files |= {f"{SPEC_FOLDER}/{name}": content for name, content in spec.items()}
         return files
 
-    def _report(self, made: BuildReport, progress: Progress | None) -> bytes:
+    def _report(self, made: BuildReport, jobs: int, progress: Progress | None) -> bytes:
         from ..report.content import ReportContent
         from ..report.page import report_html
 
-        study, no_study = _study(made, progress)
+        study, no_study = _study(made, jobs, progress)
         names = [switch.name for switch in made.manifest.switches]
         return report_html(
             ReportContent(
@@ -127,7 +128,7 @@ class Documents:
         )
 
 
-def _study(made: BuildReport, progress: Progress | None) -> "tuple[Study | None, str]":
+def _study(made: BuildReport, jobs: int, progress: Progress | None) -> "tuple[Study | None, str]":
     """Return the paper's tables, nested and once, of the build's own folds, trainer and seed; or why there are none.
 
     Last of all: by then, nothing is wrong with the build.
@@ -147,9 +148,8 @@ def _study(made: BuildReport, progress: Progress | None) -> "tuple[Study | None,
         trainer=asked.trainer,
         settings=asked.settings,
     )
-    # Little work is done before other processes are up.
-    jobs = 1 if len(made.grasp_set) * asked.rounds < _SMALL else -1
     try:
-        return evaluate(made.grasp_set, options, jobs, progress), ""
+        work = _TRAININGS * len(made.grasp_set) * asked.rounds
+        return evaluate(made.grasp_set, options, little(work, jobs), progress), ""
     except EvaluationError as reason:
         return None, f"These recordings have none: {reason}."

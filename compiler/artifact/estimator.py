@@ -1,6 +1,7 @@
 """From scikit-learn and back to C: a fitted estimator becomes a build, a build becomes firmware."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,11 @@ from numpy.typing import NDArray
 from sklearn.base import clone
 
 from thenar.runtime.build import Build as LoadedBuild
-from thenar.runtime.manifest import Inputs, Options, Recognised, TableBits
+from thenar.runtime.manifest import By, Inputs, Options, TableBits
 
 from ..boosting.classifier import LogitBoostClassifier
 from ..boosting.stumps import Stumps
-from ..evaluation.folds import weka_folds
+from ..evaluation.folds import Fold
 from ..firmware.board import Board
 from ..firmware.classifier import LIBRARY_NAME
 from ..firmware.generate import Firmware, write_folder
@@ -22,14 +23,16 @@ from ..firmware.targets.base import Mode
 from ..placement.methods.base import METHODS, PAPERS
 from ..placement.placement import information_alone
 from ..placement.selectors import SwitchSelector
+from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
 from ..tables.collapse import Model, ScoreTables
+from ..tables.quantise import integer_scores
 from . import CompileError
 from .compile import Making, Wired, check_target
 from .documents import BuildReport, Documents, Progress
 from .ensemble import model_fault
-from .training import Tested, Trained
+from .training import Answers, Trained, cross_validated, cuts_of, integers_of
 
 
 class Build(LoadedBuild):
@@ -94,10 +97,12 @@ def compile(  # noqa: A001
     *,
     folds: int = 4,
     seed: int = 1,
+    by: By | None = None,
     table_bits: TableBits = 16,
     width: int = 16,
     harness: Wired | None = None,
     documents: Documents | None = None,
+    jobs: int = -1,
     progress: Progress | None = None,
 ) -> BuildReport:
     """Write a fitted estimator as a build: `folder`, whole or not at all.
@@ -112,11 +117,11 @@ def compile(  # noqa: A001
         The recordings: their names and calibrations go into the build, their rows prove its integers.
     folder : path
         The folder to write: new, empty, or a build, which is replaced.
-    folds, seed : int
-        Of the cross-validation, of clones of the estimator, whose rate goes into the build; 0 folds: none.
+    folds, seed, by
+        As in Options, of clones of the estimator.
     table_bits, width : int
         As in Options.
-    harness, documents
+    harness, documents, jobs
         As in `compile_build`.
     progress : callable, optional
         Called with (done, total) after each fold.
@@ -143,22 +148,52 @@ def compile(  # noqa: A001
     5
     """
     target = check_target(Path(folder))
-    samples = Samples.of(grasp_set)
+    if grasp_set.taxel_columns:
+        raise CompileError(
+            "the recordings have taxels, whose thresholds compile_build learns: import them with fixed thresholds for "
+            "an estimator"
+        )
+    samples, classifier = Samples.of(grasp_set), _classifier(estimator)
+    _columns(estimator, samples.inputs)
+    samples = _labelled(samples, grasp_set, classifier.classes_)
+    trained, joints = _trained(estimator, samples)
+    inputs: Inputs = "both" if trained.columns and joints else "switches" if trained.columns else "joints"
+    options = Options(
+        inputs=inputs, folds=folds, seed=seed, table_bits=table_bits, width=width, placement="estimator", by=by
+    )
+    if folds:
+        check_trials(grasp_set, CompileError)
+    cuts = cuts_of(grasp_set, options)
+    options, gains = _placed_by(estimator, _trained_by(classifier, options))
+    trained = replace(trained, gains=gains or information_alone(samples, trained.columns))
+    made = Making(grasp_set, _with_joints(samples, joints), joints, options, trained, harness)
+    test = partial(_answers_of, estimator, samples, options)
+    tested = cross_validated(samples, cuts, options, test, jobs, progress or _silent)
+    return made.publish(target, tested, documents, jobs, progress)
+
+
+def _silent(_done: int, _total: int) -> None:
+    pass
+
+
+def _classifier(estimator: Any) -> Any:
+    return estimator[-1] if hasattr(estimator, "steps") else estimator
+
+
+def _with_joints(samples: Samples, joints: Columns) -> Samples:
+    return replace(samples, codes=samples.codes[:, list(joints)])
+
+
+def _trained(estimator: Any, samples: Samples) -> tuple[Trained, Columns]:
+    """Return what an estimator has learnt from these samples, and the joints that it looks at."""
     columns = _columns(estimator, samples.inputs)
-    classifier = estimator[-1] if hasattr(estimator, "steps") else estimator
     switches = tuple(column for column in columns if column < samples.n_switches)
     joints = tuple(column - samples.n_switches for column in columns if column >= samples.n_switches)
-    samples = replace(_labelled(samples, grasp_set, classifier.classes_), codes=samples.codes[:, list(joints)])
+    classifier = _classifier(estimator)
     model = _model(classifier, columns, samples.n_switches)
-    if fault := model_fault(model, len(switches), len(joints), samples.n_classes):
+    if fault := model_fault(model, len(switches), len(joints), len(classifier.classes_)):
         raise CompileError(f"the estimator has a model that {fault}: fit it on these recordings")
-    inputs: Inputs = "both" if switches and joints else "switches" if switches else "joints"
-    options = Options(inputs=inputs, folds=folds, seed=seed, table_bits=table_bits, width=width, placement="estimator")
-    options, gains = _placed_by(estimator, _trained_by(classifier, options))
-    trained = Trained(switches, gains or information_alone(samples, switches), None, model)
-    made = Making(grasp_set, samples, joints, options, trained, harness)
-    tested = _tested(estimator, grasp_set, samples, options, progress) if folds else None
-    return made.publish(target, tested, documents, progress)
+    return Trained(switches, (), None, model), joints
 
 
 def _columns(estimator: Any, X: NDArray[np.uint16]) -> Columns:
@@ -236,17 +271,12 @@ def _trained_by(classifier: Any, options: Options) -> Options:
     )
 
 
-def _tested(
-    estimator: Any, grasp_set: GraspSet, samples: Samples, options: Options, progress: Progress | None
-) -> Tested:
-    """Return what comes of stratified folds, on each of which a clone of the estimator is fitted anew."""
-    X, classes = Samples.of(grasp_set).inputs, estimator.classes_
-    y, confusion = classes[samples.labels], np.zeros((len(classes),) * 2, dtype=np.intp)
-    for number, fold in enumerate(weka_folds(samples.labels, options.folds, options.seed), 1):
-        found = clone(estimator).fit(X[fold.train], y[fold.train]).predict(X[fold.test])
-        answers = (found[:, np.newaxis] == classes).argmax(axis=1)
-        np.add.at(confusion, (samples.labels[fold.test], answers), 1)
-        if progress is not None:
-            progress(number, options.folds)
-    correct = int(np.trace(confusion))
-    return Tested(Recognised("honest", options.folds, options.seed, correct, len(y)), confusion)
+def _answers_of(estimator: Any, samples: Samples, options: Options, fold: Fold) -> Answers:
+    """Fit a clone on the fold's training rows alone; return the classes that its integers give the test rows."""
+    learnt, classes = samples.rows(fold.train), estimator.classes_
+    fitted = clone(estimator).fit(learnt.inputs, classes[learnt.labels])
+    trained, joints = _trained(fitted, learnt)
+    tables = integers_of(trained, _with_joints(learnt, joints), options)
+    test = _with_joints(samples.rows(fold.test), joints).keeping(trained.columns)
+    found = _classifier(fitted).classes_[integer_scores(tables, test.switches, test.codes).argmax(axis=1)]
+    return np.asarray((found[:, np.newaxis] == classes).argmax(axis=1))

@@ -1,23 +1,30 @@
 """What `compile` trains: a placement, then a model on the kept switches and the joints; and both once more in folds."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.manifest import Options, Recognised
+from thenar.runtime.manifest import Of, Options, Protocol, Recognised
+from thenar.runtime.tables import IntegerTables
 
-from ..boosting.stumps import Stumps, winners
-from ..evaluation.folds import weka_folds
+from ..boosting.stumps import Stumps
+from ..evaluation.folds import Fold, leave_one_out, trial_folds
+from ..evaluation.populations import OF, groups_of
+from ..evaluation.rates import rated
 from ..limits import check_inputs, check_memory, check_types
 from ..placement.methods.base import METHODS, PAPERS
 from ..placement.placement import choose
 from ..placement.ports import PortCosts
+from ..placement.thresholds import Thresholds, taxel_thresholds, with_switches
 from ..placement.tree import Tree
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
-from ..tables.collapse import Model, model_scores
+from ..tables.collapse import Model, collapse
+from ..tables.quantise import integer_scores, quantise
 from ..trainers.base import Report, Training
+from ..workers import in_workers, little
 from . import CompileError
 from .ensemble import MAX_STUMPS, model_fault
 
@@ -25,13 +32,15 @@ from .ensemble import MAX_STUMPS, model_fault
 @dataclass(frozen=True, slots=True, eq=False)
 class Trained:
     """The kept switches in the order in which they were chosen, and what each brought (bits): to the tree of ID3, which
-    is None where another method chose, and alone otherwise; and the model.
+    is None where another method chose, and alone otherwise; the model; and the thresholds above which the taxels, which
+    follow the switches, are closed.
     """
 
     columns: Columns
     gains: tuple[float, ...]
     tree: Tree | None
     model: Model
+    thresholds: Thresholds = ()
 
     @property
     def stopped_after(self) -> int:
@@ -53,14 +62,14 @@ class Trained:
 def samples_of(grasp_set: GraspSet, options: Options) -> Samples:
     """Return what of `grasp_set` the option `inputs` allows. Raises CompileError if that is nothing to learn from."""
     wanted = options.inputs
-    for kind, names in (("switches", grasp_set.switch_names), ("joints", grasp_set.joint_names)):
+    for kind, names in (("switches", grasp_set.element_names), ("joints", grasp_set.joint_names)):
         if wanted == kind and not names:
             raise CompileError(f"the recordings have no {kind}: choose other inputs than {kind!r}")
     if (found := len(np.unique(grasp_set.labels))) < 2:
         raise CompileError(f"the recordings hold {found} grasp type(s): there is nothing to tell apart")
     samples = Samples.of(grasp_set, wanted)
     check_types(found, CompileError)
-    check_inputs(found, min(options.keep or 0, samples.n_switches), samples.codes.shape[1], CompileError)
+    check_inputs(found, min(options.keep or 0, len(grasp_set.element_names)), samples.codes.shape[1], CompileError)
     check_memory(len(samples.codes), found, CompileError)
     if options.rounds * found > MAX_STUMPS:
         raise CompileError(
@@ -75,6 +84,8 @@ def train(samples: Samples, options: Options, report: Report | None = None, port
 
     ports  what reading switches costs, for methods that ask
     """
+    thresholds = taxel_thresholds(samples)
+    samples = with_switches(samples, thresholds)
     # Without switches the tree is a leaf.
     method = options.placement if samples.n_switches else PAPERS
     parameter = options.keep or 0 if METHODS.named(method).by_number else options.prune
@@ -90,27 +101,128 @@ def train(samples: Samples, options: Options, report: Report | None = None, port
     model = Training.of(options).train(kept, report)
     if fault := model_fault(model, kept.n_switches, kept.codes.shape[1], kept.n_classes):
         raise CompileError(f"trainer {options.trainer!r} made a model that {fault}: it is at fault")
-    return Trained(columns, chosen.gains, chosen.tree, model)
+    return Trained(columns, chosen.gains, chosen.tree, model, thresholds)
+
+
+def integers_of(trained: Trained, samples: Samples, options: Options) -> IntegerTables:
+    """Return the integer tables of what was trained on these samples."""
+    kept = with_switches(samples, trained.thresholds).keeping(trained.columns)
+    tables = collapse(trained.model, kept.n_switches)
+    return quantise(tables, kept.switches, kept.codes, options.width, options.table_bits)
+
+
+# A new subject, object or session costs a training for each, or for each of so many groups of them.
+_MOST_GROUPS = 10
+
+Answers = NDArray[np.intp]
+Test = Callable[[Fold], Answers]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cut:
+    """Folds of all rows; what is new about the rows that they test, and to whom or what each row (n,) belongs then."""
+
+    of: Of
+    folds: tuple[Fold, ...]
+    groups: NDArray[np.str_] | None = None
+
+
+def cuts_of(grasp_set: GraspSet, options: Options) -> tuple[Cut, ...]:
+    """Return the folds of each rate that is to be measured, those of the headline first; none without folds.
+
+    No fold parts a trial. Raises EvaluationError where the recordings cannot be cut so.
+    """
+    if not options.folds:
+        return ()
+    several = (grasp_set.subjects != grasp_set.subjects[0]).any()
+    trials = trial_folds(grasp_set.labels, grasp_set.trial_ids, options.folds, options.seed)
+    pooled = Cut("pooled" if several else "within subject", tuple(trials))
+    by = options.by or ("subject" if several else "trial")
+    if by == "trial":
+        return (pooled,)
+    if by == "session":
+        for subject in np.unique(grasp_set.subjects).tolist():
+            leave_one_out(grasp_set.sessions[grasp_set.subjects == subject], f"session of subject {subject}")
+    names = groups_of(grasp_set, by)
+    assert names is not None
+    found, number = np.unique(names, return_inverse=True)
+    parts = names if len(found) <= _MOST_GROUPS else (number % _MOST_GROUPS).astype(np.str_)
+    return (Cut(OF[by], tuple(leave_one_out(parts, by)), names), pooled)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tested:
-    """What came of the folds: the rate, and how often each grasp type (rows) was answered by each (columns), (K, K)."""
+    """What came of the folds: the rates, the headline first; and how often frames of each grasp type (rows) were
+    answered by each (columns) in the folds of the headline, (K, K).
+    """
 
-    rate: Recognised
+    rates: tuple[Recognised, ...]
     confusion: NDArray[np.intp]
 
 
-def cross_validated(samples: Samples, options: Options, report: Report, ports: PortCosts | None = None) -> Tested:
-    """Return what comes of stratified folds, each trained anew and without a look at its test rows."""
+def answers_of(samples: Samples, options: Options, ports: PortCosts | None, fold: Fold) -> Answers:
+    """Train on the fold's training rows alone; return the classes that the integers give its test rows.
+
+    Raises CompileError, which names the fold, as `train` does.
+    """
+    learning = samples.rows(fold.train)
+    try:
+        trained = train(learning, options, ports=ports)
+    except CompileError as wrong:
+        raise CompileError(f"in fold {fold.name}: {wrong}, or do without folds (0)") from None
+    tables = integers_of(trained, learning, options)
+    test = with_switches(samples.rows(fold.test), trained.thresholds).keeping(trained.columns)
+    return np.asarray(integer_scores(tables, test.switches, test.codes).argmax(axis=1))
+
+
+def cross_validated(
+    samples: Samples, cuts: Sequence[Cut], options: Options, test: Test, jobs: int, report: Report
+) -> Tested | None:
+    """Return what comes of the folds, None if there are none; `test` returns the classes of a fold's test rows.
+
+    jobs  worker processes that call `test`; report: called with (done, all) after each fold
+    """
+    if not cuts:
+        return None
+    folds = [(place, fold) for place, cut in enumerate(cuts) for fold in cut.folds]
+    answers = np.empty((len(cuts), len(samples.labels)), np.intp)
+    tasks = ((place, fold, test) for place, fold in folds)
+    for done, (place, fold, found) in enumerate(
+        in_workers(_done, tasks, little(len(folds) * len(samples.labels) * options.rounds, jobs)), 1
+    ):
+        answers[place, fold.test] = found
+        report(done, len(folds))
     confusion = np.zeros((len(samples.grasps),) * 2, dtype=np.intp)
-    for number, fold in enumerate(weka_folds(samples.labels, options.folds, options.seed), 1):
-        try:
-            trained = train(samples.rows(fold.train), options, ports=ports)
-        except CompileError as wrong:
-            raise CompileError(f"in fold {number}: {wrong}, or do without folds (0)") from None
-        test = samples.rows(fold.test).keeping(trained.columns)
-        np.add.at(confusion, (test.labels, winners(model_scores(trained.model, test.switches, test.codes))), 1)
-        report(number, options.folds)
-    correct = int(np.trace(confusion))
-    return Tested(Recognised("honest", options.folds, options.seed, correct, len(samples.labels)), confusion)
+    np.add.at(confusion, (samples.labels, answers[0]), 1)
+    measured = zip(cuts, answers, strict=True)
+    rates = [rate for cut, own in measured for rate in rates_of("nested", samples, own, options.seed, cut)]
+    return Tested(tuple(rates), confusion)
+
+
+def _done(task: tuple[int, Fold, Test]) -> tuple[int, Fold, Answers]:
+    place, fold, test = task
+    return place, fold, test(fold)
+
+
+def rates_of(
+    protocol: Protocol, samples: Samples, answers: Answers, seed: int, cut: Cut | None = None
+) -> tuple[Recognised, ...]:
+    """Return the rate of trials, and that of frames where trials have several."""
+    cut = cut or Cut("pooled", ())
+    found = rated(answers, samples.labels, samples.trials, of=cut.of, groups=cut.groups)
+    return tuple(
+        Recognised(
+            protocol=protocol,
+            folds=len(cut.folds),
+            seed=seed,
+            correct=rate.correct[0],
+            total=rate.total,
+            of=cut.of,
+            unit=rate.unit,
+            # The last digits of a quantile may differ between machines.
+            low=round(rate.low, 6),
+            high=round(rate.high, 6),
+        )
+        for rate in found
+        if rate is not None
+    )

@@ -9,11 +9,13 @@ from numpy.typing import NDArray
 
 from thenar.runtime.build import ENSEMBLE_NAME, Build, read_member
 from thenar.runtime.errors import BuildError
+from thenar.runtime.manifest import Unit
 from thenar.runtime.scanning.decided import Decided
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.tables import IntegerTables
 
 from ..boosting.stumps import Stumps
+from ..evaluation.rates import rated
 from ..recordings.graspset import GraspSet
 from ..tables.collapse import Model
 from ..tables.compare import Comparison, WorstCase, compare, worst_case
@@ -33,6 +35,24 @@ class ChangedRow(Struct, frozen=True):
     margin: float
 
 
+class Counted(Struct, frozen=True):
+    """How many trials (the majority of a trial's frames) or frames were recognised, of `total`: by the ensemble, and by
+    the integers; and the 95 % interval of the integers' rate.
+    """
+
+    unit: Unit
+    total: int
+    ensemble: int
+    integers: int
+    low: float
+    high: float
+
+    @property
+    def rate(self) -> float:
+        """What the integers recognise, as a share of all."""
+        return self.integers / self.total
+
+
 class ScanCheck(Struct, frozen=True):
     """What became of rows that were scanned port by port until they were decided.
 
@@ -50,7 +70,8 @@ class Verification(Struct, frozen=True, kw_only=True):
 
     collapse_* compare the ensemble with the float tables, in units of score; integer_* the float tables with the
     integers, in steps. covered counts rows whose margin exceeds safe_margin, covered_changed those of them that change.
-    worst looks beyond the rows; scan is there if the build says how to read a harness, firmware if it was asked for.
+    recognised counts trials, and frames where trials have several. worst looks beyond the rows; scan is there if the
+    build says how to read a harness, firmware if it was asked for.
     """
 
     same_recordings: bool
@@ -62,8 +83,7 @@ class Verification(Struct, frozen=True, kw_only=True):
     safe_margin: float
     covered: int
     covered_changed: int
-    correct_ensemble: int
-    correct_integers: int
+    recognised: tuple[Counted, ...]
     worst: WorstCase
     changed: tuple[ChangedRow, ...]
     scan: ScanCheck | None
@@ -133,8 +153,7 @@ def verify(
         safe_margin=comparison.safe_margin,
         covered=int(np.count_nonzero(comparison.covered)),
         covered_changed=int(np.count_nonzero(comparison.covered[comparison.changed])),
-        correct_ensemble=int(np.count_nonzero(grasps[comparison.trained] == grasp_set.grasps)),
-        correct_integers=int(np.count_nonzero(grasps[comparison.deployed] == grasp_set.grasps)),
+        recognised=_recognised(comparison, grasps, grasp_set),
         worst=worst,
         changed=_changed(comparison, grasps, grasp_set),
         scan=scan,
@@ -176,6 +195,20 @@ def check_scan(
         changed += int(np.count_nonzero(leaders[pending & decided] != deployed[pending & decided]))
         pending &= ~decided
     return ScanCheck(len(ports), read / len(frames), changed)
+
+
+def _recognised(comparison: Comparison, grasps: NDArray[np.str_], grasp_set: GraspSet) -> tuple[Counted, ...]:
+    # A type that the build does not know is none of its classes.
+    labels = np.append(grasp_set.grasps[:, None] == grasps, np.ones((len(grasp_set), 1), bool), axis=1).argmax(axis=1)
+    both = [
+        rated(answers, labels, grasp_set.trial_ids, of="pooled")
+        for answers in (comparison.trained, comparison.deployed)
+    ]
+    return tuple(
+        Counted(one.unit, one.total, one.correct[0], other.correct[0], other.low, other.high)
+        for one, other in zip(*both, strict=True)
+        if one is not None and other is not None
+    )
 
 
 def _changed(comparison: Comparison, grasps: NDArray[np.str_], grasp_set: GraspSet) -> tuple[ChangedRow, ...]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from thenar.runtime.build import Build
 from thenar.runtime.files import read_file
-from thenar.runtime.manifest import Calibration, Manifest
+from thenar.runtime.manifest import Calibration, Manifest, Switch
 from thenar.runtime.names import list_names
 from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.tables import IntegerTables
@@ -34,11 +34,28 @@ def select_inputs(grasp_set: GraspSet, manifest: Manifest) -> tuple[NDArray[np.b
 
     Raises CompileError naming the inputs that the recordings lack, or joints whose codes mean something else there.
     """
-    switches = _columns("switches", [switch.name for switch in manifest.switches], grasp_set.switch_names)
+    switches = _columns("switches", [switch.name for switch in manifest.switches], grasp_set.element_names)
     joints = _columns("joints", [joint.name for joint in manifest.joints], grasp_set.joint_names)
     for calibration, column in zip(manifest.joints, joints, strict=True):
-        _check_calibration(calibration, grasp_set.joints[column])
-    return grasp_set.switches[:, switches], grasp_set.codes[:, joints]
+        _check_calibration("joint", calibration, grasp_set.joints[column])
+    bits = np.empty((len(grasp_set), len(switches)), np.bool_)
+    for place, (switch, column) in enumerate(zip(manifest.switches, switches, strict=True)):
+        bits[:, place] = _bits(grasp_set, switch, column)
+    return bits, grasp_set.codes[:, joints]
+
+
+def _bits(grasp_set: GraspSet, switch: Switch, column: int) -> NDArray[np.bool_]:
+    """Return a kept switch (n,), or the taxel that it is made of above its threshold."""
+    taxel = column - len(grasp_set.switch_names)
+    if (taxel < 0) != (switch.threshold is None):
+        here, built = ("a switch", "a taxel") if taxel < 0 else ("a taxel", "a switch")
+        raise CompileError(
+            f"{switch.name} is {here} here, in the build {built}: import these recordings as the build's"
+        )
+    if switch.threshold is None:
+        return grasp_set.switches[:, column]
+    _check_calibration("taxel", switch.threshold.taxel, grasp_set.taxel_columns[taxel])
+    return grasp_set.taxels[:, taxel] > switch.threshold.code
 
 
 def _columns(kind: str, wanted: list[str], there: tuple[str, ...]) -> list[int]:
@@ -49,7 +66,7 @@ def _columns(kind: str, wanted: list[str], there: tuple[str, ...]) -> list[int]:
     return [number[name] for name in wanted]
 
 
-def _check_calibration(built: Calibration, recorded: Joint) -> None:
+def _check_calibration(kind: str, built: Calibration, recorded: Joint) -> None:
     values = np.array([built.value_a, built.value_b])
     meant = recorded.value([built.code_a, built.code_b])
     same = np.isclose(meant, values, rtol=0, atol=abs(recorded.step) * 1e-6)
@@ -57,7 +74,7 @@ def _check_calibration(built: Calibration, recorded: Joint) -> None:
         point = int(same.argmin())
         code = (built.code_a, built.code_b)[point]
         raise CompileError(
-            f"joint {built.name} is coded differently here: code {code} is {meant[point]:g} {recorded.unit}, in the "
+            f"{kind} {built.name} is coded differently here: code {code} is {meant[point]:g} {recorded.unit}, in the "
             f"build {values[point]:g} {built.unit}; import these recordings with the build's grid and origin"
         )
 

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..recordings.graspset import GraspSet
+from ..samples import decided
 from ..trainers.base import Training
 from .plan import COMPOSITIONS, FoldFit, Progress, inputs, run_fits
 from .populations import populations
-from .rates import Rate, decided, rated
+from .rates import Rate, rated
 
 Bits = NDArray[np.bool_]
 Labels = NDArray[np.intp]

@@ -8,12 +8,13 @@ import numpy as np
 from thenar.runtime.files import write_atomically
 
 from ..pictures import painting, rendered
-from .study import RateTable, Row, Study
+from .study import Study
+from .tables import RateTable, Row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from .study import Confusion
+    from .tables import Confusion
 
 
 def draw_confusions(study: Study, folder: Path) -> list[Path]:
@@ -37,7 +38,7 @@ def _draw(grasps: tuple[str, ...], table: RateTable, row: Row, path: Path) -> Pa
 
     side = 1.6 + 0.42 * len(grasps)
     figure = Figure(figsize=(side * len(row.cells) + 0.6, side + 0.4), layout="constrained", dpi=120)
-    figure.suptitle(f"{row.name}: {row.what} ({table.protocol} protocol)")
+    figure.suptitle(f"{row.name}: {row.what} ({table.protocol} protocol, {row.rate.what})")
     all_axes = figure.subplots(1, len(row.cells), squeeze=False)[0]
     for axes, name, cell in zip(all_axes, table.columns, row.cells, strict=True):
         if cell.confusion is not None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..boosting.stumps import winners
 from ..placement.methods.base import METHODS, PAPERS, Chooser
 from ..placement.methods.filters import random_placement
+from ..placement.thresholds import made_plain, taxel_thresholds, with_switches
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
 from ..tables.collapse import model_scores
@@ -28,14 +29,15 @@ Progress = Callable[[int, int], None]
 class FoldFit:
     """Train on a fold's training rows and these columns, classes `grasps` (ascending labels); then test the fold.
 
-    The first `n_switches` columns are switches, the others joints. Two fits are one if they are of the same `Fold`
-    object and the same columns.
+    The first `n_switches` columns are switches, of which the last `n_taxels` are taxels; the others are joints. Two
+    fits are one if they are of the same `Fold` object and the same columns.
     """
 
     fold: Fold
     columns: Columns
     grasps: tuple[int, ...]
     n_switches: int = 0
+    n_taxels: int = 0
 
 
 def predictions(X: Inputs, labels: Labels, fit: FoldFit, training: Training) -> Labels:
@@ -48,11 +50,14 @@ def predictions(X: Inputs, labels: Labels, fit: FoldFit, training: Training) -> 
     trained = np.searchsorted(grasps, labels[fit.fold.train])
     if is_blind(X, fit):
         return np.full(len(fit.fold.test), grasps[np.bincount(trained).argmax()])
-    part = X[:, fit.columns]
-    bits, codes = part[:, : fit.n_switches].astype(bool), part[:, fit.n_switches :]
+    ends = (fit.n_switches - fit.n_taxels, fit.n_switches)
+    bits, taxels, codes = np.split(X[:, fit.columns], ends, axis=1)
     rows, names = fit.fold.train, tuple(map(str, fit.grasps))
-    model = training.train(Samples(bits[rows], codes[rows], trained, names))
-    return grasps[winners(model_scores(model, bits[fit.fold.test], codes[fit.fold.test]))]
+    learning = Samples(bits[rows].astype(bool), codes[rows], trained, names, taxels=taxels[rows])
+    thresholds = taxel_thresholds(learning)
+    model = training.train(with_switches(learning, thresholds))
+    closed = np.hstack([bits > 0, taxels > np.array(thresholds, np.int64)])
+    return grasps[winners(model_scores(model, closed[fit.fold.test], codes[fit.fold.test]))]
 
 
 def is_blind(X: Inputs, fit: FoldFit) -> bool:
@@ -134,8 +139,8 @@ def available(n_switches: int, n_joints: int) -> tuple[Composition, ...]:
 
 
 def inputs(grasp_set: GraspSet) -> NDArray[np.uint16]:
-    """Return what compositions take columns of: (n, s + j), the switches' bits, then the joints' codes."""
-    return np.hstack([grasp_set.switches.astype(np.uint16), grasp_set.codes])
+    """Return what compositions take columns of: (n, s + t + j), the switches' bits, then codes of taxels and joints."""
+    return np.hstack([grasp_set.switches, grasp_set.taxels, grasp_set.codes], dtype=np.uint16)
 
 
 TableName = Literal["compositions", "generality", "pruning", "baselines"]
@@ -237,7 +242,7 @@ class Planner:
 
     @property
     def _n_switches(self) -> int:
-        return self.samples.n_switches
+        return self.samples.n_switches + int(self.samples.taxels.shape[1])
 
     def own(self, protocol: Protocol, part: Population, fold: Fold) -> Columns:
         """Return the placement that ID3 chooses for a fold from the population's own rows, as the protocol allows."""
@@ -250,7 +255,7 @@ class Planner:
         rows = np.sort(rows)
         key = (method, rows.tobytes())
         if key not in self._choosers:
-            self._choosers[key] = METHODS.named(method).chooser(self.samples.rows(rows))
+            self._choosers[key] = METHODS.named(method).chooser(made_plain(self.samples.rows(rows)))
         return self._choosers[key](parameter)
 
     def _row(self, name: str, what: str, kind: Composition, select: Select) -> RowPlan:
@@ -262,7 +267,9 @@ class Planner:
         def fit(fold: Fold) -> FoldFit:
             placement = select(part, fold) if kind.needs_placement else ()
             columns = kind.columns(placement, self._n_switches, self.n_joints)
-            return FoldFit(fold, columns, part.grasps, sum(column < self._n_switches for column in columns))
+            closing = [column for column in columns if column < self._n_switches]
+            taxels = sum(column >= self.samples.n_switches for column in closing)
+            return FoldFit(fold, columns, part.grasps, len(closing), taxels)
 
         return CellPlan(part, tuple(tuple(map(fit, folds)) for folds in part.repeats))
 

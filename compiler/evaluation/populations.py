@@ -7,9 +7,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.manifest import Of
+
 from ..recordings.graspset import GraspSet
 from .folds import EvaluationError, Fold, Rows, block_folds, leave_one_out, trial_folds
-from .rates import Of
 
 Scheme = Literal["trial", "subject", "object", "session", "block"]
 
@@ -131,8 +132,8 @@ PROTOCOLS = (PAPER, NESTED)
 
 
 def concerns(grasp_set: GraspSet, parts: tuple[Population, ...], scheme: Scheme, n_folds: int) -> tuple[str, ...]:
-    """Return a sentence if the grasps are simulated, and for each grasp type that is alone, too rare for the folds, or
-    tested but never trained.
+    """Return sentences: that grasps are simulated, that rows are stated to be independent, and for each grasp type that
+    is alone, too rare for the folds, or tested but never trained.
     """
     made = grasp_set.simulated
     simulated = [f"these grasps are simulated ({made}): the rates are not those of recorded ones"] if made else []
@@ -144,7 +145,8 @@ def concerns(grasp_set: GraspSet, parts: tuple[Population, ...], scheme: Scheme,
     found = [text for part in parts for text in _untrained(grasp_set, part)]
     if scheme == "trial":
         found = [text for part in parts for text in _rare(grasp_set, part, n_folds)] + found
-    return tuple(simulated + alone + found)
+    claimed = ["each row counts as a trial of its own, as its recorder states"] if grasp_set.independent else []
+    return tuple(simulated + claimed + alone + found)
 
 
 def _rare(grasp_set: GraspSet, part: Population, n_folds: int) -> list[str]:

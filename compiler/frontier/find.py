@@ -18,6 +18,7 @@ from ..limits import check_inputs, check_memory, check_types
 from ..placement.methods.base import BEST, METHODS, PAPERS, usual
 from ..placement.ports import ports_of_whole_glove
 from ..publication import check_folder, entries, publish_folder
+from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from .cache import Cache, Report, Store
@@ -42,6 +43,7 @@ _EARLY = (
     "Scans that end early are tried with decisions on single frames: a dwell with a lead reads on for longer, and a "
     "sequential test needs whole scans."
 )
+_CLAIMED = "Each row counts as a trial of its own, as its recorder states."
 _RENEWED = f"{STORE_NAME} was an older thenar's, of another form: everything was computed anew"
 _UNTIMED = (
     "what reading the joints ({}) takes is not known and is left out of every frame time and latency: give it with "
@@ -101,7 +103,7 @@ def find_frontier(
     Parameters
     ----------
     grasp_set : GraspSet
-        Recordings of at least two grasp types; folds part no trial.
+        Recordings of at least two grasp types; no fold parts a trial.
     output : Path, optional
         Folder for frontier.json, frontier.csv, three pictures, and the store, from which an interrupted run goes on.
         Without it nothing is written, and nothing is kept.
@@ -178,6 +180,9 @@ def _samples(grasp_set: GraspSet) -> Samples:
     # All switches at once are tried as well.
     check_inputs(n_types, len(grasp_set.switch_names), len(grasp_set.joints), FrontierError)
     check_memory(len(grasp_set), n_types, FrontierError)
+    if grasp_set.taxel_columns:
+        raise FrontierError("the recordings have taxels, whose thresholds are learnt: import them with fixed ones")
+    check_trials(grasp_set, FrontierError)
     return Samples.of(grasp_set)
 
 
@@ -280,6 +285,7 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
     luck = lucks((by_time, by_switches), every, screened, survey.cuts, search.seed)
     points = points_of(kept, _latencies(survey, stream, kept), luck, survey.switch_names, search)
     picked, tried = wanted.pick(points), _tried(screened, closes, search)
+    claimed = [_CLAIMED] if survey.grasp_set.independent else []
     early = [_EARLY] if any(design.scan_kind == "early" for design in kept) else []
     return Frontier(
         schema=SCHEMA,
@@ -302,7 +308,7 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
         curves=curves,
         marks=(*marks_of(named, closes, survey), *own),
         checks=checks,
-        skipped=(*lacking, *skipped, *early, stream.what),
+        skipped=(*lacking, *claimed, *skipped, *early, stream.what),
         picked=None if picked is None else picked.number,
         wanted=wanted.words,
     )
@@ -386,12 +392,13 @@ def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
     build = Build.load(folder)
     manifest = build.manifest
     names = [switch.name for switch in manifest.switches]
-    honest = [rate for rate in manifest.rates if rate.protocol == "honest"]
-    if not honest:
+    # As the frontier's own rates are.
+    pooled = [rate for rate in manifest.rates if rate.protocol != "training" and not rate.of.startswith("new")]
+    if not pooled:
         raise FrontierError(
             f"{folder} does not say what it recognises: compile it with --folds 4, or leave --build out"
         )
-    rate, options, fitting = honest[-1], equipment.model.options(build.tables), equipment.fitting(names)
+    options, fitting = equipment.model.options(build.tables), equipment.fitting(names)
     if not options or (names and not fitting):
         raise FrontierError(f"{folder} cannot be built for {equipment.model.target}: leave --build out, or --target")
     joints = [joint.name for joint in manifest.joints]
@@ -399,7 +406,9 @@ def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
     codes = grasp_set.codes[:, _places(joints, [joint.name for joint in grasp_set.joints], folder)]
     scans = [scan_times(names, build.tables, wiring, bits, codes, equipment.beside).full_us for wiring in fitting]
     frame_us = max(min(scans, default=0.0), equipment.joints.us * bool(joints)) + options[0].us
-    return Mark(f"build {folder.name}", len(names), Rate.counted((rate.correct,), rate.total, of="pooled"), frame_us)
+    return Mark(
+        f"build {folder.name}", len(names), Rate.counted((pooled[0].correct,), pooled[0].total, of="pooled"), frame_us
+    )
 
 
 def _places(names: Sequence[str], there: Sequence[str], folder: Path) -> list[int]:

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from ..boosting.stumps import winners
 from ..evaluation.folds import EvaluationError, Fold, Rows, leave_one_out, trial_folds
-from ..evaluation.rates import Rate, decided
+from ..evaluation.rates import Rate
 from ..placement.methods.base import METHODS
 from ..placement.ports import PortCosts
 from ..recordings.graspset import GraspSet
-from ..samples import Columns, Samples
+from ..samples import Columns, Samples, decided
 from ..tables.collapse import ScoreTables, collapse, model_scores
 from ..tables.quantise import integer_scores, quantise
 from ..trainers.base import Training

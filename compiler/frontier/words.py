@@ -136,12 +136,14 @@ def luck_of(point: Point) -> str:
 
 
 def rates_of(frontier: Frontier) -> dict[str, Callable[[Point], Rate | None]]:
-    """Return the rates that each point has, by what they are of: that by which points are chosen first."""
-    found: dict[str, Callable[[Point], Rate | None]] = {f"{frontier.by}, trials": lambda point: point.rate}
+    """Return the rates of a point by what they are of, the one by which points are chosen first; of trials, if not of
+    frames.
+    """
+    found: dict[str, Callable[[Point], Rate | None]] = {frontier.by: lambda point: point.rate}
     if any(point.frames is not None for point in frontier.points):
         found[f"{frontier.by}, frames"] = lambda point: point.frames
     if frontier.beside is not None:
-        found[f"{frontier.beside}, trials"] = lambda point: point.beside
+        found[frontier.beside] = lambda point: point.beside
     return found
 
 

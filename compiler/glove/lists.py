@@ -90,9 +90,8 @@ def expectations(expected: Expected) -> Iterator[str]:
         yield f"A scanner board's bitmap takes {us:.0f} us on its line."
     if expected.glove_us is not None:
         yield f"The CyberGlove sends a record every {expected.glove_us:.0f} us at best."
-    for rate in expected.rates:
-        how = "on the rows trained on" if rate.protocol == "training" else f"in {rate.folds} folds, placement and all"
-        yield f"Recognised {how}: {rate.correct} of {rate.total} ({rate.rate:.1%})."
+    for rate in sorted(expected.rates, key=lambda rate: rate.protocol == "training"):
+        yield f"Recognised, {rate}."
 
 
 def _building(summary: SpecSummary) -> Iterator[str]:

@@ -203,6 +203,12 @@ def _remarks(
                 f"SW{first} and SW{second} are {apart} mm apart and their bodies {hand.body_mm:g} mm broad: move one "
                 "of them aside"
             )
+    for number, switch in enumerate(manifest.switches, start=1):
+        if switch.threshold is not None:
+            yield (
+                f"SW{number} is the taxel {switch.name}: set its comparator or converter to {switch.threshold.value:g} "
+                f"{switch.threshold.taxel.unit}; it is {switch.closed}"
+            )
     joints = own_joints([joint.name for joint in manifest.joints])
     if joints and harness.cyberglove is None:
         yield joints

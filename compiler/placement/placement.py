@@ -19,6 +19,7 @@ from .inputs import PlacementError
 from .methods.base import METHODS, PAPERS
 from .optimum import Pairs, best_subset
 from .ports import PortCosts
+from .thresholds import made_plain
 from .tree import Tree
 
 Progress = Callable[[int, int], None]
@@ -241,7 +242,7 @@ def place(
     PlacementError
         If the set has no switches, no rows, or more grasp types than a build can hold.
     """
-    samples = samples_of(grasp_set, joints=joints)
+    samples = made_plain(samples_of(grasp_set, joints=joints))
     chosen = choose(samples, method, parameter, ports)
     kept = kept_of(grasp_set, chosen.columns)
     if chosen.tree is not None:
@@ -258,7 +259,7 @@ def place(
         switches=kept,
         rows=len(grasp_set),
         fingerprint=grasp_set.fingerprint(),
-        all_names=grasp_set.switch_names,
+        all_names=grasp_set.element_names,
         grasps=samples.grasps,
         tree=chosen.tree,
         exact=_exactly(grasp_set, samples, chosen.columns, on_round) if exact else None,
@@ -282,7 +283,7 @@ def place_by_subject(grasp_set: GraspSet, prune: int, on_done: Progress) -> list
 
 def samples_of(grasp_set: GraspSet, *, joints: bool) -> Samples:
     """Return the rows of a set to choose switches from, with the joints' codes or without."""
-    if not grasp_set.switch_names:
+    if not grasp_set.element_names:
         raise PlacementError("the set has no switches to place: it holds joints only")
     if not len(grasp_set):
         raise PlacementError("there are no rows: a placement is learnt from at least one labelled grasp")
@@ -292,7 +293,7 @@ def samples_of(grasp_set: GraspSet, *, joints: bool) -> Samples:
 
 def kept_of(grasp_set: GraspSet, columns: Columns) -> tuple[Kept, ...]:
     """Return switches with their names."""
-    return tuple(Kept(number, grasp_set.switch_names[number]) for number in columns)
+    return tuple(Kept(number, grasp_set.element_names[number]) for number in columns)
 
 
 def _exactly(grasp_set: GraspSet, samples: Samples, columns: Columns, on_round: Progress | None) -> Exactly:

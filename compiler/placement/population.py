@@ -20,11 +20,12 @@ from numpy.typing import NDArray
 from ..boosting.boost import boost
 from ..boosting.stumps import winners
 from ..recordings.graspset import GraspSet
-from ..samples import Columns, Samples
+from ..samples import Columns, Samples, decided
 from ..workers import in_workers
 from .inputs import PlacementError
 from .methods.base import BEST, METHODS
 from .placement import Aim, CurvePoint, Placement, Progress, Served, Standard, kept_of, samples_of
+from .thresholds import made_plain, taxel_thresholds, with_switches
 
 Numbers = NDArray[np.intp]
 
@@ -72,28 +73,39 @@ class Crowd:
         return self._part(np.flatnonzero(np.isin(self.subjects, subjects)))
 
     def drawn(self, rows: int, seed: int) -> "Crowd":
-        """Return about so many rows, equally many of every subject, drawn with `seed`; all where there are no more."""
+        """Return about so many rows, about equally many of every subject, all frames of trials that are drawn with
+        `seed`; all rows where there are no more.
+        """
         there = np.unique(self.subjects)
         if rows >= len(self.subjects):
             return self
         each = max(rows // len(there), 1)
         random = np.random.default_rng(seed)
-        own = (random.permutation(np.flatnonzero(self.subjects == subject))[:each] for subject in there)
-        return self._part(np.sort(np.concatenate(list(own))))
+        own = (self._trials_of(subject, each, random) for subject in there)
+        return self._part(np.flatnonzero(np.isin(self.samples.trials, np.concatenate(list(own)))))
+
+    def _trials_of(self, subject: int, rows: int, random: np.random.Generator) -> Numbers:
+        """Return the numbers of random trials of a subject: one, or as many as have at most so many rows."""
+        trials, frames = np.unique(self.samples.trials[self.subjects == subject], return_counts=True)
+        order = random.permutation(len(trials))
+        return np.asarray(trials[order[: max(int(np.searchsorted(np.cumsum(frames[order]), rows, "right")), 1)]])
 
     def _part(self, rows: Numbers) -> "Crowd":
         return replace(self, samples=self.samples.rows(rows), subjects=self.subjects[rows])
 
 
 def rates(learnt: Crowd, asked: Crowd, columns: Columns, rounds: int) -> NDArray[np.float64]:
-    """Return the recognition rate of every subject of `asked`, in the order of their numbers.
+    """Return the share of trials of every subject of `asked` that are recognised, in the order of their numbers.
 
     LogitBoost of so many rounds learns the switches `columns`, and the joints if there are any, from `learnt`.
     """
-    samples = learnt.samples
+    thresholds = taxel_thresholds(learnt.samples)
+    samples, others = (with_switches(crowd.samples, thresholds) for crowd in (learnt, asked))
     stumps, _ = boost(samples.kept(columns), samples.labels, samples.n_classes, rounds=rounds)
-    right = winners(stumps.scores(asked.samples.kept(columns))) == asked.samples.labels
-    numbers = np.unique(asked.subjects, return_inverse=True)[1]
+    _, first, trial = np.unique(asked.samples.trials, return_index=True, return_inverse=True)
+    found = decided(winners(stumps.scores(others.kept(columns)))[np.newaxis], trial)[0]
+    numbers = np.unique(asked.subjects[first], return_inverse=True)[1]
+    right = found == asked.samples.labels[first]
     return np.asarray(np.bincount(numbers, right) / np.bincount(numbers), dtype=np.float64)
 
 
@@ -196,7 +208,7 @@ def place_for_crowd(
         switches=kept_of(grasp_set, study.columns),
         rows=len(grasp_set),
         fingerprint=grasp_set.fingerprint(),
-        all_names=grasp_set.switch_names,
+        all_names=grasp_set.element_names,
         grasps=samples.grasps,
         study=study,
     )
@@ -268,7 +280,7 @@ def _work(task: _Task) -> tuple[int, tuple[Served, ...]]:
 
 def _refining(crowd: Crowd, take: Asked, seed: int) -> Refining:
     """Return the method's placement, from rows drawn evenly over the subjects, ready to be bettered."""
-    choose = METHODS.named(take.method).chooser(crowd.drawn(take.rows, seed).samples)
+    choose = METHODS.named(take.method).chooser(made_plain(crowd.drawn(take.rows, seed).samples))
     kept = choose(take.keep)
     spare = tuple(column for column in choose(take.keep + REACH) if column not in kept)
     return Refining(crowd, kept, spare, take.rows, take.rounds, seed)

@@ -110,9 +110,9 @@ class Separability(msgspec.Struct, frozen=True):
     """What one choice of inputs can tell apart.
 
     `ceiling` is the recognition rate of the best possible memory: the commonest grasp type of every distinct frame; no
-    classifier that sees these inputs alone is right more often on these rows. `neighbour_rate` is leave-one-out nearest
-    neighbour (Euclidean; joints in standard deviations, switches as 0 and 1) over `neighbour_rows` rows, None without
-    scikit-learn.
+    classifier that sees these inputs alone is right more often on these rows. `neighbour_rate` is the rate of frames by
+    the nearest frame of another trial (Euclidean; joints in standard deviations, switches as 0 and 1) over
+    `neighbour_rows` rows, None without scikit-learn.
     """
 
     inputs: str
@@ -133,7 +133,7 @@ def _separability(grasp_set: GraspSet, inputs: str) -> Separability:
     switches = grasp_set.switches if inputs != "joints" else grasp_set.switches[:, :0]
     codes = grasp_set.codes if inputs != "switches" else grasp_set.codes[:, :0]
     frames = frame_numbers(switches, codes)
-    rate, rows = _neighbour_rate(switches, codes, grasp_set.labels)
+    rate, rows = _neighbour_rate(switches, codes, grasp_set.labels, grasp_set.trial_ids)
     return Separability(inputs, int(frames.max()) + 1, _ceiling(frames, grasp_set.labels), rate, rows)
 
 
@@ -146,7 +146,7 @@ def _ceiling(frames: NDArray[np.intp], labels: NDArray[np.intp]) -> float:
 
 
 def _neighbour_rate(
-    switches: NDArray[np.bool_], codes: NDArray[np.uint16], labels: NDArray[np.intp]
+    switches: NDArray[np.bool_], codes: NDArray[np.uint16], labels: NDArray[np.intp], trials: NDArray[np.intp]
 ) -> tuple[float | None, int]:
     try:
         from sklearn.neighbors import NearestNeighbors
@@ -155,11 +155,15 @@ def _neighbour_rate(
     rows = np.arange(len(labels))
     if len(rows) > NEIGHBOUR_ROWS:
         rows = np.sort(np.random.default_rng(0).choice(rows, NEIGHBOUR_ROWS, replace=False))
-    if len(rows) < 2:
+    trial = trials[rows]
+    most = int(np.bincount(trial).max(initial=0))
+    if most == len(rows):
         return None, len(rows)
     spread = codes.std(axis=0)
     points = np.hstack([switches[rows], codes[rows] / np.where(spread, spread, 1.0)])
-    nearest = NearestNeighbors(n_neighbors=1, algorithm="kd_tree").fit(points).kneighbors(return_distance=False)[:, 0]
+    # So many are certain to hold one of another trial.
+    near = NearestNeighbors(n_neighbors=most, algorithm="kd_tree").fit(points).kneighbors(return_distance=False)
+    nearest = near[np.arange(len(rows)), (trial[near] != trial[:, np.newaxis]).argmax(axis=1)]
     return float(np.mean(labels[rows][nearest] == labels[rows])), len(rows)
 
 

@@ -31,7 +31,7 @@ class ReportContent:
     firmware      a sentence: what the firmware in the build is laid out for, or why there is none
     only_answer   the one grasp type that every row gets, where there is but one
     tree          the tree that chose the switches, over the recordings' switches; classes index manifest.grasps
-    confusion     (K, K) counts of the honest folds, row: true, column: recognised, K as in manifest.grasps
+    confusion     (K, K) counts of frames in the headline's folds, row: true, column: recognised, as in manifest.grasps
     study         the paper's tables for these recordings; no_study: a sentence, why there are none
     frontier      of which the report tells; point: the number of the one that the build is, None if it is none of them
     hand          where the recordings' switches lie

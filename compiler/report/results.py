@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..evaluation.populations import PROTOCOLS
-from ..evaluation.study import RateTable, Study
-from ..text import NBSP, counted, interval, percent, sentence
+from ..evaluation.study import Study
+from ..evaluation.tables import RateTable, both
+from ..text import NBSP, counted, percent, sentence
 from .content import PlainTable, ReportContent
-from .sections import honest_rate
 
 # Wider tables cannot be read; the list of what is mistaken most often can.
 WIDEST = 40
@@ -40,7 +40,7 @@ def _table(table: RateTable) -> PlainTable:
     several = len(table.columns) > 1
     columns = ("Row", "What", "Switches", *table.columns, *(["all"] * several))
     rows = tuple(
-        (row.name, row.what, str(row.switches), *map(str, row.cells), *([interval(row.rate)] * several))
+        (row.name, row.what, str(row.switches), *map(str, row.cells), *([both(row.rate, row.frames)] * several))
         for row in table.rows
     )
     return PlainTable(table.title, columns, rows, words=(0, 1), note=table.note)
@@ -72,11 +72,11 @@ def confusion_view(title: str, grasps: Sequence[str], counts: NDArray[np.intp]) 
 
 
 def confusions(content: ReportContent) -> Iterator[ConfusionView]:
-    """Yield the build's own matrix, then those of the compositions, honest folds, all subjects together."""
+    """Yield the build's own matrix, then those of the compositions, nested folds, all subjects together."""
     if content.confusion is not None:
-        rate = honest_rate(content.manifest)
-        folds = "honest folds" if rate is None else counted(rate.folds, "honest fold")
-        yield confusion_view(f"This build's own recipe, {folds}", content.manifest.grasps, content.confusion)
+        rate = content.manifest.headline
+        folds = "" if rate is None else f", {rate.title}, {counted(rate.folds, 'nested fold')}"
+        yield confusion_view(f"This build's own recipe{folds}", content.manifest.grasps, content.confusion)
     if content.study is None:
         return
     for table in content.study.tables:
@@ -86,7 +86,7 @@ def confusions(content: ReportContent) -> Iterator[ConfusionView]:
             for row in table.rows:
                 counts = [cell.confusion for cell in row.cells if cell.confusion is not None]
                 if counts:
-                    title = f"{row.name}: {row.what}, honest folds of {whose}"
+                    title = f"{row.name}: {row.what}, nested folds of {whose}"
                     yield confusion_view(title, content.study.grasps, np.sum(counts, axis=0))
 
 

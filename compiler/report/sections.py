@@ -6,22 +6,17 @@ from itertools import accumulate
 
 import msgspec
 
-from thenar.runtime.manifest import Manifest, Recognised
+from thenar.runtime.manifest import Manifest
 from thenar.runtime.scanning.propose import own_joints
 from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, scan_us, scanner_us
 
 from ..placement.gain import entropy_bits
 from ..placement.methods.base import METHODS
-from ..text import NBSP, counted, microseconds, percent, sentence
+from ..text import INDEPENDENT, NBSP, counted, microseconds, percent, sentence
 from ..trainers.base import TRAINERS
 from .content import PlainTable, ReportContent
 
 Pairs = tuple[tuple[str, str], ...]
-
-
-def honest_rate(manifest: Manifest) -> Recognised | None:
-    """Return the rate to expect of new grasps, if it was measured."""
-    return next((rate for rate in manifest.rates if rate.protocol == "honest"), None)
 
 
 def headline(manifest: Manifest) -> str:
@@ -32,21 +27,17 @@ def headline(manifest: Manifest) -> str:
     if manifest.joints:
         inputs.append(counted(len(manifest.joints), "joint"))
     said = f"This build recognises {len(manifest.grasps)} grasp types from {' and '.join(inputs)}"
-    rate = honest_rate(manifest)
+    rate = manifest.headline
     if rate is None:
         return f"{said}; what to expect of new grasps was not measured."
-    return f"{said}: {percent(rate.rate, NBSP)} of grasps that it was not trained on."
+    return f"{said}; {rate.title}: {percent(rate.rate, NBSP)} of {rate.unit}."
 
 
 def facts(content: ReportContent) -> Iterator[tuple[str, str, str]]:
     """Yield the numbers that one asks for first: what each is, itself in large, and what it is out of."""
     manifest = content.manifest
-    for rate in sorted(manifest.rates, key=lambda rate: rate.protocol):
-        yield (
-            "Recognised, honest folds" if rate.protocol == "honest" else "Recognised, rows trained on",
-            percent(rate.rate, NBSP),
-            f"{rate.correct:,} of {rate.total:,} rows" + (f", {rate.folds} folds" if rate.folds else ""),
-        )
+    for rate in sorted(manifest.rates, key=lambda rate: rate.protocol == "training"):
+        yield f"Recognised, {rate.title}", percent(rate.rate, NBSP), rate.basis
     yield "Switches kept", f"{len(manifest.switches)}", f"of {manifest.source.switches}"
     whose = "of a source of your own" if _unread(content) else "of the CyberGlove"
     yield "Joints", f"{len(manifest.joints)}", whose if manifest.joints else "none are used"
@@ -75,6 +66,8 @@ def warnings(content: ReportContent) -> Iterator[str]:
     if manifest.zero_gain_nodes:
         nodes = counted(manifest.zero_gain_nodes, "decision")
         yield f"At {nodes} of the placement no switch gains anything alone: the lowest-numbered was taken."
+    if manifest.source.independent:
+        yield sentence(INDEPENDENT)
     if manifest.source.simulated:
         yield f"The recordings are simulated ({manifest.source.simulated})."
 
@@ -87,14 +80,18 @@ def kept_table(content: ReportContent) -> PlainTable:
     switches, tree, hand = content.manifest.switches, content.tree, content.hand
     entropy = 0.0 if tree is None else entropy_bits(list(tree.nodes[0].counts))
     parts = {} if hand is None else dict(zip(hand.names, hand.parts.tolist(), strict=True))
-    rows = []
+    taxels = any(switch.threshold is not None for switch in switches)
+    rows: list[tuple[str, ...]] = []
     for order, (switch, gain) in enumerate(zip(switches, accumulate(each.gain for each in switches), strict=True), 1):
         part = "" if hand is None else hand.part_names[parts[switch.name]]
         together = () if tree is None else (percent(gain / entropy, NBSP) if entropy else "",)
         rows.append((str(order), switch.name, part, str(switch.column), f"{switch.gain:.3f}", *together))
+        if taxels:
+            rows[-1] += (switch.closed,)
     columns = ("Order", "Switch", "Part", "Column", "Bits", *(() if tree is None else ("Together",)))
+    columns += ("Taxel",) * taxels
     caption = "Kept switches, in the order in which they were chosen"
-    return PlainTable(caption, columns, tuple(rows), words=(1, 2), head=1)
+    return PlainTable(caption, columns, tuple(rows), words=(1, 2, *((len(columns) - 1,) * taxels)), head=1)
 
 
 def placement_sentences(content: ReportContent) -> tuple[str, str]:

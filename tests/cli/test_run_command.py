@@ -48,6 +48,17 @@ def test_every_frame_gives_one_line(thenar: Thenar, small_set: GraspSet, set_fil
     assert all(1 / 3 <= line["probability"] <= 1 and line["margin"] >= 0 and not line["degraded"] for line in lines)
     correct = sum(line["grasp"] == line["recorded"] for line in lines)
     assert f"{correct} of 60 frames recognised as recorded" in done.stderr
+    assert "trials" not in done.stderr
+
+
+def test_a_replay_counts_trials_where_they_have_several_frames(
+    thenar: Thenar, build_folder: Path, small_set: GraspSet, tmp_path: Path
+) -> None:
+    small_set.rows([row for row in range(60) for _ in range(3)]).save(tmp_path / "framed.grasps")
+    found = json.loads(thenar("verify", build_folder, tmp_path / "framed.grasps", "--json").stdout)["recognised"]
+    done = thenar("run", build_folder, "--replay", tmp_path / "framed.grasps")
+    assert f"{found[0]['integers']} of 60 trials, each as most of its frames are" in done.stderr
+    assert f"{found[1]['integers']} of 180 frames recognised as recorded" in done.stderr
 
 
 def test_it_runs_with_the_base_dependencies_alone(set_file: Path, build_folder: Path) -> None:

@@ -10,14 +10,21 @@ from thenar.compiler.recordings.taxonomy import own
 
 
 def _make_set(
-    seed: int = 0, rows: int = 96, switches: int = 14, joints: int = 3, types: int = 4, subjects: int = 1
+    seed: int = 0,
+    rows: int = 96,
+    switches: int = 14,
+    joints: int = 3,
+    types: int = 4,
+    subjects: int = 1,
+    frames: int = 1,
 ) -> GraspSet:
+    """Return `rows` trials, each of so many equal frames."""
     random = np.random.default_rng(seed)
     labels = np.arange(rows) % types
     closed = np.random.default_rng(99).random((types, switches)) < 0.5
     centres = np.random.default_rng(98).integers(40, 200, (types, joints))
     names = ("cup", "pen", "plate", "rod", "ball", "key", *(f"g{number}" for number in range(6, types)))[:types]
-    return GraspSet(
+    grasp_set = GraspSet(
         switches=closed[labels] ^ (random.random((rows, switches)) < 0.12),
         switch_names=tuple(f"s{number}" for number in range(switches)),
         codes=np.clip(centres[labels] + random.normal(0, 25, (rows, joints)), 0, 254).astype(np.uint16),
@@ -28,6 +35,7 @@ def _make_set(
         objects=np.full(rows, "thing"),
         trials=np.arange(rows),
     )
+    return grasp_set if frames == 1 else grasp_set.rows(np.repeat(np.arange(rows), frames))
 
 
 @pytest.fixture(scope="session")

@@ -78,7 +78,7 @@ def test_a_fitted_classifier_becomes_a_build_that_answers_as_it_does(
     options = made.manifest.options
     assert len(made.manifest.switches) == len(grasp_set.switch_names)
     assert (options.rounds, options.shrinkage, options.max_bins) == (5, 0.5, 4)
-    assert [rate.protocol for rate in made.manifest.rates] == ["training", "honest"]
+    assert [rate.protocol for rate in made.manifest.rates] == ["training", "nested"]
     assert verify(tmp_path / "made", grasp_set).holds
     build = Build.load(tmp_path / "made")
     frames = zip(grasp_set.switches, grasp_set.codes, strict=True)
@@ -114,12 +114,15 @@ def test_a_pipeline_that_selects_columns_becomes_a_build_of_those(
     assert inputs == sorted(inputs)
     found = verify(tmp_path / "build", grasp_set)
     assert found.holds
-    assert found.correct_ensemble == np.count_nonzero(pipeline.predict(X) == grasp_set.labels)
+    assert found.recognised[0].ensemble == np.count_nonzero(pipeline.predict(X) == grasp_set.labels)
 
 
+@pytest.mark.parametrize("subjects", [1, 3])
 def test_the_papers_recipe_is_the_same_from_a_pipeline_and_from_compile_build(
-    grasp_set: GraspSet, X: np.ndarray, tmp_path: Path
+    make_set: Callable[..., GraspSet], tmp_path: Path, subjects: int
 ) -> None:
+    grasp_set = make_set(subjects=subjects, frames=2)
+    X = Samples.of(grasp_set).inputs
     switches = slice(0, len(grasp_set.switch_names))
     chosen = ColumnTransformer([("switches", ID3Selector(min_samples=5), switches)], remainder="passthrough")
     pipeline = make_pipeline(chosen, LogitBoostClassifier(rounds=4)).fit(X, grasp_set.labels)
@@ -127,6 +130,9 @@ def test_the_papers_recipe_is_the_same_from_a_pipeline_and_from_compile_build(
     same = compile_build(grasp_set, tmp_path / "same", prune=5, rounds=4, folds=3).manifest
     assert made.options == same.options
     assert made.rates == same.rates
+    assert [rate.of for rate in made.rates if rate.unit == "trials"][1:] == (
+        ["within subject"] if subjects == 1 else ["new subject", "pooled"]
+    )
     assert sorted(made.switches, key=lambda switch: switch.column) == sorted(
         same.switches, key=lambda switch: switch.column
     )

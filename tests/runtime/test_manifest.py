@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from thenar.runtime.errors import BuildError, ThenarError
-from thenar.runtime.manifest import MAX_BYTES, Manifest, manifest_from_bytes, manifest_to_bytes
+from thenar.runtime.manifest import MAX_BYTES, Manifest, Recognised, manifest_from_bytes, manifest_to_bytes
 from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
@@ -24,6 +24,31 @@ def test_what_was_written_is_read_again(manifest: Manifest) -> None:
     read = manifest_from_bytes(data)
     assert replace(read, checksum="") == manifest
     assert manifest_to_bytes(read) == data
+
+
+OLDER = """  "rates": [
+    {
+      "protocol": "honest",
+      "folds": 4,
+      "seed": 1,
+      "correct": 9,
+      "total": 10
+    }
+  ]"""
+
+
+def test_builds_of_older_versions_say_honest_and_load(manifest: Manifest) -> None:
+    older = replace(manifest, rates=(Recognised("honest", 4, 1, 9, 10),))
+    data = manifest_to_bytes(older)
+    assert OLDER in data.decode()
+    read = manifest_from_bytes(data)
+    assert str(read.headline) == "pooled: 90.0 %, 9 of 10 frames in 4 nested folds"
+
+
+def test_a_rate_says_what_it_is_of_its_interval_and_its_unit() -> None:
+    rate = Recognised("nested", 7, 1, 1230, 1680, "new subject", "trials", 0.6012, 0.834)
+    assert str(rate) == "new subject: 73.2 % [60.1, 83.4], 1,230 of 1,680 trials in 7 nested folds"
+    assert str(Recognised("training", 0, 1, 4, 5)) == "rows trained on: 80.0 %, 4 of 5 frames"
 
 
 def test_it_is_json_that_people_can_read(manifest: Manifest) -> None:

@@ -13,11 +13,12 @@ import pytest
 
 from thenar.compiler import GraspSet, compile_build, grow_id3
 from thenar.compiler.artifact import CompileError
+from thenar.compiler.artifact.training import cuts_of
 from thenar.compiler.artifact.verify import verify
 from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.drivers.errors import ThenarError
 from thenar.runtime import Build
-from thenar.runtime.manifest import Inputs
+from thenar.runtime.manifest import Inputs, Options
 
 Make = Callable[..., GraspSet]
 ROUNDS = 12
@@ -34,13 +35,127 @@ def test_a_build_knows_its_inputs_and_recognises_what_it_was_trained_on(grasp_se
     frames = zip(grasp_set.switches[:, kept], grasp_set.codes, strict=True)
     found = np.array([build.classify(bits, codes) for bits, codes in frames])
     correct = int(np.count_nonzero(found == grasp_set.grasps))
-    training, honest = report.manifest.rates
+    training, nested = report.manifest.rates
     assert (training.protocol, training.correct, training.total) == ("training", correct, len(grasp_set))
-    assert (honest.protocol, honest.folds, honest.seed, honest.total) == ("honest", 4, 1, len(grasp_set))
-    assert correct > honest.correct > len(grasp_set) / 2
+    assert (nested.protocol, nested.folds, nested.seed, nested.total) == ("nested", 4, 1, len(grasp_set))
+    assert (nested.of, nested.unit) == ("within subject", "trials")
+    assert correct > nested.correct > len(grasp_set) / 2
     assert build.grasps == ("cup", "pen", "plate", "rod")
     assert [switch.name for switch in build.manifest.switches] == [f"s{column}" for column in kept]
     assert [joint.name for joint in build.manifest.joints] == ["j0", "j1", "j2"]
+
+
+def test_the_headline_of_several_subjects_is_a_new_one_and_the_others_are_beside_it(
+    make_set: Make, tmp_path: Path
+) -> None:
+    report = compile_build(make_set(subjects=3), tmp_path / "build", rounds=ROUNDS)
+    rates = report.manifest.rates
+    assert [(rate.protocol, rate.title, rate.unit, rate.folds, rate.total) for rate in rates] == [
+        ("training", "rows trained on", "trials", 0, 96),
+        ("nested", "new subject", "trials", 3, 96),
+        ("nested", "pooled", "trials", 4, 96),
+    ]
+    assert report.manifest.headline == rates[1]
+    assert all(rate.low is not None and rate.low <= rate.rate <= (rate.high or 0) for rate in rates)
+    # Over three people, not over 96 trials.
+    assert (rates[1].high or 0) - (rates[1].low or 0) > 2 * ((rates[2].high or 0) - (rates[2].low or 0))
+    assert report.confusion is not None
+    assert int(report.confusion.trace()) == rates[1].correct
+    document = json.loads((tmp_path / "build" / "build.json").read_bytes())
+    assert document["rates"][1]["of"] == "new subject"
+    assert "by" not in document["options"]
+
+
+def test_what_is_new_is_asked_for(make_set: Make, tmp_path: Path) -> None:
+    whole = make_set(subjects=12)
+    number = np.arange(96)
+    parted = replace(
+        whole, objects=np.where(number // 8 % 2, "cup", "jug"), sessions=np.where(number // 48 % 2, "late", "early")
+    )
+    seen = {}
+    for by in ("trial", "subject", "object", "session"):
+        rates = compile_build(parted, tmp_path / "build", rounds=1, by=by).manifest.rates[1:]
+        seen[by] = [(rate.of, rate.folds) for rate in rates]
+    # Twelve subjects, and their 24 sessions, are left out in ten groups.
+    pooled = ("pooled", 4)
+    assert seen == {
+        "trial": [pooled],
+        "subject": [("new subject", 10), pooled],
+        "object": [("new object", 2), pooled],
+        "session": [("new session", 10), pooled],
+    }
+    for by in ("object", "session"):
+        with pytest.raises(EvaluationError, match=f"leaving one {by}.* out needs two or more"):
+            compile_build(whole, tmp_path / "build", rounds=1, by=by)
+
+
+def test_left_out_subjects_have_no_say_in_what_is_tested_on_them(make_set: Make) -> None:
+    for subjects in (3, 23):
+        whole = make_set(subjects=subjects, rows=96, frames=2)
+        cuts = cuts_of(whole, Options())
+        for cut in cuts:
+            assert np.array_equal(np.sort(np.concatenate([fold.test for fold in cut.folds])), np.arange(len(whole)))
+            for fold in cut.folds:
+                trained, tested = whole.rows(fold.train), whole.rows(fold.test)
+                assert not set(whole.trial_ids[fold.train]) & set(whole.trial_ids[fold.test])
+                assert cut.of == "pooled" or not set(trained.subjects) & set(tested.subjects)
+
+
+def test_frames_of_a_trial_are_one_piece_of_evidence(make_set: Make, tmp_path: Path) -> None:
+    """Five equal frames a trial change no rate of trials, where random folds of frames would know all of them."""
+    one = compile_build(make_set(rows=64), tmp_path / "one", rounds=ROUNDS, prune=1).manifest.rates
+    five = compile_build(make_set(rows=64, frames=5), tmp_path / "five", rounds=ROUNDS, prune=1).manifest.rates
+    assert [rate.unit for rate in five] == ["trials", "frames"] * 2
+    for single, trials, frames in zip(one, five[::2], five[1::2], strict=True):
+        assert (trials.correct, trials.total) == (single.correct, single.total)
+        assert (frames.correct, frames.total) == (5 * single.correct, 5 * single.total)
+    assert (five[3].high or 0) - (five[3].low or 0) > 0.6 * ((five[2].high or 0) - (five[2].low or 0))
+
+
+def test_a_claim_of_independent_rows_is_carried_into_the_build(make_set: Make, tmp_path: Path) -> None:
+    claimed = replace(make_set(frames=2), independent=True)
+    manifest = compile_build(claimed, tmp_path / "build", rounds=2).manifest
+    assert manifest.source.independent
+    assert [(rate.unit, rate.total) for rate in manifest.rates] == [("trials", 192)] * 2
+
+
+def test_frames_that_are_numbered_as_trials_are_refused_before_any_work(make_set: Make, tmp_path: Path) -> None:
+    framed = make_set(rows=64, frames=6)
+    drift = np.random.default_rng(1).integers(0, 3, framed.codes.shape).astype(np.uint16)
+    numbered = replace(framed, codes=framed.codes + drift, trials=np.arange(len(framed)))
+    with pytest.raises(CompileError, match="count as trials"):
+        compile_build(numbered, tmp_path / "build", rounds=1, progress=lambda *_: pytest.fail("worked in vain"))
+    claimed = replace(numbered, independent=True)
+    assert compile_build(claimed, tmp_path / "build", rounds=1).manifest.source.independent
+    assert compile_build(numbered, tmp_path / "build", rounds=1, folds=0).manifest.headline is None
+
+
+def test_the_rates_are_those_of_builds_of_each_folds_training_rows(make_set: Make, tmp_path: Path) -> None:
+    options: dict[str, Any] = {"rounds": ROUNDS, "prune": 5, "width": 5}
+    whole = make_set(subjects=3)
+    rates = compile_build(whole, tmp_path / "build", **options).manifest.rates[1:]
+    for rate, cut in zip(rates, cuts_of(whole, Options()), strict=True):
+        correct = 0
+        for fold in cut.folds:
+            tested = whole.rows(fold.test)
+            compile_build(whole.rows(fold.train), tmp_path / "fold", folds=0, **options)
+            (counted,) = verify(tmp_path / "fold", tested).recognised
+            correct += counted.integers
+        assert (rate.correct, rate.total) == (correct, 96)
+
+
+@pytest.mark.slow
+def test_any_number_of_workers_gives_the_same_bytes_and_counts_all_folds(make_set: Make, tmp_path: Path) -> None:
+    whole, seen = make_set(subjects=3, rows=192), []
+    for jobs in (1, 2):
+        told: list[tuple[int, int]] = []
+        compile_build(
+            whole, tmp_path / str(jobs), rounds=150, jobs=jobs, progress=lambda *step, told=told: told.append(step)
+        )
+        seen.append(told)
+    assert _bytes(tmp_path / "1") == _bytes(tmp_path / "2")
+    assert seen[0] == seen[1]
+    assert seen[0][-1] == (8 * 150, 8 * 150)
 
 
 def test_the_switches_are_the_placement_in_its_order(grasp_set: GraspSet, tmp_path: Path) -> None:

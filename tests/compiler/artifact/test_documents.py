@@ -74,7 +74,7 @@ def test_the_report_has_the_papers_tables_of_the_builds_own_folds(gloved: GraspS
     words = _compile(gloved, tmp_path / "build", folds=3, seed=5)
     assert "Angle + Sel-Co" in words
     assert "3 stratified folds of whole trials, 1 repeat from seed 5; 3 rounds" in words
-    assert "This build's own recipe, 3 honest folds" in words
+    assert "This build's own recipe, within subject, 3 nested folds" in words
 
 
 def test_without_folds_the_report_says_what_it_lacks(gloved: GraspSet, tmp_path: Path) -> None:

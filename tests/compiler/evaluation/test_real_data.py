@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from thenar.compiler.evaluation.rates import Rate
-from thenar.compiler.evaluation.study import Options, RateTable, Study, evaluate
+from thenar.compiler.evaluation.study import Options, Study, evaluate
+from thenar.compiler.evaluation.tables import RateTable
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import import_file
 

@@ -9,7 +9,8 @@ from thenar.compiler.evaluation.folds import EvaluationError, Fold
 from thenar.compiler.evaluation.plan import CellPlan, FoldFit, RowPlan
 from thenar.compiler.evaluation.populations import Population, Scheme
 from thenar.compiler.evaluation.rates import Rate
-from thenar.compiler.evaluation.study import TABLES, Options, RateTable, Reader, Row, Study, evaluate
+from thenar.compiler.evaluation.study import TABLES, Options, Study, evaluate
+from thenar.compiler.evaluation.tables import RateTable, Reader, Row
 from thenar.compiler.recordings.graspset import GraspSet
 
 # Six rows of labels 2 and 5 (others do not occur), two folds, two repeats of the same folds; switches are columns 0..2.
@@ -56,13 +57,19 @@ def test_more_runs_than_repeats_are_draws_with_a_range_of_their_own() -> None:
 
 
 def test_a_row_counts_all_its_subjects_and_only_compositions_carry_confusions() -> None:
-    row = RowPlan("VI", "Sel-Co", (CellPlan(PART, (FIRST, FIRST)), CellPlan(PART, (SECOND, SECOND))))
-    table = READER.table("pruning", "paper", (row,))
-    assert table.columns == ("A", "A")
+    folds = tuple(Fold(fold.train + 6, fold.test + 6, fold.name) for fold in FOLDS)
+    theirs = tuple(FoldFit(fold, fit.columns, fit.grasps) for fold, fit in zip(folds, SECOND, strict=True))
+    answers = ANSWERS | {fit: ANSWERS[like] for fit, like in zip(theirs, SECOND, strict=True)}
+    reader = replace(READER, labels=np.tile(LABELS, 2), trials=np.arange(12), predictions=answers)
+    other = Population("B", np.arange(6, 12), (2, 5), (folds, folds))
+    row = RowPlan("VI", "Sel-Co", (CellPlan(PART, (FIRST, FIRST)), CellPlan(other, (theirs, theirs))))
+    table = reader.table("pruning", "paper", (row,))
+    assert table.columns == ("A", "B")
+    assert table.rows[0].rate.total == 12
     assert table.rows[0].rate.mean == pytest.approx((5 / 6 + 4 / 6) / 2)
     assert (table.rows[0].switches.least, table.rows[0].switches.most) == (0, 3)
     assert table.rows[0].cells[0].confusion is None
-    assert READER.table("compositions", "paper", (row,)).rows[0].cells[0].confusion is not None
+    assert reader.table("compositions", "paper", (row,)).rows[0].cells[0].confusion is not None
 
 
 Make = Callable[..., GraspSet]

@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 
-from thenar.compiler.evaluation.rates import Of, Rate
+from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.points import (
     SCHEMA,
     Check,
@@ -27,7 +27,7 @@ from thenar.compiler.frontier.points import (
     frontier_from_bytes,
     frontier_to_bytes,
 )
-from thenar.runtime.manifest import Inputs
+from thenar.runtime.manifest import Inputs, Of
 
 GRASPS = (
     *("PoS", "PoH", "PoI", "PoE-W", "PoE-N", "Lat", "Tri"),

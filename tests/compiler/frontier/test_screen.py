@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -56,6 +58,13 @@ def test_the_papers_placements_are_marked_with_all_inputs_that_there_are() -> No
 def test_one_type_leaves_nothing_to_tell_apart(grasp_set: GraspSet) -> None:
     with pytest.raises(FrontierError, match="nothing to tell apart"):
         find_frontier(grasp_set.rows(np.arange(0, 96, 4)))
+
+
+def test_frames_that_are_numbered_as_trials_are_refused(grasp_set: GraspSet) -> None:
+    rows = grasp_set.rows(np.repeat(np.arange(96), 10))
+    leaking = replace(rows, trials=np.arange(960), objects=np.repeat(np.arange(96) // 24, 10).astype(str))
+    with pytest.raises(FrontierError, match="the rows that count as trials"):
+        find_frontier(leaking)
 
 
 def test_a_search_for_nothing_is_refused() -> None:

@@ -29,12 +29,12 @@ def test_what_was_not_corrected_is_not_said_to_be(examples: Any) -> None:
 
 def test_rates_are_named_by_what_they_are_of_and_their_unit(examples: Any) -> None:
     frontier = examples.example_frontier()
-    assert list(rates_of(frontier)) == ["new subject, trials", "pooled, trials"]
+    assert list(rates_of(frontier)) == ["new subject", "pooled"]
     point = msgspec.structs.replace(frontier.points[0], frames=frontier.points[1].rate)
     several = rates_of(examples.example_frontier(points=(point,), picked=None))
-    assert list(several) == ["new subject, trials", "new subject, frames", "pooled, trials"]
+    assert list(several) == ["new subject", "new subject, frames", "pooled"]
     assert [rate(point) for rate in several.values()] == [point.rate, point.frames, point.beside]
-    assert list(rates_of(examples.example_frontier(subjects=1, by="pooled"))) == ["pooled, trials"]
+    assert list(rates_of(examples.example_frontier(subjects=1, by="pooled"))) == ["pooled"]
 
 
 def test_joints_are_told_too(examples: Any) -> None:

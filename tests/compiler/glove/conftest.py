@@ -112,7 +112,10 @@ def manifest_of() -> Callable[..., Manifest]:
             switches=tuple(Switch(number, name, 0.1) for number, name in enumerate(names)),
             joints=(Calibration(0, "thumb_mpj", "deg", 0, 0.0, 255, 90.0),) if joints else (),
             proof=Proof(16, 1.0, 1, 0.5, 1.0, 10, 0),
-            rates=(Recognised("training", 0, 1, 10, 10), Recognised("honest", 4, 1, 9, 10)),
+            rates=(
+                Recognised("training", 0, 1, 10, 10),
+                Recognised("nested", 4, 1, 9, 10, "new subject", "trials", 0.6, 0.98),
+            ),
         )
 
     return made

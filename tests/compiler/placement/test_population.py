@@ -93,6 +93,29 @@ def test_rows_are_drawn_evenly_and_repeatably() -> None:
     assert len(crowd().drawn(10**6, 3).subjects) == 40 * EACH
 
 
+def framed(crowd: Crowd, frames: int) -> Crowd:
+    """Return the crowd with `frames` of each row, which is a trial."""
+    rows = np.repeat(np.arange(len(crowd.subjects)), frames)
+    return Crowd(replace(crowd.samples.rows(rows), trials=rows), crowd.subjects[rows])
+
+
+def test_trials_are_drawn_whole() -> None:
+    one, four = crowd().drawn(400, 3), framed(crowd(), 4).drawn(1600, 3)
+    assert np.array_equal(four.samples.switches, np.repeat(one.samples.switches, 4, axis=0))
+    assert set(np.unique(four.samples.trials, return_counts=True)[1].tolist()) == {4}
+    assert set(np.bincount(framed(crowd(), 3).drawn(40 * 7, 3).subjects).tolist()) == {6}
+    assert set(np.bincount(framed(crowd(), 9).drawn(40 * 7, 3).subjects).tolist()) == {9}
+
+
+def test_a_rate_is_one_of_trials_each_recognised_as_most_of_its_frames() -> None:
+    whole = crowd()
+    three = framed(whole, 3)
+    spoilt = three.samples.switches.copy()
+    spoilt[::3] ^= True
+    asked = replace(three, samples=replace(three.samples, switches=spoilt))
+    assert np.array_equal(rates(whole, asked, (0, 1), 10), rates(whole, whole, (0, 1), 10))
+
+
 def test_service_is_the_mean_the_worst_tenth_and_the_lowest() -> None:
     given = served(np.array([0.5, 0.7, *[0.9] * 18]))
     assert [given.mean, given.worst_tenth] == pytest.approx([0.87, 0.6])

@@ -76,3 +76,18 @@ def test_a_large_set_is_sampled_and_says_so() -> None:
 
 def test_one_row_has_no_neighbour() -> None:
     assert {line.neighbour_rate for line in separabilities(blobs(1, 0))} == {None}
+
+
+@pytest.mark.parametrize("frames", [2, 7])
+def test_the_neighbour_is_of_another_trial(frames: int) -> None:
+    """A frame of the same trial would give away the grasp type of types that cannot be told apart."""
+    rows = np.repeat(np.arange(60), frames)
+    single, mixed = (
+        {line.inputs: line.neighbour_rate for line in separabilities(each)}["joints"]
+        for each in (blobs(60, 0), blobs(60, 0).rows(rows))
+    )
+    assert mixed == pytest.approx(single, abs=0.05)
+    claimed = replace(blobs(60, 0).rows(rows), independent=True)
+    assert {line.inputs: line.neighbour_rate for line in separabilities(claimed)}["joints"] == 1.0
+    one = blobs(1, 0).rows([0] * frames)
+    assert {line.neighbour_rate for line in separabilities(one)} == {None}

@@ -1,0 +1,112 @@
+"""Permutation test: what the same evaluation reaches where labels say nothing, and how seldom it does as well."""
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from thenar.runtime.manifest import Of, Unit
+
+from ..recordings.graspset import GraspSet
+from ..samples import Samples
+from ..trainers.base import Training
+from ..workers import in_workers
+from .plan import ANGLE, ANGLE_SELECTED, SELECTED, Composition, Planner, Progress, inputs, predictions
+from .populations import NESTED, OF, Population, Scheme, groups_of, populations
+from .tables import Reader
+
+
+@dataclass(frozen=True, slots=True)
+class Permuted:
+    """The rate of one composition under the nested protocol, one repeat, against that of shuffled labels.
+
+    Labels are shuffled among the trials of each subject, frames of a trial together; then folds are cut, placements
+    chosen and classifiers trained as they were with the true ones.
+
+    composition   its name and inputs             of, unit  what its rate is of
+    rate          with the true labels            chance    mean rate of the permutations
+    permutations  how many, m                     highest   their highest rate
+    p             (b + 1) / (m + 1), where b permutations reach the rate or more: how probable such a rate is by chance
+    """
+
+    composition: str
+    of: Of
+    unit: Unit
+    rate: float
+    permutations: int
+    chance: float
+    highest: float
+    p: float
+
+    def __str__(self) -> str:
+        """Return rate, chance level and p-value in a sentence."""
+        return (
+            f"Permutation test of {self.composition}, {self.of}, {self.unit}, nested: {100 * self.rate:.1f} %; chance "
+            f"{100 * self.chance:.1f} % (mean of {self.permutations} shuffles of labels within subjects, highest "
+            f"{100 * self.highest:.1f} %); p = {self.p:.2g}"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Permutations:
+    """How to evaluate, m times over: what Options of a study say; parts are the populations of the true labels."""
+
+    parts: tuple[Population, ...]
+    scheme: Scheme
+    folds: int
+    prune: int
+    seed: int
+    training: Training
+
+    def test(self, grasp_set: GraspSet, m: int, jobs: int, progress: Progress | None) -> Permuted:
+        """Return the test of selected switches and joints, or of what of them there is; m > 0."""
+        kind = ANGLE_SELECTED if grasp_set.joints else SELECTED
+        kind = kind if grasp_set.switch_names else ANGLE
+        tasks = [(self, grasp_set, kind, number) for number in range(m + 1)]
+        correct, total = _counted(tasks[0])
+        shuffled = []
+        for count, _ in in_workers(_counted, tasks[1:], jobs):
+            shuffled.append(count)
+            if progress is not None:
+                progress(len(shuffled), m)
+        return Permuted(
+            composition=f"{kind.name} {kind.what}",
+            of=OF[self.scheme],
+            unit="trials",
+            rate=correct / total,
+            permutations=m,
+            chance=sum(shuffled) / m / total,
+            highest=max(shuffled) / total,
+            p=(sum(count >= correct for count in shuffled) + 1) / (m + 1),
+        )
+
+
+def _counted(task: tuple[Permutations, GraspSet, Composition, int]) -> tuple[int, int]:
+    """Return how many trials a permutation (0: the true labels) recognises, of how many."""
+    how, grasp_set, kind, number = task
+    made = shuffled_labels(grasp_set, (how.seed, number)) if number else grasp_set
+    parts = populations(made, "trial", how.folds, 1, how.seed) if how.scheme == "trial" else how.parts
+    planner = Planner(parts, Samples.of(made, "switches"), len(made.joints), how.prune, (), how.seed)
+    cells = [planner.cell(part, kind, partial(planner.own, NESTED)) for part in parts]
+    cells = [replace(cell, runs=cell.runs[:1]) for cell in cells]
+    X = inputs(made)
+    found = {fit: predictions(X, made.labels, fit, how.training) for cell in cells for fit in cell.fits}
+    grasps = tuple(np.unique(made.labels).tolist())
+    n_switches, scheme = len(made.switch_names), how.scheme
+    groups = groups_of(made, scheme)
+    reader = Reader(made.labels, made.trial_ids, grasps, n_switches, found, frozenset(), OF[scheme], groups)
+    rate, _ = reader.rates(cells)
+    return rate.correct[0], rate.total
+
+
+def shuffled_labels(grasp_set: GraspSet, seed: tuple[int, ...]) -> GraspSet:
+    """Return the set with its grasp types shuffled among the trials of each subject; trials stay whole."""
+    random = np.random.default_rng(seed)
+    trial = grasp_set.trial_ids
+    _, first = np.unique(trial, return_index=True)
+    subjects, grasps = grasp_set.subjects[first], grasp_set.grasps[first]
+    for subject in np.unique(subjects):
+        mine = np.flatnonzero(subjects == subject)
+        grasps[mine] = grasps[random.permutation(mine)]
+    # The number of a trial keeps two apart that come to have one label.
+    return replace(grasp_set, grasps=grasps[trial], trials=trial)

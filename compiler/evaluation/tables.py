@@ -1,0 +1,186 @@
+"""The paper's tables: cells of rates, read off predictions."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from statistics import fmean
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.runtime.manifest import Of
+
+from ..samples import decided
+from ..text import interval
+from .folds import Rows
+from .plan import CellPlan, FoldFit, Labels, RowPlan, TableName
+from .populations import ProtocolName
+from .rates import Rate, rated
+
+Predictions = Mapping[FoldFit, Labels]
+Confusion = tuple[tuple[int, ...], ...]
+
+_TITLES: dict[TableName, str] = {
+    "compositions": "Compositions of inputs (the paper's Tables II and V)",
+    "generality": "One subject's placement (row) on another's data (column), selected switches (Tables III and VI)",
+    "pruning": "Placement of all subjects pooled, pruned by S, selected switches (Tables IV and VII)",
+    "baselines": "ID3 beside other placements of as many switches, selected switches",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """Least, mean and most of something that may differ from fold to fold."""
+
+    least: float
+    mean: float
+    most: float
+
+    @classmethod
+    def of(cls, values: Iterable[float]) -> Self:
+        """Return the spread of one or more values."""
+        listed = list(values)
+        return cls(min(listed), fmean(listed), max(listed))
+
+    def __str__(self) -> str:
+        """Return "33", or "31 to 35"."""
+        return f"{self.least:g}" if self.least == self.most else f"{self.least:g} to {self.most:g}"
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """The rate of one row of a table on one population.
+
+    rate       of trials; frames: of frames, None where each row is a trial
+    switches   how many switches the classifiers had         draws  spread of the rates of random draws; else None
+    no_inputs  fits without any input that varies: they answer the most frequent grasp type of their training rows
+    confusion  (K, K) counts of trials over all repeats, row: true, column: recognised, K as in Study.grasps; None but
+               for compositions
+    """
+
+    rate: Rate
+    frames: Rate | None
+    switches: Spread
+    no_inputs: int
+    draws: Spread | None
+    confusion: Confusion | None
+
+    def __str__(self) -> str:
+        """Return the rates in percent, starred where fits had no inputs; the draws' spread on a line of its own."""
+        draws = "" if self.draws is None else f"\nfrom {100 * self.draws.least:.1f} to {100 * self.draws.most:.1f}"
+        return f"{both(self.rate, self.frames, '*' if self.no_inputs else '')}{draws}"
+
+
+def both(rate: Rate, frames: Rate | None, mark: str = "") -> str:
+    """Return a rate of trials in percent, with a mark; and on a second line that of frames, where there is one."""
+    return f"{interval(rate)}{mark}" + ("" if frames is None else f"\n{interval(frames)} frames")
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A row of a table: its short name, what it is, its switches, its cells, and the rate of all their trials (frames:
+    of all their frames, None where each row is a trial).
+    """
+
+    name: str
+    what: str
+    switches: Spread
+    cells: tuple[Cell, ...]
+    rate: Rate
+    frames: Rate | None
+
+
+@dataclass(frozen=True, slots=True)
+class RateTable:
+    """A table in the paper's layout: a column a subject."""
+
+    name: TableName
+    protocol: ProtocolName
+    columns: tuple[str, ...]
+    rows: tuple[Row, ...]
+
+    @property
+    def title(self) -> str:
+        """What the table shows, and what its rates are of."""
+        return f"{_TITLES[self.name]}: {self.protocol} protocol, {self.rows[0].rate.what}"
+
+    @property
+    def note(self) -> str:
+        """What a star means, in a sentence; "" where there is none."""
+        starred = any(cell.no_inputs for row in self.rows for cell in row.cells)
+        return "* In some folds no input varied: there, the most frequent grasp type is answered." if starred else ""
+
+
+@dataclass(frozen=True, slots=True)
+class Reader:
+    """Reads rates off predictions.
+
+    labels, trials  (n,) of each row       n_switches   the set's
+    grasps          labels that occur      predictions  of each fit; blind: the fits that were
+    of              what the rates are of, with the group (n,) that each row is left out with, None: its trial
+    """
+
+    labels: Labels
+    trials: Rows
+    grasps: tuple[int, ...]
+    n_switches: int
+    predictions: Predictions
+    blind: frozenset[FoldFit]
+    of: Of
+    groups: NDArray[np.str_] | None
+
+    def table(self, name: TableName, protocol: ProtocolName, plans: Sequence[RowPlan]) -> RateTable:
+        """Return the table of these rows."""
+        columns = tuple(cell.part.name for cell in plans[0].cells)
+        rows = tuple(self._row(plan, confusing=name == "compositions") for plan in plans)
+        return RateTable(name, protocol, columns, rows)
+
+    def cell(self, plan: CellPlan, *, confusing: bool) -> Cell:
+        """Return the cell of a plan, with its confusion matrix if `confusing`."""
+        rate, frames = self.rates((plan,))
+        counts = [sum(column < self.n_switches for column in fit.columns) for fit in plan.fits]
+        blind = sum(fit in self.blind for fit in plan.fits)
+        confusion = self._confusion(plan) if confusing else None
+        return Cell(rate, frames, Spread.of(counts), blind, _draws(rate, len(plan.part.repeats)), confusion)
+
+    def _row(self, plan: RowPlan, *, confusing: bool) -> Row:
+        cells = tuple(self.cell(cell, confusing=confusing) for cell in plan.cells)
+        spreads = [cell.switches for cell in cells]
+        switches = Spread(min(s.least for s in spreads), fmean(s.mean for s in spreads), max(s.most for s in spreads))
+        rate, frames = (cells[0].rate, cells[0].frames) if len(cells) == 1 else self.rates(plan.cells)
+        return Row(plan.name, plan.what, switches, cells, rate, frames)
+
+    def rates(self, plans: Sequence[CellPlan]) -> tuple[Rate, Rate | None]:
+        """Return the rates of trials and of frames of some cells together; their runs correspond."""
+        rows, predicted = self._predicted(plans)
+        groups = None if self.groups is None else self.groups[rows]
+        repeats = len(plans[0].part.repeats)
+        a_draw = repeats if len(predicted) > repeats else 1
+        return rated(predicted, self.labels[rows], self.trials[rows], of=self.of, groups=groups, repeats_a_draw=a_draw)
+
+    def _predicted(self, plans: Sequence[CellPlan]) -> tuple[Rows, Labels]:
+        """Return the rows (n,) that some cells test, and the label (runs, n) that each run gives them."""
+        rows = np.concatenate([fit.fold.test for plan in plans for fit in plan.runs[0]])
+        predicted = np.zeros((len(plans[0].runs), len(self.labels)), dtype=np.intp)
+        for plan in plans:
+            for run, fits in enumerate(plan.runs):
+                for fit in fits:
+                    predicted[run, fit.fold.test] = self.predictions[fit]
+        return rows, predicted[:, rows]
+
+    def _confusion(self, plan: CellPlan) -> Confusion:
+        rows, predicted = self._predicted((plan,))
+        _, first, trial = np.unique(self.trials[rows], return_index=True, return_inverse=True)
+        true = np.searchsorted(self.grasps, self.labels[rows[first]])
+        counts = np.zeros((len(self.grasps), len(self.grasps)), dtype=np.intp)
+        for found in decided(predicted, trial):
+            np.add.at(counts, (true, np.searchsorted(self.grasps, found)), 1)
+        return tuple(map(tuple, counts.tolist()))
+
+
+def _draws(rate: Rate, repeats: int) -> Spread | None:
+    """Return the spread of the draws' own rates, each over its `repeats`; None if there is one draw only."""
+    if len(rate.correct) == repeats:
+        return None
+    draws = np.reshape(rate.correct, (-1, repeats)).mean(axis=1) / rate.total
+    return Spread.of(draws.tolist())

@@ -1,0 +1,113 @@
+"""Frames that are counted as trials: found by how alike rows are that follow each other."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.drivers.errors import ThenarError
+
+from .graspset import GraspSet
+
+Rows = NDArray[np.intp]
+
+# A frame is less than this share as far from the next as from a row further away: repetitions seldom are, even where
+# they come in blocks of one hand or one action.
+_ALIKE = 0.25
+# So much more often than by chance ...
+_EXCESS = 0.25
+# ... and by this many standard errors, so that few rows are no evidence.
+_ERRORS = 3.0
+_SEED = 1
+
+
+def check_trials(grasp_set: GraspSet, error: type[ThenarError]) -> None:
+    """Raise `error`, with the remedies, if rows that count as trials of their own look like frames of fewer trials.
+
+    Does nothing where the set states that its rows are independent.
+    """
+    if not grasp_set.independent and (found := looks_like_frames(grasp_set)):
+        raise error(
+            f"{found}: a rate of them would be too high, and its interval too narrow. Name the column that numbers the "
+            'trials (trial = "..." in columns.toml) and import again; or, if each row is a trial of its own, state it '
+            '(frames = "independent")'
+        )
+
+
+def looks_like_frames(grasp_set: GraspSet) -> str | None:
+    """Return why rows that count as several trials look like the frames of fewer, or None if they do not.
+
+    Rows of one subject, grasp type, object and session are compared in their order, without their trial numbers; of
+    neighbouring rows of one trial the middle one. Frames of a trial differ far less from the next than from rows a
+    third of the group away or more; repetitions do so by chance, and drift makes them do so a little more often.
+    Chance is taken from two rows that both are far away. Frames whose noise is about as large as what differs between
+    trials are not found, nor is a single trial of each group; but copies are, where joints differ between groups.
+    """
+    order, group = _units(grasp_set)
+    sizes = np.bincount(group) if len(group) else group
+    starts = np.cumsum(sizes) - sizes
+    place = np.arange(len(order)) - np.repeat(starts, sizes)
+    size = np.repeat(sizes, sizes)
+    if reason := _copies(grasp_set, order, place, starts):
+        return reason
+    this = np.flatnonzero((place + 1 < size) & (size >= 4))
+    if not len(this):
+        return None
+    random = np.random.default_rng(_SEED)
+    far, other = (_far(place[this], size[this], random) + this for _ in range(2))
+    near, away, chance = _distances(grasp_set, order[this], [order[this + 1], order[far], order[other]])
+    closer, by_chance = float(np.mean(near < _ALIKE * away)), float(np.mean(chance < _ALIKE * away))
+    if closer - by_chance < max(_EXCESS, _ERRORS * (0.5 / len(this)) ** 0.5):
+        return None
+    return (
+        "the rows look like frames of fewer trials: within a subject, grasp type, object and session, "
+        f"{100 * closer:.0f} % of the rows that count as trials are less than a quarter as far from the next as "
+        f"from one further away ({100 * by_chance:.0f} % by chance)"
+    )
+
+
+def _units(grasp_set: GraspSet) -> tuple[Rows, Rows]:
+    """Return the middle row (m,) of each run of rows of one trial, in the order of groups, and the groups (m,)."""
+    group = np.zeros(len(grasp_set), np.intp)
+    for column in (grasp_set.labels, grasp_set.subjects, grasp_set.objects, grasp_set.sessions):
+        _, part = np.unique(column, return_inverse=True)
+        group = np.unique(group * (part.max(initial=0) + 1) + part, return_inverse=True)[1]
+    order = np.argsort(group, kind="stable")
+    trial = grasp_set.trial_ids[order]
+    first = np.flatnonzero(np.diff(trial, prepend=-1) != 0)
+    middle = (first + np.append(first[1:], len(order))) // 2
+    return order[middle], group[order[middle]]
+
+
+def _copies(grasp_set: GraspSet, order: Rows, place: Rows, starts: Rows) -> str | None:
+    """Return why rows look like copies, if most equal the row before, and hardly any group begins as another does."""
+    if not grasp_set.joints or len(starts) < 3:
+        return None
+    rows = np.hstack([grasp_set.codes, grasp_set.switches])[order]
+    later = np.flatnonzero(place > 0)
+    equal = (rows[later] == rows[later - 1]).all(axis=1)
+    if 2 * np.count_nonzero(equal) <= len(later) or len(np.unique(rows[starts], axis=0)) < 0.9 * len(starts):
+        return None
+    return (
+        f"{100 * equal.mean():.0f} % of the rows that count as trials equal the one before in every joint and switch: "
+        "they look like copies of fewer trials"
+    )
+
+
+def _far(place: Rows, size: Rows, random: np.random.Generator) -> Rows:
+    """Return how far away (m,) a row is, drawn from those of the group a third of it away or more, at least two."""
+    least = np.maximum(2, -(-size // 3))
+    before, after = np.maximum(place - least + 1, 0), np.maximum(size - place - least, 0)
+    drawn = random.integers(0, before + after)
+    away: Rows = np.where(drawn < before, -least - drawn, least + drawn - before)
+    return away
+
+
+def _distances(grasp_set: GraspSet, rows: Rows, others: list[Rows]) -> list[NDArray[np.float64]]:
+    """Return how far rows (m,) are from others: switches as a whole, and each joint, in units of the second's mean."""
+    bits, codes = grasp_set.switches, grasp_set.codes.astype(np.int32)
+    switches = [np.count_nonzero(bits[rows] != bits[other], axis=1)[:, np.newaxis] for other in others]
+    joints = [np.abs(codes[rows] - codes[other]) for other in others]
+    scales = [each[1].mean(axis=0) for each in (switches, joints)]
+    weights = [
+        np.divide(1.0, scale, out=np.zeros(scale.shape), where=scale > 0) / max(len(scale), 1) for scale in scales
+    ]
+    return [each @ weights[0] + joint @ weights[1] for each, joint in zip(switches, joints, strict=True)]

@@ -1,0 +1,146 @@
+"""Builds of recordings with analog pads, whose thresholds are learnt: inside the folds, and written for the board."""
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thenar.cli import run
+from thenar.compiler import GraspSet, LogitBoostClassifier, compile_build
+from thenar.compiler.artifact import CompileError
+from thenar.compiler.artifact.documents import Documents
+from thenar.compiler.artifact.estimator import compile as compile_estimator
+from thenar.compiler.artifact.training import cuts_of
+from thenar.compiler.artifact.verify import verify
+from thenar.compiler.placement.thresholds import taxel_thresholds, with_switches
+from thenar.compiler.recordings.graspset import Joint
+from thenar.compiler.samples import Samples
+from thenar.runtime.manifest import Options
+
+Make = Callable[..., GraspSet]
+PADS = tuple(Joint(f"pad{number}", "N", 0, 0.0, 4095, 20.0) for number in range(3))
+FALLING = Joint("pull-up", "V", 0, 5.0, 4095, 0.0)
+
+
+def with_pads(plain: GraspSet, n_switches: int = 2) -> GraspSet:
+    """Return the set with its first switches, and with pads that are pressed where the next ones were closed."""
+    pressed = plain.switches[:, n_switches : n_switches + 4]
+    random = np.random.default_rng(5)
+    codes = np.where(pressed, random.normal(1500, 300, pressed.shape), random.normal(200, 80, pressed.shape))
+    return replace(
+        plain,
+        switches=plain.switches[:, :n_switches],
+        switch_names=plain.switch_names[:n_switches],
+        taxels=np.clip(codes, 0, 4095).astype(np.uint16),
+        taxel_columns=(*PADS, FALLING),
+    )
+
+
+@pytest.fixture(scope="module")
+def padded(make_set: Make) -> GraspSet:
+    return with_pads(make_set(subjects=2))
+
+
+def test_a_build_says_at_which_value_each_kept_pad_switches(padded: GraspSet, tmp_path: Path) -> None:
+    manifest = compile_build(padded, tmp_path / "build", rounds=5, documents=Documents()).manifest
+    thresholds = taxel_thresholds(Samples.of(padded))
+    assert all(250 < threshold < 1300 for threshold in thresholds)
+    assert manifest.source.switches == 6
+    pads = {switch.name: switch for switch in manifest.switches if switch.threshold is not None}
+    assert pads
+    for number, taxel in enumerate(padded.taxel_columns):
+        if taxel.name in pads:
+            threshold = pads[taxel.name].threshold
+            assert threshold is not None
+            assert (pads[taxel.name].column, threshold.taxel.column) == (2 + number, number)
+            assert threshold.code == thresholds[number]
+            assert threshold.value == pytest.approx(float(taxel.value(thresholds[number] + 0.5)))
+    rising, falling = pads["pad0"].closed, pads["pull-up"].closed
+    assert rising.startswith("closed above ")
+    assert " N (codes above " in rising
+    assert falling.startswith("closed below ")
+    text = " ".join((tmp_path / "build" / "spec" / "README.txt").read_text().split())
+    assert re.search(r"the taxel pad0: set its comparator or converter to \d+\.\d+ N; it is " + re.escape(rising), text)
+    assert rising in (tmp_path / "build" / "report.html").read_text()
+
+
+def test_it_answers_as_a_build_of_the_switches_that_the_pads_become(padded: GraspSet, tmp_path: Path) -> None:
+    made = compile_build(padded, tmp_path / "pads", rounds=5, folds=0)
+    samples = Samples.of(padded)
+    bits = with_switches(samples, taxel_thresholds(samples)).switches
+    plain = replace(
+        padded, switches=bits, switch_names=padded.element_names, taxel_columns=(), taxels=np.empty(0, np.uint16)
+    )
+    compile_build(plain, tmp_path / "plain", rounds=5, folds=0)
+    for member in ("tables.bin", "ensemble.bin"):
+        assert (tmp_path / "pads" / member).read_bytes() == (tmp_path / "plain" / member).read_bytes()
+    found = verify(tmp_path / "pads", padded)
+    assert found.holds
+    assert found.recognised[0].integers == made.manifest.rates[0].correct
+
+
+def test_thresholds_are_learnt_inside_each_fold(padded: GraspSet, tmp_path: Path) -> None:
+    """The rates are those of builds of the training rows alone, whose thresholds are others than those of all rows."""
+    rates = compile_build(padded, tmp_path / "build", rounds=5).manifest.rates[1:]
+    everything, seen = taxel_thresholds(Samples.of(padded)), set()
+    for rate, cut in zip(rates, cuts_of(padded, Options()), strict=True):
+        correct = 0
+        for fold in cut.folds:
+            made = compile_build(padded.rows(fold.train), tmp_path / "fold", rounds=5, folds=0)
+            seen.add(made.trained.thresholds)
+            correct += verify(tmp_path / "fold", padded.rows(fold.test)).recognised[0].integers
+        assert rate.correct == correct
+    assert seen - {everything}
+
+
+def test_a_set_is_replayed_by_the_builds_thresholds(
+    padded: GraspSet, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    padded.save(tmp_path / "set.grasps")
+    assert (
+        run(["compile", str(tmp_path / "set.grasps"), "-o", str(tmp_path / "build"), "--folds", "0", "--rounds", "5"])
+        == 0
+    )
+    assert "pad0: closed above " in capfd.readouterr().out
+    assert run(["run", str(tmp_path / "build"), "--replay", str(tmp_path / "set.grasps")]) == 0
+    printed = capfd.readouterr()
+    lines = [json.loads(line) for line in printed.out.splitlines()]
+    correct = sum(line["grasp"] == line["recorded"] for line in lines)
+    assert (len(lines), correct) == (96, verify(tmp_path / "build", padded).recognised[0].integers)
+
+
+def test_pads_of_another_scale_or_kind_are_refused(padded: GraspSet, tmp_path: Path) -> None:
+    compile_build(padded, tmp_path / "build", rounds=2, folds=0)
+    scaled = replace(padded, taxel_columns=(replace(PADS[0], value_b=10.0), *padded.taxel_columns[1:]))
+    with pytest.raises(CompileError, match="taxel pad0 is coded differently here"):
+        verify(tmp_path / "build", scaled)
+    bits = replace(
+        padded,
+        switches=np.hstack([padded.switches, padded.taxels > 700]),
+        switch_names=padded.element_names,
+        taxels=np.empty(0, np.uint16),
+        taxel_columns=(),
+    )
+    with pytest.raises(CompileError, match="is a switch here, in the build a taxel"):
+        verify(tmp_path / "build", bits)
+
+
+def test_joints_alone_need_no_thresholds_and_estimators_take_none(padded: GraspSet, tmp_path: Path) -> None:
+    assert not compile_build(padded, tmp_path / "joints", rounds=2, folds=2, inputs="joints").manifest.switches
+    alone = replace(padded, switches=np.zeros((96, 0), bool), switch_names=())
+    assert compile_build(alone, tmp_path / "pads", rounds=2, folds=2, inputs="switches").manifest.switches
+    with pytest.raises(CompileError, match="the recordings have taxels"):
+        compile_estimator(LogitBoostClassifier(), padded, tmp_path / "estimator")
+
+
+@pytest.mark.parametrize("crowd", [False, True])
+def test_pads_are_placed_like_switches(make_set: Make, tmp_path: Path, crowd: bool) -> None:
+    with_pads(make_set(subjects=8), 1).save(tmp_path / "set.grasps")
+    wanted = ["--crowd", "--keep", "3", "--jobs", "1"] if crowd else []
+    assert run(["place", str(tmp_path / "set.grasps"), *wanted, "-o", str(tmp_path / "placement.json")]) == 0
+    names = {switch["name"] for switch in json.loads((tmp_path / "placement.json").read_bytes())["switches"]}
+    assert names & {pad.name for pad in PADS}

@@ -1,0 +1,118 @@
+"""One nested evaluation, done once more with scikit-learn's own splitting, pipelines and predictions."""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from sklearn.model_selection import GroupKFold, LeaveOneGroupOut, cross_val_predict
+from sklearn.pipeline import make_pipeline
+
+from thenar.compiler import GraspSet, ID3Selector, LogitBoostClassifier, evaluate
+from thenar.compiler.evaluation.folds import EvaluationError
+from thenar.compiler.evaluation.permutation import shuffled_labels
+
+Make = Callable[..., GraspSet]
+NESTED: dict[str, Any] = {"protocols": ("nested",), "tables": ("compositions",), "rounds": 10, "jobs": 1}
+
+
+def framed(make_grasps: Make, frames: int = 3) -> GraspSet:
+    """Return three people's trials of several frames, each frame with a flipped switch or two of its own."""
+    one = make_grasps(subjects="ABC", per_type=6, noise=0.2)
+    rows = one.rows(np.repeat(np.arange(len(one)), frames))
+    flips = np.random.default_rng(3).random(rows.switches.shape) < 0.08
+    return replace(rows, switches=rows.switches ^ flips, sessions=np.where(rows.trials < 3, "1", "2"))
+
+
+def majorities(predicted: list[str], grasp_set: GraspSet) -> int:
+    """Return how many trials are recognised by most of their frames, the first type by name of several."""
+    columns = (grasp_set.subjects, grasp_set.grasps, grasp_set.objects, grasp_set.trials)
+    votes: dict[tuple[str, str, str, int], Counter[str]] = {}
+    for found, *trial in zip(predicted, *(column.tolist() for column in columns), strict=True):
+        votes.setdefault(tuple(trial), Counter())[found] += 1
+    return sum(min(vote, key=lambda grasp: (-vote[grasp], grasp)) == trial[1] for trial, vote in votes.items())
+
+
+def test_each_subject_left_out_is_what_scikit_learn_predicts_with_a_selector_in_its_pipeline(make_grasps: Make) -> None:
+    grasp_set = framed(make_grasps)
+    study = evaluate(grasp_set, scheme="subject", **NESTED)
+    selected = make_pipeline(ID3Selector(), LogitBoostClassifier(rounds=10))
+    predicted = cross_val_predict(
+        selected, grasp_set.switches, grasp_set.grasps, groups=grasp_set.subjects, cv=LeaveOneGroupOut()
+    )
+    (row,) = (row for row in study.tables[0].rows if row.name == "VI")
+    assert row.frames is not None
+    assert row.frames.correct == (int((predicted == grasp_set.grasps).sum()),)
+    assert row.rate.correct == (majorities(predicted.tolist(), grasp_set),)
+    assert (row.rate.total, row.frames.total, row.rate.over) == (72, 216, 3)
+    assert (row.rate.what, row.frames.what) == ("new subject, trials", "new subject, frames")
+    for name, cell in zip("ABC", row.cells, strict=True):
+        mine = grasp_set.subjects == name
+        assert cell.rate.correct == (majorities(predicted[mine].tolist(), grasp_set.rows(mine)),)
+
+
+def test_sessions_left_out_are_those_of_scikit_learn_too(make_grasps: Make) -> None:
+    grasp_set = framed(make_grasps)
+    study = evaluate(grasp_set, scheme="session", **NESTED)
+    (row,) = (row for row in study.tables[0].rows if row.name == "V")
+    for name, cell in zip("ABC", row.cells, strict=True):
+        mine = grasp_set.rows(grasp_set.subjects == name)
+        predicted = cross_val_predict(
+            LogitBoostClassifier(rounds=10), mine.switches, mine.grasps, groups=mine.sessions, cv=GroupKFold(2)
+        )
+        assert cell.frames is not None
+        assert cell.frames.correct == (int((predicted == mine.grasps).sum()),)
+        assert (cell.rate.what, cell.rate.over) == ("new session, trials", 2)
+    assert row.rate.over == 6
+
+
+def test_random_folds_part_no_trial(make_grasps: Make) -> None:
+    study = evaluate(framed(make_grasps), scheme="trial", repeats=2, **NESTED)
+    (row,) = (row for row in study.tables[0].rows if row.name == "I")
+    assert (row.rate.total, len(row.rate.correct), row.rate.of) == (72, 2, "within subject")
+    assert study.trials == 72
+    assert np.array(row.cells[0].confusion).sum() == 2 * 24
+
+
+def test_frames_that_count_as_trials_are_refused(make_grasps: Make) -> None:
+    one = make_grasps(per_type=4, noise=0.3)
+    frames = one.rows(np.repeat(np.arange(len(one)), 5))
+    wrong = replace(frames, trials=np.arange(len(frames)))
+    with pytest.raises(EvaluationError, match="of fewer trials"):
+        evaluate(wrong, **NESTED)
+    claimed = evaluate(replace(wrong, independent=True), folds=2, **NESTED)
+    assert claimed.warnings[0] == "each row counts as a trial of its own, as its recorder states"
+
+
+def test_shuffled_labels_stay_with_their_subject_and_trials_stay_whole(make_grasps: Make) -> None:
+    grasp_set = framed(make_grasps)
+    made = shuffled_labels(grasp_set, (1, 1))
+    assert made.trial_ids.tolist() == grasp_set.trial_ids.tolist()
+    assert (made.grasps != grasp_set.grasps).any()
+    for subject in "ABC":
+        mine = grasp_set.subjects == subject
+        assert Counter(made.grasps[mine].tolist()) == Counter(grasp_set.grasps[mine].tolist())
+
+
+def test_a_permutation_test_knows_chance_and_does_not_depend_on_workers(make_grasps: Make) -> None:
+    asked = {**NESTED, "tables": (), "permute": 19, "folds": 2, "rounds": 3}
+    told = evaluate(framed(make_grasps), **asked).permuted
+    assert told is not None
+    assert (told.permutations, told.p, told.composition) == (19, 0.05, "II Angle + Sel-Co")
+    assert told.chance == pytest.approx(0.25, abs=0.07)
+    assert told.rate > told.highest >= told.chance
+    assert evaluate(framed(make_grasps), **(asked | {"jobs": 2})).permuted == told
+
+
+@pytest.mark.slow
+def test_where_labels_say_nothing_p_values_are_spread_evenly(make_grasps: Make) -> None:
+    asked = {**NESTED, "tables": (), "permute": 9, "folds": 2, "rounds": 2}
+    small = [make_grasps(n_switches=5, n_joints=0, subjects="A", per_type=6, noise=0.5, seed=s) for s in range(25)]
+    found = [study.permuted for study in (evaluate(one, **asked) for one in small)]
+    p = np.array([each.p for each in found if each is not None])
+    assert len(p) == 25
+    assert p.min() >= 0.1
+    assert 0.4 <= p.mean() <= 0.75
+    assert np.mean(p <= 0.2) <= 0.35

@@ -1,0 +1,30 @@
+"""What a frontier promises of the points that it picks, against their rates on fresh grasps; small cases of
+`benchmarks/luck.py`.
+"""
+
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+BENCHMARK = Path(__file__).parents[3] / "benchmarks" / "luck.py"
+
+
+@pytest.fixture(scope="module")
+def luck() -> ModuleType:
+    spec = spec_from_file_location("luck", BENCHMARK)
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.slow
+def test_promised_intervals_cover_the_rates_of_hands_that_nobody_recorded(luck: ModuleType) -> None:
+    cases = luck.cases(range(1, 7), "new subject", 1)
+    assert len(cases) == 6
+    assert sum(case.covered for case in cases) >= 0.9 * len(cases)
+    assert all(0.0 <= case.luck < 0.1 for case in cases)
+    assert any(case.luck > 0.001 for case in cases)
