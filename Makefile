@@ -38,12 +38,13 @@ else
 endif
 	$(BIN)/thenar evaluate $(OUT)/set.grasps -o $(OUT)/evaluation.json --overwrite $(if $(TABLE),--repeats 1 --tables compositions)
 	$(BIN)/thenar frontier $(OUT)/set.grasps -o $(OUT)/frontier --methods elimination,id3 --rivals none --rounds 50 --repeats 1 --finalists 4 --budget-us 5000
-	$(BIN)/thenar compile $(OUT)/set.grasps -o $(OUT)/build --from $(OUT)/frontier/frontier.json --propose $(OUT)/glove.toml --chip board --overwrite
+	$(BIN)/thenar compile $(OUT)/set.grasps -o $(OUT)/build --from $(OUT)/frontier/frontier.json
 	$(BIN)/thenar verify $(OUT)/build $(OUT)/set.grasps
 	$(BIN)/thenar run $(OUT)/build --replay $(OUT)/set.grasps > $(OUT)/grasps.jsonl
 ifndef TABLE
+	$(BIN)/thenar compile $(OUT)/set.grasps -o $(OUT)/live --folds 0 --no-report --propose $(OUT)/glove.toml --chip board --overwrite
 	$(BIN)/thenar emulate "$(SCENE)" --glove $(OUT)/glove.toml --dir $(OUT)/emulated --period-ms 150 -- \
-	    $(BIN)/thenar run $(OUT)/build --glove $(OUT)/emulated/glove.toml --frames 2000 > $(OUT)/live.jsonl
+	    $(BIN)/thenar run $(OUT)/live --glove $(OUT)/emulated/glove.toml --frames 2000 > $(OUT)/live.jsonl
 	@echo "Grasps are simulated; live ones, from a glove that was emulated, in $(OUT)/live.jsonl;"
 	@echo "hand maps: $(OUT)/contacts.svg (which switches close), $(OUT)/kept.svg (which are kept)."
 endif
