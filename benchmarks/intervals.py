@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.evaluation.rates import clustered
+from thenar.compiler.evaluation.rates import Unit, clustered
 
 ACCURACIES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98)
 FRAMES = ((1, 1.0), (2, 1.5), (8, 1.0), (8, 2.0), (8, 5.0), (15, 5.0), (50, 1.0), (50, 5.0))
@@ -32,11 +32,12 @@ def recognised(
     return random.binomial(size, random.beta(accuracy * strength, (1 - accuracy) * strength, clusters))
 
 
-def coverage(seed: int, clusters: int, size: int, alike: float, accuracy: float, draws: int) -> float:
-    """Return the share of draws whose interval covers `accuracy`."""
-    random, covered = np.random.default_rng((seed, round(1000 * accuracy))), 0
+def coverage(unit: Unit, clusters: int, size: int, alike: float, accuracy: float, draws: int) -> float:
+    """Return the share of draws whose interval covers `accuracy`; clusters are trials, or subjects of trials."""
+    random, covered = np.random.default_rng(round(1000 * accuracy)), 0
     for _ in range(draws):
-        low, high = clustered(recognised(random, clusters, size, alike, accuracy).tolist(), [size] * clusters)
+        drawn = recognised(random, clusters, size, alike, accuracy)
+        low, high = clustered(drawn.tolist(), [size] * clusters, unit)
         covered += low <= accuracy <= high
     return covered / draws
 
@@ -46,14 +47,19 @@ def of_frames(draws: int) -> Iterator[tuple[int, float, int, list[float]]]:
     for frames, effect in FRAMES:
         alike = (effect - 1) / (frames - 1) if frames > 1 else 0.0
         for trials in TRIALS:
-            yield frames, effect, trials, [coverage(1, trials, frames, alike, each, draws) for each in ACCURACIES]
+            yield (
+                frames,
+                effect,
+                trials,
+                [coverage("frames", trials, frames, alike, each, draws) for each in ACCURACIES],
+            )
 
 
 def of_subjects(draws: int, trials: int = 100) -> Iterator[tuple[int, float, list[float]]]:
     """Yield subjects, the correlation within them, and the coverage at each accuracy."""
     for subjects in SUBJECTS:
         for alike in ALIKE:
-            yield subjects, alike, [coverage(1, subjects, trials, alike, each, draws) for each in ACCURACIES]
+            yield subjects, alike, [coverage("trials", subjects, trials, alike, each, draws) for each in ACCURACIES]
 
 
 def main() -> None:

@@ -8,6 +8,7 @@ with trials kept whole, and with each person left out.
 """
 
 import sys
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,9 @@ from thenar.compiler.evaluation.folds import Fold, leave_one_out, trial_folds, w
 from thenar.compiler.evaluation.plan import inputs
 from thenar.compiler.evaluation.rates import Rate, rated
 from thenar.compiler.recordings.graspset import GraspSet
-from thenar.runtime.manifest import Of
+
+if TYPE_CHECKING:
+    from thenar.runtime.manifest import Of
 
 
 def predicted(grasp_set: GraspSet, folds: list[Fold]) -> NDArray[np.intp]:

@@ -37,9 +37,9 @@ def _rate(_context: click.Context, _option: click.Parameter, text: str) -> int |
 @click.argument("port", callback=serial_port)
 @click.option("-o", "--output", type=OutputFile(".toml"), required=True, help="The .toml file to write.")
 @overwrite_flag
-@click.option("--subject", help="Whose hand it is; without it, the file's name.")
-@click.option("--baud", callback=_rate, default="115200", show_default=True, help="Bits a second, or auto to try.")
-@click.option("--sensors", type=click.Choice(["18", "22"]), help="How many the glove must have; else what it says.")
+@click.option("--subject", help="Name of the subject.  [default: the file's name]")
+@click.option("--baud", callback=_rate, default="115200", show_default=True, help="Baud rate, or auto to find it.")
+@click.option("--sensors", type=click.Choice(["18", "22"]), help="Expected sensor count.  [default: as reported]")
 @click.option("--hold", type=Number(0.05, 60), default=1.0, show_default=True, help="Seconds to hold a pose.")
 def command(port: str, output: Path, subject: str | None, baud: int | None, sensors: str | None, hold: float) -> None:
     """Calibrate the CyberGlove at PORT (/dev/ttyUSB0, socket://HOST:PORT, ...) for the hand that wears it.

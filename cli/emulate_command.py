@@ -69,15 +69,15 @@ class Played(msgspec.Struct, frozen=True):
     type=OutputFolder(),
     default=Path("emulated"),
     show_default=True,
-    help="Where the ports are linked, beside a glove.toml that names them and the subject's calibration.",
+    help="Folder for links to the ports, a glove.toml that names them, and the subject's calibration.",
 )
-@click.option("--subject", metavar="NAME", help="Whose session of a scene to play [default: the first subject's].")
-@click.option("--period-ms", type=Number(1, 60_000), help="Time from one frame to the next [default: the scene's].")
+@click.option("--subject", metavar="NAME", help="Subject of the scene to play.  [default: the first]")
+@click.option("--period-ms", type=Number(1, 60_000), help="Time from one frame to the next.  [default: the scene's]")
 @click.option("--repeat", is_flag=True, help="Play again and again, until Ctrl-C or the command ends.")
 @click.option(
     "--adapter", type=click.Choice(_ADAPTERS), default="any", show_default=True, help="What the I2C bus can batch."
 )
-@click.option("--log", metavar="FILE.jsonl", type=OutputFile(".jsonl"), help="Note there when which frame was shown.")
+@click.option("--log", metavar="FILE.jsonl", type=OutputFile(".jsonl"), help="Log the time of each frame to this file.")
 @overwrite_flag
 def command(
     source: str,

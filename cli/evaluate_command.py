@@ -83,7 +83,7 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     type=click.Choice(("both", "paper", "nested")),
     default="both",
     show_default=True,
-    help="Whose rows choose the placement.",
+    help="Rows that choose the placement: all (paper), or those of each training fold (nested).",
 )
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of the first repeat.")
 @jobs_option()

@@ -48,7 +48,7 @@ def _timed() -> tuple[str, ...]:
 @click.argument("recordings", metavar="SET.grasps", type=existing_file)
 @click.option("-o", "--output", type=OutputFolder(), required=True, help="Folder for tables, pictures and the store.")
 @click.option("--glove", type=existing_file, help="A glove.toml: try its wiring as well, and choose by its ports.")
-@click.option("--target", type=OneOf("target", _timed), default="host", show_default=True, help="What classifies.")
+@click.option("--target", type=OneOf("target", _timed), default="host", show_default=True, help="Deployment target.")
 @click.option(
     "--budget-us",
     type=Number(min=0, min_open=True),
@@ -58,13 +58,13 @@ def _timed() -> tuple[str, ...]:
 @click.option(
     "--rate", type=Number(0, 1, min_open=True), help="Pick the fastest point of at least this accuracy, 0 to 1."
 )
-@click.option("--build", type=existing_folder, help="A build of yours: mark it on the pictures.")
+@click.option("--build", type=existing_folder, help="Mark this build on the pictures.")
 @click.option(
     "--joint-us",
     type=Number(0, 60_000_000, min_open=True),
     help="What reading the joints takes.  [default: a CyberGlove's record; of other joints unknown, left out]",
 )
-@click.option("--stream", type=existing_file, help="A set of whole movements: measure decision latency on it.")
+@click.option("--stream", type=existing_file, help="Measure decision latency on this set of whole movements.")
 @click.option(
     "--methods",
     type=method_list,
@@ -75,7 +75,7 @@ def _timed() -> tuple[str, ...]:
 @click.option("--rounds", type=click.IntRange(1, 300), default=300, show_default=True, help="The most rounds to try.")
 @click.option("--repeats", type=click.IntRange(1), default=3, show_default=True, help="Repeats of the folds.")
 @click.option(
-    "--finalists", type=click.IntRange(1), default=12, show_default=True, help="Placements to look at closely."
+    "--finalists", type=click.IntRange(1), default=12, show_default=True, help="Placements to refine and price."
 )
 @click.option("--seed", type=seed_range, default=1, show_default=True, help="Seed of folds and stream.")
 @click.option(

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 @click.command("record")
 @click.option("--glove", type=existing_file, required=True, help="The harness, a glove.toml.")
 @click.option("--taxonomy", default="kamakura14", show_default=True, help="kamakura14, cutkosky16, feix33 or own.")
-@click.option("--subject", required=True, help="Whose hand it is.")
+@click.option("--subject", required=True, help="Name of the subject.")
 @click.option("--objects", type=existing_file, help="objects.toml: the objects of each grasp type.")
-@click.option("--repetitions", type=click.IntRange(1), default=100, show_default=True, help="Trials a grasp type.")
+@click.option("--repetitions", type=click.IntRange(1), default=100, show_default=True, help="Trials per grasp type.")
 @click.option(
     "--countdown",
     type=Number(0, 3600),
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     show_default=True,
     help="Seconds before a grasp is captured.",
 )
-@click.option("--seed", type=seed_range, help="Of the random order; one is drawn otherwise.")
+@click.option("--seed", type=seed_range, help="Seed of the trial order.  [default: random]")
 @click.option(
     "-o", "--output", type=OutputFile(".grasps", goes_on=True), required=True, help="The .grasps file to write."
 )

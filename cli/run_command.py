@@ -68,12 +68,12 @@ class _SinkOption(click.Option):
 @overwrite_flag
 @click.option("--full-scan", is_flag=True, help="Read all ports in every scan, even when the rest cannot matter.")
 @click.option("--status", is_flag=True, help="Once a second, how the glove fares: in the view, and to all sinks.")
-@click.option("--frames", metavar="N", type=click.IntRange(1), help="Stop after so many frames.")
-@click.option("--lead", type=Number(0), help="By how much a new grasp type must lead, in score units.")
-@click.option("--dwell-ms", type=Number(0, 10_000), help="For how long it must lead.")
+@click.option("--frames", metavar="N", type=click.IntRange(1), help="Stop after N frames.")
+@click.option("--lead", type=Number(0), help="Lead in score units that a new grasp type needs.")
+@click.option("--dwell-ms", type=Number(0, 10_000), help="Time for which it has to keep the lead.")
 @click.option("--max-lost", type=Number(0, 1), help="Share of the build's weight that may be missing.")
 @click.option("--error-rate", type=Number(0, 1), help="Decide by a sequential test of this error rate instead.")
-@click.option("--spacing-ms", type=Number(0, 10_000), help="Frames that the sequential test takes are so far apart.")
+@click.option("--spacing-ms", type=Number(0, 10_000), help="Minimum spacing of frames in the sequential test.")
 def command(
     build: Path,
     glove: Path | None,

@@ -49,7 +49,7 @@ _OWN = "dim"  # how own steps look
 @click.option("--explain", is_flag=True, help="Only say which steps would run, in which order, and what each costs.")
 @click.option("--ablate", is_flag=True, help="Remove each effect in turn: what that does to recognition and time.")
 @click.option("--list", "listing", is_flag=True, help="Only list the scenes that are shipped.")
-@click.option("--repetitions", type=click.IntRange(1, 100_000), help="Of each grasp type by each subject.")
+@click.option("--repetitions", type=click.IntRange(1, 100_000), help="Trials per grasp type and subject.")
 @click.option(
     "--more",
     metavar="N",

@@ -18,8 +18,10 @@ UNITS: tuple[Unit, ...] = ("trials", "frames")
 LEVEL = 0.95
 _Z = 1.959963984540054  # the normal distribution's quantile of (1 + LEVEL) / 2
 
-# Prior of how alike two units of one cluster are (intracluster correlation), and how many misses it weighs.
-ALIKE, WEIGHT = 0.3, 0.5
+# Prior of how alike two units of one cluster are (intracluster correlation), frames of a trial or trials of a subject,
+# and how many misses it weighs.
+ALIKE: dict[Unit, float] = {"frames": 0.6, "trials": 0.3}
+WEIGHT = 0.5
 
 Rows = NDArray[np.intp]
 
@@ -97,13 +99,17 @@ class Rate:
         _, first, trial = np.unique(np.asarray(trials), return_index=True, return_inverse=True)
         if not truth.size or given.shape[1:] != truth.shape or trial.shape != truth.shape:
             raise ValueError(f"predictions {given.shape} of {truth.size} rows with {trial.size} trials are no rate")
-        clusters = trial
+        clusters: Rows = trial
+        alike: Unit = "frames"
         if groups is not None and len(found := np.unique(np.asarray(groups), return_inverse=True)[1]) and found.max():
-            clusters = found
+            clusters, alike = found, "trials"
         if unit == "trials":
             given, truth, clusters = decided(given, trial), truth[first], clusters[first]
         hits = given == truth
-        return cls._of_clusters(hits, clusters, of, unit, repeats_a_draw)
+        correct, sizes = tuple(hits.sum(axis=1).tolist()), np.bincount(clusters)
+        recognised = np.bincount(clusters, weights=hits.sum(axis=0)).astype(np.intp)
+        bounds = clustered(recognised.tolist(), sizes.tolist(), alike, len(hits))
+        return cls._held(of, unit, correct, len(clusters), len(sizes), bounds, repeats_a_draw)
 
     @classmethod
     def counted(cls, correct: tuple[int, ...], total: int, *, of: Of, repeats_a_draw: int = 1) -> Self:
@@ -115,14 +121,6 @@ class Rate:
             raise ValueError(f"{correct} recognised of {total} trials is no rate")
         wilson = _wilson(sum(correct) / (len(correct) * total), total, _Z)
         return cls._held(of, "trials", correct, total, total, wilson, repeats_a_draw)
-
-    @classmethod
-    def _of_clusters(cls, hits: NDArray[np.bool_], clusters: Rows, of: Of, unit: Unit, repeats_a_draw: int) -> Self:
-        """Return the rate of hits (r, n) in clusters (n,) numbered from 0."""
-        correct, sizes = tuple(hits.sum(axis=1).tolist()), np.bincount(clusters)
-        recognised = np.bincount(clusters, weights=hits.sum(axis=0)).astype(np.intp)
-        bounds = clustered(recognised.tolist(), sizes.tolist(), len(hits))
-        return cls._held(of, unit, correct, len(clusters), len(sizes), bounds, repeats_a_draw)
 
     @classmethod
     def _held(
@@ -170,9 +168,9 @@ def rated(
     return by_trial, by_frame if by_frame.total > by_trial.total else None
 
 
-def clustered(recognised: list[int], sizes: list[int], repeats: int = 1) -> tuple[float, float]:
+def clustered(recognised: list[int], sizes: list[int], unit: Unit, repeats: int = 1) -> tuple[float, float]:
     """Return the 95 % interval of a rate of units in clusters: of each, how many were recognised in all repeats
-    together, and how many there are in one.
+    together, and how many there are in one; units are the frames of trials, or the trials of subjects or the like.
     """
     n_clusters, total, hits = len(sizes), sum(sizes), sum(recognised)
     mean = hits / (repeats * total)
@@ -180,15 +178,15 @@ def clustered(recognised: list[int], sizes: list[int], repeats: int = 1) -> tupl
         return _wilson(mean, total, _Z)
     if n_clusters == 1:
         return _wilson(mean, 1, _Z)
-    n = total / design_effect(recognised, sizes, repeats)
+    n = total / design_effect(recognised, sizes, unit, repeats)
     return _wilson(mean, n, _quantile(n_clusters - 1))
 
 
-def design_effect(recognised: list[int], sizes: list[int], repeats: int = 1) -> float:
+def design_effect(recognised: list[int], sizes: list[int], unit: Unit, repeats: int = 1) -> float:
     """Return how many units of two or more clusters tell as much as one independent unit; 1 or more."""
     n_clusters, total, hits = len(sizes), sum(sizes), sum(recognised)
     misses = repeats * total - hits
-    prior = 1 + (total / n_clusters - 1) * ALIKE
+    prior = 1 + (total / n_clusters - 1) * ALIKE[unit]
     if not hits or not misses:
         return prior
     # In whole numbers up to the quotient: exact on every machine.

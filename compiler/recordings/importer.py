@@ -18,6 +18,7 @@ from .cells import Parsed, Value, bits, codes, integers, names, numbers
 from .coding import CodingCost, coarse, code_joint
 from .columns import KEYS, Columns, Selection, read_columns, select
 from .errors import TYPES, ColumnsError, RecordingError, TableError, check_room, list_rows
+from .frames import check_trials
 from .graspset import GraspSet
 from .summary import Finding, find_oddities
 from .table import Table, read_table
@@ -343,6 +344,7 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
         independent=columns.frames == "independent",
         simulated=columns.simulated,
     )
+    check_trials(grasp_set, ColumnsError)
     warnings += [
         *aliases,
         *coarse(zip(costs, readings.joints.T, strict=True)),

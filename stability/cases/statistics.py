@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from thenar.compiler.evaluation.folds import Fold, weka_folds
 from thenar.compiler.evaluation.plan import FoldFit, inputs, predictions
 from thenar.compiler.evaluation.populations import Population, Scheme, populations
-from thenar.compiler.evaluation.rates import ALIKE, WEIGHT, Rate, clustered
+from thenar.compiler.evaluation.rates import ALIKE, UNITS, WEIGHT, Rate, Unit, clustered
 from thenar.compiler.evaluation.study import Options, evaluate
 from thenar.compiler.evaluation.tables import Cell
 from thenar.compiler.recordings.graspset import GraspSet
@@ -150,8 +150,8 @@ def _clusters(draws: int) -> Iterator[Finding]:
     for number in range(draws):
         sizes = random.integers(1, [3, 13, 500][number % 3], random.integers(2, 40))
         recognised = random.binomial(sizes, random.beta(0.3, [0.02, 0.3, 5.0][number // 3 % 3], len(sizes)))
-        found = clustered(recognised.tolist(), sizes.tolist())
-        truth = _over_clusters(recognised.tolist(), sizes.tolist())
+        counts, unit = (recognised.tolist(), sizes.tolist()), UNITS[number % 2]
+        found, truth = clustered(*counts, unit), _over_clusters(*counts, unit)
         what = f"{recognised.tolist()} of {sizes.tolist()}"
         off.see(_apart(found, truth), what)
         mean = recognised.sum() / sizes.sum()
@@ -162,12 +162,12 @@ def _clusters(draws: int) -> Iterator[Finding]:
 
 
 @precisely()
-def _over_clusters(recognised: list[int], sizes: list[int]) -> Interval:
+def _over_clusters(recognised: list[int], sizes: list[int], unit: Unit) -> Interval:
     """Wilson's interval of as many units as the clusters' are worth; the variance by its definition."""
     k, total = len(sizes), sum(sizes)
     if k == total:
         return wilson(sum(recognised), total)
-    p, alike, misses = mpf(sum(recognised)) / total, mpf(ALIKE), mpf(WEIGHT)
+    p, alike, misses = mpf(sum(recognised)) / total, mpf(ALIKE[unit]), mpf(WEIGHT)
     effect = 1 + (mpf(total) / k - 1) * alike
     if 0 < p < 1:
         residuals = sum((own - p * size) ** 2 for own, size in zip(recognised, sizes, strict=True))

@@ -220,3 +220,20 @@ def test_what_a_command_starts_ends_with_it(scene: Path, glove: Path, tmp_path: 
             process.send_signal(signal.SIGINT)
         # Its stdout ends only when everybody who holds it is gone.
         assert process.communicate(timeout=LONG_S)[0] == ""
+
+
+def test_a_glove_toml_of_the_users_is_replaced_only_if_asked(
+    thenar: Thenar, scene: Path, glove: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    (folder / "glove.toml").write_text("mine")
+    (folder / "notes.txt").write_text("mine")
+    played = ("emulate", scene, "--glove", glove, "--dir", folder, "--period-ms", "1")
+    done = thenar(*played)
+    assert done.returncode == 2
+    assert "glove.toml is there already: add --overwrite" in done.stderr
+    assert (folder / "glove.toml").read_text() == "mine"
+    assert thenar(*played, "--overwrite").returncode == 0
+    assert load_harness(folder / "glove.toml").cyberglove is not None
+    assert (folder / "notes.txt").read_text() == "mine"

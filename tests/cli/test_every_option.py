@@ -148,6 +148,8 @@ def test_there_is_a_line_for_every_command() -> None:
     assert set(LINES) == set(COMMANDS)
 
 
+# An interrupt may fall into a callback of a library, out of which nothing can be raised.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("values", [QUICK, pytest.param(VALUES, marks=pytest.mark.slow)], ids=["quick", "all"])
 def test_a_value_that_makes_no_sense_is_one_sentence(

@@ -178,7 +178,7 @@ def test_a_rate_says_in_words_what_it_is_of() -> None:
 
 
 def test_one_cluster_says_as_much_as_one_unit() -> None:
-    assert clustered([30], [30]) == clustered([1], [1])
+    assert clustered([30], [30], "frames") == clustered([1], [1], "frames")
 
 
 def test_a_majority_of_equals_is_the_lowest_label() -> None:

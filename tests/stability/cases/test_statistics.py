@@ -38,7 +38,7 @@ def test_nothing_or_everything_recognised_ends_the_interval_there_and_leaves_it_
 
 @pytest.mark.parametrize("sizes", [[1] * 12, [12], [5, 5, 2], [200] * 7, [1, 999]])
 def test_clusters_of_nothing_but_misses_or_hits_end_there(sizes: list[int]) -> None:
-    none, everything = clustered([0] * len(sizes), sizes), clustered(sizes, sizes)
+    none, everything = clustered([0] * len(sizes), sizes, "trials"), clustered(sizes, sizes, "trials")
     assert none[0] == pytest.approx(0, abs=WILSON_BOUND)
     assert everything[1] == pytest.approx(1, abs=WILSON_BOUND)
     assert none[1] == pytest.approx(1 - everything[0], abs=4 * WILSON_BOUND)
