@@ -8,7 +8,7 @@ import click
 from rich.text import Text
 
 from thenar.compiler.text import duration, interval
-from thenar.drivers.names import printable
+from thenar.drivers.names import printable, shortened
 
 from .common import (
     Number,
@@ -42,6 +42,12 @@ def _timed() -> tuple[str, ...]:
     from thenar.compiler.firmware.targets import timed
 
     return timed()
+
+
+def _address(_: click.Context, __: click.Parameter, text: str | None) -> str | None:
+    if text is not None and not all(text.partition("://")):
+        raise click.BadParameter(f"{shortened(repr(text))} is no address such as tcp://10.0.0.5:8786")
+    return text
 
 
 @click.command("frontier", cls=Training)
@@ -85,7 +91,11 @@ def _timed() -> tuple[str, ...]:
 )
 @jobs_option()
 @click.option(
-    "--dask", "cluster", metavar="ADDRESS", help="Work on the cluster of this Dask scheduler, such as tcp://host:8786."
+    "--dask",
+    "cluster",
+    callback=_address,
+    metavar="ADDRESS",
+    help="Work on the cluster of this Dask scheduler, such as tcp://host:8786.",
 )
 @json_flag
 @click.pass_context
