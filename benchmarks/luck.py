@@ -30,6 +30,7 @@ from thenar.compiler.frontier.search import Search
 from thenar.compiler.frontier.survey import Cuts, Survey
 from thenar.compiler.frontier.timing.wirings import wirings
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.recordings.merging import merge
 from thenar.compiler.samples import Samples
 from thenar.compiler.tables.quantise import integer_scores
 from thenar.compiler.workers import in_workers
@@ -67,12 +68,7 @@ def recorded(seed: int, repetitions: int = REPETITIONS, more: int | None = None)
 def strangers() -> GraspSet:
     """Return grasps of hands that no case records."""
     sets = [recorded(FIRST_OTHER + number) for number in range(OTHERS)]
-    joined = {
-        name: np.concatenate([getattr(each, name) for each in sets])
-        for name in ("switches", "codes", "grasps", "subjects", "objects", "trials")
-    }
-    first = sets[0]
-    return GraspSet(**joined, switch_names=first.switch_names, joints=first.joints, taxonomy=first.taxonomy)
+    return merge({str(number): each for number, each in enumerate(sets)}, each="subject")
 
 
 def played(asked: tuple[int, By, Equipment]) -> Case:

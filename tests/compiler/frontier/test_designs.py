@@ -25,7 +25,9 @@ NAMES = [f"s{number}" for number in range(40)]
 
 
 def judged(rate: float) -> Judged:
-    return Judged(Rate.counted((round(1000 * rate),), 1000, of="pooled"), np.arange(1000) < 1000 * rate, 1)
+    return Judged(
+        Rate.counted((round(1000 * rate),), 1000, of="pooled"), (np.arange(1000) < 1000 * rate).astype(np.intp), 1
+    )
 
 
 def close_of(switches: int = 20, rate: float = 0.9, early_us: float = 200.0, layout_us: float = 50.0) -> Close:

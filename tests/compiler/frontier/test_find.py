@@ -90,8 +90,8 @@ def test_scans_that_end_early_decide_on_single_frames(first: tuple[Request, Fron
 def test_subjects_are_left_out_where_there_are_several(first: tuple[Request, Frontier]) -> None:
     found = first[1]
     assert (found.subjects, found.by, found.trials) == (2, "new subject", found.rows)
-    every = [*found.points, *found.tried, *found.marks]
-    assert {each.rate.what for each in every} == {"new subject, trials"}
+    rates = [point.rate for point in found.points] + [tried.rate for tried in found.tried]
+    assert {rate.what for rate in (*rates, *(mark.rate for mark in found.marks))} == {"new subject, trials"}
     assert {point.beside and point.beside.what for point in found.points} == {"pooled, trials"}
     assert {point.rate.over for point in found.points} == {2}
 
