@@ -80,7 +80,7 @@ def test_evaluate_gives_rates_or_a_reason(
     if code == 0:
         for table in json.loads(out.read_bytes())["tables"]:
             for row in table["rows"]:
-                assert 0 <= row["average"]["low"] <= row["average"]["mean"] <= row["average"]["high"] <= 1
+                assert 0 <= row["rate"]["low"] <= row["rate"]["mean"] <= row["rate"]["high"] <= 1
 
 
 @pytest.mark.slow
