@@ -49,7 +49,7 @@ def test_a_frame_has_the_documented_columns_and_types(small: GraspSet) -> None:
 
 def test_rows_that_pandas_picks_and_sorts_are_those_of_the_set(small: GraspSet) -> None:
     frame = small.to_dataframe()
-    part = frame[frame["subject"] == "A"].sort_values("trial", ascending=False)
+    part = frame.query("subject == 'A'").sort_values("trial", ascending=False)
     assert GraspSet.from_dataframe(part).fingerprint() == small.rows([5, 2, 1, 0]).fingerprint()
 
 
