@@ -215,6 +215,11 @@ def command(
             f"the build recognises every row as {made.only_answer}: no input tells grasp types apart by "
             "itself, and stumps look at one at a time"
         )
+    if chosen is not None and given is not None and made.harness != given:
+        warning(
+            f"the scan map is of the wiring that point {chosen.point.number} was found with, not of {glove}: to run on "
+            "that glove, build a point that is read as wired, or compile without --from"
+        )
     if propose is not None:
         _propose(made.manifest, propose, chip or next(iter(_chips())))
     show(made.manifest, lambda _: _print(made, output, propose))

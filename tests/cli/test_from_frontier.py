@@ -11,6 +11,8 @@ from msgspec.structs import replace
 from thenar.cli import run
 from thenar.compiler import GraspSet
 from thenar.compiler.frontier.points import FrontierError, Point, Way, frontier_from_bytes, frontier_to_bytes
+from thenar.runtime.harness.writing import harness_to_toml
+from thenar.runtime.scanning.propose import propose_harness
 
 Captured = pytest.CaptureFixture[str]
 Change = Callable[[Point], Point]
@@ -21,23 +23,35 @@ def _setting(**changes: Any) -> Change:
 
 
 @pytest.fixture
-def compiled(examples: Any, set_file: Path, tmp_path: Path, capsys: Captured) -> Callable[[Change], tuple[int, str]]:
+def compiled(examples: Any, set_file: Path, tmp_path: Path, capsys: Captured) -> Callable[..., tuple[int, str]]:
     """Return what compiles a point of a frontier of the set: exit code, and what was complained of."""
     grasp_set = GraspSet.load(set_file)
 
-    def compile_point(change: Change) -> tuple[int, str]:
+    def compile_point(change: Change, *options: str) -> tuple[int, str]:
         found = examples.example_frontier(fingerprint=grasp_set.fingerprint())
         point = replace(found.points[0], switches=grasp_set.switch_names[:6])
         document = replace(found, points=(change(point),), picked=1)
         (tmp_path / "frontier.json").write_bytes(frontier_to_bytes(document))
         asked = ["compile", str(set_file), "-o", str(tmp_path / "build"), "--from", str(tmp_path / "frontier.json")]
-        return run([*asked, "--no-report", "--folds", "0"]), " ".join(capsys.readouterr().err.split())
+        return run([*asked, "--no-report", "--folds", "0", *options]), " ".join(capsys.readouterr().err.split())
 
     return compile_point
 
 
 def test_a_point_that_can_be_built_is(compiled: Callable[[Change], tuple[int, str]]) -> None:
     assert compiled(lambda point: point)[0] == 0
+
+
+def test_a_glove_that_the_point_is_not_wired_as_is_named(
+    compiled: Callable[..., tuple[int, str]], set_file: Path, tmp_path: Path
+) -> None:
+    """A point with chips of its own is built for these; the glove says what its ports cost."""
+    names = GraspSet.load(set_file).switch_names
+    (tmp_path / "glove.toml").write_text(harness_to_toml(propose_harness(names, "pca9555", name="mine")))
+    code, complaint = compiled(lambda point: point, "--glove", str(tmp_path / "glove.toml"))
+    assert code == 0
+    assert "the scan map is of the wiring that point 1 was found with, not of" in complaint
+    assert compiled(lambda point: point)[1].count("scan map") == 0
 
 
 @pytest.mark.parametrize(
