@@ -45,7 +45,7 @@ Length = Annotated[float, Meta(ge=-10_000.0, le=10_000.0)]
 Place = tuple[Length, Length]
 
 
-class Layout(Struct, frozen=True, forbid_unknown_fields=True):
+class Places(Struct, frozen=True, forbid_unknown_fields=True):
     """The content of `layout.toml`, in mm: x to the right, y up.
 
     places       the middle of each switch, by the name of its column
@@ -75,11 +75,11 @@ def load_layout(path: Path) -> HandShape:
     return _hand(layout, path.name)
 
 
-def _of_toml(path: Path) -> Layout:
+def _of_toml(path: Path) -> Places:
     source = read_source(path, MapError)
     tables = source.tables()
     check_finite(source, (), tables)
-    layout = convert(source, (), tables, Layout)
+    layout = convert(source, (), tables, Places)
     seen: dict[str, str] = {}
     for part, names in layout.parts.items():
         for name in names:
@@ -91,7 +91,7 @@ def _of_toml(path: Path) -> Layout:
     return layout
 
 
-def _hand(layout: Layout, name: str) -> HandShape:
+def _hand(layout: Places, name: str) -> HandShape:
     names, places = tuple(layout.places), np.array(list(layout.places.values()), np.float64)
     part_of = {switch: part for part, switches in layout.parts.items() for switch in switches}
     found = [part_of.get(each, _WHOLE) for each in names]
@@ -123,7 +123,7 @@ def _radius_mm(places: np.ndarray, body_mm: float) -> float:
     return max(_SMALLEST_DOT_MM, most)
 
 
-def _of_svg(path: Path) -> Layout:
+def _of_svg(path: Path) -> Places:
     from svgelements import SVG, Shape
 
     places, parts, outline = dict[str, Place](), dict[str, tuple[str, ...]](), tuple[Place, ...]()
@@ -142,7 +142,7 @@ def _of_svg(path: Path) -> Layout:
             places[name] = _mm((left + right) / 2, (top + bottom) / 2, height)
             if part:
                 parts[part] = (*parts.get(part, ()), name)
-        return msgspec.convert({"places": places, "parts": parts, "outline": outline}, Layout)
+        return msgspec.convert({"places": places, "parts": parts, "outline": outline}, Places)
     except MapError:
         raise
     except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as reason:
