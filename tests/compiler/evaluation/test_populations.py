@@ -33,6 +33,19 @@ def test_leaving_a_subject_out_trains_on_all_others(make_grasps: Make) -> None:
         assert len(part.rows) == len(grasps)
 
 
+@pytest.mark.parametrize("scheme", ["trial", "subject", "object", "block"])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_no_scheme_parts_the_frames_of_a_trial(make_grasps: Make, scheme: Scheme, seed: int) -> None:
+    """Each row comes three times, as frames of its trial do, and all rows are in another order."""
+    order = np.random.default_rng(seed).permutation(3 * 96) % 96
+    grasps = make_grasps().rows(order)
+    trials = grasps.trial_ids
+    assert len(np.unique(trials)) == 96
+    for part in populations(grasps, scheme, n_folds=4, repeats=2, seed=seed):
+        for fold in part.folds:
+            assert not set(trials[fold.train]) & set(trials[fold.test])
+
+
 def test_repeats_are_wekas_folds_of_the_following_seeds(make_grasps: Make) -> None:
     grasps = make_grasps(subjects="A")
     (part,) = populations(grasps, "trial", n_folds=4, repeats=3, seed=5)
