@@ -260,7 +260,8 @@ def _changed_rows(rows: list[list[str]], random: Random) -> list[list[str]]:
         case 0:
             return [other for other in rows if other is not row] or [[""]]
         case 1:
-            return [row] * random.choice((1, 3, 30_000 // (1 + sum(map(len, row))))) + rows
+            # Each a list of its own, and commas counted: otherwise the next change may make hundreds of megabytes.
+            return [[*row] for _ in range(random.choice((1, 3, 30_000 // (len(row) + sum(map(len, row))))))] + rows
         case 2:
             random.shuffle(rows)
         case 3:

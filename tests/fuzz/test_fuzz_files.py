@@ -4,8 +4,10 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from random import Random
 
 import pytest
+from mutating import table_file
 
 HERE = Path(__file__).parent
 
@@ -70,6 +72,17 @@ def test_every_input_that_ever_failed_and_some_new_ones_are_read_or_refused() ->
         path.is_file() for path in (HERE / "corpus").glob("*/*")
     )
     assert int(re.findall(r"(\d+) mutants of 32 formats", told)[0]) >= 540
+
+
+def test_mutants_of_a_table_are_small_enough_for_their_time() -> None:
+    """Reading a mutant may take 2 s whatever its length: one of hundreds of megabytes is not written in that."""
+    longest = 0
+    for number in range(1000):
+        random, data = Random(number), b"grasp,finger\n\n\npower,1\n" * 5
+        for _ in range(3):
+            data = table_file(data, random)
+        longest = max(longest, len(data))
+    assert 100_000 < longest < 50_000_000
 
 
 def test_whatever_goes_wrong_with_a_mutant_is_seen(tmp_path: Path) -> None:
