@@ -15,6 +15,8 @@ from .table import open_bytes, open_lines
 # Rows that are looked at, characters of each, and those that clevercsv sees, whose time grows with their square.
 _ROWS, _CHARACTERS, _SEEN = 60, 5000, 400
 _CHUNK = 1 << 20
+# The bytes that Windows-1252 does not have: to look for them is many times faster than to decode.
+_NOT_WESTERN = b"\x81\x8d\x8f\x90\x9d"
 _DELIMITERS = (",", ";", "\t", "|", " ")
 _SPOKEN = {",": "a comma", ";": "a semicolon", "\t": "a tab", "|": "a bar", " ": "a blank"}
 _NUMBER = re.compile(r"[+-]?(?:\d++(?:[.,]\d*+)?|[.,]\d++)(?:[eE][+-]?\d++)?")
@@ -51,22 +53,22 @@ def _encoding(path: Path) -> tuple[str, str]:
         if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
             return "utf-16", "its byte order mark says so"
         marked = start.startswith(codecs.BOM_UTF8)
-        utf8, western = (codecs.getincrementaldecoder(name)() for name in ("utf-8", "cp1252"))
-        failed = set[str]()
+        decoder = codecs.getincrementaldecoder("utf-8")()
+        utf8 = western = True
         piece = start
         while True:
-            for name, decoder in (("utf-8", utf8), ("cp1252", western)):
-                if name not in failed:
-                    try:
-                        decoder.decode(piece, final=not piece)
-                    except UnicodeDecodeError:
-                        failed.add(name)
-            if not piece:
+            if utf8:
+                try:
+                    decoder.decode(piece, final=not piece)
+                except UnicodeDecodeError:
+                    utf8 = False
+            western = western and not any(byte in piece for byte in _NOT_WESTERN)
+            if not piece or not (utf8 or western):
                 break
             piece = file.read(_CHUNK)
-    if "utf-8" not in failed:
+    if utf8:
         return "utf-8", "its byte order mark says so" if marked else "all of it decodes so"
-    if "cp1252" not in failed:
+    if western:
         return "cp1252", "it is not UTF-8; Windows-1252 is Latin-1 with more signs"
     return "latin-1", "it is neither UTF-8 nor Windows-1252"
 

@@ -1,6 +1,8 @@
 import codecs
 import gzip
 from pathlib import Path
+from random import Random
+from time import process_time
 
 import pytest
 
@@ -76,6 +78,29 @@ def test_a_letter_far_down_decides_on_the_encoding(tmp_path: Path) -> None:
     # Split between two pieces that are read.
     path.write_bytes(b"g,s\n" + b"x" * ((1 << 20) - 5) + "ö,1\nä,0\n".encode())
     assert sniff(path)[0].encoding == "utf-8"
+
+
+@pytest.mark.parametrize("byte", range(0x80, 0x100))
+def test_a_table_that_is_not_utf8_is_windows_1252_where_python_decodes_it_so(byte: int, tmp_path: Path) -> None:
+    content = b"g,s\nx" + bytes([byte]) + b",1\n"
+    (tmp_path / "t.csv").write_bytes(content)
+    try:
+        content.decode("cp1252")
+        expected = "cp1252"
+    except UnicodeDecodeError:
+        expected = "latin-1"
+    assert sniff(tmp_path / "t.csv")[0].encoding == expected
+
+
+@pytest.mark.parametrize("signs", ["\",;\t| '\\ab1", "\"'~`,;|", '",a\\', "1.,- ", '"', ",", "*/ int x; /*,"])
+def test_a_hostile_sample_is_looked_at_quickly(signs: str, tmp_path: Path) -> None:
+    """Long lines of whatever may be a delimiter, a quote or an escape, in two orders."""
+    random = Random(1)
+    lines = ["".join(random.choices(signs, k=20_000)) for _ in range(30)] + [signs * (20_000 // len(signs))] * 30
+    (tmp_path / "t.csv").write_text("\n".join(lines))
+    start = process_time()
+    sniff(tmp_path / "t.csv")
+    assert process_time() - start < 2
 
 
 @pytest.mark.parametrize(
