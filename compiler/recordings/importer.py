@@ -328,6 +328,9 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
     costs = tuple(cost for _, _, cost in coded)
     joints, taxels = coded[: len(selection.joints)], coded[len(selection.joints) :]
     empty = np.zeros((len(grasps), 0), np.uint16)
+    # Frozen, so that the set takes them without copies.
+    for name in readings.__slots__:
+        getattr(readings, name).setflags(write=False)
     grasp_set = GraspSet(
         switches=readings.switches,
         switch_names=(*selection.switches, *(name for name, _ in selection.taxels)),
