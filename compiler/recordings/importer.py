@@ -367,7 +367,7 @@ def report_of(
     return ImportReport(
         table=what,
         rows=len(grasp_set),
-        trials=len(np.unique(grasp_set.trial_ids)),
+        trials=int(grasp_set.trial_ids.max(initial=-1)) + 1,
         subjects=len(np.unique(grasp_set.subjects)),
         objects=len(np.unique(grasp_set.objects)),
         grasp_types=len(np.unique(grasp_set.labels)),
