@@ -71,6 +71,17 @@ def _chips() -> Iterable[str]:
     return (*CHIPS, _BOARD)
 
 
+class _ChipOption(click.Option):
+    """Its help, which is only made when it is asked for, names the chips."""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        *chips, board = _chips()
+        self.help = (
+            f"Port expander to propose: {', '.join(chips)}; or {board}, a switch-scanner board.  [default: {chips[0]}]"
+        )
+        return super().get_help_record(ctx)
+
+
 def _preset(context: click.Context, _: click.Parameter, name: str | None) -> None:
     """Let the preset's values be the defaults: explicit options win."""
     given = PRESETS.get(name or "", {})
@@ -140,7 +151,7 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
 @click.option(
     "--chip",
     type=OneOf("chip", _chips),
-    help="Port expander to propose, or board for a switch-scanner board.  [default: mcp23017]",
+    cls=_ChipOption,
 )
 @overwrite_flag
 @json_flag

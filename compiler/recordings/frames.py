@@ -39,14 +39,16 @@ def looks_like_frames(grasp_set: GraspSet) -> str | None:
     neighbouring rows of one trial the middle one. Frames of a trial differ far less from the next than from rows a
     third of the group away or more; repetitions do so by chance, and drift makes them do so a little more often.
     Chance is taken from two rows that both are far away. Frames whose noise is about as large as what differs between
-    trials are not found, nor is a single trial of each group; but copies are, where joints differ between groups.
+    trials are not found, nor is a single trial of each group; but copies are, where joints differ between groups and
+    nothing simulated them.
     """
     order, group = _units(grasp_set)
     sizes = np.bincount(group) if len(group) else group
     starts = np.cumsum(sizes) - sizes
     place = np.arange(len(order)) - np.repeat(starts, sizes)
     size = np.repeat(sizes, sizes)
-    if reason := _copies(grasp_set, order, place, starts):
+    # A scene without noise repeats itself, and numbers its repetitions rightly.
+    if not grasp_set.simulated and (reason := _copies(grasp_set, order, place, starts)):
         return reason
     this = np.flatnonzero((place + 1 < size) & (size >= 4))
     if not len(this):

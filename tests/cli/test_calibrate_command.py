@@ -136,7 +136,7 @@ def test_a_hand_that_never_moved_leaves_the_old_file(line: PtyLine, tmp_path: Pa
     output.write_text("old")
     still: dict[int, str | int | None] = dict.fromkeys(range(0, 13), 60)
     still |= dict.fromkeys(range(2, 13, 2), "k")
-    with EmulatedCyberGlove(line) as glove, calibrating(line, output) as process:
+    with EmulatedCyberGlove(line) as glove, calibrating(line, output, "--overwrite") as process:
         code, _, said = converse(process, Wearer(glove, 18, still))
     assert code == 2, said
     assert "no sensor moved" in said.splitlines()[-1]
@@ -162,7 +162,7 @@ def test_whatever_ends_it_early_leaves_the_old_file(
     output = tmp_path / "anna.toml"
     output.write_text("old")
 
-    with EmulatedCyberGlove(line) as glove, calibrating(line, output) as process:
+    with EmulatedCyberGlove(line) as glove, calibrating(line, output, "--overwrite") as process:
         wearer = Wearer(glove, 18, {})
 
         def answer(text: str) -> str | None:

@@ -90,7 +90,7 @@ def test_a_hand_length_needs_a_spec_to_be_used_in(thenar: Thenar, gloved_file: P
 
 def test_a_hand_length_needs_switches_whose_places_are_known(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
     given = ("compile", set_file, "-o", tmp_path / "build", *QUICK, "--hand-length", 180)
-    assert "where they lie is not known" in refused(thenar(*given))
+    assert "these switches are not on it: give a --layout instead" in refused(thenar(*given))
     assert not (tmp_path / "build").exists()
 
 

@@ -115,7 +115,12 @@ def test_a_standard_placement_is_printed_stored_and_drawn(
     ask = ["place", str(crowd_file), "--crowd", "--keep", "3", "--method", "cmim", "--jobs", "1"]
     assert run([*ask, "-o", str(stored), "--draw", str(drawn)]) == 0
     said = capsys.readouterr().out
-    for words in ("Standard placement", "Recognition of 2 held-out subjects", "worst tenth, %", "of all 12 subjects"):
+    for words in (
+        "Standard placement",
+        "Trials recognised of 2 held-out subjects (new subject)",
+        "worst tenth, %",
+        "of all 12 subjects",
+    ):
         assert words in said
     placement = json.loads(stored.read_text())
     assert len(kept_names(stored)) == 3

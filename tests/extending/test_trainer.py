@@ -71,7 +71,7 @@ def test_the_trainer_is_evaluated_as_the_papers_is(installed: Any, recordings: P
     study = json.loads(installed.thenar("evaluate", str(recordings), *given, "--json"))
     assert study["options"]["trainer"] == "naive-bayes"
     (table,) = study["tables"]
-    assert table["rows"][0]["average"]["mean"] > 0.8
+    assert table["rows"][0]["rate"]["mean"] > 0.8
 
 
 def test_a_frontier_of_the_trainer_has_one_stage_and_its_points_are_built(

@@ -84,6 +84,11 @@ def test_slow_holds_and_copies_are_found() -> None:
     assert "copies of fewer trials" in copies
 
 
+def test_a_scene_without_noise_repeats_itself_and_is_no_copy() -> None:
+    copies = misnamed(make(trials=1, frames=10, hold=0.0), "row")
+    assert looks_like_frames(replace(copies, simulated="scene still, seed 1")) is None
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_repetitions_are_not_taken_for_frames(seed: int) -> None:
     for trials in (1, 2, 3, 4, 12, 50):

@@ -78,8 +78,8 @@ def test_a_glove_that_is_pulled_from_its_box_gives_no_answer_until_it_is_back(
     glove = running.bench.glove
     outage(
         running.scene,
-        lambda: setattr(glove, "plugged", False),
-        lambda: setattr(glove, "plugged", True),
+        lambda: setattr(glove.state, "plugged", False),
+        lambda: setattr(glove.state, "plugged", True),
         lost=set(running.scene.truth.joint_names),
         period_us=running.periods_us()[0],
     )

@@ -90,7 +90,7 @@ def test_a_build_is_made_verified_and_run_or_refused(
 ) -> None:
     build = path.parent / "build"
     code, _, complaint = command(capsys, "compile", path, "-o", build, "--rounds", 20, "--folds", folds)
-    assert code == 0 or (folds and "in fold 1" in complaint) or name not in TRAINABLE
+    assert code == 0 or (folds and "in fold " in complaint) or name not in TRAINABLE
     if code:
         assert not build.exists()
         return
