@@ -168,10 +168,11 @@ def asked_settings(context: click.Context, asked: dict[str, Any]) -> dict[str, A
 
 
 def _option(setting: "Setting") -> click.Option:
-    least = setting.least
-    kind: click.ParamType[Any] = Number(least)
+    ends = (setting.least, setting.most)
+    kind: click.ParamType[Any] = Number(*ends)
     if setting.kind is int:
-        kind = click.INT if least is None else click.IntRange(int(least))
+        low, high = (None if end is None else int(end) for end in ends)
+        kind = click.INT if ends == (None, None) else click.IntRange(low, high)
     decls, shown = [f"--{setting.name.replace('_', '-')}", setting.name], setting.default is not None
     return click.Option(decls, type=kind, default=setting.default, show_default=shown, help=setting.what)
 

@@ -6,9 +6,10 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+import warnings
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import BrokenExecutor
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import TypeVar
 
 from .cluster import on_cluster
@@ -52,10 +53,12 @@ def in_workers(
     with _safe_paths(), parallel_config(backend="loky", inner_max_num_threads=1, **ending):
         workers = Parallel(n_jobs=min(jobs, MOST_JOBS), return_as="generator_unordered")
         try:
-            with _cancelled_work_forgotten():
+            with _cancelled_work_forgotten(), ExitStack() as ended:
                 with _interrupts_held():
                     answers = workers(delayed(work)(task) for task in tasks)
-                yield from answers
+                    ended.callback(_end_early, answers)
+                # `yield from answers` would close them without a filter when this generator is closed.
+                yield from (answer for answer in answers)
         except (BrokenExecutor, BrokenPipeError) as reason:
             raise BrokenExecutor(
                 "a worker process ended before its work was done, perhaps for want of memory: --jobs 1 takes none"
@@ -111,6 +114,14 @@ def _cancelled_work_forgotten() -> Iterator[None]:
         yield
     finally:
         threading.excepthook = before
+
+
+def _end_early(answers: Generator[object, None, None]) -> None:
+    """End the work that is left, if any, and its workers, without joblib's warning of what is lost."""
+    with warnings.catch_warnings():
+        lost = r"\d+ tasks (have been successfully executed|which were still being processed)"
+        warnings.filterwarnings("ignore", lost, UserWarning)
+        answers.close()
 
 
 @contextmanager

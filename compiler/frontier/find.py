@@ -1,15 +1,18 @@
 """A frontier from recordings: everything is screened, what is near the front is looked at closely, and put together."""
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from importlib.metadata import version
+from itertools import filterfalse
+from os.path import lexists
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from thenar.runtime.build import Build
+from thenar.runtime.errors import BuildError, HarnessError
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.names import list_names
 
@@ -153,16 +156,24 @@ def find_frontier(
     search, lacking = _installed(search or Search(methods=usual(ours=True, wired=harness is not None)))
     cuts = Cuts.of(samples, search)
     ports = ports_of_whole_glove(harness, grasp_set.switch_names)
+    made = [] if output is None else [*filterfalse(lexists, (output / STORE_NAME, output, *output.parents))]
     with _folder(output) as folder, Store(folder / STORE_NAME, f"thenar {version('thenar')}") as store:
         cache = Cache(store, report or _unheard, jobs=jobs, cluster=cluster)
-        names = [joint.name for joint in grasp_set.joints]
-        joints = joints_time(names, joint_us, None if harness is None else harness.cyberglove)
-        equipment = equipment_for(target, wirings(harness, target), cache, joints)
-        untimed = (_UNTIMED.format(list_names(names)),) if joints.how == "unknown" else ()
-        renewed = (_RENEWED,) if store.renewed else ()
-        survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
-        played = _stream(survey, stream)
-        own = () if build is None else (own_build(build, grasp_set, equipment),)
+        try:
+            names = [joint.name for joint in grasp_set.joints]
+            joints = joints_time(names, joint_us, None if harness is None else harness.cyberglove)
+            equipment = equipment_for(target, wirings(harness, target), cache, joints)
+            untimed = (_UNTIMED.format(list_names(names)),) if joints.how == "unknown" else ()
+            renewed = (_RENEWED,) if store.renewed else ()
+            survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
+            played = _stream(survey, stream)
+            own = () if build is None else (own_build(build, grasp_set, equipment),)
+        except (FrontierError, BuildError, HarnessError):
+            # What was refused before its work began leaves nothing; what came by meanwhile stays.
+            with suppress(OSError):
+                for path in made:
+                    (path.rmdir if path.is_dir() else path.unlink)()
+            raise
         cache.foresee(foreseen(survey))
         found = _found(survey, played, wanted or Wanted(), own, (*renewed, *untimed, *lacking))
         if output is not None:

@@ -37,8 +37,8 @@ class Setting:
         int or float.
     default : int, float or None
         Without a value; None is a value of its own.
-    least : int or float, optional
-        The least value that makes sense.
+    least, most : int or float, optional
+        The least and the largest value that make sense.
 
     Examples
     --------
@@ -52,6 +52,7 @@ class Setting:
     kind: type[int] | type[float]
     default: Number
     least: float | None = None
+    most: float | None = None
 
 
 class Trainer(ABC):
@@ -115,6 +116,8 @@ class Trainer(ABC):
             value = getattr(options, setting.name, given)
             if value is not None and setting.least is not None and not value >= setting.least:
                 raise TrainerError(f"{setting.name}={value} must be at least {setting.least}")
+            if value is not None and setting.most is not None and not value <= setting.most:
+                raise TrainerError(f"{setting.name}={value} must be at most {setting.most}")
             values[setting.name] = None if value is None else setting.kind(value)
         return values
 

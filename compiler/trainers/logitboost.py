@@ -19,8 +19,9 @@ class LogitBoost(Trainer):
     staged = True
     settings = (
         Setting("rounds", "Rounds of LogitBoost.", int, 100, 1),
-        Setting("shrinkage", "Share of each round that is kept.", float, 1.0),
-        Setting("tolerance", "Stop after a round that changes the mean loss by less than this.", float, None),
+        # As boosting.boost.SMALLEST_SHRINKAGE, which is not imported for a help text.
+        Setting("shrinkage", "Share of each round that is kept.", float, 1.0, 1e-6, 1.0),
+        Setting("tolerance", "Stop after a round that changes the mean loss by less than this.", float, None, 0),
         Setting("max_bins", "At most so many bins a joint: smaller tables.  [default: no limit]", int, None, 2),
     )
 

@@ -32,6 +32,8 @@ workers._interrupts_held = handing_out
 from thenar.cli import main
 main()
 """
+# Linux, include/linux/sched.h: in the flags of /proc/*/stat.
+PF_EXITING = 4
 COMMANDS = {
     "simulate": "simulate crowd -o new.grasps --jobs 2",
     "plan": "plan quick --anew -o new.json --jobs 2",
@@ -67,12 +69,15 @@ def folder(tmp_path: Path, material: Path, monkeypatch: pytest.MonkeyPatch) -> P
 
 
 def _of_group(group: int) -> Iterator[str]:
+    """Yield the processes of a group that have not ended: neither zombies, nor those that the kernel is removing. These
+    run nothing any more and have closed their files already, which is what this test waits for.
+    """
     for process in Path("/proc").glob("[0-9]*"):
         try:
             fields = (process / "stat").read_text(errors="replace").rpartition(")")[2].split()
         except OSError:
             continue
-        if int(fields[2]) == group and fields[0] != "Z":
+        if int(fields[2]) == group and fields[0] != "Z" and not int(fields[6]) & PF_EXITING:
             yield process.name
 
 

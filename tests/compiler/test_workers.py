@@ -4,6 +4,7 @@ import subprocess
 import sys
 import threading
 import time
+import warnings
 from collections.abc import Generator
 from concurrent.futures import BrokenExecutor
 from itertools import count
@@ -76,6 +77,16 @@ def test_an_end_before_the_last_answer_is_quiet_though_loky_looks_for_what_it_ca
     with pytest.raises(KeyboardInterrupt):
         answers.throw(KeyboardInterrupt)
     assert (stumbled, complaints) == ([True], [])
+
+
+def test_an_end_before_the_last_answer_warns_of_nothing() -> None:
+    answers = in_workers(squared_where, count(), 2)
+    assert isinstance(answers, Generator)
+    next(answers)
+    with warnings.catch_warnings(record=True) as complaints:
+        warnings.simplefilter("always")
+        answers.close()
+    assert complaints == []
 
 
 def test_as_many_processes_work_as_are_asked_for() -> None:

@@ -296,13 +296,16 @@ def test_a_build_that_does_not_say_what_it_recognises_is_refused(tmp_path: Path,
     grasp_set = make_set()
     build = compile_build(grasp_set, tmp_path / "mine", rounds=5, folds=0).folder
     with pytest.raises(FrontierError, match="does not say what it recognises"):
-        found_of(asked(tmp_path, grasp_set, build=build))
+        found_of(asked(tmp_path / "not" / "there", grasp_set, build=build))
+    assert not (tmp_path / "not").exists()
 
 
 def test_a_build_of_other_switches_is_refused(tmp_path: Path, make_set: Make) -> None:
     build = compile_build(make_set(switches=40), tmp_path / "mine", rounds=5, folds=4, prune=0).folder
+    (tmp_path / "out").mkdir()
     with pytest.raises(FrontierError, match="compiled from others"):
         found_of(asked(tmp_path, make_set(switches=2), build=build))
+    assert list((tmp_path / "out").iterdir()) == []
 
 
 def test_an_unknown_rival_is_told(tmp_path: Path, make_set: Make) -> None:

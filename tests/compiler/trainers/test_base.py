@@ -17,6 +17,7 @@ from thenar.compiler import (
     Trainer,
     compile_build,
 )
+from thenar.compiler.boosting.boost import SMALLEST_SHRINKAGE
 from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.trainers.base import Training, changed
 from thenar.drivers.members import MemberError
@@ -59,6 +60,9 @@ def test_options_give_a_trainer_all_its_settings(constant: Constant) -> None:
         ({"trainer": "oracle"}, "there is no trainer 'oracle': choose one of logitboost, constant"),
         ({"round": 3}, "trainer 'logitboost' takes no setting 'round'"),
         ({"rounds": 0}, "rounds=0 must be at least 1"),
+        ({"shrinkage": SMALLEST_SHRINKAGE / 2}, "shrinkage=5e-07 must be at least 1e-06"),
+        ({"shrinkage": 1.5}, "shrinkage=1.5 must be at most 1"),
+        ({"tolerance": -1e-9}, "tolerance=-1e-09 must be at least 0"),
         ({"trainer": "constant", "weight": 0.4}, "weight=0.4 must be at least 0.5"),
         ({"trainer": "constant", "weight": float("nan")}, "weight=nan must be at least"),
     ],
