@@ -14,7 +14,6 @@ import sys
 import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -64,16 +63,15 @@ def recorded(seed: int, repetitions: int = REPETITIONS, more: int | None = None)
     return replace(found, codes=found.codes[:, :0], joints=())
 
 
-@cache
 def strangers() -> GraspSet:
     """Return grasps of hands that no case records."""
     sets = [recorded(FIRST_OTHER + number) for number in range(OTHERS)]
     return merge({str(number): each for number, each in enumerate(sets)}, each="subject")
 
 
-def played(asked: tuple[int, By, Equipment]) -> Case:
-    """Return the case of one seed."""
-    seed, by, equipment = asked
+def played(asked: tuple[int, GraspSet | None, Equipment]) -> Case:
+    """Return the case of one seed: its rate with new subjects on the grasps of `others`, else on those of its own."""
+    seed, others, equipment = asked
     grasp_set = recorded(seed)
     search = Search(
         methods=("id3",),
@@ -84,7 +82,7 @@ def played(asked: tuple[int, By, Equipment]) -> Case:
         rounds=10,
         finalists=2,
         seed=seed,
-        by="subject" if by == "new subject" else "trial",
+        by="trial" if others is None else "subject",
     )
     samples = Samples.of(grasp_set)
     cuts = Cuts.of(samples, search)
@@ -96,7 +94,7 @@ def played(asked: tuple[int, By, Equipment]) -> Case:
     several = [design for close in closes for design in designs(close, equipment.joints)]
     fronts = best_designs(several)
     luck = lucks(fronts, several, screened, cuts, seed)
-    fresh = strangers() if by == "new subject" else recorded(seed, more=MORE)
+    fresh = recorded(seed, more=MORE) if others is None else others
     best = [design for design in fronts[0] if design.frame.us <= BUDGET_US or design is fronts[0][0]][-1]
     tables = tables_from_bytes(best.tables.content)
     columns = list(best.close.screened.columns)
@@ -110,7 +108,8 @@ def cases(seeds: Iterable[int], by: By, jobs: int) -> list[Case]:
     """Return the cases of these seeds, in any order."""
     with tempfile.TemporaryDirectory() as folder, Store(Path(folder) / "store", "") as store:
         equipment = equipment_for(TARGET, wirings(None, TARGET), Cache(store, lambda _done, _all: None, jobs=1))
-    asked = [(seed, by, equipment) for seed in seeds]
+    others = strangers() if by == "new subject" else None
+    asked = [(seed, others, equipment) for seed in seeds]
     found: list[Case] = []
     for case in in_workers(played, asked, jobs):
         found.append(case)
