@@ -63,6 +63,10 @@ class TwoValued:
         """Nothing is missing here."""
         return
 
+    def n_splits(self, position: int) -> int:
+        """One."""
+        return 1
+
     def threshold(self, position: int, split: int) -> float:
         """Return the value between the two of the column."""
         return float(self.thresholds[position])
@@ -100,6 +104,10 @@ class ManyValued:
         """Return (n,) whether the column has no value."""
         absent: NDArray[np.bool_] = self._bins[position] == len(self._edges[position]) + 1
         return absent
+
+    def n_splits(self, position: int) -> int:
+        """In how many places column number `position` of this group may be split."""
+        return len(self._edges[position])
 
     def threshold(self, position: int, split: int) -> float:
         """Return the value between the two that the split parts."""

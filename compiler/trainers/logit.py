@@ -1,0 +1,40 @@
+"""The additive multinomial logit."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from .base import Report, Setting, Trainer
+
+if TYPE_CHECKING:
+    from ..samples import Samples
+    from ..tables.collapse import ScoreTables
+
+
+class Logit(Trainer):
+    """Multinomial logistic regression on tables of each input, with a penalty; convex, so it has one answer."""
+
+    name = "logit"
+    what = "multinomial logistic regression on a table for each input"
+    settings = (
+        Setting("penalty", "Pull of all scores towards zero.", float, 1.0, 1e-6, 1e6),
+        Setting("smoothness", "Pull of a joint's neighbouring bins towards each other.", float, 1.0, 0.0, 1e6),
+        Setting("max_bins", "At most so many bins a joint: smaller tables.  [default: no limit]", int, None, 2),
+    )
+
+    def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> "ScoreTables":
+        """Return the tables."""
+        from ..additive.logit import fit_logit
+
+        bins = settings["max_bins"] or 16
+        return fit_logit(
+            samples.switches,
+            samples.codes,
+            samples.labels,
+            samples.n_classes,
+            penalty=settings["penalty"],
+            smoothness=settings["smoothness"],
+            max_bins=bins,
+        )
+
+
+MEMBER = Logit()
