@@ -70,12 +70,14 @@ class Verification(Struct, frozen=True, kw_only=True):
 
     collapse_* compare the ensemble with the float tables, in units of score; integer_* the float tables with the
     integers, in steps. covered counts rows whose margin exceeds safe_margin, covered_changed those of them that change.
-    recognised counts trials, and frames where trials have several. worst looks beyond the rows; scan is there if the
-    build says how to read a harness, firmware if it was asked for.
+    recognised counts trials, and frames where trials have several; independent says that the recordings state each row
+    to be a trial. worst looks beyond the rows; scan is there if the build says how to read a harness, firmware if it
+    was asked for.
     """
 
     same_recordings: bool
     rows: int
+    independent: bool
     collapse_difference: float
     collapse_bound: float
     integer_difference: float
@@ -146,6 +148,7 @@ def verify(
     return Verification(
         same_recordings=grasp_set.fingerprint() == build.manifest.source.fingerprint,
         rows=len(grasp_set),
+        independent=grasp_set.independent,
         collapse_difference=comparison.collapse_difference,
         collapse_bound=comparison.collapse_bound,
         integer_difference=comparison.integer_difference,
