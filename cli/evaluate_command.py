@@ -66,7 +66,7 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     show_default=True,
     help="Repeats of random folds, other seeds each.",
 )
-@trainer_option
+@trainer_option("logitboost")
 @click.option("--prune", type=click.IntRange(min=0), default=0, show_default=True, help="S: smallest node ID3 splits.")
 @click.option(
     "--prune-list",

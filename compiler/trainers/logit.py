@@ -21,6 +21,13 @@ class Logit(Trainer):
         Setting("max_bins", "At most so many bins a joint: smaller tables.  [default: no limit]", int, None, 2),
     )
 
+    tried = tuple(
+        {"penalty": penalty, "smoothness": smoothness, "max_bins": bins}
+        for penalty in (10.0, 1.0, 0.1)
+        for smoothness in (10.0, 1.0)
+        for bins in (8, 16)
+    )
+
     def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> "ScoreTables":
         """Return the tables."""
         from ..additive.logit import fit_logit
