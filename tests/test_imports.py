@@ -55,10 +55,18 @@ ALLOWED = {
     ),
     "compiler.boosting": ("runtime", "drivers.errors", "compiler.boosting", "compiler.elementary", "compiler.limits"),
     "compiler.tables": ("runtime", "drivers.errors", "compiler.boosting", "compiler.elementary", "compiler.tables"),
+    "compiler.additive": (
+        "drivers.errors",
+        "compiler.additive",
+        "compiler.boosting",
+        "compiler.elementary",
+        "compiler.tables",
+    ),
     "compiler.trainers": (
         "runtime",
         "drivers.errors",
         "drivers.members",
+        "compiler.additive",
         "compiler.boosting",
         "compiler.samples",
         "compiler.tables",

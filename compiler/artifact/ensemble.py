@@ -161,4 +161,4 @@ def _lines(arrays: Mapping[str, AnyArray], what: str) -> tuple[Line, ...]:
     lines, rows = arrays["lines"].astype(np.int64), arrays["line_rows"].astype(np.float64)
     if lines.ndim != 2 or rows.ndim != 2 or lines.shape != (len(rows), 3) or not len(rows):
         raise BuildError(f"{what} is damaged: its lines are no table")
-    return tuple(Line(*ends, row) for ends, row in zip(lines.tolist(), rows, strict=True))
+    return tuple(Line(joint, low, high, row) for (joint, low, high), row in zip(lines.tolist(), rows, strict=True))

@@ -92,7 +92,7 @@ def predictions(data: Data, fit: FoldFit, training: Training) -> Labels:
     if fit.learner in CLASSIFIERS:
         return grasps[CLASSIFIERS[fit.learner].answers(learning, np.hstack([closed, codes[fit.fold.test]]))]
     if fit.learner not in ("", training.trainer):
-        training = Training(fit.learner, TRAINERS.named(fit.learner).given(Options()))
+        training = Training.of(Options(trainer=fit.learner))
     return grasps[winners(model_scores(training.train(learning), closed, codes[fit.fold.test]))]
 
 
