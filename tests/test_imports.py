@@ -60,6 +60,7 @@ ALLOWED = {
         "compiler.additive",
         "compiler.boosting",
         "compiler.elementary",
+        "compiler.limits",
         "compiler.tables",
     ),
     "compiler.trainers": (
