@@ -56,7 +56,6 @@ ALLOWED = {
     "compiler.boosting": ("runtime", "drivers.errors", "compiler.boosting", "compiler.elementary", "compiler.limits"),
     "compiler.tables": ("runtime", "drivers.errors", "compiler.boosting", "compiler.elementary", "compiler.tables"),
     "compiler.additive": (
-        "runtime",
         "drivers.errors",
         "compiler.additive",
         "compiler.boosting",

@@ -23,6 +23,13 @@ class Logit(Trainer):
         ),
     )
 
+    tried = tuple(
+        {"penalty": penalty, "smoothness": smoothness, "max_bins": bins}
+        for penalty in (10.0, 1.0, 0.1)
+        for smoothness in (10.0, 1.0)
+        for bins in (8, 16)
+    )
+
     def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> "ScoreTables":
         """Return the tables. Raises BoostingError for settings that make no sense."""
         from ..additive.logit import BINS, fit_logit
