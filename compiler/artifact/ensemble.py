@@ -16,11 +16,11 @@ from msgspec import Meta
 
 from thenar.runtime.errors import BuildError
 from thenar.runtime.sealed import seal, unseal
-from thenar.runtime.tables import MAX_CLASSES, MAX_JOINTS, MAX_SWITCHES
+from thenar.runtime.tables import HIGHEST_CODE, MAX_CLASSES, MAX_JOINTS, MAX_SWITCHES
 
 from ..boosting.stumps import Stumps
 from ..recordings.arrays import AnyArray, pack, unpack
-from ..tables.collapse import HIGHEST_CODE, Line, Model, ScoreTables
+from ..tables.collapse import Line, Model, ScoreTables
 
 KIND = b"THNRENSM"
 STUMPS, TABLES, LINES = 1, 2, 3  # formats
@@ -161,4 +161,4 @@ def _lines(arrays: Mapping[str, AnyArray], what: str) -> tuple[Line, ...]:
     lines, rows = arrays["lines"].astype(np.int64), arrays["line_rows"].astype(np.float64)
     if lines.ndim != 2 or rows.ndim != 2 or lines.shape != (len(rows), 3) or not len(rows):
         raise BuildError(f"{what} is damaged: its lines are no table")
-    return tuple(Line(*ends, row) for ends, row in zip(lines.tolist(), rows, strict=True))
+    return tuple(Line(joint, low, high, row) for (joint, low, high), row in zip(lines.tolist(), rows, strict=True))
