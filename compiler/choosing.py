@@ -1,8 +1,9 @@
 """The fit is chosen inside the training rows: which trainer, with which settings, by inner folds.
 
 Inner folds part no trial; and where the fit is to recognise a new subject (object, session), they leave subjects out as
-well. Each way to train is scored by the trials that it recognises there, ties by the log-loss. Of those within one
-standard error of the best one, the one with the smallest tables is taken, the most regular of several.
+well. Each way to train is scored by the trials that it recognises there, ties by the log-loss. Of those that are behind
+the best one by no more than the standard error of that difference, those with small tables are cheap to recognise with;
+of these, the one with the lowest log-loss is taken.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -28,6 +29,8 @@ Rows = NDArray[np.intp]
 # A training set of so many trials is cut into so many inner folds: of many trials, halves tell enough.
 _FOLDS = ((400, 4), (1500, 3))
 _LEAST_GROUPS = 3
+# Tables up to so many times as large as the smallest are small: more bins cost flash, and next to no time.
+_SMALL = 2
 
 
 def inner_folds(samples: Samples, seed: int, groups: NDArray[np.generic] | None = None) -> list[Fold]:
@@ -201,7 +204,8 @@ def _fitting(candidates: Sequence[Training], scores: list[_Score], of: Of, n_fol
             )
         )
     near = [one for one, each in enumerate(found) if each.behind <= each.behind_error]
-    chosen = min(near, key=lambda one: (found[one].rows, one))
+    small = _SMALL * min(found[one].rows for one in near)
+    chosen = min((one for one in near if found[one].rows <= small), key=lambda one: (found[one].loss, one))
     shown = {
         min(
             (one for one, each in enumerate(found) if each.trainer == name),
@@ -226,6 +230,6 @@ def _why(found: list[Compared], best: int, chosen: int) -> str:
     if chosen == best:
         return f"it recognises the most, {rate}"
     return (
-        f"it recognises {rate}, within one standard error of the best, {top.trainer} with {100 * top.rate:.1f} %, "
-        "and has the smallest tables of those"
+        f"it recognises {rate}, within one standard error of the best, {top.name}, with {100 * top.rate:.1f} %; of "
+        "those with small tables it has the lowest log-loss"
     )
