@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Compared, Fitting, Of
 
-from .boosting.stumps import Stumps
 from .elementary import softmax_and_loss
 from .evaluation.folds import Fold, leave_one_out, trial_folds
 from .samples import Samples, decided
-from .tables.collapse import Model, model_scores
+from .tables.collapse import Model, ScoreTables, collapse, model_scores
 from .trainers.base import TRAINERS, Training
 from .workers import in_workers
 
@@ -136,7 +135,11 @@ def _tested(task: _Task) -> tuple[str, list[int], list[_Test]]:
         scores = model_scores(model, test.switches, test.codes)
         answers = decided(scores.argmax(axis=1)[np.newaxis], trial)[0]
         loss = softmax_and_loss(np.ascontiguousarray(scores.T), test.labels, weights)[1] * len(first)
-        found.append(_Test(fold.test[first], answers == test.labels[first], loss, _table_rows(model)))
+        found.append(
+            _Test(
+                fold.test[first], answers == test.labels[first], loss, _table_rows(collapse(model, samples.n_switches))
+            )
+        )
     return fold.name, batch, found
 
 
@@ -148,13 +151,10 @@ def _models(trainings: list[Training], samples: Samples) -> Iterator[Model]:
         yield from trainings[int(np.argmax(rounds))].stages(samples, rounds)
 
 
-def _table_rows(model: Model) -> int:
-    """Return how many rows of scores the model's tables hold: one a switch, one a bin of a joint, for those in use."""
-    if isinstance(model, Stumps):
-        used = np.unique(np.stack([model.columns.ravel(), np.floor(model.thresholds.ravel())]), axis=1)[0]
-        return len(used) + len(np.unique(used))
-    joints = [len(rows) for rows in model.joint_rows if rows.any()]
-    return int(model.switch_rows.any(axis=1).sum()) + sum(joints)
+def _table_rows(tables: ScoreTables) -> int:
+    """Return how many rows of scores tables hold for inputs in use: one a switch, a bin of a joint, a line."""
+    in_use = [len(rows) for rows in tables.joint_rows if rows.any()]
+    return int(tables.switch_rows.any(axis=1).sum()) + sum(in_use) + sum(bool(line.row.any()) for line in tables.lines)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
