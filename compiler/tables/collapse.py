@@ -12,10 +12,10 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.tables import HIGHEST_CODE
+
 from ..boosting.stumps import Stumps, spread
 from ..elementary import add_exactly
-
-HIGHEST_CODE = 65535
 
 # Rows of answers that are written out at a time: of 1000 classes, 2 MB.
 _WRITTEN_OUT = 256
