@@ -1,7 +1,5 @@
 """Random integer tables with slopes, and the shapes that firmware of them is tried in."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from thenar.runtime.tables import COARSE, IntegerTables, Slope
@@ -59,8 +57,3 @@ def _slope(random: np.random.Generator, joint: int, classes: int, top: int, slop
     row = random.integers(-128, 128, classes) // slopes
     row[random.random(classes) < 0.2] = 0
     return Slope(joint, low, low + span, gain, row.astype(np.int8))
-
-
-def with_slope(tables: IntegerTables, slope: Slope) -> IntegerTables:
-    """Return tables with that slope alone."""
-    return replace(tables, slopes=(slope,))
