@@ -21,12 +21,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.tables import HIGHEST_CODE
+
 from ..boosting.binning import bin_columns
 from ..boosting.boost import BoostingError, check_rows
 from ..boosting.exactsums import dot, on_one_grid
 from ..elementary import add_up, softmax_and_loss
 from ..limits import check_memory
-from ..tables.collapse import HIGHEST_CODE, Floats, ScoreTables
+from ..tables.collapse import Floats, ScoreTables
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

@@ -12,6 +12,7 @@ from sklearn.base import clone
 
 from thenar.runtime.build import Build as LoadedBuild
 from thenar.runtime.manifest import By, Inputs, Options, TableBits
+from thenar.runtime.tables import HIGHEST_CODE
 
 from ..additive.classifier import AdditiveLogitClassifier
 from ..additive.logit import ColumnTables
@@ -28,7 +29,7 @@ from ..placement.selectors import SwitchSelector
 from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
-from ..tables.collapse import HIGHEST_CODE, Model, ScoreTables
+from ..tables.collapse import Model, ScoreTables
 from ..tables.quantise import integer_scores
 from . import CompileError
 from .compile import Making, Wired, check_target
