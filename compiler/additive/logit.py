@@ -14,19 +14,21 @@ which all sums are exact: so neither the order of frames nor the machine has a p
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.tables import HIGHEST_CODE
+
 from ..boosting.binning import bin_columns
 from ..boosting.boost import BoostingError, check_rows
 from ..boosting.exactsums import dot, on_one_grid
 from ..elementary import add_up, softmax_and_loss
 from ..limits import check_memory
-from ..tables.collapse import HIGHEST_CODE, Floats, ScoreTables
+from ..tables.collapse import Floats, ScoreTables
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -36,7 +38,7 @@ PENALTY, SMOOTHNESS = 1.0, 10.0
 # Of the penalty: what pulls each bin, whose neighbours hold it already, and the bias, which must only stay finite.
 BIN_SHARE, BIAS_SHARE = 2.0**-4, 2.0**-10
 # No derivative of the loss is larger at the answer than this, in the weight of all frames together.
-TOLERANCE = 1e-7
+TOLERANCE, FINEST = 1e-7, 1e-12
 # Of Newton's steps, of conjugate gradients in a step, and of halvings of a step: far more than was ever seen.
 _MOST_STEPS, _MOST_DIRECTIONS, _MOST_HALVINGS = 500, 2000, 40
 _ENOUGH = 1e-4  # of the slope that Armijo's rule wants to see
@@ -64,6 +66,11 @@ class ColumnTables:
             scores += rows[_bins(np.asarray(x, np.float64), edges)]
         return scores
 
+    def columns(self, order: Sequence[int]) -> "ColumnTables":
+        """Return these of the columns in another order."""
+        edges, rows = (tuple(part[column] for column in order) for part in (self.edges, self.rows))
+        return ColumnTables(self.bias, edges, rows)
+
     def score_tables(self, n_switches: int) -> ScoreTables:
         """Return the tables of [switches | joint codes], the first `n_switches` columns being switches."""
         bias, switch_rows = self.bias, np.zeros((n_switches, len(self.bias)))
@@ -88,18 +95,21 @@ def fit_logit(
     penalty: float = PENALTY,
     smoothness: float = SMOOTHNESS,
     max_bins: int | None = BINS,
+    tolerance: float = TOLERANCE,
     weights: Floats | None = None,
-    on_step: Callable[[], None] | None = None,
 ) -> ColumnTables:
     """Fit X (n, d) numbers (NaN: missing), labels (n,) in 0..n_classes-1, weights (n,) >= 0.
 
     `penalty` pulls rows towards zero, `smoothness` those of neighbouring bins towards each other; columns have at most
-    `max_bins` bins (2 or more; None: one for each value), that hold frames as evenly as can be. Raises BoostingError.
+    `max_bins` bins (2 or more; None: one for each value), that hold frames as evenly as can be. No derivative of the
+    loss is larger at the answer than `tolerance` times the sum of weights. Raises BoostingError.
     """
     if not (0 < penalty < math.inf and 0 <= smoothness < math.inf):
         raise BoostingError(f"penalty={penalty} must be above 0, and smoothness={smoothness} at least 0, both finite")
     if max_bins is not None and max_bins < 2:
         raise BoostingError(f"max_bins={max_bins} must be at least 2: one bin tells nothing")
+    if not FINEST <= tolerance < 1:
+        raise BoostingError(f"tolerance={tolerance} must be at least {FINEST:g} and below 1")
     check_rows(X, labels, n_classes, weights)
     check_memory(len(X), n_classes, BoostingError, *X.shape[1:])
     scale = 1.0
@@ -108,7 +118,7 @@ def fit_logit(
         scale = float(np.ldexp(1.0, -np.frexp(weights.max())[1]))
         weights = on_one_grid(weights * scale, len(X))
     columns = _columns(X, max_bins, weights)
-    rows = _Fit(columns, labels, n_classes, penalty * scale, smoothness * scale, weights).minimum(on_step)
+    rows = _Fit(columns, labels, n_classes, penalty * scale, smoothness * scale, weights).minimum(tolerance)
     held = np.ones(len(X)) if weights is None else weights
     bias, *tables = np.split(rows, np.cumsum([1, *(column.n_rows for column in columns[:-1])])) if columns else [rows]
     tabled = tuple(column.table(own, held) for column, own in zip(columns, tables, strict=True))
@@ -200,18 +210,16 @@ class _Fit:
         ends = np.pad(self._joint, ((1, 1), (0, 0)))
         self._stiffness = self._pull + ends[1:] + ends[:-1]
 
-    def minimum(self, on_step: Callable[[], None] | None = None) -> Floats:
-        """Return the rows at which no derivative is beyond TOLERANCE of the weight of all frames."""
+    def minimum(self, tolerance: float) -> Floats:
+        """Return the rows at which no derivative is beyond `tolerance` times the weight of all frames."""
         point = self._at(np.zeros((len(self._pull), self._member.shape[1])))
-        wanted, steepest = TOLERANCE * self._total, _largest(point.gradient)
+        wanted, steepest = tolerance * self._total, _largest(point.gradient)
         for _ in range(_MOST_STEPS):
             steep = _largest(point.gradient)
             if steep <= wanted:
                 return point.rows
             unsolved = max(steep * min(_LOOSEST, math.sqrt(steep / steepest)), _TIGHTEST * wanted)
             point = self._along(point, self._direction(point, unsolved))
-            if on_step is not None:
-                on_step()
         raise BoostingError(
             f"no minimum was found in {_MOST_STEPS} steps: the penalty is too small for weights as unlike as these"
         )
