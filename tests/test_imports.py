@@ -57,6 +57,7 @@ ALLOWED = {
     "compiler.tables": ("runtime", "drivers.errors", "compiler.boosting", "compiler.elementary", "compiler.tables"),
     "compiler.additive": (
         "drivers.errors",
+        "runtime.tables",
         "compiler.additive",
         "compiler.boosting",
         "compiler.elementary",
