@@ -1,8 +1,9 @@
 """The fit is chosen inside the training rows: which trainer, with which settings, by inner folds.
 
 Inner folds part no trial; and where the fit is to recognise a new subject (object, session), they leave subjects out as
-well. Each way to train is scored by the trials that it recognises there, ties by the log-loss. Of those within one
-standard error of the best one, the one with the smallest tables is taken, the most regular of several.
+well. Each way to train is scored by the trials that it recognises there, ties by the log-loss. Of those that are behind
+the best one by no more than the standard error of that difference, those with small tables are cheap to recognise with;
+of these, the one with the lowest log-loss is taken.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -15,11 +16,10 @@ from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Compared, Fitting, Of
 
-from .boosting.stumps import Stumps
 from .elementary import softmax_and_loss
 from .evaluation.folds import Fold, leave_one_out, trial_folds
 from .samples import Samples, decided
-from .tables.collapse import Model, model_scores
+from .tables.collapse import Model, ScoreTables, collapse, model_scores
 from .trainers.base import TRAINERS, Training
 from .workers import in_workers
 
@@ -28,6 +28,8 @@ Rows = NDArray[np.intp]
 # A training set of so many trials is cut into so many inner folds: of many trials, halves tell enough.
 _FOLDS = ((400, 4), (1500, 3))
 _LEAST_GROUPS = 3
+# Tables up to so many times as large as the smallest are small: more bins cost flash, and next to no time.
+_SMALL = 2
 
 
 def inner_folds(samples: Samples, seed: int, groups: NDArray[np.generic] | None = None) -> list[Fold]:
@@ -133,7 +135,11 @@ def _tested(task: _Task) -> tuple[str, list[int], list[_Test]]:
         scores = model_scores(model, test.switches, test.codes)
         answers = decided(scores.argmax(axis=1)[np.newaxis], trial)[0]
         loss = softmax_and_loss(np.ascontiguousarray(scores.T), test.labels, weights)[1] * len(first)
-        found.append(_Test(fold.test[first], answers == test.labels[first], loss, _table_rows(model)))
+        found.append(
+            _Test(
+                fold.test[first], answers == test.labels[first], loss, _table_rows(collapse(model, samples.n_switches))
+            )
+        )
     return fold.name, batch, found
 
 
@@ -145,13 +151,10 @@ def _models(trainings: list[Training], samples: Samples) -> Iterator[Model]:
         yield from trainings[int(np.argmax(rounds))].stages(samples, rounds)
 
 
-def _table_rows(model: Model) -> int:
-    """Return how many rows of scores the model's tables hold: one a switch, one a bin of a joint, for those in use."""
-    if isinstance(model, Stumps):
-        used = np.unique(np.stack([model.columns.ravel(), np.floor(model.thresholds.ravel())]), axis=1)[0]
-        return len(used) + len(np.unique(used))
-    joints = [len(rows) for rows in model.joint_rows if rows.any()]
-    return int(model.switch_rows.any(axis=1).sum()) + sum(joints)
+def _table_rows(tables: ScoreTables) -> int:
+    """Return how many rows of scores tables hold for inputs in use: one a switch, a bin of a joint, a line."""
+    in_use = [len(rows) for rows in tables.joint_rows if rows.any()]
+    return int(tables.switch_rows.any(axis=1).sum()) + sum(in_use) + sum(bool(line.row.any()) for line in tables.lines)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -201,7 +204,8 @@ def _fitting(candidates: Sequence[Training], scores: list[_Score], of: Of, n_fol
             )
         )
     near = [one for one, each in enumerate(found) if each.behind <= each.behind_error]
-    chosen = min(near, key=lambda one: (found[one].rows, one))
+    small = _SMALL * min(found[one].rows for one in near)
+    chosen = min((one for one in near if found[one].rows <= small), key=lambda one: (found[one].loss, one))
     shown = {
         min(
             (one for one, each in enumerate(found) if each.trainer == name),
@@ -226,6 +230,6 @@ def _why(found: list[Compared], best: int, chosen: int) -> str:
     if chosen == best:
         return f"it recognises the most, {rate}"
     return (
-        f"it recognises {rate}, within one standard error of the best, {top.trainer} with {100 * top.rate:.1f} %, "
-        "and has the smallest tables of those"
+        f"it recognises {rate}, within one standard error of the best, {top.name}, with {100 * top.rate:.1f} %; of "
+        "those with small tables it has the lowest log-loss"
     )

@@ -21,13 +21,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.tables import HIGHEST_CODE
+
 from ..boosting.binning import bin_columns
 from ..boosting.boost import BoostingError, check_rows
 from ..boosting.exactsums import dot, exact_sum, on_one_grid
 from ..elementary import add_up, softmax_and_loss
 from ..limits import check_memory
-from thenar.runtime.tables import HIGHEST_CODE
-
 from ..tables.collapse import Floats, Line, ScoreTables
 
 if TYPE_CHECKING:

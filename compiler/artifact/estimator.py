@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from sklearn.base import clone
 
 from thenar.runtime.build import Build as LoadedBuild
-from thenar.runtime.tables import HIGHEST_CODE
 from thenar.runtime.manifest import By, Inputs, Options, TableBits
+from thenar.runtime.tables import HIGHEST_CODE
 
 from ..additive.classifier import AdditiveLogitClassifier
 from ..additive.logit import ColumnTables

@@ -158,7 +158,7 @@ _WRONG: list[Callable[[Manifest], Manifest]] = [
     lambda m: replace(m, proof=replace(m.proof, error=1e308)),
     lambda m: replace(m, rates=(replace(m.rates[0], total=0, correct=0),)),
     lambda m: replace(m, rates=(replace(m.rates[0], correct=m.rates[0].total + 1),)),
-    lambda m: replace(m, stopped_after=m.options.rounds + 1),
+    lambda m: replace(m, stopped_after=101),
     lambda m: replace(m, options=replace(m.options, rounds=0)),
     lambda m: replace(m, options=replace(m.options, shrinkage=1e308)),
 ]
