@@ -1,5 +1,6 @@
 """The classifier in AVR assembly: which registers hold the sums, and where each look-up finds its row."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 from . import FirmwareError
@@ -13,6 +14,7 @@ _LPM_REACH = 65536
 # rcall reaches 4 KiB either way; all that update() does about a look-up must stay within that.
 _NEAR_BYTES = 3600
 _LOOKUP_BYTES, _JOINT_BYTES = 104, 54  # without comparisons
+_SLOPE_BYTES = 80  # but for its products, which no near call reaches across
 
 
 Row = dict[str, object]  # of the template's lists
@@ -48,9 +50,12 @@ def assembly_values(name: str, names: Names, layout: Layout, *, near: bool) -> d
         "kept": kept_registers(layout),
         "zero_rows": [lookup.zero_row for lookup in layout.lookups],
         "n_sources": len(inputs_seen(layout)),
+        "n_seen_slopes": len(layout.tables.slopes),
+        "halves": layout.entry_shift == 8,
+        "clean": layout.biased and not layout.entry_shift,  # r1 is zero between look-ups
         "n_found": sum(bool(lookup.joints) for lookup in layout.lookups),
         "tables": [
-            (f"thenar_{name}_rows", layout.n_rows * len(parts.firsts) * stride),
+            *([(f"thenar_{name}_rows", layout.n_rows * len(parts.firsts) * stride)] if layout.n_rows else []),
             *([(f"thenar_{name}_bins", bins)] if bins else []),
         ],
     }
@@ -68,7 +73,8 @@ def calls_are_near(layout: Layout) -> bool:
     joints = sum(_JOINT_BYTES + 4 * len(joint.thresholds) * joint.compared for joint in layout.joints)
     passes = len(layout.parts.firsts)
     wide = sum(4 * len(joint.thresholds) * joint.compared for joint in layout.joints) * (layout.code_bits == 16)
-    return _LOOKUP_BYTES * len(layout.lookups) * passes + joints + wide < _NEAR_BYTES
+    each = _LOOKUP_BYTES * len(layout.lookups) + _SLOPE_BYTES * len(layout.tables.slopes)
+    return each * passes + joints + wide < _NEAR_BYTES
 
 
 def _registers(layout: Layout) -> list[int]:
@@ -112,8 +118,45 @@ def _pass(names: Names, layout: Layout, number: int, steps: "_Steps") -> Row:
         "scores": 2 * first,
         "again": parts.firsts[number - 1] + parts.width - first if number else 0,
         "steps": [steps.step(lookup, number) for lookup in layout.lookups],
+        "slopes": [_slope(steps.name, names, layout, at, first) for at in range(len(layout.tables.slopes))],
         "last": number == len(parts.firsts) - 1,
     }
+
+
+def _slope(name: str, names: Names, layout: Layout, at: int, first: int) -> Row:
+    """Return a slope: its code in the input, how that is held within its range and scaled, and what it multiplies:
+    entries, each with the sums that it is added to, or subtracted from.
+    """
+    slope, bits, registers = layout.tables.slopes[at], layout.code_bits, _registers(layout)
+    place = len(layout.groups) + layout.padding + slope.joint * bits // 8
+    index = len(layout.lookups) + len(inputs_seen(layout)) + at
+    return {
+        "index": index,
+        "what": comment(names.joints[slope.joint].name),
+        "source": f"thenar_{name}_input + {place}",
+        "wide": bits == 16,
+        "low": slope.low,
+        "span": slope.high - slope.low,
+        "upper": slope.high < (1 << bits) - 1,
+        "doubled": max(slope.gain, 0),
+        "halved": max(-slope.gain, 0),
+        "zero": slope.zero,
+        "entries": [
+            (entry, [(registers[k], alike) for k, alike in sums])
+            for entry, sums in _products(slope.row[first : first + len(registers)].tolist())
+        ],
+    }
+
+
+def _products(row: Sequence[int]) -> list[tuple[int, list[tuple[int, bool]]]]:
+    """Return what a slope's row multiplies: each entry that is not zero, but for those that are equal to another or its
+    negative, and the classes that it is of, with whether it is theirs or its negative is.
+    """
+    found: dict[int, list[int]] = {}
+    for k, entry in enumerate(row):
+        if entry:
+            found.setdefault(abs(entry), []).append(k)
+    return [(row[classes[0]], [(k, row[k] == row[classes[0]]) for k in classes]) for classes in found.values()]
 
 
 class _Steps:
@@ -122,7 +165,7 @@ class _Steps:
     """
 
     def __init__(self, name: str, names: Names, layout: Layout) -> None:
-        self._name, self._names, self._layout = name, names, layout
+        self.name, self.names, self._layout = name, names, layout
         indexed = [lookup.index for lookup in layout.lookups if lookup.joints and prepared(layout)]
         self._found = {index: f"thenar_{name}_found + {at}" for at, index in enumerate(indexed)}
         places = enumerate(inputs_seen(layout), len(layout.lookups))
@@ -132,7 +175,7 @@ class _Steps:
         """Return a look-up in a pass for the classes of a part."""
         layout = self._layout
         row = part * layout.n_rows + lookup.first_row
-        seen = f"thenar_{self._name}_seen + {lookup.index}"
+        seen = f"thenar_{self.name}_seen + {lookup.index}"
         step: Row = {
             "index": lookup.index,
             "what": self._what(lookup),
@@ -175,11 +218,11 @@ class _Steps:
 
     def _what(self, lookup: Lookup) -> str:
         groups = [self._layout.groups[lookup.group]] if lookup.group is not None else []
-        joints = [comment(self._names.joints[joint.number].name) for joint in lookup.joints]
+        joints = [comment(self.names.joints[joint.number].name) for joint in lookup.joints]
         return ", ".join([*(f"switches {numbers[0]} to {numbers[-1]}" for numbers in groups), *joints])
 
     def _input(self, place: int) -> str:
-        return f"thenar_{self._name}_input + {place}"
+        return f"thenar_{self.name}_input + {place}"
 
     def _source(self, place: int) -> Row:
         wide = self._layout.code_bits == 16 and place >= len(self._layout.groups)

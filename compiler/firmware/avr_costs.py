@@ -1,10 +1,12 @@
 """Cycles, flash and RAM of the classifier on an AVR, counted in its assembly as it is rendered, instruction by
 instruction along the longest path.
 
-All frames take equally long but for one thing: each class that is better than all before it costs a cycle.
+All frames take equally long but for two things: each class that is better than all before it costs a cycle, and so
+does each code of 16 bits that is beyond the ends of a slope.
 """
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import NamedTuple
@@ -21,12 +23,16 @@ from .words import numbered
 
 # AVR Instruction Set Manual, DS40002198, table 5-1: cores AVRe (ATmega328P) and AVRe+ (ATmega2560), whose program
 # counter of three bytes makes calls and returns a cycle longer. A branch or a skip that is taken costs more.
-_ONE = "adc add and clr cp cpc cpi eor inc ldi lsl mov movw sbc sbci sub subi tst brcc breq brge brlo brne cpse"
-_TWO = "ld ldd lds mul pop push rjmp st sts"
-_CYCLES = dict.fromkeys(_ONE.split(), 1) | dict.fromkeys(_TWO.split(), 2) | {"lpm": 3, "jmp": 3}
+_ONE = "adc add and clr cp cpc cpi eor inc ldi lsl lsr mov movw neg ror sbc sbci sub subi tst"
+_TWO = "ld ldd lds mul muls pop push st sts"
+_CYCLES = dict.fromkeys(_ONE.split(), 1) | dict.fromkeys(_TWO.split(), 2) | {"lpm": 3}
+_JUMPS = {"rjmp": 2, "jmp": 3}
 _CALLS = {"rcall": 3, "call": 4, "ret": 4}
 _TWO_WORDS = ("lds", "sts", "call", "jmp")
 _COMMENT, _LOOP = re.compile(r"/\*.*?\*/", re.DOTALL), re.compile(r"/\* (\d+) times \*/")
+
+
+Pick = Callable[[tuple[int, int]], int]
 
 
 class Instruction(NamedTuple):
@@ -50,7 +56,7 @@ class Assembly:
         self._code: list[Instruction] = []
         self._labels: dict[str, list[int]] = {}
         self._sections: dict[str, int] = {}
-        self._longest: dict[int, int] = {}
+        self._found: dict[int, tuple[int, int]] = {}
         self._read(text, elpm)
 
     def _read(self, text: str, elpm: bool) -> None:
@@ -87,15 +93,16 @@ class Assembly:
         """Return the bytes of code, of one section or of all."""
         return self._sections[section] if section else sum(self._sections.values())
 
-    def longest(self, label: str) -> int:
-        """Return the most cycles from a label to the return from there, which is counted."""
+    def cycles(self, label: str) -> tuple[int, int]:
+        """Return the fewest and the most cycles from a label to the return from there, which is counted."""
         return self._from(self._labels[label][0])
 
-    def _from(self, start: int) -> int:
-        """Return the most cycles from an instruction to the return."""
-        if start not in self._longest:
-            self._longest[start] = self._path(start, self._end(start) + 1)
-        return self._longest[start]
+    def _from(self, start: int) -> tuple[int, int]:
+        """Return the fewest and the most cycles from an instruction to the return."""
+        if start not in self._found:
+            end = self._end(start) + 1
+            self._found[start] = self._path(start, end, min), self._path(start, end, max)
+        return self._found[start]
 
     def _end(self, start: int) -> int:
         """Return the first instruction that ends what begins at `start`: no branch leads across it."""
@@ -115,31 +122,26 @@ class Assembly:
             return min(p for p in places if p > at) if target[-1] == "f" else max(p for p in places if p <= at)
         return self._labels[target][0] if target in self._labels else -1
 
-    def _path(self, start: int, end: int) -> int:
-        """Return the most cycles of code from `start` on until it comes to `end` or returns."""
+    def _path(self, start: int, end: int, pick: Pick) -> int:
+        """Return the fewest or the most cycles of code from `start` on until it comes to `end` or returns."""
         left = dict.fromkeys(range(end, end + 2), 0)  # cycles from an instruction on
         for at in range(end - 1, start - 1, -1):
-            each = self._code[at]
-            after = left[at + 1]
+            each, after = self._code[at], left[at + 1]
+            to = self._at(each.target, at) if each.target else -1
             if each.name in _CALLS:
                 left[at] = _CALLS[each.name] + self._counter - 2
-                left[at] += 0 if each.name == "ret" else after + self._from(self._at(each.target, at))
-            elif each.name in ("jmp", "rjmp"):
-                to = self._at(each.target, at)
-                left[at] = _CYCLES[each.name] + (self._from(to) if to >= 0 else 0)
+                left[at] += 0 if each.name == "ret" else after + pick(self._from(to))
+            elif each.name in _JUMPS:
+                left[at] = _JUMPS[each.name] + (pick(self._from(to)) if to >= 0 else 0)
             elif each.name == "cpse":
-                left[at] = max(1 + after, 1 + self._code[at + 1].size // 2 + left[at + 2])
-            elif each.name.startswith("br"):
-                left[at] = self._branch(each, at, left)
-            else:
+                left[at] = pick((1 + after, 1 + self._code[at + 1].size // 2 + left[at + 2]))
+            elif not each.name.startswith("br"):
                 left[at] = _CYCLES[each.name] + after
+            elif to > at:
+                left[at] = pick((1 + after, 2 + left[to]))
+            else:
+                left[at] = 1 + after + (each.times - 1) * (2 + self._path(to, at, pick))
         return left[start]
-
-    def _branch(self, each: Instruction, at: int, left: dict[int, int]) -> int:
-        to, after = self._at(each.target, at), left[at + 1]
-        if to > at:
-            return max(1 + after, 2 + left[to])
-        return 1 + after + (each.times - 1) * (2 + self._path(to, at))
 
 
 @lru_cache(maxsize=4096)
@@ -164,12 +166,13 @@ _CALLS_DEEP = 3
 
 Frame = tuple[NDArray[np.bool_], NDArray[np.uint16]]
 
-_DRAWN, _CLIMBED, _ROUNDS = 4096, 8, 20
+_DRAWN, _CLIMBED, _ROUNDS, _BETWEEN = 4096, 8, 20, 33
 
 
 class Counts(NamedTuple):
-    """The most cycles that classify and update take, bytes of all code and of update alone."""
+    """The fewest cycles of classify, the most of it and of update, bytes of all code and of update alone."""
 
+    least: int
     classify: int
     update: int
     size: int
@@ -204,10 +207,10 @@ def _counted(part: _Part, near: bool, elpm: bool) -> Counts:
     layout = replace(part.layout, lookups=part.lookups)
     values = assembly_values("x", numbered(layout.tables), layout, near=near)
     common = {"name": "x", "opening": "", "biased": layout.biased, "width": layout.parts.width}
-    common["classes"] = layout.tables.n_classes
+    common |= {"classes": layout.tables.n_classes, "n_rows": layout.n_rows}
     found = Assembly(render("classifier/thenar_NAME_avr.S.j2", **common, **values), elpm=elpm)
-    cycles = (found.longest(f"thenar_x_{function}") for function in ("classify", "update"))
-    return Counts(*cycles, found.size(), found.size(".text.thenar_x_update"))
+    _, update = found.cycles("thenar_x_update")
+    return Counts(*found.cycles("thenar_x_classify"), update, found.size(), found.size(".text.thenar_x_update"))
 
 
 class AvrCosts:
@@ -220,9 +223,10 @@ class AvrCosts:
     def __init__(self, layout: Layout, flash: int) -> None:
         self._layout, self._counter = layout, 3 if flash > 128 << 10 else 2
         self._near = calls_are_near(layout)
-        self._of_all = (layout.tables.n_classes, layout.entry_bits, layout.sum_bits, layout.code_bits, layout.adding)
-        first, *rest = sorted(layout.lookups, key=lambda lookup: not lookup.joints)
-        self._counts = self._count(first)
+        kind = layout.entry_bits, layout.sum_bits, layout.entry_shift, layout.code_bits, layout.adding
+        self._of_all = (layout.tables.n_classes, layout.tables.slopes, *kind)
+        ordered = sorted(layout.lookups, key=lambda lookup: not lookup.joints)
+        self._counts, rest = self._count(*ordered[:1]), ordered[1:]
         kinds = {bool(lookup.joints): lookup for lookup in layout.lookups}
         around = {kind: self._around(lookup) for kind, lookup in kinds.items()}
         for lookup in rest:
@@ -248,12 +252,12 @@ class AvrCosts:
     @property
     def fixed_cycles(self) -> int:
         """Cycles of classify that every frame takes."""
-        return self._counts.classify - (self._layout.tables.n_classes - 1)
+        return self._counts.least
 
     @property
     def _variables(self) -> int:
         """Bytes that say what the scores are of."""
-        return len(self._layout.lookups) + len(inputs_seen(self._layout))
+        return len(self._layout.lookups) + len(inputs_seen(self._layout)) + len(self._layout.tables.slopes)
 
     @property
     def flash(self) -> int:
@@ -275,12 +279,15 @@ class AvrCosts:
 
 
 def rises(layout: Layout, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDArray[np.int64]:
-    """Return how many classes of each frame, bits (n, s) and codes (n, j), are better than all before them, (n,): the
-    cycles that classify takes beyond the fixed ones.
+    """Return how many classes of each frame, bits (n, s) and codes (n, j), are better than all before them, (n,), and
+    how many codes of 16 bits are beyond their slopes: the cycles that classify takes beyond the fixed ones.
     """
     scores = layout.scores(bits, codes)
     best = np.maximum.accumulate(scores, axis=1)
     cycles: NDArray[np.int64] = np.count_nonzero(scores[:, 1:] > best[:, :-1], axis=1)
+    for slope in layout.tables.slopes if layout.code_bits == 16 else ():
+        beyond = (codes[:, slope.joint] < slope.low) | (codes[:, slope.joint] >= slope.high)
+        cycles = cycles + len(layout.parts.firsts) * beyond
     return cycles
 
 
@@ -304,7 +311,10 @@ def worst_frame(layout: Layout) -> Frame:
 
 def _codes(layout: Layout, number: int) -> NDArray[np.uint16]:
     """Return codes of a joint that differ in row or time: the least of each bin and, below all bins, zero."""
-    steps = layout.tables.thresholds[number].astype(np.int64) + 1
+    steps, slope = layout.tables.thresholds[number].astype(np.int64) + 1, layout.tables.slope_of(number)
+    if slope is not None:
+        between = np.linspace(slope.low, slope.high, _BETWEEN).astype(np.int64)
+        steps = np.unique(np.concatenate([steps, between, [slope.low + 1, slope.high - 1]]))
     return np.concatenate([[0], steps[steps < 1 << layout.code_bits]]).astype(np.uint16)
 
 

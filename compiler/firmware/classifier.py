@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from thenar.firmware_templates.rendering import render
 from thenar.runtime.manifest import Calibration
+from thenar.runtime.tables import Slope
 
 from .assembly import assembly_values, calls_are_near, check_size
 from .costs import MOST_INLINE
@@ -34,9 +35,15 @@ def portable_values(name: str, layout: Layout) -> dict[str, object]:
     lanes = _lanes(parts.width, biased, bits)
     starts, open_sums = (_start_lines(_in_parts(scores, parts), lanes) for scores in (layout.start, layout.all_open))
     n_lanes = max(lane for lane, _ in lanes) + 1
-    adding, replacing = _arithmetic(n_lanes, biased)
+    adding, replacing = _arithmetic(n_lanes, biased, layout.entry_shift)
+    slopes = [slope.row.astype(int) for slope in layout.tables.slopes]
     entries = 32 // layout.entry_bits
     return {
+        "slopes": [
+            _lane_words([row[first : first + parts.width].tolist() for row in slopes], lanes) for first in parts.firsts
+        ],
+        "open_distances": number_lines(slope.distance(0) for slope in layout.tables.slopes),
+        "distances": [_distance(name, slope) for slope in layout.tables.slopes],
         "words": -(-parts.width // entries),
         "lanes": n_lanes,
         "in_words": {2: "two", 4: "four"}[entries],
@@ -49,7 +56,7 @@ def portable_values(name: str, layout: Layout) -> dict[str, object]:
         "finds": [line for lookup in layout.lookups for line in _find(name, layout, lookup)],
         "n_lookups": len(layout.lookups),
         "adding": adding,
-        "storing": _storing(n_lanes, biased),
+        "storing": _storing(n_lanes, biased, layout.entry_shift),
         "replacing": replacing,
     }
 
@@ -123,7 +130,7 @@ def _takes(lanes: Sequence[tuple[int, int]], several: bool, bits: int) -> list[s
     return taken
 
 
-def _arithmetic(lanes: int, biased: bool) -> tuple[list[str], list[str]]:
+def _arithmetic(lanes: int, biased: bool, shift: int) -> tuple[list[str], list[str]]:
     """Return what adds a row to the sums s0, s1..., and the statements that replace one in sum[]."""
     adding, replacing = [], []
     for lane in range(lanes):
@@ -133,16 +140,18 @@ def _arithmetic(lanes: int, biased: bool) -> tuple[list[str], list[str]]:
             row = f"{row} >> 8" if lane % 2 else f"EVEN({row})"
             before, after = f"{macro}({before})", f"{macro}({after})"
         adding.append(f"s{lane} += {row}")
-        replacing.append(f"sum[{lane}] += {after} - {before};")
+        change = f"({after} - {before}) << {shift}" if shift else f"{after} - {before}"
+        replacing.append(f"sum[{lane}] += {change};")
     return adding, replacing
 
 
-def _storing(lanes: int, biased: bool) -> list[str]:
+def _storing(lanes: int, biased: bool, shift: int) -> list[str]:
     """Return the statements that put the sums s0, s1..., in words of two, into sum[]."""
     if not biased:
         return [f"sum[{lane}] = s{lane};" for lane in range(lanes)]
     sums = (f"s{lane} - ((s{lane - 1} >> 16) << 8)" if lane % 2 else f"s{lane}" for lane in range(lanes))
-    return [f"sum[{lane}] = from[{lane}] + {text};" for lane, text in enumerate(sums)]
+    whole = (f"(({text}) << {shift})" if shift else text for text in sums)
+    return [f"sum[{lane}] = from[{lane}] + {text};" for lane, text in enumerate(whole)]
 
 
 def _find(name: str, layout: Layout, lookup: Lookup) -> list[str]:
@@ -165,6 +174,24 @@ def _find(name: str, layout: Layout, lookup: Lookup) -> list[str]:
             found.append(f"thenar_{name}_bins[{_after(joint.first_bin, place)}]")
     statement = f"row[{lookup.index}] = &thenar_{name}_rows[{_after(lookup.first_row, ' + '.join(found))}];"
     return textwrap.wrap(statement, COLUMNS - 8, subsequent_indent=_INDENT, break_long_words=False)
+
+
+def _lane_words(rows: list[list[int]], lanes: Sequence[tuple[int, int]]) -> list[str]:
+    """Return the rows of slopes, for the classes of a part, as initialisers of words of two sums."""
+    found = []
+    for row in rows:
+        words: dict[int, list[int]] = {}
+        for (lane, _), value in zip(lanes, row, strict=True):
+            words.setdefault(lane, []).append(value)
+        found.append(", ".join(f"SLOPE({words[lane][0]}, {(words[lane] + [0])[1]})" for lane in sorted(words)))
+    return found
+
+
+def _distance(name: str, slope: Slope) -> str:
+    """Return the expression of the distance of a slope's code."""
+    above = f"clamped(thenar_{name}_input.codes[{slope.joint}], {slope.low}u, {slope.high - slope.low}u)"
+    shift = f" {'<<' if slope.gain > 0 else '>>'} {abs(slope.gain)}" if slope.gain else ""
+    return f"(int16_t)(({above}{shift}) - {slope.zero})"
 
 
 def _after(first: int, place: str) -> str:
@@ -334,6 +361,7 @@ def _common_values(name: str, names: Names, layout: Layout, avr: bool) -> dict[s
         "parts": len(layout.parts.firsts),
         "width": layout.parts.width,
         "n_rows": layout.n_rows,
+        "n_slopes": len(layout.tables.slopes),
     }
 
 
@@ -351,7 +379,7 @@ def _source_values(names: Names, layout: Layout) -> dict[str, object]:
         "bins": [line for joint in trimmed for line in _bin_lines(names, joint)],
         "n_bins": sum(len(joint.bins) for joint in trimmed),
         "paged": layout.bins == "direct" and bool(trimmed),
-        "clamped": layout.bins == "trimmed" and bool(trimmed),
+        "clamped": (layout.bins == "trimmed" and bool(trimmed)) or bool(layout.tables.slopes),
         "compared": bool(searched),
         "thresholds": number_lines(steps),
         "n_thresholds": len(steps),

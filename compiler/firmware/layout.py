@@ -1,7 +1,7 @@
 """How a build's integer tables lie in a microcontroller's flash: which switches share a look-up, how wide an entry is,
 how a joint's code becomes a row.
 
-    score_k = start_k + sum over look-ups l of rows_l[n_l, k]
+    score_k = start_k + sum over look-ups l of rows_l[n_l, k] + sum over slopes of distance * row[k]
 
 where n_l is the byte of a group of switches, one bit per switch, or is added up from the codes of one or a few joints,
 or both. Every row is the exact sum of its switches' and joints' rows, so the scores are those of `IntegerTables`, bit
@@ -11,7 +11,8 @@ for bit. There are three kinds of entries:
              one switch's change is plus or minus row 2^bit.
     8 bits,  added up in 8, just so, where the proved bound of all scores is at most 127.
     8 bits,  added up in 16, where it is not: entries are what exceeds the least of their look-up and class, 0 to 255;
-             the leasts are part of `start`.
+             the leasts are part of `start`. Where tables have slopes and all these are multiples of 256 (`grid`),
+             entries are of their upper halves.
 """
 
 from collections.abc import Sequence
@@ -21,7 +22,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.tables import COARSE, IntegerTables
 
 from . import FirmwareError
 from .costs import MOST_INLINE
@@ -87,16 +88,17 @@ def _bins(thresholds: NDArray[np.uint16], weight: int, bins: Bins, code_bits: in
     return first, places.astype(np.uint8)
 
 
-def code_bits(thresholds: Sequence[NDArray[np.uint16]]) -> int:
-    """Return the width of the codes, 8 where no joint's thresholds tell codes above 254 apart, else 16."""
-    return 16 if any(len(steps) and steps[-1] >= 255 for steps in thresholds) else 8
+def code_bits(tables: IntegerTables) -> int:
+    """Return the width of the codes, 8 where no joint's thresholds or slope tell codes above 254 apart, else 16."""
+    last = [int(steps[-1]) + 1 for steps in tables.thresholds if len(steps)] + [slope.high for slope in tables.slopes]
+    return 16 if any(code > 255 for code in last) else 8
 
 
-def check_joints(thresholds: Sequence[NDArray[np.uint16]], bins: Bins) -> None:
+def check_joints(tables: IntegerTables, bins: Bins) -> None:
     """Raise FirmwareError if a joint's rows are more than a byte can number, or cannot be found by `bins`."""
-    if bins == "direct" and code_bits(thresholds) == 16:
+    if bins == "direct" and code_bits(tables) == 16:
         raise FirmwareError('codes have 16 bits: their rows are found by "trimmed" or "search", not "direct"')
-    for number, steps in enumerate(thresholds):
+    for number, steps in enumerate(tables.thresholds):
         if len(steps) + 1 > MOST_ROWS:
             raise FirmwareError(
                 f"joint {number} has {len(steps) + 1} rows, firmware has at most {MOST_ROWS} a joint: "
@@ -176,6 +178,11 @@ class Layout:
         return self.entry_bits < self.sum_bits
 
     @property
+    def entry_shift(self) -> int:
+        """How far entries are shifted before they are added: 8 where they are upper halves, else 0."""
+        return 8 if self.entry_bits == 8 and self.tables.grid == COARSE else 0
+
+    @property
     def padding(self) -> int:
         """Bytes, 0 or 1, between the groups' bytes and the codes, so that codes of 16 bits lie at even offsets."""
         return len(self.groups) % 2 if self.code_bits == 16 else 0
@@ -221,7 +228,9 @@ class Layout:
         for lookup in self.lookups:
             row = np.zeros(len(bits), np.int64) if lookup.group is None else groups[:, lookup.group]
             row = sum((joint.places(codes[:, joint.number]) for joint in lookup.joints), row)
-            scores += lookup.rows[row]
+            scores += lookup.rows[row].astype(np.int64) << self.entry_shift
+        for slope in self.tables.slopes:
+            scores += slope.of(codes[:, slope.joint])
         return scores if self.sum_bits == 16 else scores.astype(np.int8).astype(np.int64)
 
     def frame_bytes(self, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDArray[np.uint8]:
@@ -263,12 +272,13 @@ def arrange(
         raise FirmwareError("the build looks at no switch and no joint: there is nothing to make firmware of")
     if entry_bits not in (8, 16):
         raise FirmwareError(f"entries of {entry_bits} bits: firmware has 8 or 16")
-    check_joints(tables.thresholds, bins)
+    check_joints(tables, bins)
+    coarse = tables.grid if entry_bits == 8 else 1
     groups = _grouped(tables.n_switches, group_size, n_groups)
-    sum_bits = 8 if entry_bits == 8 and tables.bound <= MOST_BYTE else 16
+    sum_bits = 8 if entry_bits == 8 and tables.bound <= MOST_BYTE and not tables.slopes else 16
     constant = [joint for joint, steps in enumerate(tables.thresholds) if len(steps) == 0]
     start = sum((tables.joint_rows[joint][0].astype(np.int64) for joint in constant), tables.bias.astype(np.int64))
-    wide = code_bits(tables.thresholds)
+    wide = code_bits(tables)
     made: list[Lookup] = []
     first_row = first_bin = first_step = 0
     for group, numbers in _all_shared(tables, len(groups), shared):
@@ -288,7 +298,13 @@ def arrange(
         what += f" {', '.join(map(str, numbers))}" if numbers else ""
         least = rows.min(axis=0) if entry_bits < sum_bits else 0 * rows[0]
         made.append(
-            Lookup(len(made), first_row, _entries(rows - least, entry_bits, sum_bits, what), group, tuple(joints))
+            Lookup(
+                len(made),
+                first_row,
+                _entries((rows - least) // coarse, entry_bits, sum_bits, what),
+                group,
+                tuple(joints),
+            )
         )
         start, first_row = start + least, first_row + len(rows)
     if first_row > MOST_TABLE_ROWS:

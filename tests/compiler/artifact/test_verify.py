@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from msgspec.structs import replace as replace_fields
 
-from thenar.compiler import GraspSet, compile_build
+from thenar.compiler import TRAINERS, GraspSet, Options, compile_build
 from thenar.compiler.artifact import CompileError
 from thenar.compiler.artifact.compile import MEMBERS
 from thenar.compiler.artifact.documents import REPORT_NAME
 from thenar.compiler.artifact.ensemble import ensemble_from_bytes
 from thenar.compiler.artifact.verify import ScanCheck, check_scan, verify
 from thenar.compiler.tables.collapse import collapse
+from thenar.compiler.trainers.base import Training
 from thenar.runtime import Build, BuildError
 from thenar.runtime.build import SCAN_NAME
 from thenar.runtime.errors import HarnessError
@@ -29,10 +30,15 @@ from thenar.runtime.tables import IntegerTables, tables_from_bytes, tables_to_by
 Make = Callable[..., GraspSet]
 
 
-@pytest.fixture
-def folder(grasp_set: GraspSet, tmp_path: Path) -> Path:
-    compile_build(grasp_set, tmp_path / "build", rounds=15, folds=0)
-    return tmp_path / "build"
+@pytest.fixture(params=TRAINERS)
+def folder(grasp_set: GraspSet, tmp_path: Path, request: pytest.FixtureRequest) -> Path:
+    """Return a build of each trainer, its settings given so that nothing is chosen."""
+    settings = Training.candidates(Options(trainer=request.param))[0].settings
+    given = {name: value for name, value in settings.items() if value is not None}
+    few = {"rounds": 15} if "rounds" in given else {}
+    made = compile_build(grasp_set, tmp_path / "build", trainer=request.param, folds=0, **(given | few))
+    assert made.manifest.fit.trainer == request.param
+    return made.folder
 
 
 def _silence(folder: Path, joints: int) -> None:

@@ -12,12 +12,15 @@ from hypothesis import strategies as st
 
 from thenar.compiler.firmware.avr_costs import Assembly, AvrCosts, rises, worst_frame
 from thenar.compiler.firmware.classifier import classifier_files
-from thenar.compiler.firmware.layout import Adding, Bins, Layout, arrange
+from thenar.compiler.firmware.layout import Adding, Bins, Layout, arrange, code_bits
 from thenar.compiler.firmware.probes import changing_frames
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.words import numbered
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
+
+from .sloped import SHAPES as SLOPED
+from .sloped import sloped
 
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
@@ -243,8 +246,8 @@ def test_costs_are_those_of_the_whole_assembly_counted_at_once(
     files = classifier_files("hand", numbered(layout.tables), layout, avr=True)
     whole = Assembly(files["thenar_hand_avr.S"], elpm=elpm)
     cost = AvrCosts(layout, (256 if elpm else 32) << 10).cost
-    assert cost.cycles == whole.longest("thenar_hand_classify")
-    assert cost.update_cycles == whole.longest("thenar_hand_update")
+    assert cost.cycles == whole.cycles("thenar_hand_classify")[1]
+    assert cost.update_cycles == whole.cycles("thenar_hand_update")[1]
     assert cost.flash - cost.flash_classify == whole.size(".text.thenar_hand_update")
 
 
@@ -311,3 +314,26 @@ def test_the_same_layout_has_the_same_worst_frame(make_tables: MakeTables) -> No
     one, other = worst_frame(layout), worst_frame(layout)
     assert np.array_equal(one[0], other[0])
     assert np.array_equal(one[1], other[1])
+
+
+@pytest.mark.parametrize("entry_bits", [8, 16])
+@pytest.mark.parametrize("adding", ["called", "unrolled"])
+@pytest.mark.parametrize("shape", SLOPED)
+def test_with_slopes_every_frame_takes_what_is_counted_and_has_python_s_scores(
+    tool: Tool, describe: Describe, shape: str, adding: Adding, entry_bits: int
+) -> None:
+    tool("avr-gcc")
+    tables = sloped(3, *SLOPED[shape])
+    wide = code_bits(tables) == 16
+    layout = arrange(tables, adding=adding, entry_bits=entry_bits, bins="search" if wide else "direct")
+    bits, codes = _frames(layout, 60)
+    bits, codes = _all_changing(layout, bits, codes)
+    files = classifier_files("hand", describe(tables), layout, avr=True)
+    answers = SMALL.run(files, "hand", layout, layout.frame_bytes(bits, codes))
+    assert answers.cost is not None
+    assert np.array_equal(answers.scores, layout.scores(bits, codes))
+    assert np.array_equal(answers.cost, AvrCosts(layout, SMALL.flash).fixed_cycles + rises(layout, bits, codes))
+    changed = SMALL.run(files, "hand", layout, layout.frame_bytes(bits, codes), incremental=True)
+    assert changed.cost is not None
+    assert np.array_equal(changed.scores, answers.scores)
+    assert changed.cost.max() <= AvrCosts(layout, SMALL.flash).cost.update_cycles
