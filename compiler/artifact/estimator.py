@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from sklearn.base import clone
 
 from thenar.runtime.build import Build as LoadedBuild
-from thenar.runtime.tables import HIGHEST_CODE
 from thenar.runtime.manifest import By, Inputs, Options, TableBits
 from thenar.runtime.tables import HIGHEST_CODE
 
