@@ -22,6 +22,8 @@ Floats = NDArray[np.float64]
 
 # Ties are counted on the grid in units that grow with the square of z_max: far above this, all stumps would tie.
 LARGEST_Z_MAX = 100.0
+# Next to the largest, 32 MiB, that glibc takes notice of.
+_LARGE_BYTES = 31 << 20
 # Far below this, the scores of a hundred rounds would all lie within what counts as a tie (stumps.TIE).
 SMALLEST_SHRINKAGE = 1e-6
 
@@ -58,6 +60,8 @@ def boost(
     binned = bin_columns(X, max_bins)
     many = sum(len(group.columns) for group in binned.groups if not isinstance(group, TwoValued))
     check_memory(len(X), n_classes, BoostingError, len(binned.home) - many, many)
+    # glibc returns freed memory to the system, and faults it in again, beyond twice the largest array ever freed.
+    np.empty(_LARGE_BYTES, dtype=np.uint8)
     member = labels == np.arange(n_classes)[:, np.newaxis]
     scores = carry = np.zeros((n_classes, len(X)))
     probability, loss = softmax_and_loss(scores, labels, weights)

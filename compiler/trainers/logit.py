@@ -19,7 +19,7 @@ class Logit(Trainer):
         Setting("penalty", "Pull of scores towards zero (logit).", float, 1.0, 1e-6, 1e6),
         Setting("smoothness", "Pull of a joint's neighbouring bins towards each other (logit).", float, 3.0, 0.0, 1e6),
         Setting(
-            "max_bins", "At most so many bins a joint: smaller tables.  [default: no limit; logit: 16]", int, None, 2
+            "max_bins", "At most so many bins a joint: smaller tables.  [default: no limit; logit: 16]", int, 16, 2
         ),
         Setting("linear", "1: joints add scores in proportion to their codes, without bins (logit).", int, 0, 0, 1),
     )
