@@ -124,8 +124,8 @@ def test_a_row_counts_as_often_as_it_weighs(seed: int) -> None:
 def test_a_looser_tolerance_gives_nearly_the_same_answer() -> None:
     X, labels = grasps(5)
     tight = fit_logit(X, labels, 3, tolerance=1e-12).scores(X)
-    np.testing.assert_allclose(fit_logit(X, labels, 3).scores(X), tight, atol=1e-4)
-    assert np.abs(fit_logit(X, labels, 3, tolerance=0.1).scores(X) - tight).max() > 1e-3
+    np.testing.assert_allclose(fit_logit(X, labels, 3).scores(X), tight, atol=1e-3)
+    assert np.abs(fit_logit(X, labels, 3, tolerance=0.1).scores(X) - tight).max() > 1e-2
 
 
 def test_a_class_without_rows_is_unlikely_and_finite() -> None:
