@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,9 +35,9 @@ Make = Callable[..., GraspSet]
 def folder(grasp_set: GraspSet, tmp_path: Path, request: pytest.FixtureRequest) -> Path:
     """Return a build of each trainer, its settings given so that nothing is chosen."""
     settings = Training.candidates(Options(trainer=request.param))[0].settings
-    given = {name: value for name, value in settings.items() if value is not None}
-    few = {"rounds": 15} if "rounds" in given else {}
-    made = compile_build(grasp_set, tmp_path / "build", trainer=request.param, folds=0, **(given | few))
+    given: dict[str, Any] = {name: value for name, value in settings.items() if value is not None}
+    given |= {"rounds": 15} if "rounds" in given else {}
+    made = compile_build(grasp_set, tmp_path / "build", trainer=request.param, folds=0, **given)
     assert made.manifest.fit.trainer == request.param
     return made.folder
 
