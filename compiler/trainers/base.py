@@ -215,7 +215,9 @@ def _asked(options: Options) -> list[tuple[Trainer, dict[str, Number]]]:
     if not takers:
         lacking = sorted(given.keys() - set().union(*names.values()))
         wrong = (
-            f"no trainer takes the setting {lacking[0]!r}" if lacking else f"no trainer takes all of {sorted(given)}"
+            f"no trainer takes the setting {lacking[0]!r}"
+            if lacking
+            else f"no trainer takes all of {', '.join(sorted(given))}"
         )
         raise TrainerError(f"{wrong}: leave it out")
     if len(takers) < len(names):

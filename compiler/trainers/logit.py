@@ -29,7 +29,7 @@ class Logit(Trainer):
         for penalty in (10.0, 1.0, 0.1)
         for smoothness in (10.0, 1.0)
         for bins in (8, 16)
-    )
+    ) + tuple({"penalty": penalty, "smoothness": 1.0, "linear": 1} for penalty in (10.0, 1.0, 0.1))
 
     def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> "ScoreTables":
         """Return the tables. Raises BoostingError for settings that make no sense."""
