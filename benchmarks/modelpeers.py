@@ -10,7 +10,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -19,17 +19,20 @@ import numpy as np
 from modelsets import Cut
 from numpy.typing import NDArray
 
+from thenar.compiler.choosing import choose_training
 from thenar.compiler.samples import Samples, decided
 from thenar.compiler.tables.collapse import collapse, model_scores
 from thenar.compiler.tables.quantise import integer_scores, quantise
-from thenar.compiler.trainers.base import TRAINERS, Training
-from thenar.runtime.manifest import Options
+from thenar.compiler.trainers.base import Training
+from thenar.runtime.manifest import AUTO, Options
 
 WEKA_JAR = Path("/usr/share/java/weka.jar")
 FEW, SEED = 2000, 1
 
 Answers = NDArray[np.intp]
 Given = Mapping[str, Any]
+# What a model makes of the rows of a fold with given settings: answers, also those of integers.
+Answering = Callable[[Cut, Given], tuple[Answers, Answers | None]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +45,7 @@ class Model:
 
     name: str
     how: str
-    answers: Callable[[Samples, Samples, Given], tuple[Answers, Answers | None]]
+    answers: Answering
     settings: tuple[Given, ...] = ({},)
     additive: bool = False
     slow: bool = False
@@ -61,13 +64,13 @@ class Model:
         given = self.settings[0]
         if len(self.settings) > 1 and not (self.slow and len(cut.train.labels) > FEW):
             given = max(self.settings, key=lambda each: self._inside(cut, each))  # the first of equal ones
-        return self.answers(cut.train, cut.test, given)
+        return self.answers(cut, given)
 
     def _inside(self, cut: Cut, given: Given) -> int:
         right = 0
         for fold in cut.inner():
-            train, test = cut.train.rows(fold.train), cut.train.rows(fold.test)
-            right += int(recognised(self.answers(train, test, given)[0], test).sum())
+            part = replace(cut, train=cut.train.rows(fold.train), test=cut.train.rows(fold.test))
+            right += int(recognised(self.answers(part, given)[0], part.test).sum())
         return right
 
 
@@ -78,21 +81,25 @@ def recognised(answers: Answers, test: Samples) -> NDArray[np.bool_]:
     return given
 
 
-def _trained(name: str) -> Callable[[Samples, Samples, Given], tuple[Answers, Answers | None]]:
-    def answers(train: Samples, test: Samples, given: Given) -> tuple[Answers, Answers | None]:
-        model = Training.of(Options(trainer=name, settings=dict(given))).train(train)
+def _trained(name: str) -> Answering:
+    def answers(cut: Cut, _: Given) -> tuple[Answers, Answers]:
+        train, test, options = cut.train, cut.test, Options(trainer=name)
+        training = Training.of(options)
+        if name == AUTO:
+            groups = train.subjects if cut.of == "new subject" else None
+            training = Training.chosen(choose_training(train, Training.candidates(options), groups=groups, of=cut.of))
+        model = training.train(train)
         integers = quantise(collapse(model, train.n_switches), train.switches, train.codes)
-        whole = integer_scores(integers, test.switches, test.codes)
-        return model_scores(model, test.switches, test.codes).argmax(axis=1), whole.argmax(axis=1)
+        floats = model_scores(model, test.switches, test.codes)
+        return floats.argmax(axis=1), integer_scores(integers, test.switches, test.codes).argmax(axis=1)
 
     return answers
 
 
-def _fitted(
-    make: Callable[..., Any], *, scaled: bool = False
-) -> Callable[[Samples, Samples, Given], tuple[Answers, Answers | None]]:
-    def answers(train: Samples, test: Samples, given: Given) -> tuple[Answers, Answers | None]:
-        X, asked = (np.hstack([part.switches, part.codes]).astype(np.float64) for part in (train, test))
+def _fitted(make: Callable[[Given], Any], *, scaled: bool = False) -> Answering:
+    def answers(cut: Cut, given: Given) -> tuple[Answers, None]:
+        train = cut.train
+        X, asked = (np.hstack([part.switches, part.codes]).astype(np.float64) for part in (train, cut.test))
         if scaled:
             joints = slice(train.n_switches, None)
             mean, spread = X[:, joints].mean(axis=0), X[:, joints].std(axis=0)
@@ -120,12 +127,7 @@ def _neighbours(given: Given) -> Any:
 def _support(given: Given) -> Any:
     from sklearn.svm import SVC
 
-    class Scaled(SVC):  # gamma as a multiple of scikit-learn's "scale"
-        def fit(self, X: Any, y: Any, sample_weight: Any = None) -> Any:
-            self.gamma = given["gamma"] / (X.shape[1] * X.var())
-            return super().fit(X, y)
-
-    return Scaled(C=given["C"])
+    return SVC(**given)
 
 
 def _forest(given: Given) -> Any:
@@ -154,22 +156,22 @@ def _xgboost(given: Given) -> Any:
 
 
 def _lightgbm(given: Given) -> Any:
-    from lightgbm import LGBMClassifier
+    from lightgbm import LGBMClassifier  # pyright: ignore[reportMissingImports]
 
     fixed = {"n_estimators": 200, "min_child_samples": 5, "subsample": 0.8, "subsample_freq": 1}
     return LGBMClassifier(**fixed, colsample_bytree=0.5, n_jobs=1, random_state=SEED, verbose=-1, **given)
 
 
 def _ebm(given: Given) -> Any:
-    from interpret.glassbox import ExplainableBoostingClassifier
+    from interpret.glassbox import ExplainableBoostingClassifier  # pyright: ignore[reportMissingImports]
 
     return ExplainableBoostingClassifier(outer_bags=4, n_jobs=1, random_state=SEED, **given)
 
 
-def _weka(train: Samples, test: Samples, _: Given) -> tuple[Answers, None]:
+def _weka(cut: Cut, _: Given) -> tuple[Answers, None]:
     with tempfile.TemporaryDirectory() as folder:
         paths = [Path(folder) / name for name in ("train.arff", "test.arff")]
-        for path, part in zip(paths, (train, test), strict=True):
+        for path, part in zip(paths, (cut.train, cut.test), strict=True):
             _write_arff(path, part)
         command = ["java", "-XX:+UseSerialGC", "-XX:ActiveProcessorCount=1", "-Xmx4g", "-cp", str(WEKA_JAR)]
         command += ["weka.classifiers.meta.LogitBoost", "-t", str(paths[0]), "-T", str(paths[1]), "-p", "0"]
@@ -192,20 +194,24 @@ def _grid(**values: Sequence[Any]) -> tuple[Given, ...]:
     return tuple(dict(zip(values, each, strict=True)) for each in product(*values.values()))
 
 
-# Additive logits of three strengths; the paper's boosting with and without shrinkage.
 OURS = tuple(
-    Model(name, how, _trained(name), settings, additive=True, ours=True, needs="thenar")
-    for name, how, settings in (
-        ("logitboost", "as it is by default", ({},)),
-        ("logit", "as it is by default", ({},)),
-        ("sum", "as it is by default", ({},)),
+    Model(name, how, _trained(name), additive=True, ours=True, needs="thenar")
+    for name, how in (
+        ("logitboost", "100 rounds, the paper's"),
+        ("logit", "as it is by default"),
+        ("sum", "as it is by default"),
+        (AUTO, "chosen by inner folds"),
     )
-    if name in TRAINERS
 )
 PEERS = (
     Model("logistic regression", "C of 4", _fitted(_logistic, scaled=True), _grid(C=[1, 0.1, 10, 100]), additive=True),
     Model("k neighbours", "k of 4, by distance", _fitted(_neighbours, scaled=True), _grid(n_neighbors=[5, 1, 3, 10])),
-    Model("RBF SVM", "C of 3, gamma of 3", _fitted(_support, scaled=True), _grid(C=[10, 1, 100], gamma=[1, 0.3, 3])),
+    Model(
+        "RBF SVM",
+        "C of 3, gamma of 4",
+        _fitted(_support, scaled=True),
+        _grid(C=[10, 1, 100], gamma=[0.03, 0.01, 0.1, 0.3]),
+    ),
     Model("random forest", "500 trees", _fitted(_forest)),
     Model("extra trees", "500 trees", _fitted(_extra_trees)),
     Model(
@@ -213,7 +219,12 @@ PEERS = (
     ),
     Model("XGBoost", "200 rounds, depth of 2", _fitted(_xgboost), _grid(max_depth=[3, 6]), slow=True, needs="xgboost"),
     Model(
-        "LightGBM", "200 rounds, leaves of 2", _fitted(_lightgbm), _grid(num_leaves=[7, 31]), slow=True, needs="lightgbm"
+        "LightGBM",
+        "200 rounds",
+        _fitted(_lightgbm),
+        _grid(num_leaves=[7, 31]),
+        slow=True,
+        needs="lightgbm",
     ),
     Model("EBM", "4 bags, no pairs", _fitted(_ebm), _grid(interactions=[0]), additive=True, needs="interpret"),
     Model("EBM with pairs", "4 bags, 5 pairs", _fitted(_ebm), _grid(interactions=[5]), needs="interpret"),

@@ -9,7 +9,6 @@ where it was, and what is there is printed. `--again MODEL` computes those anew.
 """
 
 import argparse
-import os
 import resource
 import warnings
 from collections.abc import Iterator, Sequence
@@ -17,17 +16,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import process_time
 
-for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(_threads, "1")
-
 import msgspec
 import numpy as np
-from modelpeers import OURS, PEERS, Answers, Model, recognised
-from modelsets import CURVE, CURVE_SCENE, SETS, Cut, cuts, curve, load
+from modelpeers import OURS, PEERS, Model, recognised
+from modelsets import CURVE, CURVE_SCENE, SETS, Cut, curve, cuts, load
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from threadpoolctl import threadpool_limits
 
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.workers import in_workers
@@ -67,7 +64,8 @@ def answered(task: Task) -> Answered:
     name, cut, model = task
     warnings.filterwarnings("ignore")
     began = process_time() + _of_children()
-    answers, integers = model.answered(cut)
+    with threadpool_limits(1):
+        answers, integers = model.answered(cut)
     spent = process_time() + _of_children() - began
     whole = None if integers is None else integers.tolist()
     return Answered(name, cut.of, cut.name, model.name, round(spent, 3), answers.tolist(), whole)
@@ -126,21 +124,20 @@ def lines(name: str, found: Sequence[Cut], models: Sequence[Model], store: Store
 
 
 def _line(model: Model, found: Sequence[Cut], told: Sequence[Answered]) -> Line:
-    def rate(answers: Sequence[list[int] | None]) -> Rate | None:
-        if any(each is None for each in answers):
-            return None
-        labels, trials, subjects = (
-            np.concatenate([getattr(cut.test, what) for cut in found]) for what in ("labels", "trials", "subjects")
-        )
-        groups = subjects if found[0].of == "new subject" else None
-        return Rate.predicted(np.concatenate(answers), labels, trials, of=found[0].of, groups=groups)
+    labels, trials, subjects = (
+        np.concatenate([getattr(cut.test, what) for cut in found]) for what in ("labels", "trials", "subjects")
+    )
+    of = found[0].of
 
-    floats = rate([each.answers for each in told])
-    assert floats is not None
-    hits = [
-        recognised(np.array(each.answers, np.intp), cut.test) for each, cut in zip(told, found, strict=True)
-    ]
-    return Line(model, floats, rate([each.integers for each in told]), np.concatenate(hits), sum(e.cpu_s for e in told))
+    def rate(answers: Sequence[list[int]]) -> Rate:
+        groups = subjects if of == "new subject" else None
+        return Rate.predicted(np.concatenate(answers), labels, trials, of=of, groups=groups)
+
+    whole = [each.integers for each in told if each.integers is not None]
+    hits = [recognised(np.array(each.answers, np.intp), cut.test) for each, cut in zip(told, found, strict=True)]
+    integers = rate(whole) if len(whole) == len(told) else None
+    cpu_s = sum(each.cpu_s for each in told)
+    return Line(model, rate([each.answers for each in told]), integers, np.concatenate(hits), cpu_s)
 
 
 def p_value(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
@@ -160,11 +157,12 @@ def shown(name: str, of: Of, made: Sequence[Line]) -> Table:
         table.add_column(heading, justify="right")
     rival = next((line for line in made if not line.model.ours), None)
     for line in made:
+        name, yes, how = line.model.name, "yes" if line.model.additive else "", line.model.how
+        of_integers = "" if line.integers is None else f"{100 * line.integers.mean:.2f}"
+        within = f"{100 * line.rate.low:.1f} to {100 * line.rate.high:.1f}"
         gap, p = ("", "") if rival is None or line is rival else _against(line, rival)
-        row = (line.model.name, "yes" if line.model.additive else "", line.model.how, f"{100 * line.rate.mean:.2f}")
-        row += (f"{100 * line.rate.low:.1f} to {100 * line.rate.high:.1f}",)
-        row += ("" if line.integers is None else f"{100 * line.integers.mean:.2f}", gap, p, f"{line.cpu_s:.1f}")
-        table.add_row(*row, style="bold" if line.model.ours else "")
+        numbers = (f"{100 * line.rate.mean:.2f}", within, of_integers, gap, p, f"{line.cpu_s:.1f}")
+        table.add_row(name, yes, how, *numbers, style="bold" if line.model.ours else "")
     return table
 
 
@@ -173,7 +171,7 @@ def _against(line: Line, rival: Line) -> tuple[str, str]:
 
 
 def summary(every: dict[tuple[str, Of], list[Line]], name: str) -> Table:
-    """Return how model `name` of ours does on each set: behind the best of all, and ahead of the best additive rival."""
+    """Return how far the best rival is ahead of model `name` on each set, and the best additive one behind it."""
     table = Table(title=f"{name}: within {WITHIN} points of the best rival, ahead of every additive one?")
     for heading in ("set", "", f"{name}, %", "best rival, %", "", "behind", "best additive rival, %", "", "ahead"):
         table.add_column(heading, justify="right" if heading.endswith(("%", "behind", "ahead")) else "left")

@@ -91,11 +91,10 @@ def keeps_zero(layout: Layout) -> bool:
 
 
 def _slope(name: str, names: Names, layout: Layout, at: int, first: int, registers: Sequence[int]) -> Row:
-    """Return a slope: its code in the input, how that is held within its range and scaled, and the entries that are not
-    zero, each with the lower register of its sum.
+    """Return a slope: its code in the input, how that is held within its range and scaled, and what it multiplies:
+    entries, each with the sums that it is added to, or subtracted from.
     """
     slope, bits = layout.tables.slopes[at], layout.code_bits
-    entries = slope.row[first : first + len(registers)].tolist()
     place = len(layout.groups) + layout.padding + slope.joint * bits // 8
     return {
         "index": layout.n_lookups + at,
@@ -108,8 +107,22 @@ def _slope(name: str, names: Names, layout: Layout, at: int, first: int, registe
         "doubled": max(slope.gain, 0),
         "halved": max(-slope.gain, 0),
         "zero": slope.zero,
-        "entries": [(low, entry) for low, entry in zip(registers, entries, strict=True) if entry],
+        "entries": [
+            (entry, [(registers[k], alike) for k, alike in sums])
+            for entry, sums in products(slope.row[first : first + len(registers)].tolist())
+        ],
     }
+
+
+def products(row: Sequence[int]) -> list[tuple[int, list[tuple[int, bool]]]]:
+    """Return what a slope's row multiplies: each entry that is not zero, but for those that are equal to another or its
+    negative, and the classes that it is of, with whether it is theirs or its negative is.
+    """
+    found: dict[int, list[int]] = {}
+    for k, entry in enumerate(row):
+        if entry:
+            found.setdefault(abs(entry), []).append(k)
+    return [(row[classes[0]], [(k, row[k] == row[classes[0]]) for k in classes]) for classes in found.values()]
 
 
 def _step(name: str, names: Names, layout: Layout, part: int, lookup: Lookup) -> Row:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from thenar.runtime.tables import Slope
 
-from .assembly import calls_are_near, keeps_zero
+from .assembly import calls_are_near, keeps_zero, products
 from .costs import NAME_BYTES, Cost
 from .layout import JointLayout, Layout
 
@@ -218,7 +218,7 @@ class AvrCosts:
         once = code("push pop") * self._kept + code("sts") * len(self._steps) + code("jmp clr") + self._answering
         searching = self._search.fixed_cycles if self._search else 0
         whole = passes + once + code("st st") * -stored_twice + self._slopes_compared + code("sts") * self._n_slopes
-        whole += self._moved * self._n_products + self._routines * 2
+        whole += self._moved * self._n_products + (self._routines + self._distances * self._parts) * 2
         return whole.takes(self._counter) + self._most_varying + searching
 
     def varying_cycles(self, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDArray[np.int64]:
@@ -312,6 +312,7 @@ class AvrCosts:
         passes = (move * 2 + steps + together(self._changes())) * self._parts
         routines = (self._row + code("ret")) * (2 if self._steps else 0)
         routines += self._slopes_compared + self._moved * self._n_products + code("sts") * self._n_slopes
+        routines += self._distances
         if self._layout.adding == "unrolled":
             routines += self._routines
         return passes + code("push") * self._kept + code("sts") * len(self._steps) + code("jmp") + routines
@@ -380,8 +381,9 @@ class AvrCosts:
     def _products(self) -> Code:
         """The products of all slopes in all passes, without returns."""
         firsts, slopes = self._layout.parts.firsts, self._layout.tables.slopes
-        entries = sum(np.count_nonzero(slope.row[first : first + self._width]) for first in firsts for slope in slopes)
-        return code("ldi muls add adc") * int(entries)
+        rows = (slope.row[first : first + self._width].tolist() for first in firsts for slope in slopes)
+        sums = (len(classes) for row in rows for _, classes in products(row))
+        return together(code("ldi muls") + code("add adc") * count for count in sums)
 
     @property
     def _routines(self) -> Code:
@@ -389,36 +391,48 @@ class AvrCosts:
         return self._products + code("ret") * self._n_products
 
     @property
-    def _distances(self) -> Code:
-        """Finding how far all slopes' codes lie above the lowest, in all passes."""
-        return together(self._distance(slope) for slope in self._layout.tables.slopes) * self._parts
+    def _held(self) -> Code:
+        """Finding once how far all slopes' codes lie above the lowest."""
+        return together(map(self._hold, self._layout.tables.slopes))
 
-    def _distance(self, slope: Slope) -> Code:
+    def _hold(self, slope: Slope) -> Code:
         halved, doubled, bits = max(-slope.gain, 0), max(slope.gain, 0), self._layout.code_bits
         if bits == 16:
             lower = code("subi sbci brcc ldi ldi") + _CLAMPED * -1 if slope.low else Code()
-            held = code("lds lds subi sbci brcs ldi ldi subi sbci mov") + _CLAMPED * -1 + lower
+            held = code("subi sbci brcs ldi ldi subi sbci mov") + _CLAMPED * -1 + lower
             return held + code("lsr ror") * halved + code("lsl") * doubled
         lower = code("subi brcc ldi") if slope.low else Code()
         upper = code("cpi brlo ldi") if slope.high < 255 else Code()
-        return code("lds") + lower + upper + code("lsr") * halved + code("lsl") * doubled
+        return lower + upper + code("lsr") * halved + code("lsl") * doubled
 
     @property
     def _slopes_classified(self) -> Code:
         """All that classify does about slopes where it is written out, or all but what it calls."""
         cleaned = self._parts - 1 if self._n_slopes and keeps_zero(self._layout) else 0
-        each = self._distances + code("subi") * self._n_products + code("sts") * self._n_slopes + code("clr") * cleaned
+        each = (self._held + self._loaded) * self._parts + code("subi") * self._n_products
+        each += code("sts") * self._n_slopes + code("clr") * cleaned
         return each + (code("call") * self._n_products if self._layout.adding == "called" else self._products)
 
     @property
+    def _loaded(self) -> Code:
+        return code("lds" if self._layout.code_bits == 8 else "lds lds") * self._n_slopes
+
+    @property
     def _slopes_compared(self) -> Code:
-        return self._distances + code("lds cpse call") * self._n_products
+        held = self._held if self._layout.code_bits == 16 else Code()
+        return (self._loaded + held) * self._parts + code("lds cpse call") * self._n_products
 
     @property
     def _moved(self) -> Code:
-        """What is done about a slope whose code has moved, but for the products and their returns."""
+        """What is done about a slope whose code has moved, but for distances and products."""
         ends = code("call clr ret") if keeps_zero(self._layout) else code("jmp")
-        return code("push subi call pop subi neg") + ends
+        return code("push call call pop call neg") + ends
+
+    @property
+    def _distances(self) -> Code:
+        """The routines that find the distances of codes."""
+        held = self._held if self._layout.code_bits == 8 else Code()
+        return held + code("subi ret") * self._n_slopes
 
     def _guard(self, text: str) -> Code:
         """Return the check that tables lie within reach of lpm, where there is flash beyond it."""

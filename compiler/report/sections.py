@@ -6,7 +6,7 @@ from itertools import accumulate
 
 import msgspec
 
-from thenar.runtime.manifest import Manifest
+from thenar.runtime.manifest import AUTO, Manifest
 from thenar.runtime.scanning.propose import own_joints
 from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, scan_us, scanner_us
 
@@ -251,7 +251,8 @@ def options_set(manifest: Manifest) -> Pairs:
     """Return every option that is set, by the name that `thenar compile` gives it: of trainers, only of its own."""
     options = manifest.options
     names = {trainer.name: {setting.name for setting in trainer.settings} for trainer in TRAINERS.values()}
-    foreign = set().union(*names.values()) - names.get(options.trainer, set()) | {"settings"}
+    every = set().union(*names.values())
+    foreign = every - names.get(options.trainer, every if options.trainer == AUTO else set()) | {"settings"}
     fields = [field.name for field in msgspec.structs.fields(options) if field.name not in foreign]
     values = {name: getattr(options, name) for name in fields} | options.settings
     called = {name: "method" if name == "placement" else name.replace("_", "-") for name in values}
