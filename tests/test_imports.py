@@ -58,6 +58,7 @@ ALLOWED = {
     "compiler.additive": (
         "runtime.tables",
         "drivers.errors",
+        "runtime.tables",
         "compiler.additive",
         "compiler.boosting",
         "compiler.elementary",

@@ -23,10 +23,13 @@ class AdditiveLogitClassifier(AdditiveClassifier):
     penalty : float, default=1.0
         Pull of scores towards zero: half of it times the sum of their squares is added to the loss; of bins a
         sixteenth of that, of the bias a thousandth.
-    smoothness : float, default=10.0
+    smoothness : float, default=3.0
         Pull of neighbouring bins towards each other: half of it times the sum of squares of their differences is added.
     max_bins : int, optional, default=16
         No input has more bins than this (2 or more); they hold rows as evenly as can be. None: one for each value.
+    linear : bool, default=False
+        An input of more than two values adds scores in proportion to it instead, between the least and the largest of
+        the training set; `smoothness` then pulls what a standard deviation of it adds.
     tolerance : float, default=1e-7
         No derivative of the loss is larger than this at the answer, in the weight of all rows; at least 1e-12.
     classes : sequence, optional
@@ -37,7 +40,8 @@ class AdditiveLogitClassifier(AdditiveClassifier):
     classes_ : ndarray, shape (K,)
         The labels, in the order of the columns of scores and probabilities.
     tables_ : ColumnTables
-        The rows of scores: `bias` (K,), and for each column its `edges` and `rows`, the last one for a missing value.
+        The rows of scores: `bias` (K,), for each column its `edges` and `rows`, the last one for a missing value, and
+        `lines` of some columns.
 
     Examples
     --------
@@ -53,12 +57,14 @@ class AdditiveLogitClassifier(AdditiveClassifier):
         penalty: float = PENALTY,
         smoothness: float = SMOOTHNESS,
         max_bins: int | None = BINS,
+        linear: bool = False,
         tolerance: float = TOLERANCE,
         classes: Sequence[Any] | None = None,
     ) -> None:
         self.penalty = penalty
         self.smoothness = smoothness
         self.max_bins = max_bins
+        self.linear = linear
         self.tolerance = tolerance
         self.classes = classes
 
@@ -76,6 +82,7 @@ class AdditiveLogitClassifier(AdditiveClassifier):
             penalty=self.penalty,
             smoothness=self.smoothness,
             max_bins=self.max_bins,
+            linear=self.linear,
             tolerance=self.tolerance,
             weights=weights,
         )

@@ -267,6 +267,7 @@ def _placed_by(estimator: Any, options: Options) -> tuple[Options, tuple[float, 
 def _trained_by(classifier: Any, options: Options) -> Options:
     if isinstance(classifier, AdditiveLogitClassifier):
         own = {"penalty": float(classifier.penalty), "smoothness": float(classifier.smoothness)}
+        own |= {"linear": 1.0} if classifier.linear else {}
         bins = classifier.max_bins or HIGHEST_CODE + 1
         return structs.replace(options, trainer="logit", max_bins=bins, settings=own)
     if not isinstance(classifier, LogitBoostClassifier):

@@ -56,7 +56,7 @@ def on_grids(values: Floats) -> tuple[OnGrid, OnGrid]:
     return OnGrid(units, exponents), OnGrid(rest, exponents + np.int32(finer))
 
 
-def on_one_grid(values: Floats, terms: int) -> Floats:
+def on_one_grid(values: Floats, terms: float) -> Floats:
     """Round all `values`, any shape, to the finest grid on which every sum of so many of them is exact.
 
     Each is off by 2^-52 of `terms` times the largest at most, or by 2^-1001. So are sums of their products with bits.

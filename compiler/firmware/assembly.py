@@ -143,12 +143,12 @@ def _slope(name: str, names: Names, layout: Layout, at: int, first: int) -> Row:
         "zero": slope.zero,
         "entries": [
             (entry, [(registers[k], alike) for k, alike in sums])
-            for entry, sums in _products(slope.row[first : first + len(registers)].tolist())
+            for entry, sums in products(slope.row[first : first + len(registers)].tolist())
         ],
     }
 
 
-def _products(row: Sequence[int]) -> list[tuple[int, list[tuple[int, bool]]]]:
+def products(row: Sequence[int]) -> list[tuple[int, list[tuple[int, bool]]]]:
     """Return what a slope's row multiplies: each entry that is not zero, but for those that are equal to another or its
     negative, and the classes that it is of, with whether it is theirs or its negative is.
     """

@@ -129,7 +129,8 @@ def _addings(target: Target) -> tuple[Adding, ...]:
 
 def features(layout: Layout, target: Target) -> str:
     """Return in words how `layout` lies in flash, and on an AVR how it is added up."""
-    parts = [f"{layout.entry_bits}-bit entries"]
+    halves = ", the upper halves of steps" if layout.entry_shift else ""
+    parts = [f"{layout.entry_bits}-bit entries{' and sums' if layout.sum_bits == 8 else halves}"]
     if layout.groups:
         parts.append(f"up to {max(map(len, layout.groups))} switches a look-up")
     if layout.joints:
@@ -142,6 +143,8 @@ def features(layout: Layout, target: Target) -> str:
         )
         if (most := max((len(lookup.joints) for lookup in layout.lookups), default=0)) > 1:
             parts.append(f"up to {most} joints a look-up")
+    if layout.tables.slopes:
+        parts.append("codes multiplied")
     if target.avr:
         parts.append({"called": "rows added by one routine", "unrolled": "rows added in line"}[layout.adding])
     return ", ".join(parts)

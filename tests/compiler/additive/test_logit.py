@@ -29,7 +29,8 @@ def grasps(seed: int, n: int = 60, bits: int = 6, joints: int = 2, classes: int 
 
 
 def numbers(tables: ColumnTables) -> bytes:
-    return b"".join(part.tobytes() for part in (tables.bias, *tables.edges, *tables.rows))
+    slopes = (tables.lines[column].row for column in sorted(tables.lines))
+    return b"".join(part.tobytes() for part in (tables.bias, *tables.edges, *tables.rows, *slopes))
 
 
 @given(SEEDS, st.sampled_from([(0.05, 0.0), (1.0, 10.0), (4.0, 0.5)]))
@@ -57,14 +58,49 @@ def test_it_is_scikit_learns_answer_on_the_expanded_design(seed: int, pulls: tup
     np.testing.assert_allclose(tables.scores(X), found, atol=1e-5)
 
 
+@given(SEEDS, st.sampled_from([0.1, 3.0]))
+@settings(max_examples=10, deadline=None)
+def test_lines_are_scikit_learns_answer_on_scaled_codes(seed: int, smoothness: float) -> None:
+    X, labels = grasps(seed)
+    X[:, :6] *= 7  # of two values, that need not be 0 and 1
+    weights = np.random.default_rng(seed).integers(1, 4, len(X)).astype(float)
+    tables = fit_logit(X, labels, 3, smoothness=smoothness, linear=True, tolerance=1e-10, weights=weights)
+    deviation = np.sqrt(np.average((X[:, 6:] - np.average(X[:, 6:], 0, weights)) ** 2, 0, weights))
+    pulls = np.r_[BIAS_SHARE, np.ones(6), (BIN_SHARE + smoothness) * deviation**2]
+    design = np.column_stack([np.ones(len(X)), X[:, :6] / 7, X[:, 6:] - np.average(X[:, 6:], 0, weights)])
+    theirs = LogisticRegression(C=1.0, fit_intercept=False, tol=1e-9, solver="newton-cg", max_iter=1000)
+    theirs.fit(design / np.sqrt(pulls), labels, weights)
+    # A column is centred to the half of a 512th of its range, and so is what pulls its bias.
+    np.testing.assert_allclose(tables.scores(X), (design / np.sqrt(pulls)) @ theirs.coef_.T, atol=2e-3)
+    # Beyond what was trained on a line is flat; a missing value adds the mean.
+    beyond = np.vstack([X[:1], X[:1]]).astype(float)
+    beyond[0, 6:], beyond[1, 6:] = X[:, 6:].max(axis=0), 1e6
+    assert np.ptp(tables.scores(beyond), axis=0).max() == 0
+    beyond[0, 6:], beyond[1, 6:] = np.nan, np.average(X[:, 6:], 0, weights)
+    np.testing.assert_allclose(*tables.scores(beyond), atol=1e-9)
+
+
+@pytest.mark.parametrize("unit", [1, 1000, 2.0**-20])
+def test_missing_values_of_a_line_have_a_row_of_their_own(unit: float) -> None:
+    X = np.array([[0.0], [1.0], [2.0], [5.0], [np.nan], [np.nan]]) * unit
+    labels = np.array([0, 0, 1, 1, 2, 2])
+    tables = fit_logit(X, labels, 3, smoothness=0.01, penalty=0.1, linear=True)
+    assert list(tables.lines) == [0]
+    assert tables.scores(X).argmax(axis=1).tolist() == labels.tolist()
+    np.testing.assert_allclose(
+        tables.scores(X), fit_logit(X / unit, labels, 3, smoothness=0.01, penalty=0.1, linear=True).scores(X / unit)
+    )
+
+
 @given(SEEDS)
 @settings(max_examples=10, deadline=None)
 def test_neither_the_order_of_rows_nor_that_of_columns_changes_a_bit(seed: int) -> None:
     X, labels = grasps(seed)
-    tables, rng = fit_logit(X, labels, 3), np.random.default_rng(seed)
+    rng, linear = np.random.default_rng(seed), bool(seed % 2)
+    tables = fit_logit(X, labels, 3, linear=linear)
     rows, columns = rng.permutation(len(X)), rng.permutation(X.shape[1])
-    assert numbers(fit_logit(X[rows], labels[rows], 3)) == numbers(tables)
-    assert numbers(fit_logit(X[:, columns], labels, 3)) == numbers(tables.columns(columns.tolist()))
+    assert numbers(fit_logit(X[rows], labels[rows], 3, linear=linear)) == numbers(tables)
+    assert numbers(fit_logit(X[:, columns], labels, 3, linear=linear)) == numbers(tables.columns(columns.tolist()))
 
 
 @given(SEEDS)
@@ -112,12 +148,12 @@ def test_smoothness_brings_neighbouring_bins_together() -> None:
     assert apart[0] > 2 * apart[1] > 4 * apart[2]
 
 
-@pytest.mark.parametrize("seed", [3, 4])
-def test_score_tables_add_what_the_columns_add(seed: int) -> None:
-    X, labels = grasps(seed)
-    tables = fit_logit(X, labels, 3).score_tables(6)
-    found = tables.scores(X[:, :6].astype(bool), X[:, 6:].astype(np.uint16))
-    np.testing.assert_allclose(found, fit_logit(X, labels, 3).scores(X), rtol=0, atol=1e-12)
+@pytest.mark.parametrize("linear", [False, True])
+def test_score_tables_add_what_the_columns_add(linear: bool) -> None:
+    X, labels = grasps(3)
+    fitted = fit_logit(X, labels, 3, linear=linear)
+    found = fitted.score_tables(6).scores(X[:, :6].astype(bool), X[:, 6:].astype(np.uint16))
+    np.testing.assert_allclose(found, fitted.scores(X), rtol=0, atol=1e-12)
     # Edges between numbers that are no codes, and below all codes.
     odd = ColumnTables(np.zeros(2), (np.array([-3.5, 1.2, 1.7, 4.0]),), (np.arange(12.0).reshape(6, 2),))
     codes = np.arange(7, dtype=np.uint16)[:, np.newaxis]

@@ -12,15 +12,12 @@ from hypothesis import strategies as st
 
 from thenar.compiler.firmware.avr_costs import Assembly, AvrCosts, rises, worst_frame
 from thenar.compiler.firmware.classifier import classifier_files
-from thenar.compiler.firmware.layout import Adding, Bins, Layout, arrange, code_bits
+from thenar.compiler.firmware.layout import Adding, Bins, Layout, arrange
 from thenar.compiler.firmware.probes import changing_frames
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.words import numbered
 from thenar.runtime.manifest import Manifest
 from thenar.runtime.tables import IntegerTables
-
-from .sloped import SHAPES as SLOPED
-from .sloped import sloped
 
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
@@ -314,26 +311,3 @@ def test_the_same_layout_has_the_same_worst_frame(make_tables: MakeTables) -> No
     one, other = worst_frame(layout), worst_frame(layout)
     assert np.array_equal(one[0], other[0])
     assert np.array_equal(one[1], other[1])
-
-
-@pytest.mark.parametrize("entry_bits", [8, 16])
-@pytest.mark.parametrize("adding", ["called", "unrolled"])
-@pytest.mark.parametrize("shape", SLOPED)
-def test_with_slopes_every_frame_takes_what_is_counted_and_has_python_s_scores(
-    tool: Tool, describe: Describe, shape: str, adding: Adding, entry_bits: int
-) -> None:
-    tool("avr-gcc")
-    tables = sloped(3, *SLOPED[shape])
-    wide = code_bits(tables) == 16
-    layout = arrange(tables, adding=adding, entry_bits=entry_bits, bins="search" if wide else "direct")
-    bits, codes = _frames(layout, 60)
-    bits, codes = _all_changing(layout, bits, codes)
-    files = classifier_files("hand", describe(tables), layout, avr=True)
-    answers = SMALL.run(files, "hand", layout, layout.frame_bytes(bits, codes))
-    assert answers.cost is not None
-    assert np.array_equal(answers.scores, layout.scores(bits, codes))
-    assert np.array_equal(answers.cost, AvrCosts(layout, SMALL.flash).fixed_cycles + rises(layout, bits, codes))
-    changed = SMALL.run(files, "hand", layout, layout.frame_bytes(bits, codes), incremental=True)
-    assert changed.cost is not None
-    assert np.array_equal(changed.scores, answers.scores)
-    assert changed.cost.max() <= AvrCosts(layout, SMALL.flash).cost.update_cycles
