@@ -25,11 +25,12 @@ from .workers import in_workers
 
 Rows = NDArray[np.intp]
 
-# A training set of so many trials is cut into so many inner folds: of many trials, halves tell enough.
-_FOLDS = ((400, 4), (1500, 3))
+# A training set of fewer trials than these is cut into so many inner folds, a larger one into two.
+_FOLDS = ((1500, 4), (20_000, 3))
 _LEAST_GROUPS = 3
-# Tables up to so many times as large as the smallest are small: more bins cost flash, and next to no time.
-_SMALL = 2
+# Tables of a kilobyte, at a byte an entry, cost next to nothing; of larger ones, those up to a quarter above the
+# smallest are small.
+_SMALL, _LARGER = 1024, 1.25
 
 
 def inner_folds(samples: Samples, seed: int, groups: NDArray[np.generic] | None = None) -> list[Fold]:
@@ -97,7 +98,7 @@ def choose_training(
     ]
     if not grouped:
         of = "pooled" if np.ptp(samples.subjects) else "within subject"
-    return _fitting(candidates, scores, of, len(folds))
+    return _fitting(candidates, scores, samples.n_classes, of, len(folds))
 
 
 def _values(training: Training) -> dict[str, float | None]:
@@ -185,7 +186,7 @@ def _error(gains: NDArray[np.intp], clusters: Rows) -> float:
     return sqrt(squares * len(sizes) / max(1, len(sizes) - 1)) / len(gains) ** 2
 
 
-def _fitting(candidates: Sequence[Training], scores: list[_Score], of: Of, n_folds: int) -> Fitting:
+def _fitting(candidates: Sequence[Training], scores: list[_Score], n_classes: int, of: Of, n_folds: int) -> Fitting:
     best = min(range(len(scores)), key=lambda one: (-int(scores[one].hits.sum()), scores[one].loss))
     found = []
     for candidate, score in zip(candidates, scores, strict=True):
@@ -204,7 +205,7 @@ def _fitting(candidates: Sequence[Training], scores: list[_Score], of: Of, n_fol
             )
         )
     near = [one for one, each in enumerate(found) if each.behind <= each.behind_error]
-    small = _SMALL * min(found[one].rows for one in near)
+    small = max(_SMALL / n_classes, _LARGER * min(found[one].rows for one in near))
     chosen = min((one for one in near if found[one].rows <= small), key=lambda one: (found[one].loss, one))
     shown = {
         min(

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.linalg import block_diag
 from sklearn.linear_model import LogisticRegression
 
-from thenar.compiler.additive.logit import BIAS_SHARE, BIN_SHARE, ColumnTables, fit_logit
+from thenar.compiler.additive.logit import BIAS_SHARE, BIN_SHARE, PENALTY, SMOOTHNESS, ColumnTables, fit_logit
 from thenar.compiler.boosting.boost import BoostingError
 from thenar.compiler.elementary import softmax
 
@@ -108,12 +108,13 @@ def test_neither_the_order_of_rows_nor_that_of_columns_changes_a_bit(seed: int) 
 def test_a_row_counts_as_often_as_it_weighs(seed: int) -> None:
     X, labels = grasps(seed, n=40)
     weights = np.random.default_rng(seed).integers(1, 5, len(X)).astype(float)
-    repeated = fit_logit(X.repeat(weights.astype(int), axis=0), labels.repeat(weights.astype(int)), 3, max_bins=4)
-    weighted = fit_logit(X, labels, 3, max_bins=4, weights=weights)
+    own: dict[str, Any] = {"max_bins": 4, "tolerance": 1e-11}
+    repeated = fit_logit(X.repeat(weights.astype(int), axis=0), labels.repeat(weights.astype(int)), 3, **own)
+    weighted = fit_logit(X, labels, 3, weights=weights, **own)
     assert [edges.tolist() for edges in weighted.edges] == [edges.tolist() for edges in repeated.edges]
     for ours, theirs in zip(weighted.rows, repeated.rows, strict=True):
-        np.testing.assert_allclose(ours, theirs, atol=1e-4)
-    halves = fit_logit(X, labels, 3, max_bins=4, weights=weights / 2, penalty=0.5, smoothness=5.0)
+        np.testing.assert_allclose(ours, theirs, atol=1e-7)
+    halves = fit_logit(X, labels, 3, weights=weights / 2, penalty=PENALTY / 2, smoothness=SMOOTHNESS / 2, **own)
     assert numbers(halves) == numbers(weighted)
 
 
