@@ -130,7 +130,7 @@ def _addings(target: Target) -> tuple[Adding, ...]:
 def features(layout: Layout, target: Target) -> str:
     """Return in words how `layout` lies in flash, and on an AVR how it is added up."""
     halves = ", the upper halves of steps" if layout.entry_shift else ""
-    parts = [f"{layout.entry_bits}-bit entries{halves}"]
+    parts = [f"{layout.entry_bits}-bit entries{' and sums' if layout.sum_bits == 8 else halves}"]
     if layout.groups:
         parts.append(f"up to {max(map(len, layout.groups))} switches a look-up")
     if layout.joints:

@@ -62,10 +62,10 @@ _REPLACING = 17  # a row in update(), but for its words
 # below and above, where it can lie there; a code of 16 bits clamped; a code searched, and each step of the search.
 _FOUND, _COMPARED, _BELOW, _ABOVE, _WIDE = 5, 3, 4, 6, 13
 _SEARCHED, _SEARCH_STEP = 6, 14
+MOST_INLINE = 8  # thresholds are compared one by one; where there are more, they are searched
 # The distance of a code, and how much more in update(); in each part all but the products; and of each word of sums,
 # at the end and where entries are upper halves.
 _DISTANCE, _MOVED, _MULTIPLYING, _WORD, _HALVES = 14, 5, 17, 2, 8
-MOST_INLINE = 8  # thresholds are compared one by one; where there are more, they are searched
 
 # Of code; where classes are added up in parts, that takes more.
 _BYTES, _BYTES_PARTS, _BYTES_LOOKUP, _BYTES_CLASS = 60, 250, 18, 13
