@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     from ..samples import Samples
 
 
+# As boosting.boost.TIES.
+TIES = ("first", "least-used")
+
+
 class LogitBoost(Trainer):
     """Rounds of one stump a class, as Weka 3.6 computes them, with exact sums."""
 
@@ -29,6 +33,7 @@ class LogitBoost(Trainer):
         Setting("shrinkage", "Share of each round that is kept.", float, 1.0, 1e-6, 1.0),
         Setting("tolerance", "Stop after a round that changes the mean loss by less than this.", float, None, 0),
         Setting("max_bins", "At most so many bins a joint: smaller tables.  [default: no limit]", int, None, 2),
+        Setting("ties", "Of equal stumps: the first input's, or the least used input's.", str, "first", names=TIES),
     )
 
     def candidates(self, given: Mapping[str, Number]) -> tuple[dict[str, Number], ...]:
