@@ -14,8 +14,7 @@ from thenar.runtime.manifest import Calibration
 from thenar.runtime.tables import Slope
 
 from .assembly import assembly_values, calls_are_near, check_size
-from .costs import MOST_INLINE
-from .layout import JointLayout, Layout, Lookup, Parts
+from .layout import MOST_INLINE, JointLayout, Layout, Lookup, Parts
 from .words import Names, comment, inputs_in_words, string
 
 _STARTS_PER_LINE = 4

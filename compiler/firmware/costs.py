@@ -6,10 +6,9 @@ of 16 bits, for they must be taken apart before they are added. Other compilers 
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-if TYPE_CHECKING:
-    from .layout import JointLayout, Layout
+from .layout import MOST_INLINE, JointLayout, Layout
 
 Unit = Literal["cycles", "instructions", ""]
 
@@ -63,7 +62,6 @@ _FIXED, _REPLACING = 20, 13  # of an answer; of a row in update(), but for its w
 # below and above, where it can lie there; a code of 16 bits clamped; a code searched, and each step of the search.
 _FOUND, _BELOW, _ABOVE, _WIDE = 4, 6, 4, 10
 _SEARCHED, _SEARCH_STEP = 16, 11
-MOST_INLINE = 8  # thresholds are compared one by one; where there are more, they are searched
 # The distance of a code, and how much more in update(); in each part all but the products; and of each word of sums,
 # at the end and where entries are upper halves.
 _DISTANCE, _MOVED, _MULTIPLYING, _WORD, _HALVES = 14, 5, 17, 2, 8
@@ -77,7 +75,7 @@ _BYTES_MULTIPLYING, _BYTES_PRODUCT, _BYTES_DISTANCE = 150, 30, 24
 _STACK = 128
 
 
-def word_cost(layout: "Layout", core: Core) -> Cost:
+def word_cost(layout: Layout, core: Core) -> Cost:
     """Return what the portable C takes on a core, roughly."""
     parts, classes = len(layout.parts.firsts), layout.tables.n_classes
     words, finding = _words(layout), sum(_finding(layout, joint, core) for joint in layout.joints)
@@ -93,7 +91,7 @@ def word_cost(layout: "Layout", core: Core) -> Cost:
     return Cost(classify, update, flash + update_flash, flash, _ram(layout))
 
 
-def _multiplying(layout: "Layout", core: Core) -> int:
+def _multiplying(layout: Layout, core: Core) -> int:
     """Return the instructions that slopes take."""
     slopes, parts = len(layout.tables.slopes), layout.parts
     if not slopes:
@@ -102,12 +100,12 @@ def _multiplying(layout: "Layout", core: Core) -> int:
     return slopes * _DISTANCE + len(parts.firsts) * (_MULTIPLYING + -(-parts.width // 2) * word)
 
 
-def _words(layout: "Layout") -> int:
+def _words(layout: Layout) -> int:
     """Return how many words a row has."""
     return -(-layout.parts.width * layout.entry_bits // 32)
 
 
-def _finding(layout: "Layout", joint: "JointLayout", core: Core) -> int:
+def _finding(layout: Layout, joint: JointLayout, core: Core) -> int:
     """Return the instructions that a joint takes in finding a row."""
     if joint.compared:
         steps = len(joint.thresholds)
@@ -122,7 +120,7 @@ def _finding(layout: "Layout", joint: "JointLayout", core: Core) -> int:
     return _FOUND + _BELOW * (joint.first > 0) + _ABOVE * above
 
 
-def _flash(layout: "Layout") -> int:
+def _flash(layout: Layout) -> int:
     """Return the bytes of tables and code, update() left out, at most, roughly; the names of the grasp types come on
     top.
     """
@@ -140,7 +138,7 @@ def _flash(layout: "Layout") -> int:
     return rows + places + starts + code + sum(_joint_flash(layout, joint) for joint in layout.joints)
 
 
-def _joint_flash(layout: "Layout", joint: "JointLayout") -> int:
+def _joint_flash(layout: Layout, joint: JointLayout) -> int:
     """Return the bytes of code for a joint, its thresholds included."""
     steps = len(joint.thresholds)
     if not joint.compared:
@@ -150,7 +148,7 @@ def _joint_flash(layout: "Layout", joint: "JointLayout") -> int:
     return _BYTES_JOINT + _BYTES_SEARCHED + steps * layout.code_bits // 8
 
 
-def _ram(layout: "Layout") -> int:
+def _ram(layout: Layout) -> int:
     """Return the bytes of variables and stack, roughly."""
     classes = layout.tables.n_classes
     frame = len(layout.groups) + layout.padding + layout.tables.n_joints * layout.code_bits // 8
