@@ -22,12 +22,14 @@ Floats = NDArray[np.float64]
 
 # Ties are counted on the grid in units that grow with the square of z_max: far above this, all stumps would tie.
 LARGEST_Z_MAX = 100.0
+# Next to the largest, 32 MiB, that glibc takes notice of.
+_LARGE_BYTES = 31 << 20
 # Far below this, the scores of a hundred rounds would all lie within what counts as a tie (stumps.TIE).
 SMALLEST_SHRINKAGE = 1e-6
 
 
 class BoostingError(ThenarError, ValueError):
-    """The training set or an option makes no sense to LogitBoost."""
+    """A training set, or an option of a fit to it, makes no sense."""
 
 
 def boost(
@@ -51,13 +53,15 @@ def boost(
     round and after every round: the mean of -ln P(true class). Raises BoostingError.
     """
     _check_options(rounds, shrinkage, z_max, tolerance, max_bins)
-    _check_rows(X, labels, n_classes, weights)
+    check_rows(X, labels, n_classes, weights)
     if weights is not None:
         # By a power of two, which changes no answer: now sums of huge weights stay finite, and of tiny ones exact.
         weights = np.ldexp(weights, -np.frexp(weights.max())[1])
     binned = bin_columns(X, max_bins)
     many = sum(len(group.columns) for group in binned.groups if not isinstance(group, TwoValued))
     check_memory(len(X), n_classes, BoostingError, len(binned.home) - many, many)
+    # glibc returns freed memory to the system, and faults it in again, beyond twice the largest array ever freed.
+    np.empty(_LARGE_BYTES, dtype=np.uint8)
     member = labels == np.arange(n_classes)[:, np.newaxis]
     scores = carry = np.zeros((n_classes, len(X)))
     probability, loss = softmax_and_loss(scores, labels, weights)
@@ -125,7 +129,8 @@ def _check_options(rounds: int, shrinkage: float, z_max: float, tolerance: float
         )
 
 
-def _check_rows(X: NDArray[np.generic], labels: NDArray[np.intp], n_classes: int, weights: Floats | None) -> None:
+def check_rows(X: NDArray[np.generic], labels: NDArray[np.intp], n_classes: int, weights: Floats | None) -> None:
+    """Raise BoostingError unless these are a training set."""
     if X.ndim != 2 or len(X) == 0 or labels.shape != (len(X),):
         raise BoostingError(f"inputs {X.shape} and labels {labels.shape} must be (n, d) and (n,) with at least one row")
     if labels.min() < 0 or labels.max() >= n_classes:

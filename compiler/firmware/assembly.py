@@ -13,6 +13,7 @@ _LPM_REACH = 65536
 # rcall reaches 4 KiB either way; all that update() does about a look-up must stay within that.
 _NEAR_BYTES = 3600
 _LOOKUP_BYTES = 104  # of the longest kind
+_SLOPE_BYTES = 80  # but for its products, which no near call reaches across
 
 
 Row = dict[str, object]  # of the template's lists
@@ -30,7 +31,8 @@ def check_size(layout: Layout) -> None:
 def calls_are_near(layout: Layout) -> bool:
     """Return whether all calls are `rcall`; else they are `call`, a word and a cycle more."""
     passes = len(layout.parts.firsts)
-    return _LOOKUP_BYTES * layout.n_lookups * passes < _NEAR_BYTES
+    each = _LOOKUP_BYTES * layout.n_lookups + _SLOPE_BYTES * len(layout.tables.slopes)
+    return each * passes < _NEAR_BYTES
 
 
 def assembly_values(name: str, names: Names, layout: Layout) -> dict[str, object]:
@@ -51,9 +53,11 @@ def assembly_values(name: str, names: Names, layout: Layout) -> dict[str, object
         "sums": passes[0]["sums"],
         "stride": stride,
         "kept": [register + half for register in registers if register in _KEPT for half in (0, 1)],
-        "n_seen": layout.n_lookups,
+        "n_seen": layout.n_lookups + len(layout.tables.slopes),
+        "halves": layout.entry_shift == 8,
+        "clean": keeps_zero(layout),
         "tables": [
-            (f"thenar_{name}_rows", layout.n_rows * len(parts.firsts) * stride),
+            *([(f"thenar_{name}_rows", layout.n_rows * len(parts.firsts) * stride)] if layout.n_rows else []),
             *([(f"thenar_{name}_bins", bins)] if bins else []),
         ],
     }
@@ -76,8 +80,49 @@ def _pass(name: str, names: Names, layout: Layout, number: int, registers: Seque
         "scores": 2 * first,
         "again": parts.firsts[number - 1] + parts.width - first if number else 0,
         "steps": [_step(name, names, layout, number, lookup) for lookup in lookups(layout)],
+        "slopes": [_slope(name, names, layout, at, first, registers) for at in range(len(layout.tables.slopes))],
         "last": number == len(parts.firsts) - 1,
     }
+
+
+def keeps_zero(layout: Layout) -> bool:
+    """Return whether r1 is zero between look-ups: plain bytes are added with the carry alone."""
+    return layout.entry_bits == 8 and not layout.entry_shift
+
+
+def _slope(name: str, names: Names, layout: Layout, at: int, first: int, registers: Sequence[int]) -> Row:
+    """Return a slope: its code in the input, how that is held within its range and scaled, and what it multiplies:
+    entries, each with the sums that it is added to, or subtracted from.
+    """
+    slope, bits = layout.tables.slopes[at], layout.code_bits
+    place = len(layout.groups) + layout.padding + slope.joint * bits // 8
+    return {
+        "index": layout.n_lookups + at,
+        "what": comment(names.joints[slope.joint].name),
+        "source": f"thenar_{name}_input + {place}",
+        "wide": bits == 16,
+        "low": slope.low,
+        "span": slope.high - slope.low,
+        "upper": slope.high < (1 << bits) - 1,
+        "doubled": max(slope.gain, 0),
+        "halved": max(-slope.gain, 0),
+        "zero": slope.zero,
+        "entries": [
+            (entry, [(registers[k], alike) for k, alike in sums])
+            for entry, sums in products(slope.row[first : first + len(registers)].tolist())
+        ],
+    }
+
+
+def products(row: Sequence[int]) -> list[tuple[int, list[tuple[int, bool]]]]:
+    """Return what a slope's row multiplies: each entry that is not zero, but for those that are equal to another or its
+    negative, and the classes that it is of, with whether it is theirs or its negative is.
+    """
+    found: dict[int, list[int]] = {}
+    for k, entry in enumerate(row):
+        if entry:
+            found.setdefault(abs(entry), []).append(k)
+    return [(row[classes[0]], [(k, row[k] == row[classes[0]]) for k in classes]) for classes in found.values()]
 
 
 def _step(name: str, names: Names, layout: Layout, part: int, lookup: Lookup) -> Row:

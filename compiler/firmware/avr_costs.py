@@ -14,14 +14,19 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from .assembly import calls_are_near
+from thenar.runtime.tables import Slope
+
+from .assembly import calls_are_near, keeps_zero, products
 from .costs import NAME_BYTES, Cost
 from .layout import JointLayout, Layout
 
 # AVR Instruction Set Manual, DS40002198, table 5-1: cores AVRe (ATmega328P) and AVRe+ (ATmega2560), whose program
 # counter of three bytes makes calls and returns a cycle longer. A conditional branch is one that is not taken.
-_ONE = "adc add and brcc breq brge brlo brne clr cp cpc cpi cpse eor ldi mov movw sbc sbci sub subi tst"
-_TWO = "ld lds mul pop push rjmp st sts taken"
+_ONE = (
+    "adc add and brcc brcs breq brge brlo brne clr cp cpc cpi cpse eor ldi lsl lsr mov movw neg ror sbc sbci sub subi "
+    "tst"
+)
+_TWO = "ld lds mul muls pop push rjmp st sts taken"
 _CYCLES = dict.fromkeys(_ONE.split(), 1) | dict.fromkeys(_TWO.split(), 2) | {"lpm": 3, "jmp": 3, "skip": 3}
 _CALLS = {"rcall": 3, "call": 4, "ret": 4}
 _WORDS = {"lds": 2, "sts": 2, "call": 2, "jmp": 2, "taken": 0, "skip": 0}
@@ -139,13 +144,13 @@ _FREE_PAIRS, _IMMEDIATE_PAIRS = 5, 7
 _SET_SWITCH, _GRASP, _PAGE = 80, 40, 256
 
 
-# What a code of 16 bits below a joint's bins takes more than others.
+# What a code of 16 bits below a joint's bins, or beyond an end of its slope, takes more than others.
 _CLAMPED = Code(1)
 
 
 Frame = tuple[NDArray[np.bool_], NDArray[np.uint16]]
 
-_DRAWN, _CLIMBED, _ROUNDS = 4096, 8, 20
+_DRAWN, _CLIMBED, _ROUNDS, _BETWEEN = 4096, 8, 20, 33
 
 
 class AvrCosts:
@@ -175,6 +180,7 @@ class AvrCosts:
         """Cycles of classify that every frame takes."""
         adding = self._adding + (self._call if self._layout.adding == "called" else Code())
         taken = self._guard("ldi skip") + self._classify + adding * (len(self._steps) * self._parts)
+        taken += self._slopes_classified + (self._routines if self._layout.adding == "called" else Code())
         searching = self._search.fixed_cycles if self._search else 0
         return (taken + self._answering).takes(self._counter) + searching
 
@@ -195,6 +201,7 @@ class AvrCosts:
     @property
     def _most_varying(self) -> int:
         clamped = sum(self._clamps(joint) for joint in self._layout.joints) * self._parts
+        clamped += self._n_products if self._layout.code_bits == 16 else 0
         searching = self._search.most_cycles if self._search else 0
         return self._layout.tables.n_classes - 1 + clamped + searching
 
@@ -210,7 +217,8 @@ class AvrCosts:
         stored_twice = self._width * self._parts - self._layout.tables.n_classes  # in classify alone
         once = code("push pop") * self._kept + code("sts") * len(self._steps) + code("jmp clr") + self._answering
         searching = self._search.fixed_cycles if self._search else 0
-        whole = passes + once + code("st st") * -stored_twice
+        whole = passes + once + code("st st") * -stored_twice + self._slopes_compared + code("sts") * self._n_slopes
+        whole += self._moved * self._n_products + (self._routines + self._distances * self._parts) * 2
         return whole.takes(self._counter) + self._most_varying + searching
 
     def varying_cycles(self, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDArray[np.int64]:
@@ -218,6 +226,9 @@ class AvrCosts:
         scores = self._layout.scores(bits, codes)
         best = np.maximum.accumulate(scores, axis=1)
         cycles: NDArray[np.int64] = np.count_nonzero(scores[:, 1:] > best[:, :-1], axis=1)
+        for slope in self._layout.tables.slopes if self._layout.code_bits == 16 else ():
+            column = codes[:, slope.joint]
+            cycles = cycles + self._parts * (column < slope.low) + self._parts * (column >= slope.high)
         for joint, column in zip(self._layout.joints, codes.T, strict=True):
             if self._clamps(joint):
                 cycles = cycles + self._parts * (column < joint.first)
@@ -244,6 +255,7 @@ class AvrCosts:
             assembly += self._row * (len(self._steps) * self._parts)
         else:
             assembly += self._call * (len(self._steps) * self._parts)
+        assembly += self._slopes_classified + (self._routines if layout.adding == "called" else Code())
         searching = self._search.flash if self._search else 0
         return tables + assembly.size + searching + _GRASP + (_SET_SWITCH if layout.groups else 0)
 
@@ -252,7 +264,7 @@ class AvrCosts:
         """Bytes of variables and of the deepest stack, return address included."""
         found = len(self._steps) - len(self._layout.groups) if self._search else 0
         scores = 2 * self._layout.tables.n_classes
-        return self._layout.frame_size + scores + len(self._steps) + found + self._stack
+        return self._layout.frame_size + scores + len(self._steps) + self._n_slopes + found + self._stack
 
     @property
     def _stack(self) -> int:
@@ -270,6 +282,8 @@ class AvrCosts:
 
     @property
     def _row(self) -> Code:
+        if self._layout.entry_shift:
+            return code("lpm add") * self._width
         return code("lpm add adc" if self._layout.entry_bits == 8 else "lpm add lpm adc") * self._width
 
     @property
@@ -279,7 +293,7 @@ class AvrCosts:
 
     @property
     def _to_row(self) -> Code:
-        return code("ldi mul movw subi sbci clr" if self._layout.entry_bits == 8 else "ldi mul movw subi sbci")
+        return code("ldi mul movw subi sbci clr" if keeps_zero(self._layout) else "ldi mul movw subi sbci")
 
     @property
     def _classify(self) -> Code:
@@ -296,7 +310,11 @@ class AvrCosts:
         compared = Code() if self._coded else together(self._steps)
         steps = compared + (code("lds lds cpse") + self._call) * len(self._steps)
         passes = (move * 2 + steps + together(self._changes())) * self._parts
-        routines = (self._row + code("ret")) * 2
+        routines = (self._row + code("ret")) * (2 if self._steps else 0)
+        routines += self._slopes_compared + self._moved * self._n_products + code("sts") * self._n_slopes
+        routines += self._distances
+        if self._layout.adding == "unrolled":
+            routines += self._routines
         return passes + code("push") * self._kept + code("sts") * len(self._steps) + code("jmp") + routines
 
     @property
@@ -341,7 +359,7 @@ class AvrCosts:
             return code("ldi lpm")
         within = code("ldi subi sbci lpm")
         if self._layout.code_bits == 16:
-            zero = code("clr") if self._layout.entry_bits == 16 else Code()
+            zero = Code() if keeps_zero(self._layout) else code("clr")
             return code("lds subi sbci brcc ldi ldi cpi cpc brlo ldi") + _CLAMPED * -1 + zero + within
         lower = code("subi brcc ldi") if joint.first else Code()
         upper = code("cpi brlo ldi") if joint.first + len(joint.bins) <= 255 else Code()
@@ -350,9 +368,77 @@ class AvrCosts:
     def _clamps(self, joint: JointLayout) -> bool:
         return self._layout.bins == "trimmed" and self._layout.code_bits == 16 and not joint.constant
 
+    @property
+    def _n_slopes(self) -> int:
+        return len(self._layout.tables.slopes)
+
+    @property
+    def _n_products(self) -> int:
+        """How often a slope's row is multiplied."""
+        return self._n_slopes * self._parts
+
+    @property
+    def _products(self) -> Code:
+        """The products of all slopes in all passes, without returns."""
+        firsts, slopes = self._layout.parts.firsts, self._layout.tables.slopes
+        rows = (slope.row[first : first + self._width].tolist() for first in firsts for slope in slopes)
+        sums = (len(classes) for row in rows for _, classes in products(row))
+        return together(code("ldi muls") + code("add adc") * count for count in sums)
+
+    @property
+    def _routines(self) -> Code:
+        """The products where they are called."""
+        return self._products + code("ret") * self._n_products
+
+    @property
+    def _held(self) -> Code:
+        """Finding once how far all slopes' codes lie above the lowest."""
+        return together(map(self._hold, self._layout.tables.slopes))
+
+    def _hold(self, slope: Slope) -> Code:
+        halved, doubled, bits = max(-slope.gain, 0), max(slope.gain, 0), self._layout.code_bits
+        if bits == 16:
+            lower = code("subi sbci brcc ldi ldi") + _CLAMPED * -1 if slope.low else Code()
+            held = code("subi sbci brcs ldi ldi subi sbci mov") + _CLAMPED * -1 + lower
+            return held + code("lsr ror") * halved + code("lsl") * doubled
+        lower = code("subi brcc ldi") if slope.low else Code()
+        upper = code("cpi brlo ldi") if slope.high < 255 else Code()
+        return lower + upper + code("lsr") * halved + code("lsl") * doubled
+
+    @property
+    def _slopes_classified(self) -> Code:
+        """All that classify does about slopes where it is written out, or all but what it calls."""
+        cleaned = self._parts - 1 if self._n_slopes and keeps_zero(self._layout) else 0
+        each = (self._held + self._loaded) * self._parts + code("subi") * self._n_products
+        each += code("sts") * self._n_slopes + code("clr") * cleaned
+        return each + (code("call") * self._n_products if self._layout.adding == "called" else self._products)
+
+    @property
+    def _loaded(self) -> Code:
+        return code("lds" if self._layout.code_bits == 8 else "lds lds") * self._n_slopes
+
+    @property
+    def _slopes_compared(self) -> Code:
+        held = self._held if self._layout.code_bits == 16 else Code()
+        return (self._loaded + held) * self._parts + code("lds cpse call") * self._n_products
+
+    @property
+    def _moved(self) -> Code:
+        """What is done about a slope whose code has moved, but for distances and products."""
+        ends = code("call clr ret") if keeps_zero(self._layout) else code("jmp")
+        return code("push call call pop call neg") + ends
+
+    @property
+    def _distances(self) -> Code:
+        """The routines that find the distances of codes."""
+        held = self._held if self._layout.code_bits == 8 else Code()
+        return held + code("subi ret") * self._n_slopes
+
     def _guard(self, text: str) -> Code:
         """Return the check that tables lie within reach of lpm, where there is flash beyond it."""
-        tables = 2 if self._layout.bins != "search" and len(self._steps) > len(self._layout.groups) else 1
+        tables = (
+            2 if self._layout.bins != "search" and len(self._steps) > len(self._layout.groups) else bool(self._steps)
+        )
         return code(text) * tables if self._counter == 3 else Code()
 
 
@@ -378,7 +464,10 @@ def worst_frame(layout: Layout) -> Frame:
 
 def _codes(layout: Layout, number: int) -> NDArray[np.uint16]:
     """Return codes of a joint that differ in row or time: the least of each bin and, below all bins, zero."""
-    steps = layout.joints[number].thresholds.astype(np.int64) + 1
+    steps, slope = layout.joints[number].thresholds.astype(np.int64) + 1, layout.tables.slope_of(number)
+    if slope is not None:
+        between = np.linspace(slope.low, slope.high, _BETWEEN).astype(np.int64)
+        steps = np.unique(np.concatenate([steps, between, [slope.low + 1, slope.high - 1]]))
     return np.concatenate([[0], steps[steps < 1 << layout.code_bits]]).astype(np.uint16)
 
 

@@ -106,10 +106,11 @@ def _addings(target: Target) -> tuple[Adding, ...]:
 
 def features(layout: Layout, target: Target) -> str:
     """Return in words how `layout` lies in flash, and on an AVR how it is added up."""
-    parts = [f"{layout.entry_bits}-bit entries"]
+    halves = ", the upper halves of steps" if layout.entry_shift else ""
+    parts = [f"{layout.entry_bits}-bit entries{halves}"]
     if layout.groups:
         parts.append(f"up to {max(map(len, layout.groups))} switches a look-up")
-    if layout.joints:
+    if any(not joint.constant for joint in layout.joints):
         parts.append(
             {
                 "direct": "codes looked up in 256 bytes a joint",
@@ -117,6 +118,8 @@ def features(layout: Layout, target: Target) -> str:
                 "search": "codes searched among thresholds",
             }[layout.bins]
         )
+    if layout.tables.slopes:
+        parts.append("codes multiplied")
     if target.avr:
         parts.append({"called": "rows added by one routine", "unrolled": "rows added in line"}[layout.adding])
     return ", ".join(parts)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from thenar.firmware_templates.rendering import render
 from thenar.runtime.manifest import Calibration
+from thenar.runtime.tables import Slope
 
 from .assembly import assembly_values, check_size
 from .layout import Layout, Lookup, Parts, lookups
@@ -31,8 +32,15 @@ def portable_values(name: str, layout: Layout) -> dict[str, object]:
     lanes = _lanes(parts.width, narrow)
     starts, open_sums = (_start_lines(_in_parts(scores, parts), lanes) for scores in (layout.start, layout.all_open))
     n_lanes = max(lane for lane, _ in lanes) + 1
-    adding, replacing = _arithmetic(n_lanes, narrow)
+    adding, replacing = _arithmetic(n_lanes, narrow, layout.entry_shift)
+    slopes = [layout.tables.slopes[at].row.astype(int) for at in range(len(layout.tables.slopes))]
     return {
+        "entry_shift": layout.entry_shift,
+        "slopes": [
+            _lane_words([row[first : first + parts.width].tolist() for row in slopes], lanes) for first in parts.firsts
+        ],
+        "open_distances": number_lines(slope.distance(0) for slope in layout.tables.slopes),
+        "distances": [_distance(name, slope) for slope in layout.tables.slopes],
         "words": -(-parts.width // (4 if narrow else 2)),
         "lanes": n_lanes,
         "takes": _takes(lanes, len(parts.firsts) > 1),
@@ -42,7 +50,7 @@ def portable_values(name: str, layout: Layout) -> dict[str, object]:
         "open_rows": [f"&thenar_{name}_rows[{lookup.first_row}]," for lookup in lookups(layout)],
         "finds": [_find(name, layout, lookup) for lookup in lookups(layout)],
         "adding": adding,
-        "storing": _storing(n_lanes, narrow),
+        "storing": _storing(n_lanes, narrow, layout.entry_shift),
         "replacing": replacing,
     }
 
@@ -100,7 +108,7 @@ def _takes(lanes: Sequence[tuple[int, str]], several: bool) -> list[str]:
     return [f"{words}[{lane}] {halves[half]}, {k}" for (lane, half), k in zip(lanes, numbers, strict=True)]
 
 
-def _arithmetic(lanes: int, narrow: bool) -> tuple[list[str], list[str]]:
+def _arithmetic(lanes: int, narrow: bool, shift: int) -> tuple[list[str], list[str]]:
     """Return the statements that add a row to the sums s0, s1..., and those that replace one in sum[]."""
     adding, replacing = [], []
     for lane in range(lanes):
@@ -110,16 +118,18 @@ def _arithmetic(lanes: int, narrow: bool) -> tuple[list[str], list[str]]:
             row = f"{row} >> 8" if lane % 2 else f"EVEN({row})"
             before, after = f"{macro}({before})", f"{macro}({after})"
         adding.append(f"s{lane} += {row};")
-        replacing.append(f"sum[{lane}] += {after} - {before};")
+        change = f"({after} - {before}) << {shift}" if shift else f"{after} - {before}"
+        replacing.append(f"sum[{lane}] += {change};")
     return adding, replacing
 
 
-def _storing(lanes: int, narrow: bool) -> list[str]:
+def _storing(lanes: int, narrow: bool, shift: int) -> list[str]:
     """Return the statements that put the sums s0, s1..., in words of two, into sum[]."""
     if not narrow:
         return [f"sum[{lane}] = s{lane};" for lane in range(lanes)]
     sums = (f"s{lane} - ((s{lane - 1} >> 16) << 8)" if lane % 2 else f"s{lane}" for lane in range(lanes))
-    return [f"sum[{lane}] = from[{lane}] + {text};" for lane, text in enumerate(sums)]
+    whole = (f"(({text}) << {shift})" if shift else text for text in sums)
+    return [f"sum[{lane}] = from[{lane}] + {text};" for lane, text in enumerate(whole)]
 
 
 def _find(name: str, layout: Layout, lookup: Lookup) -> str:
@@ -136,6 +146,24 @@ def _find(name: str, layout: Layout, lookup: Lookup) -> str:
             place = code if layout.bins == "direct" else f"clamped({code}, {joint.first}u, {last}u)"
             found = f"thenar_{name}_bins[{_after(lookup.first_bin, place)}]"
     return f"row[{lookup.index}] = &thenar_{name}_rows[{_after(lookup.first_row, found)}];"
+
+
+def _lane_words(rows: list[list[int]], lanes: Sequence[tuple[int, str]]) -> list[str]:
+    """Return the rows of slopes, for the classes of a part, as initialisers of words of two sums."""
+    found = []
+    for row in rows:
+        words: dict[int, list[int]] = {}
+        for (lane, _), value in zip(lanes, row, strict=True):
+            words.setdefault(lane, []).append(value)
+        found.append(", ".join(f"SLOPE({words[lane][0]}, {(words[lane] + [0])[1]})" for lane in sorted(words)))
+    return found
+
+
+def _distance(name: str, slope: Slope) -> str:
+    """Return the expression of the distance of a slope's code."""
+    above = f"clamped(thenar_{name}_input.codes[{slope.joint}], {slope.low}u, {slope.high - slope.low}u)"
+    shift = f" {'<<' if slope.gain > 0 else '>>'} {abs(slope.gain)}" if slope.gain else ""
+    return f"(int16_t)(({above}{shift}) - {slope.zero})"
 
 
 def _after(first: int, place: str) -> str:
@@ -302,6 +330,7 @@ def _common_values(name: str, names: Names, layout: Layout, avr: bool) -> dict[s
         "parts": len(layout.parts.firsts),
         "width": layout.parts.width,
         "n_rows": layout.n_rows,
+        "n_slopes": len(layout.tables.slopes),
     }
 
 
@@ -320,7 +349,7 @@ def _source_values(names: Names, layout: Layout) -> dict[str, object]:
         "bins": [line for lookup in joints if bins for line in _bin_lines(names, lookup)],
         "n_bins": bins,
         "paged": layout.bins == "direct" and bool(joints),
-        "clamped": layout.bins == "trimmed" and bool(joints),
+        "clamped": (layout.bins == "trimmed" and bool(joints)) or bool(layout.tables.slopes),
         "searched": searched,
         "thresholds": number_lines(steps),
         "n_thresholds": len(steps),

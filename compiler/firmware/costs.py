@@ -39,7 +39,7 @@ class Cost:
 class Core:
     """Instructions of a class, and how many more where classes are added up in parts; of a look-up; in each part of a
     look-up, of a word of two 16-bit entries, and of a word of four 8-bit entries; in update() of a word of two or of
-    four that is replaced.
+    four that is replaced; of a word of two sums that a slope adds to.
     """
 
     a_class: int
@@ -50,6 +50,7 @@ class Core:
     quad: int
     replaced_pair: int
     replaced_quad: int
+    product: int = 2
 
 
 CORTEX_M4 = Core(a_class=11, in_parts=2, lookup=5, part=3, pair=2, quad=5, replaced_pair=5, replaced_quad=16)
@@ -61,11 +62,15 @@ _REPLACING = 17  # a row in update(), but for its words
 # bits clamped; a code searched, and each step of the search.
 _BELOW, _ABOVE, _WIDE = 4, 6, 13
 _SEARCHED, _SEARCH_STEP = 6, 14
+# The distance of a code, and how much more in update(); in each part all but the products; and of each word of sums,
+# at the end and where entries are upper halves.
+_DISTANCE, _MOVED, _MULTIPLYING, _WORD, _HALVES = 14, 5, 17, 2, 8
 
 # Of code; where classes are added up in parts, that takes more.
 _BYTES, _BYTES_PARTS, _BYTES_LOOKUP, _BYTES_CLASS, _BYTES_PAIR, _BYTES_QUAD = 60, 250, 21, 13, 55, 111
 _BYTES_UPDATE, _BYTES_UPDATE_PAIR, _BYTES_UPDATE_QUAD = 185, 9, 46
 _BYTES_CLAMPED, _BYTES_SEARCHED = 26, 52
+_BYTES_MULTIPLYING, _BYTES_PRODUCT, _BYTES_DISTANCE = 150, 30, 24
 _STACK = 128
 
 
@@ -77,9 +82,20 @@ def word_cost(layout: "Layout", core: Core) -> Cost:
     replacing = _REPLACING + rows * words * (core.replaced_pair if wide else core.replaced_quad)
     answering = (core.a_class + (core.in_parts if rows > 1 else 0)) * classes + finding
     classify, update = (layout.n_lookups * (core.lookup + each) + answering for each in (adding, replacing))
+    multiplying, slopes = _multiplying(layout, core), len(layout.tables.slopes)
+    classify, update = classify + multiplying, update + multiplying + _MOVED * slopes
     flash = _flash(layout) + NAME_BYTES * (classes + 1)
     update_flash = _BYTES_UPDATE + words * (_BYTES_UPDATE_PAIR if wide else _BYTES_UPDATE_QUAD)
     return Cost(classify, update, flash + update_flash, flash, _ram(layout))
+
+
+def _multiplying(layout: "Layout", core: Core) -> int:
+    """Return the instructions that slopes take."""
+    slopes, parts = len(layout.tables.slopes), layout.parts
+    if not slopes:
+        return 0
+    word = slopes * core.product + _WORD + (core.product + _HALVES if layout.entry_shift else 0)
+    return slopes * _DISTANCE + len(parts.firsts) * (_MULTIPLYING + -(-parts.width // 2) * word)
 
 
 def _words(layout: "Layout") -> int:
@@ -118,6 +134,10 @@ def _flash(layout: "Layout") -> int:
     starts += 2 * layout.tables.n_classes + 4 * layout.n_lookups  # scores, and rows added, in the beginning
     code = _BYTES + (_BYTES_PARTS if len(parts.firsts) > 1 else 0) + _BYTES_CLASS * parts.width
     code += _BYTES_LOOKUP * layout.n_lookups + words * (_BYTES_PAIR if layout.entry_bits == 16 else _BYTES_QUAD)
+    if slopes := len(layout.tables.slopes):
+        lanes = -(-parts.width // 2)
+        code += _BYTES_MULTIPLYING + _BYTES_PRODUCT * lanes + _BYTES_DISTANCE * slopes
+        starts += slopes * (2 + 4 * lanes * len(parts.firsts))
     return rows + found + places + starts + code + finding * len(joints)
 
 
@@ -126,4 +146,5 @@ def _ram(layout: "Layout") -> int:
     classes = layout.tables.n_classes
     frame = len(layout.groups) + layout.padding + layout.tables.n_joints * layout.code_bits // 8
     rows = 2 * 4 * layout.n_lookups  # pointers to those added, and in update() to those that are now
-    return frame + 2 * classes + 2 * (classes + 6) + rows + _STACK
+    slopes = 4 * len(layout.tables.slopes)  # distances added, and in update() those that are now
+    return frame + 2 * classes + 2 * (classes + 6) + rows + slopes + _STACK

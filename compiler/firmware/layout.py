@@ -3,20 +3,23 @@ how a joint's code becomes a row.
 
     score_k = start_k + sum over groups g of group_rows[g][byte_g, k] + sum over joints a of joints[a].rows[bin_a, k]
 
+              + sum over slopes of distance * row[k]
+
 where byte_g holds one bit per switch of group g. Every row of a group is the exact sum of its switches' rows, so the
 scores are those of `IntegerTables`, bit for bit. With 16-bit entries row 0 of a group is zero, so that one switch's
 change is plus or minus row 2^bit. With 8-bit entries every entry is what exceeds the least of its look-up and class,
-0 to 255; the leasts are part of `start`.
+0 to 255; the leasts are part of `start`. Where tables have slopes and all these are multiples of 256 (`grid`), entries
+are of their upper halves.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.tables import COARSE, IntegerTables
 
 from . import FirmwareError
 
@@ -63,16 +66,17 @@ def joint_layout(thresholds: NDArray[np.uint16], rows: Rows, bins: Bins) -> Join
     return JointLayout(first, np.searchsorted(thresholds, codes, side="left").astype(np.uint8), rows, thresholds)
 
 
-def code_bits(thresholds: Sequence[NDArray[np.uint16]]) -> int:
-    """Return the width of the codes, 8 where no joint's thresholds tell codes above 254 apart, else 16."""
-    return 16 if any(len(steps) and steps[-1] >= 255 for steps in thresholds) else 8
+def code_bits(tables: IntegerTables) -> int:
+    """Return the width of the codes, 8 where no joint's thresholds or slope tell codes above 254 apart, else 16."""
+    last = [int(steps[-1]) + 1 for steps in tables.thresholds if len(steps)] + [slope.high for slope in tables.slopes]
+    return 16 if any(code > 255 for code in last) else 8
 
 
-def check_joints(thresholds: Sequence[NDArray[np.uint16]], bins: Bins) -> None:
+def check_joints(tables: IntegerTables, bins: Bins) -> None:
     """Raise FirmwareError if a joint's rows are more than a byte can number, or cannot be found by `bins`."""
-    if bins == "direct" and code_bits(thresholds) == 16:
+    if bins == "direct" and code_bits(tables) == 16:
         raise FirmwareError('codes have 16 bits: their rows are found by "trimmed" or "search", not "direct"')
-    for number, steps in enumerate(thresholds):
+    for number, steps in enumerate(tables.thresholds):
         if len(steps) + 1 > MOST_ROWS:
             raise FirmwareError(
                 f"joint {number} has {len(steps) + 1} rows, firmware has at most {MOST_ROWS} a joint: "
@@ -129,7 +133,12 @@ class Layout:
     @property
     def code_bits(self) -> int:
         """Width of a joint's code: 8 where no threshold tells codes above 254 apart, else 16."""
-        return code_bits(self.tables.thresholds)
+        return code_bits(self.tables)
+
+    @property
+    def entry_shift(self) -> int:
+        """How far entries are shifted before they are added: 8 where they are upper halves, else 0."""
+        return 8 if self.entry_bits == 8 and self.tables.grid == COARSE else 0
 
     @property
     def padding(self) -> int:
@@ -175,9 +184,11 @@ class Layout:
         """Return the scores (n, K) of the switches (n, s) and codes (n, j), as the firmware adds them up."""
         scores = np.tile(self.start, (len(bits), 1))
         for byte, rows in zip(self.group_bytes(bits).T, self.group_rows, strict=True):
-            scores += rows[byte]
+            scores += rows[byte].astype(np.int64) << self.entry_shift
         for column, joint in zip(codes.T, self.joints, strict=True):
-            scores += joint.rows[joint.bin_of(column)]
+            scores += joint.rows[joint.bin_of(column)].astype(np.int64) << self.entry_shift
+        for slope in self.tables.slopes:
+            scores += slope.of(codes[:, slope.joint])
         return scores
 
     def frame_bytes(self, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDArray[np.uint8]:
@@ -213,7 +224,8 @@ def arrange(
         raise FirmwareError("the build looks at no switch and no joint: there is nothing to make firmware of")
     if entry_bits not in (8, 16):
         raise FirmwareError(f"entries of {entry_bits} bits: firmware has 8 or 16")
-    check_joints(tables.thresholds, bins)
+    check_joints(tables, bins)
+    coarse = tables.grid if entry_bits == 8 else 1
     groups = _grouped(tables.n_switches, group_size, n_groups)
     sums = [_group_sums(tables.switch_rows[list(numbers)].astype(np.int64)) for numbers in groups]
     wide_joints = [rows.astype(np.int64) for rows in tables.joint_rows]
@@ -227,11 +239,11 @@ def arrange(
         adding=adding,
         start=sum([*leasts, *joint_leasts], tables.bias.astype(np.int64)),
         group_rows=tuple(
-            _entries(rows - least, entry_bits, f"switch group {g}")
+            _entries((rows - least) // coarse, entry_bits, f"switch group {g}")
             for g, (rows, least) in enumerate(zip(sums, leasts, strict=True))
         ),
         joints=tuple(
-            joint_layout(thresholds, _entries(rows - least, entry_bits, f"joint {a}"), bins)
+            joint_layout(thresholds, _entries((rows - least) // coarse, entry_bits, f"joint {a}"), bins)
             for a, (thresholds, rows, least) in enumerate(
                 zip(tables.thresholds, wide_joints, joint_leasts, strict=True)
             )

@@ -269,6 +269,7 @@ def _draw_trainers(labels: Labels, tried: Sequence[tuple[float, Tried]]) -> None
         for (x, y), (after, higher) in pairwise(zip(xs, ys, strict=True)):
             labels.avoid_line((x, after, after), (y, y, higher))
 
+
 def _draw_best(labels: Labels, best: Iterable[tuple[float, float]], name: str) -> None:
     """Draw the line of best points, (cost, rate) each: from each point on its rate is to be had, until a better one.
 

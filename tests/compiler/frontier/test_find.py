@@ -348,7 +348,10 @@ def test_every_trainer_is_on_one_picture_and_what_compile_makes_of_a_point_is_wh
     # Outlines: but each trainer has a line in the key, and the file another size than with one trainer.
     assert drawn != pictures(replace(found, tried=found.tried[:1]), "svg")["frontier"].decode()
     tried = {name: {(one.way, one.inputs) for one in found.tried if one.trainer == name} for name in found.trainers}
-    assert tried["logit"] == tried["logitboost"]
+    assert tried["logit"] <= tried["logitboost"]
+    # What is near the front with one trainer is tried with all.
+    best = max((one for one in found.tried if one.trainer == "logitboost"), key=lambda one: one.rate.mean)
+    assert (best.way, best.inputs) in tried["logit"]
     path = tmp_path / "out" / "frontier.json"
     for name in found.trainers:
         points = [point for point in found.points if point.setting.trainer == name]
