@@ -106,6 +106,14 @@ class _TrainerOption(click.Option):
         return super().get_help_record(ctx)
 
 
+class _SettingOption(click.Option):
+    """Its help shows as its default what a trainer takes where it is not given, and not that it has no value."""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        record = super().get_help_record(ctx)
+        return record and (record[0], record[1].replace(f"({self.show_default})", str(self.show_default)))
+
+
 def trainer_option(default: str) -> Callable[[Command], Command]:
     """Return the option --trainer; where AUTO is its default, the trainer and its settings can be chosen."""
     kind = OneOf("trainer", lambda: (AUTO, *_trainers()) if default == AUTO else _trainers())
@@ -181,14 +189,16 @@ def asked_settings(context: click.Context, asked: dict[str, Any]) -> dict[str, A
 def _option(setting: "Setting", chosen: bool) -> click.Option:
     ends = (setting.least, setting.most)
     kind: click.ParamType[Any] = Number(*ends)
-    if setting.kind is int:
+    if setting.names:
+        kind = click.Choice(setting.names)
+    elif setting.kind is int:
         low, high = (None if end is None else int(end) for end in ends)
         kind = click.INT if ends == (None, None) else click.IntRange(low, high)
     what, _, default = setting.what.partition("  [default: ")
-    default = "chosen" if chosen else default.rstrip("]") if setting.default is None else f"{setting.default:g}"
+    default = "chosen" if chosen else default.rstrip("]") if setting.default is None else str(setting.default)
     # Without a value it is not given.
     decls, shown = [f"--{setting.name.replace('_', '-')}", setting.name], default or False
-    return click.Option(decls, type=kind, show_default=shown, help=what)
+    return _SettingOption(decls, type=kind, show_default=shown, help=what)
 
 
 layout_option = click.option(

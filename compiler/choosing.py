@@ -101,8 +101,8 @@ def choose_training(
     return _fitting(candidates, scores, samples.n_classes, of, len(folds))
 
 
-def _values(training: Training) -> dict[str, float | None]:
-    return {name: None if value is None else float(value) for name, value in training.settings.items()}
+def _values(training: Training) -> dict[str, float | str | None]:
+    return {name: float(value) if isinstance(value, int) else value for name, value in training.settings.items()}
 
 
 def _alike(training: Training) -> tuple[object, ...]:

@@ -33,8 +33,7 @@ class Scorer:
     start                       bias and offset: the sum of no rows
     switch_rows, switch_means   s rows
     joint_means                 j rows
-    joint_rows, thresholds      j lists: a row per bin, and the codes that part the bins
-    slopes                      of some joints what codes are multiplied with: a slope and its row
+    joint_rows, thresholds      j lists: a row per bin, and the codes that part the bins; distances of a slope are bins
     size, unpack                of a sum that began with `start`: its bytes, and what makes K scores of them, each 2^15
                                 too high
     """
@@ -48,9 +47,9 @@ class Scorer:
         self.switch_rows = _packed(tables.switch_rows, offsets)
         self.switch_means = _packed(tables.switch_means, offsets)
         self.joint_means = _packed(tables.joint_means, offsets)
-        self.joint_rows = [_packed(rows, offsets) for rows in tables.joint_rows]
-        self.thresholds: list[list[int]] = [thresholds.tolist() for thresholds in tables.thresholds]
-        self.slopes = [(slope, _packed(slope.row[np.newaxis].astype(np.int16), offsets)[0]) for slope in tables.slopes]
+        binned = [tables.binned(joint) for joint in range(tables.n_joints)]
+        self.joint_rows = [_packed(rows, offsets) for _, rows in binned]
+        self.thresholds: list[list[int]] = [thresholds.tolist() for thresholds, _ in binned]
         self.reach = lru_cache(maxsize=_KEPT // tables.n_classes)(self._reach)
 
     @cached_property
@@ -71,10 +70,7 @@ class Scorer:
 
     def joint_sum(self, codes: Sequence[int]) -> int:
         """Return the sum of what all joints' codes add."""
-        total = sum(map(getitem, self.joint_rows, map(bisect_left, self.thresholds, codes)))
-        for slope, row in self.slopes:
-            total += slope.distance(codes[slope.joint]) * row
-        return total
+        return sum(map(getitem, self.joint_rows, map(bisect_left, self.thresholds, codes)))
 
     def lanes_without(
         self, bits: ArrayLike, codes: ArrayLike, lost_switches: ArrayLike, lost_joints: ArrayLike
@@ -88,8 +84,6 @@ class Scorer:
         for joint, (code, lost) in enumerate(zip(joints, lost_codes, strict=True)):
             row = self.joint_rows[joint][bisect_left(self.thresholds[joint], code)]
             total += self.joint_means[joint] if lost else row
-        for slope, row in self.slopes:
-            total += 0 if lost_codes[slope.joint] else slope.distance(joints[slope.joint]) * row
         return self.unpack(total.to_bytes(self.size, "little"))
 
     def _codes(self, codes: ArrayLike) -> list[int]:

@@ -175,6 +175,17 @@ class IntegerTables:
         codes = codes[codes <= HIGHEST_CODE]
         return codes, np.stack([rows[np.searchsorted(thresholds, codes)], slope.of(codes)])
 
+    def binned(self, joint: int) -> tuple[NDArray[np.uint16], Rows]:
+        """Return the thresholds of a joint and its rows, as they would be if each distance of its slope were a bin."""
+        thresholds, rows, slope = self.thresholds[joint], self.joint_rows[joint], self.slope_of(joint)
+        if slope is None:
+            return thresholds, rows
+        cell = 1 << max(-slope.gain, 0)
+        steps = np.union1d(thresholds, np.arange(slope.low + cell - 1, slope.high, cell)).astype(np.uint16)
+        codes = np.append(0, steps.astype(np.int64) + 1)
+        whole = rows[np.searchsorted(thresholds, codes)] + slope.of(codes)
+        return steps, whole.astype(np.int16)
+
     def joint_sums(self, codes: NDArray[np.uint16]) -> NDArray[np.int32]:
         """Return the bias and what the joints' codes (n, j) add, (n, K)."""
         # No partial sum leaves int16, so nothing overflows here.

@@ -8,9 +8,10 @@ one for missing values, where there are any. Over the rows W (r, K), the first o
 
 with u the frames' weights and D (n, r) the bits that say which rows count in a frame. As every row has a pull there is
 one minimum, and it is finite, also where classes can be parted perfectly, or a class has no frames. Newton's method
-finds it: H V = -gradient is solved by conjugate gradients, to a share that falls as the gradient does (Nocedal and
-Wright, Numerical Optimization, 2nd ed., algorithm 7.1). What goes into a product with D is rounded to a grid first, on
-which all sums are exact: so neither the order of frames nor the machine has a part in the answer.
+finds it: H V = -gradient is solved by conjugate gradients to a share of the gradient (Nocedal and Wright, Numerical
+Optimization, 2nd ed., algorithm 7.1). What goes into a product with D is rounded to a grid first, on which all sums are
+exact: so neither the order of frames nor the machine has a part in the answer. Columns as lines have multiples of a
+mark for bits.
 """
 
 import math
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 BINS = 16
-PENALTY, SMOOTHNESS = 1.0, 3.0
+PENALTY, SMOOTHNESS = 0.5, 2.0
 # Of the penalty: what pulls each bin, whose neighbours hold it already, and the bias, which must only stay finite.
 BIN_SHARE, BIAS_SHARE = 2.0**-4, 2.0**-10
 # No derivative of the loss is larger at the answer than this, in the weight of all frames together.
@@ -42,9 +43,9 @@ TOLERANCE, FINEST = 1e-7, 1e-12
 # Of Newton's steps, of conjugate gradients in a step, and of halvings of a step: far more than was ever seen.
 _MOST_STEPS, _MOST_DIRECTIONS, _MOST_HALVINGS = 500, 2000, 40
 _ENOUGH = 1e-4  # of the slope that Armijo's rule wants to see
-_ROUNDING = 2.0**-46  # of the loss: a rise by less may be one of rounding
+_ROUNDING = 2.0**-50  # of the loss, for each entry of the rows: a rise by less may be one of rounding
 _MARKS = 512.0  # of a unit, in which a line measures its column: one or two units from end to end
-_LOOSEST, _TIGHTEST = 0.5, 0.1  # shares of the gradient, and of the tolerance, that a step may leave unsolved
+_UNSOLVED = 0.3  # of the gradient, that a step leaves
 
 
 class Rise(NamedTuple):
@@ -308,13 +309,12 @@ class _Fit:
     def minimum(self, tolerance: float) -> Floats:
         """Return the rows at which no derivative is beyond `tolerance` times the weight of all frames."""
         point = self._at(np.zeros((len(self._pull), self._member.shape[1])))
-        wanted, steepest = tolerance * self._total, _largest(point.gradient)
+        wanted = tolerance * self._total
         for _ in range(_MOST_STEPS):
             steep = _largest(point.gradient)
             if steep <= wanted:
                 return point.rows
-            unsolved = max(steep * min(_LOOSEST, math.sqrt(steep / steepest)), _TIGHTEST * wanted)
-            point = self._along(point, self._direction(point, unsolved))
+            point = self._along(point, self._direction(point, max(_UNSOLVED * steep, 0.5 * wanted)))
         raise BoostingError(
             f"no minimum was found in {_MOST_STEPS} steps: the penalty is too small for weights as unlike as these"
         )
@@ -373,9 +373,10 @@ class _Fit:
     def _along(self, point: _Point, direction: Floats) -> _Point:
         """Return a point along the direction that is lower by enough: the whole step, or a half, a quarter of it ..."""
         slope, length = dot(direction, point.gradient), 1.0
+        noise = _ROUNDING * direction.size * point.loss
         for _ in range(_MOST_HALVINGS):
             there = self._at(point.rows + length * direction)
-            if there.loss <= point.loss + _ENOUGH * length * slope + _ROUNDING * point.loss:
+            if there.loss <= point.loss + _ENOUGH * length * slope + noise:
                 break
             length *= 0.5
         return there

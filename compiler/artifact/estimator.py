@@ -278,6 +278,7 @@ def _trained_by(classifier: Any, options: Options) -> Options:
         shrinkage=float(classifier.shrinkage),
         tolerance=classifier.tolerance,
         max_bins=classifier.max_bins,
+        settings={} if classifier.ties == "first" else {"ties": classifier.ties},
     )
 
 

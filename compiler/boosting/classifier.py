@@ -149,6 +149,9 @@ class LogitBoostClassifier(AdditiveClassifier):
         Training stops where the mean log-likelihood changes by less than this in a round (Weka's -L); None never stops.
     max_bins : int, optional
         No input has more bins than this (2 or more); they hold rows as evenly as can be. None: one for each value.
+    ties : {"first", "least-used"}, default="first"
+        Of inputs whose stumps explain the same, the first is taken (Weka's rule), or the one that the fewest stumps
+        look at so far, so that with few rows the classifier does not hang on a few inputs.
     classes : sequence, optional
         Labels that exist even where y lacks some of them (a fold without a rare class). None: those in y.
 
@@ -183,6 +186,7 @@ class LogitBoostClassifier(AdditiveClassifier):
         z_max: float = 3.0,
         tolerance: float | None = None,
         max_bins: int | None = None,
+        ties: str = "first",
         classes: Sequence[Any] | None = None,
     ) -> None:
         self.rounds = rounds
@@ -190,6 +194,7 @@ class LogitBoostClassifier(AdditiveClassifier):
         self.z_max = z_max
         self.tolerance = tolerance
         self.max_bins = max_bins
+        self.ties = ties
         self.classes = classes
 
     def staged_decision_function(self, X: ArrayLike) -> Iterator[Floats]:
@@ -214,6 +219,7 @@ class LogitBoostClassifier(AdditiveClassifier):
             tolerance=self.tolerance,
             weights=weights,
             max_bins=self.max_bins,
+            ties=self.ties,
             on_round=progress,
         )
         self.n_rounds_ = self.stumps_.n_rounds

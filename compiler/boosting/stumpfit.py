@@ -54,9 +54,12 @@ class FittedStumps:
     answers: Floats  # (K, n)
 
 
-def fit_stumps(binned: Binned, targets: Targets, z_max: float) -> FittedStumps:
-    """Fit one stump a class. Equal stumps: the lowest column, then the lowest threshold wins. |value| <= z_max."""
-    columns, splits = _best_splits(binned, targets, z_max, _tie_bound(targets, z_max))
+def fit_stumps(binned: Binned, targets: Targets, z_max: float, used: NDArray[np.int64] | None = None) -> FittedStumps:
+    """Fit one stump a class. Equal stumps: the lowest column, then the lowest threshold wins. |value| <= z_max.
+
+    With `used` (d,), how many stumps look at each column, a least used column wins; and each stump is counted there.
+    """
+    columns, splits = _best_splits(binned, targets, z_max, _tie_bound(targets, z_max), used)
     places = [(*binned.home[int(column)], int(split)) for column, split in zip(columns, splits, strict=True)]
     left = np.array([group.goes_left(position, split) for group, position, split in places])
     missing = _missing(places, left.shape)
@@ -97,7 +100,7 @@ def _unit(targets: Targets) -> Floats:
 
 
 def _best_splits(
-    binned: Binned, targets: Targets, z_max: float, tie_bound: Floats
+    binned: Binned, targets: Targets, z_max: float, tie_bound: Floats, used: NDArray[np.int64] | None
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the column and split (K,) that explain most, for each class; of equal ones the lowest."""
     n_classes, n = targets.weights.units.shape
@@ -123,8 +126,21 @@ def _best_splits(
             columns, most = sums.columns[places], parts.max(axis=1)
             explained[columns, classes] = most
             splits[columns, classes] = (parts >= (most - tie_bound[classes])[:, np.newaxis]).argmax(axis=1)
-    columns = (explained >= explained.max(axis=0) - tie_bound).argmax(axis=0)
+    tied = explained >= explained.max(axis=0) - tie_bound
+    columns = tied.argmax(axis=0) if used is None else _least_used(tied, used, len(binned.home))
     return columns, splits[columns, np.arange(n_classes)]
+
+
+def _least_used(tied: NDArray[np.bool_], used: NDArray[np.int64], varying: int) -> NDArray[np.intp]:
+    """Return the column of each class (K,), of the `tied` ones (d, K) the least used so far, and count it."""
+    columns: NDArray[np.intp] = tied.argmax(axis=0)
+    for k, among in enumerate(tied.T):
+        candidates = np.flatnonzero(among)
+        # Where all columns tie, none tells anything: others need no threshold because of it.
+        if len(candidates) < varying:
+            columns[k] = candidates[used[candidates].argmin()]
+        used[columns[k]] += 1
+    return columns
 
 
 def _roughly_explained(sums: SplitSums, totals: Floats, least: Floats) -> tuple[Floats, Floats]:

@@ -59,7 +59,7 @@ class Options:
     seed: int = 1
     rivals: tuple[str, ...] = RIVALS
     trainer: str = "logitboost"
-    settings: Mapping[str, float] = field(default_factory=dict)
+    settings: Mapping[str, float | str] = field(default_factory=dict)
     permute: int = 0
     learning: bool = False
 

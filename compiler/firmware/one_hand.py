@@ -46,16 +46,11 @@ def on_bytes(tables: IntegerTables, codes: Sequence[Sequence[int]]) -> IntegerTa
 def _joint(
     tables: IntegerTables, joint: int, codes: NDArray[np.uint16]
 ) -> tuple[NDArray[np.uint16], NDArray[np.int16]]:
-    """Return thresholds and rows of one joint: a threshold after each byte whose successor falls into another bin, or
-    comes to another distance.
-    """
-    bins, slope = np.searchsorted(tables.thresholds[joint], codes), tables.slope_of(joint)
-    rows, apart = tables.joint_rows[joint][bins].astype(np.int64), bins[1:] != bins[:-1]
-    if slope is not None:
-        rows, distances = rows + slope.of(codes), slope.distances(codes)
-        apart |= distances[1:] != distances[:-1]
-    last = np.flatnonzero(apart)
-    return last.astype(np.uint16), rows[np.concatenate([last, [BYTES - 1]])].astype(np.int16)
+    """Return thresholds and rows of one joint: a threshold after each byte whose successor falls into another bin."""
+    thresholds, rows = tables.binned(joint)
+    bins = np.searchsorted(thresholds, codes)
+    last = np.flatnonzero(bins[1:] != bins[:-1])
+    return last.astype(np.uint16), rows[bins[np.concatenate([last, [BYTES - 1]])]]
 
 
 _FIRST, _LAST = 1, 255  # what a CyberGlove can send

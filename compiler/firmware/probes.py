@@ -90,7 +90,7 @@ def record_files(
         sizes=[len(numbers) for numbers in layout.groups],
         by_switch=answer == "update",
         padding=layout.padding,
-        joints=len(layout.joints),
+        joints=layout.tables.n_joints,
         code_bytes=layout.code_bits // 8,
         frame_bytes=layout.frame_size,
     )

@@ -3,6 +3,7 @@
 import hashlib
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib.metadata import version
 from typing import Protocol
 
@@ -54,6 +55,7 @@ class Numbered:
     thenar: str
 
 
+@lru_cache(maxsize=4)
 def numbered(tables: IntegerTables) -> Numbered:
     """Return names for tables alone: "type 0", "s0", "j0" and so on."""
     return Numbered(

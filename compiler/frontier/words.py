@@ -4,7 +4,7 @@ import csv
 import io
 from collections.abc import Callable, Iterable, Iterator
 
-from thenar.runtime.manifest import PAPERS_TRAINER
+from thenar.runtime.manifest import PAPERS_TRAINER, in_words
 from thenar.runtime.names import printable
 
 from ..evaluation.rates import Rate
@@ -75,7 +75,7 @@ def is_usual(setting: Recipe) -> bool:
 
 
 def _settings(setting: Recipe) -> list[str]:
-    return [f"{name.replace('_', '-')} {value:g}" for name, value in setting.settings.items()]
+    return [in_words(name, value) for name, value in setting.settings.items()]
 
 
 def wiring_of(setting: Recipe) -> str:

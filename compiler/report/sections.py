@@ -44,7 +44,7 @@ def facts(content: ReportContent) -> Iterator[tuple[str, str, str]]:
     fit = manifest.fit
     yield "Trainer", fit.trainer, f"chosen of {counted(fit.tried, 'fit')}" if fit.compared else "given"
     if content.rounds:
-        ended = f"of {fit.settings.get('rounds') or 0:g}: the tolerance ended the training"
+        ended = f"of {fit.number('rounds'):g}: the tolerance ended the training"
         yield "Rounds", f"{content.rounds}", ended if manifest.stopped_after else "of boosting"
     yield "Tables", f"{content.tables_bytes:,}", "bytes of tables.bin"
     yield "Changed by rounding", f"{manifest.proof.changed}", f"of {counted(manifest.source.rows, 'row')}"

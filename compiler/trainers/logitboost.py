@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     from ..samples import Samples
 
 
+# As boosting.boost.TIES.
+TIES = ("first", "least-used")
+
+
 class LogitBoost(Trainer):
     """Rounds of one stump a class, as Weka 3.6 computes them, with exact sums."""
 
@@ -18,9 +22,9 @@ class LogitBoost(Trainer):
     rank = -1
     staged = True
     tried = (
-        {"rounds": 30, "max_bins": 16},
-        {"rounds": 100, "max_bins": 16},
-        {"rounds": 100, "max_bins": 16, "shrinkage": 0.3},
+        {"rounds": 30, "max_bins": 16, "ties": "least-used"},
+        {"rounds": 100, "max_bins": 16, "ties": "least-used"},
+        {"rounds": 100, "max_bins": 16, "ties": "least-used", "shrinkage": 0.3},
         {"rounds": 100},
     )
     settings = (
@@ -29,11 +33,13 @@ class LogitBoost(Trainer):
         Setting("shrinkage", "Share of each round that is kept.", float, 1.0, 1e-6, 1.0),
         Setting("tolerance", "Stop after a round that changes the mean loss by less than this.", float, None, 0),
         Setting("max_bins", "At most so many bins a joint: smaller tables.  [default: no limit]", int, None, 2),
+        Setting("ties", "Of equal stumps: the first input's, or the least used input's.", str, "first", names=TIES),
     )
 
     def candidates(self, given: Mapping[str, Number]) -> tuple[dict[str, Number], ...]:
         """Return what is compared; given rounds are the paper's recipe, of which nothing else is left open."""
-        return super().candidates({"shrinkage": 1.0, "max_bins": None, **given} if "rounds" in given else given)
+        recipe = {"shrinkage": 1.0, "max_bins": None, "ties": "first"} if "rounds" in given else {}
+        return super().candidates({**recipe, **given})
 
     def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> "Stumps":
         """Return the ensemble. Raises BoostingError for settings that make no sense."""

@@ -12,7 +12,7 @@ from thenar.compiler.tables.collapse import ScoreTables
 from thenar.compiler.trainers.base import Training
 
 
-@parametrize_with_checks([AdditiveLogitClassifier(tolerance=1e-10), AdditiveLogitClassifier(linear=True)])
+@parametrize_with_checks([AdditiveLogitClassifier(tolerance=1e-12), AdditiveLogitClassifier(linear=True)])
 @pytest.mark.filterwarnings("ignore::sklearn.exceptions.SkipTestWarning")
 def test_scikit_learn_accepts_the_estimator(
     estimator: AdditiveLogitClassifier, check: Callable[[AdditiveLogitClassifier], None]

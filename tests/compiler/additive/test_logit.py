@@ -3,6 +3,8 @@
 import os
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,7 +15,7 @@ from scipy.linalg import block_diag
 from sklearn.linear_model import LogisticRegression
 
 from thenar.compiler.additive.logit import BIAS_SHARE, BIN_SHARE, PENALTY, SMOOTHNESS, ColumnTables, fit_logit
-from thenar.compiler.boosting.boost import BoostingError
+from thenar.compiler.boosting.boost import BoostingError, boost
 from thenar.compiler.elementary import softmax
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -64,7 +66,8 @@ def test_lines_are_scikit_learns_answer_on_scaled_codes(seed: int, smoothness: f
     X, labels = grasps(seed)
     X[:, :6] *= 7  # of two values, that need not be 0 and 1
     weights = np.random.default_rng(seed).integers(1, 4, len(X)).astype(float)
-    tables = fit_logit(X, labels, 3, smoothness=smoothness, linear=True, tolerance=1e-10, weights=weights)
+    own: dict[str, Any] = {"penalty": 1.0, "smoothness": smoothness, "linear": True}
+    tables = fit_logit(X, labels, 3, **own, tolerance=1e-10, weights=weights)
     deviation = np.sqrt(np.average((X[:, 6:] - np.average(X[:, 6:], 0, weights)) ** 2, 0, weights))
     pulls = np.r_[BIAS_SHARE, np.ones(6), (BIN_SHARE + smoothness) * deviation**2]
     design = np.column_stack([np.ones(len(X)), X[:, :6] / 7, X[:, 6:] - np.average(X[:, 6:], 0, weights)])
@@ -77,7 +80,8 @@ def test_lines_are_scikit_learns_answer_on_scaled_codes(seed: int, smoothness: f
     beyond[0, 6:], beyond[1, 6:] = X[:, 6:].max(axis=0), 1e6
     assert np.ptp(tables.scores(beyond), axis=0).max() == 0
     beyond[0, 6:], beyond[1, 6:] = np.nan, np.average(X[:, 6:], 0, weights)
-    np.testing.assert_allclose(*tables.scores(beyond), atol=1e-9)
+    missing, mean = tables.scores(beyond)
+    np.testing.assert_allclose(missing, mean, atol=1e-9)
 
 
 @pytest.mark.parametrize("unit", [1, 1000, 2.0**-20])
@@ -121,8 +125,8 @@ def test_a_row_counts_as_often_as_it_weighs(seed: int) -> None:
 def test_a_looser_tolerance_gives_nearly_the_same_answer() -> None:
     X, labels = grasps(5)
     tight = fit_logit(X, labels, 3, tolerance=1e-12).scores(X)
-    np.testing.assert_allclose(fit_logit(X, labels, 3).scores(X), tight, atol=1e-4)
-    assert np.abs(fit_logit(X, labels, 3, tolerance=0.1).scores(X) - tight).max() > 1e-3
+    np.testing.assert_allclose(fit_logit(X, labels, 3).scores(X), tight, atol=1e-3)
+    assert np.abs(fit_logit(X, labels, 3, tolerance=0.1).scores(X) - tight).max() > 1e-2
 
 
 def test_a_class_without_rows_is_unlikely_and_finite() -> None:
@@ -174,6 +178,23 @@ def test_score_tables_add_what_the_columns_add(linear: bool) -> None:
 def test_what_makes_no_sense_is_refused(changes: dict[str, Any], because: str) -> None:
     with pytest.raises(BoostingError, match=because):
         fit_logit(*grasps(0), 3, **changes)
+
+
+@pytest.mark.slow
+def test_a_fit_takes_no_longer_than_a_hundred_rounds_of_boosting() -> None:
+    """Of the processor's time; the quickest of some runs, in turn."""
+    X, labels = grasps(1, n=4200, bits=160, joints=16, classes=14)
+
+    def seconds(work: Callable[[], Any]) -> float:
+        start = time.process_time()
+        work()
+        return time.process_time() - start
+
+    fits = [
+        (seconds(lambda: fit_logit(X, labels, 14)), seconds(lambda: boost(X, labels, 14, rounds=100))) for _ in range(3)
+    ]
+    ours, theirs = map(min, zip(*fits, strict=True))
+    assert ours < 1.1 * theirs
 
 
 _FIT = """

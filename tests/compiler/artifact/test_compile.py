@@ -130,7 +130,7 @@ def test_frames_that_are_numbered_as_trials_are_refused_before_any_work(make_set
     assert compile_build(numbered, tmp_path / "build", rounds=1, folds=0).manifest.headline is None
 
 
-OPEN = {"trainer": "logit", "penalty": 1.0, "max_bins": 4}  # the smoothness is chosen
+OPEN: dict[str, Any] = {"trainer": "logit", "penalty": 1.0, "max_bins": 4, "linear": 0}  # the smoothness is chosen
 
 
 @pytest.mark.parametrize(
@@ -166,14 +166,14 @@ def test_a_choice_is_recorded_and_made_again_from_the_recorded_options(grasp_set
     manifest = compile_build(grasp_set, tmp_path / "build", folds=0, **OPEN).manifest
     fit, options = manifest.fit, manifest.options
     assert manifest.fitting == fit
-    assert (options.trainer, options.settings, options.max_bins) == ("logit", {"penalty": 1.0}, 4)
+    assert (options.trainer, options.settings, options.max_bins) == ("logit", {"penalty": 1.0, "linear": 0.0}, 4)
     assert (fit.trainer, fit.tried, fit.of) == ("logit", 2, "within subject")
     assert fit.settings["smoothness"] in {tried["smoothness"] for tried in TRAINERS["logit"].tried}
     assert {each.settings["smoothness"] for each in fit.compared} >= {fit.settings["smoothness"]}
     compile_build(grasp_set, tmp_path / "again", options)
     assert _bytes(tmp_path / "again") == _bytes(tmp_path / "build")
     # Asked for by name, it is the same model.
-    given = {name: value for name, value in fit.settings.items() if value is not None}
+    given: dict[str, Any] = {name: value for name, value in fit.settings.items() if value is not None}
     alone = compile_build(grasp_set, tmp_path / "alone", trainer="logit", folds=0, **given)
     assert alone.manifest.fitting is None
     assert alone.manifest.fit.settings == fit.settings

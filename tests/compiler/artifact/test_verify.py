@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 import pytest
@@ -35,9 +36,9 @@ def folder(grasp_set: GraspSet, tmp_path: Path, request: pytest.FixtureRequest) 
     """Return a build of each trainer, its settings given so that nothing is chosen."""
     trainer, changes = request.param
     settings = Training.candidates(Options(trainer=trainer))[0].settings
-    given = {name: value for name, value in settings.items() if value is not None}
-    few = {"rounds": 15} if "rounds" in given else {}
-    made = compile_build(grasp_set, tmp_path / "build", trainer=trainer, folds=0, **(given | few | changes))
+    given: dict[str, Any] = {name: value for name, value in settings.items() if value is not None}
+    given |= {"rounds": 15} if "rounds" in given else {}
+    made = compile_build(grasp_set, tmp_path / "build", trainer=trainer, folds=0, **(given | changes))
     assert made.manifest.fit.trainer == trainer
     assert bool(made.tables.slopes) == bool(changes)
     return made.folder
