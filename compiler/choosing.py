@@ -28,9 +28,9 @@ Rows = NDArray[np.intp]
 # A training set of fewer trials than these is cut into so many inner folds, a larger one into two.
 _FOLDS = ((1500, 4), (20_000, 3))
 _LEAST_GROUPS = 3
-# Tables of a kilobyte, at a byte an entry, cost next to nothing; of larger ones, those up to a quarter above the
-# smallest are small.
-_SMALL, _LARGER = 1024, 1.25
+# Tables of eight kilobytes, at a byte an entry, fit the smallest microcontrollers; of larger ones, those up to a quarter
+# above the smallest are small.
+_SMALL, _LARGER = 8192, 1.25
 
 
 def inner_folds(samples: Samples, seed: int, groups: NDArray[np.generic] | None = None) -> list[Fold]:

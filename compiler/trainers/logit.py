@@ -24,12 +24,15 @@ class Logit(Trainer):
         Setting("linear", "1: joints add scores in proportion to their codes, without bins (logit).", int, 0, 0, 1),
     )
 
-    tried = tuple(
-        {"penalty": penalty, "smoothness": smoothness, "max_bins": bins}
-        for penalty in (10.0, 1.0, 0.1)
-        for smoothness in (10.0, 1.0)
-        for bins in (8, 16)
-    ) + tuple({"penalty": penalty, "smoothness": 1.0, "linear": 1} for penalty in (10.0, 1.0, 0.1))
+    # The smoothness that suits grows with the bins: each step is the smaller, the more there are.
+    tried = (
+        {"penalty": 1.0, "smoothness": 1.0, "linear": 1},
+        {"penalty": 0.3, "smoothness": 1.0, "linear": 1},
+        {"penalty": 1.0, "smoothness": 4.0, "max_bins": 16},
+        {"penalty": 3.0, "smoothness": 24.0, "max_bins": 32},
+        {"penalty": 1.0, "smoothness": 8.0, "max_bins": 32},
+        {"penalty": 0.3, "smoothness": 1.5, "max_bins": 32},
+    )
 
     def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> "ScoreTables":
         """Return the tables. Raises BoostingError for settings that make no sense."""
