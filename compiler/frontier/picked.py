@@ -35,9 +35,10 @@ class Picked:
             "trainer": setting.trainer,
             # What is not written is a default, and nothing of it is open any more.
             **{own.name: own.default for own in TRAINERS[setting.trainer].settings},
-            "max_bins": setting.max_bins,
             **setting.settings,
         }
+        if setting.max_bins is not None:
+            settled["max_bins"] = setting.max_bins
         if setting.rounds is not None:
             settled["rounds"] = setting.rounds
         if setting.inputs == "joints":
