@@ -7,21 +7,24 @@ C: its cycles are those of avr-gcc 5.4 with -Os.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .assembly import calls_are_near
+from .assembly import calls_are_near, group_lines
 from .costs import NAME_BYTES, Cost
 from .layout import JointLayout, Layout
 
 # AVR Instruction Set Manual, DS40002198, table 5-1: cores AVRe (ATmega328P) and AVRe+ (ATmega2560), whose program
 # counter of three bytes makes calls and returns a cycle longer. A conditional branch is one that is not taken.
-_ONE = "adc add and brcc breq brge brlo brne clr cp cpc cpi cpse eor ldi mov movw sbc sbci sub subi tst"
-_TWO = "ld lds mul pop push rjmp st sts taken"
+_ONE = (
+    "adc add and andi brcc breq brge brlo brne clr cp cpc cpi cpse eor ldi lsl lsr mov movw or ori sbc sbci sbrc sub "
+    "subi swap tst"
+)
+_TWO = "icall ld lds mul pop push rjmp st sts taken"
 _CYCLES = dict.fromkeys(_ONE.split(), 1) | dict.fromkeys(_TWO.split(), 2) | {"lpm": 3, "jmp": 3, "skip": 3}
 _CALLS = {"rcall": 3, "call": 4, "ret": 4}
 _WORDS = {"lds": 2, "sts": 2, "call": 2, "jmp": 2, "taken": 0, "skip": 0}
@@ -139,6 +142,13 @@ _FREE_PAIRS, _IMMEDIATE_PAIRS = 5, 7
 _SET_SWITCH, _GRASP, _PAGE = 80, 40, 256
 
 
+# Seeing that no input is missing, in classify() and in update(), with the bytes of what is done otherwise.
+_NOTHING_MISSING = replace(code("lds tst taken"), size=code("lds tst breq ldi ldi lds lds icall rjmp").size)
+_NOTHING_TO_LEAVE = replace(_NOTHING_MISSING, size=_NOTHING_MISSING.size - code("rjmp").size)
+# Bytes of C code about missing inputs, rounded up.
+_LOSING, _LOSING_JOINTS = 400, 300
+_LOST_RAM = 5  # how many, whether any, and what is done then
+
 # What a code of 16 bits below a joint's bins takes more than others.
 _CLAMPED = Code(1)
 
@@ -151,7 +161,7 @@ _DRAWN, _CLIMBED, _ROUNDS = 4096, 8, 20
 class AvrCosts:
     """The costs of a layout on an AVR of so many bytes of flash, of which depends how wide its program counter is."""
 
-    __slots__ = ("_counter", "_layout", "_parts", "_search", "_steps", "_width")
+    __slots__ = ("_counter", "_groups", "_layout", "_parts", "_search", "_steps", "_width")
 
     def __init__(self, layout: Layout, flash: int) -> None:
         parts = layout.parts
@@ -160,15 +170,17 @@ class AvrCosts:
         joints = [joint for joint in layout.joints if not joint.constant]
         searched = layout.bins == "search" and joints
         self._search = BinSearch(joints, layout.code_bits, self._counter) if searched else None
-        self._steps = [code("")] * len(layout.groups) + [self._row_number(joint) for joint in joints]
+        lines = (group_lines("", fields) for fields in layout.fields)
+        self._groups = [code(" ".join(line.split()[0] for line in each)) for each in lines]
+        self._steps = self._groups + [self._row_number(joint) for joint in joints]
 
     @property
     def cost(self) -> Cost:
         """What the classifier takes at most, a few bytes more of flash and RAM."""
         names = NAME_BYTES * (self._layout.tables.n_classes + 1)
         flash = self.flash + names
-        update = self._update.size  # in a section of its own
-        return Cost(self.most_cycles, self.most_update_cycles, flash, flash - update, self.ram)
+        uncalled = self._update.size + self._losing  # in sections of their own
+        return Cost(self.most_cycles, self.most_update_cycles, flash, flash - uncalled, self.ram)
 
     @property
     def fixed_cycles(self) -> int:
@@ -204,11 +216,12 @@ class AvrCosts:
         else as in `most_cycles`.
         """
         move = code("ldi ldi") * 2 + code("ld ld st st") * self._width
-        compared = Code() if self._coded else together(self._steps)
+        compared = together(self._groups if self._coded else self._steps)
         steps = compared + (code("lds lds cpse") + self._call) * len(self._steps)
         passes = (move + steps + together(self._changing())) * self._parts
         stored_twice = self._width * self._parts - self._layout.tables.n_classes  # in classify alone
-        once = code("push pop") * self._kept + code("sts") * len(self._steps) + code("jmp clr") + self._answering
+        once = _NOTHING_TO_LEAVE + code("push pop") * self._kept + code("sts") * len(self._steps)
+        once += code("jmp clr") + self._answering
         searching = self._search.fixed_cycles if self._search else 0
         whole = passes + once + code("st st") * -stored_twice
         return whole.takes(self._counter) + self._most_varying + searching
@@ -233,7 +246,7 @@ class AvrCosts:
         bins = sum(len(joint.bins) for joint in layout.joints if not joint.constant)
         tables += 2 * layout.tables.n_classes  # the scores that it begins with
         tables += bins + (2 * (_PAGE - 1) if layout.bins == "direct" and bins else 0)
-        if len(layout.groups) > 255:
+        if len(layout.ports) > 255:
             tables += 2 * layout.tables.n_switches
         routine = self._adding if layout.adding == "called" else Code()
         answer = code("movw ldi mov") + code("cp cpc brge movw ldi") * (layout.tables.n_classes - 1)
@@ -245,14 +258,23 @@ class AvrCosts:
         else:
             assembly += self._call * (len(self._steps) * self._parts)
         searching = self._search.flash if self._search else 0
-        return tables + assembly.size + searching + _GRASP + (_SET_SWITCH if layout.groups else 0)
+        return tables + self._losing + assembly.size + searching + _GRASP + (_SET_SWITCH if layout.groups else 0)
+
+    @property
+    def _losing(self) -> int:
+        """Bytes of flash of what replaces missing inputs by their means."""
+        means = self._layout.means.size * (1 if self._layout.narrow_means else 2)
+        loading = code("push push clr call pop pop movw subi sbci ret") + code("ld ld") * self._width
+        losing = _LOSING if self._layout.groups else _LOSING_JOINTS
+        return means + 2 * self._layout.tables.n_classes + loading.size + losing
 
     @property
     def ram(self) -> int:
         """Bytes of variables and of the deepest stack, return address included."""
         found = len(self._steps) - len(self._layout.groups) if self._search else 0
-        scores = 2 * self._layout.tables.n_classes
-        return self._layout.frame_size + scores + len(self._steps) + found + self._stack
+        scores = 4 * self._layout.tables.n_classes  # as they are, and as they begin where an input is missing
+        lost = len(self._layout.ports) + -(-len(self._layout.joints) // 8) + _LOST_RAM
+        return self._layout.frame_size + scores + len(self._steps) + found + lost + self._stack
 
     @property
     def _stack(self) -> int:
@@ -287,17 +309,18 @@ class AvrCosts:
         at_once = min(self._width, _IMMEDIATE_PAIRS)
         start = code("ldi ldi") * at_once + code("ldi ldi movw") * (self._width - at_once)
         found = together(self._steps) + (code("lds") + self._to_row) * len(self._steps)
-        passes = (start + found + code("ldi ldi") + code("st st") * self._width) * self._parts
+        passes = (_NOTHING_MISSING + start + found + code("ldi ldi") + code("st st") * self._width) * self._parts
         return passes + code("sts") * len(self._steps) + code("push pop") * self._kept + code("clr")
 
     @property
     def _update(self) -> Code:
         move = code("ldi ldi") + code("ld ld") * self._width
-        compared = Code() if self._coded else together(self._steps)
+        compared = together(self._groups if self._coded else self._steps)
         steps = compared + (code("lds lds cpse") + self._call) * len(self._steps)
         passes = (move * 2 + steps + together(self._changes())) * self._parts
         routines = (self._row + code("ret")) * 2
-        return passes + code("push") * self._kept + code("sts") * len(self._steps) + code("jmp") + routines
+        once = _NOTHING_TO_LEAVE + code("push") * self._kept + code("sts") * len(self._steps) + code("jmp")
+        return passes + once + routines
 
     @property
     def _coded(self) -> bool:

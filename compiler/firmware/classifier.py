@@ -13,8 +13,8 @@ from thenar.firmware_templates.rendering import render
 from thenar.runtime.manifest import Calibration
 
 from .assembly import assembly_values, check_size
-from .layout import Layout, Lookup, Parts, lookups
-from .words import Names, comment, inputs_in_words, string
+from .layout import NO_SWITCH, Field, Layout, Lookup, Parts, lookups
+from .words import Names, comment, inputs_in_words, string, switches_in_words
 
 _STARTS_PER_LINE = 4
 
@@ -40,7 +40,8 @@ def portable_values(name: str, layout: Layout) -> dict[str, object]:
         "start": starts,
         "open_sums": open_sums,
         "open_rows": [f"&thenar_{name}_rows[{lookup.first_row}]," for lookup in lookups(layout)],
-        "finds": [_find(name, layout, lookup) for lookup in lookups(layout)],
+        "finds": [line for lookup in lookups(layout) for line in _find(name, layout, lookup)],
+        "n_lookups": layout.n_lookups,
         "adding": adding,
         "storing": _storing(n_lanes, narrow),
         "replacing": replacing,
@@ -122,20 +123,28 @@ def _storing(lanes: int, narrow: bool) -> list[str]:
     return [f"sum[{lane}] = from[{lane}] + {text};" for lane, text in enumerate(sums)]
 
 
-def _find(name: str, layout: Layout, lookup: Lookup) -> str:
-    """Return the statement that finds the row of one look-up."""
-    source = f"thenar_{name}_input."
+def _find(name: str, layout: Layout, lookup: Lookup) -> list[str]:
+    """Return the lines of the statement that finds the row of one look-up."""
     if lookup.joint is None:
-        found = f"{source}switches[{lookup.number}]"
+        found = " | ".join(map(_field, layout.fields[lookup.number]))
+        found = f"({found})" if len(layout.fields[lookup.number]) > 1 and lookup.first_row else found
     else:
-        code, joint = f"{source}codes[{lookup.number}]", lookup.joint
+        code, joint = f"thenar_{name}_input.codes[{lookup.number}]", lookup.joint
         if layout.bins == "search":
             found = f"below({lookup.first_bin}u, {len(joint.thresholds)}u, {code})"
         else:
             last = len(joint.bins) - 1
             place = code if layout.bins == "direct" else f"clamped({code}, {joint.first}u, {last}u)"
             found = f"thenar_{name}_bins[{_after(lookup.first_bin, place)}]"
-    return f"row[{lookup.index}] = &thenar_{name}_rows[{_after(lookup.first_row, found)}];"
+    statement = f"row[{lookup.index}] = &thenar_{name}_rows[{_after(lookup.first_row, found)}];"
+    return textwrap.wrap(statement, COLUMNS - 4, subsequent_indent=_INDENT)
+
+
+def _field(field: Field) -> str:
+    """Return the expression of a field of a port's byte, at its place in the group's."""
+    by, mask = field.bit - field.to, ((1 << field.width) - 1) << field.to
+    moved = f"((uint32_t)ports[{field.port}] {'>>' if by > 0 else '<<'} {abs(by)})" if by else f"ports[{field.port}]"
+    return f"({moved} & 0x{mask:02X}u)"
 
 
 def _after(first: int, place: str) -> str:
@@ -183,7 +192,7 @@ def _lookup_lines(layout: Layout, names: Names, lookup: Lookup, columns: slice) 
     if lookup.joint is None:
         numbers = layout.groups[lookup.number]
         switches = [names.switches[number].name for number in numbers]
-        heading = f"switches {numbers[0]} to {numbers[-1]}: " + ", ".join(map(comment, switches))
+        heading = f"{switches_in_words(numbers)}: " + ", ".join(map(comment, switches))
         says = [_closed(switches, byte) for byte in range(len(lookup.rows))]
     else:
         name = comment(names.joints[lookup.number].name)
@@ -253,7 +262,7 @@ def classifier_files(
         check_size(layout)
     common = _common_values(name, names, layout, avr)
     texts: dict[str, dict[str, object]] = {
-        ".h": {"groups": _group_notes(names, layout), "joints": _joint_notes(names)},
+        ".h": {"ports": _port_notes(names, layout), "joints": _joint_notes(names)},
         ".c": _source_values(names, layout) | portable_values(name, layout),
     }
     if avr:
@@ -292,7 +301,7 @@ def _common_values(name: str, names: Names, layout: Layout, avr: bool) -> dict[s
         "avr": avr,
         "classes": n_classes,
         "switches": n_switches,
-        "n_groups": len(layout.groups),
+        "n_ports": len(layout.ports),
         "n_joints": n_joints,
         "class_type": _unsigned(n_classes),
         "switch_type": _unsigned(n_switches),
@@ -315,6 +324,7 @@ def _source_values(names: Names, layout: Layout) -> dict[str, object]:
     searched = layout.bins == "search" and bool(joints)
     bins = sum(len(_bins(lookup)) for lookup in joints)
     steps = [step for lookup in joints for step in _steps(lookup)] if searched else []
+    means = layout.means
     return {
         "table": table_lines(layout, names),
         "bins": [line for lookup in joints if bins for line in _bin_lines(names, lookup)],
@@ -326,11 +336,15 @@ def _source_values(names: Names, layout: Layout) -> dict[str, object]:
         "n_thresholds": len(steps),
         "found": joints if searched else [],
         "n_found": len(joints),
+        "means": _mean_lines(means),
+        "mean_type": "int8_t" if layout.narrow_means else "int16_t",
+        "n_inputs": len(means),
+        "starts": number_lines(layout.start.tolist()),
         "open_scores": number_lines(layout.all_open.tolist()),
         "names": [string(grasp) for grasp in names.grasps],
         "longest_name": max(len(grasp.encode()) for grasp in names.grasps) + 1,
         "places": _place_lines(layout),
-        "group_type": _unsigned(len(layout.groups)),
+        "port_type": _unsigned(len(layout.ports)),
         "first_classes": number_lines(layout.parts.firsts),
         "avr_macros": avr_macros(layout.parts.width, layout.entry_bits),
     }
@@ -351,16 +365,26 @@ def _steps(lookup: Lookup) -> list[int]:
     return [] if lookup.joint is None else lookup.joint.thresholds.tolist()
 
 
+def _mean_lines(means: NDArray[np.int64]) -> list[str]:
+    """Return a row of the means in braces for each input, as words of 16 bits."""
+    lines = []
+    for row in means.astype(np.int16).tolist():
+        first, *more = number_lines(row)
+        held = [f"{_INDENT}{{{first.lstrip()}", *more]
+        lines += [*held[:-1], f"{held[-1].removesuffix(',')}}},"]
+    return lines
+
+
 def _place_lines(layout: Layout) -> list[str]:
-    """Return a line per group: for each of its switches the number of the group and the bit."""
-    return [
-        "    " + " ".join(f"{{{g}, {1 << bit}}}," for bit in range(len(numbers)))
-        for g, numbers in enumerate(layout.groups)
-    ]
+    """Return for each switch the number of its port and the bit, eight on a line."""
+    pairs = [f"{{{port}, {1 << bit}}}," for port, bit in layout.places]
+    return [_INDENT + " ".join(pairs[at : at + 8]) for at in range(0, len(pairs), 8)]
 
 
-def _group_notes(names: Names, layout: Layout) -> list[str]:
-    return [", ".join(comment(names.switches[number].name) for number in numbers) for numbers in layout.groups]
+def _port_notes(names: Names, layout: Layout) -> list[str]:
+    shown = (("-" if n == NO_SWITCH else comment(names.switches[n].name) for n in port) for port in layout.ports)
+    wrapped = (textwrap.wrap(", ".join(port), COLUMNS - 20, break_on_hyphens=False) for port in shown)
+    return [f"\n{' ' * 18}".join(lines) for lines in wrapped]
 
 
 def _joint_notes(names: Names) -> list[str]:

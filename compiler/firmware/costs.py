@@ -23,8 +23,9 @@ class Cost:
     cycles          that classify() takes for any frame; elsewhere than on an AVR instructions
     update_cycles   that update() takes, whatever has changed
     flash           bytes of all of it, with names of grasp types of up to 15 bytes
-    flash_classify  of these, bytes that a program has which never calls update(), where the linker leaves out what is
-                    not called (--gc-sections; code in C compiled with -ffunction-sections)
+    flash_classify  of these, bytes that a program has which never calls update() and never says that an input is
+                    missing, where the linker leaves out what is not called (--gc-sections; C compiled with
+                    -ffunction-sections -fdata-sections)
     ram             bytes, stack included, whichever of the two is called
     """
 
@@ -63,9 +64,11 @@ _BELOW, _ABOVE, _WIDE = 4, 6, 13
 _SEARCHED, _SEARCH_STEP = 6, 14
 
 # Of code; where classes are added up in parts, that takes more.
-_BYTES, _BYTES_PARTS, _BYTES_LOOKUP, _BYTES_CLASS, _BYTES_PAIR, _BYTES_QUAD = 60, 250, 21, 13, 55, 111
+_BYTES, _BYTES_PARTS, _BYTES_LOOKUP, _BYTES_CLASS, _BYTES_PAIR, _BYTES_QUAD = 150, 250, 21, 13, 55, 111
 _BYTES_UPDATE, _BYTES_UPDATE_PAIR, _BYTES_UPDATE_QUAD = 185, 9, 46
 _BYTES_CLAMPED, _BYTES_SEARCHED = 26, 52
+# Of what replaces missing inputs, beside the table of their means.
+_BYTES_LOSING, _FIELD, _MISSING = 290, 3, 3
 _STACK = 128
 
 
@@ -79,7 +82,8 @@ def word_cost(layout: "Layout", core: Core) -> Cost:
     classify, update = (layout.n_lookups * (core.lookup + each) + answering for each in (adding, replacing))
     flash = _flash(layout) + NAME_BYTES * (classes + 1)
     update_flash = _BYTES_UPDATE + words * (_BYTES_UPDATE_PAIR if wide else _BYTES_UPDATE_QUAD)
-    return Cost(classify, update, flash + update_flash, flash, _ram(layout))
+    losing = _BYTES_LOSING + layout.means.size * (1 if layout.narrow_means else 2)
+    return Cost(classify, update, flash + update_flash + losing, flash, _ram(layout))
 
 
 def _words(layout: "Layout") -> int:
@@ -88,7 +92,11 @@ def _words(layout: "Layout") -> int:
 
 
 def _finding(layout: "Layout") -> int:
-    """Return the instructions that finding rows takes beyond those of a direct look-up."""
+    """Return the instructions that finding rows takes beyond those of a direct look-up of whole bytes."""
+    return _MISSING + _FIELD * sum(map(len, layout.fields)) + _finding_joints(layout)
+
+
+def _finding_joints(layout: "Layout") -> int:
     joints = [joint for joint in layout.joints if not joint.constant]
     match layout.bins:
         case "direct":
@@ -113,7 +121,7 @@ def _flash(layout: "Layout") -> int:
     if layout.bins == "search":
         found = sum(len(joint.thresholds) for joint in joints) * layout.code_bits // 8
     rows = 4 * layout.n_rows * words * len(parts.firsts)
-    places = layout.tables.n_switches * (2 if len(layout.groups) <= 255 else 4)
+    places = layout.tables.n_switches * (2 if len(layout.ports) <= 255 else 4)
     starts = 2 * len(parts.firsts) * (2 * parts.width + 8)  # of the sums, constant and as they are in the beginning
     starts += 2 * layout.tables.n_classes + 4 * layout.n_lookups  # scores, and rows added, in the beginning
     code = _BYTES + (_BYTES_PARTS if len(parts.firsts) > 1 else 0) + _BYTES_CLASS * parts.width
@@ -124,6 +132,7 @@ def _flash(layout: "Layout") -> int:
 def _ram(layout: "Layout") -> int:
     """Return the bytes of variables and stack, roughly."""
     classes = layout.tables.n_classes
-    frame = len(layout.groups) + layout.padding + layout.tables.n_joints * layout.code_bits // 8
+    frame = len(layout.ports) + layout.padding + layout.tables.n_joints * layout.code_bits // 8
+    lost = len(layout.ports) + -(-layout.tables.n_joints // 8) + 4
     rows = 2 * 4 * layout.n_lookups  # pointers to those added, and in update() to those that are now
-    return frame + 2 * classes + 2 * (classes + 6) + rows + _STACK
+    return frame + 2 * classes + 4 * (classes + 6) + lost + rows + _STACK

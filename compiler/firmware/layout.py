@@ -3,14 +3,18 @@ how a joint's code becomes a row.
 
     score_k = start_k + sum over groups g of group_rows[g][byte_g, k] + sum over joints a of joints[a].rows[bin_a, k]
 
-where byte_g holds one bit per switch of group g. Every row of a group is the exact sum of its switches' rows, so the
+where byte_g holds one bit per switch of group g. A frame holds the switches as they come, a byte for each port: eight
+wires of an expander, eight keys of a matrix, or eight kept switches in their order. A group is a field of one such
+byte, or put together from fields of several. Every row of a group is the exact sum of its switches' rows, so the
 scores are those of `IntegerTables`, bit for bit. With 16-bit entries row 0 of a group is zero, so that one switch's
 change is plus or minus row 2^bit. With 8-bit entries every entry is what exceeds the least of its look-up and class,
 0 to 255; the leasts are part of `start`.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import chain
 from typing import Literal
 
 import numpy as np
@@ -85,7 +89,28 @@ def check_joints(thresholds: Sequence[NDArray[np.uint16]], bins: Bins) -> None:
             )
 
 
+Ports = tuple[tuple[int, ...], ...]
+"""For each port the switches of its bits, bit 0 first, at most eight; NO_SWITCH where a bit shows none."""
+NO_SWITCH = -1
+
+
+def consecutive(n_switches: int) -> Ports:
+    """Return the ports of switches that are wired to nothing known: eight after eight."""
+    return tuple(tuple(range(first, min(first + 8, n_switches))) for first in range(0, n_switches, 8))
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """`width` bits of the byte of a port, from `bit` on, which are those of a group from `to` on."""
+
+    port: int
+    bit: int
+    width: int
+    to: int
+
+
 SMALLEST_GROUP, LARGEST_GROUP = 2, 6
+MOST_MEAN = 127
 MOST_TABLE_ROWS = 65535  # their numbers are 16 bits wide
 
 Adding = Literal["called", "unrolled"]
@@ -109,15 +134,16 @@ def parts_of(n_classes: int) -> Parts:
     return Parts(width, tuple(min(part * width, n_classes - width) for part in range(count)))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Layout:
-    """An arrangement of `tables` for K classes, s switches and j joints.
+    """An arrangement of `tables` for K classes, s switches and j joints, each switch in one of `ports`.
 
     groups[g] are the numbers of the switches that share look-up g, bit 0 first; group_rows[g] are its rows
     (2^len(groups[g]), K), int16 or uint8 as `entry_bits` says; joints (j) likewise; start (K,) int64.
     """
 
     tables: IntegerTables
+    ports: Ports
     groups: tuple[tuple[int, ...], ...]
     entry_bits: int
     bins: Bins
@@ -133,13 +159,13 @@ class Layout:
 
     @property
     def padding(self) -> int:
-        """Bytes, 0 or 1, between the groups' bytes and the codes, so that codes of 16 bits lie at even offsets."""
-        return len(self.groups) % 2 if self.code_bits == 16 else 0
+        """Bytes, 0 or 1, between the ports' bytes and the codes, so that codes of 16 bits lie at even offsets."""
+        return len(self.ports) % 2 if self.code_bits == 16 else 0
 
     @property
     def frame_size(self) -> int:
         """Bytes of a frame as `frame_bytes` makes them."""
-        return len(self.groups) + self.padding + len(self.joints) * self.code_bits // 8
+        return len(self.ports) + self.padding + len(self.joints) * self.code_bits // 8
 
     @property
     def parts(self) -> Parts:
@@ -164,12 +190,52 @@ class Layout:
         scores: NDArray[np.int64] = self.scores(*nothing)[0]
         return scores
 
+    @property
+    def places(self) -> tuple[tuple[int, int], ...]:
+        """The port and the bit of each switch."""
+        found = {n: (p, bit) for p, port in enumerate(self.ports) for bit, n in enumerate(port) if n != NO_SWITCH}
+        return tuple(found[number] for number in range(self.tables.n_switches))
+
+    @cached_property
+    def fields(self) -> tuple[tuple[Field, ...], ...]:
+        """What each group's byte is put together from: bits that follow each other in one port are one field."""
+        places, found = self.places, []
+        for numbers in self.groups:
+            fields: list[Field] = []
+            for to, (port, bit) in enumerate(places[number] for number in numbers):
+                last = fields[-1] if fields else None
+                if last is not None and (last.port, last.bit + last.width) == (port, bit):
+                    fields[-1] = replace(last, width=last.width + 1)
+                else:
+                    fields.append(Field(port, bit, 1, to))
+            found.append(tuple(fields))
+        return tuple(found)
+
+    def port_bytes(self, bits: NDArray[np.bool_]) -> NDArray[np.uint8]:
+        """Return the byte of each port (n, ports) for the switches (n, s)."""
+        shown = np.zeros((len(bits), len(self.ports), 8), bool)
+        for number, (port, bit) in enumerate(self.places):
+            shown[:, port, bit] = bits[:, number]
+        return np.packbits(shown, axis=2, bitorder="little")[:, :, 0]
+
     def group_bytes(self, bits: NDArray[np.bool_]) -> NDArray[np.uint8]:
         """Return the byte of each group (n, groups) for the switches (n, s)."""
         packed = np.zeros((len(bits), len(self.groups)), np.uint8)
         for g, numbers in enumerate(self.groups):
             packed[:, g] = np.packbits(np.asarray(bits, bool)[:, numbers], axis=1, bitorder="little")[:, 0]
         return packed
+
+    @property
+    def means(self) -> NDArray[np.int64]:
+        """What each switch, then each joint, adds to the scores while it is missing, beyond its row 0: (s + j, K)."""
+        pairs = zip(self.tables.joint_means, self.tables.joint_rows, strict=True)
+        joints = [mean.astype(np.int64) - rows[0] for mean, rows in pairs]
+        return np.vstack([self.tables.switch_means.astype(np.int64), *joints])
+
+    @property
+    def narrow_means(self) -> bool:
+        """Whether a byte holds each of the `means`."""
+        return bool((np.abs(self.means) <= MOST_MEAN).all())
 
     def scores(self, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDArray[np.int64]:
         """Return the scores (n, K) of the switches (n, s) and codes (n, j), as the firmware adds them up."""
@@ -181,7 +247,7 @@ class Layout:
         return scores
 
     def frame_bytes(self, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDArray[np.uint8]:
-        """Return what the firmware's input structure holds, (n, F): groups, padding, codes (little-endian).
+        """Return what the firmware's input structure holds, (n, F): ports, padding, codes (little-endian).
 
         Where a code has 8 bits, codes above 255 become 255: no threshold tells them apart.
         """
@@ -190,37 +256,41 @@ class Layout:
             held = np.minimum(codes, 255).astype(np.uint8)
         else:
             held = np.ascontiguousarray(codes, "<u2").view(np.uint8).reshape(len(bits), 2 * codes.shape[1])
-        return np.hstack([self.group_bytes(bits), padding, held])
+        return np.hstack([self.port_bytes(bits), padding, held])
 
 
 def arrange(
     tables: IntegerTables,
     *,
+    ports: Ports | None = None,
     group_size: int = 5,
     n_groups: int | None = None,
     entry_bits: int = 16,
     bins: Bins = "direct",
     adding: Adding = "called",
 ) -> Layout:
-    """Return `tables` with the switches in groups of at most `group_size` (2 to 6), consecutive and as even as can be.
+    """Return `tables` with the switches in groups of at most `group_size` (2 to 6), in the order of `ports`.
 
-    There are as few groups as that size allows, or `n_groups` where given: more look-ups and less flash. Raises
-    FirmwareError if the tables cannot be laid out so: 8-bit entries for look-ups that span more than 255 steps, a joint
-    with more than 256 rows, "direct" for codes of 16 bits, "trimmed" for thresholds further apart than 254 codes, no
-    inputs at all.
+    There are as few groups as that size allows, or `n_groups` where given: more look-ups and less flash. They are as
+    even as can be, and none is of two ports where as few can do without. Where no wiring is known, `ports` are left
+    out, and switches follow each other by number. Raises FirmwareError if the tables cannot be laid out so: 8-bit
+    entries for look-ups that span more than 255 steps, a joint with more than 256 rows, "direct" for codes of 16 bits,
+    "trimmed" for thresholds further apart than 254 codes, no inputs at all.
     """
     if tables.n_switches + tables.n_joints == 0:
         raise FirmwareError("the build looks at no switch and no joint: there is nothing to make firmware of")
     if entry_bits not in (8, 16):
         raise FirmwareError(f"entries of {entry_bits} bits: firmware has 8 or 16")
     check_joints(tables.thresholds, bins)
-    groups = _grouped(tables.n_switches, group_size, n_groups)
+    ports = consecutive(tables.n_switches) if ports is None else ports
+    groups = _grouped(ports, group_size, n_groups)
     sums = [_group_sums(tables.switch_rows[list(numbers)].astype(np.int64)) for numbers in groups]
     wide_joints = [rows.astype(np.int64) for rows in tables.joint_rows]
     leasts = [_least(rows, entry_bits, group=True) for rows in sums]
     joint_leasts = [_least(rows, entry_bits, group=False) for rows in wide_joints]
     layout = Layout(
         tables=tables,
+        ports=ports,
         groups=groups,
         entry_bits=entry_bits,
         bins=bins,
@@ -242,16 +312,21 @@ def arrange(
     return layout
 
 
-def _grouped(n_switches: int, group_size: int, n_groups: int | None) -> tuple[tuple[int, ...], ...]:
+def _grouped(ports: Ports, group_size: int, n_groups: int | None) -> tuple[tuple[int, ...], ...]:
     if not SMALLEST_GROUP <= group_size <= LARGEST_GROUP:
         raise FirmwareError(f"groups of {group_size} switches: {SMALLEST_GROUP} to {LARGEST_GROUP} share a look-up")
-    if n_switches == 0:
-        return ()
-    fewest = -(-n_switches // group_size)
+    shown = [[number for number in port if number != NO_SWITCH] for port in ports]
+    switches = [*chain(*shown)]
+    fewest = -(-len(switches) // group_size)
     count = fewest if n_groups is None else n_groups
-    if not fewest <= count <= n_switches:
-        raise FirmwareError(f"{count} groups of at most {group_size} for {n_switches} switches: {fewest} or more")
-    return tuple(tuple(part.tolist()) for part in np.array_split(np.arange(n_switches), count))
+    if not fewest <= count <= len(switches):
+        raise FirmwareError(f"{count} groups of at most {group_size} for {len(switches)} switches: {fewest} or more")
+    within = [part for port in shown for part in _even(port, -(-len(port) // group_size))]
+    return tuple(within if len(within) == count else _even(switches, count))
+
+
+def _even(numbers: Sequence[int], count: int) -> list[tuple[int, ...]]:
+    return [tuple(part.tolist()) for part in np.array_split(np.asarray(numbers, int), count)] if count else []
 
 
 def _group_sums(rows: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from thenar.compiler.firmware import simavr
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.layout import Layout, arrange
-from thenar.compiler.firmware.probes import Answers, Probes, random_frames
+from thenar.compiler.firmware.probes import Lost, Probes, lost_inputs, random_frames
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.targets.host import MEMBER as HOST
 from thenar.runtime.manifest import Manifest
@@ -20,7 +20,7 @@ from thenar.runtime.tables import IntegerTables
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
 Probed = Callable[[IntegerTables, int], Probes]
-SameAsPython = Callable[[Answers, IntegerTables, Probes], None]
+SameAsPython = Callable[..., None]
 Tool = Callable[[str], str]
 
 _arrange: Callable[..., Layout] = arrange
@@ -138,6 +138,34 @@ def test_assembly_scores_as_python_does(
     for incremental in (False, True):
         answers = TARGETS[part].run(files, "hand", layout, held, incremental=incremental)
         same_as_python(answers, layout.tables, frames)
+
+
+def _without_each(layout: Layout, frames: Probes) -> tuple[Probes, Lost]:
+    """Return every frame once with nothing missing, once without each of its inputs, and thrice without several."""
+    inputs, several = layout.tables.n_switches + layout.tables.n_joints, len(frames) * 3
+    alone = np.vstack([np.zeros((1, inputs), bool), np.eye(inputs, dtype=bool)])
+    lost = np.vstack([np.tile(alone, (len(frames), 1)), lost_inputs(layout.tables, several, 1)])
+    order = np.concatenate([np.repeat(np.arange(len(frames)), len(alone)), np.arange(several) % len(frames)])
+    return Probes(frames.bits[order], frames.codes[order]), lost
+
+
+@NAMED
+@pytest.mark.parametrize("target", ["host", "avr328p", "avr2560"])
+def test_the_mean_stands_in_for_every_input_that_is_missing_as_in_python(
+    avr: None,
+    arranged: Callable[[Case], Layout],
+    describe: Describe,
+    same_as_python: SameAsPython,
+    case: Case,
+    target: str,
+) -> None:
+    layout, part = arranged(case), TARGETS[target]
+    frames, lost = _without_each(layout, random_frames(layout.tables, 12, seed=2))
+    held = layout.frame_bytes(frames.bits, frames.codes)
+    files = classifier_files("hand", describe(layout.tables), layout, avr=part.avr)
+    for incremental in (False, True):
+        answers = part.run(files, "hand", layout, held, incremental=incremental, lost=lost)
+        same_as_python(answers, layout.tables, frames, lost)
 
 
 @pytest.fixture
