@@ -9,6 +9,7 @@ import click
 from click.core import ParameterSource
 
 from thenar.compiler.text import INDEPENDENT
+from thenar.runtime.manifest import AUTO
 
 from .common import (
     Number,
@@ -56,7 +57,7 @@ PRESETS: dict[str, dict[str, str]] = {
 }
 _GROUPS = {
     "Basics": ("output", "preset", "method", "keep", "prune", "inputs"),
-    "Training": ("trainer", "rounds", "shrinkage", "tolerance", "max_bins"),
+    "Training": ("trainer",),
     "Integer tables": ("table_bits", "width"),
     "The rates in build.json": ("folds", "seed", "by", "jobs"),
     "A point of a frontier": ("from_frontier", "point"),
@@ -115,7 +116,7 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
     show_default=True,
     help="Which inputs the build reads.",
 )
-@trainer_option
+@trainer_option(AUTO)
 @click.option(
     "--folds",
     type=click.IntRange(0),
@@ -322,10 +323,13 @@ def _print_training(manifest: "Manifest") -> None:
     for switch in manifest.switches:
         if switch.threshold is not None:
             console.print(f"{switch.name}: {switch.closed}, learnt")
+    console.print(f"trained by {manifest.fit}{': ' if manifest.fit.why else ''}{manifest.fit.why}", soft_wrap=True)
+    for each in manifest.fit.compared:
+        console.print(f"  {each}", soft_wrap=True)
     if manifest.stopped_after:
         console.print(
-            f"stopped after {manifest.stopped_after} of {manifest.options.rounds} rounds: the last changed the mean "
-            f"loss by less than {manifest.options.tolerance:g}"
+            f"stopped after {manifest.stopped_after} of {manifest.fit.settings['rounds']:g} rounds: the last changed "
+            f"the mean loss by less than {manifest.options.tolerance:g}"
         )
     if manifest.zero_gain_nodes:
         console.print(

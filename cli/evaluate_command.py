@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from thenar.compiler.evaluation.study import Study
     from thenar.compiler.evaluation.tables import Cell, RateTable
 
-TABLES = ("compositions", "generality", "pruning", "baselines")
+TABLES = ("compositions", "generality", "pruning", "baselines", "trainers")
 
 
 def _numbers(_: click.Context, __: click.Parameter, value: str) -> tuple[int, ...]:
@@ -66,7 +66,7 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     show_default=True,
     help="Repeats of random folds, other seeds each.",
 )
-@trainer_option
+@trainer_option("logitboost")
 @click.option("--prune", type=click.IntRange(min=0), default=0, show_default=True, help="S: smallest node ID3 splits.")
 @click.option(
     "--prune-list",
@@ -198,14 +198,16 @@ def _print_confusions(study: "Study") -> None:
 
 def _rates(rated: "RateTable") -> "Grid":
     averaged = ["all"] if len(rated.columns) > 1 else []
-    numbers = ("switches", *rated.columns, *averaged)
+    paired = [f"against {row.paired.than}" for row in rated.rows if row.paired is not None][:1]
+    numbers = ("switches", *rated.columns, *averaged, *paired)
     from thenar.compiler.evaluation.tables import both
 
     grid = table(("", "", *numbers), numbers)
     for row in rated.rows:
         average = [Text(both(row.rate, row.frames))] if averaged else []
         rates = [Text(str(cell)) for cell in row.cells]
-        grid.add_row(Text(row.name), Text(row.what), str(row.switches), *rates, *average)
+        compared = [Text(str(row.paired or ""))] if paired else []
+        grid.add_row(Text(row.name), Text(row.what), str(row.switches), *rates, *average, *compared)
     return grid
 
 

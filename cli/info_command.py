@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from thenar.compiler.text import INDEPENDENT
+
 from .common import existing_file, json_flag, keep_apart, out, overwrite_flag, picture_file, progress, show, table
 from .lines import echo
 
@@ -58,6 +60,8 @@ def _print(summary: "Summary", path: Path) -> None:
     )
     if summary.simulated:
         echo(f"simulated: {summary.simulated}")
+    if summary.independent:
+        echo(INDEPENDENT)
     _print_counts(summary)
     _print_joints(summary)
     _print_separability(summary)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
+from thenar.runtime.manifest import AUTO
+
 from .common import Command, ListOf, Number, OneOf, existing_file
 
 if TYPE_CHECKING:
@@ -28,7 +30,7 @@ def _trainers() -> Iterable[str]:
     return TRAINERS
 
 
-method_name, trainer_name = OneOf("method", _methods), OneOf("trainer", _trainers)
+method_name = OneOf("method", _methods)
 method_list = ListOf("method", _methods, none=True)
 
 
@@ -99,13 +101,15 @@ class _TrainerOption(click.Option):
         from thenar.compiler.trainers.base import TRAINERS
 
         names = ", ".join(f"{trainer.name} ({trainer.what})" for trainer in TRAINERS.values())
-        self.help = f"What makes the model: {names}."
+        chosen = f"; {AUTO}: chosen by folds of the training rows, of those that take the settings given"
+        self.help = f"What makes the model: {names}{chosen if self.default == AUTO else ''}."
         return super().get_help_record(ctx)
 
 
-trainer_option = click.option(
-    "--trainer", type=trainer_name, default="logitboost", show_default=True, cls=_TrainerOption
-)
+def trainer_option(default: str) -> Callable[[Command], Command]:
+    """Return the option --trainer; where AUTO is its default, the trainer and its settings can be chosen."""
+    kind = OneOf("trainer", lambda: (AUTO, *_trainers()) if default == AUTO else _trainers())
+    return click.option("--trainer", type=kind, default=default, show_default=True, cls=_TrainerOption)
 
 
 class Training(WithMethods):
@@ -118,6 +122,7 @@ class Training(WithMethods):
         params = super().get_params(ctx)
         names = [param.name for param in params]
         place = names.index("trainer") + 1
+        self._auto = params[place - 1].default == AUTO
         return [*params[:place], *(each for each in self._settings if each.name not in names), *params[place:]]
 
     @cached_property
@@ -125,11 +130,14 @@ class Training(WithMethods):
         from thenar.compiler.trainers.base import TRAINERS
 
         settings = {setting.name: setting for trainer in TRAINERS.values() for setting in trainer.settings}
-        return tuple(map(_option, settings.values()))
+        chosen = {name for trainer in TRAINERS.values() for tried in trainer.tried for name in tried if self._auto}
+        return tuple(_option(setting, name in chosen) for name, setting in settings.items())
 
 
 class Grouped(Training):
-    """A command whose help shows its options in `groups`, by title; the rest are in a last one."""
+    """A command whose help shows its options in `groups`, by title, settings after the trainer; the rest in a last
+    one.
+    """
 
     def __init__(self, *args: Any, groups: Mapping[str, tuple[str, ...]], **named: Any) -> None:
         super().__init__(*args, **named)
@@ -138,9 +146,11 @@ class Grouped(Training):
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options group by group."""
         params = {str(param.name): param for param in self.get_params(ctx) if isinstance(param, click.Option)}
-        grouped = {name for names in self.groups.values() for name in names}
+        settings = tuple(str(each.name) for each in self._settings)
+        groups = {title: names + settings * ("trainer" in names) for title, names in self.groups.items()}
+        grouped = {name for names in groups.values() for name in names}
         rest = tuple(name for name in params if name not in grouped)
-        for title, names in {**self.groups, "More": rest}.items():
+        for title, names in {**groups, "More": rest}.items():
             records = (params[name].get_help_record(ctx) for name in names if name in params)
             if lines := [record for record in records if record]:
                 with formatter.section(title):
@@ -148,33 +158,37 @@ class Grouped(Training):
 
 
 def asked_settings(context: click.Context, asked: dict[str, Any]) -> dict[str, Any]:
-    """Take what the options of a `Training` command say of the trainer out of `asked`; return the trainer, and its
-    settings that are no defaults.
+    """Take what the options of a `Training` command say of the trainer out of `asked`; return the trainer, and the
+    settings that are given.
 
     Raises UsageError for a setting that is given to a trainer that takes none of that name.
     """
     from thenar.compiler.trainers.base import TRAINERS
 
     trainer = asked.pop("trainer")
-    own = {setting.name: setting.default for setting in TRAINERS[trainer].settings}
+    names = {setting.name for each in TRAINERS.values() for setting in each.settings}
+    own = names if trainer == AUTO else {setting.name for setting in TRAINERS[trainer].settings}
     found: dict[str, Any] = {"trainer": trainer}
-    for name in {setting.name for each in TRAINERS.values() for setting in each.settings}:
+    for name in names:
         value = asked.pop(name)
         if name in own:
-            found |= {} if value == own[name] else {name: value}
+            found |= {} if value is None else {name: value}
         elif context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
             raise click.UsageError(f"--{name.replace('_', '-')} is no setting of --trainer {trainer}: leave it out.")
     return found
 
 
-def _option(setting: "Setting") -> click.Option:
+def _option(setting: "Setting", chosen: bool) -> click.Option:
     ends = (setting.least, setting.most)
     kind: click.ParamType[Any] = Number(*ends)
     if setting.kind is int:
         low, high = (None if end is None else int(end) for end in ends)
         kind = click.INT if ends == (None, None) else click.IntRange(low, high)
-    decls, shown = [f"--{setting.name.replace('_', '-')}", setting.name], setting.default is not None
-    return click.Option(decls, type=kind, default=setting.default, show_default=shown, help=setting.what)
+    what, _, default = setting.what.partition("  [default: ")
+    default = "chosen" if chosen else default.rstrip("]") if setting.default is None else f"{setting.default:g}"
+    # Without a value it is not given.
+    decls, shown = [f"--{setting.name.replace('_', '-')}", setting.name], default or False
+    return click.Option(decls, type=kind, show_default=shown, help=what)
 
 
 layout_option = click.option(

@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from thenar.compiler.text import INDEPENDENT
+
 from .common import ListOf, existing_file, existing_folder, json_flag, out, progress, show
 
 if TYPE_CHECKING:
@@ -88,6 +90,8 @@ def _print(found: "Verification") -> None:
             f"recognised by the integers, {whose}: {rate}, {counted.integers:,} of {counted.total:,} {counted.unit}; "
             f"by the ensemble {counted.ensemble:,}"
         )
+    if found.independent:
+        console.print(INDEPENDENT)
     console.print(f"rows that change class: {len(found.changed)}")
     for row in found.changed[:_SHOWN]:
         line = f"  row {row.row}: {row.ensemble} becomes {row.integers}, recorded {row.recorded}"

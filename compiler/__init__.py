@@ -56,7 +56,7 @@ _HOMES = {
     ".recordings.graspset": ("GraspSet", "Joint"),
     ".recordings.merging": ("merge", "split"),
     ".samples": ("Samples",),
-    ".tables.collapse": ("ScoreTables",),
+    ".tables.collapse": ("Line", "ScoreTables"),
     ".trainers.base": ("TRAINERS", "Setting", "Trainer"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
@@ -76,6 +76,7 @@ __all__ = [
     "GraspSet",
     "ID3Selector",
     "Joint",
+    "Line",
     "LogitBoostClassifier",
     "Options",
     "Samples",

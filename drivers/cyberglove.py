@@ -418,6 +418,7 @@ class CyberGlove(Closing):
                 self._ready.append((self._last_us, record))
             self._quiet_from, self._expected, self._poll_at = now_us / 1e6, not polled, self._due
         elif now_us / 1e6 > self._given_up_at and self._expected:
+            line.check_plugged()
             silent = now_us / 1e6 - self._heard_at > self._silent_s
             said = f"no byte for {self._silent_s:g}" if silent else f"no record for {self._noisy_s:g}"
             raise DeviceError(f"{self.url}: the CyberGlove has sent {said} s: check its power and the cable")

@@ -114,6 +114,11 @@ class SerialLine(Closing):
         self._descriptor = -1  # nobody reads what another file of the same number holds
         self._port.close()
 
+    def check_plugged(self) -> None:
+        """Raise DeviceError if the node that was opened has been removed, which reading may not show yet."""
+        if self._node is not None and _node(self.url) is None:
+            raise self._gone("its device node was removed")
+
     def _look(self) -> None:
         self._look_at = monotonic() + _LOOK_S
         if _node(self.url) not in (None, self._node):
@@ -140,7 +145,7 @@ class SerialLine(Closing):
         waiting = min(self._port.in_waiting, _CHUNK)
         return first + (self._port.read(waiting) if waiting else b"")
 
-    def _gone(self, reason: Exception) -> DeviceError:
+    def _gone(self, reason: Exception | str) -> DeviceError:
         return DeviceError(f"{self.url}: the serial line is gone ({reason}): check cable and power")
 
 

@@ -5,7 +5,7 @@ path, no host. `checksum` is the SHA-256 of those bytes with that field empty.
 """
 
 import hashlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Literal, TypeVar
 
 import msgspec
@@ -17,6 +17,8 @@ from .names import LONGEST_NAME, fault, shortened
 
 SCHEMA = 1
 MAX_BYTES = 16 << 20
+
+AUTO, PAPERS_TRAINER = "auto", "logitboost"  # trainers: the one that is chosen, and the paper's
 
 Inputs = Literal["both", "switches", "joints"]
 TableBits = Literal[8, 16]
@@ -61,9 +63,9 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     ----------
     prune : int
         The paper's S: ID3 splits no fewer rows.
-    rounds, shrinkage, tolerance, max_bins : int, float, float or None, int or None
-        Settings of LogitBoost: how many rounds, the share of each that is kept, the change of the mean loss below
-        which a round is the last, and the most bins of a joint.
+    rounds, shrinkage, tolerance, max_bins : int, float, float, int; or None
+        Settings of trainers: how many rounds of boosting, the share of each that is kept, the change of the mean loss
+        below which a round is the last, and the most bins of a joint. None: chosen, or the trainer's default.
     inputs : {"both", "switches", "joints"}
         Which of the recordings' inputs are used.
     folds, seed : int
@@ -77,13 +79,14 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     width : int
         No sum of the tables needs more bits, 4 to 16.
     trainer, settings : str, dict
-        What makes the model, and the settings that only it takes, by name.
+        What makes the model, and the settings that only it takes, by name. "auto": of the trainers that take the
+        settings given, the one that inner folds choose; with `rounds` that is LogitBoost.
     """
 
     prune: Count = _written(0)
-    rounds: Annotated[int, Meta(ge=1, le=2**53)] = _written(100)
+    rounds: Annotated[int, Meta(ge=1, le=2**53)] | None = _written(None)
     inputs: Inputs = _written("both")
-    shrinkage: Annotated[float, Meta(gt=0.0, le=1.0)] = _written(1.0)
+    shrinkage: Annotated[float, Meta(gt=0.0, le=1.0)] | None = _written(None)
     folds: Count = _written(4)
     seed: int = _written(1)
     tolerance: Annotated[float, Meta(ge=0.0)] | None = None
@@ -92,9 +95,73 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     placement: Name = "id3"
     keep: Annotated[int, Meta(ge=1, le=2**53)] | None = None
     width: Annotated[int, Meta(ge=4, le=16)] = 16
-    trainer: Name = "logitboost"
+    trainer: Name = AUTO
     settings: dict[Name, Value] = {}
     by: By | None = None
+
+
+class Compared(Struct, frozen=True, forbid_unknown_fields=True):
+    """A way to train, as inner folds of the training rows saw it.
+
+    correct  trials recognised, of `total` that were tested in them
+    error    the rate's standard error
+    loss     mean of -ln P(true type) over the trials
+    behind   by how much its rate lacks the best one's; behind_error: the standard error of that difference
+    rows     rows of its score tables, on average
+    """
+
+    trainer: Name
+    settings: dict[Name, Value | None]
+    correct: Count
+    total: Annotated[int, Meta(ge=1, le=2**53)]
+    error: Share
+    loss: Annotated[float, Meta(ge=0.0)]
+    behind: Share
+    behind_error: Share
+    rows: Amount
+
+    @property
+    def rate(self) -> float:
+        """Recognised trials as a share of all."""
+        return self.correct / self.total
+
+    @property
+    def name(self) -> str:
+        """The trainer and its settings: "logit, penalty 1, smoothness 10"."""
+        return fit_name(self.trainer, self.settings)
+
+    def __str__(self) -> str:
+        """Return "logit, penalty 1: 98.1 +- 0.5 %, 0.6 +- 0.3 behind the best; tables of 158 rows"."""
+        behind = f", {100 * self.behind:.1f} +- {100 * self.behind_error:.1f} behind the best" if self.behind else ""
+        return f"{self.name}: {100 * self.rate:.1f} +- {100 * self.error:.1f} %{behind}; tables of {self.rows:.0f} rows"
+
+
+def fit_name(trainer: str, settings: Mapping[str, float | None]) -> str:
+    """Return a trainer and its settings in words: "logit, penalty 1, smoothness 10"."""
+    values = (f"{name.replace('_', '-')} {value:g}" for name, value in settings.items() if value is not None)
+    return ", ".join([trainer, *values])
+
+
+class Fitting(Struct, frozen=True, forbid_unknown_fields=True):
+    """The trainer that made the model, values for all its settings, and how they were chosen.
+
+    of        what the rates of the inner folds are of; folds: how many there were
+    tried     how many ways to train were compared
+    compared  the best of each trainer, and the chosen one; empty where there was nothing to choose
+    why       a sentence
+    """
+
+    trainer: Name
+    settings: dict[Name, Value | None]
+    of: Of = "within subject"
+    folds: Count = 0
+    tried: Count = 1
+    compared: tuple[Compared, ...] = ()
+    why: str = ""
+
+    def __str__(self) -> str:
+        """Return the trainer and its settings."""
+        return fit_name(self.trainer, self.settings)
 
 
 class Calibration(Struct, frozen=True, forbid_unknown_fields=True):
@@ -203,6 +270,7 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     zero_gain_nodes  decisions of the placement's tree at which no switch gained anything alone; left out if there are
                      none
     scan_sha256      of scan.json; left out where the build was compiled for no harness
+    fitting          how the fit was chosen; left out where the options leave no choice
     """
 
     schema: int
@@ -220,6 +288,20 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     stopped_after: Count = 0
     zero_gain_nodes: Count = 0
     scan_sha256: Digest | None = None
+    fitting: Fitting | None = None
+
+    @property
+    def fit(self) -> Fitting:
+        """The trainer and its settings, as they were chosen or given."""
+        if self.fitting is not None:
+            return self.fitting
+        asked = self.options
+        boosted = {"rounds": asked.rounds, "shrinkage": asked.shrinkage, "tolerance": asked.tolerance}
+        given = {"max_bins": asked.max_bins, **asked.settings}
+        # Of other trainers, older versions wrote the first two as well.
+        if asked.trainer in (AUTO, PAPERS_TRAINER):
+            return Fitting(PAPERS_TRAINER, boosted | given)
+        return Fitting(asked.trainer, given)
 
     @property
     def headline(self) -> Recognised | None:
@@ -266,7 +348,10 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
     yield from _wrong_names("units", (each.unit for each in (*manifest.joints, *taxels)))
     yield from _wrong_names("taxels", (taxel.name for taxel in taxels))
     options = manifest.options
-    texts = (manifest.thenar, source.taxonomy, options.placement, options.trainer, *options.settings)
+    texts = [manifest.thenar, source.taxonomy, options.placement, options.trainer, *options.settings]
+    fit = manifest.fit
+    texts += [fit.trainer, *fit.settings]
+    texts += [name for each in fit.compared for name in (each.trainer, *each.settings)]
     yield from _wrong_names("texts", texts)
     yield from _wrong_names("texts", filter(None, [source.simulated]), 2 * LONGEST_NAME)
     yield from _wrong_columns(manifest)
@@ -276,7 +361,9 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
     proof = manifest.proof
     if proof.width != options.width or max(proof.covered, proof.changed) > manifest.source.rows:
         yield "proves something of other tables than it describes"
-    if any(rate.correct > rate.total for rate in manifest.rates) or manifest.stopped_after > options.rounds:
+    counted = [(rate.correct, rate.total) for rate in manifest.rates]
+    counted += [(each.correct, each.total) for each in fit.compared]
+    if any(correct > total for correct, total in counted) or manifest.stopped_after > (fit.settings.get("rounds") or 0):
         yield "counts more than there is"
 
 

@@ -14,6 +14,8 @@ from msgspec.structs import replace
 from thenar.runtime.build import ENSEMBLE_NAME, MANIFEST_NAME, SCAN_NAME, TABLES_NAME
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import (
+    AUTO,
+    PAPERS_TRAINER,
     SCHEMA,
     Calibration,
     Manifest,
@@ -40,7 +42,7 @@ from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet, Joint
 from ..samples import Columns, Samples
 from ..tables.compare import Comparison, compare
-from ..trainers.base import Training, changed
+from ..trainers.base import SHARED, Training, changed
 from . import CompileError
 from .documents import REPORT_NAME, SPEC_FOLDER, BuildReport, Documents, Progress
 from .ensemble import ensemble_to_bytes
@@ -50,6 +52,7 @@ from .training import (
     answers_of,
     cross_validated,
     cuts_of,
+    groups_for,
     integers_of,
     rates_of,
     samples_of,
@@ -119,7 +122,7 @@ def compile_build(
     progress: Progress | None = None,
     **changes: Any,
 ) -> BuildReport:
-    """Choose the placement, train, collapse, quantise, prove, and write the build `folder`, whole or not at all.
+    """Choose placement and fit, train, collapse, quantise, prove, and write the build `folder`, whole or not at all.
 
     The same recordings, options and harness give the same bytes.
 
@@ -175,10 +178,13 @@ def compile_build(
     cuts = cuts_of(grasp_set, asked)
     steps = _Steps(progress, sum(len(cut.folds) for cut in cuts))
     ports = ports or ports_of_whole_glove(None, grasp_set.element_names)
-    trained = train(samples, asked, steps.trained, ports)
+    groups = groups_for(grasp_set, asked)
+    trained = train(samples, asked, steps.trained, ports, groups, jobs)
     joints = tuple(range(samples.codes.shape[1]))
     made = Making(grasp_set, samples, joints, asked, trained, harness)
-    tested = cross_validated(samples, cuts, asked, partial(answers_of, samples, asked, ports), jobs, steps.tested)
+    tested = cross_validated(
+        samples, cuts, asked, partial(answers_of, samples, asked, ports, groups), jobs, steps.tested
+    )
     return made.publish(target, tested, documents, jobs, progress)
 
 
@@ -189,20 +195,17 @@ def _sound(options: Options) -> Options:
     if not 4 <= options.width <= 16:
         raise CompileError(f"sums of {options.width} bits: tables have 4 to 16")
     METHODS.named(options.placement).check_given(options.keep, options.prune)
-    values = Training.of(options).settings
+    only, *others = Training.candidates(options)
+    trainer, given = options.trainer, {name: getattr(options, name) for name in SHARED} | options.settings
+    if not others:
+        # Nothing is chosen: the options say all. LogitBoost is what those with rounds mean.
+        trainer, given = AUTO if only.trainer == PAPERS_TRAINER else only.trainer, dict(only.settings)
+    floats = {name: float(value) for name, value in given.items() if value is not None}
+    shared: dict[str, Any] = {name: floats.pop(name, None) for name in SHARED}
+    shared |= {name: int(shared[name]) for name in ("rounds", "max_bins") if shared[name] is not None}
     # A name that is equal to a default is left out if it is the very same string.
-    return replace(
-        options,
-        shrinkage=float(options.shrinkage),
-        tolerance=None if options.tolerance is None else float(options.tolerance),
-        placement=sys.intern(options.placement),
-        trainer=sys.intern(options.trainer),
-        settings={
-            name: float(value)
-            for name, value in values.items()
-            if value is not None and name not in Options.__struct_fields__
-        },
-    )
+    names = {"placement": sys.intern(options.placement), "trainer": sys.intern(trainer)}
+    return replace(options, **shared, **names, settings=floats)
 
 
 class _Steps:
@@ -288,7 +291,7 @@ class Making:
     def _manifest(self, tested: Tested | None, files: Mapping[str, bytes]) -> Manifest:
         """Return what `build.json` says, not sealed yet; `files` are name -> content of what lies beside it."""
         digests = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
-        grasp_set, options = self.grasp_set, self.options
+        grasp_set, options, fitting = self.grasp_set, self.options, self.trained.fitting
         rates = rates_of("training", self.samples, self.comparison.deployed, options.seed)
         switches = zip(self.trained.columns, self.trained.gains, strict=True)
         return Manifest(
@@ -314,6 +317,7 @@ class Making:
             stopped_after=self.trained.stopped_after,
             zero_gain_nodes=self.trained.zero_gain_nodes,
             scan_sha256=digests.get(SCAN_NAME),
+            fitting=fitting if fitting is not None and fitting.compared else None,
         )
 
     def _switch(self, column: int, gain: float) -> Switch:

@@ -18,7 +18,7 @@ from ..hand import HandShape
 from ..recordings.graspset import GraspSet
 from ..tables.compare import Comparison, worst_case
 from ..workers import little
-from .training import Trained
+from .training import USUAL_ROUNDS, Trained
 
 if TYPE_CHECKING:
     from ..evaluation.study import Study
@@ -135,21 +135,22 @@ def _study(made: BuildReport, jobs: int, progress: Progress | None) -> "tuple[St
     """
     from ..evaluation.study import Options, evaluate
 
-    asked = made.manifest.options
+    asked, fit = made.manifest.options, made.manifest.fit
+    settings = {name: value for name, value in fit.settings.items() if value is not None}
     if not asked.folds:
         return None, "The build was compiled without folds."
     options = Options(
         folds=asked.folds,
         repeats=1,
-        rounds=asked.rounds,
+        rounds=int(settings.pop("rounds", None) or USUAL_ROUNDS),
         protocols=("nested",),
         tables=("compositions", "generality", "pruning"),
         seed=asked.seed,
-        trainer=asked.trainer,
-        settings=asked.settings,
+        trainer=fit.trainer,
+        settings=settings,
     )
     try:
-        work = _TRAININGS * len(made.grasp_set) * asked.rounds
+        work = _TRAININGS * len(made.grasp_set) * options.rounds
         return evaluate(made.grasp_set, options, little(work, jobs), progress), ""
     except EvaluationError as reason:
         return None, f"These recordings have none: {reason}."

@@ -3,7 +3,8 @@
 A sealed npz (recordings/arrays.py). Format 1, of LogitBoost: columns (M, K) int32, thresholds (M, K) float64 and values
 (M, K, 3) float64, with a JSON header {"n_inputs", "shrinkage"}. Format 2, of every other trainer: bias (K,),
 switch_rows (s, K), bins (j,) int64, thresholds (sum of bins - 1,) uint16 and joint_rows (sum of bins, K), else float64,
-with the header {}.
+with the header {}. Format 3, of those that have lines, holds in addition lines (n, 3) int64, the joint, the lowest and
+the highest code of each, and line_rows (n, K).
 """
 
 from collections.abc import Mapping
@@ -19,10 +20,10 @@ from thenar.runtime.tables import MAX_CLASSES, MAX_JOINTS, MAX_SWITCHES
 
 from ..boosting.stumps import Stumps
 from ..recordings.arrays import AnyArray, pack, unpack
-from ..tables.collapse import Model, ScoreTables
+from ..tables.collapse import HIGHEST_CODE, Line, Model, ScoreTables
 
 KIND = b"THNRENSM"
-STUMPS, TABLES = 1, 2  # formats
+STUMPS, TABLES, LINES = 1, 2, 3  # formats
 MAX_BYTES = 1 << 30
 
 # Some hundred bytes less than these make a gigabyte: a column, a threshold and three values each.
@@ -32,6 +33,7 @@ _DTYPES = {
     STUMPS: {"columns": "<i4", "thresholds": "<f8", "values": "<f8"},
     TABLES: {"bias": "<f8", "switch_rows": "<f8", "bins": "<i8", "thresholds": "<u2", "joint_rows": "<f8"},
 }
+_DTYPES[LINES] = _DTYPES[TABLES] | {"lines": "<i8", "line_rows": "<f8"}
 
 # Beyond what boosting gives (boost.LARGEST_Z_MAX), and of thresholds beyond every code.
 _LARGEST_VALUE, _LARGEST_THRESHOLD = 1e6, 1e6
@@ -61,6 +63,10 @@ def ensemble_to_bytes(model: Model) -> bytes:
             "thresholds": np.concatenate([np.zeros(0), *model.thresholds]),
             "joint_rows": np.concatenate([np.zeros((0, model.n_classes)), *model.joint_rows]),
         }
+        if model.lines:
+            version = LINES
+            arrays["lines"] = np.array([(line.joint, line.low, line.high) for line in model.lines])
+            arrays["line_rows"] = np.stack([line.row for line in model.lines])
     written = {name: array.astype(_DTYPES[version][name]) for name, array in arrays.items()}
     return seal(KIND, version, pack(header, written))
 
@@ -71,7 +77,7 @@ def ensemble_from_bytes(data: bytes, what: str = "ensemble.bin") -> Model:
     Raises SealError for a file that is foreign, truncated, altered or newer, BuildError for one that contradicts
     itself.
     """
-    version, payload = unseal(data, KIND, TABLES, what)
+    version, payload = unseal(data, KIND, LINES, what)
     header_bytes, arrays = unpack(payload, what)
     dtypes = _DTYPES.get(version, {})
     if {name: array.dtype for name, array in arrays.items()} != {n: np.dtype(d) for n, d in dtypes.items()}:
@@ -98,9 +104,23 @@ def model_fault(model: Model, n_switches: int, n_joints: int, n_classes: int) ->
         thresholds.dtype != np.uint16 or (np.diff(thresholds.astype(int)) < 1).any() for thresholds in model.thresholds
     ):
         return "has thresholds that are no codes, or do not rise"
+    if fault := _lines_fault(model):
+        return fault
     # Written so that what is no number fails as well.
-    if not all((np.abs(rows) <= _LARGEST_VALUE).all() for rows in (model.bias, model.switch_rows, *model.joint_rows)):
+    numbers = (model.bias, model.switch_rows, *model.joint_rows, *(line.row for line in model.lines))
+    if not all((np.abs(rows) <= _LARGEST_VALUE).all() for rows in numbers):
         return "holds numbers beyond a million, or that are none"
+    return ""
+
+
+def _lines_fault(model: ScoreTables) -> str:
+    joints = [line.joint for line in model.lines]
+    if joints != sorted(set(joints)) or any(not 0 <= joint < len(model.joint_rows) for joint in joints):
+        return "has lines of joints that there are not, or not in their order"
+    if any(not 0 <= line.low < line.high <= HIGHEST_CODE for line in model.lines):
+        return "has lines whose ends are no codes, or do not rise"
+    if any(line.row.shape != model.bias.shape for line in model.lines):
+        return f"has lines of other shapes than {model.n_classes} classes"
     return ""
 
 
@@ -129,7 +149,16 @@ def _tables(arrays: Mapping[str, AnyArray], what: str) -> ScoreTables:
     ends = np.cumsum(bins)[:-1]
     steps = np.split(thresholds, ends - np.arange(1, len(bins))) if len(bins) else []
     rows = np.split(joint_rows, ends) if len(bins) else []
-    tables = ScoreTables(bias, switch_rows, tuple(steps), tuple(rows))
+    tables = ScoreTables(bias, switch_rows, tuple(steps), tuple(rows), _lines(arrays, what))
     if fault := model_fault(tables, len(switch_rows), len(bins), len(bias)):
         raise BuildError(f"{what} is damaged: it {fault}")
     return tables
+
+
+def _lines(arrays: Mapping[str, AnyArray], what: str) -> tuple[Line, ...]:
+    if "lines" not in arrays:
+        return ()
+    lines, rows = arrays["lines"].astype(np.int64), arrays["line_rows"].astype(np.float64)
+    if lines.ndim != 2 or rows.ndim != 2 or lines.shape != (len(rows), 3) or not len(rows):
+        raise BuildError(f"{what} is damaged: its lines are no table")
+    return tuple(Line(joint, low, high, row) for (joint, low, high), row in zip(lines.tolist(), rows, strict=True))

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.manifest import Of, Options, Protocol, Recognised
+from thenar.runtime.manifest import By, Fitting, Of, Options, Protocol, Recognised
 from thenar.runtime.tables import IntegerTables
 
 from ..boosting.stumps import Stumps
+from ..choosing import choose_training
 from ..evaluation.folds import Fold, leave_one_out, trial_folds
 from ..evaluation.populations import OF, groups_of
 from ..evaluation.rates import rated
@@ -28,12 +29,15 @@ from ..workers import in_workers, little
 from . import CompileError
 from .ensemble import MAX_STUMPS, model_fault
 
+Answers = NDArray[np.intp]
+Groups = NDArray[np.str_] | None
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trained:
     """The kept switches in the order in which they were chosen, and what each brought (bits): to the tree of ID3, which
-    is None where another method chose, and alone otherwise; the model; and the thresholds above which the taxels, which
-    follow the switches, are closed.
+    is None where another method chose, and alone otherwise; the model; the thresholds above which the taxels, which
+    follow the switches, are closed; and how the fit was chosen.
     """
 
     columns: Columns
@@ -41,6 +45,7 @@ class Trained:
     tree: Tree | None
     model: Model
     thresholds: Thresholds = ()
+    fitting: Fitting | None = None
 
     @property
     def stopped_after(self) -> int:
@@ -71,18 +76,29 @@ def samples_of(grasp_set: GraspSet, options: Options) -> Samples:
     check_types(found, CompileError)
     check_inputs(found, min(options.keep or 0, len(grasp_set.element_names)), samples.codes.shape[1], CompileError)
     check_memory(len(samples.codes), found, CompileError)
-    if options.rounds * found > MAX_STUMPS:
+    rounds = max(int(each.settings.get("rounds") or 0) for each in Training.candidates(options))
+    if rounds * found > MAX_STUMPS:
         raise CompileError(
-            f"{options.rounds} rounds of {found} grasp types are {options.rounds * found} stumps, a build has at most "
-            f"{MAX_STUMPS}: boost for fewer rounds"
+            f"{rounds} rounds of {found} grasp types are {rounds * found} stumps, a build has at most {MAX_STUMPS}: "
+            "boost for fewer rounds"
         )
     return samples
 
 
-def train(samples: Samples, options: Options, report: Report | None = None, ports: PortCosts | None = None) -> Trained:
-    """Choose the switches and train on them and the joints. Raises CompileError if no input tells grasps apart.
+def train(
+    samples: Samples,
+    options: Options,
+    report: Report | None = None,
+    ports: PortCosts | None = None,
+    groups: Groups = None,
+    jobs: int = 1,
+) -> Trained:
+    """Choose the switches and the fit, and train on them and the joints. Raises CompileError if no input tells grasps
+    apart.
 
-    ports  what reading switches costs, for methods that ask
+    ports   what reading switches costs, for methods that ask
+    groups  what of each row (n,) is left out where the fit is to recognise new subjects, objects or sessions
+    jobs    worker processes that compare fits
     """
     thresholds = taxel_thresholds(samples)
     samples = with_switches(samples, thresholds)
@@ -98,10 +114,12 @@ def train(samples: Samples, options: Options, report: Report | None = None, port
     inputs = kept.inputs
     if not (inputs != inputs[0]).any():
         raise CompileError("no input differs between rows: there is nothing to tell grasp types apart by")
-    model = Training.of(options).train(kept, report)
+    candidates, of = Training.candidates(options), OF[options.by or "subject"]
+    fitting = choose_training(kept, candidates, seed=options.seed, groups=groups, of=of, jobs=jobs, report=report)
+    model = Training.chosen(fitting).train(kept, report if len(candidates) == 1 else None)
     if fault := model_fault(model, kept.n_switches, kept.codes.shape[1], kept.n_classes):
-        raise CompileError(f"trainer {options.trainer!r} made a model that {fault}: it is at fault")
-    return Trained(columns, chosen.gains, chosen.tree, model, thresholds)
+        raise CompileError(f"trainer {fitting.trainer!r} made a model that {fault}: it is at fault")
+    return Trained(columns, chosen.gains, chosen.tree, model, thresholds, fitting)
 
 
 def integers_of(trained: Trained, samples: Samples, options: Options) -> IntegerTables:
@@ -111,10 +129,10 @@ def integers_of(trained: Trained, samples: Samples, options: Options) -> Integer
     return quantise(tables, kept.switches, kept.codes, options.width, options.table_bits)
 
 
+USUAL_ROUNDS = 100  # where a fit is chosen, its work is taken to be that of so many
 # A new subject, object or session costs a training for each, or for each of so many groups of them.
 _MOST_GROUPS = 10
 
-Answers = NDArray[np.intp]
 Test = Callable[[Fold], Answers]
 
 
@@ -124,7 +142,16 @@ class Cut:
 
     of: Of
     folds: tuple[Fold, ...]
-    groups: NDArray[np.str_] | None = None
+    groups: Groups = None
+
+
+def groups_for(grasp_set: GraspSet, options: Options) -> Groups:
+    """Return the subject, object or session of each row (n,), if the headline is of new ones."""
+    return groups_of(grasp_set, _by(grasp_set, options))
+
+
+def _by(grasp_set: GraspSet, options: Options) -> By:
+    return options.by or ("subject" if (grasp_set.subjects != grasp_set.subjects[0]).any() else "trial")
 
 
 def cuts_of(grasp_set: GraspSet, options: Options) -> tuple[Cut, ...]:
@@ -137,7 +164,7 @@ def cuts_of(grasp_set: GraspSet, options: Options) -> tuple[Cut, ...]:
     several = (grasp_set.subjects != grasp_set.subjects[0]).any()
     trials = trial_folds(grasp_set.labels, grasp_set.trial_ids, options.folds, options.seed)
     pooled = Cut("pooled" if several else "within subject", tuple(trials))
-    by = options.by or ("subject" if several else "trial")
+    by = _by(grasp_set, options)
     if by == "trial":
         return (pooled,)
     if by == "session":
@@ -160,14 +187,14 @@ class Tested:
     confusion: NDArray[np.intp]
 
 
-def answers_of(samples: Samples, options: Options, ports: PortCosts | None, fold: Fold) -> Answers:
-    """Train on the fold's training rows alone; return the classes that the integers give its test rows.
+def answers_of(samples: Samples, options: Options, ports: PortCosts | None, groups: Groups, fold: Fold) -> Answers:
+    """Choose and train on the fold's training rows alone; return the classes that the integers give its test rows.
 
     Raises CompileError, which names the fold, as `train` does.
     """
     learning = samples.rows(fold.train)
     try:
-        trained = train(learning, options, ports=ports)
+        trained = train(learning, options, ports=ports, groups=None if groups is None else groups[fold.train])
     except CompileError as wrong:
         raise CompileError(f"in fold {fold.name}: {wrong}, or do without folds (0)") from None
     tables = integers_of(trained, learning, options)
@@ -188,7 +215,7 @@ def cross_validated(
     answers = np.empty((len(cuts), len(samples.labels)), np.intp)
     tasks = ((place, fold, test) for place, fold in folds)
     for done, (place, fold, found) in enumerate(
-        in_workers(_done, tasks, little(len(folds) * len(samples.labels) * options.rounds, jobs)), 1
+        in_workers(_done, tasks, little(len(folds) * len(samples.labels) * (options.rounds or USUAL_ROUNDS), jobs)), 1
     ):
         answers[place, fold.test] = found
         report(done, len(folds))

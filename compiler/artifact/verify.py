@@ -70,12 +70,14 @@ class Verification(Struct, frozen=True, kw_only=True):
 
     collapse_* compare the ensemble with the float tables, in units of score; integer_* the float tables with the
     integers, in steps. covered counts rows whose margin exceeds safe_margin, covered_changed those of them that change.
-    recognised counts trials, and frames where trials have several. worst looks beyond the rows; scan is there if the
-    build says how to read a harness, firmware if it was asked for.
+    recognised counts trials, and frames where trials have several; independent says that the recordings state each row
+    to be a trial. worst looks beyond the rows; scan is there if the build says how to read a harness, firmware if it
+    was asked for.
     """
 
     same_recordings: bool
     rows: int
+    independent: bool
     collapse_difference: float
     collapse_bound: float
     integer_difference: float
@@ -146,6 +148,7 @@ def verify(
     return Verification(
         same_recordings=grasp_set.fingerprint() == build.manifest.source.fingerprint,
         rows=len(grasp_set),
+        independent=grasp_set.independent,
         collapse_difference=comparison.collapse_difference,
         collapse_bound=comparison.collapse_bound,
         integer_difference=comparison.integer_difference,
@@ -165,10 +168,10 @@ def verify(
 def _load_ensemble(folder: Path, build: Build) -> Model:
     path = folder / ENSEMBLE_NAME
     model = ensemble_from_bytes(read_member(path, MAX_BYTES, build.manifest.ensemble_sha256), str(path))
-    tables, options = build.tables, build.manifest.options
+    tables, settings = build.tables, build.manifest.fit.settings
     foreign = bool(model_fault(model, tables.n_switches, tables.n_joints, tables.n_classes))
     if isinstance(model, Stumps):
-        foreign |= model.shrinkage != options.shrinkage or model.n_rounds > options.rounds
+        foreign |= model.shrinkage != settings.get("shrinkage") or model.n_rounds > (settings.get("rounds") or 0)
     if foreign:
         raise BuildError(f"{path} is the ensemble of another build: compile the build again")
     return model

@@ -149,13 +149,14 @@ class Binned:
     home: dict[int, tuple[TwoValued | ManyValued, int]]  # column -> its group and position there
 
 
-def bin_columns(X: NDArray[np.generic], max_bins: int | None = None) -> Binned:
+def bin_columns(X: NDArray[np.generic], max_bins: int | None = None, weights: Floats | None = None) -> Binned:
     """Sort the columns of `X` (n, d), numbers with NaN for missing, into groups; constant ones are left out.
 
-    Columns have at most `max_bins` bins (2 or more; None: one for each value), that hold rows as evenly as can be.
+    Columns have at most `max_bins` bins (2 or more; None: one for each value), that hold rows as evenly as can be; a
+    row counts as often as `weights` (n,) say, of which every sum must be exact.
     """
     two, rest = _two_valued(X)
-    binned = [(column, *_bin(np.asarray(X[:, column], dtype=np.float64), max_bins)) for column in rest]
+    binned = [(column, *_bin(np.asarray(X[:, column], dtype=np.float64), max_bins, weights)) for column in rest]
     varying = [(column, bins, edges) for column, bins, edges in binned if edges.size]
     # With few bins a column of many values may have two.
     two += [([column], [bins == 0], edges) for column, bins, edges in varying if bins.max() == 1]
@@ -193,19 +194,20 @@ def _two_valued(X: NDArray[np.generic]) -> tuple[list[tuple[Any, Any, Floats]], 
     return two, rest
 
 
-def _bin(numbers: Floats, max_bins: int | None) -> tuple[NDArray[np.int32], Floats]:
+def _bin(numbers: Floats, max_bins: int | None, weights: Floats | None = None) -> tuple[NDArray[np.int32], Floats]:
     """Return the bin (n,) of every number and the edges between bins; a missing one gets bin len(edges) + 1."""
     values, bins, counts = np.unique(numbers, return_inverse=True, return_counts=True)
     present = ~np.isnan(values)
     edges = midpoints(values[present])
     if max_bins is not None and len(edges) >= max_bins:
-        kept = _even(counts[present], max_bins)
+        heavy = counts if weights is None else np.bincount(bins, weights)
+        kept = _even(heavy[present], max_bins)
         edges = edges[kept]
         bins = np.where(np.isnan(numbers), len(edges) + 1, np.searchsorted(kept, bins))
     return bins.astype(np.int32), edges
 
 
-def _even(counts: NDArray[np.intp], bins: int) -> NDArray[np.intp]:
+def _even(counts: NDArray[np.intp] | Floats, bins: int) -> NDArray[np.intp]:
     """Return after which of the values, each with as many rows as `counts` says, to part them into `bins` at most.
 
     An edge lies where the share of rows below it is nearest to 1, 2, ... of so many parts; of equally near ones first.

@@ -27,7 +27,7 @@ SMALLEST_SHRINKAGE = 1e-6
 
 
 class BoostingError(ThenarError, ValueError):
-    """The training set or an option makes no sense to LogitBoost."""
+    """A training set, or an option of a fit to it, makes no sense."""
 
 
 def boost(
@@ -51,7 +51,7 @@ def boost(
     round and after every round: the mean of -ln P(true class). Raises BoostingError.
     """
     _check_options(rounds, shrinkage, z_max, tolerance, max_bins)
-    _check_rows(X, labels, n_classes, weights)
+    check_rows(X, labels, n_classes, weights)
     if weights is not None:
         # By a power of two, which changes no answer: now sums of huge weights stay finite, and of tiny ones exact.
         weights = np.ldexp(weights, -np.frexp(weights.max())[1])
@@ -125,7 +125,8 @@ def _check_options(rounds: int, shrinkage: float, z_max: float, tolerance: float
         )
 
 
-def _check_rows(X: NDArray[np.generic], labels: NDArray[np.intp], n_classes: int, weights: Floats | None) -> None:
+def check_rows(X: NDArray[np.generic], labels: NDArray[np.intp], n_classes: int, weights: Floats | None) -> None:
+    """Raise BoostingError unless these are a training set."""
     if X.ndim != 2 or len(X) == 0 or labels.shape != (len(X),):
         raise BoostingError(f"inputs {X.shape} and labels {labels.shape} must be (n, d) and (n,) with at least one row")
     if labels.min() < 0 or labels.max() >= n_classes:

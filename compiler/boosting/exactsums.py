@@ -7,6 +7,7 @@ worst case: four times what an ordinary floating-point sum of n numbers may lose
 on a finer grid of its own, where a sum needs more than that.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 SUM_BITS = 52
+_FINEST = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +54,28 @@ def on_grids(values: Floats) -> tuple[OnGrid, OnGrid]:
     finer = SUM_BITS - n.bit_length()
     rest = np.rint((scaled - units) * 2.0**finer)
     return OnGrid(units, exponents), OnGrid(rest, exponents + np.int32(finer))
+
+
+def on_one_grid(values: Floats, terms: int) -> Floats:
+    """Round all `values`, any shape, to the finest grid on which every sum of so many of them is exact.
+
+    Each is off by 2^-52 of `terms` times the largest at most, or by 2^-1001. So are sums of their products with bits.
+    """
+    top = max(float(values.max(initial=0.0)), -float(values.min(initial=0.0)))
+    exponent = min(SUM_BITS - math.frexp(top * terms)[1], _FINEST) if top else 0
+    rounded: Floats = np.rint(values * 2.0**exponent)
+    rounded *= 2.0**-exponent
+    return rounded
+
+
+def exact_sum(values: Floats) -> float:
+    """Return the sum of `values`, any shape, as `on_one_grid` rounds them."""
+    return float(on_one_grid(values, values.size).sum())
+
+
+def dot(a: Floats, b: Floats) -> float:
+    """Return the sum of a * b, arrays of one shape; see `exact_sum`."""
+    return exact_sum(a * b)
 
 
 def _bits(magnitudes: Floats) -> NDArray[np.int32]:

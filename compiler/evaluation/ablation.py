@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..recordings.graspset import GraspSet
 from ..samples import decided
 from ..trainers.base import Training
-from .plan import COMPOSITIONS, FoldFit, Progress, inputs, run_fits
+from .plan import COMPOSITIONS, Data, FoldFit, Progress, run_fits
 from .populations import populations
 from .rates import Rate, rated
 
@@ -107,9 +107,8 @@ def _predicted(grasp_set: GraspSet, jobs: int, progress: Progress | None) -> dic
         for name, kind in _KINDS.items()
     }
     everything = [fit for some in fits.values() for fit in some]
-    found = run_fits(
-        inputs(grasp_set), grasp_set.labels, everything, Training("logitboost", {"rounds": ROUNDS}), jobs, progress
-    )
+    training = Training("logitboost", {"rounds": ROUNDS})
+    found = run_fits(Data.of(grasp_set), everything, training, jobs, progress)
     predicted = {name: np.zeros(len(grasp_set), dtype=np.intp) for name in fits}
     for name, some in fits.items():
         for fit in some:

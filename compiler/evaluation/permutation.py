@@ -11,7 +11,7 @@ from ..recordings.graspset import GraspSet
 from ..samples import Samples
 from ..trainers.base import Training
 from ..workers import in_workers
-from .plan import ANGLE, ANGLE_SELECTED, SELECTED, Composition, Planner, Progress, inputs, predictions
+from .plan import ANGLE, ANGLE_SELECTED, SELECTED, Composition, Data, Planner, Progress, predictions
 from .populations import NESTED, OF, Population, Scheme, groups_of, populations
 from .tables import Reader
 
@@ -89,8 +89,8 @@ def _counted(task: tuple[Permutations, GraspSet, Composition, int]) -> tuple[int
     planner = Planner(parts, Samples.of(made, "switches"), len(made.joints), how.prune, (), how.seed)
     cells = [planner.cell(part, kind, partial(planner.own, NESTED)) for part in parts]
     cells = [replace(cell, runs=cell.runs[:1]) for cell in cells]
-    X = inputs(made)
-    found = {fit: predictions(X, made.labels, fit, how.training) for cell in cells for fit in cell.fits}
+    data = Data.of(made)
+    found = {fit: predictions(data, fit, how.training) for cell in cells for fit in cell.fits}
     grasps = tuple(np.unique(made.labels).tolist())
     n_switches, scheme = len(made.switch_names), how.scheme
     groups = groups_of(made, scheme)

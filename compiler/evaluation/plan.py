@@ -8,6 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.manifest import Options
+
 from ..boosting.stumps import winners
 from ..placement.methods.base import METHODS, PAPERS, Chooser
 from ..placement.methods.filters import random_placement
@@ -15,22 +17,44 @@ from ..placement.thresholds import made_plain, taxel_thresholds, with_switches
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
 from ..tables.collapse import model_scores
-from ..trainers.base import Training
+from ..trainers.base import TRAINERS, Training
 from ..workers import in_workers
 from .folds import Fold, Rows
 from .populations import Population, Protocol
+from .rivals import CLASSIFIERS
 
 Inputs = NDArray[np.uint16]
 Labels = NDArray[np.intp]
 Progress = Callable[[int, int], None]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Data:
+    """All rows that fits take columns of.
+
+    X                 (n, s + t + j): the switches' bits, then the codes of taxels and joints
+    labels            (n,), and the numbers (n,) of trials and subjects
+    """
+
+    X: Inputs
+    labels: Labels
+    trials: Rows
+    subjects: Rows
+
+    @classmethod
+    def of(cls, grasp_set: GraspSet) -> "Data":
+        """Return the rows of a set."""
+        X = np.hstack([grasp_set.switches, grasp_set.taxels, grasp_set.codes], dtype=np.uint16)
+        return cls(X, grasp_set.labels, grasp_set.trial_ids, np.unique(grasp_set.subjects, return_inverse=True)[1])
+
+
 @dataclass(frozen=True, slots=True)
 class FoldFit:
     """Train on a fold's training rows and these columns, classes `grasps` (ascending labels); then test the fold.
 
-    The first `n_switches` columns are switches, of which the last `n_taxels` are taxels; the others are joints. Two
-    fits are one if they are of the same `Fold` object and the same columns.
+    The first `n_switches` columns are switches, of which the last `n_taxels` are taxels; the others are joints.
+    `learner` is a trainer, at settings that it chooses from the training rows, or one of CLASSIFIERS; "": the trainer
+    and settings of the evaluation. Two fits are one if they are of the same `Fold` object, columns and learner.
     """
 
     fold: Fold
@@ -38,26 +62,38 @@ class FoldFit:
     grasps: tuple[int, ...]
     n_switches: int = 0
     n_taxels: int = 0
+    learner: str = ""
 
 
-def predictions(X: Inputs, labels: Labels, fit: FoldFit, training: Training) -> Labels:
-    """Return the labels given to the fold's test rows; X (n, d), labels (n,).
+def predictions(data: Data, fit: FoldFit, training: Training) -> Labels:
+    """Return the labels given to the fold's test rows.
 
     Where the fit is blind, every row gets the most frequent label of the training rows (the lowest of several), which
     is the rate to beat.
     """
-    grasps = np.array(fit.grasps, dtype=np.intp)
-    trained = np.searchsorted(grasps, labels[fit.fold.train])
-    if is_blind(X, fit):
+    grasps, rows = np.array(fit.grasps, dtype=np.intp), fit.fold.train
+    trained = np.searchsorted(grasps, data.labels[rows])
+    if is_blind(data.X, fit):
         return np.full(len(fit.fold.test), grasps[np.bincount(trained).argmax()])
     ends = (fit.n_switches - fit.n_taxels, fit.n_switches)
-    bits, taxels, codes = np.split(X[:, fit.columns], ends, axis=1)
-    rows, names = fit.fold.train, tuple(map(str, fit.grasps))
-    learning = Samples(bits[rows].astype(bool), codes[rows], trained, names, taxels=taxels[rows])
+    bits, taxels, codes = np.split(data.X[:, fit.columns], ends, axis=1)
+    learning = Samples(
+        bits[rows].astype(bool),
+        codes[rows],
+        trained,
+        tuple(map(str, fit.grasps)),
+        data.trials[rows],
+        data.subjects[rows],
+        taxels[rows],
+    )
     thresholds = taxel_thresholds(learning)
-    model = training.train(with_switches(learning, thresholds))
-    closed = np.hstack([bits > 0, taxels > np.array(thresholds, np.int64)])
-    return grasps[winners(model_scores(model, closed[fit.fold.test], codes[fit.fold.test]))]
+    learning = with_switches(learning, thresholds)
+    closed = np.hstack([bits > 0, taxels > np.array(thresholds, np.int64)])[fit.fold.test]
+    if fit.learner in CLASSIFIERS:
+        return grasps[CLASSIFIERS[fit.learner].answers(learning, np.hstack([closed, codes[fit.fold.test]]))]
+    if fit.learner not in ("", training.trainer):
+        training = Training.of(Options(trainer=fit.learner))
+    return grasps[winners(model_scores(training.train(learning), closed, codes[fit.fold.test]))]
 
 
 def is_blind(X: Inputs, fit: FoldFit) -> bool:
@@ -67,12 +103,7 @@ def is_blind(X: Inputs, fit: FoldFit) -> bool:
 
 
 def run_fits(
-    X: Inputs,
-    labels: Labels,
-    fits: Iterable[FoldFit],
-    training: Training,
-    jobs: int = -1,
-    progress: Progress | None = None,
+    data: Data, fits: Iterable[FoldFit], training: Training, jobs: int = -1, progress: Progress | None = None
 ) -> dict[FoldFit, Labels]:
     """Return the predictions of every fit. Equal fits are done once; `progress(done, total)` after each.
 
@@ -81,7 +112,7 @@ def run_fits(
     """
     todo = list(dict.fromkeys(fits))
     results: dict[FoldFit, Labels] = {}
-    tasks = ((number, X, labels, fit, training) for number, fit in enumerate(todo))
+    tasks = ((number, data, fit, training) for number, fit in enumerate(todo))
     for number, found in in_workers(_numbered, tasks, jobs):
         results[todo[number]] = found
         if progress is not None:
@@ -89,9 +120,9 @@ def run_fits(
     return results
 
 
-def _numbered(task: tuple[int, Inputs, Labels, FoldFit, Training]) -> tuple[int, Labels]:
-    number, X, labels, fit, training = task
-    return number, predictions(X, labels, fit, training)
+def _numbered(task: tuple[int, Data, FoldFit, Training]) -> tuple[int, Labels]:
+    number, data, fit, training = task
+    return number, predictions(data, fit, training)
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,16 +169,17 @@ def available(n_switches: int, n_joints: int) -> tuple[Composition, ...]:
     return tuple(c for c in COMPOSITIONS if (n_joints or not c.angle) and (n_switches or not c.has_switches))
 
 
-def inputs(grasp_set: GraspSet) -> NDArray[np.uint16]:
-    """Return what compositions take columns of: (n, s + t + j), the switches' bits, then codes of taxels and joints."""
-    return np.hstack([grasp_set.switches, grasp_set.taxels, grasp_set.codes], dtype=np.uint16)
-
-
-TableName = Literal["compositions", "generality", "pruning", "baselines"]
+TableName = Literal["compositions", "generality", "pruning", "baselines", "trainers"]
 Select = Callable[[Population, Fold], Columns]
 
 RIVALS = ("cmim", "mutual-information")
+REFERENCE = "logitboost"  # of the trainers: the others are compared with it
 DRAWS = 5  # random placements that a placement is compared with
+
+
+def learners() -> tuple[str, ...]:
+    """Return who is compared in the table of trainers: all trainers, REFERENCE before the others, then CLASSIFIERS."""
+    return tuple(dict.fromkeys([REFERENCE, *TRAINERS, *CLASSIFIERS]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,6 +228,7 @@ class Planner:
             "generality": self._generality,
             "pruning": self._pruning,
             "baselines": self._baselines,
+            "trainers": self._trainers,
         }
         return rows[name](protocol)
 
@@ -240,6 +273,12 @@ class Planner:
             _joined(draws),
         ]
 
+    def _trainers(self, protocol: Protocol) -> list[RowPlan]:
+        chosen = partial(self.own, protocol)
+        there = available(self._n_switches, self.n_joints)
+        kinds = [kind for kind in (ANGLE_SELECTED, ANGLE, SELECTED) if kind in there]
+        return [self._row(name, kind.what, kind, chosen, name) for kind in kinds for name in learners()]
+
     @property
     def _n_switches(self) -> int:
         return self.samples.n_switches + int(self.samples.taxels.shape[1])
@@ -258,10 +297,10 @@ class Planner:
             self._choosers[key] = METHODS.named(method).chooser(made_plain(self.samples.rows(rows)))
         return self._choosers[key](parameter)
 
-    def _row(self, name: str, what: str, kind: Composition, select: Select) -> RowPlan:
-        return RowPlan(name, what, tuple(self.cell(part, kind, select) for part in self.parts))
+    def _row(self, name: str, what: str, kind: Composition, select: Select, learner: str = "") -> RowPlan:
+        return RowPlan(name, what, tuple(self.cell(part, kind, select, learner) for part in self.parts))
 
-    def cell(self, part: Population, kind: Composition, select: Select) -> CellPlan:
+    def cell(self, part: Population, kind: Composition, select: Select, learner: str = "") -> CellPlan:
         """Return the fits of composition `kind` on every fold of `part`; `select` gives the placement for a fold."""
 
         def fit(fold: Fold) -> FoldFit:
@@ -269,7 +308,7 @@ class Planner:
             columns = kind.columns(placement, self._n_switches, self.n_joints)
             closing = [column for column in columns if column < self._n_switches]
             taxels = sum(column >= self.samples.n_switches for column in closing)
-            return FoldFit(fold, columns, part.grasps, len(closing), taxels)
+            return FoldFit(fold, columns, part.grasps, len(closing), taxels, learner)
 
         return CellPlan(part, tuple(tuple(map(fit, folds)) for folds in part.repeats))
 

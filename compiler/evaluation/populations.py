@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from thenar.runtime.manifest import Of
 
 from ..recordings.graspset import GraspSet
+from ..text import INDEPENDENT
 from .folds import EvaluationError, Fold, Rows, block_folds, leave_one_out, trial_folds
 
 Scheme = Literal["trial", "subject", "object", "session", "block"]
@@ -145,7 +146,7 @@ def concerns(grasp_set: GraspSet, parts: tuple[Population, ...], scheme: Scheme,
     found = [text for part in parts for text in _untrained(grasp_set, part)]
     if scheme == "trial":
         found = [text for part in parts for text in _rare(grasp_set, part, n_folds)] + found
-    claimed = ["each row counts as a trial of its own, as its recorder states"] if grasp_set.independent else []
+    claimed = [INDEPENDENT] if grasp_set.independent else []
     return tuple(simulated + claimed + alone + found)
 
 

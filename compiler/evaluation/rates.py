@@ -168,6 +168,38 @@ def rated(
     return by_trial, by_frame if by_frame.total > by_trial.total else None
 
 
+@dataclass(frozen=True, slots=True)
+class Paired:
+    """The same m trials by two recognisers.
+
+    than        the other one
+    difference  of the rates, -1..1
+    better      trials that are recognised in more repeats than by the other; worse: in fewer
+    p           how probable a split of these as uneven is where both are equal: McNemar's exact test, two-sided. It is
+                of these people: trials of a person are alike, so of new people it tells less.
+    """
+
+    than: str
+    difference: float
+    better: int
+    worse: int
+    p: float
+
+    @classmethod
+    def of(cls, hits: NDArray[np.bool_], others: NDArray[np.bool_], than: str) -> Self:
+        """Return the comparison of `hits` (r, m), which trials are recognised in each of r repeats, with `others`."""
+        from scipy.special import bdtr
+
+        gained = hits.sum(axis=0, dtype=np.intp) - others.sum(axis=0, dtype=np.intp)
+        better, worse = int((gained > 0).sum()), int((gained < 0).sum())
+        p = min(1.0, 2 * float(bdtr(min(better, worse), better + worse, 0.5))) if better + worse else 1.0
+        return cls(than, float(gained.sum()) / hits.size, better, worse, p)
+
+    def __str__(self) -> str:
+        """Return "+0.8, p 0.02"."""
+        return f"{100 * self.difference:+.1f}, p {self.p:.2g}"
+
+
 def clustered(recognised: list[int], sizes: list[int], unit: Unit, repeats: int = 1) -> tuple[float, float]:
     """Return the 95 % interval of a rate of units in clusters: of each, how many were recognised in all repeats
     together, and how many there are in one; units are the frames of trials, or the trials of subjects or the like.

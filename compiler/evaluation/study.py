@@ -17,11 +17,11 @@ from ..text import counted
 from ..trainers.base import Training, changed
 from .folds import EvaluationError
 from .permutation import Permutations, Permuted
-from .plan import RIVALS, Planner, Progress, TableName, inputs, is_blind, run_fits
-from .populations import OF, PROTOCOLS, Population, ProtocolName, Scheme, concerns, groups_of, populations
+from .plan import RIVALS, Data, Planner, Progress, TableName, is_blind, run_fits
+from .populations import NESTED, OF, PROTOCOLS, Population, ProtocolName, Scheme, concerns, groups_of, populations
 from .tables import RateTable, Reader
 
-TABLES: tuple[TableName, ...] = ("compositions", "generality", "pruning", "baselines")
+TABLES: tuple[TableName, ...] = ("compositions", "generality", "pruning", "baselines", "trainers")
 
 # Those with a row that is trained on all switches at once.
 _OF_ALL_SWITCHES: tuple[TableName, ...] = ("compositions", "pruning")
@@ -150,7 +150,7 @@ def evaluate(
     training = Training.of(changed(Manifested(rounds=options.rounds, trainer=options.trainer), options.settings))
     chosen = _of_subjects(grasp_set, options.subjects)
     parts = populations(chosen, options.scheme, options.folds, options.repeats, options.seed)
-    reasons = {name: _why_not(name, chosen, parts, options.scheme) for name in options.tables}
+    reasons = {name: _why_not(name, chosen, parts, options) for name in options.tables}
     if any(reasons.get(name, "") is None for name in _OF_ALL_SWITCHES):
         _check_all_switches(chosen, parts)
     planner = Planner(
@@ -168,21 +168,21 @@ def evaluate(
         for name, reason in reasons.items()
         if reason is None
         for each in protocols
+        if each is NESTED or name != "trainers"
     }
     fits = [fit for rows in plans.values() for row in rows for cell in row.cells for fit in cell.fits]
-    X = inputs(chosen)
+    data = Data.of(chosen)
     further = None if progress is None else _before(progress, options.permute)
-    predictions = run_fits(X, chosen.labels, fits, training, jobs, further)
+    predictions = run_fits(data, fits, training, jobs, further)
     test = None
     if m := options.permute:
         how = Permutations(parts, options.scheme, options.folds, options.prune, options.seed, training)
         test = how.test(chosen, m, jobs, None if progress is None else _after(progress, len(predictions)))
     grasps = tuple(np.unique(chosen.labels).tolist())
-    blind = frozenset(fit for fit in predictions if is_blind(X, fit))
-    trials = chosen.trial_ids
+    blind = frozenset(fit for fit in predictions if is_blind(data.X, fit))
     reader = Reader(
         chosen.labels,
-        trials,
+        data.trials,
         grasps,
         len(chosen.element_names),
         predictions,
@@ -193,7 +193,7 @@ def evaluate(
     return Study(
         fingerprint=grasp_set.fingerprint(),
         rows=len(chosen),
-        trials=int(trials.max()) + 1,
+        trials=int(data.trials.max()) + 1,
         options=options,
         grasps=tuple(chosen.taxonomy.types[label] for label in grasps),
         warnings=concerns(chosen, parts, options.scheme, options.folds),
@@ -235,12 +235,14 @@ def _check_all_switches(grasp_set: GraspSet, parts: tuple[Population, ...]) -> N
         check_memory(rows, len(part.grasps), EvaluationError, varying)
 
 
-def _why_not(name: TableName, grasp_set: GraspSet, parts: tuple[Population, ...], scheme: Scheme) -> str | None:
-    """Return why a table has no meaning for the set and the cut, or None."""
+def _why_not(name: TableName, grasp_set: GraspSet, parts: tuple[Population, ...], options: Options) -> str | None:
+    """Return why a table has no meaning for the set and what is asked, or None."""
+    if name == "trainers":
+        return None if "nested" in options.protocols else "trainers are compared under the nested protocol alone"
     if name != "compositions" and not grasp_set.element_names:
         return "a placement needs switches, and the set has none"
     if name == "generality" and len(parts) < 2:
         return "another's placement needs a second subject"
-    if name == "generality" and scheme == "subject":
+    if name == "generality" and options.scheme == "subject":
         return "when a subject is left out, the placement always is others'"
     return None

@@ -1,7 +1,7 @@
 """The paper's tables: cells of rates, read off predictions."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import fmean
 from typing import Self
 
@@ -13,9 +13,9 @@ from thenar.runtime.manifest import Of
 from ..samples import decided
 from ..text import interval
 from .folds import Rows
-from .plan import CellPlan, FoldFit, Labels, RowPlan, TableName
+from .plan import REFERENCE, CellPlan, FoldFit, Labels, RowPlan, TableName
 from .populations import ProtocolName
-from .rates import Rate, rated
+from .rates import Paired, Rate, rated
 
 Predictions = Mapping[FoldFit, Labels]
 Confusion = tuple[tuple[int, ...], ...]
@@ -25,6 +25,7 @@ _TITLES: dict[TableName, str] = {
     "generality": "One subject's placement (row) on another's data (column), selected switches (Tables III and VI)",
     "pruning": "Placement of all subjects pooled, pruned by S, selected switches (Tables IV and VII)",
     "baselines": "ID3 beside other placements of as many switches, selected switches",
+    "trainers": f"Trainers, their settings chosen from the training rows, and rivals; paired with {REFERENCE}",
 }
 
 
@@ -79,7 +80,8 @@ def both(rate: Rate, frames: Rate | None, mark: str = "") -> str:
 @dataclass(frozen=True, slots=True)
 class Row:
     """A row of a table: its short name, what it is, its switches, its cells, and the rate of all their trials (frames:
-    of all their frames, None where each row is a trial).
+    of all their frames, None where each row is a trial); paired: their trials compared with those of the REFERENCE
+    trainer on the same inputs, in the table of trainers.
     """
 
     name: str
@@ -88,6 +90,7 @@ class Row:
     cells: tuple[Cell, ...]
     rate: Rate
     frames: Rate | None
+    paired: Paired | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,8 +135,15 @@ class Reader:
     def table(self, name: TableName, protocol: ProtocolName, plans: Sequence[RowPlan]) -> RateTable:
         """Return the table of these rows."""
         columns = tuple(cell.part.name for cell in plans[0].cells)
-        rows = tuple(self._row(plan, confusing=name == "compositions") for plan in plans)
-        return RateTable(name, protocol, columns, rows)
+        rows = [self._row(plan, confusing=name == "compositions") for plan in plans]
+        if name == "trainers":
+            hits = [self.hits(plan.cells) for plan in plans]
+            first = {plan.what: own for plan, own in zip(plans, hits, strict=True) if plan.name == REFERENCE}
+            rows = [
+                row if row.name == REFERENCE else replace(row, paired=Paired.of(own, first[row.what], REFERENCE))
+                for row, own in zip(rows, hits, strict=True)
+            ]
+        return RateTable(name, protocol, columns, tuple(rows))
 
     def cell(self, plan: CellPlan, *, confusing: bool) -> Cell:
         """Return the cell of a plan, with its confusion matrix if `confusing`."""
@@ -157,6 +167,12 @@ class Reader:
         repeats = len(plans[0].part.repeats)
         a_draw = repeats if len(predicted) > repeats else 1
         return rated(predicted, self.labels[rows], self.trials[rows], of=self.of, groups=groups, repeats_a_draw=a_draw)
+
+    def hits(self, plans: Sequence[CellPlan]) -> NDArray[np.bool_]:
+        """Return which trials (runs, m) of some cells each run recognises, in the order of the trials' numbers."""
+        rows, predicted = self._predicted(plans)
+        _, first, trial = np.unique(self.trials[rows], return_index=True, return_inverse=True)
+        return np.asarray(decided(predicted, trial) == self.labels[rows[first]])
 
     def _predicted(self, plans: Sequence[CellPlan]) -> tuple[Rows, Labels]:
         """Return the rows (n,) that some cells test, and the label (runs, n) that each run gives them."""

@@ -24,6 +24,7 @@ from ..publication import check_folder, entries, publish_folder
 from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet
 from ..samples import Samples
+from ..text import INDEPENDENT, sentence
 from .cache import Cache, Report, Store
 from .designs import Design, Latencies, best_designs, designs, lucks, points_of, with_whole_scans
 from .equipment import Equipment, equipment_for
@@ -46,7 +47,6 @@ _EARLY = (
     "Scans that end early are tried with decisions on single frames: a dwell with a lead reads on for longer, and a "
     "sequential test needs whole scans."
 )
-_CLAIMED = "Each row counts as a trial of its own, as its recorder states."
 _RENEWED = f"{STORE_NAME} was an older thenar's, of another form: everything was computed anew"
 _UNTIMED = (
     "what reading the joints ({}) takes is not known and is left out of every frame time and latency: give it with "
@@ -296,7 +296,7 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
     luck = lucks((by_time, by_switches), every, screened, survey.cuts, search.seed)
     points = points_of(kept, _latencies(survey, stream, kept), luck, survey.switch_names, search)
     picked, tried = wanted.pick(points), _tried(screened, closes, search)
-    claimed = [_CLAIMED] if survey.grasp_set.independent else []
+    claimed = [sentence(INDEPENDENT)] if survey.grasp_set.independent else []
     early = [_EARLY] if any(design.scan_kind == "early" for design in kept) else []
     return Frontier(
         schema=SCHEMA,

@@ -7,7 +7,7 @@ import msgspec
 from msgspec import Meta, Struct, field
 
 from thenar.drivers.errors import ThenarError
-from thenar.runtime.manifest import Inputs, Name, Options, TableBits, Value
+from thenar.runtime.manifest import PAPERS_TRAINER, Inputs, Name, TableBits, Value
 from thenar.runtime.names import fault, shortened
 
 from ..evaluation.rates import Rate
@@ -75,7 +75,7 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     clock_hz: Annotated[int, Meta(ge=0, le=12_000_000)]
     table_bits: TableBits = field(default_factory=lambda: WIDEST)
     max_bins: Annotated[int, Meta(ge=2, le=2**53)] | None = field(default_factory=lambda: None)
-    trainer: Name = Options().trainer
+    trainer: Name = PAPERS_TRAINER
     settings: dict[Name, Value] = {}
 
 

@@ -4,7 +4,7 @@ import csv
 import io
 from collections.abc import Callable, Iterable, Iterator
 
-from thenar.runtime.manifest import Options
+from thenar.runtime.manifest import PAPERS_TRAINER
 from thenar.runtime.names import printable
 
 from ..evaluation.rates import Rate
@@ -34,7 +34,6 @@ COLUMNS = (
 
 # They follow only where a point's trainer, or a setting of it, is not the default.
 TRAINER_COLUMNS = ("trainer", "settings")
-_PAPERS = Options().trainer
 
 _LONGEST = 40  # letters of a name on a picture
 _SPARED = 0.005  # what a rate may lack and still count as level: half a point
@@ -60,14 +59,14 @@ def way_of(setting: Recipe) -> str:
 
 def training_of(setting: Recipe) -> str:
     """Return how the model was made, the paper's trainer unnamed: "100 rounds", "naive-bayes, joint-bins 5"."""
-    name = () if setting.trainer == _PAPERS else (setting.trainer,)
+    name = () if setting.trainer == PAPERS_TRAINER else (setting.trainer,)
     rounds = () if setting.rounds is None else (counted(setting.rounds, "round"),)
     return ", ".join((*name, *rounds, *_settings(setting)))
 
 
 def is_usual(setting: Recipe) -> bool:
     """Return whether rounds and bins say all of how the model was made."""
-    return setting.trainer == _PAPERS and not setting.settings
+    return setting.trainer == PAPERS_TRAINER and not setting.settings
 
 
 def _settings(setting: Recipe) -> list[str]:

@@ -10,12 +10,12 @@ Optimization, 2nd ed., algorithm 7.4); rows and residuals are put on grids on wh
 the fit has the same bits on every machine.
 """
 
-import math
 from copy import copy
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..boosting.exactsums import SUM_BITS, dot, exact_sum
 from ..elementary import softmax_and_loss
 from .exact import Floats
 
@@ -23,8 +23,6 @@ RIDGE = 1.0
 _MEMORY = 6
 # Rows are multiples of 2^-28: below 2^24 in sum, every sum of them is exact.
 _ROW_BITS = 28
-_SUM_BITS = 52
-_SMALLEST_UNIT = -1000
 _ENOUGH = 1e-4  # of the slope that Armijo's rule wants to see
 _MOST_HALVINGS = 12
 
@@ -41,7 +39,7 @@ class Logistic:
         self._inputs = np.concatenate([bits, np.ones((1, n), np.bool_)]).astype(np.float64)
         self._labels = labels
         self._member = (labels == np.arange(n_classes)[:, np.newaxis]).astype(np.float64)
-        self._residual_bits = _SUM_BITS - n.bit_length()
+        self._residual_bits = SUM_BITS - n.bit_length()
         self._pairs: list[tuple[Floats, Floats]] = []
         self._stand(np.zeros((len(self._inputs), n_classes)))
 
@@ -113,21 +111,3 @@ def _rounded(values: Floats, bits: int) -> Floats:
     """Return the nearest multiples of 2^-bits."""
     rounded: Floats = np.rint(values * 2.0**bits) * 2.0**-bits
     return rounded
-
-
-def exact_sum(values: Floats) -> float:
-    """Return the sum of `values`, any shape, each of which counts to within 2^-52 of their number times the largest,
-    and no finer than 2^-1000.
-
-    They are rounded to a grid on which all partial sums are whole, and so exact.
-    """
-    top = float(np.abs(values).max(initial=0.0))
-    if top == 0.0:
-        return 0.0
-    unit = math.ldexp(1.0, max(math.frexp(top * values.size)[1] - _SUM_BITS, _SMALLEST_UNIT))
-    return float(np.rint(values / unit).sum()) * unit
-
-
-def dot(a: Floats, b: Floats) -> float:
-    """Return the sum of a * b, arrays of one shape."""
-    return exact_sum(a * b)

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from thenar.drivers.errors import ThenarError
 
 from .graspset import GraspSet
+from .trials import groups
 
 Rows = NDArray[np.intp]
 
@@ -68,10 +69,7 @@ def looks_like_frames(grasp_set: GraspSet) -> str | None:
 
 def _units(grasp_set: GraspSet) -> tuple[Rows, Rows]:
     """Return the middle row (m,) of each run of rows of one trial, in the order of groups, and the groups (m,)."""
-    group = np.zeros(len(grasp_set), np.intp)
-    for column in (grasp_set.labels, grasp_set.subjects, grasp_set.objects, grasp_set.sessions):
-        _, part = np.unique(column, return_inverse=True)
-        group = np.unique(group * (part.max(initial=0) + 1) + part, return_inverse=True)[1]
+    group = groups(grasp_set.labels, grasp_set.subjects, grasp_set.objects, grasp_set.sessions)
     order = np.argsort(group, kind="stable")
     trial = grasp_set.trial_ids[order]
     first = np.flatnonzero(np.diff(trial, prepend=-1) != 0)

@@ -196,12 +196,14 @@ class JointRange(msgspec.Struct, frozen=True):
 class Summary(msgspec.Struct, frozen=True):
     """A set in numbers.
 
-    simulated  what simulated the grasps; empty: they were recorded
-    balance    the rarest grasp type's count over the commonest one's
+    simulated    what simulated the grasps; empty: they were recorded
+    independent  each row is stated to be a trial of its own
+    balance      the rarest grasp type's count over the commonest one's
     """
 
     rows: int
     simulated: str
+    independent: bool
     fingerprint: str
     taxonomy: str
     grasps: tuple[Count, ...]
@@ -223,6 +225,7 @@ def summarise(grasp_set: GraspSet) -> Summary:
     return Summary(
         rows=len(grasp_set),
         simulated=grasp_set.simulated,
+        independent=grasp_set.independent,
         fingerprint=grasp_set.fingerprint(),
         taxonomy=grasp_set.taxonomy.name,
         grasps=tuple(count for count in grasps if count.rows),

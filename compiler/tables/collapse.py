@@ -24,8 +24,34 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Line:
+    """What a joint adds in proportion to its code: row_k * (clamp(code, low, high) - low).
+
+    Parameters
+    ----------
+    joint : int
+        The number of the joint, from 0.
+    low, high : int
+        The codes between which it rises, low < high: the range that was trained on.
+    row : ndarray of float, shape (K,)
+        What each code adds.
+    """
+
+    joint: int
+    low: int
+    high: int
+    row: Floats
+
+    def of(self, codes: NDArray[np.uint16]) -> Floats:
+        """Return what it adds (n, K) for all joints' codes (n, j)."""
+        above = np.clip(codes[:, self.joint].astype(np.int64), self.low, self.high) - self.low
+        return above[:, np.newaxis] * self.row
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class ScoreTables:
-    """F_k = bias_k + sum over switches s of bits_s * switch_rows[s, k] + sum over joints a of joint_rows[a][bin_a, k].
+    """F_k = bias_k + sum over switches s of bits_s * switch_rows[s, k] + sum over joints a of joint_rows[a][bin_a, k],
+    and what the lines of linear joints add.
 
     Parameters
     ----------
@@ -36,7 +62,9 @@ class ScoreTables:
     thresholds : tuple of j ndarrays of uint16, shape (T_a,)
         Strictly increasing; bin_a is the number of thresholds below the code, so code <= t goes left of t.
     joint_rows : tuple of j ndarrays of float, shape (T_a + 1, K)
-        What a joint adds in each bin.
+        What a joint adds in each bin; of a joint that is nothing but linear one row of zeros.
+    lines : tuple of Line, optional
+        What some of the joints add in proportion to their codes, at most one a joint, in the order of the joints.
 
     Examples
     --------
@@ -52,6 +80,7 @@ class ScoreTables:
     switch_rows: Floats
     thresholds: tuple[NDArray[np.uint16], ...]
     joint_rows: tuple[Floats, ...]
+    lines: tuple[Line, ...] = ()
 
     @property
     def n_inputs(self) -> int:
@@ -71,6 +100,8 @@ class ScoreTables:
             scores += np.where(closed[:, np.newaxis], row, 0.0)
         for column, thresholds, rows in zip(codes.T, self.thresholds, self.joint_rows, strict=True):
             scores += rows[np.searchsorted(thresholds, column)]
+        for line in self.lines:
+            scores += line.of(codes)
         return scores
 
 

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from thenar.drivers.errors import ThenarError
 from thenar.drivers.members import Members
-from thenar.runtime.manifest import Options
+from thenar.runtime.manifest import AUTO, Fitting, Options
 
 if TYPE_CHECKING:
     from ..samples import Samples
@@ -68,6 +68,9 @@ class Trainer(ABC):
         A sentence about it, for `--help`.
     settings : tuple of Setting
         The numbers that it takes. Trainers that share a name share its meaning.
+    tried : tuple of mapping
+        Settings, by name, of the ways to train that are compared where a trainer and its settings are chosen; the
+        others have their defaults. The most regular first. Empty: only who names the trainer gets it.
     staged : bool
         Whether it takes `rounds`, and one training gives the models of all smaller numbers of rounds as well.
     """
@@ -75,6 +78,7 @@ class Trainer(ABC):
     name: str
     what: str
     settings: tuple[Setting, ...] = ()
+    tried: tuple[Mapping[str, Number], ...] = ({},)
     staged: bool = False
 
     @abstractmethod
@@ -105,20 +109,35 @@ class Trainer(ABC):
         """
         return (self.train(samples, settings),) * len(rounds)
 
-    def given(self, options: Options) -> dict[str, Number]:
-        """Return a value for each setting, as `options` give them. Raises TrainerError for what it does not take."""
-        unknown = sorted(set(options.settings) - {setting.name for setting in self.settings})
-        if unknown:
-            raise TrainerError(f"trainer {self.name!r} takes no setting {unknown[0]!r}: leave it out")
+    def candidates(self, given: Mapping[str, Number]) -> tuple[dict[str, Number], ...]:
+        """Return values for all settings, for each way to train that is compared where these settings are `given`.
+
+        Raises TrainerError for a setting that it does not take, or a value that is out of its range.
+        """
+        fixed = self.checked(given)
+        defaults = {setting.name: setting.default for setting in self.settings}
+        found: list[dict[str, Number]] = []
+        for tried in self.tried or ({},):
+            values = {**defaults, **tried, **fixed}
+            found += [] if values in found else [values]
+        return tuple(found)
+
+    def checked(self, given: Mapping[str, Number]) -> dict[str, Number]:
+        """Return given settings as numbers of their kind.
+
+        Raises TrainerError for a setting that it does not take, or a value that is out of its range.
+        """
+        settings = {setting.name: setting for setting in self.settings}
         values: dict[str, Number] = {}
-        for setting in self.settings:
-            given = options.settings.get(setting.name, setting.default)
-            value = getattr(options, setting.name, given)
+        for name, value in given.items():
+            if name not in settings:
+                raise TrainerError(f"trainer {self.name!r} takes no setting {name!r}: leave it out")
+            setting = settings[name]
             if value is not None and setting.least is not None and not value >= setting.least:
-                raise TrainerError(f"{setting.name}={value} must be at least {setting.least}")
+                raise TrainerError(f"{name}={value} must be at least {setting.least}")
             if value is not None and setting.most is not None and not value <= setting.most:
-                raise TrainerError(f"{setting.name}={value} must be at most {setting.most}")
-            values[setting.name] = None if value is None else setting.kind(value)
+                raise TrainerError(f"{name}={value} must be at most {setting.most}")
+            values[name] = None if value is None else setting.kind(value)
         return values
 
 
@@ -133,6 +152,10 @@ def changed(options: Options, changes: Mapping[str, Any]) -> Options:
 TRAINERS: Members[Trainer] = Members("trainer", Trainer, "thenar.compiler.trainers", "thenar.trainers")  # type: ignore[type-abstract]
 
 
+# Options that are settings of some trainers. None is not given.
+SHARED = ("rounds", "shrinkage", "tolerance", "max_bins")
+
+
 @dataclass(frozen=True, slots=True)
 class Training:
     """A trainer by its name, and values for all its settings: what a worker process needs to train."""
@@ -142,8 +165,29 @@ class Training:
 
     @classmethod
     def of(cls, options: Options) -> "Training":
-        """Return what `options` ask for. Raises MemberError or TrainerError where that makes no sense."""
-        return cls(options.trainer, TRAINERS.named(options.trainer).given(options))
+        """Return what `options` ask for, with defaults for what they leave open: of LogitBoost, the paper's, where they
+        leave open the trainer. Raises MemberError or TrainerError where that makes no sense.
+        """
+        trainer, given = _asked(options)[0]
+        return cls(
+            trainer.name, {setting.name: setting.default for setting in trainer.settings} | trainer.checked(given)
+        )
+
+    @classmethod
+    def candidates(cls, options: Options) -> "tuple[Training, ...]":
+        """Return every way to train that `options` leave open, to be compared: one, where they leave none open.
+
+        Raises MemberError or TrainerError where that makes no sense.
+        """
+        asked = _asked(options)
+        if options.trainer == AUTO and len(asked) > 1:
+            asked = [(trainer, given) for trainer, given in asked if trainer.tried]
+        return tuple(cls(trainer.name, values) for trainer, given in asked for values in trainer.candidates(given))
+
+    @classmethod
+    def chosen(cls, fitting: Fitting) -> "Training":
+        """Return the way that was chosen."""
+        return cls(fitting.trainer, TRAINERS.named(fitting.trainer).checked(fitting.settings))
 
     def train(self, samples: "Samples", report: Report | None = None) -> "Model":
         """Return the trainer's model of `samples`."""
@@ -152,3 +196,28 @@ class Training:
     def stages(self, samples: "Samples", rounds: Sequence[int]) -> "tuple[Model, ...]":
         """Return the trainer's models of `samples` after each of these numbers of rounds."""
         return TRAINERS.named(self.trainer).stages(samples, self.settings, rounds)
+
+
+def _asked(options: Options) -> list[tuple[Trainer, dict[str, Number]]]:
+    """Return the trainers that may make the model, and the settings that are given to each.
+
+    A given setting that some trainers do not take is meant for the simplest that does: `rounds` for LogitBoost, and not
+    for a trainer that boosts and does more.
+    """
+    shared = {name: value for name in SHARED if (value := getattr(options, name)) is not None}
+    if options.trainer != AUTO:
+        trainer = TRAINERS.named(options.trainer)
+        own = {setting.name for setting in trainer.settings}
+        return [(trainer, {name: value for name, value in shared.items() if name in own} | options.settings)]
+    given: dict[str, Number] = shared | options.settings
+    names = {trainer.name: {setting.name for setting in trainer.settings} for trainer in TRAINERS.values()}
+    takers = [name for name in names if names[name] >= given.keys()]
+    if not takers:
+        lacking = sorted(given.keys() - set().union(*names.values()))
+        wrong = (
+            f"no trainer takes the setting {lacking[0]!r}" if lacking else f"no trainer takes all of {sorted(given)}"
+        )
+        raise TrainerError(f"{wrong}: leave it out")
+    if len(takers) < len(names):
+        takers = [name for at, name in enumerate(takers) if not any(names[one] < names[name] for one in takers[:at])]
+    return [(TRAINERS[name], given) for name in takers]

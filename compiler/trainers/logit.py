@@ -16,25 +16,26 @@ class Logit(Trainer):
     name = "logit"
     what = "multinomial logistic regression on a table for each input"
     settings = (
-        Setting("penalty", "Pull of all scores towards zero.", float, 1.0, 1e-6, 1e6),
-        Setting("smoothness", "Pull of a joint's neighbouring bins towards each other.", float, 1.0, 0.0, 1e6),
-        Setting("max_bins", "At most so many bins a joint: smaller tables.  [default: no limit]", int, None, 2),
+        Setting("penalty", "Pull of scores towards zero (logit).", float, 1.0, 1e-6, 1e6),
+        Setting("smoothness", "Pull of a joint's neighbouring bins towards each other (logit).", float, 10.0, 0.0, 1e6),
+        Setting(
+            "max_bins", "At most so many bins a joint: smaller tables.  [default: no limit; logit: 16]", int, None, 2
+        ),
+    )
+
+    tried = tuple(
+        {"penalty": penalty, "smoothness": smoothness, "max_bins": bins}
+        for penalty in (10.0, 1.0, 0.1)
+        for smoothness in (10.0, 1.0)
+        for bins in (8, 16)
     )
 
     def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> "ScoreTables":
-        """Return the tables."""
-        from ..additive.logit import fit_logit
+        """Return the tables. Raises BoostingError for settings that make no sense."""
+        from ..additive.logit import BINS, fit_logit
 
-        bins = settings["max_bins"] or 16
-        return fit_logit(
-            samples.switches,
-            samples.codes,
-            samples.labels,
-            samples.n_classes,
-            penalty=settings["penalty"],
-            smoothness=settings["smoothness"],
-            max_bins=bins,
-        )
+        given = {**settings, "max_bins": settings["max_bins"] or BINS}
+        return fit_logit(samples.inputs, samples.labels, samples.n_classes, **given).score_tables(samples.n_switches)
 
 
 MEMBER = Logit()

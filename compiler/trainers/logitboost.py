@@ -17,6 +17,7 @@ class LogitBoost(Trainer):
     what = "LogitBoost on decision stumps, the paper's"
     rank = -1
     staged = True
+    tried = ({"rounds": 30}, {"rounds": 100})
     settings = (
         Setting("rounds", "Rounds of LogitBoost.", int, 100, 1),
         # As boosting.boost.SMALLEST_SHRINKAGE, which is not imported for a help text.

@@ -8,6 +8,7 @@ import pytest
 
 from thenar.cli import run
 from thenar.compiler import GraspSet
+from thenar.compiler.text import INDEPENDENT
 from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.recording.session import Collection, Label, Session, Task
 from thenar.runtime.recording.writer import Recorder
@@ -205,6 +206,11 @@ def test_who_states_that_rows_are_independent_is_asked_for_it(
     asked(monkeypatch, "y", "y")
     assert run(["import", "rows.csv", "-o", "set.grasps"]) == 0
     assert GraspSet.load("set.grasps").independent
+    assert run(["compile", "set.grasps", "-o", "build", "--folds", "0", "--rounds", "2"]) == 0
+    capsys.readouterr()
+    for line in (["info", "set.grasps"], ["verify", "build", "set.grasps"]):
+        assert run(line) == 0
+        assert INDEPENDENT in capsys.readouterr().out.splitlines()
     assert 'frames = "independent"' in (glove / "columns-2.toml").read_text()
     asked(monkeypatch, "n")
     assert run(["import", "rows.csv", "-o", "no.grasps"]) == 2

@@ -352,6 +352,16 @@ def test_a_pulled_plug_is_seen_at_once_and_the_glove_opened_again_after_it(line:
         glove.close()
 
 
+def test_a_silent_glove_whose_node_is_gone_was_unplugged_even_before_reading_shows_it(line: PtyLine) -> None:
+    emulated = EmulatedCyberGlove(line)
+    with CyberGlove(str(line.link)) as glove:
+        read(glove)
+        line.link.unlink()
+        emulated.close()  # it streams no more; the pty stays open
+        with pytest.raises(DeviceError, match=r"serial line is gone \(its device node was removed\)"):
+            read(glove, lambda _: False)
+
+
 @pytest.mark.parametrize("mode", ["stream", "poll"])
 def test_a_glove_that_falls_silent_is_taken_for_dead_after_half_a_second(line: PtyLine, mode: str) -> None:
     emulated = EmulatedCyberGlove(line)

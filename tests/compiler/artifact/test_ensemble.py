@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.artifact.ensemble import KIND, TABLES, ensemble_from_bytes, ensemble_to_bytes
+from thenar.compiler.artifact.ensemble import KIND, LINES, TABLES, ensemble_from_bytes, ensemble_to_bytes
 from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.recordings.arrays import pack, unpack
-from thenar.compiler.tables.collapse import ScoreTables
+from thenar.compiler.tables.collapse import Line, ScoreTables
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.sealed import seal, unseal
 
@@ -80,6 +80,46 @@ def test_tables_that_contradict_themselves_are_refused(change: dict[str, np.ndar
     header, arrays = unpack(payload)
     with pytest.raises(ThenarError, match=r"ensemble\.bin is damaged"):
         ensemble_from_bytes(seal(KIND, TABLES, pack(header, arrays | change)))
+
+
+def _with_lines() -> ScoreTables:
+    lines = (Line(0, 3, 200, np.array([0.5, -1.0, 0.0])), Line(1, 0, 65535, np.array([1e-5, 0.0, 2.0])))
+    return replace(_tables(), lines=lines)
+
+
+def test_lines_are_read_again_bit_for_bit() -> None:
+    data = ensemble_to_bytes(_with_lines())
+    read = ensemble_from_bytes(data)
+    assert isinstance(read, ScoreTables)
+    for ours, theirs in zip(read.lines, _with_lines().lines, strict=True):
+        assert (ours.joint, ours.low, ours.high) == (theirs.joint, theirs.low, theirs.high)
+        assert np.array_equal(ours.row, theirs.row)
+    assert ensemble_to_bytes(read) == data
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"lines": np.array([[1, 0, 9], [0, 0, 9]])},
+        {"lines": np.array([[0, 0, 9], [0, 0, 9]])},
+        {"lines": np.array([[0, 0, 9], [2, 0, 9]])},
+        {"lines": np.array([[-1, 0, 9], [1, 0, 9]])},
+        {"lines": np.array([[0, 9, 9], [1, 0, 9]])},
+        {"lines": np.array([[0, -1, 9], [1, 0, 9]])},
+        {"lines": np.array([[0, 0, 65536], [1, 0, 9]])},
+        {"lines": np.zeros((0, 3), np.int64), "line_rows": np.zeros((0, 3))},
+        {"lines": np.zeros((2, 2), np.int64)},
+        {"lines": np.zeros(6, np.int64)},
+        {"line_rows": np.zeros((2, 2))},
+        {"line_rows": np.zeros(3)},
+        {"line_rows": np.full((2, 3), np.nan)},
+    ],
+)
+def test_lines_that_contradict_themselves_are_refused(change: dict[str, np.ndarray]) -> None:
+    _, payload = unseal(ensemble_to_bytes(_with_lines()), KIND, LINES, "ensemble.bin")
+    header, arrays = unpack(payload)
+    with pytest.raises(ThenarError, match=r"ensemble\.bin is damaged"):
+        ensemble_from_bytes(seal(KIND, LINES, pack(header, arrays | change)))
 
 
 @pytest.mark.parametrize(

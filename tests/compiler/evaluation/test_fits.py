@@ -5,7 +5,7 @@ import pytest
 
 from thenar.compiler import LogitBoostClassifier
 from thenar.compiler.evaluation.folds import Fold, weka_folds
-from thenar.compiler.evaluation.plan import FoldFit, inputs, is_blind, predictions, run_fits
+from thenar.compiler.evaluation.plan import Data, FoldFit, is_blind, predictions, run_fits
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.trainers.base import Training
 
@@ -22,12 +22,12 @@ def fits(make_grasps: Make) -> tuple[GraspSet, list[FoldFit]]:
 
 def test_a_fit_answers_as_the_classifier_does(fits: tuple[GraspSet, list[FoldFit]]) -> None:
     grasps, todo = fits
-    X = inputs(grasps)
+    data = Data.of(grasps)
     for fit in todo:
-        part = X[:, fit.columns]
+        part = data.X[:, fit.columns]
         classifier = LogitBoostClassifier(rounds=5, shrinkage=0.5)
         classifier.fit(part[fit.fold.train], grasps.labels[fit.fold.train])
-        found = predictions(X, grasps.labels, fit, Training("logitboost", {"rounds": 5, "shrinkage": 0.5}))
+        found = predictions(data, fit, Training("logitboost", {"rounds": 5, "shrinkage": 0.5}))
         assert np.array_equal(found, classifier.predict(part[fit.fold.test]))
 
 
@@ -35,7 +35,7 @@ def test_labels_keep_their_numbers_where_some_do_not_occur(make_grasps: Make) ->
     grasps = make_grasps(noise=0.0)
     rows = np.flatnonzero(np.isin(grasps.labels, (1, 3)))
     fold = Fold(rows[::2], rows[1::2], "1")
-    found = predictions(inputs(grasps), grasps.labels, FoldFit(fold, tuple(range(12)), (1, 3)), QUICK)
+    found = predictions(Data.of(grasps), FoldFit(fold, tuple(range(12)), (1, 3)), QUICK)
     assert np.array_equal(found, grasps.labels[fold.test])
 
 
@@ -43,37 +43,38 @@ def test_without_inputs_the_most_frequent_training_label_is_answered(make_grasps
     grasps = make_grasps()
     rows = np.concatenate([np.flatnonzero(grasps.labels == 2)[:5], np.flatnonzero(grasps.labels == 1)[:4]])
     fold = Fold(rows, np.arange(6), "1")
-    found = predictions(inputs(grasps), grasps.labels, FoldFit(fold, (), (0, 1, 2, 3)), QUICK)
+    found = predictions(Data.of(grasps), FoldFit(fold, (), (0, 1, 2, 3)), QUICK)
     assert found.tolist() == [2] * 6
 
 
 def test_equal_fits_are_done_once_and_progress_counts_each(fits: tuple[GraspSet, list[FoldFit]]) -> None:
     grasps, todo = fits
     seen: list[tuple[int, int]] = []
-    run_fits(inputs(grasps), grasps.labels, todo + todo, QUICK, 1, lambda done, total: seen.append((done, total)))
+    run_fits(Data.of(grasps), todo + todo, QUICK, 1, lambda done, total: seen.append((done, total)))
     assert seen == [(done, len(todo)) for done in range(1, len(todo) + 1)]
 
 
 def test_any_number_of_workers_gives_the_same(fits: tuple[GraspSet, list[FoldFit]]) -> None:
     grasps, todo = fits
-    alone = run_fits(inputs(grasps), grasps.labels, todo, QUICK, jobs=1)
-    together = run_fits(inputs(grasps), grasps.labels, todo, QUICK, jobs=2)
+    alone = run_fits(Data.of(grasps), todo, QUICK, jobs=1)
+    together = run_fits(Data.of(grasps), todo, QUICK, jobs=2)
     assert alone.keys() == together.keys()
     assert all(np.array_equal(alone[fit], together[fit]) for fit in todo)
 
 
 def test_nothing_to_do_is_done_at_once(make_grasps: Make) -> None:
     grasps = make_grasps()
-    assert run_fits(inputs(grasps), grasps.labels, [], QUICK, jobs=2) == {}
+    assert run_fits(Data.of(grasps), [], QUICK, jobs=2) == {}
 
 
 def test_where_no_input_varies_the_most_frequent_training_label_is_answered(make_grasps: Make) -> None:
     grasps = make_grasps()
     rows = np.concatenate([np.flatnonzero(grasps.labels == 2)[:5], np.flatnonzero(grasps.labels == 1)[:4]])
-    X = inputs(grasps).copy()
+    data = Data.of(grasps)
+    X = data.X
     X[rows, :2] = 7, 65535
     fit = FoldFit(Fold(rows, np.arange(6), "1"), (0, 1), (0, 1, 2, 3))
     assert is_blind(X, fit)
-    assert predictions(X, grasps.labels, fit, QUICK).tolist() == [2] * 6
+    assert predictions(data, fit, QUICK).tolist() == [2] * 6
     X[rows[-1], 1] = 0
     assert not is_blind(X, fit)

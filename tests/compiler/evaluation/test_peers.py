@@ -13,6 +13,7 @@ from sklearn.pipeline import make_pipeline
 from thenar.compiler import GraspSet, ID3Selector, LogitBoostClassifier, evaluate
 from thenar.compiler.evaluation.folds import EvaluationError
 from thenar.compiler.evaluation.permutation import shuffled_labels
+from thenar.compiler.text import INDEPENDENT
 
 Make = Callable[..., GraspSet]
 NESTED: dict[str, Any] = {"protocols": ("nested",), "tables": ("compositions",), "rounds": 10, "jobs": 1}
@@ -83,7 +84,7 @@ def test_frames_that_count_as_trials_are_refused(make_grasps: Make) -> None:
     with pytest.raises(EvaluationError, match="of fewer trials"):
         evaluate(wrong, **NESTED)
     claimed = evaluate(replace(wrong, independent=True), folds=2, **NESTED)
-    assert claimed.warnings[0] == "each row counts as a trial of its own, as its recorder states"
+    assert claimed.warnings[0] == INDEPENDENT
 
 
 def test_shuffled_labels_stay_with_their_subject_and_trials_stay_whole(make_grasps: Make) -> None:

@@ -9,7 +9,7 @@ from mpmath import mpf
 from scipy.special import stdtrit
 from scipy.stats import binomtest, t
 
-from thenar.compiler.evaluation.rates import Rate, clustered, rated
+from thenar.compiler.evaluation.rates import Paired, Rate, clustered, rated
 from thenar.compiler.samples import decided
 from thenar.stability.reference.intervals import student_quantile
 from thenar.stability.reference.numbers import ulps
@@ -190,3 +190,22 @@ def test_the_quantile_of_students_t_is_scipys_within_a_few_ulp(freedom: int) -> 
     # 21 at 6 degrees of freedom, which a percentage never shows; the case of the statistics relies on 4 up to 3.
     off = ulps(float(stdtrit(freedom, 0.975)), student_quantile(freedom, mpf(0.975)))
     assert off <= (4 if freedom <= 3 else 32)
+
+
+@given(st.lists(st.tuples(st.booleans(), st.booleans()), min_size=1, max_size=200))
+def test_two_recognisers_are_paired_by_mcnemars_exact_test(trials: list[tuple[bool, bool]]) -> None:
+    own, other = np.array(trials).T
+    paired = Paired.of(own[np.newaxis], other[np.newaxis], "another")
+    assert (paired.better, paired.worse) == (int((own & ~other).sum()), int((other & ~own).sum()))
+    differ = paired.better + paired.worse
+    assert paired.p == pytest.approx(binomtest(paired.better, differ).pvalue if differ else 1)
+    assert paired.difference == pytest.approx(own.mean() - other.mean())
+    again = Paired.of(np.tile(own, (3, 1)), np.tile(other, (3, 1)), "another")
+    assert again == paired
+
+
+def test_of_several_repeats_a_trial_counts_once() -> None:
+    own, other = np.array([[1, 1, 0], [1, 0, 0], [1, 1, 1]], bool), np.array([[1, 0, 0], [0, 1, 0], [1, 1, 0]], bool)
+    paired = Paired.of(own, other, "another")
+    assert (paired.better, paired.worse, paired.difference) == (2, 0, 2 / 9)
+    assert str(paired) == "+22.2, p 0.5"

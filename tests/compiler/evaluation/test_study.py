@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from thenar.compiler.evaluation.folds import EvaluationError, Fold
-from thenar.compiler.evaluation.plan import CellPlan, FoldFit, RowPlan
+from thenar.compiler.evaluation.plan import REFERENCE, CellPlan, FoldFit, RowPlan, learners
 from thenar.compiler.evaluation.populations import Population, Scheme
 from thenar.compiler.evaluation.rates import Rate
+from thenar.compiler.evaluation.rivals import CLASSIFIERS
 from thenar.compiler.evaluation.study import TABLES, Options, Study, evaluate
 from thenar.compiler.evaluation.tables import RateTable, Reader, Row
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.trainers.base import TRAINERS
 
 # Six rows of labels 2 and 5 (others do not occur), two folds, two repeats of the same folds; switches are columns 0..2.
 LABELS = np.array([2, 2, 2, 5, 5, 5])
@@ -92,7 +94,8 @@ def row(table: RateTable, name: str) -> Row:
 
 
 def test_every_table_comes_under_both_protocols_in_the_papers_layout(study: Study) -> None:
-    assert [(t.name, t.protocol) for t in study.tables] == [(name, p) for name in TABLES for p in ("paper", "nested")]
+    both = [(name, p) for name in TABLES for p in ("paper", "nested") if (name, p) != ("trainers", "paper")]
+    assert [(t.name, t.protocol) for t in study.tables] == both
     for each in study.tables:
         assert each.columns == ("A", "B")
     assert [r.name for r in table(study, "compositions").rows] == ["I", "II", "III", "IV", "V", "VI", "VII"]
@@ -159,7 +162,8 @@ def test_a_perfect_switch_for_each_grasp_is_found_and_enough(make_grasps: Make) 
 
 def test_without_switches_there_are_the_joints_and_no_placements(make_grasps: Make) -> None:
     study = evaluate(make_grasps(n_switches=0), QUICK, jobs=1)
-    assert [(t.name, t.protocol) for t in study.tables] == [("compositions", "paper"), ("compositions", "nested")]
+    tables = [("compositions", "paper"), ("compositions", "nested"), ("trainers", "nested")]
+    assert [(t.name, t.protocol) for t in study.tables] == tables
     assert [(t.name, t.reason) for t in study.left_out] == [
         (name, "a placement needs switches, and the set has none") for name in ("generality", "pruning", "baselines")
     ]
@@ -184,7 +188,7 @@ def test_one_subject_alone_has_nobody_elses_placement(make_grasps: Make) -> None
     grasps = make_grasps()
     study = evaluate(grasps, replace(QUICK, subjects=("B",)), jobs=1)
     assert study.fingerprint == grasps.fingerprint()
-    assert {t.name for t in study.tables} == {"compositions", "pruning", "baselines"}
+    assert {t.name for t in study.tables} == {"compositions", "pruning", "baselines", "trainers"}
     assert [t.name for t in study.left_out] == ["generality"]
     assert study.tables[0].columns == ("B",)
     assert study.rows == 48
@@ -205,6 +209,29 @@ def test_other_cuts_have_one_repeat_and_a_column_a_subject(make_grasps: Make, sc
     for each in study.tables:
         assert each.columns == ("A", "B")
         assert all(len(c.rate.correct) == 1 for line in each.rows for c in line.cells if line.name != "random")
+
+
+def test_every_trainer_is_compared_on_the_same_folds_and_inputs_with_rivals(study: Study) -> None:
+    compared = table(study, "trainers")
+    assert [(line.what, line.name) for line in compared.rows] == [
+        (what, name) for what in ("Angle + Sel-Co", "Angle", "Sel-Co") for name in learners()
+    ]
+    assert {*TRAINERS, *CLASSIFIERS} == set(learners())
+    # The paper's settings were asked for: the first trainer's rows are those of the compositions.
+    for what, composition in (("Angle + Sel-Co", "II"), ("Angle", "IV"), ("Sel-Co", "VI")):
+        (first,) = (line for line in compared.rows if (line.what, line.name) == (what, REFERENCE))
+        assert first.rate == row(table(study, "compositions"), composition).rate
+        assert first.paired is None
+        for line in compared.rows:
+            if line.what == what and line.name != REFERENCE:
+                assert line.paired is not None
+                assert line.paired.difference == pytest.approx(line.rate.mean - first.rate.mean)
+
+
+def test_trainers_are_not_compared_where_test_rows_choose(make_grasps: Make) -> None:
+    study = evaluate(make_grasps(), replace(QUICK, protocols=("paper",), tables=("trainers",)), jobs=1)
+    assert study.tables == ()
+    assert [left.reason for left in study.left_out] == ["trainers are compared under the nested protocol alone"]
 
 
 def test_an_unknown_subject_is_refused_with_those_there_are(make_grasps: Make) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from thenar.compiler import GraspSet, compile_build, evaluate
-from thenar.compiler.evaluation.plan import FoldFit, inputs, predictions
+from thenar.compiler.evaluation.plan import Data, FoldFit, predictions
 from thenar.compiler.evaluation.populations import populations
 from thenar.compiler.placement.thresholds import taxel_thresholds, with_switches
 from thenar.compiler.recordings.graspset import Joint
@@ -47,8 +47,8 @@ def test_a_fold_is_predicted_by_the_thresholds_of_its_training_rows(padded: Gras
         plain = plain_by(padded, taxel_thresholds(Samples.of(padded.rows(fold.train))))
         fit = FoldFit(fold, columns, part.grasps, n_switches, n_taxels)
         same = FoldFit(fold, columns, part.grasps, n_switches)
-        found = predictions(inputs(padded), padded.labels, fit, TRAINING)
-        assert np.array_equal(found, predictions(inputs(plain), plain.labels, same, TRAINING))
+        found = predictions(Data.of(padded), fit, TRAINING)
+        assert np.array_equal(found, predictions(Data.of(plain), same, TRAINING))
 
 
 def test_evaluate_and_compile_agree_on_the_selected_switches_and_joints(padded: GraspSet, tmp_path: Path) -> None:

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from sklearn.linear_model import LogisticRegression
 
-from thenar.compiler.placement.logistic import RIDGE, Logistic, dot, exact_sum
+from thenar.compiler.boosting.exactsums import dot, exact_sum
+from thenar.compiler.placement.logistic import RIDGE, Logistic
 
 Bits = npt.NDArray[np.bool_]
 Labels = npt.NDArray[np.intp]

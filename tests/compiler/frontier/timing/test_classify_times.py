@@ -1,4 +1,3 @@
-import pickle
 from itertools import pairwise
 
 import numpy as np
@@ -9,6 +8,7 @@ from thenar.compiler.firmware.targets import TARGETS, timed
 from thenar.compiler.frontier.points import FrontierError
 from thenar.compiler.frontier.timing.classify_times import ClassifyModel
 from thenar.compiler.frontier.timing.python_times import YARDSTICK, PythonCost, classify_us, fit_here, random_tables
+from thenar.compiler.workers import in_workers
 from thenar.runtime.tables import tables_to_bytes
 
 PYTHON = PythonCost(1.0, 0.1, 0.2, 0.3, 0.01, 0.02, 10.0)
@@ -72,9 +72,13 @@ def test_a_raspberry_pi_elsewhere_is_so_many_times_as_slow_and_that_is_said_to_b
 
 
 def test_models_go_to_other_processes() -> None:
-    for target in timed():
-        model = ClassifyModel(target, python=PYTHON)
-        assert pickle.loads(pickle.dumps(model)).options(TABLES) == model.options(TABLES)  # noqa: S301 - our own
+    models = [ClassifyModel(target, python=PYTHON) for target in timed()]
+    found = dict(in_workers(_options, enumerate(models), 2))
+    assert [found[number] for number in range(len(models))] == [model.options(TABLES) for model in models]
+
+
+def _options(task: tuple[int, ClassifyModel]) -> tuple[int, object]:
+    return task[0], task[1].options(TABLES)
 
 
 def test_there_is_no_other_target() -> None:

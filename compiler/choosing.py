@@ -1,0 +1,231 @@
+"""The fit is chosen inside the training rows: which trainer, with which settings, by inner folds.
+
+Inner folds part no trial; and where the fit is to recognise a new subject (object, session), they leave subjects out as
+well. Each way to train is scored by the trials that it recognises there, ties by the log-loss. Of those within one
+standard error of the best one, the one with the smallest tables is taken, the most regular of several.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from math import fsum, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.runtime.manifest import Compared, Fitting, Of
+
+from .boosting.stumps import Stumps
+from .elementary import softmax_and_loss
+from .evaluation.folds import Fold, leave_one_out, trial_folds
+from .samples import Samples, decided
+from .tables.collapse import Model, model_scores
+from .trainers.base import TRAINERS, Training
+from .workers import in_workers
+
+Rows = NDArray[np.intp]
+
+# A training set of so many trials is cut into so many inner folds: of many trials, halves tell enough.
+_FOLDS = ((400, 4), (1500, 3))
+_LEAST_GROUPS = 3
+
+
+def inner_folds(samples: Samples, seed: int, groups: NDArray[np.generic] | None = None) -> list[Fold]:
+    """Return folds of training rows that part no trial, and no group if there are three or more; none of one trial.
+
+    groups  (n,) the subject, object or session of each row, where those are left out
+    """
+    n_trials = len(np.unique(samples.trials))
+    number = next((folds for most, folds in _FOLDS if n_trials < most), 2)
+    if groups is not None and len(found := np.unique(groups, return_inverse=True)[1]) and found.max() >= 2:
+        return leave_one_out((found % min(number, int(found.max()) + 1)).astype(np.str_), "group")
+    if n_trials < 2:
+        return []
+    return trial_folds(samples.labels, samples.trials, min(number, n_trials), seed)
+
+
+def choose_training(
+    samples: Samples,
+    candidates: Sequence[Training],
+    *,
+    seed: int = 1,
+    groups: NDArray[np.generic] | None = None,
+    of: Of = "within subject",
+    jobs: int = 1,
+    report: Callable[[int, int], None] | None = None,
+) -> Fitting:
+    """Return which of several ways to train suits these rows, and why. Of one way, no fold is made.
+
+    Parameters
+    ----------
+    samples : Samples
+        The rows to learn from, of the kept switches and the joints.
+    candidates : sequence of Training
+        The ways, as `Training.candidates` returns them: those of one trainer together, the most regular first.
+    seed : int
+        Of inner folds that are cut at random.
+    groups : ndarray, shape (n,), optional
+        The subject, object or session of each row, if the fit is to recognise new ones.
+    of : str
+        What is new about rows that are to be recognised, if there are `groups`.
+    jobs : int
+        Worker processes. The answer is the same for any number of them.
+    report : callable, optional
+        Called with (done, total) as work is done.
+
+    Returns
+    -------
+    Fitting
+        `Training.chosen(fitting)` trains so.
+    """
+    folds = inner_folds(samples, seed, groups) if len(candidates) > 1 else []
+    if not folds:
+        return Fitting(candidates[0].trainer, _values(candidates[0]))
+    grouped = groups is not None and len(np.unique(groups)) >= _LEAST_GROUPS
+    clusters = groups if grouped and groups is not None else samples.trials
+    together = [list(each) for _, each in groupby(range(len(candidates)), lambda one: _alike(candidates[one]))]
+    tasks = [(samples, fold, [candidates[one] for one in batch], batch) for fold in folds for batch in together]
+    tests: dict[tuple[int, str], _Test] = {}
+    for done, (name, batch, found) in enumerate(in_workers(_tested, tasks, jobs), 1):
+        tests |= {(one, name): test for one, test in zip(batch, found, strict=True)}
+        if report is not None:
+            report(done, len(tasks) + 1)
+    scores = [
+        _Score.over(samples, clusters, [tests[one, fold.name] for fold in folds]) for one in range(len(candidates))
+    ]
+    if not grouped:
+        of = "pooled" if np.ptp(samples.subjects) else "within subject"
+    return _fitting(candidates, scores, of, len(folds))
+
+
+def _values(training: Training) -> dict[str, float | None]:
+    return {name: None if value is None else float(value) for name, value in training.settings.items()}
+
+
+def _alike(training: Training) -> tuple[object, ...]:
+    """Return what trainings share of which one gives the others: all but the rounds, if the trainer has stages."""
+    staged = TRAINERS.named(training.trainer).staged
+    return training.trainer, *(
+        (name, value) for name, value in training.settings.items() if name != "rounds" or not staged
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Test:
+    """What became of a fold's trials: their first rows (T,), whether each was recognised, the sum of the losses."""
+
+    first: Rows
+    hits: NDArray[np.bool_]
+    loss: float
+    rows: int
+
+
+_Task = tuple[Samples, Fold, list[Training], list[int]]
+
+
+def _tested(task: _Task) -> tuple[str, list[int], list[_Test]]:
+    samples, fold, trainings, batch = task
+    learning, test = samples.rows(fold.train), samples.rows(fold.test)
+    _, first, trial = np.unique(test.trials, return_index=True, return_inverse=True)
+    weights = 1.0 / np.bincount(trial)[trial]
+    found = []
+    for model in _models(trainings, learning):
+        scores = model_scores(model, test.switches, test.codes)
+        answers = decided(scores.argmax(axis=1)[np.newaxis], trial)[0]
+        loss = softmax_and_loss(np.ascontiguousarray(scores.T), test.labels, weights)[1] * len(first)
+        found.append(_Test(fold.test[first], answers == test.labels[first], loss, _table_rows(model)))
+    return fold.name, batch, found
+
+
+def _models(trainings: list[Training], samples: Samples) -> Iterator[Model]:
+    if len(trainings) == 1:
+        yield trainings[0].train(samples)
+    else:
+        rounds = [int(each.settings["rounds"] or 0) for each in trainings]
+        yield from trainings[int(np.argmax(rounds))].stages(samples, rounds)
+
+
+def _table_rows(model: Model) -> int:
+    """Return how many rows of scores the model's tables hold: one a switch, one a bin of a joint, for those in use."""
+    if isinstance(model, Stumps):
+        used = np.unique(np.stack([model.columns.ravel(), np.floor(model.thresholds.ravel())]), axis=1)[0]
+        return len(used) + len(np.unique(used))
+    joints = [len(rows) for rows in model.joint_rows if rows.any()]
+    return int(model.switch_rows.any(axis=1).sum()) + sum(joints)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Score:
+    """A candidate over all inner folds: trials recognised (T,), and the cluster of each; mean loss; rows of tables."""
+
+    hits: NDArray[np.bool_]
+    clusters: Rows
+    loss: float
+    rows: float
+
+    @classmethod
+    def over(cls, samples: Samples, clusters: NDArray[np.generic], tests: list[_Test]) -> "_Score":
+        first = np.concatenate([test.first for test in tests])
+        return cls(
+            np.concatenate([test.hits for test in tests]),
+            np.unique(clusters[first], return_inverse=True)[1],
+            round(fsum(test.loss for test in tests) / len(first), 6),
+            sum(test.rows for test in tests) / len(tests),
+        )
+
+
+def _error(gains: NDArray[np.intp], clusters: Rows) -> float:
+    """Return the standard error of the mean of whole numbers (T,) in clusters: robust to what those share."""
+    sizes, own, total = np.bincount(clusters), np.zeros(clusters.max() + 1, np.int64), int(gains.sum())
+    np.add.at(own, clusters, gains)
+    squares = int(((len(gains) * own - sizes * total) ** 2).sum())
+    return sqrt(squares * len(sizes) / max(1, len(sizes) - 1)) / len(gains) ** 2
+
+
+def _fitting(candidates: Sequence[Training], scores: list[_Score], of: Of, n_folds: int) -> Fitting:
+    best = min(range(len(scores)), key=lambda one: (-int(scores[one].hits.sum()), scores[one].loss))
+    found = []
+    for candidate, score in zip(candidates, scores, strict=True):
+        lost = scores[best].hits.astype(np.intp) - score.hits
+        found.append(
+            Compared(
+                candidate.trainer,
+                _values(candidate),
+                correct=int(score.hits.sum()),
+                total=len(score.hits),
+                error=round(_error(score.hits.astype(np.intp), score.clusters), 6),
+                loss=score.loss,
+                behind=round(int(lost.sum()) / len(lost), 6),
+                behind_error=round(_error(lost, score.clusters), 6),
+                rows=score.rows,
+            )
+        )
+    near = [one for one, each in enumerate(found) if each.behind <= each.behind_error]
+    chosen = min(near, key=lambda one: (found[one].rows, one))
+    shown = {
+        min(
+            (one for one, each in enumerate(found) if each.trainer == name),
+            key=lambda one: (-found[one].correct, found[one].loss, one),
+        )
+        for name in {each.trainer for each in found}
+    }
+    return Fitting(
+        candidates[chosen].trainer,
+        _values(candidates[chosen]),
+        of=of,
+        folds=n_folds,
+        tried=len(candidates),
+        compared=tuple(found[one] for one in sorted(shown | {chosen})),
+        why=_why(found, best, chosen),
+    )
+
+
+def _why(found: list[Compared], best: int, chosen: int) -> str:
+    one, top = found[chosen], found[best]
+    rate = f"{100 * one.rate:.1f} % of {one.total} trials in inner folds"
+    if chosen == best:
+        return f"it recognises the most, {rate}"
+    return (
+        f"it recognises {rate}, within one standard error of the best, {top.trainer} with {100 * top.rate:.1f} %, "
+        "and has the smallest tables of those"
+    )
