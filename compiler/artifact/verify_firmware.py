@@ -17,6 +17,7 @@ from thenar.runtime.build import Build
 from thenar.runtime.files import read_file
 from thenar.runtime.manifest import Calibration, Manifest, Switch
 from thenar.runtime.names import list_names
+from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.tables import IntegerTables
 
@@ -24,6 +25,7 @@ from ..firmware import FirmwareError
 from ..firmware.choose import Fit, fit_for, smallest_fit
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES, LIBRARY_NAME, Library, classifier_files
 from ..firmware.generate import LARGEST
+from ..firmware.layout import ports_of_scan
 from ..firmware.probes import Answers, Lost, Probes, extreme_frames, joined, lost_inputs, random_frames
 from ..firmware.targets import TARGETS
 from ..firmware.targets import kinds as every_kind
@@ -94,10 +96,10 @@ class Carried(Struct, frozen=True):
     outdated: tuple[str, ...]
 
 
-def made_firmware(manifest: Manifest, tables: IntegerTables) -> tuple[dict[str, str], str]:
+def made_firmware(manifest: Manifest, tables: IntegerTables, scan: ScanMap | None) -> tuple[dict[str, str], str]:
     """Return path in the build -> text of its firmware, and a sentence that says what for, or why there is none."""
     try:
-        fit = smallest_fit(tables)
+        fit = smallest_fit(tables, ports=ports_of_scan(scan))
         made = Library(LIBRARY_NAME, manifest, fit.choice.layout, fit.target.avr, fit.notes()).files
     except FirmwareError as reason:
         return {}, f"no firmware: {reason}"
@@ -108,7 +110,7 @@ def carried_firmware(folder: Path, build: Build) -> Carried:
     """Return how the firmware in the build `folder` stands."""
     if not (folder / FIRMWARE_NAME).is_dir():
         return Carried(False, ())
-    made, _ = made_firmware(build.manifest, build.tables)
+    made, _ = made_firmware(build.manifest, build.tables, build.scan)
     now = {name: text.encode() for name, text in made.items()}
     names = [f"{FIRMWARE_NAME}/{name}" for name in LIBRARY_FILES]
     return Carried(True, tuple(name for name in names if now.get(name) != _content(folder / name)))
@@ -270,7 +272,7 @@ def verify_firmware(
     if unknown := [kind for kind in kinds if kind not in every_kind()]:
         raise FirmwareError(f"nothing runs firmware for {unknown[0]!r}: choose among {', '.join(every_kind())}")
     build = Build.load(folder)
-    fits = [fit for kind in every_kind() if kind in kinds for fit in _fits(build.tables, kind)]
+    fits = [fit for kind in every_kind() if kind in kinds for fit in _fits(build, kind)]
     for fit in fits:
         if lack := fit.target.missing():
             raise FirmwareError(f"firmware for {fit.target.part} cannot be tried here: {lack}")
@@ -292,9 +294,10 @@ def verify_firmware(
     )
 
 
-def _fits(tables: IntegerTables, kind: str) -> list[Fit]:
+def _fits(build: Build, kind: str) -> list[Fit]:
     """Return the parts of a kind to try, each with its layout: of parts that are alike, the smallest that will do."""
+    tables, ports = build.tables, ports_of_scan(build.scan)
     targets = [target for target in TARGETS.values() if target.kind == kind]
     if all(target.alike for target in targets):
-        return [smallest_fit(tables, kind=kind)]
-    return [fit_for(target, tables) for target in targets]
+        return [smallest_fit(tables, kind=kind, ports=ports)]
+    return [fit_for(target, tables, ports=ports) for target in targets]

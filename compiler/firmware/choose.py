@@ -11,7 +11,7 @@ from thenar.runtime.tables import IntegerTables
 
 from . import FirmwareError
 from .costs import Cost
-from .layout import LARGEST_GROUP, SMALLEST_GROUP, Adding, Bins, Layout, arrange
+from .layout import LARGEST_GROUP, SMALLEST_GROUP, Adding, Bins, Layout, Ports, arrange
 from .targets import TARGETS, Target
 
 Option = tuple[Layout, Cost]
@@ -33,8 +33,17 @@ class Choice:
     frontier: tuple[Option, ...]
 
 
-def choose(tables: IntegerTables, target: Target, *, flash: int | None = None, entry_bits: int | None = None) -> Choice:
+def choose(
+    tables: IntegerTables,
+    target: Target,
+    *,
+    ports: Ports | None = None,
+    flash: int | None = None,
+    entry_bits: int | None = None,
+) -> Choice:
     """Return the fastest layout of `tables` that takes at most `flash` bytes, of equally fast ones the smallest.
+
+    ports say how the switches come, as in `arrange`.
 
     flash is one of `flash_shares` unless given; entry_bits allows only 8 or 16, else both that are possible.
     Raises FirmwareError if no layout fits, the tables cannot be laid out, or the part has not as much flash.
@@ -43,7 +52,7 @@ def choose(tables: IntegerTables, target: Target, *, flash: int | None = None, e
         raise FirmwareError(
             f"the classifier cannot be allowed {flash} bytes of flash: {target.named} has {target.flash} bytes"
         )
-    options = list(_options(tables, target, entry_bits))
+    options = list(_options(tables, target, ports, entry_bits))
     best = frontier(options)
     for allowed in flash_shares(target) if flash is None else (flash,):
         for layout, cost in best:
@@ -76,7 +85,7 @@ def flash_shares(target: Target) -> tuple[int, int]:
     return min(target.flash // 2, target.most_flash), min(target.flash * 3 // 4, target.most_flash)
 
 
-def _options(tables: IntegerTables, target: Target, entry_bits: int | None) -> Iterator[Option]:
+def _options(tables: IntegerTables, target: Target, ports: Ports | None, entry_bits: int | None) -> Iterator[Option]:
     """Yield the layouts that there are, each with its cost. Raises FirmwareError if there is none, saying why not."""
     refused: FirmwareError | None = None
     found = False
@@ -85,7 +94,7 @@ def _options(tables: IntegerTables, target: Target, entry_bits: int | None) -> I
         (8, 16) if entry_bits is None else (entry_bits,), sizes, _bins(tables), _addings(target)
     ):
         try:
-            layout = arrange(tables, group_size=size, entry_bits=bits, bins=bins, adding=adding)
+            layout = arrange(tables, ports=ports, group_size=size, entry_bits=bits, bins=bins, adding=adding)
         except FirmwareError as reason:
             refused = refused or reason
         else:
@@ -149,18 +158,19 @@ class Fit:
         return f"for {self.target.part}: {self.choice.why}"
 
 
-def fit_for(target: Target, tables: IntegerTables, flash: int | None = None) -> Fit:
-    """Return the part that firmware for a target is for, and the layout chosen for it, in `flash` bytes where given.
+def fit_for(target: Target, tables: IntegerTables, flash: int | None = None, ports: Ports | None = None) -> Fit:
+    """Return the part that firmware for a target is for, and the layout chosen for it, in `flash` bytes where given;
+    `ports` as in `choose`.
 
     Raises FirmwareError if no layout fits.
     """
     if target.own_layout:
-        return Fit(target, choose(tables, target, flash=flash))
-    fit = smallest_fit(tables, flash=flash)
+        return Fit(target, choose(tables, target, ports=ports, flash=flash))
+    fit = smallest_fit(tables, flash=flash, ports=ports)
     return fit if target.any_part else Fit(target, fit.choice)
 
 
-def smallest_fit(tables: IntegerTables, *, kind: str = "", flash: int | None = None) -> Fit:
+def smallest_fit(tables: IntegerTables, *, kind: str = "", flash: int | None = None, ports: Ports | None = None) -> Fit:
     """Return the smallest part that holds the tables, of those that builds carry firmware for, or that are of `kind`;
     in `flash` bytes where given, or in all that the part has if that is less.
 
@@ -170,9 +180,10 @@ def smallest_fit(tables: IntegerTables, *, kind: str = "", flash: int | None = N
     *smaller, largest = sorted(candidates, key=lambda target: target.flash)
     for target in smaller:
         with suppress(FirmwareError):
-            return _fit(tables, target, flash)
-    return _fit(tables, largest, flash)
+            return _fit(tables, target, flash, ports)
+    return _fit(tables, largest, flash, ports)
 
 
-def _fit(tables: IntegerTables, target: Target, flash: int | None) -> Fit:
-    return Fit(target, choose(tables, target, flash=None if flash is None else min(flash, target.flash)))
+def _fit(tables: IntegerTables, target: Target, flash: int | None, ports: Ports | None) -> Fit:
+    most = None if flash is None else min(flash, target.flash)
+    return Fit(target, choose(tables, target, ports=ports, flash=most))

@@ -11,7 +11,7 @@ change is plus or minus row 2^bit. With 8-bit entries every entry is what exceed
 0 to 255; the leasts are part of `start`.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
@@ -20,6 +20,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.tables import IntegerTables
 
 from . import FirmwareError
@@ -97,6 +98,23 @@ NO_SWITCH = -1
 def consecutive(n_switches: int) -> Ports:
     """Return the ports of switches that are wired to nothing known: eight after eight."""
     return tuple(tuple(range(first, min(first + 8, n_switches))) for first in range(0, n_switches, 8))
+
+
+def ports_of(pairs: Iterable[tuple[int, int]]) -> Ports:
+    """Return the ports of an answer, or of a bitmap of keys, of which `pairs` say bit and switch; bytes that show no
+    switch are left out.
+    """
+    ports: dict[int, list[int]] = {}
+    for bit, number in sorted(pairs):
+        ports.setdefault(bit // 8, [NO_SWITCH] * 8)[bit % 8] = number
+    return tuple(map(tuple, ports.values()))
+
+
+def ports_of_scan(scan: ScanMap | None) -> Ports | None:
+    """Return the ports of a build that was compiled for a harness: its boards', then its readings', byte by byte."""
+    if scan is None:
+        return None
+    return tuple(chain(*map(ports_of, (*scan.scanners, *(port.switches for port in scan.ports)))))
 
 
 @dataclass(frozen=True, slots=True)
