@@ -104,7 +104,8 @@ def test_a_glove_with_a_cyberglove_tells_the_builds_answers_and_when_joints_are_
     line.unplug()
     gone_us = board.do("uart 1 off").time_us
     found = grasp_after(scanner, gone_us + SETTLE_US)
-    without = truth.build.recognise(truth.bits[row], truth.codes[row], lost_joints=np.ones(len(truth.codes[row]), bool))
+    no_joints = np.ones(len(truth.codes[row]), bool)
+    without = truth.build.recognise(truth.bits[row], truth.codes[row], lost_joints=no_joints)
     assert (truth.build.grasps[found.number or 0], found.margin, found.degraded) == (
         without.grasp,
         without.margin,
