@@ -2,7 +2,7 @@
 
 Scores are relative to the last class, so that 13 sums, a pointer and two operands fill the registers. A code is clamped
 to the range that was trained on, and multiplied by an immediate weight of each class (`mulsu`). The sums of the joints
-are `shift` bits finer than the rest; after them come the groups of switches, fields of the bytes as they are read. Their
+are `shift` bits finer than the rest. After them come groups of switches, fields of the bytes as they are read, whose
 rows are bytes above the least of a class. No sum leaves 16 bits: that is checked for all rows there can be.
 """
 

@@ -46,6 +46,8 @@ def _case(bins: str = "direct", entry_bits: int = 16, constant: int | None = Non
     return Case(sizes, {"bins": bins, "entry_bits": entry_bits}, constant)
 
 
+WIRED = ((-1, 8, 0, -1, 1), (2, -1, -1, -1, -1, -1, 3, 4), (5, 7, -1, 6))
+MATRIX = ((8, 7, -1, 6, 5, 4, 3, -1), (-1,) * 8, (2, 0, 1))
 CASES = {
     "2 classes": _case(classes=2),
     "2 classes, bytes": _case(classes=2, entry_bits=8, bins="trimmed"),
@@ -71,6 +73,11 @@ CASES = {
     "a constant joint": _case(constant=1),
     "a constant joint, search": _case("search", constant=0),
     "a constant joint alone with switches": _case("search", joints=1, constant=0),
+    "ports of a harness": Case({}, {"ports": WIRED, "group_size": 3}),
+    "ports of a harness, groups of three of them, bytes": Case({}, {"ports": WIRED, "group_size": 6, "entry_bits": 8}),
+    "keys of a matrix, a byte without a switch": Case(
+        {}, {"ports": ((8, 7, -1, 6, 5, 4, 3, -1), (-1,) * 8, (2, 0, 1))}
+    ),
     "254 thresholds": _case("direct", joints=1, bins_=255),
     "48 look-ups, more than near calls reach": _case("trimmed", switches=160, joints=16, classes=4, reach=150),
 }

@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.layout import Bins, Field, Layout, arrange, lookups, parts_of
+from thenar.compiler.firmware.layout import NO_SWITCH, Bins, Field, Layout, arrange, lookups, parts_of, ports_of_scan
 from thenar.compiler.firmware.probes import Probes
+from thenar.runtime.scanning.scanmap import Port, ScanMap
 from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
@@ -115,6 +116,18 @@ def test_frames_hold_the_bytes_of_ports_then_codes(make_tables: MakeTables) -> N
     assert layout.frame_bytes(bits, np.array([[7, 60000]], np.uint16)).tolist() == [[0b1001001, 7, 255]]
     wired = arrange(tables, ports=((-1, 6, 0), (3, 4, 5, -1, 1, 2)))
     assert wired.frame_bytes(bits, np.array([[7, 254]], np.uint16)).tolist() == [[0b110, 0b1, 7, 254]]
+
+
+def test_ports_of_a_harness_are_the_bytes_that_show_a_kept_switch_boards_first() -> None:
+    scan = ScanMap(1, "0" * 64, (Port(0, 1, "GPIO", ((17, 3), (1, 2)), True),), (((9, 0), (40, 1)),))
+    none = NO_SWITCH
+    assert ports_of_scan(scan) == (
+        (none, 0, *[none] * 6),
+        (1, *[none] * 7),
+        (none, 2, *[none] * 6),
+        (none, 3, *[none] * 6),
+    )
+    assert ports_of_scan(None) is None
 
 
 def test_groups_are_of_one_port_each_where_no_more_are_needed(make_tables: MakeTables) -> None:
