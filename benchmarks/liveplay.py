@@ -54,7 +54,7 @@ class Played:
 def played(name: str, folder: Path, prune: int = 0) -> Played:
     """Simulate and compile a shipped scene; the first subject performs."""
     scene = load_scene(name)
-    compiled = compile_build(simulate(scene, 1).grasp_set, folder / name, folds=0, prune=prune).folder
+    compiled = compile_build(simulate(scene, 1).grasp_set, folder / name, rounds=100, folds=0, prune=prune).folder
     performance = of_scene(scene, jobs=1)
     calibration = folder / f"{name}.toml"
     calibration.write_text(performance.calibration.to_toml())
@@ -63,7 +63,9 @@ def played(name: str, folder: Path, prune: int = 0) -> Played:
 
 def joints_alone(name: str, folder: Path) -> Path:
     """Return a build of a shipped scene that uses the joints alone."""
-    return compile_build(simulate(load_scene(name), 1).grasp_set, folder / "joints", folds=0, inputs="joints").folder
+    return compile_build(
+        simulate(load_scene(name), 1).grasp_set, folder / "joints", rounds=100, folds=0, inputs="joints"
+    ).folder
 
 
 def glove(played: Played, port: str = "glove", sensors: Literal[18, 22] = SENSORS) -> GloveWiring:

@@ -83,7 +83,7 @@ def main() -> None:
 
     recorded = grasp_set()
     with tempfile.TemporaryDirectory() as folder:
-        manifest = compile_build(recorded, Path(folder) / "build", folds=0).manifest
+        manifest = compile_build(recorded, Path(folder) / "build", rounds=100, folds=0).manifest
         build = Build.load(Path(folder) / "build")
     kept = [switch.column for switch in manifest.switches]
     bits, codes = np.ascontiguousarray(recorded.switches[0, kept]), recorded.codes[0]

@@ -225,7 +225,7 @@ def command(
     if made.only_answer is not None:
         warning(
             f"the build recognises every row as {made.only_answer}: no input tells grasp types apart by "
-            "itself, and stumps look at one at a time"
+            "itself, and the model looks at one at a time"
         )
     if chosen is not None and given is not None and made.harness != given:
         warning(

@@ -29,6 +29,7 @@ from .options import Training, asked_settings, method_list, trainer_option
 if TYPE_CHECKING:
     from rich.table import Table as Grid
 
+    from thenar.compiler.evaluation.learning import Learning
     from thenar.compiler.evaluation.study import Study
     from thenar.compiler.evaluation.tables import Cell, RateTable
 
@@ -95,7 +96,11 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     help="Methods to compare ID3 with, by commas.",
 )
 @click.option(
-    "--tables", type=ListOf("table", lambda: TABLES), default=",".join(TABLES), show_default=True, help="Which tables."
+    "--tables",
+    type=ListOf("table", lambda: TABLES, none=True),
+    default=",".join(TABLES),
+    show_default=True,
+    help="Which tables, or none.",
 )
 @click.option(
     "--permute",
@@ -104,9 +109,19 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
     metavar="M",
     help="Permutation test: evaluate M times with shuffled labels, for the chance level and a p-value.",
 )
+@click.option(
+    "--learning-curve",
+    "learning",
+    is_flag=True,
+    help="Learning curves: accuracy after 2, 4, 8, ... repetitions, and what to expect of more.",
+)
 @click.option("--confusion", is_flag=True, help="Print the confusion matrix of every composition and subject.")
 @click.option(
-    "--plot", "folder", type=OutputFolder(fresh=True), metavar="FOLDER", help="Draw the confusion matrices there."
+    "--plot",
+    "folder",
+    type=OutputFolder(fresh=True),
+    metavar="FOLDER",
+    help="Draw the confusion matrices there, and the learning curves.",
 )
 @click.option("-o", "--output", type=OutputFile(".json"), metavar="FILE", help="Write the whole result there, as JSON.")
 @overwrite_flag
@@ -131,9 +146,13 @@ def command(
     A fold never has frames of one trial on both sides. Accuracies are of trials, each recognised as most of its frames
     are; where trials have several frames, the accuracy of single frames is added.
 
+    Trainers are compared with each other and with scikit-learn's simplest, at settings that each chooses from its
+    training rows.
+
     \b
     Example:
         thenar evaluate set.grasps
+        thenar evaluate set.grasps --tables none --learning-curve --plot pictures/
         thenar evaluate set.grasps --by subject --permute 100
         thenar evaluate set.grasps --by subject --protocol nested --plot pictures/ -o result.json
     """
@@ -144,15 +163,15 @@ def command(
     named = {name: training.pop(name) for name in ("trainer", "rounds") if name in training}
     asked["tables"] = tuple(name for name in TABLES if name in asked["tables"])
     options = msgspec.convert(asked | named | {"settings": training}, Options)
-    if (confusion or folder is not None) and "compositions" not in options.tables:
+    if (confusion or (folder is not None and not options.learning)) and "compositions" not in options.tables:
         raise click.UsageError("--confusion and --plot show the compositions: name them among --tables")
     keep_apart(grasps, output)
     with progress("evaluating") as report:
         study = evaluate(GraspSet.load(grasps), options, jobs, report)
     if folder is not None:
-        from thenar.compiler.evaluation.pictures import draw_confusions
+        from thenar.compiler.evaluation.pictures import draw
 
-        draw_confusions(study, folder)
+        draw(study, folder)
     if output is not None:
         write_json(output, study)
     for sentence in study.warnings:
@@ -180,8 +199,23 @@ def _print(study: "Study", *, confusion: bool) -> None:
     console.print(str(study))
     if study.permuted is not None:
         console.print(str(study.permuted))
+    if study.learning is not None:
+        _print_learning(study.learning)
     if confusion:
         _print_confusions(study)
+
+
+def _print_learning(learning: "Learning") -> None:
+    from thenar.compiler.text import interval
+
+    console, numbers = out(), [*map(str, learning.repetitions), *(f"{n} expected" for n in learning.further)]
+    grid = table(("", *numbers), numbers)
+    for curve in learning.curves:
+        grid.add_row(Text(curve.learner), *map(interval, curve.rates), *map(interval, curve.expected))
+    console.print()
+    console.print(Text(learning.title, "bold"))
+    console.print(grid)
+    console.print(learning.note or "Expected: by a power law through the points. Nothing tells whether it goes on so.")
 
 
 def _print_confusions(study: "Study") -> None:

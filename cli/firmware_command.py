@@ -183,12 +183,13 @@ def _expected(fit: "Fit", updates: bool) -> str:
 
 def _layouts(fit: "Fit") -> list[dict[str, Any]]:
     """Return the frontier that a layout was chosen from, fastest first: `time` of a frame, bytes, and how many switches
-    share a `lookup` at most.
+    share a `lookup` at most, and how many joints.
     """
     return [
         {
             "entry_bits": layout.entry_bits,
             "lookup": max(map(len, layout.groups), default=0),
+            "joints": max((len(lookup.joints) for lookup in layout.lookups), default=0),
             "bins": layout.bins if layout.joints else "",
             "adding": layout.adding if fit.target.avr else "",
             "time": cost.cycles,
@@ -202,13 +203,13 @@ def _layouts(fit: "Fit") -> list[dict[str, Any]]:
 
 def _frontier_table(fit: "Fit") -> Table:
     """Return the frontier as a table, the chosen layout marked."""
-    numbers = ("bits", "switches a look-up", fit.target.unit, "flash", "RAM")
-    columns = ("", *numbers[:2], "codes", "rows added", *numbers[2:])
+    numbers = ("bits", "switches a look-up", "joints", fit.target.unit, "flash", "RAM")
+    columns = ("", *numbers[:3], "codes", "rows added", *numbers[3:])
     layouts = table(columns, numbers, f"Layouts for {fit.target.part}, {fit.target.bound}")
     for row in _layouts(fit):
-        mark, lookup = "*" if row["chosen"] else "", str(row["lookup"] or "")
+        mark, shared = "*" if row["chosen"] else "", [str(row[key] or "") for key in ("lookup", "joints")]
         costs = (str(row[key]) for key in ("time", "flash", "ram"))
-        layouts.add_row(mark, str(row["entry_bits"]), lookup, row["bins"], row["adding"], *costs)
+        layouts.add_row(mark, str(row["entry_bits"]), *shared, row["bins"], row["adding"], *costs)
     return layouts
 
 

@@ -9,6 +9,7 @@ from rich.text import Text
 
 from thenar.compiler.text import duration, interval
 from thenar.drivers.names import printable, shortened
+from thenar.runtime.manifest import AUTO
 
 from .common import (
     Number,
@@ -77,7 +78,7 @@ def _address(_: click.Context, __: click.Parameter, text: str | None) -> str | N
     help="Placement methods to build from.  [default: elimination and ID3, by cost with --glove]",
 )
 @click.option("--rivals", type=method_list, help="Methods to compare them with, or none.  [default: most rivals]")
-@trainer_option("logitboost")
+@trainer_option(AUTO)
 @click.option("--rounds", type=click.IntRange(1, 300), default=300, show_default=True, help="The most rounds to try.")
 @click.option("--repeats", type=click.IntRange(1), default=3, show_default=True, help="Repeats of the folds.")
 @click.option(

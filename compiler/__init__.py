@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from thenar.drivers.errors import ThenarError
     from thenar.runtime.manifest import Options
 
+    from .additive.classifier import AdditiveLogitClassifier
     from .artifact import CompileError
     from .artifact.compile import compile_build
     from .artifact.documents import BuildReport, Documents
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "thenar.drivers.errors": ("ThenarError",),
     "thenar.runtime.manifest": ("Options",),
+    ".additive.classifier": ("AdditiveLogitClassifier",),
     ".artifact.compile": ("compile_build",),
     ".artifact.documents": ("BuildReport", "Documents"),
     ".artifact": ("CompileError",),
@@ -65,6 +67,7 @@ __all__ = [
     "METHODS",
     "TARGETS",
     "TRAINERS",
+    "AdditiveLogitClassifier",
     "BoostingError",
     "Build",
     "BuildReport",

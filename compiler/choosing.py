@@ -1,8 +1,9 @@
 """The fit is chosen inside the training rows: which trainer, with which settings, by inner folds.
 
 Inner folds part no trial; and where the fit is to recognise a new subject (object, session), they leave subjects out as
-well. Each way to train is scored by the trials that it recognises there, ties by the log-loss. Of those within one
-standard error of the best one, the one with the smallest tables is taken, the most regular of several.
+well. Each way to train is scored by the trials that it recognises there, ties by the log-loss. Of those that are behind
+the best one by no more than the standard error of that difference, those with small tables are cheap to recognise with;
+of these, the one with the lowest log-loss is taken.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -15,19 +16,21 @@ from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Compared, Fitting, Of
 
-from .boosting.stumps import Stumps
 from .elementary import softmax_and_loss
 from .evaluation.folds import Fold, leave_one_out, trial_folds
 from .samples import Samples, decided
-from .tables.collapse import Model, model_scores
+from .tables.collapse import Model, ScoreTables, collapse, model_scores
 from .trainers.base import TRAINERS, Training
 from .workers import in_workers
 
 Rows = NDArray[np.intp]
 
-# A training set of so many trials is cut into so many inner folds: of many trials, halves tell enough.
-_FOLDS = ((400, 4), (1500, 3))
+# A training set of fewer trials than these is cut into so many inner folds, a larger one into two.
+_FOLDS = ((1500, 4), (20_000, 3))
 _LEAST_GROUPS = 3
+# Tables of a kilobyte, at a byte an entry, cost next to nothing; of larger ones, those up to a quarter above the
+# smallest are small.
+_SMALL, _LARGER = 1024, 1.25
 
 
 def inner_folds(samples: Samples, seed: int, groups: NDArray[np.generic] | None = None) -> list[Fold]:
@@ -95,11 +98,11 @@ def choose_training(
     ]
     if not grouped:
         of = "pooled" if np.ptp(samples.subjects) else "within subject"
-    return _fitting(candidates, scores, of, len(folds))
+    return _fitting(candidates, scores, samples.n_classes, of, len(folds))
 
 
-def _values(training: Training) -> dict[str, float | None]:
-    return {name: None if value is None else float(value) for name, value in training.settings.items()}
+def _values(training: Training) -> dict[str, float | str | None]:
+    return {name: float(value) if isinstance(value, int) else value for name, value in training.settings.items()}
 
 
 def _alike(training: Training) -> tuple[object, ...]:
@@ -133,7 +136,11 @@ def _tested(task: _Task) -> tuple[str, list[int], list[_Test]]:
         scores = model_scores(model, test.switches, test.codes)
         answers = decided(scores.argmax(axis=1)[np.newaxis], trial)[0]
         loss = softmax_and_loss(np.ascontiguousarray(scores.T), test.labels, weights)[1] * len(first)
-        found.append(_Test(fold.test[first], answers == test.labels[first], loss, _table_rows(model)))
+        found.append(
+            _Test(
+                fold.test[first], answers == test.labels[first], loss, _table_rows(collapse(model, samples.n_switches))
+            )
+        )
     return fold.name, batch, found
 
 
@@ -145,13 +152,10 @@ def _models(trainings: list[Training], samples: Samples) -> Iterator[Model]:
         yield from trainings[int(np.argmax(rounds))].stages(samples, rounds)
 
 
-def _table_rows(model: Model) -> int:
-    """Return how many rows of scores the model's tables hold: one a switch, one a bin of a joint, for those in use."""
-    if isinstance(model, Stumps):
-        used = np.unique(np.stack([model.columns.ravel(), np.floor(model.thresholds.ravel())]), axis=1)[0]
-        return len(used) + len(np.unique(used))
-    joints = [len(rows) for rows in model.joint_rows if rows.any()]
-    return int(model.switch_rows.any(axis=1).sum()) + sum(joints)
+def _table_rows(tables: ScoreTables) -> int:
+    """Return how many rows of scores tables hold for inputs in use: one a switch, a bin of a joint, a line."""
+    in_use = [len(rows) for rows in tables.joint_rows if rows.any()]
+    return int(tables.switch_rows.any(axis=1).sum()) + sum(in_use) + sum(bool(line.row.any()) for line in tables.lines)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -182,7 +186,7 @@ def _error(gains: NDArray[np.intp], clusters: Rows) -> float:
     return sqrt(squares * len(sizes) / max(1, len(sizes) - 1)) / len(gains) ** 2
 
 
-def _fitting(candidates: Sequence[Training], scores: list[_Score], of: Of, n_folds: int) -> Fitting:
+def _fitting(candidates: Sequence[Training], scores: list[_Score], n_classes: int, of: Of, n_folds: int) -> Fitting:
     best = min(range(len(scores)), key=lambda one: (-int(scores[one].hits.sum()), scores[one].loss))
     found = []
     for candidate, score in zip(candidates, scores, strict=True):
@@ -201,7 +205,8 @@ def _fitting(candidates: Sequence[Training], scores: list[_Score], of: Of, n_fol
             )
         )
     near = [one for one, each in enumerate(found) if each.behind <= each.behind_error]
-    chosen = min(near, key=lambda one: (found[one].rows, one))
+    small = max(_SMALL / n_classes, _LARGER * min(found[one].rows for one in near))
+    chosen = min((one for one in near if found[one].rows <= small), key=lambda one: (found[one].loss, one))
     shown = {
         min(
             (one for one, each in enumerate(found) if each.trainer == name),
@@ -226,6 +231,6 @@ def _why(found: list[Compared], best: int, chosen: int) -> str:
     if chosen == best:
         return f"it recognises the most, {rate}"
     return (
-        f"it recognises {rate}, within one standard error of the best, {top.trainer} with {100 * top.rate:.1f} %, "
-        "and has the smallest tables of those"
+        f"it recognises {rate}, within one standard error of the best, {top.name}, with {100 * top.rate:.1f} %; of "
+        "those with small tables it has the lowest log-loss"
     )

@@ -32,9 +32,11 @@ Code = Annotated[int, Meta(ge=0, le=65535)]
 Amount = Annotated[float, Meta(ge=0.0, le=1e9)]
 Value = Annotated[float, Meta(ge=-1e300, le=1e300)]
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+Name = Annotated[str, Meta(min_length=1)]
+# A number, or one of a few names.
+Given = Value | Name
 Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 _T = TypeVar("_T")
-Name = Annotated[str, Meta(min_length=1)]
 
 
 def _written(default: _T) -> _T:
@@ -96,7 +98,7 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     keep: Annotated[int, Meta(ge=1, le=2**53)] | None = None
     width: Annotated[int, Meta(ge=4, le=16)] = 16
     trainer: Name = AUTO
-    settings: dict[Name, Value] = {}
+    settings: dict[Name, Given] = {}
     by: By | None = None
 
 
@@ -111,7 +113,7 @@ class Compared(Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     trainer: Name
-    settings: dict[Name, Value | None]
+    settings: dict[Name, Given | None]
     correct: Count
     total: Annotated[int, Meta(ge=1, le=2**53)]
     error: Share
@@ -136,9 +138,14 @@ class Compared(Struct, frozen=True, forbid_unknown_fields=True):
         return f"{self.name}: {100 * self.rate:.1f} +- {100 * self.error:.1f} %{behind}; tables of {self.rows:.0f} rows"
 
 
-def fit_name(trainer: str, settings: Mapping[str, float | None]) -> str:
+def in_words(name: str, value: float | str) -> str:
+    """Return a setting in words: "max-bins 16"."""
+    return f"{name.replace('_', '-')} {value if isinstance(value, str) else format(value, 'g')}"
+
+
+def fit_name(trainer: str, settings: Mapping[str, float | str | None]) -> str:
     """Return a trainer and its settings in words: "logit, penalty 1, smoothness 10"."""
-    values = (f"{name.replace('_', '-')} {value:g}" for name, value in settings.items() if value is not None)
+    values = (in_words(name, value) for name, value in settings.items() if value is not None)
     return ", ".join([trainer, *values])
 
 
@@ -152,12 +159,17 @@ class Fitting(Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     trainer: Name
-    settings: dict[Name, Value | None]
+    settings: dict[Name, Given | None]
     of: Of = "within subject"
     folds: Count = 0
     tried: Count = 1
     compared: tuple[Compared, ...] = ()
     why: str = ""
+
+    def number(self, name: str) -> float:
+        """Return a setting that is a number; 0 where there is none of this name."""
+        value = self.settings.get(name)
+        return 0.0 if value is None or isinstance(value, str) else value
 
     def __str__(self) -> str:
         """Return the trainer and its settings."""
@@ -296,12 +308,12 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
         if self.fitting is not None:
             return self.fitting
         asked = self.options
-        boosted = {"rounds": asked.rounds, "shrinkage": asked.shrinkage, "tolerance": asked.tolerance}
-        given = {"max_bins": asked.max_bins, **asked.settings}
+        given: dict[Name, Given | None] = {"max_bins": asked.max_bins, **asked.settings}
         # Of other trainers, older versions wrote the first two as well.
-        if asked.trainer in (AUTO, PAPERS_TRAINER):
-            return Fitting(PAPERS_TRAINER, boosted | given)
-        return Fitting(asked.trainer, given)
+        if asked.trainer not in (AUTO, PAPERS_TRAINER):
+            return Fitting(asked.trainer, given)
+        boosted = {name: getattr(asked, name) for name in ("rounds", "shrinkage", "tolerance")}
+        return Fitting(PAPERS_TRAINER, boosted | given)
 
     @property
     def headline(self) -> Recognised | None:
@@ -350,8 +362,10 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
     options = manifest.options
     texts = [manifest.thenar, source.taxonomy, options.placement, options.trainer, *options.settings]
     fit = manifest.fit
-    texts += [fit.trainer, *fit.settings]
-    texts += [name for each in fit.compared for name in (each.trainer, *each.settings)]
+    texts += [fit.trainer, *(value for value in options.settings.values() if isinstance(value, str))]
+    for settings in (fit.settings, *(each.settings for each in fit.compared)):
+        texts += [text for text in (*settings, *settings.values()) if isinstance(text, str)]
+    texts += [each.trainer for each in fit.compared]
     yield from _wrong_names("texts", texts)
     yield from _wrong_names("texts", filter(None, [source.simulated]), 2 * LONGEST_NAME)
     yield from _wrong_columns(manifest)
@@ -363,7 +377,7 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
         yield "proves something of other tables than it describes"
     counted = [(rate.correct, rate.total) for rate in manifest.rates]
     counted += [(each.correct, each.total) for each in fit.compared]
-    if any(correct > total for correct, total in counted) or manifest.stopped_after > (fit.settings.get("rounds") or 0):
+    if any(correct > total for correct, total in counted) or manifest.stopped_after > fit.number("rounds"):
         yield "counts more than there is"
 
 

@@ -18,10 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import FrameError
 from .frames import Mask
-from .tables import IntegerTables
+from .tables import HIGHEST_CODE, IntegerTables
 
 LANE_OFFSET = 1 << 15
-_HIGHEST_CODE = 65535
 # Switches are looked up eight at a time: a byte of a mask is the place of its sum of rows.
 _EIGHT = 8
 # Of how many classes answers of `reach` are kept, over all answers: some 2 MB.
@@ -34,7 +33,7 @@ class Scorer:
     start                       bias and offset: the sum of no rows
     switch_rows, switch_means   s rows
     joint_means                 j rows
-    joint_rows, thresholds      j lists: a row per bin, and the codes that part the bins
+    joint_rows, thresholds      j lists: a row per bin, and the codes that part the bins; distances of a slope are bins
     size, unpack                of a sum that began with `start`: its bytes, and what makes K scores of them, each 2^15
                                 too high
     """
@@ -48,8 +47,9 @@ class Scorer:
         self.switch_rows = _packed(tables.switch_rows, offsets)
         self.switch_means = _packed(tables.switch_means, offsets)
         self.joint_means = _packed(tables.joint_means, offsets)
-        self.joint_rows = [_packed(rows, offsets) for rows in tables.joint_rows]
-        self.thresholds: list[list[int]] = [thresholds.tolist() for thresholds in tables.thresholds]
+        binned = [tables.binned(joint) for joint in range(tables.n_joints)]
+        self.joint_rows = [_packed(rows, offsets) for _, rows in binned]
+        self.thresholds: list[list[int]] = [thresholds.tolist() for thresholds, _ in binned]
         self.reach = lru_cache(maxsize=_KEPT // tables.n_classes)(self._reach)
 
     @cached_property
@@ -65,10 +65,12 @@ class Scorer:
     def lanes(self, bits: ArrayLike, codes: ArrayLike) -> tuple[int, ...]:
         """Return the scores of one frame, each 2^15 too high: K integers. Raises FrameError."""
         switches = _flags(bits, len(self.switch_rows), "switches")
-        bins = map(bisect_left, self.thresholds, self._codes(codes))
-        total = sum(compress(self.switch_rows, switches), self.start)
-        total = sum(map(getitem, self.joint_rows, bins), total)
+        total = sum(compress(self.switch_rows, switches), self.start) + self.joint_sum(self._codes(codes))
         return self.unpack(total.to_bytes(self.size, "little"))
+
+    def joint_sum(self, codes: Sequence[int]) -> int:
+        """Return the sum of what all joints' codes add."""
+        return sum(map(getitem, self.joint_rows, map(bisect_left, self.thresholds, codes)))
 
     def lanes_without(
         self, bits: ArrayLike, codes: ArrayLike, lost_switches: ArrayLike, lost_joints: ArrayLike
@@ -144,7 +146,7 @@ class LiveScores:
         elif len(taken) != len(scorer.thresholds):
             raise FrameError(f"{len(taken)} codes, the build has {len(scorer.thresholds)} joints")
         else:
-            self._joints = sum(map(getitem, scorer.joint_rows, map(bisect_left, scorer.thresholds, taken)))
+            self._joints = scorer.joint_sum(taken)
         self._codes = taken
 
     def lanes(self, closed: Mask, lost: Mask = 0) -> tuple[int, ...]:
@@ -208,6 +210,6 @@ def _flags(flags: ArrayLike, expected: int, what: str) -> list[bool]:
 def _check_codes(array: NDArray[np.generic], values: list[int]) -> None:
     if array.dtype.kind not in "iu":
         raise FrameError(f"joint codes are integers, this frame has {array.dtype}")
-    if min(values) < 0 or max(values) > _HIGHEST_CODE:
-        wrong = next(value for value in values if not 0 <= value <= _HIGHEST_CODE)
-        raise FrameError(f"joint codes are 0 to {_HIGHEST_CODE}, this frame has {wrong}")
+    if min(values) < 0 or max(values) > HIGHEST_CODE:
+        wrong = next(value for value in values if not 0 <= value <= HIGHEST_CODE)
+        raise FrameError(f"joint codes are 0 to {HIGHEST_CODE}, this frame has {wrong}")

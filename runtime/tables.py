@@ -1,8 +1,10 @@
 """The integer score tables of a build, and `tables.bin`.
 
     score_k = bias_k + sum over switches s of bits_s * switch_rows[s, k] + sum over joints a of joint_rows[a][bin_a, k]
+              + sum over slopes l of distance_l * row_l[k]
 
-where bin_a is the number of thresholds of joint a below its code. Everything is int16, and no partial sum, in any
+where bin_a is the number of thresholds of joint a below its code, and distance_l how far its joint's code lies from the
+middle of a range (`Slope`). Distances and their rows are int8, everything else is int16, and no partial sum, in any
 order, leaves int16: `IntegerTables` proves it when it is made, so a table that could overflow cannot be loaded.
 
 The payload of `tables.bin`, inside the envelope of `sealed.py`, all little-endian (K classes, s switches, j joints):
@@ -20,6 +22,11 @@ The payload of `tables.bin`, inside the envelope of `sealed.py`, all little-endi
             2 j K       joint_means, int16: what stands in for a missing joint
             2 sum T     thresholds, uint16, joint after joint, strictly increasing within a joint
             2 sum(T+1)K joint_rows, int16, joint after joint, bin after bin, a row of K each
+
+Tables with n > 0 slopes are of format 2, in which offset 6 holds n, and in which follow
+
+            8 n         joint, low, high, uint16, and gain, int16, of each slope
+            K n         rows, int8, a row of K per slope
 """
 
 import struct
@@ -33,7 +40,7 @@ from .errors import BuildError
 from .sealed import seal, unseal
 
 KIND = b"THNRTABL"
-VERSION = 1
+PLAIN, SLOPED = 1, 2  # formats
 LIMIT = 32767
 MAX_CLASSES, MAX_SWITCHES, MAX_JOINTS = 1024, 4096, 256
 MAX_BYTES = 16 << 20
@@ -41,8 +48,59 @@ MAX_BYTES = 16 << 20
 # a tie (stumps.TIE): a row that is safe is never one that the ensemble decided by the number of the class.
 COARSEST_SCALE, FINEST_SCALE = 2.0**-64, 2.0**30
 _COUNTS = struct.Struct("<HHHHd")
+_SLOPE = struct.Struct("<HHHh")
+HIGHEST_CODE = 65535
+# The most that a range of codes may come to: a distance from its middle, and its negative, are one byte.
+WIDEST = 254
+COARSE = 256
 
 Rows = NDArray[np.int16]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Slope:
+    """What a joint adds in proportion to its code: row (K,) int8 times the code's distance from the middle.
+
+    A code is taken between `low` and `high`. How far it lies above low is multiplied by 2^gain, or divided and rounded
+    down where `gain` is negative: 0 to `most`, at most 254. The distance is that less `zero`. Raises BuildError.
+    """
+
+    joint: int
+    low: int
+    high: int
+    gain: int
+    row: NDArray[np.int8]
+
+    def __post_init__(self) -> None:
+        if not (0 <= self.low < self.high <= HIGHEST_CODE and -16 <= self.gain <= 7 and 0 < self.most <= WIDEST):
+            raise BuildError(f"a slope from code {self.low} to {self.high} with gain {self.gain} fits no byte")
+
+    def _gained(self, above: int) -> int:
+        return above << self.gain if self.gain > 0 else above >> -self.gain
+
+    @property
+    def most(self) -> int:
+        """What the highest code comes to."""
+        return self._gained(self.high - self.low)
+
+    @property
+    def zero(self) -> int:
+        """What the middle comes to, where nothing is added."""
+        return (self.most + 1) // 2
+
+    def distance(self, code: int) -> int:
+        """Return the distance of a code."""
+        return self._gained(min(max(code, self.low), self.high) - self.low) - self.zero
+
+    def distances(self, codes: NDArray[np.integer]) -> NDArray[np.int64]:
+        """Return the distances of codes (n,)."""
+        above = np.clip(codes.astype(np.int64), self.low, self.high) - self.low
+        gained: NDArray[np.int64] = above << self.gain if self.gain > 0 else above >> -self.gain
+        return gained - self.zero
+
+    def of(self, codes: NDArray[np.integer]) -> NDArray[np.int64]:
+        """Return what codes (n,) of the joint add, (n, K)."""
+        return self.distances(codes)[:, np.newaxis] * self.row.astype(np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +108,8 @@ class IntegerTables:
     """Score tables in int16. Raises BuildError if shapes disagree or a sum could leave -32767..32767.
 
     bias (K,), switch_rows (s, K), thresholds: j arrays uint16 (T_a,), joint_rows: j arrays (T_a + 1, K),
-    switch_means (s, K), joint_means (j, K), scale in steps per unit of score.
+    switch_means (s, K), joint_means (j, K), scale in steps per unit of score; slopes of joints, at most one each, in
+    the order of the joints.
     """
 
     bias: Rows
@@ -60,6 +119,7 @@ class IntegerTables:
     switch_means: Rows
     joint_means: Rows
     scale: float
+    slopes: tuple[Slope, ...] = ()
 
     def __post_init__(self) -> None:
         _check_counts(self.n_classes, self.n_switches, self.n_joints)
@@ -92,15 +152,59 @@ class IntegerTables:
         """The largest absolute value that any partial sum, in any order, with any inputs or missing ones, can take."""
         return max(int(_furthest(self, +1).max()), int(_furthest(self, -1).max()))
 
+    @property
+    def grid(self) -> int:
+        """What all rows of switches and bins are multiples of, where joints have slopes: 256 if they are, else 1."""
+        rows = [self.switch_rows, *(rows for rows in self.joint_rows if len(rows) > 1)]
+        return COARSE if self.slopes and not any((each % COARSE).any() for each in rows) else 1
+
+    def slope_of(self, joint: int) -> Slope | None:
+        """Return the slope of a joint, if it has one."""
+        return next((slope for slope in self.slopes if slope.joint == joint), None)
+
+    def choices(self, joint: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return codes (c,) at which what a joint adds is the most and the least in each bin, and its terms (t, c, K).
+
+        They are one, the row of the bin, or two, that and what the slope adds.
+        """
+        thresholds, rows = self.thresholds[joint].astype(np.int64), self.joint_rows[joint].astype(np.int64)
+        slope = self.slope_of(joint)
+        if slope is None:
+            return np.append(0, thresholds + 1), rows[np.newaxis]
+        codes = np.unique(np.concatenate([[0, HIGHEST_CODE], thresholds, thresholds + 1]))
+        codes = codes[codes <= HIGHEST_CODE]
+        return codes, np.stack([rows[np.searchsorted(thresholds, codes)], slope.of(codes)])
+
+    def binned(self, joint: int) -> tuple[NDArray[np.uint16], Rows]:
+        """Return the thresholds of a joint and its rows, as they would be if each distance of its slope were a bin."""
+        thresholds, rows, slope = self.thresholds[joint], self.joint_rows[joint], self.slope_of(joint)
+        if slope is None:
+            return thresholds, rows
+        cell = 1 << max(-slope.gain, 0)
+        steps = np.union1d(thresholds, np.arange(slope.low + cell - 1, slope.high, cell)).astype(np.uint16)
+        codes = np.append(0, steps.astype(np.int64) + 1)
+        whole = rows[np.searchsorted(thresholds, codes)] + slope.of(codes)
+        return steps, whole.astype(np.int16)
+
+    def joint_sums(self, codes: NDArray[np.uint16]) -> NDArray[np.int32]:
+        """Return the bias and what the joints' codes (n, j) add, (n, K)."""
+        # No partial sum leaves int16, so nothing overflows here.
+        sums = np.repeat(self.bias[np.newaxis].astype(np.int32), len(codes), axis=0)
+        for column, thresholds, rows in zip(codes.T, self.thresholds, self.joint_rows, strict=True):
+            sums += rows[np.searchsorted(thresholds, column, side="left")]
+        for slope in self.slopes:
+            sums += slope.of(codes[:, slope.joint]).astype(np.int32)
+        return sums
+
 
 def _furthest(tables: IntegerTables, sign: int) -> NDArray[np.int64]:
     """Return, per class, the most that the rows can add up to in the direction of `sign`; (K,)."""
-    choices = [np.stack([tables.switch_rows, tables.switch_means])]
-    pairs = zip(tables.joint_rows, tables.joint_means, strict=True)
-    choices += [np.vstack([rows, mean])[:, np.newaxis] for rows, mean in pairs]
     reach = np.maximum(sign * tables.bias.astype(np.int64), 0)
-    for rows in choices:
-        reach += np.maximum(sign * rows.astype(np.int64), 0).max(axis=0).sum(axis=0)
+    switches = np.stack([tables.switch_rows, tables.switch_means]).astype(np.int64)
+    reach += np.maximum(sign * switches, 0).max(axis=0).sum(axis=0)
+    for joint, mean in enumerate(tables.joint_means.astype(np.int64)):
+        onward = np.maximum(sign * tables.choices(joint)[1], 0).sum(axis=0)
+        reach += np.maximum(onward.max(axis=0), sign * mean)
     return reach
 
 
@@ -125,6 +229,12 @@ def _check_shapes(tables: IntegerTables) -> None:
         raise BuildError(f"rows for {len(tables.joint_rows)} joints and thresholds for {j}")
     for a, (thresholds, rows) in enumerate(zip(tables.thresholds, tables.joint_rows, strict=True)):
         expected[f"joint_rows[{a}]"] = (rows, (len(thresholds) + 1, K))
+    joints = [slope.joint for slope in tables.slopes]
+    if joints != sorted(set(joints)) or any(not 0 <= joint < j for joint in joints):
+        raise BuildError(f"slopes of joints {joints}: they must rise, each below {j}")
+    for slope in tables.slopes:
+        if slope.row.shape != (K,) or slope.row.dtype != np.int8:
+            raise BuildError(f"the row of a slope is {slope.row.dtype} {slope.row.shape}, it must be int8 ({K},)")
     for name, (rows, shape) in expected.items():
         if rows.shape != shape or rows.dtype != np.int16:
             raise BuildError(f"{name} is {rows.dtype} {rows.shape}, it must be int16 {shape}")
@@ -136,22 +246,25 @@ def _check_stored_scale(scale: float) -> None:
         raise BuildError(f"the scale is {scale!r}, in a file it must be at least 2^-64 steps per unit")
 
 
-def payload_bytes(n_classes: int, n_switches: int, thresholds: Sequence[int]) -> int:
+def payload_bytes(n_classes: int, n_switches: int, thresholds: Sequence[int], n_slopes: int = 0) -> int:
     """Return the length of the payload of tables of so many classes and switches; `thresholds` of each joint."""
     rows = 1 + 2 * n_switches + sum(2 + count for count in thresholds)
-    return _COUNTS.size + 2 * (len(thresholds) + sum(thresholds) + n_classes * rows)
+    words = len(thresholds) + sum(thresholds) + n_classes * rows
+    return _COUNTS.size + 2 * words + n_slopes * (_SLOPE.size + n_classes)
 
 
 def tables_to_bytes(tables: IntegerTables) -> bytes:
     """Return the content of `tables.bin`. Raises BuildError if it is larger than 16 MiB or its scale too coarse."""
     _check_stored_scale(tables.scale)
-    header = _COUNTS.pack(tables.n_classes, tables.n_switches, tables.n_joints, 0, tables.scale)
+    header = _COUNTS.pack(tables.n_classes, tables.n_switches, tables.n_joints, len(tables.slopes), tables.scale)
     counts = np.array([len(t) for t in tables.thresholds], dtype="<u2").tobytes()
     rows = (tables.bias, tables.switch_rows, tables.switch_means, tables.joint_means)
     parts = [header, counts, *(r.astype("<i2").tobytes() for r in rows)]
     parts += [t.astype("<u2").tobytes() for t in tables.thresholds]
     parts += [r.astype("<i2").tobytes() for r in tables.joint_rows]
-    data = seal(KIND, VERSION, b"".join(parts))
+    parts += [_SLOPE.pack(slope.joint, slope.low, slope.high, slope.gain) for slope in tables.slopes]
+    parts += [slope.row.astype("<i1").tobytes() for slope in tables.slopes]
+    data = seal(KIND, SLOPED if tables.slopes else PLAIN, b"".join(parts))
     if len(data) > MAX_BYTES:
         raise BuildError(f"the tables need {len(data)} bytes, a build has at most {MAX_BYTES}: keep fewer inputs")
     return data
@@ -165,29 +278,29 @@ def tables_from_bytes(data: bytes, what: str = "tables.bin") -> IntegerTables:
     """
     if len(data) > MAX_BYTES:
         raise BuildError(f"{what} has {len(data)} bytes, a build has at most {MAX_BYTES}")
-    _, payload = unseal(data, KIND, VERSION, what)
+    version, payload = unseal(data, KIND, SLOPED, what)
     try:
-        return _parse(payload)
+        return _parse(payload, version)
     except BuildError as wrong:
         raise BuildError(f"{what} is damaged: {wrong}") from None
 
 
-def _parse(payload: bytes) -> IntegerTables:
+def _parse(payload: bytes, version: int) -> IntegerTables:
     if len(payload) < _COUNTS.size:
         raise BuildError(f"{len(payload)} bytes of content, the counts alone have {_COUNTS.size}")
-    K, s, j, zero, scale = _COUNTS.unpack_from(payload)
+    K, s, j, n, scale = _COUNTS.unpack_from(payload)
     _check_counts(K, s, j)
     _check_stored_scale(scale)
-    if zero:
-        raise BuildError("the two bytes at offset 6 are not zero")
+    if (n > 0) != (version == SLOPED):
+        raise BuildError(f"{n} slopes in format {version}: the two bytes at offset 6 are wrong")
     if len(payload) < _COUNTS.size + 2 * j:
         raise BuildError(f"{len(payload)} bytes of content are too few for {j} joints")
     counts = np.frombuffer(payload, "<u2", j, _COUNTS.size).tolist()
     sizes = [K, s * K, s * K, j * K, *counts, *((T + 1) * K for T in counts)]
-    expected = payload_bytes(K, s, counts)
+    expected = payload_bytes(K, s, counts, n)
     if len(payload) != expected:
         raise BuildError(f"{len(payload)} bytes of content, its counts call for {expected}")
-    words = np.frombuffer(payload, "<u2", offset=_COUNTS.size + 2 * j).astype(np.uint16)
+    words = np.frombuffer(payload, "<u2", sum(sizes), _COUNTS.size + 2 * j).astype(np.uint16)
     bias, switches, means, joint_means, *joints = np.split(words, np.cumsum(sizes)[:-1])
     rows = [block.view(np.int16).reshape(-1, K) for block in (switches, means, joint_means, *joints[j:])]
     return IntegerTables(
@@ -198,4 +311,11 @@ def _parse(payload: bytes) -> IntegerTables:
         switch_means=rows[1],
         joint_means=rows[2],
         scale=scale,
+        slopes=_parse_slopes(payload[len(payload) - n * (_SLOPE.size + K) :], n, K),
     )
+
+
+def _parse_slopes(data: bytes, n: int, K: int) -> tuple[Slope, ...]:
+    rows = np.frombuffer(data, "<i1", offset=n * _SLOPE.size).astype(np.int8).reshape(n, K)
+    ends = _SLOPE.iter_unpack(data[: n * _SLOPE.size])
+    return tuple(Slope(joint, low, high, gain, row) for (joint, low, high, gain), row in zip(ends, rows, strict=True))

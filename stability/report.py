@@ -25,6 +25,7 @@ NAMES = (
     "scoretables",
     "invariances",
     "separable",
+    "logits",
     "degenerate",
     "columns",
     "codes",

@@ -56,7 +56,9 @@ ALLOWED = {
     "compiler.boosting": ("runtime", "drivers.errors", "compiler.boosting", "compiler.elementary", "compiler.limits"),
     "compiler.tables": ("runtime", "drivers.errors", "compiler.boosting", "compiler.elementary", "compiler.tables"),
     "compiler.additive": (
+        "runtime.tables",
         "drivers.errors",
+        "runtime.tables",
         "compiler.additive",
         "compiler.boosting",
         "compiler.elementary",

@@ -8,40 +8,52 @@ one for missing values, where there are any. Over the rows W (r, K), the first o
 
 with u the frames' weights and D (n, r) the bits that say which rows count in a frame. As every row has a pull there is
 one minimum, and it is finite, also where classes can be parted perfectly, or a class has no frames. Newton's method
-finds it: H V = -gradient is solved by conjugate gradients, to a share that falls as the gradient does (Nocedal and
-Wright, Numerical Optimization, 2nd ed., algorithm 7.1). What goes into a product with D is rounded to a grid first, on
-which all sums are exact: so neither the order of frames nor the machine has a part in the answer.
+finds it: H V = -gradient is solved by conjugate gradients to a share of the gradient (Nocedal and Wright, Numerical
+Optimization, 2nd ed., algorithm 7.1). What goes into a product with D is rounded to a grid first, on which all sums are
+exact: so neither the order of frames nor the machine has a part in the answer. Columns as lines have multiples of a
+mark for bits.
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.tables import HIGHEST_CODE
+
 from ..boosting.binning import bin_columns
 from ..boosting.boost import BoostingError, check_rows
-from ..boosting.exactsums import dot, on_one_grid
+from ..boosting.exactsums import dot, exact_sum, on_one_grid
 from ..elementary import add_up, softmax_and_loss
 from ..limits import check_memory
-from ..tables.collapse import HIGHEST_CODE, Floats, ScoreTables
+from ..tables.collapse import Floats, Line, ScoreTables
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 BINS = 16
-PENALTY, SMOOTHNESS = 1.0, 10.0
+PENALTY, SMOOTHNESS = 1.0, 3.0
 # Of the penalty: what pulls each bin, whose neighbours hold it already, and the bias, which must only stay finite.
 BIN_SHARE, BIAS_SHARE = 2.0**-4, 2.0**-10
 # No derivative of the loss is larger at the answer than this, in the weight of all frames together.
-TOLERANCE = 1e-7
+TOLERANCE, FINEST = 1e-7, 1e-12
 # Of Newton's steps, of conjugate gradients in a step, and of halvings of a step: far more than was ever seen.
 _MOST_STEPS, _MOST_DIRECTIONS, _MOST_HALVINGS = 500, 2000, 40
 _ENOUGH = 1e-4  # of the slope that Armijo's rule wants to see
 _ROUNDING = 2.0**-46  # of the loss: a rise by less may be one of rounding
-_LOOSEST, _TIGHTEST = 0.5, 0.1  # shares of the gradient, and of the tolerance, that a step may leave unsolved
+_MARKS = 512.0  # of a unit, in which a line measures its column: one or two units from end to end
+_UNSOLVED = 0.3  # of the gradient, that a step leaves
+
+
+class Rise(NamedTuple):
+    """A column's line: row (K,) times (x - low), x between low and high."""
+
+    low: float
+    high: float
+    row: Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,18 +63,31 @@ class ColumnTables:
     bias   (K,)
     edges  for each column, ascending (B - 1,): the bin of x is the number of edges below it
     rows   for each column (B + 1, K), the last one what a missing value adds
+    lines  for some columns what they add besides, in proportion to x
     """
 
     bias: Floats
     edges: tuple[Floats, ...]
     rows: tuple[Floats, ...]
+    lines: Mapping[int, Rise] = field(default_factory=dict)
 
     def scores(self, X: NDArray[np.generic]) -> Floats:
         """Return F (n, K) of X (n, d)."""
         scores = np.tile(self.bias, (len(X), 1))
-        for x, edges, rows in zip(X.T, self.edges, self.rows, strict=True):
-            scores += rows[_bins(np.asarray(x, np.float64), edges)]
+        for column, (edges, rows) in enumerate(zip(self.edges, self.rows, strict=True)):
+            x = np.asarray(X[:, column], np.float64)
+            scores += rows[_bins(x, edges)]
+            if column in self.lines:
+                low, high, row = self.lines[column]
+                scores += (np.clip(np.nan_to_num(x, nan=low), low, high) - low)[:, np.newaxis] * row
         return scores
+
+    def columns(self, order: Sequence[int]) -> "ColumnTables":
+        """Return these of the columns in another order."""
+        edges, rows = (tuple(part[column] for column in order) for part in (self.edges, self.rows))
+        return ColumnTables(
+            self.bias, edges, rows, {at: self.lines[c] for at, c in enumerate(order) if c in self.lines}
+        )
 
     def score_tables(self, n_switches: int) -> ScoreTables:
         """Return the tables of [switches | joint codes], the first `n_switches` columns being switches."""
@@ -77,7 +102,8 @@ class ColumnTables:
             thresholds.append(steps.astype(np.uint16))
             # The smallest code of each bin.
             joint_rows.append(rows[np.searchsorted(edges, np.append(0.0, steps + 1))])
-        return ScoreTables(bias, switch_rows, tuple(thresholds), tuple(joint_rows))
+        lines = (Line(column - n_switches, int(low), int(high), row) for column, (low, high, row) in self.lines.items())
+        return ScoreTables(bias, switch_rows, tuple(thresholds), tuple(joint_rows), tuple(lines))
 
 
 def fit_logit(
@@ -88,18 +114,24 @@ def fit_logit(
     penalty: float = PENALTY,
     smoothness: float = SMOOTHNESS,
     max_bins: int | None = BINS,
+    linear: bool = False,
+    tolerance: float = TOLERANCE,
     weights: Floats | None = None,
-    on_step: Callable[[], None] | None = None,
 ) -> ColumnTables:
     """Fit X (n, d) numbers (NaN: missing), labels (n,) in 0..n_classes-1, weights (n,) >= 0.
 
     `penalty` pulls rows towards zero, `smoothness` those of neighbouring bins towards each other; columns have at most
-    `max_bins` bins (2 or more; None: one for each value), that hold frames as evenly as can be. Raises BoostingError.
+    `max_bins` bins (2 or more; None: one for each value), that hold frames as evenly as can be. With `linear` a column
+    of more than two values adds scores in proportion to them, between the least and the largest, and `smoothness` pulls
+    what a standard deviation of it adds. No derivative of the loss is larger at the answer than `tolerance` times the
+    sum of weights. Raises BoostingError.
     """
     if not (0 < penalty < math.inf and 0 <= smoothness < math.inf):
         raise BoostingError(f"penalty={penalty} must be above 0, and smoothness={smoothness} at least 0, both finite")
     if max_bins is not None and max_bins < 2:
         raise BoostingError(f"max_bins={max_bins} must be at least 2: one bin tells nothing")
+    if not FINEST <= tolerance < 1:
+        raise BoostingError(f"tolerance={tolerance} must be at least {FINEST:g} and below 1")
     check_rows(X, labels, n_classes, weights)
     check_memory(len(X), n_classes, BoostingError, *X.shape[1:])
     scale = 1.0
@@ -107,46 +139,116 @@ def fit_logit(
         # By a power of two, which changes no answer: now sums of huge weights stay finite, and of tiny ones exact.
         scale = float(np.ldexp(1.0, -np.frexp(weights.max())[1]))
         weights = on_one_grid(weights * scale, len(X))
-    columns = _columns(X, max_bins, weights)
-    rows = _Fit(columns, labels, n_classes, penalty * scale, smoothness * scale, weights).minimum(on_step)
     held = np.ones(len(X)) if weights is None else weights
-    bias, *tables = np.split(rows, np.cumsum([1, *(column.n_rows for column in columns[:-1])])) if columns else [rows]
-    tabled = tuple(column.table(own, held) for column, own in zip(columns, tables, strict=True))
-    return ColumnTables(bias[0], tuple(column.edges for column in columns), tabled)
+    columns = _columns(X, max_bins, weights, held if linear else None)
+    rows = _Fit(columns, labels, n_classes, penalty * scale, smoothness * scale, weights).minimum(tolerance)
+    bias, *parts = np.split(rows, np.cumsum([1, *(column.n_rows for column in columns[:-1])])) if columns else [rows]
+    bias, tables, lines = bias[0], [], {}
+    for number, (column, own) in enumerate(zip(columns, parts, strict=True)):
+        if column.line is not None:
+            bias = bias - column.line.centre * own[0]
+            lines[number] = Rise(column.line.low, column.line.high, own[0] / column.line.unit)
+        tables.append(column.table(own, held))
+    return ColumnTables(bias, tuple(column.edges for column in columns), tuple(tables), lines)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Ruler:
+    """A column in units from low, rounded to marks: centre + steps (n,); 0 steps where it is missing."""
+
+    low: float
+    high: float
+    unit: float
+    mean: float
+    centre: float
+    steps: Floats
+    variance: float
+
+    @classmethod
+    def of(cls, x: Floats, weights: Floats) -> "_Ruler":
+        """Return the ruler of numbers (n,) of which two at least differ, NaN for missing."""
+        there = ~np.isnan(x)
+        low, high = float(np.min(x[there])), float(np.max(x[there]))
+        if not math.isfinite(high - low):
+            raise BoostingError(f"a column from {low} to {high} is too wide for a line: scale it")
+        # A power of two: whole numbers of a range below 1024 lie on marks.
+        unit = math.ldexp(1.0, math.frexp(high - low)[1] - 1)
+        places = _marked(np.where(there, (x - low) / unit, 0.0))
+        heavy = weights * there
+        mean = dot(heavy, places) / exact_sum(heavy)
+        centre = float(_marked(np.array(mean)))
+        steps = np.where(there, places - centre, 0.0)
+        return cls(low, high, unit, mean, centre, steps, dot(heavy, steps * steps) / exact_sum(heavy))
+
+
+def _marked(units: Floats) -> Floats:
+    marked: Floats = np.rint(units * _MARKS) / _MARKS
+    return marked
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Column:
-    """A column of frames: its edges, the bin (n,) of each, the last for missing, and the first bin that has a row."""
+    """A column of frames: its edges, the bin (n,) of each, the last for missing, and the first bin that has a row.
+
+    A line has one row instead of its only bin.
+    """
 
     edges: Floats
     bins: NDArray[np.intp]
     first: int
+    line: _Ruler | None = None
 
     @property
     def n_rows(self) -> int:
         return int(self.bins.max()) + 1 - self.first
 
+    def entries(self) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
+        """Return the frames, rows and values of the column's entries in the design, each (entries,)."""
+        values = (self.bins >= self.first).astype(np.float64)
+        if self.line is not None:
+            values = np.where(self.bins == 0, self.line.steps, values)
+        frames = np.flatnonzero(values)
+        return frames, self.bins[frames] - self.first, values[frames]
+
+    def pulls(self, penalty: float, smoothness: float) -> Floats:
+        """Return the pull (rows,) on each row."""
+        pulls = np.full(self.n_rows, penalty if self.first else BIN_SHARE * penalty)
+        if self.line is not None:
+            pulls[0] = (pulls[0] + smoothness) * self.line.variance
+        return pulls
+
     def table(self, rows: Floats, weights: Floats) -> Floats:
         """Return what each bin adds, and a missing value: where none was seen, the mean of the frames."""
         table = np.vstack([np.zeros((self.first, rows.shape[1])), rows])
-        if len(table) < len(self.edges) + 2:
-            shares = np.bincount(self.bins, weights) / weights.sum()
-            table = np.vstack([table, add_up(shares[:, np.newaxis] * table)])
-        return table
+        if self.line is not None:
+            table[0] = 0.0
+            table[1:] += self.line.centre * rows[0]
+        if len(table) == len(self.edges) + 2:
+            return table
+        shares = np.bincount(self.bins, weights) / weights.sum()
+        mean = add_up(shares[:, np.newaxis] * table) if self.line is None else self.line.mean * rows[0]
+        return np.vstack([table, mean])
 
 
-def _columns(X: NDArray[np.generic], max_bins: int | None, weights: Floats | None) -> list[_Column]:
+def _columns(
+    X: NDArray[np.generic], max_bins: int | None, weights: Floats | None, straight: Floats | None
+) -> list[_Column]:
+    """Return the columns; those of more than two values as lines, if weights (n,) are given for it as `straight`."""
     binned = bin_columns(X, max_bins, weights)
     columns = []
-    for number, x in enumerate(X.T):
-        edges = np.zeros(0)
+    for number in range(X.shape[1]):
+        x, edges = np.asarray(X[:, number], np.float64), np.zeros(0)
         if number in binned.home:
             group, position = binned.home[number]
             edges = np.array([group.threshold(position, split) for split in range(group.n_splits(position))])
-        bins = _bins(np.asarray(x, np.float64), edges)
+        bins = _bins(x, edges)
         # One bin alone says what the bias does, and one of two what the other does not.
-        columns.append(_Column(edges, bins, int(bins.max() < 2)))
+        if bins.max() < 2:
+            columns.append(_Column(edges, bins, 1))
+        elif straight is None or not len(edges):
+            columns.append(_Column(edges, bins, 0))
+        else:
+            columns.append(_Column(np.zeros(0), np.isnan(x).astype(np.intp), 0, _Ruler.of(x, straight)))
     return columns
 
 
@@ -181,43 +283,46 @@ class _Fit:
         n, self._labels, self._weights = len(labels), labels, weights
         self._member = (labels[:, np.newaxis] == np.arange(n_classes)).astype(np.float64)
         self._total = float(n if weights is None else weights.sum())
-        frames, rows = [np.arange(n)], [np.zeros(n, np.intp)]
-        pull, joined, start = [np.array([BIAS_SHARE])], [], 1
+        frames, rows, values = [np.arange(n)], [np.zeros(n, np.intp)], [np.ones(n)]
+        pull, joined, start = [np.array([BIAS_SHARE * penalty])], [np.zeros(0, np.intp)], 1
         for column in columns:
-            there = np.flatnonzero(column.bins >= column.first)
-            frames.append(there)
-            rows.append(start - column.first + column.bins[there])
-            pull.append(np.full(column.n_rows, BIN_SHARE if column.first == 0 else 1.0))
+            own_frames, own_rows, own_values = column.entries()
+            frames.append(own_frames)
+            rows.append(start + own_rows)
+            values.append(own_values)
+            pull.append(column.pulls(penalty, smoothness))
             if column.first == 0:
                 joined.append(np.arange(start, start + len(column.edges)))
             start += column.n_rows
-        self._bits = _sparse(np.concatenate(frames), np.concatenate(rows), (n, start))
-        self._rows_a_frame = 1 + len(columns)
-        self._by_row = self._bits.T.tocsr()
-        self._pull = penalty * np.concatenate(pull)[:, np.newaxis]
+        self._design = _sparse(np.concatenate(values), np.concatenate(frames), np.concatenate(rows), (n, start))
+        self._by_row = self._design.T.tocsr()
+        self._squares = self._by_row * self._by_row
+        # How much the values of a frame, and those of a row, add up to, in the units of which they are multiples.
+        marks = _MARKS if any(column.line for column in columns) else 1.0
+        self._across, self._down = (float(abs(each).sum(axis=1).max()) * marks for each in (self._design, self._by_row))
+        self._pull = np.concatenate(pull)[:, np.newaxis]
         self._joint = np.zeros((start - 1, 1))
-        self._joint[np.concatenate([np.zeros(0, np.intp), *joined])] = smoothness
+        self._joint[np.concatenate(joined)] = smoothness
         ends = np.pad(self._joint, ((1, 1), (0, 0)))
         self._stiffness = self._pull + ends[1:] + ends[:-1]
 
-    def minimum(self, on_step: Callable[[], None] | None = None) -> Floats:
-        """Return the rows at which no derivative is beyond TOLERANCE of the weight of all frames."""
+    def minimum(self, tolerance: float) -> Floats:
+        """Return the rows at which no derivative is beyond `tolerance` times the weight of all frames."""
         point = self._at(np.zeros((len(self._pull), self._member.shape[1])))
-        wanted, steepest = TOLERANCE * self._total, _largest(point.gradient)
+        wanted = tolerance * self._total
         for _ in range(_MOST_STEPS):
             steep = _largest(point.gradient)
             if steep <= wanted:
                 return point.rows
-            unsolved = max(steep * min(_LOOSEST, math.sqrt(steep / steepest)), _TIGHTEST * wanted)
-            point = self._along(point, self._direction(point, unsolved))
-            if on_step is not None:
-                on_step()
+            point = self._along(point, self._direction(point, max(_UNSOLVED * steep, 0.5 * wanted)))
         raise BoostingError(
             f"no minimum was found in {_MOST_STEPS} steps: the penalty is too small for weights as unlike as these"
         )
 
     def _at(self, rows: Floats) -> _Point:
-        scores = self._bits @ on_one_grid(rows, self._rows_a_frame)
+        # A point is one of the grid itself, so that its loss is that of its rows to the last digits.
+        rows = on_one_grid(rows, self._across)
+        scores = self._design @ rows
         shares, mean = softmax_and_loss(np.ascontiguousarray(scores.T), self._labels, self._weights)
         probability, held = np.ascontiguousarray(shares.T), self._held(rows)
         gradient = self._over_frames(probability - self._member) + held
@@ -234,12 +339,12 @@ class _Fit:
         """Return the sums (r, K) of `values` (n, K), which are lost, times the weights, over the frames of each row."""
         if self._weights is not None:
             values *= self._weights[:, np.newaxis]
-        summed: Floats = self._by_row @ on_one_grid(values, len(values))
+        summed: Floats = self._by_row @ on_one_grid(values, self._down)
         return summed
 
     def _bent(self, rows: Floats, probability: Floats) -> Floats:
         """Return the Hessian's product (r, K) with rows (r, K), at these probabilities."""
-        moved = self._bits @ on_one_grid(rows, self._rows_a_frame)
+        moved = self._design @ on_one_grid(rows, self._across)
         moved *= probability
         moved = on_one_grid(moved, moved.shape[1])
         moved -= probability * moved.sum(axis=1, keepdims=True)
@@ -248,7 +353,8 @@ class _Fit:
     def _direction(self, point: _Point, unsolved: float) -> Floats:
         """Return V with H V = -gradient but for `unsolved`, by conjugate gradients, preconditioned by H's diagonal."""
         p = point.probability
-        diagonal = self._over_frames(p * (1.0 - p)) + self._stiffness
+        spread = p * (1.0 - p) if self._weights is None else p * (1.0 - p) * self._weights[:, np.newaxis]
+        diagonal = self._squares @ on_one_grid(spread, self._down * _MARKS) + self._stiffness
         found, rest = np.zeros_like(point.rows), -point.gradient
         near = rest / diagonal
         along, size = near, dot(rest, near)
@@ -275,11 +381,11 @@ class _Fit:
         return there
 
 
-def _sparse(frames: NDArray[np.intp], rows: NDArray[np.intp], shape: tuple[int, int]) -> "csr_array":
+def _sparse(values: Floats, frames: NDArray[np.intp], rows: NDArray[np.intp], shape: tuple[int, int]) -> "csr_array":
     # Help of commands lists the trainers, and none of it takes scipy's half a second.
     from scipy.sparse import csr_array
 
-    return csr_array((np.ones(len(frames)), (frames, rows)), shape=shape)
+    return csr_array((values, (frames, rows)), shape=shape)
 
 
 def _largest(values: Floats) -> float:

@@ -42,7 +42,7 @@ from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet, Joint
 from ..samples import Columns, Samples
 from ..tables.compare import Comparison, compare
-from ..trainers.base import SHARED, Training, changed
+from ..trainers.base import SHARED, TRAINERS, Training, changed
 from . import CompileError
 from .documents import REPORT_NAME, SPEC_FOLDER, BuildReport, Documents, Progress
 from .ensemble import ensemble_to_bytes
@@ -200,12 +200,15 @@ def _sound(options: Options) -> Options:
     if not others:
         # Nothing is chosen: the options say all. LogitBoost is what those with rounds mean.
         trainer, given = AUTO if only.trainer == PAPERS_TRAINER else only.trainer, dict(only.settings)
-    floats = {name: float(value) for name, value in given.items() if value is not None}
-    shared: dict[str, Any] = {name: floats.pop(name, None) for name in SHARED}
+    values = {name: float(value) if isinstance(value, int) else value for name, value in given.items()}
+    # Of a few names the first is what older versions meant, and is not written.
+    usual = {each.name: each.default for each in TRAINERS[only.trainer].settings if each.names}
+    own: dict[str, Any] = {n: value for n, value in values.items() if value is not None and value != usual.get(n)}
+    shared = {name: own.pop(name, None) for name in SHARED}
     shared |= {name: int(shared[name]) for name in ("rounds", "max_bins") if shared[name] is not None}
     # A name that is equal to a default is left out if it is the very same string.
     names = {"placement": sys.intern(options.placement), "trainer": sys.intern(trainer)}
-    return replace(options, **shared, **names, settings=floats)
+    return replace(options, **shared, **names, settings=own)
 
 
 class _Steps:

@@ -16,11 +16,11 @@ from msgspec import Meta
 
 from thenar.runtime.errors import BuildError
 from thenar.runtime.sealed import seal, unseal
-from thenar.runtime.tables import MAX_CLASSES, MAX_JOINTS, MAX_SWITCHES
+from thenar.runtime.tables import HIGHEST_CODE, MAX_CLASSES, MAX_JOINTS, MAX_SWITCHES
 
 from ..boosting.stumps import Stumps
 from ..recordings.arrays import AnyArray, pack, unpack
-from ..tables.collapse import HIGHEST_CODE, Line, Model, ScoreTables
+from ..tables.collapse import Line, Model, ScoreTables
 
 KIND = b"THNRENSM"
 STUMPS, TABLES, LINES = 1, 2, 3  # formats

@@ -12,7 +12,10 @@ from sklearn.base import clone
 
 from thenar.runtime.build import Build as LoadedBuild
 from thenar.runtime.manifest import By, Inputs, Options, TableBits
+from thenar.runtime.tables import HIGHEST_CODE
 
+from ..additive.classifier import AdditiveLogitClassifier
+from ..additive.logit import ColumnTables
 from ..boosting.classifier import LogitBoostClassifier
 from ..boosting.stumps import Stumps
 from ..evaluation.folds import Fold
@@ -109,10 +112,10 @@ def compile(  # noqa: A001
 
     Parameters
     ----------
-    estimator : LogitBoostClassifier or Pipeline
+    estimator : LogitBoostClassifier, AdditiveLogitClassifier or Pipeline
         Fitted on X, y = `Samples.of(grasp_set).inputs`, `grasp_set.grasps`. The last step of a pipeline is the
         classifier; those before it select columns. Any classifier will do that has `classes_` and its model as
-        `stumps_` (Stumps) or `tables_` (ScoreTables, of the switches first).
+        `stumps_` (Stumps) or `tables_` (ColumnTables; or ScoreTables, of the switches first).
     grasp_set : GraspSet
         The recordings: their names and calibrations go into the build, their rows prove its integers.
     folder : path
@@ -236,6 +239,8 @@ def _model(classifier: Any, columns: Columns, n_switches: int) -> Model:
     tables, stumps = getattr(classifier, "tables_", None), getattr(classifier, "stumps_", None)
     if isinstance(stumps, Stumps):
         return replace(stumps, columns=np.argsort(order)[stumps.columns].astype(np.int32))
+    if isinstance(tables, ColumnTables):
+        return tables.columns(order).score_tables(sum(column < n_switches for column in columns))
     if not isinstance(tables, ScoreTables) or order != sorted(order):
         raise CompileError(
             f"{type(classifier).__name__} has no model that is a sum over switches, then joints: use a classifier with "
@@ -260,6 +265,11 @@ def _placed_by(estimator: Any, options: Options) -> tuple[Options, tuple[float, 
 
 
 def _trained_by(classifier: Any, options: Options) -> Options:
+    if isinstance(classifier, AdditiveLogitClassifier):
+        own = {"penalty": float(classifier.penalty), "smoothness": float(classifier.smoothness)}
+        own |= {"linear": 1.0} if classifier.linear else {}
+        bins = classifier.max_bins or HIGHEST_CODE + 1
+        return structs.replace(options, trainer="logit", max_bins=bins, settings=own)
     if not isinstance(classifier, LogitBoostClassifier):
         return structs.replace(options, trainer=type(classifier).__name__)
     return structs.replace(
@@ -268,6 +278,7 @@ def _trained_by(classifier: Any, options: Options) -> Options:
         shrinkage=float(classifier.shrinkage),
         tolerance=classifier.tolerance,
         max_bins=classifier.max_bins,
+        settings={} if classifier.ties == "first" else {"ties": classifier.ties},
     )
 
 

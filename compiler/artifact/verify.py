@@ -168,10 +168,10 @@ def verify(
 def _load_ensemble(folder: Path, build: Build) -> Model:
     path = folder / ENSEMBLE_NAME
     model = ensemble_from_bytes(read_member(path, MAX_BYTES, build.manifest.ensemble_sha256), str(path))
-    tables, settings = build.tables, build.manifest.fit.settings
+    tables, fit = build.tables, build.manifest.fit
     foreign = bool(model_fault(model, tables.n_switches, tables.n_joints, tables.n_classes))
     if isinstance(model, Stumps):
-        foreign |= model.shrinkage != settings.get("shrinkage") or model.n_rounds > (settings.get("rounds") or 0)
+        foreign |= model.shrinkage != fit.settings.get("shrinkage") or model.n_rounds > fit.number("rounds")
     if foreign:
         raise BuildError(f"{path} is the ensemble of another build: compile the build again")
     return model

@@ -1,62 +1,65 @@
 """Columns as bins between neighbouring values, and the sums of weights and responses left of every split.
 
-A column of two values is a row of an indicator matrix: all such columns and all classes are summed by one matrix
-product. A column of more values, or with missing ones, is a one-hot block: one sparse product sums its bins, a running
-sum its splits.
+Columns of two values are taken several at a time: rows of the same values share a cell. A column of more values, or
+with missing ones, has a cell for each bin. One sparse product sums all cells; a running sum makes splits of bins.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from scipy.sparse import csr_array
+    from scipy.sparse import csc_array
 
 Floats = NDArray[np.float64]
 
-# Elements of the histograms of one batch of many-valued columns: 32 MiB of doubles, whatever the number of rows.
-_BATCH_ELEMENTS = 1 << 22
+# Elements of the sums over a batch of cells: 256 KiB of doubles stay in a processor's cache.
+_BATCH_ELEMENTS = 1 << 15
 # Of the columns that are looked at together: 8 MiB of doubles.
 _BLOCK_ELEMENTS = 1 << 20
+# Columns of two values that share a partition of the rows, at most: 2^8 cells.
+_MOST_BITS = 8
 
 
 @dataclass(frozen=True, slots=True)
 class SplitSums:
-    """Sums of a batch of c columns of at most B - 1 splits, over R summands: exact integers.
-
-    Splits come first, so that the running sum over them adds long rows.
-    """
+    """Sums of a batch of c columns of at most B bins, over R summands: exact integers."""
 
     columns: NDArray[np.intp]  # (c,) ascending
-    left: Floats  # (B - 1, c, R) rows with a value at or below the split
-    missing: Floats | None  # (c, R)
-    valid: NDArray[np.bool_] | None  # (B - 1, c) which splits exist; None: all
+    left: Floats  # (c, R, B) rows with a value in a bin or below it
+    missing: Floats  # (c, R)
+    is_split: NDArray[np.bool_]  # (c, B) some value lies above the bin
 
 
-@dataclass(frozen=True)
 class TwoValued:
     """Columns that take exactly two values and are never missing."""
 
-    columns: NDArray[np.intp]  # (c,)
-    low: NDArray[np.bool_]  # (c, n) value is the lower one
-    thresholds: Floats  # (c,)
+    def __init__(self, columns: NDArray[np.intp], low: NDArray[np.bool_], thresholds: Floats) -> None:
+        """`low` (c, n): the value is the lower one; `thresholds` (c,) between the two."""
+        self.columns = columns
+        self._low = low
+        self._thresholds = thresholds
+        # 2^bits cells a partition, and all together not many more than rows.
+        few = [bits for bits in range(2, _MOST_BITS + 1) if -(-len(low) // bits) << bits <= 2 * low.shape[1]]
+        self._bits = max(few, default=1)
+        self._batches: list[csc_array] = []
 
-    @cached_property
-    def _indicator(self) -> Floats:
-        return self.low.astype(np.float64)
-
-    def sums(self, summands: Floats) -> Iterator[SplitSums]:
-        """Yield the sums of `summands` (R, n)."""
-        left = self._indicator @ summands.T
-        yield SplitSums(self.columns, left[np.newaxis], None, None)
+    def sums(self, by_row: Floats) -> Floats:
+        """Return the sums (c, R) of `by_row` (n, R) over the rows that have their lower value."""
+        bits, summands = self._bits, by_row.shape[1]
+        if not self._batches:
+            widths = [1 << bits] * -(-len(self._low) // bits)
+            self._batches = [_one_hot(self._cells(batch), width) for batch, width in _batches(widths, summands)]
+        has_bit = (np.arange(1 << bits) >> np.arange(bits)[:, np.newaxis] & 1).astype(np.float64)
+        sums = [has_bit @ (one_hot @ by_row).reshape(-1, 1 << bits, summands) for one_hot in self._batches]
+        return np.concatenate(sums).reshape(-1, summands)[: len(self._low)]
 
     def goes_left(self, position: int, split: int) -> NDArray[np.bool_]:
         """Return (n,) whether each row lies left of the only split of column number `position` of this group."""
-        rows: NDArray[np.bool_] = self.low[position]
+        rows: NDArray[np.bool_] = self._low[position]
         return rows
 
     def is_missing(self, position: int) -> None:
@@ -69,7 +72,14 @@ class TwoValued:
 
     def threshold(self, position: int, split: int) -> float:
         """Return the value between the two of the column."""
-        return float(self.thresholds[position])
+        return float(self._thresholds[position])
+
+    def _cells(self, batch: slice) -> Iterator[NDArray[np.int32]]:
+        for start in range(batch.start * self._bits, batch.stop * self._bits, self._bits):
+            cells = np.zeros(self._low.shape[1], dtype=np.int32)
+            for bit, rows in enumerate(self._low[start : start + self._bits]):
+                cells |= rows.astype(np.int32) << bit
+            yield cells
 
 
 class ManyValued:
@@ -80,21 +90,28 @@ class ManyValued:
         self.columns = np.array(columns, dtype=np.intp)
         self._bins = bins
         self._edges = edges
-        self._batches: list[tuple[slice, int, csr_array]] = []
+        self._batches: list[tuple[slice, int, csc_array]] = []
 
-    def sums(self, summands: Floats) -> Iterator[SplitSums]:
-        """Yield the sums of `summands` (R, n), a batch of columns at a time."""
+    def sums(self, by_row: Floats) -> Iterator[SplitSums]:
+        """Yield the sums of `by_row` (n, R), R even, a batch of columns at a time."""
+        summands = by_row.shape[1]
         if not self._batches:
-            self._batches = list(self._one_hot(len(summands)))
-        by_row = np.ascontiguousarray(summands.T)
+            widths = [len(edges) + 2 for edges in self._edges]
+            for batch, width in _batches(widths, summands):
+                cells = (
+                    np.where(bins > len(edges), np.int32(width - 1), bins)
+                    for bins, edges in zip(self._bins[batch], self._edges[batch], strict=True)
+                )
+                self._batches.append((batch, width, _one_hot(cells, width)))
         for batch, width, one_hot in self._batches:
-            histogram = (one_hot @ by_row).reshape(width + 1, -1, len(summands))
+            histogram = (one_hot @ by_row).reshape(-1, width, summands)
+            # Two at a time, as complex numbers: numpy's cumsum goes one element after the other.
+            left = np.cumsum(histogram[:, :-1].view(np.complex128), axis=1).view(np.float64)
             splits = np.array([len(edges) for edges in self._edges[batch]])
-            valid = np.arange(width - 1)[:, np.newaxis] < splits
-            # Row by row: numpy's cumsum over a first axis walks down it element by element, five times slower.
-            for row in range(1, width - 1):
-                histogram[row] += histogram[row - 1]
-            yield SplitSums(self.columns[batch], histogram[: width - 1], histogram[width], valid)
+            is_split = np.arange(width - 1) < splits[:, np.newaxis]
+            yield SplitSums(
+                self.columns[batch], np.ascontiguousarray(left.transpose(0, 2, 1)), histogram[:, -1], is_split
+            )
 
     def goes_left(self, position: int, split: int) -> NDArray[np.bool_]:
         """Return (n,) whether each row lies left of a split of column number `position` of this group."""
@@ -113,31 +130,32 @@ class ManyValued:
         """Return the value between the two that the split parts."""
         return float(self._edges[position][split])
 
-    def _one_hot(self, n_summands: int) -> Iterator[tuple[slice, int, "csr_array"]]:
-        """Yield (columns, bins W of the widest, one-hot matrix ((W + 1) * c, n)); bin W holds the missing rows."""
-        start = 0
-        while start < len(self._bins):
-            stop, width = start, 0
-            while stop < len(self._bins):
-                wider = max(width, len(self._edges[stop]) + 1)
-                if stop > start and (stop + 1 - start) * (wider + 1) * n_summands > _BATCH_ELEMENTS:
-                    break
-                stop, width = stop + 1, wider
-            batch = slice(start, stop)
-            yield batch, width, self._stack(batch, width)
-            start = stop
 
-    def _stack(self, batch: slice, width: int) -> "csr_array":
-        # Help of commands lists the methods, and none of it takes scipy's half a second.
-        from scipy.sparse import csr_array
+def _batches(widths: Sequence[int], n_summands: int) -> Iterator[tuple[slice, int]]:
+    """Yield batches of partitions, as many as fit but at least one, and the cells of the widest."""
+    start = 0
+    while start < len(widths):
+        stop, width = start, 0
+        while stop < len(widths):
+            wider = max(width, widths[stop])
+            if stop > start and (stop + 1 - start) * wider * n_summands > _BATCH_ELEMENTS:
+                break
+            stop, width = stop + 1, wider
+        yield slice(start, stop), width
+        start = stop
 
-        n_columns = batch.stop - batch.start
-        rows = []
-        for offset, (bins, edges) in enumerate(zip(self._bins[batch], self._edges[batch], strict=True)):
-            rows.append(np.where(bins > len(edges), width, bins) * n_columns + offset)
-        row = np.concatenate(rows)
-        column = np.tile(np.arange(rows[0].size), n_columns)
-        return csr_array((np.ones(row.size), (row, column)), shape=((width + 1) * n_columns, rows[0].size))
+
+def _one_hot(partitions: Iterator[NDArray[np.int32]], width: int) -> "csc_array":
+    """Return the matrix (p * width, n) of p partitions of n rows into cells below `width`.
+
+    By columns: a product reads each row of summands once, and adds it to sums that stay in the cache.
+    """
+    # Help of commands lists the methods, and none of it takes scipy's half a second.
+    from scipy.sparse import csc_array
+
+    cells = np.column_stack([cells + np.int32(number * width) for number, cells in enumerate(partitions)])
+    n, p = cells.shape
+    return csc_array((np.ones(cells.size), cells.ravel(), np.arange(n + 1) * p), shape=(p * width, n))
 
 
 @dataclass(frozen=True, slots=True)

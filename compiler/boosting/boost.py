@@ -22,6 +22,9 @@ Floats = NDArray[np.float64]
 
 # Ties are counted on the grid in units that grow with the square of z_max: far above this, all stumps would tie.
 LARGEST_Z_MAX = 100.0
+# Next to the largest, 32 MiB, that glibc takes notice of.
+_LARGE_BYTES = 31 << 20
+TIES = ("first", "least-used")
 # Far below this, the scores of a hundred rounds would all lie within what counts as a tie (stumps.TIE).
 SMALLEST_SHRINKAGE = 1e-6
 
@@ -41,16 +44,20 @@ def boost(
     tolerance: float | None = None,
     weights: Floats | None = None,
     max_bins: int | None = None,
+    ties: str = "first",
     on_round: Callable[[int, int], None] | None = None,
 ) -> tuple[Stumps, tuple[float, ...]]:
     """Train `rounds` rounds on X (n, d) numbers (NaN: missing), labels (n,) in 0..n_classes-1, weights (n,) >= 0.
 
     Stops early where the mean log-likelihood changes by less than `tolerance` in a round (Weka's -L; None: never), or
     where no column varies. With `max_bins` (2 or more) no column has more bins than that; they hold rows as evenly as
-    can be. `on_round(done, rounds)` is called after every round. Return the ensemble, and the losses before the first
-    round and after every round: the mean of -ln P(true class). Raises BoostingError.
+    can be. Of stumps that explain the same, `ties` takes the lowest column ("first", Weka's rule), or the one that the
+    fewest stumps look at so far ("least-used"). `on_round(done, rounds)` is called after every round.
+
+    Return the ensemble, and the losses before the first round and after every round: the mean of -ln P(true class).
+    Raises BoostingError.
     """
-    _check_options(rounds, shrinkage, z_max, tolerance, max_bins)
+    _check_options(rounds, shrinkage, z_max, tolerance, max_bins, ties)
     check_rows(X, labels, n_classes, weights)
     if weights is not None:
         # By a power of two, which changes no answer: now sums of huge weights stay finite, and of tiny ones exact.
@@ -58,14 +65,17 @@ def boost(
     binned = bin_columns(X, max_bins)
     many = sum(len(group.columns) for group in binned.groups if not isinstance(group, TwoValued))
     check_memory(len(X), n_classes, BoostingError, len(binned.home) - many, many)
+    # glibc returns freed memory to the system, and faults it in again, beyond twice the largest array ever freed.
+    np.empty(_LARGE_BYTES, dtype=np.uint8)
     member = labels == np.arange(n_classes)[:, np.newaxis]
     scores = carry = np.zeros((n_classes, len(X)))
     probability, loss = softmax_and_loss(scores, labels, weights)
     losses = [loss]
+    used = np.zeros(X.shape[1], dtype=np.int64) if ties == "least-used" else None
     fitted: list[tuple[NDArray[np.int32], Floats, Floats]] = []
     stopped = False
     while len(fitted) < rounds and binned.groups and not stopped:
-        stumps = fit_stumps(binned, working_targets(probability, member, z_max, weights), z_max)
+        stumps = fit_stumps(binned, working_targets(probability, member, z_max, weights), z_max, used)
         # Not the answers: of a million rows they would be a hundred megabytes a round.
         fitted.append((stumps.columns, stumps.thresholds, stumps.values))
         scores, carry = add_exactly(scores, carry, centred(stumps.answers, shrinkage))
@@ -110,7 +120,11 @@ def _stack(
     )
 
 
-def _check_options(rounds: int, shrinkage: float, z_max: float, tolerance: float | None, max_bins: int | None) -> None:
+def _check_options(
+    rounds: int, shrinkage: float, z_max: float, tolerance: float | None, max_bins: int | None, ties: str
+) -> None:
+    if ties not in TIES:
+        raise BoostingError(f"ties={ties!r} must be one of {', '.join(TIES)}")
     if rounds < 1:
         raise BoostingError(f"rounds={rounds} must be at least 1")
     if max_bins is not None and max_bins < 2:

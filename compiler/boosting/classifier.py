@@ -1,4 +1,4 @@
-"""LogitBoost on decision stumps as a scikit-learn estimator."""
+"""Additive classifiers as scikit-learn estimators, and LogitBoost on decision stumps as one."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Self
@@ -17,7 +17,120 @@ from .stumps import TIE, winners
 Floats = NDArray[np.float64]
 
 
-class LogitBoostClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
+class AdditiveClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
+    """A classifier whose scores are a sum over inputs. One derived from it has a parameter `classes`, and learns."""
+
+    classes: Sequence[Any] | None
+
+    def fit(
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        sample_weight: ArrayLike | None = None,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> Self:
+        """Train on X (n, d) and labels y (n,).
+
+        Parameters
+        ----------
+        X : array-like, shape (n, d)
+            Numbers; NaN is a missing value.
+        y : array-like, shape (n,)
+            Labels.
+        sample_weight : array-like, shape (n,), optional
+            A row counts so many times; 0 removes it.
+        progress : callable, optional
+            Called with (done, total) after every round; what has no rounds does not call it.
+
+        Returns
+        -------
+        AdditiveClassifier
+            The same, fitted.
+
+        Raises
+        ------
+        BoostingError
+            A ValueError, if a parameter, a weight or a label makes no sense.
+        """
+        inputs, targets = validate_data(self, X, y, ensure_all_finite="allow-nan", dtype=_kept_dtypes(X))
+        if self.classes is None:
+            check_classification_targets(targets)
+        self.classes_ = np.unique(targets) if self.classes is None else np.asarray(self.classes)
+        labels, weights = self._index(targets), None
+        if sample_weight is not None:
+            weights = check_array(sample_weight, ensure_2d=False, dtype=np.float64, input_name="sample_weight")
+            check_weights(weights, len(inputs))
+            # A row of no weight is a row that is not there: its values make no thresholds (in Weka they do).
+            kept = weights > 0
+            inputs, labels, weights = inputs[kept], labels[kept], weights[kept]
+        self._learn(inputs, labels, weights, progress)
+        return self
+
+    def decision_function(self, X: ArrayLike) -> Floats:
+        """Return the additive scores F (n, K) of X (n, d); of two classes the second's less the first's, (n,).
+
+        The class of the largest score is the answer, the lowest number at a tie.
+        """
+        return self._decided(self._scores(X))
+
+    def predict_proba(self, X: ArrayLike) -> Floats:
+        """Return class probabilities (n, K), columns as in `classes_`."""
+        scores = self._scores(X)
+        return np.ascontiguousarray(softmax(np.ascontiguousarray(scores.T)).T)
+
+    def predict(self, X: ArrayLike) -> NDArray[Any]:
+        """Return the label (n,) of the largest score."""
+        best = winners(self._scores(X))
+        labels: NDArray[Any] = self.classes_[best]
+        return labels
+
+    def __sklearn_tags__(self) -> Tags:
+        """Tell scikit-learn that NaN is welcome."""
+        tags = super().__sklearn_tags__()
+        tags.input_tags.allow_nan = True
+        return tags
+
+    def _learn(
+        self,
+        inputs: NDArray[Any],
+        labels: NDArray[np.intp],
+        weights: Floats | None,
+        progress: Callable[[int, int], None] | None,
+    ) -> None:
+        """Set what is learnt of inputs (n, d), class numbers (n,), and weights (n,) above 0."""
+        raise NotImplementedError
+
+    def _sums(self, inputs: NDArray[Any]) -> Floats:
+        """Return the scores (n, K) of inputs (n, d)."""
+        raise NotImplementedError
+
+    def _decided(self, scores: Floats) -> Floats:
+        if len(self.classes_) != 2:
+            return scores
+        lead = scores[:, 1] - scores[:, 0]
+        # Tied scores, which go to the first class, lead by nothing.
+        return np.where(np.abs(lead) <= TIE, 0.0, lead)
+
+    def _scores(self, X: ArrayLike) -> Floats:
+        return self._sums(self._inputs(X))
+
+    def _inputs(self, X: ArrayLike) -> NDArray[Any]:
+        check_is_fitted(self)
+        inputs: NDArray[Any] = validate_data(self, X, reset=False, ensure_all_finite="allow-nan", dtype=_kept_dtypes(X))
+        return inputs
+
+    def _index(self, targets: NDArray[Any]) -> NDArray[np.intp]:
+        matches = targets[:, np.newaxis] == self.classes_
+        if not matches.any(axis=1).all():
+            strange = targets[~matches.any(axis=1)][0]
+            raise BoostingError(
+                f"label {str(strange)!r} of y is not among the declared classes {self.classes_.tolist()}"
+            )
+        found: NDArray[np.intp] = matches.argmax(axis=1)
+        return found
+
+
+class LogitBoostClassifier(AdditiveClassifier):
     """Additive logistic regression on decision stumps, multi-class as Weka 3.6's LogitBoost computes it.
 
     Inputs are bits, integer codes or floating-point numbers, X (n, d); NaN is a missing value, which gets a branch of
@@ -36,6 +149,9 @@ class LogitBoostClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc
         Training stops where the mean log-likelihood changes by less than this in a round (Weka's -L); None never stops.
     max_bins : int, optional
         No input has more bins than this (2 or more); they hold rows as evenly as can be. None: one for each value.
+    ties : {"first", "least-used"}, default="first"
+        Of inputs whose stumps explain the same, the first is taken (Weka's rule), or the one that the fewest stumps
+        look at so far, so that with few rows the classifier does not hang on a few inputs.
     classes : sequence, optional
         Labels that exist even where y lacks some of them (a fold without a rare class). None: those in y.
 
@@ -70,6 +186,7 @@ class LogitBoostClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc
         z_max: float = 3.0,
         tolerance: float | None = None,
         max_bins: int | None = None,
+        ties: str = "first",
         classes: Sequence[Any] | None = None,
     ) -> None:
         self.rounds = rounds
@@ -77,49 +194,21 @@ class LogitBoostClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc
         self.z_max = z_max
         self.tolerance = tolerance
         self.max_bins = max_bins
+        self.ties = ties
         self.classes = classes
 
-    def fit(
+    def staged_decision_function(self, X: ArrayLike) -> Iterator[Floats]:
+        """Yield the scores after 1, 2, ... rounds: one training serves every number of rounds."""
+        inputs = self._inputs(X)
+        return map(self._decided, self.stumps_.staged_scores(inputs))
+
+    def _learn(
         self,
-        X: ArrayLike,
-        y: ArrayLike,
-        sample_weight: ArrayLike | None = None,
-        progress: Callable[[int, int], None] | None = None,
-    ) -> Self:
-        """Train on X (n, d) and labels y (n,).
-
-        Parameters
-        ----------
-        X : array-like, shape (n, d)
-            Numbers; NaN is a missing value.
-        y : array-like, shape (n,)
-            Labels.
-        sample_weight : array-like, shape (n,), optional
-            A row counts so many times, in the stumps and in the losses; 0 removes it.
-        progress : callable, optional
-            Called with (rounds done, rounds) after every round.
-
-        Returns
-        -------
-        LogitBoostClassifier
-            The same, fitted.
-
-        Raises
-        ------
-        BoostingError
-            A ValueError, if a parameter, a weight or a label makes no sense.
-        """
-        inputs, targets = validate_data(self, X, y, ensure_all_finite="allow-nan", dtype=_kept_dtypes(X))
-        if self.classes is None:
-            check_classification_targets(targets)
-        self.classes_ = np.unique(targets) if self.classes is None else np.asarray(self.classes)
-        labels, weights = self._index(targets), None
-        if sample_weight is not None:
-            weights = check_array(sample_weight, ensure_2d=False, dtype=np.float64, input_name="sample_weight")
-            check_weights(weights, len(inputs))
-            # A row of no weight is a row that is not there: its values make no thresholds (in Weka they do).
-            kept = weights > 0
-            inputs, labels, weights = inputs[kept], labels[kept], weights[kept]
+        inputs: NDArray[Any],
+        labels: NDArray[np.intp],
+        weights: Floats | None,
+        progress: Callable[[int, int], None] | None,
+    ) -> None:
         self.stumps_, losses = boost(
             inputs,
             labels,
@@ -130,66 +219,14 @@ class LogitBoostClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc
             tolerance=self.tolerance,
             weights=weights,
             max_bins=self.max_bins,
+            ties=self.ties,
             on_round=progress,
         )
         self.n_rounds_ = self.stumps_.n_rounds
         self.losses_ = np.array(losses)
-        return self
 
-    def decision_function(self, X: ArrayLike) -> Floats:
-        """Return the additive scores F (n, K) of X (n, d); of two classes the second's less the first's, (n,).
-
-        The class of the largest score is the answer, the lowest number at a tie.
-        """
-        return self._decided(self._scores(X))
-
-    def staged_decision_function(self, X: ArrayLike) -> Iterator[Floats]:
-        """Yield the scores after 1, 2, ... rounds: one training serves every number of rounds."""
-        inputs = self._inputs(X)
-        return map(self._decided, self.stumps_.staged_scores(inputs))
-
-    def predict_proba(self, X: ArrayLike) -> Floats:
-        """Return class probabilities (n, K), columns as in `classes_`."""
-        scores = self._scores(X)
-        return np.ascontiguousarray(softmax(np.ascontiguousarray(scores.T)).T)
-
-    def predict(self, X: ArrayLike) -> NDArray[Any]:
-        """Return the label (n,) of the largest score."""
-        best = winners(self._scores(X))
-        labels: NDArray[Any] = self.classes_[best]
-        return labels
-
-    def __sklearn_tags__(self) -> Tags:
-        """Tell scikit-learn that NaN is welcome."""
-        tags = super().__sklearn_tags__()
-        tags.input_tags.allow_nan = True
-        return tags
-
-    def _decided(self, scores: Floats) -> Floats:
-        if len(self.classes_) != 2:
-            return scores
-        lead = scores[:, 1] - scores[:, 0]
-        # Tied scores, which go to the first class, lead by nothing.
-        return np.where(np.abs(lead) <= TIE, 0.0, lead)
-
-    def _scores(self, X: ArrayLike) -> Floats:
-        inputs = self._inputs(X)
+    def _sums(self, inputs: NDArray[Any]) -> Floats:
         return self.stumps_.scores(inputs)
-
-    def _inputs(self, X: ArrayLike) -> NDArray[Any]:
-        check_is_fitted(self)
-        inputs: NDArray[Any] = validate_data(self, X, reset=False, ensure_all_finite="allow-nan", dtype=_kept_dtypes(X))
-        return inputs
-
-    def _index(self, targets: NDArray[Any]) -> NDArray[np.intp]:
-        matches = targets[:, np.newaxis] == self.classes_
-        if not matches.any(axis=1).all():
-            strange = targets[~matches.any(axis=1)][0]
-            raise BoostingError(
-                f"label {str(strange)!r} of y is not among the declared classes {self.classes_.tolist()}"
-            )
-        found: NDArray[np.intp] = matches.argmax(axis=1)
-        return found
 
 
 def _kept_dtypes(X: ArrayLike) -> str | list[type]:

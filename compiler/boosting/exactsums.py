@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 SUM_BITS = 52
+_LARGEST_POWER = 1023
 _FINEST = 1000
 
 
@@ -45,18 +46,20 @@ def on_grids(values: Floats) -> tuple[OnGrid, OnGrid]:
     sizes = np.abs(values)
     # First from the largest magnitude, which no order of summation can change, then from the exact sum that it allows.
     rough = SUM_BITS - _bits(sizes.max(axis=1, initial=0.0) * n)
-    total = np.rint(np.ldexp(sizes, rough[:, np.newaxis])).sum(axis=1)
+    total = np.rint(_scaled(sizes, rough)).sum(axis=1)
     # One bit is left as room for n/2 units of rounding, which is enough as long as n < 2^50.
     exponents = (rough + np.where(total > 0, SUM_BITS - 1 - _bits(total), 0)).astype(np.int32)
-    scaled = np.ldexp(values, exponents[:, np.newaxis])
+    scaled = _scaled(values, exponents)
     units = np.rint(scaled)
     # The rest is at most half a unit a number, n/2 a row: that gives its grid without another look.
     finer = SUM_BITS - n.bit_length()
-    rest = np.rint((scaled - units) * 2.0**finer)
+    scaled -= units
+    scaled *= 2.0**finer
+    rest = np.rint(scaled, out=scaled)
     return OnGrid(units, exponents), OnGrid(rest, exponents + np.int32(finer))
 
 
-def on_one_grid(values: Floats, terms: int) -> Floats:
+def on_one_grid(values: Floats, terms: float) -> Floats:
     """Round all `values`, any shape, to the finest grid on which every sum of so many of them is exact.
 
     Each is off by 2^-52 of `terms` times the largest at most, or by 2^-1001. So are sums of their products with bits.
@@ -76,6 +79,13 @@ def exact_sum(values: Floats) -> float:
 def dot(a: Floats, b: Floats) -> float:
     """Return the sum of a * b, arrays of one shape; see `exact_sum`."""
     return exact_sum(a * b)
+
+
+def _scaled(values: Floats, exponents: NDArray[np.int32]) -> Floats:
+    """Return each row of `values` (K, n) times a power of two, as ldexp does, which takes several times as long."""
+    if exponents.max(initial=0) > _LARGEST_POWER:
+        return np.ldexp(values, exponents[:, np.newaxis])
+    return values * np.ldexp(1.0, exponents)[:, np.newaxis]
 
 
 def _bits(magnitudes: Floats) -> NDArray[np.int32]:

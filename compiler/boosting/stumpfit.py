@@ -54,9 +54,12 @@ class FittedStumps:
     answers: Floats  # (K, n)
 
 
-def fit_stumps(binned: Binned, targets: Targets, z_max: float) -> FittedStumps:
-    """Fit one stump a class. Equal stumps: the lowest column, then the lowest threshold wins. |value| <= z_max."""
-    columns, splits = _best_splits(binned, targets, _tie_bound(targets, z_max))
+def fit_stumps(binned: Binned, targets: Targets, z_max: float, used: NDArray[np.int64] | None = None) -> FittedStumps:
+    """Fit one stump a class. Equal stumps: the lowest column, then the lowest threshold wins. |value| <= z_max.
+
+    With `used` (d,), how many stumps look at each column, a least used column wins; and each stump is counted there.
+    """
+    columns, splits = _best_splits(binned, targets, z_max, _tie_bound(targets, z_max), used)
     places = [(*binned.home[int(column)], int(split)) for column, split in zip(columns, splits, strict=True)]
     left = np.array([group.goes_left(position, split) for group, position, split in places])
     missing = _missing(places, left.shape)
@@ -84,48 +87,123 @@ def _tie_bound(targets: Targets, z_max: float) -> Floats:
     the roundings of the squares and quotients themselves. Units are those of `_explained`.
     """
     n = targets.weights.units.shape[1]
-    # Without weight nothing is explained, and this unit may be more than a double holds.
-    apart = np.where(targets.weights.units.any(axis=1), targets.responses.exponents - targets.weights.exponents, 0)
-    unit = np.ldexp(1.0, apart)
+    unit = _unit(targets)
     bound: Floats = (2.0 * z_max * unit + (z_max * unit) ** 2) * n + 64.0
     return bound
 
 
-def _best_splits(binned: Binned, targets: Targets, tie_bound: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _unit(targets: Targets) -> Floats:
+    """Return (K,) a unit of weights in units of responses."""
+    # Without weight nothing is explained, and this unit may be more than a double holds.
+    apart = np.where(targets.weights.units.any(axis=1), targets.responses.exponents - targets.weights.exponents, 0)
+    return np.ldexp(1.0, apart)
+
+
+def _best_splits(
+    binned: Binned, targets: Targets, z_max: float, tie_bound: Floats, used: NDArray[np.int64] | None
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the column and split (K,) that explain most, for each class; of equal ones the lowest."""
-    summands = np.concatenate([targets.weights.units, targets.responses.units])
-    totals = summands.sum(axis=1)
-    n_classes = len(summands) // 2
+    n_classes, n = targets.weights.units.shape
+    by_row = np.empty((n, 2 * n_classes))
+    by_row[:, :n_classes], by_row[:, n_classes:] = targets.weights.units.T, targets.responses.units.T
+    totals = by_row.sum(axis=0)
+    # Nothing is explained of a class without weight, of which at most responses have not underflown.
+    least = np.where(totals[:n_classes] > 0, totals[:n_classes] * EMPTY_SHARE, np.inf)
     explained = np.full((binned.n_columns, n_classes), -np.inf)
     splits = np.zeros((binned.n_columns, n_classes), dtype=np.intp)
+    slack = _slack(targets, z_max, least) + tie_bound
     for group in binned.groups:
-        for sums in group.sums(summands):
-            parts = _explained(sums, totals, n_classes)
-            most = parts.max(axis=0)
-            explained[sums.columns] = most
-            splits[sums.columns] = (parts >= most - tie_bound).argmax(axis=0)
-    columns = (explained >= explained.max(axis=0) - tie_bound).argmax(axis=0)
+        if isinstance(group, TwoValued):
+            left = group.sums(by_row)
+            explained[group.columns] = _shares(left, least) + _shares(totals - left, least)
+            continue
+        for sums in group.sums(by_row):
+            most, base = _roughly_explained(sums, totals, least)
+            most += base
+            floor = np.maximum(explained.max(axis=0), most.max(axis=0)) - slack
+            places, classes = np.nonzero(most >= floor - slack)
+            parts = _explained(sums, totals, least, places, classes)
+            columns, most = sums.columns[places], parts.max(axis=1)
+            explained[columns, classes] = most
+            splits[columns, classes] = (parts >= (most - tie_bound[classes])[:, np.newaxis]).argmax(axis=1)
+    tied = explained >= explained.max(axis=0) - tie_bound
+    columns = tied.argmax(axis=0) if used is None else _least_used(tied, used, len(binned.home))
     return columns, splits[columns, np.arange(n_classes)]
 
 
-def _explained(sums: SplitSums, totals: Floats, n_classes: int) -> Floats:
-    """Return the explained part (B - 1, c, K) of every split of a batch; -inf where there is no split."""
-    right = totals - sums.left
-    if sums.missing is not None:
-        right -= sums.missing
-    # Nothing is explained of a class without weight, of which at most responses have not underflown.
-    least = np.where(totals[:n_classes] > 0, totals[:n_classes] * EMPTY_SHARE, np.inf)
-    parts = _share(sums.left, least)
-    parts += _share(right, least)
-    if sums.missing is not None:
-        parts += _share(sums.missing, least)
-    if sums.valid is not None:
-        parts[~sums.valid] = -np.inf
+def _least_used(tied: NDArray[np.bool_], used: NDArray[np.int64], varying: int) -> NDArray[np.intp]:
+    """Return the column of each class (K,), of the `tied` ones (d, K) the least used so far, and count it."""
+    columns: NDArray[np.intp] = tied.argmax(axis=0)
+    for k, among in enumerate(tied.T):
+        candidates = np.flatnonzero(among)
+        # Where all columns tie, none tells anything: others need no threshold because of it.
+        if len(candidates) < varying:
+            columns[k] = candidates[used[candidates].argmin()]
+        used[columns[k]] += 1
+    return columns
+
+
+def _roughly_explained(sums: SplitSums, totals: Floats, least: Floats) -> tuple[Floats, Floats]:
+    """Return (c, K) the most that a split of each column explains, less what no split can change, and that.
+
+    C_L^2 / W_L + C_R^2 / W_R - C^2 / W = (W C_L - C W_L)^2 / (W W_L W_R): one division. Not below what `_explained`
+    finds by more than `_slack`.
+    """
+    K = least.size
+    present = totals - sums.missing
+    base = _shares(present, least) + _shares(sums.missing, least)
+    weight, response = sums.left[:, :K], sums.left[:, K:]
+    all_weight, all_response = present[:, :K, np.newaxis], present[:, K:, np.newaxis]
+    part = response * all_weight
+    other = weight * all_response
+    part -= other
+    part *= part
+    np.subtract(all_weight, weight, out=other)
+    other *= weight
+    other *= all_weight
+    np.maximum(other, least[:, np.newaxis] ** 3, out=other)
+    part /= other
+    return part.max(axis=2), base
+
+
+def _slack(targets: Targets, z_max: float, least: Floats) -> Floats:
+    """Return (K,) how far below `_explained` the rough way may come, in its units.
+
+    With |C_b| <= ratio W_b + r, where r is n rows' half units of both grids (and of the smallest doubles, which round
+    what is weighed), a branch of less than the least weight explains less than ratio^2 least, or at most (11 r)^2 /
+    least below W_b = 10 r / ratio; so little also counts where only one way takes it for empty. All else is the
+    rounding of doubles: 2^-53 of ratio^2 W some hundred times, where least is 2^-38 W.
+    """
+    n, exponents = targets.weights.units.shape[1], targets.responses.exponents
+    ratio = z_max * _unit(targets)
+    rounding = n * (0.5 + 0.5 * ratio + np.ldexp(z_max, exponents - 1074))
+    slack: Floats = 32.0 * ratio**2 * least + 4.0 * (11.0 * rounding) ** 2 / least
+    return slack
+
+
+def _explained(
+    sums: SplitSums, totals: Floats, least: Floats, places: NDArray[np.intp], classes: NDArray[np.intp]
+) -> Floats:
+    """Return (S, B) what the splits of some columns explain, for a class each; -inf where there is no split."""
+    K = least.size
+    pair = np.array([classes, K + classes])
+    left = sums.left[places, pair]
+    missing = sums.missing[places, pair][..., np.newaxis]
+    right = totals[pair][..., np.newaxis] - left
+    right -= missing
+    lightest = least[classes, np.newaxis]
+    parts = _share(left[0], left[1], lightest)
+    parts += _share(right[0], right[1], lightest)
+    parts += _share(missing[0], missing[1], lightest)
+    parts[~sums.is_split[places]] = -np.inf
     return parts
 
 
-def _share(sums: Floats, least: Floats) -> Floats:
-    weight, response = sums[..., : least.size], sums[..., least.size :]
+def _shares(sums: Floats, least: Floats) -> Floats:
+    return _share(sums[..., : least.size], sums[..., least.size :], least)
+
+
+def _share(weight: Floats, response: Floats, least: Floats) -> Floats:
     # Below the least weight that counts this is less than the branch explains, and next to nothing.
     part: Floats = response * response
     part /= np.maximum(weight, least)

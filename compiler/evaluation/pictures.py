@@ -1,4 +1,4 @@
-"""Confusion matrices as pictures."""
+"""Confusion matrices and learning curves as pictures."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -7,25 +7,35 @@ import numpy as np
 
 from thenar.runtime.files import write_atomically
 
-from ..pictures import painting, rendered
+from ..pictures import on_paper, painting, rendered
+from .learning import Expected, Learning
 from .study import Study
 from .tables import RateTable, Row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from .rates import Rate
     from .tables import Confusion
 
 
-def draw_confusions(study: Study, folder: Path) -> list[Path]:
-    """Write a picture for each composition and protocol, subjects side by side; return the files.
+# Curves are no inputs: colours that no inputs have.
+_CURVES = ("ink", "picked", "link", "rival-1", "rival-2", "rival-3")
+LEARNING_NAME = "learning-curve.svg"
 
-    They are `confusion-PROTOCOL-COMPOSITION.png` in `folder`, which is made if need be. Colour is the share of the true
-    grasp type's rows; numbers are percent of them, left out below 1 %. Raises OSError as the system gives it.
+
+def draw(study: Study, folder: Path) -> list[Path]:
+    """Write a picture for each composition and protocol, subjects side by side, and one of learning curves, as far as
+    the study has them; return the files.
+
+    They are `confusion-PROTOCOL-COMPOSITION.png` and LEARNING_NAME in `folder`, which is made if need be. Colour is the
+    share of the true grasp type's rows; numbers are percent of them, left out below 1 %. Raises OSError as the system
+    gives it.
     """
     folder.mkdir(parents=True, exist_ok=True)
     with painting(font_size=10):
-        return [
+        curves = [] if study.learning is None else [_draw_learning(study.learning, folder / LEARNING_NAME)]
+        return curves + [
             _draw(study.grasps, table, row, folder / f"confusion-{table.protocol}-{row.name}.png")
             for table in study.tables
             if table.name == "compositions"
@@ -46,6 +56,40 @@ def _draw(grasps: tuple[str, ...], table: RateTable, row: Row, path: Path) -> Pa
         axes.set_title(f"subject {name}: {100 * cell.rate.mean:.1f} %", fontsize=10)
     all_axes[0].set_ylabel("true")
     write_atomically(path, rendered(figure, "png"))
+    return path
+
+
+def _draw_learning(learning: Learning, path: Path) -> Path:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.0, 5.4), layout="constrained", dpi=120)
+    axes = figure.subplots()
+    axes.set_xscale("log")
+    for number, curve in enumerate(learning.curves):
+        colour, last = on_paper(_CURVES[number % len(_CURVES)]), learning.repetitions[-1]
+        # Side by side: whiskers do not hide each other.
+        beside = 1 + 0.025 * (number - (len(learning.curves) - 1) / 2)
+        xs, means = [beside * n for n in learning.repetitions], [100 * rate.mean for rate in curve.rates]
+        reach = [[100 * (r.mean - r.low) for r in curve.rates], [100 * (r.high - r.mean) for r in curve.rates]]
+        axes.errorbar(xs, means, reach, color=colour, marker="os^Dv"[number % 5], ms=4, lw=1.5, elinewidth=0.8)
+        axes.plot([], [], color=colour, marker="os^Dv"[number % 5], ms=4, label=curve.learner)
+        if curve.expected:
+            ahead = [last, *(each.repetitions for each in curve.expected)]
+            shown: list[Rate | Expected] = [curve.rates[-1], *curve.expected]
+            lows, highs = [100 * each.low for each in shown], [100 * each.high for each in shown]
+            axes.plot(ahead, [100 * each.mean for each in shown], color=colour, lw=1.5, ls=(0, (2, 2)))
+            axes.fill_between(ahead, lows, highs, color=colour, alpha=0.08, lw=0)
+    if learning.further:
+        axes.plot([], [], color=on_paper("soft"), ls=(0, (2, 2)), label="expected, 95 % shaded")
+    ticks = [*learning.repetitions, *learning.further]
+    axes.set_xticks(ticks, [str(tick) for tick in ticks])
+    axes.minorticks_off()
+    axes.set_xlabel("repetitions of each grasp type by each person that were trained on")
+    axes.set_ylabel(f"accuracy in %: {learning.of}, trials")
+    axes.set_title(f"Learning curves, {learning.inputs}", fontsize=11)
+    axes.grid(color=on_paper("line"), lw=0.6)
+    axes.legend(loc="lower right")
+    write_atomically(path, rendered(figure, "svg"))
     return path
 
 

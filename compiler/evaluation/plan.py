@@ -1,16 +1,18 @@
 """What to fit for each of the tables (which inputs, which placement, which folds); and the fits, each done once."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Literal
 
 import numpy as np
+from msgspec.structs import replace as replace_option
 from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Options
 
 from ..boosting.stumps import winners
+from ..choosing import choose_training
 from ..placement.methods.base import METHODS, PAPERS, Chooser
 from ..placement.methods.filters import random_placement
 from ..placement.thresholds import made_plain, taxel_thresholds, with_switches
@@ -20,12 +22,14 @@ from ..tables.collapse import model_scores
 from ..trainers.base import TRAINERS, Training
 from ..workers import in_workers
 from .folds import Fold, Rows
-from .populations import Population, Protocol
+from .populations import Population, Protocol, Scheme, groups_of
 from .rivals import CLASSIFIERS
 
 Inputs = NDArray[np.uint16]
 Labels = NDArray[np.intp]
 Progress = Callable[[int, int], None]
+# For each trainer, those ways to train among which each fit chooses.
+Ways = Mapping[str, tuple[Training, ...]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,19 +37,20 @@ class Data:
     """All rows that fits take columns of.
 
     X                 (n, s + t + j): the switches' bits, then the codes of taxels and joints
-    labels            (n,), and the numbers (n,) of trials and subjects
+    labels, trials    (n,)
+    groups            (n,) what each row is left out with, None: its trial
     """
 
     X: Inputs
     labels: Labels
     trials: Rows
-    subjects: Rows
+    groups: NDArray[np.str_] | None
 
     @classmethod
-    def of(cls, grasp_set: GraspSet) -> "Data":
+    def of(cls, grasp_set: GraspSet, scheme: Scheme = "trial") -> "Data":
         """Return the rows of a set."""
         X = np.hstack([grasp_set.switches, grasp_set.taxels, grasp_set.codes], dtype=np.uint16)
-        return cls(X, grasp_set.labels, grasp_set.trial_ids, np.unique(grasp_set.subjects, return_inverse=True)[1])
+        return cls(X, grasp_set.labels, grasp_set.trial_ids, groups_of(grasp_set, scheme))
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +70,8 @@ class FoldFit:
     learner: str = ""
 
 
-def predictions(data: Data, fit: FoldFit, training: Training) -> Labels:
-    """Return the labels given to the fold's test rows.
+def predictions(data: Data, fit: FoldFit, training: Training, ways: Ways | None = None) -> Labels:
+    """Return the labels given to the fold's test rows, where its learner is `training` or one of `ways`.
 
     Where the fit is blind, every row gets the most frequent label of the training rows (the lowest of several), which
     is the rate to beat.
@@ -83,16 +88,16 @@ def predictions(data: Data, fit: FoldFit, training: Training) -> Labels:
         trained,
         tuple(map(str, fit.grasps)),
         data.trials[rows],
-        data.subjects[rows],
-        taxels[rows],
+        taxels=taxels[rows],
     )
     thresholds = taxel_thresholds(learning)
     learning = with_switches(learning, thresholds)
     closed = np.hstack([bits > 0, taxels > np.array(thresholds, np.int64)])[fit.fold.test]
     if fit.learner in CLASSIFIERS:
         return grasps[CLASSIFIERS[fit.learner].answers(learning, np.hstack([closed, codes[fit.fold.test]]))]
-    if fit.learner not in ("", training.trainer):
-        training = Training.of(Options(trainer=fit.learner))
+    if fit.learner:
+        groups = None if data.groups is None else data.groups[rows]
+        training = Training.chosen(choose_training(learning, (ways or {})[fit.learner], groups=groups))
     return grasps[winners(model_scores(training.train(learning), closed, codes[fit.fold.test]))]
 
 
@@ -103,7 +108,12 @@ def is_blind(X: Inputs, fit: FoldFit) -> bool:
 
 
 def run_fits(
-    data: Data, fits: Iterable[FoldFit], training: Training, jobs: int = -1, progress: Progress | None = None
+    data: Data,
+    fits: Iterable[FoldFit],
+    training: Training,
+    jobs: int = -1,
+    progress: Progress | None = None,
+    ways: Ways | None = None,
 ) -> dict[FoldFit, Labels]:
     """Return the predictions of every fit. Equal fits are done once; `progress(done, total)` after each.
 
@@ -112,7 +122,7 @@ def run_fits(
     """
     todo = list(dict.fromkeys(fits))
     results: dict[FoldFit, Labels] = {}
-    tasks = ((number, data, fit, training) for number, fit in enumerate(todo))
+    tasks = ((number, data, fit, training, ways) for number, fit in enumerate(todo))
     for number, found in in_workers(_numbered, tasks, jobs):
         results[todo[number]] = found
         if progress is not None:
@@ -120,9 +130,9 @@ def run_fits(
     return results
 
 
-def _numbered(task: tuple[int, Data, FoldFit, Training]) -> tuple[int, Labels]:
-    number, data, fit, training = task
-    return number, predictions(data, fit, training)
+def _numbered(task: tuple[int, Data, FoldFit, Training, Ways | None]) -> tuple[int, Labels]:
+    number, data, fit, training, ways = task
+    return number, predictions(data, fit, training, ways)
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,8 +188,17 @@ DRAWS = 5  # random placements that a placement is compared with
 
 
 def learners() -> tuple[str, ...]:
-    """Return who is compared in the table of trainers: all trainers, REFERENCE before the others, then CLASSIFIERS."""
-    return tuple(dict.fromkeys([REFERENCE, *TRAINERS, *CLASSIFIERS]))
+    """Return who is compared in the table of trainers: REFERENCE, the other trainers that take part where one is
+    chosen, and CLASSIFIERS.
+    """
+    return tuple(dict.fromkeys([REFERENCE, *(name for name in TRAINERS if TRAINERS[name].tried), *CLASSIFIERS]))
+
+
+def ways_of(asked: Options) -> Ways:
+    """Return for each trainer the ways to train that are tried; settings that are asked for are those of its own."""
+    trainers = [name for name in learners() if name not in CLASSIFIERS]
+    own = {name: asked if name == asked.trainer else replace_option(Options(), trainer=name) for name in trainers}
+    return {name: Training.candidates(each) for name, each in own.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,9 +294,15 @@ class Planner:
 
     def _trainers(self, protocol: Protocol) -> list[RowPlan]:
         chosen = partial(self.own, protocol)
+        # Where settings are chosen, a fit takes as long as many: one repeat has to do.
+        once = replace(self, parts=tuple(replace(part, repeats=part.repeats[:1]) for part in self.parts))
+        return [once._row(name, kind.what, kind, chosen, name) for kind in self.kinds for name in learners()]
+
+    @property
+    def kinds(self) -> tuple[Composition, ...]:
+        """What trainers are compared on: selected switches and joints, or what of them there is; and each alone."""
         there = available(self._n_switches, self.n_joints)
-        kinds = [kind for kind in (ANGLE_SELECTED, ANGLE, SELECTED) if kind in there]
-        return [self._row(name, kind.what, kind, chosen, name) for kind in kinds for name in learners()]
+        return tuple(kind for kind in (ANGLE_SELECTED, ANGLE, SELECTED) if kind in there)
 
     @property
     def _n_switches(self) -> int:

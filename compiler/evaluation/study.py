@@ -16,13 +16,15 @@ from ..samples import Samples
 from ..text import counted
 from ..trainers.base import Training, changed
 from .folds import EvaluationError
+from .learning import Learning, plan_learning
 from .permutation import Permutations, Permuted
-from .plan import RIVALS, Data, Planner, Progress, TableName, is_blind, run_fits
-from .populations import NESTED, OF, PROTOCOLS, Population, ProtocolName, Scheme, concerns, groups_of, populations
+from .plan import RIVALS, Data, Planner, Progress, TableName, is_blind, run_fits, ways_of
+from .populations import NESTED, OF, PROTOCOLS, Population, ProtocolName, Scheme, concerns, populations
 from .tables import RateTable, Reader
 
 TABLES: tuple[TableName, ...] = ("compositions", "generality", "pruning", "baselines", "trainers")
 
+_ROUNDS = 100  # the paper's
 # Those with a row that is trained on all switches at once.
 _OF_ALL_SWITCHES: tuple[TableName, ...] = ("compositions", "pruning")
 
@@ -39,7 +41,9 @@ class Options:
     prune       S of the placements of the compositions, the generality and the baselines
     prune_list  each S of the table of pooled and pruned placements
     rivals      methods that ID3 is compared with in the baselines, besides random placements
-    trainer     what makes every classifier, with its `settings`; rounds are LogitBoost's
+    trainer     what makes every classifier, with its `settings`; rounds are LogitBoost's, None: the paper's hundred. In
+                the table of trainers and the learning curve, what is not given is chosen from the training rows
+    learning    whether to find learning curves
     permute     how often to evaluate with shuffled labels, for the chance level; 0: not at all
     """
 
@@ -47,7 +51,7 @@ class Options:
     scheme: Scheme = "trial"
     folds: int = 4
     repeats: int = 3
-    rounds: int = 100
+    rounds: int | None = None
     prune: int = 0
     prune_list: tuple[int, ...] = (0, 13, 62)
     protocols: tuple[ProtocolName, ...] = ("paper", "nested")
@@ -55,8 +59,9 @@ class Options:
     seed: int = 1
     rivals: tuple[str, ...] = RIVALS
     trainer: str = "logitboost"
-    settings: Mapping[str, float] = field(default_factory=dict)
+    settings: Mapping[str, float | str] = field(default_factory=dict)
     permute: int = 0
+    learning: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +77,7 @@ class Study:
     """The result: what was asked of which set, the grasp types that occur, what to beware of, and the tables.
 
     left_out names the tables that were asked for but have no meaning here, with the reason; permuted is the permutation
-    test, None if there was none.
+    test, learning the learning curves; each None if it was not asked for.
     """
 
     fingerprint: str
@@ -84,6 +89,7 @@ class Study:
     left_out: tuple[LeftOut, ...]
     tables: tuple[RateTable, ...]
     permuted: Permuted | None = None
+    learning: Learning | None = None
 
     def __str__(self) -> str:
         """Return how many trials and frames there are, and how they were cut."""
@@ -98,7 +104,7 @@ class Study:
         grasps = counted(len(self.grasps), "grasp type")
         frames = f" of {self.rows:,} frames" if self.rows > self.trials else ""
         size = f"{counted(self.trials, 'trial')}{frames}, {grasps}"
-        return f"{size}; {cut}; {options.rounds} rounds; accuracies in % with 95 % intervals"
+        return f"{size}; {cut}; {options.rounds or _ROUNDS} rounds; accuracies in % with 95 % intervals"
 
 
 def evaluate(
@@ -147,7 +153,8 @@ def evaluate(
     for name in options.rivals:
         if not METHODS.named(name).by_number:
             raise EvaluationError(f"{name} takes S: a rival is a method that takes a number of switches")
-    training = Training.of(changed(Manifested(rounds=options.rounds, trainer=options.trainer), options.settings))
+    wanted = changed(Manifested(rounds=options.rounds, trainer=options.trainer), options.settings)
+    training, ways = Training.of(wanted), ways_of(wanted)
     chosen = _of_subjects(grasp_set, options.subjects)
     parts = populations(chosen, options.scheme, options.folds, options.repeats, options.seed)
     reasons = {name: _why_not(name, chosen, parts, options) for name in options.tables}
@@ -170,10 +177,13 @@ def evaluate(
         for each in protocols
         if each is NESTED or name != "trainers"
     }
-    fits = [fit for rows in plans.values() for row in rows for cell in row.cells for fit in cell.fits]
-    data = Data.of(chosen)
+    data, curves = Data.of(chosen, options.scheme), None
+    if options.learning:
+        curves = plan_learning(data, chosen.subjects, planner, options.scheme, options.folds, options.repeats)
+    cells = [cell for rows in plans.values() for row in rows for cell in row.cells]
+    fits = [fit for cell in (*cells, *(curves.every if curves else ())) for fit in cell.fits]
     further = None if progress is None else _before(progress, options.permute)
-    predictions = run_fits(data, fits, training, jobs, further)
+    predictions = run_fits(data, fits, training, jobs, further, ways)
     test = None
     if m := options.permute:
         how = Permutations(parts, options.scheme, options.folds, options.prune, options.seed, training)
@@ -188,7 +198,7 @@ def evaluate(
         predictions,
         blind,
         OF[options.scheme],
-        groups_of(chosen, options.scheme),
+        data.groups,
     )
     return Study(
         fingerprint=grasp_set.fingerprint(),
@@ -200,6 +210,7 @@ def evaluate(
         left_out=tuple(LeftOut(name, reason) for name, reason in reasons.items() if reason is not None),
         tables=tuple(reader.table(*which, rows) for which, rows in plans.items()),
         permuted=test,
+        learning=None if curves is None else curves.read(replace(reader, of=curves.of), data.groups, options.seed),
     )
 
 

@@ -2,16 +2,18 @@
 
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
-from itertools import product
+from dataclasses import dataclass, replace
+from itertools import combinations, product
 from textwrap import wrap
 from typing import get_args
+
+import numpy as np
 
 from thenar.runtime.tables import IntegerTables
 
 from . import FirmwareError
 from .costs import Cost
-from .layout import LARGEST_GROUP, SMALLEST_GROUP, Adding, Bins, Layout, Ports, arrange
+from .layout import LARGEST_GROUP, MOST_ROWS, SMALLEST_GROUP, Adding, Bins, Layout, Ports, Shared, arrange
 from .targets import TARGETS, Target
 
 Option = tuple[Layout, Cost]
@@ -52,7 +54,7 @@ def choose(
         raise FirmwareError(
             f"the classifier cannot be allowed {flash} bytes of flash: {target.named} has {target.flash} bytes"
         )
-    options = list(_options(tables, target, ports, entry_bits))
+    options = [(layout, target.cost(layout)) for layout in _layouts(tables, target, ports, entry_bits)]
     best = frontier(options)
     for allowed in flash_shares(target) if flash is None else (flash,):
         for layout, cost in best:
@@ -85,23 +87,44 @@ def flash_shares(target: Target) -> tuple[int, int]:
     return min(target.flash // 2, target.most_flash), min(target.flash * 3 // 4, target.most_flash)
 
 
-def _options(tables: IntegerTables, target: Target, ports: Ports | None, entry_bits: int | None) -> Iterator[Option]:
-    """Yield the layouts that there are, each with its cost. Raises FirmwareError if there is none, saying why not."""
+def _layouts(tables: IntegerTables, target: Target, ports: Ports | None, entry_bits: int | None) -> Iterator[Layout]:
+    """Yield the layouts that there are. Raises FirmwareError if there is none, saying why not."""
     refused: FirmwareError | None = None
     found = False
     sizes = range(SMALLEST_GROUP, LARGEST_GROUP + 1) if tables.n_switches else [SMALLEST_GROUP]
-    for bits, size, bins, adding in product(
-        (8, 16) if entry_bits is None else (entry_bits,), sizes, _bins(tables), _addings(target)
-    ):
+    for bits, size, bins in product((8, 16) if entry_bits is None else (entry_bits,), sizes, _bins(tables)):
         try:
-            layout = arrange(tables, ports=ports, group_size=size, entry_bits=bits, bins=bins, adding=adding)
+            for shared in _sharings(tables, -(-tables.n_switches // size)):
+                layout = arrange(tables, ports=ports, group_size=size, entry_bits=bits, bins=bins, shared=shared)
+                found = True
+                yield from (replace(layout, adding=adding) for adding in _addings(target))
         except FirmwareError as reason:
             refused = refused or reason
-        else:
-            found = True
-            yield layout, target.cost(layout)
     if not found and refused is not None:
         raise refused
+
+
+def _sharings(tables: IntegerTables, n_groups: int) -> Iterator[tuple[Shared, ...]]:
+    """Yield which joints, and groups of switches, share look-ups: at first none, then each time the two look-ups that
+    together have the fewest rows more than apart.
+    """
+    sizes = [len(part) for part in np.array_split(np.arange(tables.n_switches), n_groups)] if n_groups else []
+    held: list[tuple[int, Shared]] = [(1 << size, (group, ())) for group, size in enumerate(sizes)]
+    held += [(len(steps) + 1, (None, (joint,))) for joint, steps in enumerate(tables.thresholds) if len(steps)]
+    yield ()
+    while True:
+        pairs = [
+            (one[0] * other[0] - one[0] - other[0], a, b)
+            for (a, one), (b, other) in combinations(enumerate(held), 2)
+            if one[0] * other[0] <= MOST_ROWS and other[1][1] and (one[1][0] is None or other[1][0] is None)
+        ]
+        if not pairs:
+            return
+        _, a, b = min(pairs)
+        one, other = held[a], held.pop(b)
+        joined = one[1][0] if other[1][0] is None else other[1][0], one[1][1] + other[1][1]
+        held[a] = one[0] * other[0], joined
+        yield tuple(shared for _, shared in held if len(shared[1]) + (shared[0] is not None) > 1)
 
 
 def _bins(tables: IntegerTables) -> tuple[Bins, ...]:
@@ -115,7 +138,8 @@ def _addings(target: Target) -> tuple[Adding, ...]:
 
 def features(layout: Layout, target: Target) -> str:
     """Return in words how `layout` lies in flash, and on an AVR how it is added up."""
-    parts = [f"{layout.entry_bits}-bit entries"]
+    halves = ", the upper halves of steps" if layout.entry_shift else ""
+    parts = [f"{layout.entry_bits}-bit entries{' and sums' if layout.sum_bits == 8 else halves}"]
     if layout.groups:
         parts.append(f"up to {max(map(len, layout.groups))} switches a look-up")
     if layout.joints:
@@ -123,9 +147,13 @@ def features(layout: Layout, target: Target) -> str:
             {
                 "direct": "codes looked up in 256 bytes a joint",
                 "trimmed": "codes looked up between the first and the last threshold of a joint",
-                "search": "codes searched among thresholds",
+                "search": "codes compared with thresholds",
             }[layout.bins]
         )
+        if (most := max((len(lookup.joints) for lookup in layout.lookups), default=0)) > 1:
+            parts.append(f"up to {most} joints a look-up")
+    if layout.tables.slopes:
+        parts.append("codes multiplied")
     if target.avr:
         parts.append({"called": "rows added by one routine", "unrolled": "rows added in line"}[layout.adding])
     return ", ".join(parts)

@@ -11,15 +11,19 @@ from numpy.typing import NDArray
 
 from thenar.firmware_templates.rendering import render
 from thenar.runtime.manifest import Calibration
+from thenar.runtime.tables import Slope
 
-from .assembly import assembly_values, check_size
-from .layout import NO_SWITCH, Field, Layout, Lookup, Parts, lookups
+from .assembly import assembly_values, calls_are_near, check_size
+from .costs import MOST_INLINE
+from .layout import NO_SWITCH, Field, JointLayout, Layout, Lookup, Parts
 from .words import Names, comment, inputs_in_words, string, switches_in_words
 
 _STARTS_PER_LINE = 4
+_HIGHEST = 65535  # no code is above it
 
-# Portable C adds two sums of 16 bits side by side in a word of 32. Two 16-bit entries are one integer, low + 65536
-# high, so words add up to the word of the sums, whatever was borrowed on the way. Of four 8-bit entries a, b, c, d
+# Portable C adds sums side by side in a word of 32 bits: two of 16 bits, or four of 8. Two 16-bit entries are one
+# integer, low + 65536 high, so words add up to the word of the sums, whatever was borrowed on the way; and so are four
+# 8-bit entries that are added up in 8 bits. Where 8-bit entries are added up in 16, of four 8-bit entries a, b, c, d
 # the even and the odd ones are added up apart, each with 16 bits of room: no sum of them is above 65535, for it is
 # the difference of two scores. The odd ones are not masked: (b, c, d) is 256 c more than b + 65536 d, and the sum of
 # all c, the upper half of the even sum, is subtracted once, in the end.
@@ -27,23 +31,32 @@ _STARTS_PER_LINE = 4
 
 def portable_values(name: str, layout: Layout) -> dict[str, object]:
     """Return what the templates of the portable C ask for."""
-    narrow, parts = layout.entry_bits == 8, layout.parts
-    lanes = _lanes(parts.width, narrow)
+    parts, biased, bits = layout.parts, layout.biased, layout.sum_bits
+    lanes = _lanes(parts.width, biased, bits)
     starts, open_sums = (_start_lines(_in_parts(scores, parts), lanes) for scores in (layout.start, layout.all_open))
     n_lanes = max(lane for lane, _ in lanes) + 1
-    adding, replacing = _arithmetic(n_lanes, narrow)
+    adding, replacing = _arithmetic(n_lanes, biased, layout.entry_shift)
+    slopes = [slope.row.astype(int) for slope in layout.tables.slopes]
+    entries = 32 // layout.entry_bits
     return {
-        "words": -(-parts.width // (4 if narrow else 2)),
+        "slopes": [
+            _lane_words([row[first : first + parts.width].tolist() for row in slopes], lanes) for first in parts.firsts
+        ],
+        "open_distances": number_lines(slope.distance(0) for slope in layout.tables.slopes),
+        "distances": [_distance(name, slope) for slope in layout.tables.slopes],
+        "words": -(-parts.width // entries),
         "lanes": n_lanes,
-        "takes": _takes(lanes, len(parts.firsts) > 1),
-        "word_macros": _narrow_macros(parts.width) if narrow else _wide_macros(parts.width),
+        "in_words": {2: "two", 4: "four"}[entries],
+        "sum_bits": bits,
+        "takes": _takes(lanes, len(parts.firsts) > 1, bits),
+        "word_macros": _narrow_macros(parts.width) if biased else _sum_macros(parts.width, bits),
         "start": starts,
         "open_sums": open_sums,
-        "open_rows": [f"&thenar_{name}_rows[{lookup.first_row}]," for lookup in lookups(layout)],
-        "finds": [line for lookup in lookups(layout) for line in _find(name, layout, lookup)],
-        "n_lookups": layout.n_lookups,
+        "open_rows": [f"&thenar_{name}_rows[{lookup.first_row + lookup.zero_row}]," for lookup in layout.lookups],
+        "finds": [line for lookup in layout.lookups for line in _find(name, layout, lookup)],
+        "n_lookups": len(layout.lookups),
         "adding": adding,
-        "storing": _storing(n_lanes, narrow),
+        "storing": _storing(n_lanes, biased, layout.entry_shift),
         "replacing": replacing,
     }
 
@@ -56,16 +69,26 @@ def avr_macros(width: int, entry_bits: int) -> list[str]:
     return whole + [["", "REST(a) (a)", "REST(a, b) (a), (b)", "REST(a, b, c) (a), (b), (c)"][rest]][: bool(rest)]
 
 
-def _lanes(width: int, narrow: bool) -> list[tuple[int, str]]:
-    """Return for every class of a part the number of its word of sums, and which half of it is its sum."""
-    if narrow:
-        return [(2 * (k // 4) + k % 2, "high" if k % 4 >= 2 else "low") for k in range(width)]
-    return [(k // 2, "high" if k % 2 else "low") for k in range(width)]
+def _lanes(width: int, biased: bool, bits: int) -> list[tuple[int, int]]:
+    """Return for every class of a part the number of its word of sums, and the lowest bit of its sum in there."""
+    if biased:
+        return [(2 * (k // 4) + k % 2, 16 if k % 4 >= 2 else 0) for k in range(width)]
+    each = 32 // bits
+    return [(k // each, bits * (k % each)) for k in range(width)]
 
 
-def _wide_macros(width: int) -> list[str]:
-    pair = "PAIR(a, b) ((uint32_t)(int32_t)(a) + ((uint32_t)(int32_t)(b) << 16))"
-    return [pair] + (["REST(a) PAIR(a, 0)"] if width % 2 else [])
+def _sum_macros(width: int, bits: int) -> list[str]:
+    """Return the macros of words that are sums of their entries, each shifted to its lane."""
+    letters = "abcd"[: 32 // bits]
+    cells = (f"(uint32_t)(int32_t)({letter})" + (f" << {bits * at}" if at else "") for at, letter in enumerate(letters))
+    whole = "QUAD" if bits == 8 else "PAIR"
+    sums = " + ".join(f"({cell})" if "<<" in cell else cell for cell in cells)
+    given, rest = ", ".join(letters), width % len(letters)
+    macros = [f"{whole}({given}) ({sums})"]
+    if rest:
+        zeros = ", ".join([*letters[:rest], *["0"] * (len(letters) - rest)])
+        macros.append(f"REST({', '.join(letters[:rest])}) {whole}({zeros})")
+    return macros
 
 
 def _narrow_macros(width: int) -> list[str]:
@@ -80,64 +103,81 @@ def _in_parts(scores: NDArray[np.int64], parts: Parts) -> list[list[int]]:
     return [scores[first : first + parts.width].tolist() for first in parts.firsts]
 
 
-def _start_lines(starts: Sequence[Sequence[int]], lanes: Sequence[tuple[int, str]]) -> list[str]:
+def _start_lines(starts: Sequence[Sequence[int]], lanes: Sequence[tuple[int, int]]) -> list[str]:
     """Return the lines of the initialiser of the sums, in braces for each part where there are several."""
     lines = []
     for start in starts:
         sums: dict[int, list[int]] = {}
         for (lane, _), value in zip(lanes, start, strict=True):
             sums.setdefault(lane, []).append(value)
-        words = [f"START({', '.join(map(str, (sums[lane] + [0])[:2]))})" for lane in sorted(sums)]
+        room = 4 if any(shift == 8 for _, shift in lanes) else 2
+        words = [f"START({', '.join(map(str, (sums[lane] + [0] * room)[:room]))})" for lane in sorted(sums)]
         held = [", ".join(words[at : at + _STARTS_PER_LINE]) for at in range(0, len(words), _STARTS_PER_LINE)]
         text = [f"{line}," for line in held]
         lines += text if len(starts) == 1 else ["{", *(f"    {line}" for line in text), "},"]
     return lines
 
 
-def _takes(lanes: Sequence[tuple[int, str]], several: bool) -> list[str]:
+def _takes(lanes: Sequence[tuple[int, int]], several: bool, bits: int) -> list[str]:
     """Return the arguments that say the sum and the number of each class of a part."""
-    words, halves = "sum" if several else "sums", {"low": "& 0xFFFFu", "high": ">> 16"}
+    words, mask = "sum" if several else "sums", {8: "0xFFu", 16: "0xFFFFu"}[bits]
     numbers = (f"first + {k}u" if several and k else "first" if several else f"{k}u" for k in range(len(lanes)))
-    return [f"{words}[{lane}] {halves[half]}, {k}" for (lane, half), k in zip(lanes, numbers, strict=True)]
+    taken = []
+    for (lane, shift), number in zip(lanes, numbers, strict=True):
+        lowered = f"{words}[{lane}] >> {shift}" if shift else f"{words}[{lane}]"
+        inner = shift + bits < 32
+        taken.append(f"{f'({lowered})' if shift and inner else lowered}{f' & {mask}' if inner else ''}, {number}")
+    return taken
 
 
-def _arithmetic(lanes: int, narrow: bool) -> tuple[list[str], list[str]]:
-    """Return the statements that add a row to the sums s0, s1..., and those that replace one in sum[]."""
+def _arithmetic(lanes: int, biased: bool, shift: int) -> tuple[list[str], list[str]]:
+    """Return what adds a row to the sums s0, s1..., and the statements that replace one in sum[]."""
     adding, replacing = [], []
     for lane in range(lanes):
-        row, before, after = (f"{each}[{lane // 2 if narrow else lane}]" for each in ("row", "before", "after"))
-        if narrow:
+        row, before, after = (f"{each}[{lane // 2 if biased else lane}]" for each in ("(row)", "before", "after"))
+        if biased:
             macro = "ODD" if lane % 2 else "EVEN"
             row = f"{row} >> 8" if lane % 2 else f"EVEN({row})"
             before, after = f"{macro}({before})", f"{macro}({after})"
-        adding.append(f"s{lane} += {row};")
-        replacing.append(f"sum[{lane}] += {after} - {before};")
+        adding.append(f"s{lane} += {row}")
+        change = f"({after} - {before}) << {shift}" if shift else f"{after} - {before}"
+        replacing.append(f"sum[{lane}] += {change};")
     return adding, replacing
 
 
-def _storing(lanes: int, narrow: bool) -> list[str]:
+def _storing(lanes: int, biased: bool, shift: int) -> list[str]:
     """Return the statements that put the sums s0, s1..., in words of two, into sum[]."""
-    if not narrow:
+    if not biased:
         return [f"sum[{lane}] = s{lane};" for lane in range(lanes)]
     sums = (f"s{lane} - ((s{lane - 1} >> 16) << 8)" if lane % 2 else f"s{lane}" for lane in range(lanes))
-    return [f"sum[{lane}] = from[{lane}] + {text};" for lane, text in enumerate(sums)]
+    whole = (f"(({text}) << {shift})" if shift else text for text in sums)
+    return [f"sum[{lane}] = from[{lane}] + {text};" for lane, text in enumerate(whole)]
 
 
 def _find(name: str, layout: Layout, lookup: Lookup) -> list[str]:
-    """Return the lines of the statement that finds the row of one look-up."""
-    if lookup.joint is None:
-        found = " | ".join(map(_field, layout.fields[lookup.number]))
-        found = f"({found})" if len(layout.fields[lookup.number]) > 1 and lookup.first_row else found
-    else:
-        code, joint = f"thenar_{name}_input.codes[{lookup.number}]", lookup.joint
-        if layout.bins == "search":
-            found = f"below({lookup.first_bin}u, {len(joint.thresholds)}u, {code})"
+    """Return the statement that finds the row of one look-up, in lines."""
+    source = f"thenar_{name}_input."
+    found: list[str] = []
+    if lookup.group is not None:
+        fields = layout.fields[lookup.group]
+        alone = len(fields) == 1 or not (lookup.joints or lookup.first_row)
+        found = [" | ".join(map(_field, fields)) if alone else f"({' | '.join(map(_field, fields))})"]
+    for joint in lookup.joints:
+        code = f"{source}codes[{joint.number}]"
+        if joint.compared:
+            counted = f"not_below({joint.first_step}u, {len(joint.thresholds)}u, {code})"
+            if len(joint.thresholds) <= MOST_INLINE:
+                counted = " + ".join(
+                    f"({code} <= {step}u)" if step < _HIGHEST else "1" for step in joint.thresholds.tolist()
+                )
+                counted = f"(uint32_t)({counted})"
+            found.append(f"{joint.weight}u * {counted}" if joint.weight > 1 else counted)
         else:
-            last = len(joint.bins) - 1
-            place = code if layout.bins == "direct" else f"clamped({code}, {joint.first}u, {last}u)"
-            found = f"thenar_{name}_bins[{_after(lookup.first_bin, place)}]"
-    statement = f"row[{lookup.index}] = &thenar_{name}_rows[{_after(lookup.first_row, found)}];"
-    return textwrap.wrap(statement, COLUMNS - 4, subsequent_indent=_INDENT)
+            whole = len(joint.bins) == 1 << layout.code_bits
+            place = code if whole else f"clamped({code}, {joint.first}u, {len(joint.bins) - 1}u)"
+            found.append(f"thenar_{name}_bins[{_after(joint.first_bin, place)}]")
+    statement = f"row[{lookup.index}] = &thenar_{name}_rows[{_after(lookup.first_row, ' + '.join(found))}];"
+    return textwrap.wrap(statement, COLUMNS - 8, subsequent_indent=_INDENT, break_long_words=False)
 
 
 def _field(field: Field) -> str:
@@ -145,6 +185,24 @@ def _field(field: Field) -> str:
     by, mask = field.bit - field.to, ((1 << field.width) - 1) << field.to
     moved = f"((uint32_t)ports[{field.port}] {'>>' if by > 0 else '<<'} {abs(by)})" if by else f"ports[{field.port}]"
     return f"({moved} & 0x{mask:02X}u)"
+
+
+def _lane_words(rows: list[list[int]], lanes: Sequence[tuple[int, int]]) -> list[str]:
+    """Return the rows of slopes, for the classes of a part, as initialisers of words of two sums."""
+    found = []
+    for row in rows:
+        words: dict[int, list[int]] = {}
+        for (lane, _), value in zip(lanes, row, strict=True):
+            words.setdefault(lane, []).append(value)
+        found.append(", ".join(f"SLOPE({words[lane][0]}, {(words[lane] + [0])[1]})" for lane in sorted(words)))
+    return found
+
+
+def _distance(name: str, slope: Slope) -> str:
+    """Return the expression of the distance of a slope's code."""
+    above = f"clamped(thenar_{name}_input.codes[{slope.joint}], {slope.low}u, {slope.high - slope.low}u)"
+    shift = f" {'<<' if slope.gain > 0 else '>>'} {abs(slope.gain)}" if slope.gain else ""
+    return f"(int16_t)(({above}{shift}) - {slope.zero})"
 
 
 def _after(first: int, place: str) -> str:
@@ -169,7 +227,7 @@ def table_lines(layout: Layout, names: Names) -> list[str]:
     for first in layout.parts.firsts:
         columns = slice(first, first + layout.parts.width)
         lines += remark("columns: " + ", ".join(map(comment, names.grasps[columns])))
-        for lookup in lookups(layout):
+        for lookup in layout.lookups:
             lines += _lookup_lines(layout, names, lookup, columns)
     return lines
 
@@ -189,17 +247,19 @@ def remark(text: str) -> list[str]:
 
 
 def _lookup_lines(layout: Layout, names: Names, lookup: Lookup, columns: slice) -> list[str]:
-    if lookup.joint is None:
-        numbers = layout.groups[lookup.number]
+    headings, says = [], [""]
+    if lookup.group is not None:
+        numbers = layout.groups[lookup.group]
         switches = [names.switches[number].name for number in numbers]
-        heading = f"{switches_in_words(numbers)}: " + ", ".join(map(comment, switches))
-        says = [_closed(switches, byte) for byte in range(len(lookup.rows))]
-    else:
-        name = comment(names.joints[lookup.number].name)
-        heading = f"joint {lookup.number}: {name}"
-        steps = [str(step) for step in lookup.joint.thresholds.tolist()]
-        says = [f"{name} to {step}" for step in steps] + [f"{name} above {steps[-1]}"]
-    lines = ["", *remark(heading)]
+        headings.append(f"{switches_in_words(numbers)}: " + ", ".join(map(comment, switches)))
+        says = [_closed(switches, byte) for byte in range(1 << len(numbers))]
+    for joint in lookup.joints:
+        name = comment(names.joints[joint.number].name)
+        headings.append(f"joint {joint.number}: {name}")
+        steps = joint.thresholds.tolist()[::-1]
+        ranges = [f"{name} above {steps[0]}"] + [f"{name} to {step}" for step in steps]
+        says = [f"{what}, {one}" if what else one for one in ranges for what in says]
+    lines = ["", *remark("; ".join(headings))]
     for row, what in zip(np.asarray(lookup.rows)[:, columns].tolist(), says, strict=True):
         lines += _row_lines(row, layout.entry_bits, what)
     return lines
@@ -212,7 +272,7 @@ def _closed(names: Sequence[str], byte: int) -> str:
 def _row_lines(row: Sequence[int], entry_bits: int, what: str) -> list[str]:
     """Return one row of the table; the comment goes behind it, or before it where it is too long for that."""
     at_once, macro = (2, "PAIR") if entry_bits == 16 else (4, "QUAD")
-    digits = 6 if entry_bits == 16 else 3
+    digits = 6 if entry_bits == 16 else 4
     cells = []
     for at in range(0, len(row), at_once):
         held = row[at : at + at_once]
@@ -266,7 +326,7 @@ def classifier_files(
         ".c": _source_values(names, layout) | portable_values(name, layout),
     }
     if avr:
-        texts["_avr.S"] = assembly_values(name, names, layout)
+        texts["_avr.S"] = assembly_values(name, names, layout, near=calls_are_near(layout))
     return {
         f"thenar_{name}{ending}": render(
             f"{_FOLDER}thenar_NAME{ending}.j2", **common, **values, opening=_opening(name, names, ending, notes)
@@ -307,10 +367,12 @@ def _common_values(name: str, names: Names, layout: Layout, avr: bool) -> dict[s
         "switch_type": _unsigned(n_switches),
         "code_type": f"uint{layout.code_bits}_t",
         "padding": layout.padding,
-        "narrow": layout.entry_bits == 8,
+        "biased": layout.biased,
+        "entry_type": layout.lookups[0].rows.dtype.name + "_t" if layout.lookups else "int16_t",
         "parts": len(layout.parts.firsts),
         "width": layout.parts.width,
         "n_rows": layout.n_rows,
+        "n_slopes": len(layout.tables.slopes),
     }
 
 
@@ -320,22 +382,19 @@ def _unsigned(most: int) -> str:
 
 
 def _source_values(names: Names, layout: Layout) -> dict[str, object]:
-    joints = [lookup for lookup in lookups(layout) if lookup.joint is not None]
-    searched = layout.bins == "search" and bool(joints)
-    bins = sum(len(_bins(lookup)) for lookup in joints)
-    steps = [step for lookup in joints for step in _steps(lookup)] if searched else []
+    searched = [joint for joint in layout.joints if joint.compared and len(joint.thresholds) > MOST_INLINE]
+    trimmed = [joint for joint in layout.joints if not joint.compared]
+    steps = [step for joint in searched for step in joint.thresholds.tolist()]
     means = layout.means
     return {
         "table": table_lines(layout, names),
-        "bins": [line for lookup in joints if bins for line in _bin_lines(names, lookup)],
-        "n_bins": bins,
-        "paged": layout.bins == "direct" and bool(joints),
-        "clamped": layout.bins == "trimmed" and bool(joints),
-        "searched": searched,
+        "bins": [line for joint in trimmed for line in _bin_lines(names, joint)],
+        "n_bins": sum(len(joint.bins) for joint in trimmed),
+        "paged": layout.bins == "direct" and bool(trimmed),
+        "clamped": (layout.bins == "trimmed" and bool(trimmed)) or bool(layout.tables.slopes),
+        "compared": bool(searched),
         "thresholds": number_lines(steps),
         "n_thresholds": len(steps),
-        "found": joints if searched else [],
-        "n_found": len(joints),
         "means": _mean_lines(means),
         "mean_type": "int8_t" if layout.narrow_means else "int16_t",
         "n_inputs": len(means),
@@ -350,19 +409,10 @@ def _source_values(names: Names, layout: Layout) -> dict[str, object]:
     }
 
 
-def _bins(lookup: Lookup) -> list[int]:
-    return [] if lookup.joint is None else lookup.joint.bins.tolist()
-
-
-def _bin_lines(names: Names, lookup: Lookup) -> list[str]:
-    """Return the rows of a joint's codes as lines, and before them whose they are."""
-    first = 0 if lookup.joint is None else lookup.joint.first
-    name = names.joints[lookup.number].name
-    return [*remark(comment(f"{name}, from code {first} on")), *number_lines(_bins(lookup))]
-
-
-def _steps(lookup: Lookup) -> list[int]:
-    return [] if lookup.joint is None else lookup.joint.thresholds.tolist()
+def _bin_lines(names: Names, joint: JointLayout) -> list[str]:
+    """Return what a joint's codes add to the number of a row as lines, and before them whose they are."""
+    name = names.joints[joint.number].name
+    return [*remark(comment(f"{name}, from code {joint.first} on")), *number_lines(joint.bins.tolist())]
 
 
 def _mean_lines(means: NDArray[np.int64]) -> list[str]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from .layout import Layout
+    from .layout import JointLayout, Layout
 
 Unit = Literal["cycles", "instructions", ""]
 
@@ -40,7 +40,7 @@ class Cost:
 class Core:
     """Instructions of a class, and how many more where classes are added up in parts; of a look-up; in each part of a
     look-up, of a word of two 16-bit entries, and of a word of four 8-bit entries; in update() of a word of two or of
-    four that is replaced.
+    four that is replaced; of a word of two sums that a slope adds to.
     """
 
     a_class: int
@@ -51,6 +51,7 @@ class Core:
     quad: int
     replaced_pair: int
     replaced_quad: int
+    product: int = 2
 
 
 CORTEX_M4 = Core(a_class=11, in_parts=2, lookup=5, part=3, pair=2, quad=5, replaced_pair=5, replaced_quad=16)
@@ -58,32 +59,53 @@ CORTEX_M4 = Core(a_class=11, in_parts=2, lookup=5, part=3, pair=2, quad=5, repla
 
 
 _REPLACING = 17  # a row in update(), but for its words
-# More than for a code that is looked up directly: a byte clamped below and above, where it can lie there; a code of 16
-# bits clamped; a code searched, and each step of the search.
-_BELOW, _ABOVE, _WIDE = 4, 6, 13
+# A joint in a look-up; more than for a code that is looked up directly: a threshold that is compared; a byte clamped
+# below and above, where it can lie there; a code of 16 bits clamped; a code searched, and each step of the search.
+_FOUND, _COMPARED, _BELOW, _ABOVE, _WIDE = 5, 3, 4, 6, 13
 _SEARCHED, _SEARCH_STEP = 6, 14
+MOST_INLINE = 8  # thresholds are compared one by one; where there are more, they are searched
+# The distance of a code, and how much more in update(); in each part all but the products; and of each word of sums,
+# at the end and where entries are upper halves.
+_DISTANCE, _MOVED, _MULTIPLYING, _WORD, _HALVES = 14, 5, 17, 2, 8
 
 # Of code; where classes are added up in parts, that takes more.
-_BYTES, _BYTES_PARTS, _BYTES_LOOKUP, _BYTES_CLASS, _BYTES_PAIR, _BYTES_QUAD = 150, 250, 21, 13, 55, 111
+_BYTES, _BYTES_PARTS, _BYTES_LOOKUP, _BYTES_CLASS = 150, 250, 18, 13
+_BYTES_WORD, _BYTES_QUAD, _BYTES_START = 6, 16, 40
 _BYTES_UPDATE, _BYTES_UPDATE_PAIR, _BYTES_UPDATE_QUAD = 185, 9, 46
-_BYTES_CLAMPED, _BYTES_SEARCHED = 26, 52
-# Of what replaces missing inputs, beside the table of their means.
+_BYTES_JOINT, _BYTES_CLAMPED, _BYTES_COMPARED, _BYTES_SEARCHED = 8, 24, 10, 12
+_BYTES_SEARCH = 60
+_BYTES_MULTIPLYING, _BYTES_PRODUCT, _BYTES_DISTANCE = 150, 30, 24
+# Of what replaces missing inputs, beside the table of their means; instructions that take a field of a port's byte, and
+# that see that nothing is missing.
 _BYTES_LOSING, _FIELD, _MISSING = 290, 3, 3
 _STACK = 128
 
 
 def word_cost(layout: "Layout", core: Core) -> Cost:
     """Return what the portable C takes on a core, roughly."""
-    rows, classes, wide = len(layout.parts.firsts), layout.tables.n_classes, layout.entry_bits == 16
-    words, finding = _words(layout), _finding(layout)
-    adding = rows * (core.part + words * (core.pair if wide else core.quad))
-    replacing = _REPLACING + rows * words * (core.replaced_pair if wide else core.replaced_quad)
-    answering = (core.a_class + (core.in_parts if rows > 1 else 0)) * classes + finding
-    classify, update = (layout.n_lookups * (core.lookup + each) + answering for each in (adding, replacing))
+    parts, classes = len(layout.parts.firsts), layout.tables.n_classes
+    words, finding = _words(layout), sum(_finding(layout, joint) for joint in layout.joints)
+    finding += _MISSING + _FIELD * sum(map(len, layout.fields))
+    word, replaced = (core.quad, core.replaced_quad) if layout.biased else (core.pair, core.replaced_pair)
+    adding = parts * (core.part + words * word)
+    replacing = _REPLACING + parts * words * replaced
+    answering = (core.a_class + (core.in_parts if parts > 1 else 0)) * classes + finding
+    classify, update = (len(layout.lookups) * (core.lookup + each) + answering for each in (adding, replacing))
+    multiplying, slopes = _multiplying(layout, core), len(layout.tables.slopes)
+    classify, update = classify + multiplying, update + multiplying + _MOVED * slopes
     flash = _flash(layout) + NAME_BYTES * (classes + 1)
-    update_flash = _BYTES_UPDATE + words * (_BYTES_UPDATE_PAIR if wide else _BYTES_UPDATE_QUAD)
+    update_flash = _BYTES_UPDATE + words * (_BYTES_UPDATE_QUAD if layout.biased else _BYTES_UPDATE_PAIR)
     losing = _BYTES_LOSING + layout.means.size * (1 if layout.narrow_means else 2)
     return Cost(classify, update, flash + update_flash + losing, flash, _ram(layout))
+
+
+def _multiplying(layout: "Layout", core: Core) -> int:
+    """Return the instructions that slopes take."""
+    slopes, parts = len(layout.tables.slopes), layout.parts
+    if not slopes:
+        return 0
+    word = slopes * core.product + _WORD + (core.product + _HALVES if layout.entry_shift else 0)
+    return slopes * _DISTANCE + len(parts.firsts) * (_MULTIPLYING + -(-parts.width // 2) * word)
 
 
 def _words(layout: "Layout") -> int:
@@ -91,48 +113,54 @@ def _words(layout: "Layout") -> int:
     return -(-layout.parts.width * layout.entry_bits // 32)
 
 
-def _finding(layout: "Layout") -> int:
-    """Return the instructions that finding rows takes beyond those of a direct look-up of whole bytes."""
-    return _MISSING + _FIELD * sum(map(len, layout.fields)) + _finding_joints(layout)
-
-
-def _finding_joints(layout: "Layout") -> int:
-    joints = [joint for joint in layout.joints if not joint.constant]
-    match layout.bins:
-        case "direct":
-            return 0
-        case "trimmed":
-            if layout.code_bits == 16:
-                return _WIDE * len(joints)
-            above = sum(joint.first + len(joint.bins) <= 255 for joint in joints)
-            return _BELOW * sum(joint.first > 0 for joint in joints) + _ABOVE * above
-        case "search":
-            return sum(_SEARCHED + _SEARCH_STEP * len(joint.thresholds).bit_length() for joint in joints)
+def _finding(layout: "Layout", joint: "JointLayout") -> int:
+    """Return the instructions that a joint takes in finding a row."""
+    if joint.compared:
+        steps = len(joint.thresholds)
+        return _FOUND + (_COMPARED * steps if steps <= MOST_INLINE else _SEARCHED + _SEARCH_STEP * steps.bit_length())
+    if len(joint.bins) == 1 << layout.code_bits:
+        return _FOUND
+    if layout.code_bits == 16:
+        return _FOUND + _WIDE
+    above = joint.first + len(joint.bins) <= 255
+    return _FOUND + _BELOW * (joint.first > 0) + _ABOVE * above
 
 
 def _flash(layout: "Layout") -> int:
     """Return the bytes of tables and code, update() left out, at most, roughly; the names of the grasp types come on
     top.
     """
-    parts, words = layout.parts, _words(layout)
-    joints = [joint for joint in layout.joints if not joint.constant]
-    found = sum(len(joint.bins) for joint in joints)
-    finding = {"direct": 0, "trimmed": _BYTES_CLAMPED, "search": _BYTES_SEARCHED}[layout.bins]
-    if layout.bins == "search":
-        found = sum(len(joint.thresholds) for joint in joints) * layout.code_bits // 8
-    rows = 4 * layout.n_rows * words * len(parts.firsts)
+    parts, words, lookups = layout.parts, _words(layout), len(layout.lookups)
+    rows = 4 * layout.n_rows * words * len(parts.firsts) + sum(len(joint.bins) for joint in layout.joints)
     places = layout.tables.n_switches * (2 if len(layout.ports) <= 255 else 4)
     starts = 2 * len(parts.firsts) * (2 * parts.width + 8)  # of the sums, constant and as they are in the beginning
-    starts += 2 * layout.tables.n_classes + 4 * layout.n_lookups  # scores, and rows added, in the beginning
+    starts += 2 * layout.tables.n_classes + 4 * lookups  # scores, and rows added, in the beginning
     code = _BYTES + (_BYTES_PARTS if len(parts.firsts) > 1 else 0) + _BYTES_CLASS * parts.width
-    code += _BYTES_LOOKUP * layout.n_lookups + words * (_BYTES_PAIR if layout.entry_bits == 16 else _BYTES_QUAD)
-    return rows + found + places + starts + code + finding * len(joints)
+    code += (_BYTES_LOOKUP + words * (_BYTES_QUAD if layout.biased else _BYTES_WORD)) * lookups + _BYTES_START * words
+    searched = any(joint.compared and len(joint.thresholds) > MOST_INLINE for joint in layout.joints)
+    code += _BYTES_SEARCH * searched
+    if slopes := len(layout.tables.slopes):
+        lanes = -(-parts.width // 2)
+        code += _BYTES_MULTIPLYING + _BYTES_PRODUCT * lanes + _BYTES_DISTANCE * slopes
+        starts += slopes * (2 + 4 * lanes * len(parts.firsts))
+    return rows + places + starts + code + sum(_joint_flash(layout, joint) for joint in layout.joints)
+
+
+def _joint_flash(layout: "Layout", joint: "JointLayout") -> int:
+    """Return the bytes of code for a joint, its thresholds included."""
+    steps = len(joint.thresholds)
+    if not joint.compared:
+        return _BYTES_JOINT + (0 if len(joint.bins) == 1 << layout.code_bits else _BYTES_CLAMPED)
+    if steps <= MOST_INLINE:
+        return _BYTES_JOINT + _BYTES_COMPARED * steps
+    return _BYTES_JOINT + _BYTES_SEARCHED + steps * layout.code_bits // 8
 
 
 def _ram(layout: "Layout") -> int:
     """Return the bytes of variables and stack, roughly."""
     classes = layout.tables.n_classes
-    frame = len(layout.ports) + layout.padding + layout.tables.n_joints * layout.code_bits // 8
     lost = len(layout.ports) + -(-layout.tables.n_joints // 8) + 4
-    rows = 2 * 4 * layout.n_lookups  # pointers to those added, and in update() to those that are now
-    return frame + 2 * classes + 4 * (classes + 6) + lost + rows + _STACK
+    frame = len(layout.ports) + layout.padding + layout.tables.n_joints * layout.code_bits // 8
+    rows = 2 * 4 * len(layout.lookups)  # pointers to those added, and in update() to those that are now
+    slopes = 4 * len(layout.tables.slopes)  # distances added, and in update() those that are now
+    return frame + 2 * classes + 4 * (classes + 6) + lost + rows + slopes + _STACK

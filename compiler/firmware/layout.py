@@ -1,17 +1,23 @@
 """How a build's integer tables lie in a microcontroller's flash: which switches share a look-up, how wide an entry is,
 how a joint's code becomes a row.
 
-    score_k = start_k + sum over groups g of group_rows[g][byte_g, k] + sum over joints a of joints[a].rows[bin_a, k]
+    score_k = start_k + sum over look-ups l of rows_l[n_l, k] + sum over slopes of distance * row[k]
 
-where byte_g holds one bit per switch of group g. A frame holds the switches as they come, a byte for each port: eight
-wires of an expander, eight keys of a matrix, or eight kept switches in their order. A group is a field of one such
-byte, or put together from fields of several. Every row of a group is the exact sum of its switches' rows, so the
-scores are those of `IntegerTables`, bit for bit. With 16-bit entries row 0 of a group is zero, so that one switch's
-change is plus or minus row 2^bit. With 8-bit entries every entry is what exceeds the least of its look-up and class,
-0 to 255; the leasts are part of `start`.
+where n_l is the byte of a group of switches, one bit per switch, or is added up from the codes of one or a few joints,
+or both. A frame holds the switches as they come, a byte for each port: eight wires of an expander, eight keys of a
+matrix, or eight kept switches in their order; a group is put together from fields of such bytes. Every row is the exact
+sum of its switches' and joints' rows, so the scores are those of `IntegerTables`, bit for bit. There are three kinds of
+entries:
+
+    16 bits, added up in 16. They wrap around at will, for all scores fit; row 0 of a group of switches is zero, so that
+             one switch's change is plus or minus row 2^bit.
+    8 bits,  added up in 8, just so, where the proved bound of all scores is at most 127.
+    8 bits,  added up in 16, where it is not: entries are what exceeds the least of their look-up and class, 0 to 255;
+             the leasts are part of `start`. Where tables have slopes and all these are multiples of 256 (`grid`),
+             entries are of their upper halves.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
@@ -21,11 +27,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.scanning.scanmap import ScanMap
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.tables import COARSE, IntegerTables
 
 from . import FirmwareError
+from .costs import MOST_INLINE
 
 MOST_ROWS = 256  # a bin is one byte
+MOST_BYTE = 127  # the largest bound of scores that are added up in a byte
 MOST_BINS = 256  # and so is what is left of a code when the first of a joint's bins is taken from it
 
 Bins = Literal["direct", "trimmed", "search"]
@@ -34,50 +42,68 @@ Rows = NDArray[np.integer]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointLayout:
-    """A joint's rows (m, K), as stored, and the bytes `bins` (n,) that say which row a code takes.
+    """Joint `number`, and what its code adds to the number of a look-up's row: `weight` times the number of thresholds
+    that are not below the code, so that the highest codes add nothing.
 
-    "direct": bins[code] for all 256 codes. "trimmed": bins[clamped code - first] from the first threshold, where codes
-    still take row 0, to one beyond the last, where they take the last row. "search": no bins; the row is the number of
-    thresholds (m - 1,) uint16 below the code.
+    "direct": bins[code] for all 256 codes. "trimmed": bins[clamped code - first] from the first threshold to one beyond
+    the last. Both hold uint8 (n,) with the weight in them. "search": no bins, the thresholds are compared; and so are
+    few of them in "trimmed", where that is faster. Bins begin at byte `first_bin` of all bins, thresholds at
+    `first_step` of all that are compared.
     """
 
+    number: int
+    weight: int
+    thresholds: NDArray[np.uint16]
     first: int
     bins: NDArray[np.uint8]
-    rows: Rows
-    thresholds: NDArray[np.uint16]
+    first_bin: int
+    first_step: int
 
     @property
-    def constant(self) -> bool:
-        """Whether all codes take the same row, which is then zero: it is part of the layout's start."""
-        return len(self.thresholds) == 0
+    def compared(self) -> bool:
+        """Whether thresholds are compared with the code."""
+        return len(self.bins) == 0
 
-    def bin_of(self, codes: NDArray[np.uint16]) -> NDArray[np.int64]:
-        """Return the row (n,) of each code (n,), found in the way that the firmware finds it."""
-        if len(self.bins) == 0:
-            return np.searchsorted(self.thresholds, codes, side="left").astype(np.int64)
+    @property
+    def most(self) -> int:
+        """What code 0 adds, and no code more."""
+        return self.weight * len(self.thresholds)
+
+    def places(self, codes: NDArray[np.uint16]) -> NDArray[np.int64]:
+        """Return what each code (n,) adds, found in the way that the firmware finds it."""
+        if self.compared:
+            return self.weight * (len(self.thresholds) - np.searchsorted(self.thresholds, codes)).astype(np.int64)
         held = np.clip(codes.astype(np.int64), self.first, self.first + len(self.bins) - 1)
         return self.bins[held - self.first].astype(np.int64)
 
 
-def joint_layout(thresholds: NDArray[np.uint16], rows: Rows, bins: Bins) -> JointLayout:
-    """Return the layout of a joint whose stored rows are `rows` (T + 1, K)."""
+# Up to so many thresholds of a byte are compared no slower than a code is clamped and looked up, and in less flash.
+_COMPARED = 6
+
+
+def _bins(thresholds: NDArray[np.uint16], weight: int, bins: Bins, code_bits: int) -> tuple[int, NDArray[np.uint8]]:
+    """Return the first code of a joint's bins, and the bins."""
     first, last = 0, 255
     if bins == "trimmed":
-        first, last = (int(thresholds[0]), int(thresholds[-1]) + 1) if len(thresholds) else (0, 0)
+        first, last = int(thresholds[0]), int(thresholds[-1]) + 1
+        if code_bits == 8 and len(thresholds) <= _COMPARED:
+            bins = "search"
     codes = np.arange(first, last + 1) if bins != "search" else np.arange(0)
-    return JointLayout(first, np.searchsorted(thresholds, codes, side="left").astype(np.uint8), rows, thresholds)
+    places = weight * (len(thresholds) - np.searchsorted(thresholds, codes))
+    return first, places.astype(np.uint8)
 
 
-def code_bits(thresholds: Sequence[NDArray[np.uint16]]) -> int:
-    """Return the width of the codes, 8 where no joint's thresholds tell codes above 254 apart, else 16."""
-    return 16 if any(len(steps) and steps[-1] >= 255 for steps in thresholds) else 8
+def code_bits(tables: IntegerTables) -> int:
+    """Return the width of the codes, 8 where no joint's thresholds or slope tell codes above 254 apart, else 16."""
+    last = [int(steps[-1]) + 1 for steps in tables.thresholds if len(steps)] + [slope.high for slope in tables.slopes]
+    return 16 if any(code > 255 for code in last) else 8
 
 
-def check_joints(thresholds: Sequence[NDArray[np.uint16]], bins: Bins) -> None:
+def check_joints(tables: IntegerTables, bins: Bins) -> None:
     """Raise FirmwareError if a joint's rows are more than a byte can number, or cannot be found by `bins`."""
-    if bins == "direct" and code_bits(thresholds) == 16:
+    if bins == "direct" and code_bits(tables) == 16:
         raise FirmwareError('codes have 16 bits: their rows are found by "trimmed" or "search", not "direct"')
-    for number, steps in enumerate(thresholds):
+    for number, steps in enumerate(tables.thresholds):
         if len(steps) + 1 > MOST_ROWS:
             raise FirmwareError(
                 f"joint {number} has {len(steps) + 1} rows, firmware has at most {MOST_ROWS} a joint: "
@@ -128,13 +154,11 @@ class Field:
 
 
 SMALLEST_GROUP, LARGEST_GROUP = 2, 6
-MOST_MEAN = 127
 MOST_TABLE_ROWS = 65535  # their numbers are 16 bits wide
 
 Adding = Literal["called", "unrolled"]
 
-
-MOST_CLASSES = 14  # of a pass: an AVR has registers for fourteen sums of 16 bits
+_REGISTERS = 28  # that an AVR has for sums
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,35 +169,61 @@ class Parts:
     firsts: tuple[int, ...]
 
 
-def parts_of(n_classes: int) -> Parts:
-    """Return the fewest parts of equal width, at most 14, that cover `n_classes`."""
-    count = -(-n_classes // MOST_CLASSES)
+def parts_of(n_classes: int, sum_bits: int = 16) -> Parts:
+    """Return the fewest parts of equal width that cover `n_classes`: an AVR has 28 registers for their sums."""
+    most = _REGISTERS * 8 // sum_bits
+    count = -(-n_classes // most)
     width = -(-n_classes // count)
     return Parts(width, tuple(min(part * width, n_classes - width) for part in range(count)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lookup:
+    """One row added per frame, of `rows` (m, K), which begin at row `first_row` of the table.
+
+    Its number is the byte of the group of switches `group`, if there is one, plus what the codes of `joints` add.
+    """
+
+    index: int
+    first_row: int
+    rows: Rows
+    group: int | None
+    joints: tuple[JointLayout, ...]
+
+    @property
+    def zero_row(self) -> int:
+        """The number of the row that is added while all switches are open and all codes are 0."""
+        return sum(joint.most for joint in self.joints)
 
 
 @dataclass(frozen=True, eq=False)
 class Layout:
     """An arrangement of `tables` for K classes, s switches and j joints, each switch in one of `ports`.
 
-    groups[g] are the numbers of the switches that share look-up g, bit 0 first; group_rows[g] are its rows
-    (2^len(groups[g]), K), int16 or uint8 as `entry_bits` says; joints (j) likewise; start (K,) int64.
+    groups[g] are the numbers of the switches of a group, bit 0 first; rows of look-ups are int16,
+    uint8 or int8, as entry_bits and sum_bits say; code_bits as the function of that name says; start (K,) int64.
     """
 
     tables: IntegerTables
     ports: Ports
     groups: tuple[tuple[int, ...], ...]
     entry_bits: int
+    sum_bits: int
+    code_bits: int
     bins: Bins
     adding: Adding
     start: NDArray[np.int64]
-    group_rows: tuple[Rows, ...]
-    joints: tuple[JointLayout, ...]
+    lookups: tuple[Lookup, ...]
 
     @property
-    def code_bits(self) -> int:
-        """Width of a joint's code: 8 where no threshold tells codes above 254 apart, else 16."""
-        return code_bits(self.tables.thresholds)
+    def biased(self) -> bool:
+        """Whether entries are what exceeds the least of their look-up and class."""
+        return self.entry_bits < self.sum_bits
+
+    @property
+    def entry_shift(self) -> int:
+        """How far entries are shifted before they are added: 8 where they are upper halves, else 0."""
+        return 8 if self.entry_bits == 8 and self.tables.grid == COARSE else 0
 
     @property
     def padding(self) -> int:
@@ -183,27 +233,26 @@ class Layout:
     @property
     def frame_size(self) -> int:
         """Bytes of a frame as `frame_bytes` makes them."""
-        return len(self.ports) + self.padding + len(self.joints) * self.code_bits // 8
+        return len(self.ports) + self.padding + self.tables.n_joints * self.code_bits // 8
 
     @property
     def parts(self) -> Parts:
         """How the classes are divided among passes."""
-        return parts_of(self.tables.n_classes)
+        return parts_of(self.tables.n_classes, self.sum_bits)
 
     @property
-    def n_lookups(self) -> int:
-        """Rows added per frame: one per group and one per joint that has thresholds."""
-        return len(self.groups) + sum(not joint.constant for joint in self.joints)
+    def joints(self) -> tuple[JointLayout, ...]:
+        """The joints that have thresholds, in the order of their bins; the others are part of the start."""
+        return tuple(joint for lookup in self.lookups for joint in lookup.joints)
 
     @property
     def n_rows(self) -> int:
-        """Rows of all look-ups together; a constant joint's is in none."""
-        looked_up = [joint.rows for joint in self.joints if not joint.constant]
-        return sum(len(rows) for rows in [*self.group_rows, *looked_up])
+        """Rows of all look-ups together."""
+        return sum(len(lookup.rows) for lookup in self.lookups)
 
     @property
     def all_open(self) -> NDArray[np.int64]:
-        """The scores (K,) of the frame in which every look-up takes its row 0: all switches open, all codes 0."""
+        """The scores (K,) of the frame in which all switches are open and all codes 0."""
         nothing = np.zeros((1, self.tables.n_switches), bool), np.zeros((1, self.tables.n_joints), np.uint16)
         scores: NDArray[np.int64] = self.scores(*nothing)[0]
         return scores
@@ -236,6 +285,20 @@ class Layout:
             shown[:, port, bit] = bits[:, number]
         return np.packbits(shown, axis=2, bitorder="little")[:, :, 0]
 
+    @property
+    def means(self) -> NDArray[np.int64]:
+        """What each switch, then each joint, adds to the scores while it is missing, beyond what 0 adds: (s + j, K)."""
+        pairs = zip(self.tables.joint_means, self.tables.joint_rows, strict=True)
+        joints = [mean.astype(np.int64) - rows[0] for mean, rows in pairs]
+        for slope in self.tables.slopes:
+            joints[slope.joint] = joints[slope.joint] - slope.of(np.zeros(1, np.uint16))[0]
+        return np.vstack([self.tables.switch_means.astype(np.int64), *joints])
+
+    @property
+    def narrow_means(self) -> bool:
+        """Whether a byte holds each of the `means`."""
+        return bool((np.abs(self.means) <= MOST_BYTE).all())
+
     def group_bytes(self, bits: NDArray[np.bool_]) -> NDArray[np.uint8]:
         """Return the byte of each group (n, groups) for the switches (n, s)."""
         packed = np.zeros((len(bits), len(self.groups)), np.uint8)
@@ -243,26 +306,17 @@ class Layout:
             packed[:, g] = np.packbits(np.asarray(bits, bool)[:, numbers], axis=1, bitorder="little")[:, 0]
         return packed
 
-    @property
-    def means(self) -> NDArray[np.int64]:
-        """What each switch, then each joint, adds to the scores while it is missing, beyond its row 0: (s + j, K)."""
-        pairs = zip(self.tables.joint_means, self.tables.joint_rows, strict=True)
-        joints = [mean.astype(np.int64) - rows[0] for mean, rows in pairs]
-        return np.vstack([self.tables.switch_means.astype(np.int64), *joints])
-
-    @property
-    def narrow_means(self) -> bool:
-        """Whether a byte holds each of the `means`."""
-        return bool((np.abs(self.means) <= MOST_MEAN).all())
-
     def scores(self, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDArray[np.int64]:
         """Return the scores (n, K) of the switches (n, s) and codes (n, j), as the firmware adds them up."""
         scores = np.tile(self.start, (len(bits), 1))
-        for byte, rows in zip(self.group_bytes(bits).T, self.group_rows, strict=True):
-            scores += rows[byte]
-        for column, joint in zip(codes.T, self.joints, strict=True):
-            scores += joint.rows[joint.bin_of(column)]
-        return scores
+        groups = self.group_bytes(bits).astype(np.int64)
+        for lookup in self.lookups:
+            row = np.zeros(len(bits), np.int64) if lookup.group is None else groups[:, lookup.group]
+            row = sum((joint.places(codes[:, joint.number]) for joint in lookup.joints), row)
+            scores += lookup.rows[row].astype(np.int64) << self.entry_shift
+        for slope in self.tables.slopes:
+            scores += slope.of(codes[:, slope.joint])
+        return scores if self.sum_bits == 16 else scores.astype(np.int8).astype(np.int64)
 
     def frame_bytes(self, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDArray[np.uint8]:
         """Return what the firmware's input structure holds, (n, F): ports, padding, codes (little-endian).
@@ -277,6 +331,10 @@ class Layout:
         return np.hstack([self.port_bytes(bits), padding, held])
 
 
+Shared = tuple[int | None, tuple[int, ...]]
+"""A look-up: the number of a group of switches or None, and those of joints."""
+
+
 def arrange(
     tables: IntegerTables,
     *,
@@ -286,48 +344,70 @@ def arrange(
     entry_bits: int = 16,
     bins: Bins = "direct",
     adding: Adding = "called",
+    shared: Sequence[Shared] = (),
 ) -> Layout:
     """Return `tables` with the switches in groups of at most `group_size` (2 to 6), in the order of `ports`.
 
     There are as few groups as that size allows, or `n_groups` where given: more look-ups and less flash. They are as
     even as can be, and none is of two ports where as few can do without. Where no wiring is known, `ports` are left
-    out, and switches follow each other by number. Raises FirmwareError if the tables cannot be laid out so: 8-bit
-    entries for look-ups that span more than 255 steps, a joint with more than 256 rows, "direct" for codes of 16 bits,
-    "trimmed" for thresholds further apart than 254 codes, no inputs at all.
+    out, and switches follow each other by number. What `shared`
+    names shares look-ups; every other group, and every other joint that has thresholds, has one of its own. Raises
+    FirmwareError if the tables cannot be laid out so: 8-bit entries for look-ups that span more than 255 steps, more
+    than 256 rows in a look-up, "direct" for codes of 16 bits, "trimmed" for thresholds further apart than 254 codes, no
+    inputs at all.
     """
     if tables.n_switches + tables.n_joints == 0:
         raise FirmwareError("the build looks at no switch and no joint: there is nothing to make firmware of")
     if entry_bits not in (8, 16):
         raise FirmwareError(f"entries of {entry_bits} bits: firmware has 8 or 16")
-    check_joints(tables.thresholds, bins)
+    check_joints(tables, bins)
+    coarse = tables.grid if entry_bits == 8 else 1
     ports = consecutive(tables.n_switches) if ports is None else ports
     groups = _grouped(ports, group_size, n_groups)
-    sums = [_group_sums(tables.switch_rows[list(numbers)].astype(np.int64)) for numbers in groups]
-    wide_joints = [rows.astype(np.int64) for rows in tables.joint_rows]
-    leasts = [_least(rows, entry_bits, group=True) for rows in sums]
-    joint_leasts = [_least(rows, entry_bits, group=False) for rows in wide_joints]
-    layout = Layout(
-        tables=tables,
-        ports=ports,
-        groups=groups,
-        entry_bits=entry_bits,
-        bins=bins,
-        adding=adding,
-        start=sum([*leasts, *joint_leasts], tables.bias.astype(np.int64)),
-        group_rows=tuple(
-            _entries(rows - least, entry_bits, f"switch group {g}")
-            for g, (rows, least) in enumerate(zip(sums, leasts, strict=True))
-        ),
-        joints=tuple(
-            joint_layout(thresholds, _entries(rows - least, entry_bits, f"joint {a}"), bins)
-            for a, (thresholds, rows, least) in enumerate(
-                zip(tables.thresholds, wide_joints, joint_leasts, strict=True)
+    sum_bits = 8 if entry_bits == 8 and tables.bound <= MOST_BYTE and not tables.slopes else 16
+    constant = [joint for joint, steps in enumerate(tables.thresholds) if len(steps) == 0]
+    start = sum((tables.joint_rows[joint][0].astype(np.int64) for joint in constant), tables.bias.astype(np.int64))
+    wide = code_bits(tables)
+    made: list[Lookup] = []
+    first_row = first_bin = first_step = 0
+    for group, numbers in _all_shared(tables, len(groups), shared):
+        rows = np.zeros((1, tables.n_classes), np.int64) if group is None else _group_sums(tables, groups[group])
+        weight, joints = len(rows), []
+        for number in numbers:
+            steps = tables.thresholds[number]
+            first, held = _bins(steps, weight, bins, wide)
+            joints.append(JointLayout(number, weight, steps, first, held, first_bin, first_step))
+            first_bin, weight = first_bin + len(held), weight * (len(steps) + 1)
+            first_step += len(steps) if len(held) == 0 and len(steps) > MOST_INLINE else 0
+            falling = tables.joint_rows[number][::-1].astype(np.int64)
+            rows = (falling[:, np.newaxis] + rows).reshape(-1, tables.n_classes)
+        if len(rows) > MOST_ROWS:
+            raise FirmwareError(f"a look-up of {len(rows)} rows: firmware has at most {MOST_ROWS}")
+        what = f"the look-up of switch group {group}" if group is not None else "the look-up of joints"
+        what += f" {', '.join(map(str, numbers))}" if numbers else ""
+        least = rows.min(axis=0) if entry_bits < sum_bits else 0 * rows[0]
+        made.append(
+            Lookup(
+                len(made),
+                first_row,
+                _entries((rows - least) // coarse, entry_bits, sum_bits, what),
+                group,
+                tuple(joints),
             )
-        ),
-    )
-    if layout.n_rows > MOST_TABLE_ROWS:
-        raise FirmwareError(f"{layout.n_rows} rows: firmware has at most {MOST_TABLE_ROWS}; keep fewer inputs")
-    return layout
+        )
+        start, first_row = start + least, first_row + len(rows)
+    if first_row > MOST_TABLE_ROWS:
+        raise FirmwareError(f"{first_row} rows: firmware has at most {MOST_TABLE_ROWS}; keep fewer inputs")
+    return Layout(tables, ports, groups, entry_bits, sum_bits, wide, bins, adding, start, tuple(made))
+
+
+def _all_shared(tables: IntegerTables, n_groups: int, shared: Sequence[Shared]) -> list[Shared]:
+    """Return all look-ups: `shared`, every other group and every other joint with thresholds, groups first."""
+    taken = {group for group, _ in shared}
+    placed = {joint for _, joints in shared for joint in joints}
+    alone: list[Shared] = [(group, ()) for group in range(n_groups) if group not in taken]
+    alone += [(None, (joint,)) for joint, steps in enumerate(tables.thresholds) if len(steps) and joint not in placed]
+    return sorted([*alone, *shared], key=lambda lookup: (lookup[0] is None, lookup[0] or 0, lookup[1]))
 
 
 def _grouped(ports: Ports, group_size: int, n_groups: int | None) -> tuple[tuple[int, ...], ...]:
@@ -347,55 +427,21 @@ def _even(numbers: Sequence[int], count: int) -> list[tuple[int, ...]]:
     return [tuple(part.tolist()) for part in np.array_split(np.asarray(numbers, int), count)] if count else []
 
 
-def _group_sums(rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the sum of every subset of rows (n, K), in the order of the bytes that say which: (2^n, K)."""
-    sums = np.zeros((1, rows.shape[1]), np.int64)
-    for row in rows:
-        sums = np.vstack([sums, sums + row])
+def _group_sums(tables: IntegerTables, numbers: Sequence[int]) -> NDArray[np.int64]:
+    """Return the sum of the rows of every subset of switches, in the order of the bytes that say which: (2^n, K)."""
+    sums = np.zeros((1, tables.n_classes), np.int64)
+    for number in numbers:
+        sums = np.vstack([sums, sums + tables.switch_rows[number]])
     return sums
 
 
-def _least(rows: NDArray[np.int64], entry_bits: int, *, group: bool) -> NDArray[np.int64]:
-    """Return what the look-up always adds, (K,). A 16-bit group's is nothing: its row 0 stays zero."""
-    folded = entry_bits == 8 or (not group and len(rows) == 1)
-    return np.asarray(rows.min(axis=0) if folded else 0 * rows[0])
-
-
-def _entries(rows: NDArray[np.int64], entry_bits: int, what: str) -> Rows:
+def _entries(rows: NDArray[np.int64], entry_bits: int, sum_bits: int, what: str) -> Rows:
     if entry_bits == 16:
         return rows.astype(np.int16)
+    if sum_bits == 8:
+        return rows.astype(np.int8)
     if rows.max() > 255:
         raise FirmwareError(
             f"{what} spans {rows.max()} steps, an 8-bit entry holds 255: compile the build with --table-bits 8"
         )
     return rows.astype(np.uint8)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Lookup:
-    """One row added per frame.
-
-    `index` counts the look-ups, `number` the groups or, where `joint` is given, all joints; the rows begin at row
-    `first_row` of the table, and a joint's bins at byte `first_bin` of the bins, or its thresholds at that threshold.
-    """
-
-    index: int
-    number: int
-    first_row: int
-    rows: Rows
-    joint: JointLayout | None = None
-    first_bin: int = 0
-
-
-def lookups(layout: Layout) -> Iterator[Lookup]:
-    """Yield the groups of switches and then the joints that have thresholds."""
-    index = first_row = first_bin = 0
-    for number, rows in enumerate(layout.group_rows):
-        yield Lookup(index, number, first_row, rows)
-        index, first_row = index + 1, first_row + len(rows)
-    for number, joint in enumerate(layout.joints):
-        if joint.constant:
-            continue
-        yield Lookup(index, number, first_row, joint.rows, joint, first_bin)
-        index, first_row = index + 1, first_row + len(joint.rows)
-        first_bin += len(joint.thresholds) if layout.bins == "search" else len(joint.bins)

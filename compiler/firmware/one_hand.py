@@ -31,21 +31,23 @@ def on_bytes(tables: IntegerTables, codes: Sequence[Sequence[int]]) -> IntegerTa
     """
     if [len(joint) for joint in codes] != [BYTES] * tables.n_joints:
         raise FirmwareError(f"codes of {BYTES} bytes are needed for each of {tables.n_joints} joints")
-    pairs = [
-        _joint(thresholds, rows, np.asarray(joint, np.uint16))
-        for thresholds, rows, joint in zip(tables.thresholds, tables.joint_rows, codes, strict=True)
-    ]
+    # A slope stays one where bytes are codes; elsewhere each byte has the row of its code.
+    kept = tuple(slope for slope in tables.slopes if np.array_equal(codes[slope.joint], np.arange(BYTES)))
+    of_bytes = replace(tables, slopes=tuple(slope for slope in tables.slopes if slope not in kept))
+    pairs = [_joint(of_bytes, number, np.asarray(joint, np.uint16)) for number, joint in enumerate(codes)]
     return replace(
         tables,
         thresholds=tuple(thresholds for thresholds, _ in pairs),
         joint_rows=tuple(rows for _, rows in pairs),
+        slopes=kept,
     )
 
 
 def _joint(
-    thresholds: NDArray[np.uint16], rows: NDArray[np.int16], codes: NDArray[np.uint16]
+    tables: IntegerTables, joint: int, codes: NDArray[np.uint16]
 ) -> tuple[NDArray[np.uint16], NDArray[np.int16]]:
     """Return thresholds and rows of one joint: a threshold after each byte whose successor falls into another bin."""
+    thresholds, rows = tables.binned(joint)
     bins = np.searchsorted(thresholds, codes)
     last = np.flatnonzero(bins[1:] != bins[:-1])
     return last.astype(np.uint16), rows[bins[np.concatenate([last, [BYTES - 1]])]]

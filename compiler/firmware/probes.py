@@ -18,7 +18,7 @@ from thenar.runtime.tables import IntegerTables
 
 from . import FirmwareError
 from .costs import Unit
-from .layout import Layout
+from .layout import Layout, code_bits
 from .words import string
 
 Frames = NDArray[np.uint8]
@@ -102,7 +102,7 @@ def record_files(
         places=[f"{{{port}, {bit}}}" for port, bit in layout.places] if answer == "update" else [],
         switches=layout.tables.n_switches,
         padding=layout.padding,
-        joints=len(layout.joints),
+        joints=layout.tables.n_joints,
         code_bytes=layout.code_bits // 8,
         frame_bytes=layout.frame_size + (_lost_bytes(layout) if lost else 0),
         answers=machine != "avr",
@@ -121,6 +121,7 @@ def with_lost(frames: Frames, lost: Lost | None) -> Frames:
 
 _BYTE, _WORD = 0xFF, 0xFFFF
 _CHANGING = 40
+_BETWEEN = 9  # codes of a slope, its ends included
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -197,15 +198,20 @@ def lost_inputs(tables: IntegerTables, n: int, seed: int) -> Lost:
 
 
 def turns(tables: IntegerTables, joint: int) -> NDArray[np.uint16]:
-    """Return, in order, 0, each threshold of a joint and the code after it, and the highest code."""
-    thresholds = tables.thresholds[joint].astype(np.int64)
-    codes = np.unique(np.concatenate([[0, _top(tables)], thresholds, thresholds + 1]))
+    """Return, in order, 0, each threshold of a joint and the code after it, and the highest code; and where it has a
+    slope, codes about its ends and some between.
+    """
+    thresholds, slope = tables.thresholds[joint].astype(np.int64), tables.slope_of(joint)
+    codes = np.concatenate([[0, _top(tables)], thresholds, thresholds + 1])
+    if slope is not None:
+        between = np.linspace(slope.low, slope.high, _BETWEEN).astype(np.int64)
+        codes = np.concatenate([codes, between, [abs(slope.low - 1), slope.low + 1, slope.high - 1, slope.high + 1]])
+    codes = np.unique(codes)
     return codes[codes <= _top(tables)].astype(np.uint16)
 
 
 def _top(tables: IntegerTables) -> int:
-    wide = any(len(thresholds) and thresholds[-1] >= _BYTE for thresholds in tables.thresholds)
-    return _WORD if wide else _BYTE
+    return _BYTE if code_bits(tables) == 8 else _WORD
 
 
 DRAWN = 16  # frames beside the two extreme ones

@@ -4,6 +4,7 @@ import hashlib
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib.metadata import version
 from typing import Protocol
 
@@ -55,6 +56,7 @@ class Numbered:
     thenar: str
 
 
+@lru_cache(maxsize=4)
 def numbered(tables: IntegerTables) -> Numbered:
     """Return names for tables alone: "type 0", "s0", "j0" and so on."""
     return Numbered(

@@ -1,19 +1,22 @@
 """From finalists to points: every way to build each of them, how each decides, and those that are on a front."""
 
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ..evaluation.luck import Draws
 from ..evaluation.rates import Rate
+from ..trainers.base import TRAINERS, Training
 from .equipment import NO_TIME
 from .finalists import Close
 from .latency import POLICIES
 from .points import DecisionKind, Latency, Point, Recipe, Scan, Time, front
 from .price import PricedTables, Wired
 from .screen import Screened
-from .search import Search, Shape
+from .search import Candidate, Shape
 from .survey import Cuts, Judged
 from .timing.classify_times import Classified
 
@@ -166,18 +169,32 @@ def _identity(design: Design) -> tuple[object, ...]:
 
 
 def points_of(
-    several: Sequence[Design], latencies: Latencies, luck: Mapping[Judged, float], names: Sequence[str], search: Search
+    several: Sequence[Design],
+    latencies: Latencies,
+    luck: Mapping[Judged, float],
+    names: Sequence[str],
+    training: Callable[[Candidate], Training],
 ) -> tuple[Point, ...]:
     """Return those that are on a front, numbered from the fastest frame on.
 
     luck   by how much the rate of each is to be corrected
     names  of all switches of the set
+    training  how a choice is trained
     """
     fronts = _fronts(several, latencies)
     ordered = sorted(several, key=lambda design: (design.frame.us, design.n_switches))
     found = [(design, kind) for design in ordered for kind in design.decisions if fronts[design, kind]]
     return tuple(
-        _point(number, design, kind, latencies[design, kind], luck[design.judged], fronts[design, kind], names, search)
+        _point(
+            number,
+            design,
+            kind,
+            latencies[design, kind],
+            luck[design.judged],
+            fronts[design, kind],
+            names,
+            training(design.close.screened.choice),
+        )
         for number, (design, kind) in enumerate(found, 1)
     )
 
@@ -201,6 +218,14 @@ def corrected(rate: Rate, luck: float) -> Rate:
     return replace(rate, mean=max(rate.mean - luck, 0.0), low=max(rate.low - luck, 0.0))
 
 
+def _trained(training: Training) -> dict[str, Any]:
+    """Return what the `Recipe` of a point says of the trainer, but for rounds."""
+    usual = {setting.name: setting.default for setting in TRAINERS.named(training.trainer).settings}
+    own = {name: value for name, value in training.settings.items() if value not in (usual[name], None)}
+    # A name that is equal to a default is left out if it is the very same string.
+    return {"trainer": sys.intern(training.trainer), "max_bins": own.pop("max_bins", None), "settings": own}
+
+
 def _point(
     number: int,
     design: Design,
@@ -209,7 +234,7 @@ def _point(
     luck: float,
     fronts: tuple[str, ...],
     names: Sequence[str],
-    search: Search,
+    training: Training,
 ) -> Point:
     wired, tabled, close = design.wired, design.tables.tabled, design.close
     choice = close.screened.choice
@@ -218,7 +243,7 @@ def _point(
         setting=Recipe(
             way=choice.way,
             inputs=choice.inputs,
-            rounds=tabled.rounds if search.staged else None,
+            rounds=tabled.rounds if TRAINERS.named(training.trainer).staged else None,
             width=tabled.shape.width,
             layout=design.classified.layout,
             scan=design.scan_kind,
@@ -226,7 +251,7 @@ def _point(
             wiring="" if wired is None else wired.wiring,
             clock_hz=0 if wired is None else wired.clock_hz,
             table_bits=tabled.shape.table_bits,
-            **search.trained,
+            **_trained(training),
         ),
         switches=tuple(names[column] for column in close.screened.columns),
         rate=corrected(design.judged.rate, luck),

@@ -12,7 +12,7 @@ from ..evaluation.rates import Rate
 from .points import STEP, By, front
 from .price import PricedTables, Tabled, price
 from .screen import Screened
-from .search import SHAPES, Candidate, Search, Shape
+from .search import NO_SWITCHES, SHAPES, Candidate, Search, Shape
 from .survey import Cuts, Judged, Survey, Tally
 
 # Of what the best recognises; the least gain that counts on a front of rates that were screened; what is level.
@@ -20,7 +20,9 @@ _USEFUL, _STEP, _LEVEL = 0.75, 0.003, 0.005
 # The share of errors below which fewer no longer count: a screening of some hundred rows cannot tell.
 _FEWEST = 0.002
 # Expected seconds of one core: of training twice, and of the layouts of all tables.
-PRICE_S = 4.0
+PRICE_S = 3.0
+# The stage that trains finalists in all folds but those of the screening.
+OTHERS = "finalists, other folds"
 # The share of the rows that more rounds than the paper's have to win in the first repeat.
 _DEEPER = 0.002
 
@@ -96,7 +98,9 @@ def _errors(one: Screened) -> float:
 
 
 def _different(screened: Sequence[Screened]) -> list[Screened]:
-    return list({(one.choice.inputs, frozenset(one.columns)): one for one in reversed(screened)}.values())[::-1]
+    return list(
+        {(replace(one.choice, way=NO_SWITCHES), *sorted(one.columns)): one for one in reversed(screened)}.values()
+    )[::-1]
 
 
 def look_closely(survey: Survey, chosen: Sequence[Screened]) -> tuple[Close, ...]:
@@ -105,14 +109,15 @@ def look_closely(survey: Survey, chosen: Sequence[Screened]) -> tuple[Close, ...
     All are trained to the last round in the folds of the first repeat; in the others, those that gain nothing by more
     rounds than the paper's hundred are trained for these alone.
     """
-    search, cuts, choices = survey.search, survey.cuts, [one.choice for one in chosen]
+    cuts, choices = survey.cuts, [one.choice for one in chosen]
+    searches = {choice: survey.search.alone(choice.trainer) for choice in choices}
+    typical = survey.typical(choices)
     survey.choose("finalists' placements", choices, cuts.others)
-    fits = survey.fit("finalists", choices, cuts.screening, search.stages, search.tabled, SHAPES)
+    survey.settle("finalists' settings", typical, cuts.others)
+    fits = survey.fit("finalists", choices, cuts.screening, lambda one: (searches[one].stages, searches[one].tabled))
     rows = len(cuts.trials)
-    depths = {choice: depth_of(search, [fits[choice, fold] for fold in cuts.screening], rows) for choice in choices}
-    for depth in dict.fromkeys(depths.values()):
-        alike = [choice for choice in choices if depths[choice] == depth]
-        fits |= survey.fit(further(depth), alike, cuts.others, depth.stages, depth.tabled, SHAPES)
+    depths = {one: depth_of(searches[one], [fits[one, fold] for fold in cuts.screening], rows) for one in choices}
+    fits |= survey.fit(OTHERS, choices, cuts.others, lambda one: (depths[one].stages, depths[one].tabled))
     judged = {
         choice: _judged(cuts, depth, {fold: fits[choice, fold] for fold in (*cuts.screening, *cuts.others)})
         for choice, depth in depths.items()
@@ -123,10 +128,10 @@ def look_closely(survey: Survey, chosen: Sequence[Screened]) -> tuple[Close, ...
             survey.inputs(one.choice.joints),
             tuple(survey.switch_names[column] for column in one.columns),
             one.columns,
-            tuple(dict.fromkeys([*worthwhile(judged[one.choice][1]), papers_tables(search)])),
-            search.training,
+            tuple(dict.fromkeys([*worthwhile(judged[one.choice][1]), papers_tables(searches[one.choice])])),
+            survey.training(one.choice),
             survey.equipment,
-            cuts.screening[0],
+            (cuts.screening[0], survey.training(one.choice, cuts.screening[0])),
         )
         for one in chosen
     ]
@@ -145,11 +150,6 @@ def papers_tables(search: Search) -> Tabled:
 def papers_depth(search: Search) -> Search:
     """Return the same search, of no more than the paper's hundred rounds."""
     return replace(search, rounds=min(100, search.rounds))
-
-
-def further(search: Search) -> str:
-    """Return the name of the stage that trains finalists as far as that in all folds but the first repeat's."""
-    return f"finalists, {search.stages[-1]} rounds"
 
 
 def depth_of(search: Search, fits: Sequence[Tally], rows: int) -> Search:

@@ -1,5 +1,6 @@
 """A frontier from recordings: everything is screened, what is near the front is looked at closely, and put together."""
 
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -14,6 +15,7 @@ import numpy as np
 from thenar.runtime.build import Build
 from thenar.runtime.errors import BuildError, HarnessError
 from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.manifest import PAPERS_TRAINER
 from thenar.runtime.names import list_names
 
 from ..evaluation.rates import Rate
@@ -28,15 +30,15 @@ from ..text import INDEPENDENT, sentence
 from .cache import Cache, Report, Store
 from .designs import Design, Latencies, best_designs, designs, lucks, points_of, with_whole_scans
 from .equipment import Equipment, equipment_for
-from .finalists import PRICE_S, Close, finalists, further, look_closely, papers_depth, papers_tables
+from .finalists import OTHERS, PRICE_S, Close, finalists, look_closely, papers_depth, papers_tables
 from .latency import Pace, latencies
 from .measure import TRIAL_S, measured
 from .plots import PICTURES, pictures
 from .points import SCHEMA, Frontier, FrontierError, Mark, Point, Tried, Way, frontier_to_bytes
 from .screen import QUICK_PRICE_S, Screened, screen
-from .search import SHAPES, Candidate, Search, available_inputs, curve_ways, ways
+from .search import Candidate, Search, available_inputs, curve_ways, ways
 from .stream import Stream, stream_of
-from .survey import Cuts, Survey, fit_s, path_s
+from .survey import Cuts, Survey, fit_s, path_s, settle_s
 from .timing.scan_times import joints_time, scan_times
 from .timing.wirings import wirings
 from .words import csv_bytes
@@ -263,16 +265,23 @@ def foreseen(survey: Survey) -> dict[str, float]:
     methods = [name for name in search.methods for _ in range(wired if METHODS[name].uses_joints else min(wired, 1))]
     choices = sum(len(ways(name, n_switches)) for name in search.methods) * wired + ("joints" in kinds)
     rivals = sum(len(curve_ways(name, n_switches)) for name in search.rivals)
-    last = min(search.finalists + _MARKED, choices)
+    trainers = [search.alone(name) for name in search.trainers]
+    settled = [each for each in trainers if len(each.candidates) > 1]
+    last = min(search.finalists + _MARKED, choices * len(trainers))
     few = papers_depth(search)
     return {
         "placements": sum(path_s(name, n) for name in methods for n in (rows, *train)),
         "rivals": sum(path_s(name, n) for name in search.rivals for n in train) if wired else 0.0,
-        "screening": (_DIFFERENT * choices + rivals) * sum(fit_s(search.screened, 0, n) for n in train),
-        "times": _DIFFERENT * choices * QUICK_PRICE_S,
+        "screening": _DIFFERENT
+        * choices
+        * sum(fit_s(each, ((each.screened,), ()), n) for each in trainers for n in train)
+        + rivals * sum(fit_s(search, ((search.screened,), ()), n) for n in train),
+        "settings": len(kinds) * sum(settle_s(each, n) for each in settled for n in (rows, *train)),
+        "finalists' settings": len(kinds) * sum(settle_s(each, n) for each in settled for n in more),
+        "times": _DIFFERENT * choices * len(trainers) * QUICK_PRICE_S,
         "finalists' placements": sum(path_s(name, n) for name in methods for n in more),
-        "finalists": last * sum(fit_s(search.stages[-1], len(search.tabled) * len(SHAPES), n) for n in train),
-        further(few): last * sum(fit_s(few.stages[-1], len(few.tabled) * len(SHAPES), n) for n in more),
+        "finalists": last * sum(fit_s(search, (search.stages, search.tabled), n) for n in train),
+        OTHERS: last * sum(fit_s(few, (few.stages, few.tabled), n) for n in more),
         "prices": last * PRICE_S,
         "simulations": last * _DESIGNS * TRIAL_S * simulated,
         "checks": _CHECKED * TRIAL_S * simulated,
@@ -288,13 +297,13 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
             f"no placement that was tried can be built for {survey.equipment.model.target}: name other --methods or "
             "another --target"
         )
-    named = choices_to_mark(n_switches, survey.n_joints)
+    named = choices_to_mark(n_switches, survey.n_joints, search.trainers[0])
     closes = look_closely(survey, finalists(screened, list(named), search.finalists))
     every = [design for close in closes for design in designs(close, survey.equipment.joints)]
     by_time, by_switches = best_designs(every)
     kept, checks, skipped = measured(with_whole_scans([*by_time, *by_switches]), survey.equipment, survey.cache)
     luck = lucks((by_time, by_switches), every, screened, survey.cuts, search.seed)
-    points = points_of(kept, _latencies(survey, stream, kept), luck, survey.switch_names, search)
+    points = points_of(kept, _latencies(survey, stream, kept), luck, survey.switch_names, survey.training)
     picked, tried = wanted.pick(points), _tried(screened, closes, search)
     claimed = [sentence(INDEPENDENT)] if survey.grasp_set.independent else []
     early = [_EARLY] if any(design.scan_kind == "early" for design in kept) else []
@@ -312,7 +321,7 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
         grasps=survey.samples.grasps,
         target=survey.equipment.model.target,
         folds=search.folds,
-        repeats=search.repeats,
+        repeats=len(survey.cuts.repeats),
         combinations=sum(len(design.decisions) for design in every) + len(tried),
         points=points,
         tried=tried,
@@ -340,7 +349,7 @@ def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latenc
             survey.columns(choice, fold),
             stream,
             tuple(Pace(design.tables.tabled, design.frame.us, design.decisions) for design in mine),
-            survey.search.training,
+            survey.training(choice, fold),
         )
         for choice, mine in grouped.items()
     ]
@@ -354,11 +363,19 @@ def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latenc
 
 def _tried(screened: Sequence[Screened], closes: Sequence[Close], search: Search) -> tuple[Tried, ...]:
     """Return everything that was screened, and the finalists after every stage of their training."""
-    first = [(one, search.screened, one.judged.rate) for one in screened]
+    searches = {name: search.alone(name) for name in search.trainers}
+    first = [(one, searches[one.choice.trainer].screened, one.judged.rate) for one in screened]
     then = [(close.screened, rounds, rate) for close in closes for rounds, rate in close.stages.items()]
-    staged = search.staged
     return tuple(
-        Tried(one.choice.way, one.choice.inputs, len(one.columns), rounds if staged else None, rate, one.frame_us)
+        Tried(
+            one.choice.way,
+            one.choice.inputs,
+            len(one.columns),
+            rounds if searches[one.choice.trainer].staged else None,
+            rate,
+            one.frame_us,
+            sys.intern(one.choice.trainer),
+        )
         for one, rounds, rate in (*first, *then)
     )
 
@@ -371,15 +388,16 @@ def _unheard(_done: int, _total: int) -> None:
 _PAPERS = (62.0,)
 
 
-def choices_to_mark(n_switches: int, n_joints: int) -> dict[Candidate, str]:
+def choices_to_mark(n_switches: int, n_joints: int, trainer: str = PAPERS_TRAINER) -> dict[Candidate, str]:
     """Return what to mark, with its name: the paper's placement and all switches, alone and with the joints."""
     if not n_switches:
         return {}
     marked = {Way(PAPERS, prune): f"paper, S = {prune:g}" for prune in _PAPERS}
     # Whichever method says so, to keep all of them is the same.
     marked[Way(BEST, float(n_switches))] = f"all of {n_switches}"
-    alone = {Candidate(way, "switches"): name for way, name in marked.items()}
-    return alone | ({Candidate(way, "both"): f"{name}, joints" for way, name in marked.items()} if n_joints else {})
+    alone = {Candidate(way, "switches", trainer): name for way, name in marked.items()}
+    with_joints = {Candidate(way, "both", trainer): f"{name}, joints" for way, name in marked.items()}
+    return alone | (with_joints if n_joints else {})
 
 
 def marks_of(named: dict[Candidate, str], closes: Sequence[Close], survey: Survey) -> tuple[Mark, ...]:

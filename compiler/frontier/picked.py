@@ -33,6 +33,8 @@ class Picked:
             "width": setting.width,
             "table_bits": setting.table_bits,
             "trainer": setting.trainer,
+            # What is not written is a default, and nothing of it is open any more.
+            **{own.name: own.default for own in TRAINERS[setting.trainer].settings},
             "max_bins": setting.max_bins,
             **setting.settings,
         }

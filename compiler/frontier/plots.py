@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -137,6 +138,8 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
 
     labels, spoken_of = Labels(axes), featured(frontier)
     _draw_tried(labels, tried)
+    if cost.front == "frame" and len(frontier.trainers) > 1:
+        _draw_trainers(labels, tried)
     if cost.is_time:
         _draw_best(labels, [(x, point.rate.mean) for x, point in points if cost.front in point.fronts], cost.best)
     _draw_ends(labels, ends)
@@ -155,7 +158,11 @@ def _draw(frontier: Frontier, cost: _Cost) -> "Figure":
     said = duration if cost.is_time else lambda _: ""
     labels.write(*(_loud_label(x, point, said(x)) for x, point in points if point is spoken_of))
     labels.write(*names, *(_mark_label(x, mark, said(x)) for x, mark in marks))
-    labels.write(*(_point_label(x, point, cost.words(point)) for x, point in points if point is not spoken_of))
+    several = len(frontier.trainers) > 1
+    for x, point in points:
+        if point is not spoken_of:
+            words = (cost.words(point), *([point.setting.trainer] if several else ()))
+            labels.write(_point_label(x, point, ", ".join(words) if words[0] else ""))
     return figure
 
 
@@ -251,6 +258,18 @@ def _draw_tried(labels: Labels, tried: Sequence[tuple[float, Tried]]) -> None:
     labels.axes.scatter([], [], s=_TRIED_SIZE, color=_GREY, alpha=0.6, lw=0, label="tried")
 
 
+def _draw_trainers(labels: Labels, tried: Sequence[tuple[float, Tried]]) -> None:
+    """Draw for each trainer the line of the best that was tried with it, not corrected for luck."""
+    for number, name in enumerate(dict.fromkeys(each.trainer for _, each in tried)):
+        places = [(x, each.rate.mean) for x, each in tried if each.trainer == name]
+        best = front(places, lambda place: place[0], lambda place: place[1])
+        xs, ys = [*(x for x, _ in best), labels.axes.get_xlim()[1]], [*(y for _, y in best), best[-1][1]]
+        colour, dash = _RIVALS[number % len(_RIVALS)], _DASHES[1 + number % (len(_DASHES) - 1)]
+        labels.axes.step(xs, ys, where="post", color=colour, lw=1.1, ls=dash, zorder=2, label=f"{shorten(name)}, tried")
+        for (x, y), (after, higher) in pairwise(zip(xs, ys, strict=True)):
+            labels.avoid_line((x, after, after), (y, y, higher))
+
+
 def _draw_best(labels: Labels, best: Iterable[tuple[float, float]], name: str) -> None:
     """Draw the line of best points, (cost, rate) each: from each point on its rate is to be had, until a better one.
 
@@ -263,7 +282,7 @@ def _draw_best(labels: Labels, best: Iterable[tuple[float, float]], name: str) -
     ys = [*(y for _, y in corners), corners[-1][1]]
     axes.step(xs, ys, where="post", color=_INK, lw=1.6, zorder=2.5, label=name)
     axes.fill_between(xs, ys, axes.get_ylim()[0], step="post", color=_INK, alpha=0.04, lw=0, zorder=0.5)
-    for (x, y), (after, higher) in zip(zip(xs, ys, strict=True), zip(xs[1:], ys[1:], strict=True), strict=False):
+    for (x, y), (after, higher) in pairwise(zip(xs, ys, strict=True)):
         labels.avoid_line((x, after, after), (y, y, higher))
 
 

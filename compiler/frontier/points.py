@@ -7,7 +7,7 @@ import msgspec
 from msgspec import Meta, Struct, field
 
 from thenar.drivers.errors import ThenarError
-from thenar.runtime.manifest import PAPERS_TRAINER, Inputs, Name, TableBits, Value
+from thenar.runtime.manifest import PAPERS_TRAINER, Given, Inputs, Name, TableBits
 from thenar.runtime.names import fault, shortened
 
 from ..evaluation.rates import Rate
@@ -76,7 +76,7 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     table_bits: TableBits = field(default_factory=lambda: WIDEST)
     max_bins: Annotated[int, Meta(ge=2, le=2**53)] | None = field(default_factory=lambda: None)
     trainer: Name = PAPERS_TRAINER
-    settings: dict[Name, Value] = {}
+    settings: dict[Name, Given] = {}
 
 
 class Latency(Struct, frozen=True, forbid_unknown_fields=True):
@@ -127,9 +127,9 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     fronts: tuple[str, ...] = ()
 
 
-class Tried(Struct, frozen=True, forbid_unknown_fields=True):
+class Tried(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """A placement as it was screened: its rate after so many rounds (None: its trainer does not go by them), in the
-    fastest of its wirings.
+    fastest of its wirings; and its trainer, where that is not the paper's.
     """
 
     way: Way
@@ -138,6 +138,7 @@ class Tried(Struct, frozen=True, forbid_unknown_fields=True):
     rounds: Count | None
     rate: Rate
     frame_us: Microseconds
+    trainer: Name = PAPERS_TRAINER
 
 
 class Curve(Struct, frozen=True, forbid_unknown_fields=True):
@@ -201,6 +202,11 @@ class Frontier(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     skipped: tuple[str, ...]
     picked: int | None = None
     wanted: str = ""
+
+    @property
+    def trainers(self) -> tuple[str, ...]:
+        """Who trained what was tried."""
+        return tuple(dict.fromkeys(each.trainer for each in self.tried))
 
     @property
     def beside(self) -> By | None:

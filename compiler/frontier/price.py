@@ -66,17 +66,17 @@ def price(
     tables: tuple[Tabled, ...],
     training: Training,
     equipment: Equipment,
-    fold: Fold | None,
+    held: tuple[Fold, Training] | None,
 ) -> tuple[PricedTables, ...]:
     """Train on all rows, on the switches `columns`, which have these names, and the joints; see what the tables cost.
 
-    fold  how early scans end is seen on its test rows, by tables of its training rows, as rows that were trained on end
-          them too soon; None: on all rows, where nobody asks about scans that end early
+    held  how early scans end is seen on the test rows of a fold, by tables of its training rows, trained so, as rows
+          that were trained on end them too soon; None: on all rows, where nobody asks about scans that end early
     """
     rows = np.arange(len(samples.labels))
     made = list(tables_of(samples, rows, columns, tables, training))
-    scanned = made if fold is None else list(tables_of(samples, fold.train, columns, tables, training))
-    tested = rows if fold is None else fold.test
+    scanned = made if held is None else list(tables_of(samples, held[0].train, columns, tables, held[1]))
+    tested = rows if held is None else held[0].test
     spread = tested[np.linspace(0, len(tested) - 1, min(_FRAMES, len(tested))).astype(np.intp)]
     frames = samples.kept(columns)[spread]
     return tuple(

@@ -10,7 +10,7 @@ from .price import Tabled, price
 from .search import NO_SWITCHES, Candidate, Shape, available_inputs, curve_ways, ways
 from .survey import Judged, Survey
 
-# How long a frame takes hardly depends on how many rounds there were: tables of few tell it.
+# How long a frame takes hardly depends on how many rounds and rows there were: tables of few tell it.
 _TABLED = Tabled(12, Shape(16))
 QUICK_PRICE_S = 0.5
 
@@ -35,14 +35,21 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
     search, cuts, n_switches = survey.search, survey.cuts, len(survey.switch_names)
     inputs = available_inputs(n_switches, survey.n_joints)
     every = [way for name in search.methods for way in ways(name, n_switches)]
-    choices = [Candidate(way, kind) for kind in inputs for way in (every if kind != "joints" else (NO_SWITCHES,))]
-    rivals = [Candidate(way, "switches") for name in search.rivals for way in curve_ways(name, n_switches)]
+    choices = [
+        Candidate(way, kind, trainer)
+        for trainer in search.trainers
+        for kind in inputs
+        for way in (every if kind != "joints" else (NO_SWITCHES,))
+    ]
+    first = search.trainers[0]
+    rivals = [Candidate(way, "switches", first) for name in search.rivals for way in curve_ways(name, n_switches)]
     survey.choose("placements", choices, (cuts.everything, *cuts.screening))
     # A placement that keeps nothing is none.
     choices = [one for one in choices if one.way == NO_SWITCHES or survey.columns(one, cuts.everything)]
     survey.choose("rivals", rivals, cuts.screening)
+    survey.settle("settings", survey.typical(choices), (cuts.everything, *cuts.screening))
     shown = [*choices, *rivals]
-    fits = survey.fit("screening", shown, cuts.screening, (search.screened,))
+    fits = survey.fit("screening", shown, cuts.screening, lambda one: ((search.alone(one.trainer).screened,), ()))
     rates = {}
     for choice in shown:
         rates[choice] = cuts.judged(cuts.by, {fold: fits[choice, fold].stages[-1] for fold in cuts.screening})
@@ -53,7 +60,8 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
         if choice in frames
     )
     names = dict.fromkeys([*search.methods, *search.rivals])
-    return screened, tuple(_curve(survey, name, rates) for name in names if "switches" in inputs)
+    curves = {choice: rate for choice, rate in rates.items() if choice.trainer == first}
+    return screened, tuple(_curve(survey, name, curves) for name in names if "switches" in inputs)
 
 
 def _frames_us(survey: Survey, choices: Sequence[Candidate]) -> dict[Candidate, float]:
@@ -62,8 +70,8 @@ def _frames_us(survey: Survey, choices: Sequence[Candidate]) -> dict[Candidate, 
     for choice in choices:
         columns = survey.columns(choice, survey.cuts.everything)
         names = tuple(survey.switch_names[column] for column in columns)
-        rows, training = survey.inputs(choice.joints), survey.search.training
-        calls.append(price.call(QUICK_PRICE_S, rows, names, columns, (_TABLED,), training, survey.equipment, None))
+        some, training = survey.inputs(choice.joints, few=True), survey.training(choice)
+        calls.append(price.call(QUICK_PRICE_S, some, names, columns, (_TABLED,), training, survey.equipment, None))
     found = {}
     for choice, (priced,) in zip(choices, survey.cache.ask("times", calls), strict=True):
         us = priced.fastest_us(survey.equipment.joints.us if choice.joints else 0.0)

@@ -1,11 +1,10 @@
 """What the frontier tries: placements under which parameters, inputs, rounds, widths, folds."""
 
-import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import Literal, NamedTuple
 
-from thenar.runtime.manifest import Inputs, Options, TableBits
+from thenar.runtime.manifest import AUTO, PAPERS_TRAINER, Inputs, Options, TableBits
 
 from ..placement.methods.base import METHODS, usual
 from ..trainers.base import TRAINERS, Number, Training, changed
@@ -33,10 +32,13 @@ TABLED = (10, 30, 100)
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A way to choose switches, and whether the joints are read besides; inputs "joints" have NO_SWITCHES."""
+    """A way to choose switches, whether the joints are read besides, and who trains; inputs "joints" have
+    NO_SWITCHES.
+    """
 
     way: Way
     inputs: Inputs
+    trainer: str = PAPERS_TRAINER
 
     @property
     def joints(self) -> bool:
@@ -71,9 +73,9 @@ class Search:
         Whether points are chosen by subjects who are left out, or by trials of everybody; none given: by subjects where
         there are several.
     trainer : str
-        What makes the models.
+        What makes the models; "auto": each of the trainers that take the settings.
     settings : mapping
-        Its settings that are no defaults, but for rounds.
+        Settings that are given, but for rounds.
 
     Raises
     ------
@@ -94,7 +96,7 @@ class Search:
     rounds: int = 300
     finalists: int = 12
     by: Literal["subject", "trial"] | None = None
-    trainer: str = "logitboost"
+    trainer: str = AUTO
     settings: Mapping[str, Number] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
@@ -105,20 +107,39 @@ class Search:
         _ = self.training
 
     @property
-    def training(self) -> Training:
-        """The trainer, and values for all its settings."""
-        return Training.of(changed(Options(), {"trainer": self.trainer, **self.settings}))
+    def trainers(self) -> tuple[str, ...]:
+        """Who trains, the paper's trainer first; the other properties are of the first: see `alone`."""
+        if self.trainer != AUTO:
+            return (self.trainer,)
+        names = dict.fromkeys(each.trainer for each in Training.candidates(self._asked(AUTO)))
+        return tuple(sorted(names, key=lambda name: name != PAPERS_TRAINER))
+
+    def alone(self, trainer: str) -> "Search":
+        """Return the same search with one of its trainers."""
+        return replace(self, trainer=trainer)
 
     @property
-    def trained(self) -> dict[str, Any]:
-        """What the `Recipe` of a point says of the trainer, but for rounds."""
-        own = {name: value for name, value in self.settings.items() if name != "max_bins" and value is not None}
-        return {"trainer": sys.intern(self.trainer), "max_bins": self.settings.get("max_bins"), "settings": own}
+    def training(self) -> Training:
+        """The trainer, and values for all its settings, of which those not given are defaults."""
+        return Training.of(self._asked(self.trainers[0]))
+
+    @property
+    def candidates(self) -> tuple[Training, ...]:
+        """Every way to train that the settings leave open; rounds are no part of it, where there are stages."""
+        usual = {"rounds": self.training.settings["rounds"]} if self.staged else {}
+        every = Training.candidates(self._asked(self.trainers[0]))
+        found = {
+            tuple(one.settings.items()): one for one in (Training(e.trainer, {**e.settings, **usual}) for e in every)
+        }
+        return tuple(found.values())
+
+    def _asked(self, trainer: str) -> Options:
+        return changed(Options(), {"trainer": trainer, **self.settings})
 
     @property
     def staged(self) -> bool:
         """Whether there are several numbers of rounds to try."""
-        return TRAINERS.named(self.trainer).staged
+        return TRAINERS.named(self.trainers[0]).staged
 
     @property
     def screened(self) -> int:

@@ -1,7 +1,7 @@
 """The rows of a frontier and their folds, in which switches are chosen and classifiers trained."""
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -9,7 +9,10 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
+from thenar.runtime.manifest import Fitting, Inputs
+
 from ..boosting.stumps import winners
+from ..choosing import choose_training
 from ..evaluation.folds import EvaluationError, Fold, Rows, leave_one_out, trial_folds
 from ..evaluation.rates import Rate
 from ..placement.methods.base import METHODS
@@ -22,22 +25,30 @@ from ..trainers.base import Training
 from .cache import Cache, stored
 from .equipment import Equipment
 from .points import By, Way
-from .search import NO_SWITCHES, Candidate, Search, Shape
+from .search import NO_SWITCHES, SHAPES, Candidate, Search, Shape
 
 # Expected seconds of one core, for so many rows: they only say how the time that is left is told.
 _ROWS = 3000
-_ROUND_S, _TABLE_S = 0.009, 0.06
+_ROUND_S, _WHOLE_S, _TABLE_S = 0.004, 0.4, 0.03
 
 
+# Settings are chosen on the placement that keeps about as many switches as the paper's.
+_TYPICAL = 33
+# What a frame takes is seen on tables of so many rows.
+_FEW_ROWS = 1000
 # With more subjects, several are left out together.
 _MOST_LEFT_OUT = 10
+
+
+# After which rounds models are tested, and of which of them tables are made.
+Depth = tuple[tuple[int, ...], tuple[int, ...]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cuts:
     """The folds of a set, which keep every trial whole, and how rows (n,) make m trials.
 
-    repeats   stratified folds, which rate points "pooled"; of each seed
+    repeats   stratified folds, which rate points "pooled"; of each seed, or of the first where others choose points
     subjects  folds whose subjects are new to them; none where there is one subject
     by        which of these points are chosen by
     trials    (n,) the trial of each row, 0 to m - 1; people (m,) the subject of each trial
@@ -61,12 +72,13 @@ class Cuts:
                 "leaving a subject out needs two or more subjects: ask for trials in place of subjects"
             )
         rows, groups = np.arange(len(trials)), np.unique(samples.subjects, return_inverse=True)[1] % _MOST_LEFT_OUT
-        seeds = range(search.seed, search.seed + search.repeats)
+        by_subject = (search.by or "subject") == "subject" and several
+        seeds = range(search.seed, search.seed + (1 if by_subject else search.repeats))
         return cls(
             repeats=tuple(tuple(trial_folds(samples.labels, trials, search.folds, seed)) for seed in seeds),
             subjects=tuple(leave_one_out(groups.astype(np.str_), "subject")) if several else (),
             everything=Fold(rows, rows[:0], "all"),
-            by="new subject" if (search.by or "subject") == "subject" and several else "pooled",
+            by="new subject" if by_subject else "pooled",
             trials=trials,
             people=people,
         )
@@ -163,6 +175,7 @@ class Survey:
     cache: Cache
     _columns: dict[tuple[Way, bool, Fold], Columns] = field(default_factory=dict, init=False)
     _seconds: dict[tuple[str, bool], float] = field(default_factory=dict, init=False)
+    _trainings: dict[tuple[str, Inputs, Fold], Training] = field(default_factory=dict, init=False)
 
     @property
     def switch_names(self) -> tuple[str, ...]:
@@ -178,9 +191,51 @@ class Survey:
     def _alone(self) -> Samples:
         return replace(self.samples, codes=self.samples.codes[:, :0])
 
-    def inputs(self, joints: bool) -> Samples:
-        """Return all rows, with the joints or without."""
-        return self.samples if joints else self._alone
+    @cached_property
+    def _few(self) -> tuple[Samples, Samples]:
+        spread = np.linspace(0, len(self.samples.labels) - 1, min(_FEW_ROWS, len(self.samples.labels))).astype(np.intp)
+        return self._alone.rows(spread), self.samples.rows(spread)
+
+    def inputs(self, joints: bool, *, few: bool = False) -> Samples:
+        """Return all rows, or a few of them, with the joints or without."""
+        return self._few[joints] if few else self.samples if joints else self._alone
+
+    def training(self, choice: Candidate, fold: Fold | None = None) -> Training:
+        """Return how a choice is trained on the training rows of a fold, None: on all rows; once settled."""
+        fold = fold or self.cuts.everything
+        return (
+            self._trainings.get((choice.trainer, choice.inputs, fold))
+            or self.search.alone(choice.trainer).candidates[0]
+        )
+
+    def typical(self, choices: Iterable[Candidate]) -> list[Candidate]:
+        """Return, for each trainer and kind of inputs whose settings are open, the choice that settles them."""
+        alike: dict[tuple[str, Inputs], list[Candidate]] = {}
+        for choice in choices:
+            if len(self.search.alone(choice.trainer).candidates) > 1:
+                alike.setdefault((choice.trainer, choice.inputs), []).append(choice)
+        kept = {one: len(self.columns(one, self.cuts.everything)) for mine in alike.values() for one in mine}
+        return [min(mine, key=lambda one: abs(kept[one] - _TYPICAL)) for mine in alike.values()]
+
+    def settle(self, stage: str, typical: Sequence[Candidate], folds: Sequence[Fold]) -> None:
+        """Have the settings that are open chosen from the training rows of these folds, as `compile` chooses them: by
+        typical choices, once for all of the same trainer and inputs.
+        """
+        places = [(choice, fold) for choice in typical for fold in folds]
+        calls = [
+            choose_settings.call(
+                settle_s(self.search.alone(choice.trainer), len(fold.train)),
+                self.inputs(choice.joints),
+                fold.train,
+                self.columns(choice, fold),
+                self.search.alone(choice.trainer).candidates,
+                self.search.seed,
+                self.cuts.by == "new subject",
+            )
+            for choice, fold in places
+        ]
+        for (choice, fold), fitting in zip(places, self.cache.ask(stage, calls), strict=True):
+            self._trainings[choice.trainer, choice.inputs, fold] = Training.chosen(fitting)
 
     def choose(self, stage: str, choices: Iterable[Candidate], folds: Sequence[Fold]) -> None:
         """Have the switches of all choices chosen from the training rows of these folds."""
@@ -219,22 +274,19 @@ class Survey:
         stage: str,
         choices: Sequence[Candidate],
         folds: Sequence[Fold],
-        stages: tuple[int, ...],
-        tabled: tuple[int, ...] = (),
-        shapes: tuple[Shape, ...] = (),
+        depth: Callable[[Candidate], Depth],
     ) -> dict[tuple[Candidate, Fold], Tally]:
-        """Return what came of every choice in every fold."""
+        """Return what came of every choice in every fold, followed as far as `depth` says."""
         places = [(choice, fold) for choice in choices for fold in folds]
         calls = [
             fit_stages.call(
-                fit_s(stages[-1], len(tabled) * len(shapes), len(fold.train)),
+                fit_s(self.search.alone(choice.trainer), depth(choice), len(fold.train)),
                 self.inputs(choice.joints),
                 fold,
                 self.columns(choice, fold),
-                stages,
-                tabled,
-                shapes,
-                self.search.training,
+                *depth(choice),
+                SHAPES if depth(choice)[1] else (),
+                self.training(choice, fold),
             )
             for choice, fold in places
         ]
@@ -246,9 +298,15 @@ def path_s(method: str, rows: int) -> float:
     return METHODS[method].seconds * rows / _ROWS
 
 
-def fit_s(rounds: int, tables: int, rows: int) -> float:
-    """Return the expected seconds of a training with tests, and with so many tables made and tested."""
-    return (rounds * _ROUND_S + tables * _TABLE_S) * rows / _ROWS
+def settle_s(search: Search, rows: int) -> float:
+    """Return the expected seconds of choosing among the candidates of a search, in inner folds."""
+    return 2.0 * len(search.candidates) * fit_s(search, ((1,), ()), rows // 2)
+
+
+def fit_s(search: Search, depth: Depth, rows: int) -> float:
+    """Return the expected seconds of a training of so many rows with tests, with all tables made and tested."""
+    (*_, last), tabled = depth
+    return (last * (_ROUND_S if search.staged else _WHOLE_S) + len(tabled) * len(SHAPES) * _TABLE_S) * rows / _ROWS
 
 
 @stored(1)
@@ -260,6 +318,15 @@ def choose_path(
     choose = METHODS[method].chooser(samples.rows(rows), ports)
     columns = tuple(choose(parameter) for parameter in parameters)
     return Ladder(columns, time.perf_counter() - began)
+
+
+@stored(1)
+def choose_settings(
+    samples: Samples, rows: Rows, columns: Columns, candidates: tuple[Training, ...], seed: int, by_subject: bool
+) -> Fitting:
+    """Choose among ways to train by inner folds of some rows, on the switches `columns` and the joints."""
+    learning = samples.rows(rows).keeping(columns)
+    return choose_training(learning, candidates, seed=seed, groups=learning.subjects if by_subject else None)
 
 
 @stored(2)

@@ -4,7 +4,7 @@ import csv
 import io
 from collections.abc import Callable, Iterable, Iterator
 
-from thenar.runtime.manifest import PAPERS_TRAINER
+from thenar.runtime.manifest import PAPERS_TRAINER, in_words
 from thenar.runtime.names import printable
 
 from ..evaluation.rates import Rate
@@ -64,13 +64,18 @@ def training_of(setting: Recipe) -> str:
     return ", ".join((*name, *rounds, *_settings(setting)))
 
 
+def trainer_of(setting: Recipe) -> str:
+    """Return trainer and settings, the paper's named as well: "logitboost, 100 rounds"."""
+    return f"{setting.trainer}, {training_of(setting)}" if setting.trainer == PAPERS_TRAINER else training_of(setting)
+
+
 def is_usual(setting: Recipe) -> bool:
     """Return whether rounds and bins say all of how the model was made."""
     return setting.trainer == PAPERS_TRAINER and not setting.settings
 
 
 def _settings(setting: Recipe) -> list[str]:
-    return [f"{name.replace('_', '-')} {value:g}" for name, value in setting.settings.items()]
+    return [in_words(name, value) for name, value in setting.settings.items()]
 
 
 def wiring_of(setting: Recipe) -> str:
@@ -102,9 +107,10 @@ def summary(frontier: Frontier) -> str:
     point = featured(frontier)
     if point is None:
         return f"Of {frontier.combinations:,} combinations none is a point of the frontier."
+    trained = f", trained by {trainer_of(point.setting)}," if len(frontier.trainers) > 1 else ","
     said = (
-        f"Point {point.number}: {_inputs(frontier, point)}, read and classified in {duration(point.frame.us)} "
-        f"on {frontier.target}, reach {interval(point.rate)} % accuracy ({point.rate.what})"
+        f"Point {point.number}: {_inputs(frontier, point)}{trained} read and classified in "
+        f"{duration(point.frame.us)} on {frontier.target}, reach {interval(point.rate)} % accuracy ({point.rate.what})"
     )
     against = [_mark(mark) for mark in frontier.marks]
     return ". ".join(filter(None, (f"{said}, against {listed(against)}" if against else said, luck_of(point)))) + "."

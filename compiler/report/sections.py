@@ -6,7 +6,7 @@ from itertools import accumulate
 
 import msgspec
 
-from thenar.runtime.manifest import Manifest
+from thenar.runtime.manifest import AUTO, Manifest
 from thenar.runtime.scanning.propose import own_joints
 from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, scan_us, scanner_us
 
@@ -41,8 +41,11 @@ def facts(content: ReportContent) -> Iterator[tuple[str, str, str]]:
     yield "Switches kept", f"{len(manifest.switches)}", f"of {manifest.source.switches}"
     whose = "of a source of your own" if _unread(content) else "of the CyberGlove"
     yield "Joints", f"{len(manifest.joints)}", whose if manifest.joints else "none are used"
-    ended = f"of {manifest.options.rounds}: the tolerance ended the training"
-    yield "Rounds", f"{content.rounds}", ended if manifest.stopped_after else "of boosting"
+    fit = manifest.fit
+    yield "Trainer", fit.trainer, f"chosen of {counted(fit.tried, 'fit')}" if fit.compared else "given"
+    if content.rounds:
+        ended = f"of {fit.number('rounds'):g}: the tolerance ended the training"
+        yield "Rounds", f"{content.rounds}", ended if manifest.stopped_after else "of boosting"
     yield "Tables", f"{content.tables_bytes:,}", "bytes of tables.bin"
     yield "Changed by rounding", f"{manifest.proof.changed}", f"of {counted(manifest.source.rows, 'row')}"
 
@@ -60,8 +63,8 @@ def warnings(content: ReportContent) -> Iterator[str]:
         yield sentence(unread)
     if content.only_answer is not None:
         yield (
-            f"Every row is recognised as {content.only_answer}: no input tells grasp types apart by itself, and stumps "
-            "look at one at a time."
+            f"Every row is recognised as {content.only_answer}: no input tells grasp types apart by itself, and the "
+            "model looks at one at a time."
         )
     if manifest.zero_gain_nodes:
         nodes = counted(manifest.zero_gain_nodes, "decision")
@@ -106,6 +109,37 @@ def placement_sentences(content: ReportContent) -> tuple[str, str]:
         f"{how} (--method {method}).",
         f"Columns count from 0 in the recordings. Bits are the information on the grasp type that a switch {bits}.",
     )
+
+
+def fit_sentences(manifest: Manifest) -> Iterator[str]:
+    """Yield what trained the model, and how it was chosen."""
+    fit = manifest.fit
+    if not fit.compared:
+        yield f"The model was trained by {fit}, as the options say: nothing was chosen."
+        return
+    yield f"The model was trained by {fit}, because {fit.why}."
+    yield (
+        f"{counted(fit.tried, 'fit')} were compared in {counted(fit.folds, 'fold')} of the training rows ({fit.of}). "
+        "Each fold of the rates above chose anew, from its own training rows alone."
+    )
+
+
+def fit_table(manifest: Manifest) -> PlainTable | None:
+    """Return the best fit of each trainer in the inner folds, and the chosen one; None where nothing was chosen."""
+    rows = []
+    for each in manifest.fit.compared:
+        shares = (f"{100 * share:.1f}" for share in (each.rate, each.error, each.behind, each.behind_error))
+        rows.append((each.name, *shares, f"{each.loss:.3f}", f"{each.rows:.0f}"))
+    columns = (
+        "Fit",
+        "Recognised, %",
+        "Standard error",
+        "Behind the best",
+        "Standard error",
+        "Log-loss",
+        "Rows of tables",
+    )
+    return PlainTable("Fits in the inner folds, trials", columns, tuple(rows)) if rows else None
 
 
 def no_tree(manifest: Manifest) -> str:
@@ -217,7 +251,8 @@ def options_set(manifest: Manifest) -> Pairs:
     """Return every option that is set, by the name that `thenar compile` gives it: of trainers, only of its own."""
     options = manifest.options
     names = {trainer.name: {setting.name for setting in trainer.settings} for trainer in TRAINERS.values()}
-    foreign = set().union(*names.values()) - names.get(options.trainer, set()) | {"settings"}
+    every = set().union(*names.values())
+    foreign = every - names.get(options.trainer, every if options.trainer == AUTO else set()) | {"settings"}
     fields = [field.name for field in msgspec.structs.fields(options) if field.name not in foreign]
     values = {name: getattr(options, name) for name in fields} | options.settings
     called = {name: "method" if name == "placement" else name.replace("_", "-") for name in values}

@@ -12,10 +12,10 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.tables import HIGHEST_CODE
+
 from ..boosting.stumps import Stumps, spread
 from ..elementary import add_exactly
-
-HIGHEST_CODE = 65535
 
 # Rows of answers that are written out at a time: of 1000 classes, 2 MB.
 _WRITTEN_OUT = 256
@@ -112,6 +112,20 @@ def first_codes(*thresholds: NDArray[np.uint16]) -> NDArray[np.int64]:
     """
     codes = np.unique(np.concatenate([[0], *(each.astype(np.int64) + 1 for each in thresholds)]))
     return codes[codes <= HIGHEST_CODE]
+
+
+def added(one: ScoreTables, other: ScoreTables) -> ScoreTables:
+    """Return tables whose scores are the sums of the scores of two, of the same inputs and classes; at most one of them
+    has lines.
+    """
+    thresholds, joint_rows = [], []
+    parts = zip(one.thresholds, one.joint_rows, other.thresholds, other.joint_rows, strict=True)
+    for steps, rows, more_steps, more_rows in parts:
+        codes = first_codes(steps, more_steps)
+        thresholds.append((codes[1:] - 1).astype(np.uint16))
+        joint_rows.append(rows[np.searchsorted(steps, codes)] + more_rows[np.searchsorted(more_steps, codes)])
+    bias, switch_rows = one.bias + other.bias, one.switch_rows + other.switch_rows
+    return ScoreTables(bias, switch_rows, tuple(thresholds), tuple(joint_rows), one.lines + other.lines)
 
 
 # What trainers make: score tables, or an ensemble that collapses to them.

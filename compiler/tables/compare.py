@@ -13,6 +13,7 @@ from thenar.runtime.tables import LIMIT, IntegerTables
 from ..boosting.stumps import TIE, Stumps, winners
 from .collapse import Floats, Model, ScoreTables, collapse, model_scores
 from .furthest import furthest
+from .quantise import rounding_error
 from .worstcase import Rounding
 
 COLLAPSE_TOLERANCE = 1e-12  # of the sum of the magnitudes that are added up
@@ -108,21 +109,18 @@ def worst_case(
     )
 
 
-def rounding_error(n_inputs: int) -> float:
-    """Return the most steps that rounding can move a score: half for the bias, half for the row of each input."""
-    return (n_inputs + 1) / 2
-
-
 def float_slack(tables: ScoreTables, scale: float) -> float:
     """Return the most steps that doubles can move a score besides, on the way to integers and while it is compared.
 
     With n inputs, j of them joints, u = 2^-53 and S the sum of the largest magnitudes of all rows, scale * u * S times
     j for the bias that `balance` sums up, 2 for its rows, each at most twice as large as before, 3 for scaling these
-    and the bias, n for adding up the scores compared with and 1 for scaling them; and 2 for products of u.
+    and the bias, n for adding up the scores compared with and 1 for scaling them; and 2 for products of u. A line is
+    two rows more, each as large as it gets, and adds 4: a product, a sum, and two by which its middle moves.
     """
     rows = [tables.bias, *tables.switch_rows, *tables.joint_rows]
+    rows += 2 * [line.row * (line.high - line.low) for line in tables.lines]
     largest = sum(float(np.abs(row).max()) for row in rows)
-    return (tables.n_inputs + len(tables.joint_rows) + 8) * 2.0**-53 * largest * scale
+    return (tables.n_inputs + len(tables.joint_rows) + 4 * len(tables.lines) + 8) * 2.0**-53 * largest * scale
 
 
 def compare(
@@ -140,7 +138,7 @@ def compare(
     steps = by_tables * integers.scale
     best_two = np.sort(steps, axis=1)[:, -2:]
     margins = best_two[:, 1] - best_two[:, 0]
-    error, slack = rounding_error(tables.n_inputs), float_slack(tables, integers.scale)
+    error, slack = rounding_error(tables, integers.scale, integers.grid), float_slack(tables, integers.scale)
     return Comparison(
         collapse_difference=float(np.abs(by_model - by_tables).max()),
         collapse_bound=COLLAPSE_TOLERANCE * _magnitudes(model),

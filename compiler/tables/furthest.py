@@ -6,9 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.tables import IntegerTables
-
-from .collapse import first_codes
+from thenar.runtime.tables import HIGHEST_CODE, IntegerTables
 
 OPEN, CLOSED, LOST = 0, 1, -1
 _SIGNS = 1, -1
@@ -18,9 +16,10 @@ _SIGNS = 1, -1
 class Furthest:
     """A frame, perhaps with inputs missing, whose rows added in this `order` get further from zero than any other's.
 
-    The first `n_terms` of them give class `grasp` the partial sum `total`; the others lead back. order (1 + s + j,)
-    numbers the terms: 0 the bias, then switches, then joints. bits (s,) and codes (j,) with the masks of what is
-    missing, as the runtime takes them; `terms` (1 + s + j, K) are the rows themselves, in the order of their numbers.
+    The first `n_terms` of them give class `grasp` the partial sum `total`; the others lead back. order (n,) numbers the
+    terms: 0 the bias, then switches, then joints, then what slopes add, n of them. bits (s,) and codes (j,) with the
+    masks of what is missing, as the runtime takes them; `terms` (n, K) are the rows themselves, in the order of their
+    numbers.
     """
 
     grasp: int
@@ -41,12 +40,14 @@ def furthest(tables: IntegerTables, *, missing: bool = True) -> Furthest:
     none.
     """
     choices = list(_choices(tables, missing))
-    reached = np.stack([sum(np.maximum(sign * rows, 0).max(axis=0) for _, rows in choices) for sign in _SIGNS])
+    onwards = [[np.maximum(sign * terms, 0).sum(axis=0) for _, terms in choices] for sign in _SIGNS]
+    reached = np.stack([sum(onward.max(axis=0) for onward in each) for each in onwards])
     way, grasp = map(int, np.unravel_index(reached.argmax(), reached.shape))
     sign = _SIGNS[way]
-    picked = [int(np.argmax(sign * rows[:, grasp])) for _, rows in choices]
-    values = np.array([values[pick] for (values, _), pick in zip(choices, picked, strict=True)])
-    terms = np.stack([rows[pick] for (_, rows), pick in zip(choices, picked, strict=True)])
+    picked = [int(np.argmax(onward[:, grasp])) for onward in onwards[way]]
+    chosen = [(values[pick], terms[:, pick]) for (values, terms), pick in zip(choices, picked, strict=True)]
+    values = np.array([value for value, _ in chosen])
+    terms = np.stack([term[0] for _, term in chosen] + [term[1] for _, term in chosen if len(term) > 1])
     onward = sign * terms[:, grasp] > 0
     order = np.concatenate([np.flatnonzero(onward), np.flatnonzero(~onward)])
     switches, joints = values[1 : 1 + tables.n_switches], values[1 + tables.n_switches :]
@@ -64,11 +65,14 @@ def furthest(tables: IntegerTables, *, missing: bool = True) -> Furthest:
 
 
 def _choices(tables: IntegerTables, missing: bool) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
-    """Yield what bias, switches and joints can say, (c,), and the rows for it, (c, K). Missing comes last."""
+    """Yield what bias, switches and joints can say, (c,), and the terms for it, (t, c, K). Missing comes last."""
     last = slice(None if missing else -1)
-    yield np.zeros(1, np.int64), tables.bias[np.newaxis].astype(np.int64)
+    yield np.zeros(1, np.int64), tables.bias[np.newaxis, np.newaxis].astype(np.int64)
     for row, mean in zip(tables.switch_rows, tables.switch_means, strict=True):
-        yield np.array([OPEN, CLOSED, LOST])[last], np.stack([0 * row, row, mean])[last].astype(np.int64)
-    for thresholds, rows, mean in zip(tables.thresholds, tables.joint_rows, tables.joint_means, strict=True):
-        codes = first_codes(thresholds)
-        yield np.append(codes, LOST)[last], np.vstack([rows[: len(codes)], mean])[last].astype(np.int64)
+        yield np.array([OPEN, CLOSED, LOST])[last], np.stack([0 * row, row, mean])[np.newaxis, last].astype(np.int64)
+    for joint, mean in enumerate(tables.joint_means.astype(np.int64)):
+        codes, terms = tables.choices(joint)
+        there = codes <= HIGHEST_CODE
+        means = np.zeros((len(terms), 1, len(mean)), np.int64)
+        means[0] = mean
+        yield np.append(codes[there], LOST)[last], np.concatenate([terms[:, there], means], axis=1)[:, last]

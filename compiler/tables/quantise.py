@@ -7,35 +7,69 @@ leads by more than that keeps its grasp type. This holds of every scale: a coars
 Firmware adds up what look-ups give: the sum of the rows of a few switches, or a row of a joint. Where it stores these
 in entries of 8 bits, as what exceeds the least of the look-up and class, no look-up may span more than 255 steps. A
 scale for that is some 4 steps per unit of score, where one for 16 bits is some 300.
+
+The row of a line becomes whole steps per distance from the middle of its range (runtime/tables.py), a byte each: half a
+step times the largest distance, at most 127, is what that moves a score. Where tables have lines and entries are of 8
+bits, these are the upper halves of steps: rows of switches and bins are then rounded to multiples of 256 steps, and
+only lines and bias are as fine as the sums of 16 bits allow.
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.tables import FINEST_SCALE, IntegerTables
+from thenar.runtime.tables import COARSE, FINEST_SCALE, WIDEST, IntegerTables, Slope
 
 from ..boosting.stumps import winners
-from .collapse import Floats, ScoreTables
+from .collapse import Floats, Line, ScoreTables
 
 
 def balance(tables: ScoreTables) -> ScoreTables:
     """Return tables of equal scores whose bias is spread over the joints' rows, as far as their ranges take it.
 
     What moves from the bias into all rows of a joint changes no score. A partial sum can reach |bias| plus the range of
-    every input; with the bias gone it reaches no further than complete scores do, and there is nothing better.
+    every input; with the bias gone it reaches no further than complete scores do, and there is nothing better. A line
+    reaches least where it adds nothing in the middle of its range: rows here are those that it has there.
     """
     if not tables.joint_rows:
         return tables
-    lowest = np.stack([rows.min(axis=0) for rows in tables.joint_rows])
-    spans = np.stack([rows.max(axis=0) for rows in tables.joint_rows]) - lowest
+    middles = np.zeros((len(tables.joint_rows), tables.n_classes))
+    for line in tables.lines:
+        middles[line.joint] = line.row * ((line.high - line.low) / 2)
+    middle_rows = [rows + middle for rows, middle in zip(tables.joint_rows, middles, strict=True)]
+    lowest = np.stack([rows.min(axis=0) for rows in middle_rows])
+    spans = np.stack([rows.max(axis=0) for rows in middle_rows]) - lowest
     # Each joint gives up its lowest row and the same share of its span; the share is such that the bias becomes zero.
     wanted, room = -tables.bias - lowest.sum(axis=0), spans.sum(axis=0)
     share = np.divide(wanted, room, out=np.zeros_like(room), where=room > 0).clip(0, 1)
     moved = lowest + share * spans
     rows = tuple(rows - shift for rows, shift in zip(tables.joint_rows, moved, strict=True))
-    return ScoreTables(tables.bias + moved.sum(axis=0), tables.switch_rows, tables.thresholds, rows)
+    return ScoreTables(tables.bias + moved.sum(axis=0), tables.switch_rows, tables.thresholds, rows, tables.lines)
+
+
+def slope_of(line: Line, scale: float) -> tuple[Slope, Floats]:
+    """Return a line in whole steps, without its row; and the row (K,), in whole steps per distance, that it should
+    have.
+
+    Codes are divided by the least power of two that makes their range fit a byte, or multiplied by the least one that
+    makes a byte of every entry of the row, if there is one.
+    """
+    span, gain = line.high - line.low, 0
+    while span >> -gain > WIDEST:
+        gain -= 1
+    while gain >= 0 and span << gain + 1 <= WIDEST and np.rint(np.abs(line.row).max() * scale / 2**gain) > _LARGEST:
+        gain += 1
+    none = np.zeros(len(line.row), np.int8)
+    return Slope(line.joint, line.low, line.high, gain, none), np.rint(line.row * scale / 2.0**gain)
+
+
+def offset_of(slope: Slope) -> float:
+    """Return how far above the lowest code of a slope nothing is added: where codes are divided, in the middle of those
+    that become one.
+    """
+    return slope.zero / 2.0**slope.gain + max(2.0**-slope.gain - 1, 0) / 2
 
 
 # The most consecutive switches that firmware looks up together in tables of narrow entries. Any so many, wherever a
@@ -44,28 +78,33 @@ GROUP_SIZE = 5
 
 # Scales that `kindest_scale` tries, evenly spaced down to four fifths of the finest.
 TRIED, _TRIED_OF_ALL = 32, 160
+_LARGEST = 127  # entry of a slope's row
 
 
-def finest_scale(tables: ScoreTables, limit: int, widest: int) -> float:
+def finest_scale(tables: ScoreTables, limit: int, widest: int, grid: int = 1) -> float:
     """Return the largest double below FINEST_SCALE at which no sum of rounded rows exceeds `limit` and no look-up
     spans more than `widest`; 1 for tables of zeros.
 
     Rounded terms never fall as the scale grows, so neither do sums and spans, and bisection over the doubles is exact.
+    With lines, or rows on a `grid`, it finds one of the largest.
     """
     whole = reach(tables, 1.0, rounded=False)
     if whole == 0:
         return 1.0
     outer = _outermost(tables)
-    fits, too_fine = 0.0, min((limit + tables.n_inputs + 2) / whole, FINEST_SCALE)
+    most = limit + grid * (tables.n_inputs + 2) + WIDEST * len(tables.lines)
+    fits, too_fine = 0.0, min(most / whole, FINEST_SCALE)
     while (middle := (fits + too_fine) / 2) not in (fits, too_fine):
-        if reach(outer, middle) <= limit and span(outer, middle) <= widest:
+        if reach(outer, middle, grid=grid) <= limit and (grid > 1 or span(outer, middle) <= widest):
             fits = middle
         else:
             too_fine = middle
     return fits
 
 
-def kindest_scale(tables: ScoreTables, finest: float, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> float:
+def kindest_scale(
+    tables: ScoreTables, finest: float, bits: NDArray[np.bool_], codes: NDArray[np.uint16], grid: int = 1
+) -> float:
     """Return, of `finest` and scales a little coarser, the one at which the fewest rows, bits (n, s) and codes (n, j),
     change their class; of equal ones the finest.
 
@@ -74,17 +113,42 @@ def kindest_scale(tables: ScoreTables, finest: float, bits: NDArray[np.bool_], c
     """
     scales = finest * (1 - np.arange(TRIED) / _TRIED_OF_ALL)
     scores = tables.scores(bits, codes)
-    near = _leads(scores) * scales[-1] <= tables.n_inputs + 2  # no scale can change the others: quantise.py
+    most = max(rounding_error(tables, scale, grid) for scale in scales[[0, -1]].tolist())
+    near = _leads(scores) * scales[-1] <= 2 * most + 1  # no scale can change the others: quantise.py
     right, closed = winners(scores[near]), bits[near].astype(np.float64)
-    columns = zip(tables.thresholds, codes[near].T, strict=True)
-    bins = [np.searchsorted(steps, column) for steps, column in columns]
-    changed = [np.count_nonzero(_whole_scores(tables, scale, closed, bins).argmax(axis=1) != right) for scale in scales]
+    asked = codes[near]
+    changed = [
+        np.count_nonzero(_whole_scores(tables, scale, closed, asked, grid).argmax(axis=1) != right)
+        for scale in scales.tolist()
+    ]
     return float(scales[int(np.argmin(changed))])
 
 
-def reach(tables: ScoreTables, scale: float, *, rounded: bool = True) -> float:
-    """Return the largest absolute value that a partial sum of the scaled rows can take, in any order."""
-    upper, lower = _extremes(tables, scale, rounded=rounded)
+def rounding_error(tables: ScoreTables, scale: float, grid: int = 1) -> float:
+    """Return the most steps that rounding can move a score: half of one for the bias and for a joint's only row, half
+    of the `grid` for the row of each switch and bin, and for each line half of one times the largest distance, besides
+    what codes that become one differ by.
+    """
+    binned = sum(len(steps) > 0 for steps in tables.thresholds)
+    error = (tables.n_inputs + 1 + (grid - 1) * (len(tables.switch_rows) + binned)) / 2
+    for line in tables.lines:
+        slope, _ = slope_of(line, scale)
+        error += slope.zero / 2 + float(np.abs(line.row).max()) * scale * max(2.0**-slope.gain - 1, 0) / 2
+    return error
+
+
+def reach(tables: ScoreTables, scale: float, *, rounded: bool = True, grid: int = 1) -> float:
+    """Return the largest absolute value that a partial sum of the scaled rows can take, in any order; infinity if an
+    entry of a slope's row does not fit its byte.
+    """
+    upper, lower = _extremes(tables, scale, rounded=rounded, grid=grid)
+    for line in tables.lines:
+        slope, row = slope_of(line, scale)
+        if rounded and np.abs(row).max() > _LARGEST:
+            return math.inf
+        row = row if rounded else line.row * scale / 2.0**slope.gain
+        ends = np.stack([-slope.zero * row, (slope.most - slope.zero) * row])
+        upper, lower = np.vstack([upper, ends.max(axis=0)]), np.vstack([lower, ends.min(axis=0)])
     return float(max(upper.sum(axis=0).max(), -lower.sum(axis=0).min()))
 
 
@@ -109,27 +173,49 @@ def _leads(scores: Floats) -> Floats:
     return leads
 
 
-def _whole_scores(tables: ScoreTables, scale: float, closed: Floats, bins: list[NDArray[np.intp]]) -> Floats:
-    """Return the scores (n, K) of the tables in whole steps: closed (n, s) switches, and the bin (n,) of each joint."""
+def _whole_scores(tables: ScoreTables, scale: float, closed: Floats, codes: NDArray[np.uint16], grid: int) -> Floats:
+    """Return the scores (n, K) of the tables in whole steps: closed (n, s) switches, and the joints' codes (n, j)."""
     # Sums of whole numbers are exact, in any order: a matrix product may add them up.
-    scores: Floats = closed @ np.rint(tables.switch_rows * scale) + np.rint(tables.bias * scale)
-    for rows, found in zip(tables.joint_rows, bins, strict=True):
-        scores += np.rint(rows * scale)[found]
+    scores: Floats = closed @ _whole(tables.switch_rows * scale, grid) + np.rint(tables.bias * scale)
+    for column, steps, rows in zip(codes.T, tables.thresholds, _middle_rows(tables, scale, grid), strict=True):
+        scores += rows[np.searchsorted(steps, column)]
+    for line in tables.lines:
+        slope, row = slope_of(line, scale)
+        scores += slope.distances(codes[:, line.joint])[:, np.newaxis] * row
     return scores
+
+
+def _whole(rows: Floats, grid: int) -> Floats:
+    whole: Floats = np.rint(rows / grid) * grid
+    return whole
+
+
+def _middle_rows(tables: ScoreTables, scale: float, grid: int, *, rounded: bool = True) -> list[Floats]:
+    """Return the joints' rows (T_a + 1, K) in whole steps, at the codes where their slopes add nothing. A joint's only
+    row is part of the start, and needs no grid.
+    """
+    middle = list(tables.joint_rows)
+    for line in tables.lines:
+        middle[line.joint] = middle[line.joint] + line.row * offset_of(slope_of(line, scale)[0])
+    return [_whole(rows * scale, grid if len(rows) > 1 else 1) if rounded else rows * scale for rows in middle]
 
 
 def _outermost(tables: ScoreTables) -> ScoreTables:
     """Return the tables with each joint's largest and smallest rows alone: rounding keeps them outermost."""
-    joint_rows = tuple(np.array([rows.max(axis=0), rows.min(axis=0)]) for rows in tables.joint_rows)
-    return ScoreTables(tables.bias, tables.switch_rows, tables.thresholds, joint_rows)
+    outer = (np.array([rows.max(axis=0), rows.min(axis=0)]) if len(rows) > 1 else rows for rows in tables.joint_rows)
+    return ScoreTables(tables.bias, tables.switch_rows, tables.thresholds, tuple(outer), tables.lines)
 
 
-def _extremes(tables: ScoreTables, scale: float, *, rounded: bool = True) -> tuple[Floats, Floats]:
-    """Return the most and the least, zero included, that bias, switches and joints add: (1 + s + j, K) each."""
-    upper = np.vstack([tables.bias, tables.switch_rows, *(rows.max(axis=0) for rows in tables.joint_rows)]) * scale
-    lower = np.vstack([tables.bias, tables.switch_rows, *(rows.min(axis=0) for rows in tables.joint_rows)]) * scale
+def _extremes(tables: ScoreTables, scale: float, *, rounded: bool = True, grid: int = 1) -> tuple[Floats, Floats]:
+    """Return the most and the least, zero included, that bias, switches and joints add, but for their lines:
+    (1 + s + j, K) each.
+    """
+    bias, switches = tables.bias[np.newaxis] * scale, tables.switch_rows * scale
     if rounded:
-        upper, lower = np.rint(upper), np.rint(lower)
+        bias, switches = np.rint(bias), _whole(switches, grid)
+    joints = _middle_rows(tables, scale, grid, rounded=rounded)
+    upper = np.vstack([bias, switches, *(rows.max(axis=0) for rows in joints)])
+    lower = np.vstack([bias, switches, *(rows.min(axis=0) for rows in joints)])
     return np.maximum(upper, 0), np.minimum(lower, 0)
 
 
@@ -148,30 +234,37 @@ def quantise(
     bits (n, s) and codes (n, j) are the rows trained on; their mean contributions stand in for missing inputs. No
     look-up, a joint or up to GROUP_SIZE consecutive switches, spans more than 2^entry_bits - 1 steps in any class. With
     16 that is no limit, as sums of 16 bits span no more, and the scale is the finest; with fewer it is the kindest.
+    With lines, entries of fewer than 16 bits are multiples of 256 instead.
     """
-    balanced = balance(tables)
-    scale = finest_scale(balanced, 2 ** (width - 1) - 1, 2**entry_bits - 1)
+    balanced, grid = balance(tables), COARSE if tables.lines and entry_bits < 16 else 1
+    scale = finest_scale(balanced, 2 ** (width - 1) - 1, 2**entry_bits - 1, grid)
     if entry_bits < 16:
-        scale = kindest_scale(balanced, scale, bits, codes)
-    switch_rows = _rounded(balanced.switch_rows, scale)
-    switch_means = _rounded(balanced.switch_rows * _mean(bits.astype(np.int64))[:, np.newaxis], scale)
-    thresholds, joint_rows, joint_means = [], [], []
-    for column, steps, rows in zip(codes.T, balanced.thresholds, balanced.joint_rows, strict=True):
-        merged_steps, merged_rows = _merged(steps, _rounded(rows, scale))
-        thresholds.append(merged_steps)
-        joint_rows.append(merged_rows)
-        # A mean computed in floating point may round to just outside of what it is the mean of, and so of int16.
-        mean = np.rint(_mean(rows[np.searchsorted(steps, column)]) * scale)
-        joint_means.append(np.clip(mean, merged_rows.min(axis=0), merged_rows.max(axis=0)))
-    return IntegerTables(
+        scale = kindest_scale(balanced, scale, bits, codes, grid)
+    lines = {line.joint: line.of(codes) for line in balanced.lines}
+    switch_rows = _whole(balanced.switch_rows * scale, grid).astype(np.int16)
+    switch_means = np.rint(balanced.switch_rows * _mean(bits.astype(np.int64))[:, np.newaxis] * scale)
+    merged = [
+        _merged(steps, rows.astype(np.int16))
+        for steps, rows in zip(balanced.thresholds, _middle_rows(balanced, scale, grid), strict=True)
+    ]
+    slopes = (slope_of(line, scale) for line in balanced.lines)
+    integers = IntegerTables(
         bias=_rounded(balanced.bias, scale),
         switch_rows=switch_rows,
-        thresholds=tuple(thresholds),
-        joint_rows=tuple(joint_rows),
-        switch_means=switch_means,
-        joint_means=np.array(joint_means, np.int16).reshape(len(joint_means), len(tables.bias)),
+        thresholds=tuple(steps for steps, _ in merged),
+        joint_rows=tuple(rows for _, rows in merged),
+        switch_means=np.clip(switch_means, np.minimum(switch_rows, 0), np.maximum(switch_rows, 0)).astype(np.int16),
+        joint_means=np.zeros((len(merged), len(tables.bias)), np.int16),
         scale=scale,
+        slopes=tuple(replace(slope, row=row.astype(np.int8)) for slope, row in slopes),
     )
+    joint_means = []
+    for joint, (column, steps, rows) in enumerate(zip(codes.T, balanced.thresholds, balanced.joint_rows, strict=True)):
+        # A mean computed in floating point may round to just outside of what it is the mean of, and so of int16.
+        mean = np.rint(_mean(rows[np.searchsorted(steps, column)] + lines.get(joint, 0.0)) * scale)
+        added = integers.choices(joint)[1].sum(axis=0)
+        joint_means.append(np.clip(mean, added.min(axis=0), added.max(axis=0)))
+    return replace(integers, joint_means=np.array(joint_means, np.int16).reshape(len(joint_means), len(tables.bias)))
 
 
 def _rounded(rows: Floats, scale: float) -> Integers:
@@ -192,7 +285,5 @@ def _mean(rows: NDArray[np.int64] | Floats) -> Floats:
 def integer_scores(tables: IntegerTables, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDArray[np.int32]:
     """Return the scores (n, K), in steps, of the kept switches (n, s) and the joints' codes (n, j)."""
     # No partial sum leaves int16 (IntegerTables), so nothing overflows; a product of small whole numbers is exact.
-    scores = bits.astype(np.int32) @ tables.switch_rows.astype(np.int32) + tables.bias.astype(np.int32)
-    for column, thresholds, rows in zip(codes.T, tables.thresholds, tables.joint_rows, strict=True):
-        scores += rows[np.searchsorted(thresholds, column, side="left")]
+    scores: NDArray[np.int32] = tables.joint_sums(codes) + bits.astype(np.int32) @ tables.switch_rows.astype(np.int32)
     return scores

@@ -15,7 +15,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.tables import HIGHEST_CODE, IntegerTables, Slope
 
 from .collapse import Floats, ScoreTables, first_codes
 
@@ -158,34 +158,64 @@ class _Pairs:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Choice:
-    """What an input can say: values (c,), its rows (c, K) in units of score and in steps."""
+    """What an input can say: values (c,), its rows (c, K) in units of score and in steps; and the row (K,) of its line,
+    which is added `times` (c,).
+    """
 
     values: NDArray[np.int64]
     rows: Floats
-    steps: NDArray[np.int16]
+    steps: NDArray[np.integer]
+    line: Floats
+    times: NDArray[np.int64]
 
 
 def _choices(tables: ScoreTables, integers: IntegerTables) -> Iterator[_Choice]:
     """Yield bias, switches and joints."""
-    yield _Choice(np.zeros(1, np.int64), tables.bias[np.newaxis], integers.bias[np.newaxis])
+    none, never = 0 * tables.bias, np.zeros(1, np.int64)
+    yield _Choice(np.zeros(1, np.int64), tables.bias[np.newaxis], integers.bias[np.newaxis], none, never)
     for row, steps in zip(tables.switch_rows, integers.switch_rows, strict=True):
-        yield _Choice(np.arange(2), np.stack([0 * row, row]), np.stack([0 * steps, steps]))
-    for one, rows, other, steps in zip(
-        tables.thresholds, tables.joint_rows, integers.thresholds, integers.joint_rows, strict=True
-    ):
-        codes = first_codes(one, other)
-        yield _Choice(codes, rows[np.searchsorted(one, codes)], steps[np.searchsorted(other, codes)])
+        yield _Choice(np.arange(2), np.stack([0 * row, row]), np.stack([0 * steps, steps]), none, never)
+    lines = {line.joint: line for line in tables.lines}
+    for joint, (one, other) in enumerate(zip(tables.thresholds, integers.thresholds, strict=True)):
+        slope, line = integers.slope_of(joint), lines.get(joint)
+        codes = first_codes(one, other) if slope is None else _turning_codes(slope, one, other)
+        rows = tables.joint_rows[joint][np.searchsorted(one, codes)]
+        steps = integers.joint_rows[joint][np.searchsorted(other, codes)].astype(np.int64)
+        if slope is None or line is None:
+            yield _Choice(codes, rows, steps, none, never)
+        else:
+            above = np.clip(codes, line.low, line.high) - line.low
+            yield _Choice(codes, rows, steps + slope.of(codes), line.row, above)
+
+
+def _turning_codes(slope: Slope, *thresholds: NDArray[np.uint16]) -> NDArray[np.int64]:
+    """Return codes among which, in every bin, are those of the largest and of the least error.
+
+    Within a bin, errors at the first of the codes that become one distance lie on a straight line, and so do those at
+    the last ones: the ends of both lines are among the codes about each end of the bin.
+    """
+    cell = 1 << max(-slope.gain, 0)
+    last = np.concatenate([each.astype(np.int64) for each in thresholds])
+    ends = np.concatenate([[0, HIGHEST_CODE], last, last + 1])
+    firsts = slope.low + (np.clip(ends, slope.low, slope.high) - slope.low) // cell * cell
+    about = (firsts + near for near in (-1, 0, cell - 1, cell))
+    return np.unique(np.clip(np.concatenate([ends, [slope.low, slope.high], *about]), 0, HIGHEST_CODE))
 
 
 def _errors(choices: list[_Choice], scale: float) -> tuple[list[Exact], int]:
     """Return scale * rows - steps of every choice, (c, K), as whole numbers; and how many of them make a step."""
-    cut = [np.frexp(choice.rows) for choice in choices]
+    cut = [(np.frexp(choice.rows), np.frexp(choice.line)) for choice in choices]
     # Doubles are whole numbers below 2^53 times a power of two: the least power is a grid for all.
-    lowest = min(0, *(int(powers.min()) - 53 for _, powers in cut))
+    lowest = min(0, *(int(powers.min()) - 53 for both in cut for _, powers in both))
     above, below = scale.as_integer_ratio()
     step = below << -lowest
     errors = []
-    for choice, (mantissas, powers) in zip(choices, cut, strict=True):
-        whole = np.ldexp(mantissas, 53).astype(np.int64).astype(object) << (powers - 53 - lowest).astype(object)
+    for choice, (rows, line) in zip(choices, cut, strict=True):
+        whole = _whole(*rows, lowest) + choice.times.astype(object)[:, np.newaxis] * _whole(*line, lowest)
         errors.append(whole * above - choice.steps.astype(object) * step)
     return errors, step
+
+
+def _whole(mantissas: Floats, powers: NDArray[np.int32], lowest: int) -> Exact:
+    whole: Exact = np.ldexp(mantissas, 53).astype(np.int64).astype(object) << (powers - 53 - lowest).astype(object)
+    return whole

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ..tables.collapse import Model
 
 Report = Callable[[int, int], None]
-Number = float | int | None
+Number = float | int | str | None
 
 
 class TrainerError(ThenarError, ValueError):
@@ -25,7 +25,7 @@ class TrainerError(ThenarError, ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A number that a trainer takes: `--name` on the command line, with hyphens.
+    """A number, or one of a few names, that a trainer takes: `--name` on the command line, with hyphens.
 
     Parameters
     ----------
@@ -34,25 +34,43 @@ class Setting:
     what : str
         The sentence of `--help`.
     kind : type
-        int or float.
-    default : int, float or None
+        int, float, or str.
+    default : int, float, str or None
         Without a value; None is a value of its own.
     least, most : int or float, optional
-        The least and the largest value that make sense.
+        The least and the largest number that make sense.
+    names : tuple of str, optional
+        The values of a str.
 
     Examples
     --------
     >>> from thenar.compiler import TRAINERS
     >>> [setting.name for setting in TRAINERS["logitboost"].settings]
-    ['rounds', 'shrinkage', 'tolerance', 'max_bins']
+    ['rounds', 'shrinkage', 'tolerance', 'max_bins', 'ties']
     """
 
     name: str
     what: str
-    kind: type[int] | type[float]
+    kind: type[int] | type[float] | type[str]
     default: Number
     least: float | None = None
     most: float | None = None
+    names: tuple[str, ...] = ()
+
+    def checked(self, value: Number) -> Number:
+        """Return the value as one of its kind. Raises TrainerError for one that makes no sense."""
+        if value is None:
+            return None
+        if self.names or isinstance(value, str):
+            if value not in self.names:
+                wanted = f"one of {', '.join(self.names)}" if self.names else "a number"
+                raise TrainerError(f"{self.name}={value!r} must be {wanted}")
+            return value
+        if self.least is not None and not value >= self.least:
+            raise TrainerError(f"{self.name}={value} must be at least {self.least}")
+        if self.most is not None and not value <= self.most:
+            raise TrainerError(f"{self.name}={value} must be at most {self.most}")
+        return self.kind(value)
 
 
 class Trainer(ABC):
@@ -123,7 +141,7 @@ class Trainer(ABC):
         return tuple(found)
 
     def checked(self, given: Mapping[str, Number]) -> dict[str, Number]:
-        """Return given settings as numbers of their kind.
+        """Return given settings as values of their kind.
 
         Raises TrainerError for a setting that it does not take, or a value that is out of its range.
         """
@@ -132,12 +150,7 @@ class Trainer(ABC):
         for name, value in given.items():
             if name not in settings:
                 raise TrainerError(f"trainer {self.name!r} takes no setting {name!r}: leave it out")
-            setting = settings[name]
-            if value is not None and setting.least is not None and not value >= setting.least:
-                raise TrainerError(f"{name}={value} must be at least {setting.least}")
-            if value is not None and setting.most is not None and not value <= setting.most:
-                raise TrainerError(f"{name}={value} must be at most {setting.most}")
-            values[name] = None if value is None else setting.kind(value)
+            values[name] = settings[name].checked(value)
         return values
 
 
@@ -215,7 +228,9 @@ def _asked(options: Options) -> list[tuple[Trainer, dict[str, Number]]]:
     if not takers:
         lacking = sorted(given.keys() - set().union(*names.values()))
         wrong = (
-            f"no trainer takes the setting {lacking[0]!r}" if lacking else f"no trainer takes all of {sorted(given)}"
+            f"no trainer takes the setting {lacking[0]!r}"
+            if lacking
+            else f"no trainer takes all of {', '.join(sorted(given))}"
         )
         raise TrainerError(f"{wrong}: leave it out")
     if len(takers) < len(names):

@@ -17,10 +17,11 @@ class Logit(Trainer):
     what = "multinomial logistic regression on a table for each input"
     settings = (
         Setting("penalty", "Pull of scores towards zero (logit).", float, 1.0, 1e-6, 1e6),
-        Setting("smoothness", "Pull of a joint's neighbouring bins towards each other (logit).", float, 10.0, 0.0, 1e6),
+        Setting("smoothness", "Pull of a joint's neighbouring bins towards each other (logit).", float, 3.0, 0.0, 1e6),
         Setting(
-            "max_bins", "At most so many bins a joint: smaller tables.  [default: no limit; logit: 16]", int, None, 2
+            "max_bins", "At most so many bins a joint: smaller tables.  [default: no limit; logit: 16]", int, 16, 2
         ),
+        Setting("linear", "1: joints add scores in proportion to their codes, without bins (logit).", int, 0, 0, 1),
     )
 
     tried = tuple(
@@ -28,13 +29,13 @@ class Logit(Trainer):
         for penalty in (10.0, 1.0, 0.1)
         for smoothness in (10.0, 1.0)
         for bins in (8, 16)
-    )
+    ) + tuple({"penalty": penalty, "smoothness": 1.0, "linear": 1} for penalty in (10.0, 1.0, 0.1))
 
     def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> "ScoreTables":
         """Return the tables. Raises BoostingError for settings that make no sense."""
         from ..additive.logit import BINS, fit_logit
 
-        given = {**settings, "max_bins": settings["max_bins"] or BINS}
+        given = {**settings, "max_bins": settings["max_bins"] or BINS, "linear": bool(settings["linear"])}
         return fit_logit(samples.inputs, samples.labels, samples.n_classes, **given).score_tables(samples.n_switches)
 
 

@@ -200,5 +200,6 @@ class MissingInputs:
 def weights(tables: IntegerTables) -> tuple[list[int], int]:
     """Return the weight of each switch, and of all joints together, in steps."""
     switches: list[int] = np.abs(tables.switch_rows.astype(np.int64)).sum(axis=1).tolist()
-    joints = sum(int(np.ptp(rows.astype(np.int64), axis=0).sum()) for rows in tables.joint_rows)
+    terms = (tables.choices(joint)[1].sum(axis=0) for joint in range(tables.n_joints))
+    joints = sum(int(np.ptp(rows, axis=0).sum()) for rows in terms)
     return switches, joints

@@ -117,7 +117,7 @@ class Decided:
         known = sorted(set(range(tables.n_switches)).difference(*ports))
         self._frames = len(bits)
         # No partial sum leaves int16 (IntegerTables), so nothing overflows here.
-        self._base = _joints(tables, codes) + bits[:, known].astype(np.int32) @ rows[known]
+        self._base = tables.joint_sums(codes) + bits[:, known].astype(np.int32) @ rows[known]
         self._shares = [bits[:, list(port)].astype(np.int32) @ rows[list(port)] for port in ports]
         self._reaches = [_reaches(tables, port) for port in ports]
         self._counts: dict[int, int] = {}
@@ -153,11 +153,3 @@ def reach_of(tables: IntegerTables, switches: Sequence[int]) -> int:
 def _reaches(tables: IntegerTables, switches: Sequence[int]) -> Ints:
     """Return the most steps by which class c can come closer to class l, at [l, c]; (K, K)."""
     return np.array([reaches(tables, leader, switches) for leader in range(tables.n_classes)], np.int32)
-
-
-def _joints(tables: IntegerTables, codes: NDArray[np.uint16]) -> Ints:
-    """Return the bias and what the joints add, (n, K)."""
-    sums = np.repeat(tables.bias[np.newaxis].astype(np.int32), len(codes), axis=0)
-    for column, (thresholds, rows) in enumerate(zip(tables.thresholds, tables.joint_rows, strict=True)):
-        sums += rows[np.searchsorted(thresholds, codes[:, column], side="left")]
-    return sums

@@ -19,7 +19,8 @@ from thenar.compiler.recordings.errors import TableError
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.recordings.importer import ImportReport, import_table
 from thenar.compiler.recordings.table import read_table
-from thenar.compiler.tables.collapse import HIGHEST_CODE, collapse
+from thenar.compiler.tables.collapse import collapse
+from thenar.runtime.tables import HIGHEST_CODE
 
 from ..finding import Case, Finding, Worst
 

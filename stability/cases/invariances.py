@@ -18,9 +18,9 @@ from thenar.compiler.boosting.stumps import TIE, Stumps
 from thenar.compiler.elementary import Floats
 from thenar.compiler.placement.id3 import grow_id3
 from thenar.compiler.placement.tree import Tree
-from thenar.compiler.tables.collapse import HIGHEST_CODE, ScoreTables, collapse
+from thenar.compiler.tables.collapse import ScoreTables, collapse
 from thenar.compiler.tables.quantise import quantise
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.tables import HIGHEST_CODE, IntegerTables
 
 from ..checks.class_rounds import ClassRound, Step, branches, class_rounds, grown, step_of
 from ..checks.rounds import counted

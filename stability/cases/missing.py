@@ -8,11 +8,10 @@ import numpy as np
 from mpmath import mpf
 from numpy.typing import NDArray
 
-from thenar.compiler.tables.collapse import HIGHEST_CODE
 from thenar.compiler.tables.furthest import furthest
 from thenar.runtime.build import Build
 from thenar.runtime.scores import LANE_OFFSET
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.tables import HIGHEST_CODE, IntegerTables
 
 from ..checks.integer_sums import first_best
 from ..finding import Case, Finding, Worst

@@ -8,7 +8,7 @@ from mpmath import mpf
 from numpy.typing import NDArray
 
 from thenar.compiler.evaluation.folds import Fold, weka_folds
-from thenar.compiler.evaluation.plan import FoldFit, inputs, predictions
+from thenar.compiler.evaluation.plan import Data, FoldFit, predictions
 from thenar.compiler.evaluation.populations import Population, Scheme, populations
 from thenar.compiler.evaluation.rates import ALIKE, UNITS, WEIGHT, Rate, clustered
 from thenar.compiler.evaluation.study import Options, evaluate
@@ -56,13 +56,13 @@ def differs(cell: Cell, tested: NDArray[np.intp]) -> bool:
 
 def guessed_untrained(grasp_set: GraspSet, scheme: Scheme) -> int:
     """Return how many tested rows are taken for a class that their fold was not trained on."""
-    X, labels = inputs(grasp_set), grasp_set.labels
+    data = Data.of(grasp_set)
     wrong = 0
     for part in parts_of(grasp_set, scheme):
         for fold in part.folds:
-            fit = FoldFit(fold, tuple(range(X.shape[1])), part.grasps, len(grasp_set.switch_names))
-            found = predictions(X, labels, fit, Training("logitboost", {"rounds": 10}))
-            wrong += int((~np.isin(found, labels[fold.train])).sum())
+            fit = FoldFit(fold, tuple(range(data.X.shape[1])), part.grasps, len(grasp_set.switch_names))
+            found = predictions(data, fit, Training("logitboost", {"rounds": 10}))
+            wrong += int((~np.isin(found, data.labels[fold.train])).sum())
     return wrong
 
 

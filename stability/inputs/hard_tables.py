@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.tables.collapse import HIGHEST_CODE, Floats, ScoreTables
+from thenar.compiler.tables.collapse import Floats, ScoreTables
 from thenar.compiler.tables.quantise import quantise
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.tables import HIGHEST_CODE, IntegerTables
 
 Bits = NDArray[np.bool_]
 Codes = NDArray[np.uint16]

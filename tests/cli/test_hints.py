@@ -79,7 +79,7 @@ def completed(*words: str) -> list[str]:
         (("place", "set.grasps", "--method", ""), [*METHODS]),
         (("frontier", "--methods", "id3,cm"), ["id3,cmim"]),
         (("evaluate", "--rivals", "mr"), ["mrmr"]),
-        (("compile", "--trainer", ""), [*TRAINERS]),
+        (("compile", "--trainer", ""), ["auto", *TRAINERS]),
         (("compile", "--preset", "f"), ["fastest"]),
         (("compile", "--meth"), ["--method"]),
         (("firmware", "--target", "cortex"), ["cortex-m0plus", "cortex-m4"]),

@@ -17,9 +17,9 @@ from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.placement.cooccurrence import Cooccurrence
 from thenar.compiler.placement.exact import _log_sum, error_bound
 from thenar.compiler.placement.gain import NodeCounts, _score_bound
-from thenar.compiler.tables.collapse import ScoreTables, collapse
-from thenar.compiler.tables.compare import COLLAPSE_TOLERANCE, compare, float_slack, rounding_error
-from thenar.compiler.tables.quantise import quantise
+from thenar.compiler.tables.collapse import Line, ScoreTables, collapse
+from thenar.compiler.tables.compare import COLLAPSE_TOLERANCE, compare, float_slack
+from thenar.compiler.tables.quantise import quantise, rounding_error
 
 UNIT = 2.0**-53
 
@@ -68,7 +68,16 @@ def test_a_sum_of_logarithms_counts_two_errors_a_term_and_four(terms: dict[int, 
 
 
 def test_rounding_moves_a_score_by_half_a_step_for_the_bias_and_each_input() -> None:
-    assert [rounding_error(n) for n in (0, 1, 48)] == [0.5, 1.0, 24.5]
+    def of(switches: int, *lines: Line) -> ScoreTables:
+        no, row = np.array([], np.uint16), np.zeros((1, 2))
+        return ScoreTables(row[0], np.zeros((switches, 2)), (no,) * len(lines), (row,) * len(lines), lines)
+
+    assert [rounding_error(of(n), 9.0) for n in (0, 1, 48)] == [0.5, 1.0, 24.5]
+    assert rounding_error(of(3), 9.0, 256) == 0.5 + 3 * 128
+    # Half a step for its row, and for each of at most 50 distances; codes that become one are 1.5 from their middle.
+    row = np.array([0.0, -2.0])
+    assert rounding_error(of(0, Line(0, 3, 103, row)), 9.0) == 0.5 + 0.5 + 25
+    assert rounding_error(of(0, Line(0, 0, 1000, row)), 0.5) == 0.5 + 0.5 + 62.5 + 1.5 * 2.0 * 0.5
 
 
 def test_doubles_lose_a_unit_of_the_largest_magnitudes_for_each_input_joint_and_eight() -> None:

@@ -16,6 +16,7 @@ from sklearn.preprocessing import StandardScaler
 import thenar.compiler
 import thenar.runtime
 from thenar.compiler import (
+    AdditiveLogitClassifier,
     Build,
     CompileError,
     GraspSet,
@@ -84,6 +85,22 @@ def test_a_fitted_classifier_becomes_a_build_that_answers_as_it_does(
     frames = zip(grasp_set.switches, grasp_set.codes, strict=True)
     answers = [build.grasps[int(build.scores(*frame).argmax())] for frame in frames]
     assert np.mean(np.array(answers) == classifier.predict(X)) > 0.98
+
+
+def test_an_additive_logit_becomes_a_build_of_the_columns_that_it_gets(
+    grasp_set: GraspSet, X: np.ndarray, tmp_path: Path
+) -> None:
+    s = len(grasp_set.switch_names)
+    chosen = ColumnTransformer([("codes", "passthrough", slice(s, None)), ("switches", SelectKBest(k=5), slice(s))])
+    classifier = AdditiveLogitClassifier(penalty=0.5, max_bins=None)
+    pipeline = make_pipeline(chosen, classifier).fit(X, grasp_set.grasps)
+    made = compile(pipeline, grasp_set, tmp_path / "made", folds=2)
+    options = made.manifest.options
+    assert (options.trainer, options.max_bins, options.settings) == ("logit", 65536, {"penalty": 0.5, "smoothness": 3})
+    assert len(made.manifest.switches) == 5
+    found = verify(tmp_path / "made", grasp_set)
+    assert found.holds
+    assert found.recognised[0].ensemble == np.count_nonzero(pipeline.predict(X) == grasp_set.grasps)
 
 
 Steps = Callable[[int], object]

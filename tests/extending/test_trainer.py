@@ -46,7 +46,7 @@ def test_a_trainer_of_another_package_is_chosen_by_its_name_and_makes_a_build_th
 ) -> None:
     build = tmp_path / "build"
     words = " ".join(installed.thenar("compile", "--help").split())
-    assert "--trainer [logitboost|naive-bayes]" in words
+    assert "--trainer TRAINER What makes the model: logitboost (" in words
     assert "(naive Bayes: inputs are independent within a grasp type)" in words
     assert "--joint-bins INTEGER RANGE Into how many bins naive Bayes cuts a joint. [default: 8; x>=2]" in words
 
@@ -107,8 +107,15 @@ def test_a_frontier_of_the_trainer_has_one_stage_and_its_points_are_built(
     assert "naive-bayes, joint-bins 5" in (build / "report.html").read_text()
 
 
-def test_a_setting_of_another_trainer_is_refused(installed: Any, recordings: Path, tmp_path: Path) -> None:
-    given = ("compile", str(recordings), "-o", str(tmp_path / "build"))
+def test_a_setting_names_the_trainer_that_takes_it_and_of_another_it_is_refused(
+    installed: Any, recordings: Path, tmp_path: Path
+) -> None:
+    given = ("compile", str(recordings), "-o", str(tmp_path / "build"), "--no-report", "--folds", "0")
     assert "--rounds is no setting" in installed.thenar(*given, "--trainer", "naive-bayes", "--rounds", "5", code=2)
-    assert "--smoothing is no setting" in installed.thenar(*given, "--smoothing", "2", code=2)
+    assert "no trainer takes all of rounds, smoothing" in installed.thenar(
+        *given, "--smoothing", "2", "--rounds", "5", code=2
+    )
     assert not (tmp_path / "build").exists()
+    assert "trained by naive-bayes, smoothing 2, joint-bins 8" in installed.thenar(*given, "--smoothing", "2")
+    # It takes part where the trainer is chosen.
+    assert "\n  naive-bayes, smoothing 1, joint-bins 8: " in installed.thenar(*given)

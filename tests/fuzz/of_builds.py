@@ -119,7 +119,7 @@ def _member(name: str, mutate: Mutate, sealed_again: Callable[[bytes], bytes]) -
         files = {**build_files(), name: data}
         _use_build(make_folder(files if name == MANIFEST_NAME else _described(files), folder / "build"))
 
-    return Format(name, lambda: [build_files()[name]], changed, read)
+    return Format(name, lambda: [build_files()[name], build_files(linear=True)[name]], changed, read)
 
 
 def _mixed(data: bytes, random: Random) -> bytes:

@@ -26,7 +26,7 @@ from thenar.runtime.manifest import (
 )
 from thenar.runtime.preshape import Preshape
 from thenar.runtime.published import Count, DeviceHealth, Drift, HealthReport, JointAngles, LiveGrasp
-from thenar.runtime.tables import IntegerTables, tables_to_bytes
+from thenar.runtime.tables import IntegerTables, Slope, tables_to_bytes
 
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
@@ -34,7 +34,9 @@ MakeBuild = Callable[..., Build]
 MakeGrasp = Callable[..., LiveGrasp]
 
 
-def _make_tables(seed: int = 0, classes: int = 5, switches: int = 9, joints: int = 3, bins: int = 6) -> IntegerTables:
+def _make_tables(
+    seed: int = 0, classes: int = 5, switches: int = 9, joints: int = 3, bins: int = 6, slopes: int = 0
+) -> IntegerTables:
     random = np.random.default_rng(seed)
 
     def rows(*shape: int) -> np.ndarray:
@@ -49,7 +51,14 @@ def _make_tables(seed: int = 0, classes: int = 5, switches: int = 9, joints: int
         switch_means=rows(switches, classes),
         joint_means=rows(joints, classes),
         scale=100.0,
+        slopes=tuple(_slope(random, joint, classes) for joint in range(min(slopes, joints))),
     )
+
+
+def _slope(random: np.random.Generator, joint: int, classes: int) -> Slope:
+    low, gain = int(random.integers(0, 200)), int(random.integers(-2, 3))
+    high = low + int(random.integers(8, 254 / 2**gain))
+    return Slope(joint, low, high, gain, random.integers(-9, 10, classes).astype(np.int8))
 
 
 def _describe(tables: IntegerTables) -> Manifest:

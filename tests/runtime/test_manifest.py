@@ -7,7 +7,16 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from thenar.runtime.errors import BuildError, ThenarError
-from thenar.runtime.manifest import MAX_BYTES, Manifest, Recognised, manifest_from_bytes, manifest_to_bytes
+from thenar.runtime.manifest import (
+    MAX_BYTES,
+    Compared,
+    Fitting,
+    Manifest,
+    Options,
+    Recognised,
+    manifest_from_bytes,
+    manifest_to_bytes,
+)
 from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
@@ -43,6 +52,38 @@ def test_builds_of_older_versions_say_honest_and_load(manifest: Manifest) -> Non
     assert OLDER in data.decode()
     read = manifest_from_bytes(data)
     assert str(read.headline) == "pooled: 90.0 %, 9 of 10 frames in 4 nested folds"
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (Options(rounds=50, shrinkage=1.0), "logitboost, rounds 50, shrinkage 1"),
+        (
+            Options(rounds=50, shrinkage=0.5, trainer="logitboost", max_bins=8),
+            "logitboost, rounds 50, shrinkage 0.5, max-bins 8",
+        ),
+        (Options(rounds=100, shrinkage=1.0, trainer="bayes", settings={"smoothing": 2.0}), "bayes, smoothing 2"),
+    ],
+)
+def test_builds_that_chose_nothing_say_by_their_options_what_trained_them(
+    manifest: Manifest, options: Options, said: str
+) -> None:
+    """Older versions wrote LogitBoost's rounds and shrinkage whatever the trainer, and no trainer of LogitBoost."""
+    read = manifest_from_bytes(manifest_to_bytes(replace(manifest, options=options)))
+    assert (str(read.fit), read.fit.compared) == (said, ())
+
+
+COMPARED = Compared("logit", {"penalty": 1.0, "max_bins": None}, 98, 100, 0.014, 0.1, 0.01, 0.02, 90.5)
+
+
+def test_a_choice_is_kept_with_what_it_was_chosen_from(manifest: Manifest) -> None:
+    fitting = Fitting("logit", {"penalty": 1.0}, "new subject", 4, 12, (COMPARED,), "it is")
+    read = manifest_from_bytes(manifest_to_bytes(replace(manifest, fitting=fitting)))
+    assert read.fit == fitting
+    assert str(COMPARED) == "logit, penalty 1: 98.0 +- 1.4 %, 1.0 +- 2.0 behind the best; tables of 90 rows"
+    for wrong in (replace(COMPARED, correct=101), replace(COMPARED, trainer="a\nb"), replace(COMPARED, behind=2.0)):
+        with pytest.raises(BuildError):
+            manifest_from_bytes(manifest_to_bytes(replace(manifest, fitting=replace(fitting, compared=(wrong,)))))
 
 
 def test_a_rate_says_what_it_is_of_its_interval_and_its_unit() -> None:
@@ -158,7 +199,7 @@ _WRONG: list[Callable[[Manifest], Manifest]] = [
     lambda m: replace(m, proof=replace(m.proof, error=1e308)),
     lambda m: replace(m, rates=(replace(m.rates[0], total=0, correct=0),)),
     lambda m: replace(m, rates=(replace(m.rates[0], correct=m.rates[0].total + 1),)),
-    lambda m: replace(m, stopped_after=m.options.rounds + 1),
+    lambda m: replace(m, stopped_after=101),
     lambda m: replace(m, options=replace(m.options, rounds=0)),
     lambda m: replace(m, options=replace(m.options, shrinkage=1e308)),
 ]

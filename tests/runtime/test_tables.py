@@ -17,8 +17,10 @@ from thenar.runtime.tables import (
     COARSEST_SCALE,
     KIND,
     MAX_BYTES,
-    VERSION,
+    PLAIN,
+    SLOPED,
     IntegerTables,
+    Slope,
     tables_from_bytes,
     tables_to_bytes,
 )
@@ -33,6 +35,7 @@ sizes = st.fixed_dictionaries(
         "switches": st.integers(0, 9),
         "joints": st.integers(0, 3),
         "bins": st.integers(1, 5),
+        "slopes": st.integers(0, 3),
     }
 )
 
@@ -62,6 +65,42 @@ def test_the_bytes_are_as_documented() -> None:
     assert bytes(_payload(tables)) == counts + rows
 
 
+def test_the_bytes_of_slopes_are_as_documented() -> None:
+    none, row = np.zeros((0, 2), np.int16), np.zeros((1, 2), np.int16)
+    slope = Slope(0, 258, 300, -1, np.array([7, -8], np.int8))
+    tables = IntegerTables(row[0], none, (np.array([], np.uint16),), (row,), none, row, 1.0, (slope,))
+    counts = bytes.fromhex("0200 0000 0100 0100 000000000000f03f 0000")
+    assert bytes(_payload(tables)) == counts + bytes(12) + bytes.fromhex("0000 0201 2c01 ffff 07f8")
+    for version, wrong in ((PLAIN, counts), (SLOPED, counts.replace(b"\1\0\1\0", b"\1\0\0\0"))):
+        with pytest.raises(BuildError, match="offset 6"):
+            tables_from_bytes(seal(KIND, version, wrong + bytes(12)))
+
+
+@pytest.mark.parametrize(
+    "ends", [(9, 9, 0), (9, 8, 0), (0, 65536, -9), (0, 65535, -8), (0, 255, 0), (0, 20, 4), (0, 20, -5), (0, 20, -17)]
+)
+def test_a_slope_that_fits_no_byte_is_refused(ends: tuple[int, int, int]) -> None:
+    with pytest.raises(BuildError, match="fits no byte"):
+        Slope(0, *ends, np.zeros(2, np.int8))
+
+
+def test_slopes_of_other_joints_or_shapes_are_refused(make_tables: MakeTables) -> None:
+    tables = make_tables(slopes=2)
+    for joints in ((1, 0), (0, 0), (0, 3)):
+        with pytest.raises(BuildError, match="they must rise"):
+            replace(tables, slopes=tuple(replace(tables.slopes[0], joint=joint) for joint in joints))
+    with pytest.raises(BuildError, match="row of a slope"):
+        replace(tables, slopes=(replace(tables.slopes[0], row=np.zeros(4, np.int8)),))
+
+
+def test_a_slope_that_could_overflow_is_refused(make_tables: MakeTables) -> None:
+    slopes = (Slope(0, 0, 254, 0, np.full(5, 127, np.int8)),)
+    assert replace(make_tables(), slopes=slopes).bound > 127 * 127
+    two = (*slopes, replace(slopes[0], joint=1), replace(slopes[0], joint=2))
+    with pytest.raises(BuildError, match="could overflow"):
+        replace(make_tables(), slopes=two)
+
+
 @given(size=sizes, data=st.data())
 def test_no_partial_sum_of_any_frame_leaves_the_bound(make_tables: MakeTables, size: Size, data: st.DataObject) -> None:
     tables = make_tables(**size)
@@ -70,6 +109,9 @@ def test_no_partial_sum_of_any_frame_leaves_the_bound(make_tables: MakeTables, s
         terms.append(data.draw(st.sampled_from([row, mean, 0 * row])))
     for rows, mean in zip(tables.joint_rows, tables.joint_means, strict=True):
         terms.append(data.draw(st.sampled_from([*rows, mean])))
+    for slope in tables.slopes:
+        lost = (terms[1 + tables.n_switches + slope.joint] == tables.joint_means[slope.joint]).all()
+        terms.append(0 * tables.bias if lost else slope.of(np.array([data.draw(st.integers(0, 500))]))[0])
     order = data.draw(st.permutations(terms))
     assert np.abs(np.cumsum(np.array(order, np.int64), axis=0)).max() <= tables.bound
 
@@ -114,7 +156,7 @@ def test_a_file_holds_no_coarser_scale_than_an_ensemble_can_need(make_tables: Ma
         tables_to_bytes(replace(make_tables(), scale=COARSEST_SCALE / 2))
     payload = data[HEADER.size :].replace(struct.pack("<d", COARSEST_SCALE), struct.pack("<d", COARSEST_SCALE / 2))
     with pytest.raises(BuildError, match="at least 2"):
-        tables_from_bytes(seal(KIND, VERSION, payload))
+        tables_from_bytes(seal(KIND, PLAIN, payload))
 
 
 @pytest.mark.parametrize("change", [{"bias": np.zeros(4, np.int16)}, {"bias": np.zeros(5)}, {"joint_rows": ()}])
@@ -149,16 +191,16 @@ def test_an_oversized_file_is_refused() -> None:
 
 
 def test_a_newer_file_is_refused_by_its_number() -> None:
-    with pytest.raises(SealError, match="format 2"):
-        tables_from_bytes(seal(KIND, 2, b""))
+    with pytest.raises(SealError, match="format 3"):
+        tables_from_bytes(seal(KIND, 3, b""))
 
 
-@given(payload=st.binary(max_size=300))
-def test_any_sealed_content_is_read_or_refused_without_much_memory(payload: bytes) -> None:
+@given(payload=st.binary(max_size=300), version=st.sampled_from([PLAIN, SLOPED]))
+def test_any_sealed_content_is_read_or_refused_without_much_memory(payload: bytes, version: int) -> None:
     tracemalloc.start()
     try:
         with contextlib.suppress(ThenarError):
-            tables_from_bytes(seal(KIND, 1, payload))
+            tables_from_bytes(seal(KIND, version, payload))
     finally:
         _, peak = tracemalloc.get_traced_memory()
         tracemalloc.stop()
@@ -167,11 +209,12 @@ def test_any_sealed_content_is_read_or_refused_without_much_memory(payload: byte
 
 @given(size=sizes, data=st.data())
 def test_mutated_content_is_read_or_refused(make_tables: MakeTables, size: Size, data: st.DataObject) -> None:
-    payload = _payload(make_tables(**size))
+    made = make_tables(**size)
+    payload, version = _payload(made), SLOPED if made.slopes else PLAIN
     for _ in range(data.draw(st.integers(1, 4))):
         payload[data.draw(st.integers(0, len(payload) - 1))] = data.draw(st.integers(0, 255))
     try:
-        tables = tables_from_bytes(seal(KIND, 1, bytes(payload)))
+        tables = tables_from_bytes(seal(KIND, version, bytes(payload)))
     except ThenarError:
         return
     assert tables_to_bytes(tables)[56:] == bytes(payload)

@@ -61,7 +61,7 @@ class Avr(Target):
         return {
             **library.files,
             "Makefile": render("avr_library/Makefile.j2", **values),
-            "main.c": render("avr_library/main.c.j2", name=name, joints=len(layout.joints), class_type=class_type),
+            "main.c": render("avr_library/main.c.j2", name=name, joints=layout.tables.n_joints, class_type=class_type),
         }
 
     def missing(self) -> str | None:

@@ -147,7 +147,9 @@ MEMBER = (
         flash=128 << 10,
         ram=16 << 10,
         clock_hz=48_000_000,
-        core=Core(a_class=13, in_parts=10, lookup=10, part=0, pair=3, quad=11, replaced_pair=7, replaced_quad=20),
+        core=Core(
+            a_class=13, in_parts=10, lookup=10, part=0, pair=3, quad=11, replaced_pair=7, replaced_quad=20, product=5
+        ),
         flags=("-mcpu=cortex-m0plus", "-mthumb", "-O2", "-ffreestanding"),
         machine=Machine("microbit", 256 << 10, 16 << 10, 16_000_000),
     ),

@@ -99,6 +99,7 @@ def _with_fewer(tables: IntegerTables, switches: int, joints: int) -> IntegerTab
         thresholds=tables.thresholds[:joints],
         joint_rows=tables.joint_rows[:joints],
         joint_means=tables.joint_means[:joints],
+        slopes=tuple(slope for slope in tables.slopes if slope.joint < joints),
     )
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from thenar.compiler import GraspSet, compile_build, grow_id3
+from thenar.compiler import TRAINERS, GraspSet, compile_build, grow_id3
 from thenar.compiler.artifact import CompileError
 from thenar.compiler.artifact.training import cuts_of
 from thenar.compiler.artifact.verify import verify
@@ -130,10 +130,28 @@ def test_frames_that_are_numbered_as_trials_are_refused_before_any_work(make_set
     assert compile_build(numbered, tmp_path / "build", rounds=1, folds=0).manifest.headline is None
 
 
-def test_the_rates_are_those_of_builds_of_each_folds_training_rows(make_set: Make, tmp_path: Path) -> None:
-    options: dict[str, Any] = {"rounds": ROUNDS, "prune": 5, "width": 5}
+OPEN: dict[str, Any] = {"trainer": "logit", "penalty": 1.0, "max_bins": 4, "linear": 0}  # the smoothness is chosen
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"rounds": ROUNDS, "prune": 5, "width": 5},
+        {"prune": 5, "width": 6, **OPEN},
+        {"table_bits": 8, "keep": 4, "placement": "cmim", **OPEN},
+        pytest.param({"width": 6}, marks=pytest.mark.slow),
+    ],
+)
+def test_the_rates_are_those_of_builds_of_each_folds_training_rows(
+    make_set: Make, tmp_path: Path, options: dict[str, Any]
+) -> None:
+    """All of it anew: placement, fit, integers. What is tested are the integers, whatever they lose."""
     whole = make_set(subjects=3)
-    rates = compile_build(whole, tmp_path / "build", **options).manifest.rates[1:]
+    manifest = compile_build(whole, tmp_path / "build", **options).manifest
+    assert bool(manifest.fitting) == ("rounds" not in options)
+    (counted,) = verify(tmp_path / "build", whole).recognised
+    training, *rates = manifest.rates
+    assert training.correct == counted.integers
     for rate, cut in zip(rates, cuts_of(whole, Options()), strict=True):
         correct = 0
         for fold in cut.folds:
@@ -142,6 +160,24 @@ def test_the_rates_are_those_of_builds_of_each_folds_training_rows(make_set: Mak
             (counted,) = verify(tmp_path / "fold", tested).recognised
             correct += counted.integers
         assert (rate.correct, rate.total) == (correct, 96)
+
+
+def test_a_choice_is_recorded_and_made_again_from_the_recorded_options(grasp_set: GraspSet, tmp_path: Path) -> None:
+    manifest = compile_build(grasp_set, tmp_path / "build", folds=0, **OPEN).manifest
+    fit, options = manifest.fit, manifest.options
+    assert manifest.fitting == fit
+    assert (options.trainer, options.settings, options.max_bins) == ("logit", {"penalty": 1.0, "linear": 0.0}, 4)
+    assert (fit.trainer, fit.tried, fit.of) == ("logit", 2, "within subject")
+    assert fit.settings["smoothness"] in {tried["smoothness"] for tried in TRAINERS["logit"].tried}
+    assert {each.settings["smoothness"] for each in fit.compared} >= {fit.settings["smoothness"]}
+    compile_build(grasp_set, tmp_path / "again", options)
+    assert _bytes(tmp_path / "again") == _bytes(tmp_path / "build")
+    # Asked for by name, it is the same model.
+    given: dict[str, Any] = {name: value for name, value in fit.settings.items() if value is not None}
+    alone = compile_build(grasp_set, tmp_path / "alone", trainer="logit", folds=0, **given)
+    assert alone.manifest.fitting is None
+    assert alone.manifest.fit.settings == fit.settings
+    assert (tmp_path / "alone" / "tables.bin").read_bytes() == (tmp_path / "build" / "tables.bin").read_bytes()
 
 
 @pytest.mark.slow

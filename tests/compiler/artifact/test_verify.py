@@ -4,18 +4,20 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 import pytest
 from msgspec.structs import replace as replace_fields
 
-from thenar.compiler import GraspSet, compile_build
+from thenar.compiler import TRAINERS, GraspSet, Options, compile_build
 from thenar.compiler.artifact import CompileError
 from thenar.compiler.artifact.compile import MEMBERS
 from thenar.compiler.artifact.documents import REPORT_NAME
 from thenar.compiler.artifact.ensemble import ensemble_from_bytes
 from thenar.compiler.artifact.verify import ScanCheck, check_scan, verify
 from thenar.compiler.tables.collapse import collapse
+from thenar.compiler.trainers.base import Training
 from thenar.runtime import Build, BuildError
 from thenar.runtime.build import SCAN_NAME
 from thenar.runtime.errors import HarnessError
@@ -29,17 +31,26 @@ from thenar.runtime.tables import IntegerTables, tables_from_bytes, tables_to_by
 Make = Callable[..., GraspSet]
 
 
-@pytest.fixture
-def folder(grasp_set: GraspSet, tmp_path: Path) -> Path:
-    compile_build(grasp_set, tmp_path / "build", rounds=15, folds=0)
-    return tmp_path / "build"
+@pytest.fixture(params=[*((name, {}) for name in TRAINERS), ("logit", {"linear": 1})], ids=str)
+def folder(grasp_set: GraspSet, tmp_path: Path, request: pytest.FixtureRequest) -> Path:
+    """Return a build of each trainer, its settings given so that nothing is chosen."""
+    trainer, changes = request.param
+    settings = Training.candidates(Options(trainer=trainer))[0].settings
+    given: dict[str, Any] = {name: value for name, value in settings.items() if value is not None}
+    given |= {"rounds": 15} if "rounds" in given else {}
+    made = compile_build(grasp_set, tmp_path / "build", trainer=trainer, folds=0, **(given | changes))
+    assert made.manifest.fit.trainer == trainer
+    assert bool(made.tables.slopes) == bool(changes)
+    return made.folder
 
 
 def _silence(folder: Path, joints: int) -> None:
     """Make the first joints say nothing, and seal everything again, as a faulty compiler would."""
     tables = tables_from_bytes((folder / "tables.bin").read_bytes())
     rows = tuple(rows * (number >= joints) for number, rows in enumerate(tables.joint_rows))
-    silent = replace(tables, joint_rows=tuple(row.astype(np.int16) for row in rows), joint_means=0 * tables.joint_means)
+    slopes = tuple(slope for slope in tables.slopes if slope.joint >= joints)
+    whole = tuple(row.astype(np.int16) for row in rows)
+    silent = replace(tables, joint_rows=whole, joint_means=0 * tables.joint_means, slopes=slopes)
     _seal(folder, silent)
 
 
@@ -74,7 +85,7 @@ def test_the_worst_frame_is_told_whether_recorded_or_not(folder: Path, grasp_set
     lost = (exact[leader] - exact[rival]) * build.tables.scale - (deployed[leader] - deployed[rival])
     assert lost == pytest.approx(worst.loss, abs=1e-9)
     assert 0 < worst.loss < worst.bound
-    assert worst.bound == pytest.approx(build.manifest.proof.safe_margin, abs=1e-9)
+    assert worst.bound == pytest.approx(build.manifest.proof.safe_margin, rel=1e-11, abs=1e-9)
     assert worst.loss - 1 <= worst.safe_margin <= worst.loss
     assert worst.covered >= build.manifest.proof.covered
     assert worst.covered_changed == 0
@@ -85,7 +96,8 @@ def test_a_fault_that_no_recorded_row_shows_does_not_hold(folder: Path, grasp_se
     # A bin above all codes that were recorded.
     tables = tables_from_bytes((folder / "tables.bin").read_bytes())
     assert grasp_set.codes.max() < 300
-    rows = np.vstack([tables.joint_rows[0], tables.joint_rows[0][-1:] + np.array([-30, 0, 0, 0], np.int16)])
+    fault = np.array([-30 - 400 * bool(tables.slopes), 0, 0, 0], np.int16)
+    rows = np.vstack([tables.joint_rows[0], tables.joint_rows[0][-1:] + fault])
     thresholds = (np.append(tables.thresholds[0], np.uint16(300)), *tables.thresholds[1:])
     _seal(folder, replace(tables, thresholds=thresholds, joint_rows=(rows, *tables.joint_rows[1:])))
     found = verify(folder, grasp_set)

@@ -56,6 +56,19 @@ def test_every_score_and_type_of_every_frame_is_pythons(
     assert (found.carried.present, found.carried.outdated) == (True, ())
 
 
+@pytest.mark.parametrize("table_bits", [8, 16])
+@pytest.mark.parametrize("kind", ["host", "avr", pytest.param("cortex-m", marks=pytest.mark.slow)])
+def test_builds_with_linear_joints_are_pythons_too(
+    grasp_set: GraspSet, tool: Tool, tmp_path: Path, table_bits: int, kind: str
+) -> None:
+    for name in TOOLS[kind]:
+        tool(name)
+    given = {"penalty": 1.0, "smoothness": 1.0, "max_bins": 8, "linear": 1}
+    made = compile_build(grasp_set, tmp_path / "build", trainer="logit", folds=0, table_bits=table_bits, **given)
+    assert made.tables.slopes
+    assert verify_firmware(made.folder, grasp_set, (kind,)).holds
+
+
 @pytest.mark.parametrize("inputs", ["switches", "joints"])
 @pytest.mark.parametrize("kind", ["host", "avr"])
 def test_builds_without_joints_or_without_switches_are_pythons_too(

@@ -1,5 +1,6 @@
 """Sums left of every split, against a plain loop over rows."""
 
+from collections.abc import Iterator
 from fractions import Fraction
 
 import numpy as np
@@ -9,34 +10,40 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from thenar.compiler.boosting import binning
-from thenar.compiler.boosting.binning import Binned, TwoValued, bin_columns, midpoints
+from thenar.compiler.boosting.binning import Binned, ManyValued, TwoValued, bin_columns, midpoints
 
 NUMBERS = st.sampled_from([0.0, 1.0, 2.0, 5.0, -3.0, np.nan]) | st.floats(-10, 10)
 MATRICES = arrays(np.float64, st.tuples(st.integers(1, 12), st.integers(1, 5)), elements=NUMBERS)
 
 
 def check_all_sums(X: np.ndarray) -> None:
-    summands = np.arange(1.0, 1 + 2 * len(X)).reshape(2, len(X))
+    summands = np.arange(1.0, 1 + 2 * len(X)).reshape(len(X), 2)
     seen = []
     for group in bin_columns(X).groups:
-        for sums in group.sums(summands):
-            for at, column in enumerate(sums.columns):
-                numbers = X[:, column]
-                edges = midpoints(np.unique(numbers[~np.isnan(numbers)]))
-                seen.append(int(column))
-                for split, edge in enumerate(edges):
-                    expected = summands[:, numbers <= edge].sum(axis=1)
-                    assert np.array_equal(sums.left[split, at], expected)
-                    position = int(np.flatnonzero(group.columns == column)[0])
-                    assert group.threshold(position, split) == edge
-                    assert np.array_equal(group.goes_left(position, split), numbers <= edge)
-                if sums.missing is not None:
-                    assert np.array_equal(sums.missing[at], summands[:, np.isnan(numbers)].sum(axis=1))
-                if sums.valid is not None:
-                    assert sums.valid[:, at].sum() == len(edges)
-                    assert sums.valid[: len(edges), at].all()
+        for position, column, left, missing in sums_of(group, summands):
+            numbers = X[:, column]
+            edges = midpoints(np.unique(numbers[~np.isnan(numbers)]))
+            seen.append(column)
+            assert len(left) == len(edges)
+            for split, edge in enumerate(edges):
+                assert np.array_equal(left[split], summands[numbers <= edge].sum(axis=0))
+                assert group.threshold(position, split) == edge
+                assert np.array_equal(group.goes_left(position, split), numbers <= edge)
+            assert np.array_equal(missing, summands[np.isnan(numbers)].sum(axis=0))
     varying = [c for c in range(X.shape[1]) if len(np.unique(X[~np.isnan(X[:, c]), c])) > 1]
     assert sorted(seen) == varying
+
+
+def sums_of(group: TwoValued | ManyValued, summands: np.ndarray) -> Iterator[tuple[int, int, np.ndarray, np.ndarray]]:
+    """Yield the position of every column, its number, the sums (splits, R) left of its splits and (R,) missing."""
+    positions = {column: position for position, column in enumerate(group.columns.tolist())}
+    if isinstance(group, TwoValued):
+        for column, sums in zip(group.columns.tolist(), group.sums(summands), strict=True):
+            yield positions[column], column, sums[np.newaxis], np.zeros(summands.shape[1])
+        return
+    for batch in group.sums(summands):
+        for at, column in enumerate(batch.columns.tolist()):
+            yield positions[column], column, batch.left[at].T[batch.is_split[at]], batch.missing[at]
 
 
 @given(MATRICES)
@@ -47,6 +54,15 @@ def test_every_split_of_every_varying_column_is_summed(X: np.ndarray) -> None:
 def test_batches_of_columns_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(binning, "_BATCH_ELEMENTS", 30)
     check_all_sums(np.random.default_rng(7).integers(0, 9, size=(40, 11)).astype(np.float64))
+    check_all_sums(np.random.default_rng(7).integers(0, 2, size=(40, 11)).astype(np.float64))
+
+
+@pytest.mark.parametrize("columns", [1, 7, 8, 9, 21])
+@pytest.mark.parametrize("rows", [3, 40, 700])
+def test_columns_of_two_values_that_share_cells_are_summed_apart(rows: int, columns: int) -> None:
+    X = np.random.default_rng(columns).integers(0, 2, size=(rows, columns))
+    X[:2] = [[0], [1]]
+    check_all_sums(X.astype(np.float64))
 
 
 def test_bits_and_codes_need_no_floats() -> None:
@@ -71,12 +87,12 @@ def test_batches_are_the_largest_that_fit_and_of_one_column_at_least(
     values = [3, 3, 5, 3, 9, 3, 3, 4]  # so many in each column
     X = np.column_stack([np.arange(40) % count for count in values]).astype(np.float64)
     (group,) = bin_columns(X).groups
-    summands = np.ones((4, 40))
+    summands = np.ones((40, 4))
     expected: list[list[int]] = []
     for column in range(len(values)):
         batch = [*expected[-1], column] if expected else []
         # A histogram has a bin for every value of its widest column, and one for missing rows.
-        if batch and len(batch) * (max(values[c] for c in batch) + 1) * len(summands) <= elements:
+        if batch and len(batch) * (max(values[c] for c in batch) + 1) * 4 <= elements:
             expected[-1] = batch
         else:
             expected.append([column])

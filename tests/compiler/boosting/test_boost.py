@@ -271,3 +271,35 @@ def test_an_ensemble_without_rounds_has_the_types_of_one_with() -> None:
     assert none.columns.shape == (0, 2)
     for name in ("columns", "thresholds", "values"):
         assert getattr(none, name).dtype == getattr(some, name).dtype
+
+
+@given(st.integers(0, 2**32), st.integers(2, 6))
+def test_of_equal_columns_the_least_used_takes_turns(seed: int, copies: int) -> None:
+    rng = np.random.default_rng(seed)
+    X, labels = rng.integers(0, 4, size=(30, 3)), np.arange(30) % 3
+    many, _ = boost(np.hstack([X] * copies), labels, 3, rounds=12, ties="least-used")
+    first, _ = boost(X, labels, 3, rounds=12)
+    # What is learnt is that of one copy, if none of its own columns tie; which copy, takes turns.
+    assert many.values.tobytes() == boost(X, labels, 3, rounds=12, ties="least-used")[0].values.tobytes()
+    used = np.bincount(many.columns.ravel(), minlength=3 * copies).reshape(copies, 3)
+    assert (np.ptp(used, axis=0) <= 1).all()
+    assert first.columns.tobytes() == boost(X, labels, 3, rounds=12, ties="first")[0].columns.tobytes()
+
+
+def test_ties_do_not_spread_over_columns_where_none_tells_anything() -> None:
+    X = np.random.default_rng(5).integers(0, 2, size=(40, 6))
+    stumps, _ = boost(X, np.zeros(40, dtype=np.intp), 2, rounds=9, ties="least-used")
+    assert not stumps.columns.any()
+
+
+def test_fewer_rounds_of_spread_ties_are_the_first_of_more() -> None:
+    rng = np.random.default_rng(8)
+    X, labels = rng.integers(0, 2, size=(8, 60)), np.arange(8) % 4
+    long, short = (boost(X, labels, 4, rounds=rounds, ties="least-used")[0] for rounds in (20, 7))
+    assert long.first(7).columns.tobytes() == short.columns.tobytes()
+    assert len(np.unique(long.columns)) > len(np.unique(boost(X, labels, 4, rounds=20)[0].columns))
+
+
+def test_ties_have_two_names() -> None:
+    with pytest.raises(BoostingError, match="ties='last' must be one of first, least-used"):
+        boost(np.eye(2), np.arange(2), 2, ties="last")

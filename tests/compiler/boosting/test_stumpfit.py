@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from thenar.compiler.boosting import stumpfit
 from thenar.compiler.boosting.binning import bin_columns, midpoints
 from thenar.compiler.boosting.stumpfit import Targets, fit_stumps
 
@@ -59,6 +60,35 @@ def test_no_other_stump_explains_more(problem: tuple[np.ndarray, np.ndarray, np.
     clear = [part for part, _, _ in stumps if part > best - slack and part != chosen]
     if not clear:
         assert (int(fitted.columns[0]), float(fitted.thresholds[0])) == min(same)
+
+
+@st.composite
+def large_problems(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Inputs (n, d) of few and of many values, some missing; weights and responses (K, n) of very unlike sizes."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32)))
+    n, d, K = draw(st.integers(2, 300)), draw(st.integers(1, 9)), draw(st.integers(1, 5))
+    X = rng.integers(0, rng.choice([2, 3, 20, 1000], size=d), size=(n, d)).astype(np.float64)
+    X[rng.random(X.shape) < draw(st.sampled_from([0.0, 0.2]))] = np.nan
+    weights = 10.0 ** rng.uniform(-draw(st.sampled_from([0, 3, 20, 310])), 0, size=(K, n))
+    weights[rng.random((K, n)) < 0.1] = 0.0
+    steps = draw(st.sampled_from([1, 2, 1000]))
+    ratios = (1 + (Z_MAX - 1) * rng.integers(0, steps, size=(K, n)) / steps) * rng.choice([-1.0, 1.0], size=(K, n))
+    ratios[0] = abs(ratios[0, 0])  # all splits tie
+    return X, weights, weights * ratios
+
+
+@given(large_problems())
+def test_what_is_not_looked_at_exactly_cannot_win(problem: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+    X, weights, responses = problem
+    binned, targets = bin_columns(X), Targets(weights, responses)
+    if not binned.groups:
+        return
+    quick = fit_stumps(binned, targets, Z_MAX)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(stumpfit, "_slack", lambda *_: np.full(len(weights), np.inf))
+        whole = fit_stumps(binned, targets, Z_MAX)
+    for ours, theirs in zip((quick.columns, quick.thresholds), (whole.columns, whole.thresholds), strict=True):
+        assert np.array_equal(ours, theirs)
 
 
 @given(problems())

@@ -1,12 +1,13 @@
 """Sets of grasps with a structure that the tests know."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
 
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import own
+from thenar.compiler.trainers.base import TRAINERS
 
 TYPES = ("hook", "pinch", "power", "tip")
 
@@ -40,3 +41,12 @@ def _make(
 @pytest.fixture(scope="session")
 def make_grasps() -> Callable[..., GraspSet]:
     return _make
+
+
+@pytest.fixture(scope="package", autouse=True)
+def _two_ways_to_train() -> Iterator[None]:
+    """Let trainers compare few rounds, or few penalties: how they choose is tested where it is done."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(TRAINERS["logitboost"], "tried", ({"rounds": 2}, {"rounds": 5}))
+        patched.setattr(TRAINERS["logit"], "tried", ({"penalty": 1.0, "max_bins": 4},))
+        yield

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from thenar.compiler.evaluation.pictures import draw_confusions, draw_matrix
+from thenar.compiler.evaluation.pictures import draw, draw_matrix
 from thenar.compiler.evaluation.study import Options, evaluate
 from thenar.compiler.recordings.graspset import GraspSet
 
@@ -13,7 +13,7 @@ from thenar.compiler.recordings.graspset import GraspSet
 def test_every_composition_and_protocol_has_its_picture(make_grasps: Callable[..., GraspSet], tmp_path: Path) -> None:
     options = Options(rounds=2, repeats=1, tables=("compositions", "pruning"))
     study = evaluate(make_grasps(n_joints=0), options, jobs=1)
-    drawn = draw_confusions(study, tmp_path / "new" / "folder")
+    drawn = draw(study, tmp_path / "new" / "folder")
     names = [f"confusion-{protocol}-{name}.png" for protocol in ("paper", "nested") for name in ("V", "VI", "VII")]
     assert [path.name for path in drawn] == names
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in drawn)
@@ -23,7 +23,7 @@ def test_a_dollar_in_a_name_is_a_dollar(make_grasps: Callable[..., GraspSet], tm
     options = Options(rounds=2, repeats=1, tables=("compositions",), protocols=("nested",))
     study = evaluate(make_grasps(n_switches=0), options, jobs=1)
     named = replace(study, grasps=(r"$\left{$", *study.grasps[1:]))
-    (first,), (second,) = (draw_confusions(named, tmp_path / name) for name in ("one", "two"))
+    (first,), (second,) = (draw(named, tmp_path / name) for name in ("one", "two"))
     assert first.read_bytes() == second.read_bytes()
     assert list(first.parent.iterdir()) == [first]
 

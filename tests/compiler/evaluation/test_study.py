@@ -108,7 +108,8 @@ def test_every_rate_has_a_repeat_for_each_seed_over_all_rows_of_the_subject(stud
         for line in each.rows:
             for cell in line.cells:
                 assert cell.rate.total == 48
-                assert len(cell.rate.correct) == 2 * (5 if line.name == "random" else 1)
+                repeats = 1 if each.name == "trainers" else 2
+                assert len(cell.rate.correct) == repeats * (5 if line.name == "random" else 1)
                 assert cell.rate.low <= cell.rate.mean <= cell.rate.high
 
 
@@ -216,11 +217,12 @@ def test_every_trainer_is_compared_on_the_same_folds_and_inputs_with_rivals(stud
     assert [(line.what, line.name) for line in compared.rows] == [
         (what, name) for what in ("Angle + Sel-Co", "Angle", "Sel-Co") for name in learners()
     ]
-    assert {*TRAINERS, *CLASSIFIERS} == set(learners())
+    assert {*(name for name in TRAINERS if TRAINERS[name].tried), *CLASSIFIERS} == set(learners())
     # The paper's settings were asked for: the first trainer's rows are those of the compositions.
     for what, composition in (("Angle + Sel-Co", "II"), ("Angle", "IV"), ("Sel-Co", "VI")):
         (first,) = (line for line in compared.rows if (line.what, line.name) == (what, REFERENCE))
-        assert first.rate == row(table(study, "compositions"), composition).rate
+        # Trainers are compared in the first repeat alone.
+        assert first.rate.correct == row(table(study, "compositions"), composition).rate.correct[:1]
         assert first.paired is None
         for line in compared.rows:
             if line.what == what and line.name != REFERENCE:

@@ -6,15 +6,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.layout import NO_SWITCH, Bins, Field, Layout, arrange, lookups, parts_of, ports_of_scan
+from thenar.compiler.firmware.layout import NO_SWITCH, Bins, Field, Layout, arrange, parts_of, ports_of_scan
 from thenar.compiler.firmware.probes import Probes
 from thenar.runtime.scanning.scanmap import Port, ScanMap
 from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
+SHARED = [(), ((None, (0, 1)),), ((0, (2,)), (None, (1, 0))), ((0, (1,)),), ((None, (2, 0, 1)),)]
 ANY_LAYOUT = st.fixed_dictionaries(
     {"group_size": st.integers(2, 6), "entry_bits": st.sampled_from([8, 16])}
     | {"bins": st.sampled_from(["direct", "trimmed", "search"])}
+    | {
+        "shared": st.sampled_from(
+            [(), ((None, (0, 1)),), ((0, (2,)), (None, (1, 0))), ((0, (1,)),), ((None, (2, 0, 1)),)]
+        )
+    }
 )
 
 
@@ -41,15 +47,17 @@ def without_thresholds(tables: IntegerTables, joint: int) -> IntegerTables:
     )
 
 
-@given(st.integers(0, 99), st.integers(0, 12), st.integers(0, 3), ANY_LAYOUT)
+@given(st.integers(0, 99), st.integers(0, 12), st.integers(0, 3), st.sampled_from([3, 12]), ANY_LAYOUT)
 def test_scores_are_those_of_the_tables(
-    make_tables: MakeTables, probed: Callable[..., Probes], seed: int, switches: int, joints: int, how: dict
+    make_tables: MakeTables, probed: Callable[..., Probes], seed: int, switches: int, joints: int, reach: int, how: dict
 ) -> None:
-    tables = make_tables(seed, switches=switches, joints=joints)
+    tables = make_tables(seed, switches=switches, joints=joints, bins=4, reach=reach)
     if switches + joints == 0:
         return
     frames = probed(tables, 30)
+    how["shared"] = tuple(each for each in how["shared"] if joints == 3 and (each[0] is None or switches > 0))
     layout = arrange(tables, **how)
+    assert layout.sum_bits == (8 if how["entry_bits"] == 8 and tables.bound <= 127 else 16)
     assert np.array_equal(layout.scores(frames.bits, frames.codes), plain_scores(tables, frames))
 
 
@@ -73,7 +81,8 @@ def test_groups_are_consecutive_and_as_even_as_can_be(make_tables: MakeTables) -
 def test_with_wide_entries_row_0_of_a_group_is_zero_and_row_2_to_the_b_its_switch_b(make_tables: MakeTables) -> None:
     tables = make_tables(switches=11)
     layout = arrange(tables)
-    for numbers, rows in zip(layout.groups, layout.group_rows, strict=True):
+    for numbers, lookup in zip(layout.groups, layout.lookups, strict=False):
+        rows = lookup.rows
         assert not rows[0].any()
         for bit, number in enumerate(numbers):
             assert np.array_equal(rows[1 << bit], tables.switch_rows[number])
@@ -84,19 +93,34 @@ def test_narrow_entries_are_bytes_of_which_every_class_has_a_zero_in_every_look_
     make_tables: MakeTables, seed: int
 ) -> None:
     layout = arrange(make_tables(seed), entry_bits=8)
-    for lookup in lookups(layout):
+    assert layout.biased
+    for lookup in layout.lookups:
         assert lookup.rows.dtype == np.uint8
         assert not lookup.rows.min(axis=0).any()
 
 
 def test_look_ups_lie_one_after_the_other(make_tables: MakeTables) -> None:
     layout = arrange(without_thresholds(make_tables(joints=4), 1), bins="trimmed")
-    made = list(lookups(layout))
-    assert [lookup.index for lookup in made] == list(range(layout.n_lookups))
-    assert [lookup.number for lookup in made] == [0, 1, 0, 2, 3]
+    made = layout.lookups
+    assert [lookup.index for lookup in made] == list(range(5))
+    assert [lookup.group for lookup in made] == [0, 1, None, None, None]
+    assert [joint.number for joint in layout.joints] == [0, 2, 3]
     ends = np.cumsum([len(lookup.rows) for lookup in made]).tolist()
     assert [lookup.first_row for lookup in made] == [0, *ends[:-1]]
     assert ends[-1] == layout.n_rows
+
+
+def test_joints_share_a_look_up_whose_rows_are_all_sums_of_theirs(make_tables: MakeTables) -> None:
+    tables = make_tables(switches=3, joints=3, bins=4)
+    layout = arrange(tables, shared=((0, (2,)), (None, (1, 0))))
+    (mixed, pair), bits = layout.lookups, np.array([[1, 0, 1]], bool)
+    assert (mixed.group, [joint.number for joint in mixed.joints], len(mixed.rows)) == (0, [2], 8 * 4)
+    assert (pair.group, [joint.number for joint in pair.joints], len(pair.rows)) == (None, [1, 0], 4 * 4)
+    # The highest codes add nothing to a row's number; a switch adds its bit.
+    assert [joint.weight for joint in (*mixed.joints, *pair.joints)] == [8, 1, 4]
+    assert np.array_equal(mixed.rows[0b101 + 8], tables.switch_rows[[0, 2]].sum(axis=0) + tables.joint_rows[2][2])
+    assert np.array_equal(pair.rows[1 + 4 * 3], tables.joint_rows[1][2] + tables.joint_rows[0][0])
+    assert layout.group_bytes(bits).tolist() == [[0b101]]
 
 
 def test_a_constant_joint_is_part_of_the_start(make_tables: MakeTables, probed: Callable[..., Probes]) -> None:
@@ -104,8 +128,7 @@ def test_a_constant_joint_is_part_of_the_start(make_tables: MakeTables, probed: 
     tables = without_thresholds(whole, 1)
     frames = probed(whole, 20)
     layout = arrange(tables)
-    assert layout.joints[1].constant
-    assert not layout.joints[1].rows.any()
+    assert [joint.number for joint in layout.joints] == [0, 2]
     assert np.array_equal(layout.scores(frames.bits, frames.codes), plain_scores(tables, frames))
 
 
@@ -187,6 +210,7 @@ def test_what_cannot_be_laid_out_is_refused(make_tables: MakeTables) -> None:
     assert '"trimmed" or "search", not "direct"' in refused(wide)
     assert 'found by "search"' in refused(wide, bins="trimmed")
     assert "compile the build with --table-bits 8" in refused(make_tables(reach=300), entry_bits=8)
+    assert "a look-up of 512 rows" in refused(make_tables(joints=3, bins=8), shared=((None, (0, 1, 2)),))
     assert "300 rows" in refused(make_tables(bins=300, highest=3000), bins="search")
 
 
@@ -197,3 +221,4 @@ def test_parts_are_of_equal_width_and_cover_all_classes(classes: int) -> None:
     assert covered == set(range(classes))
     assert parts.width <= 14
     assert len(parts.firsts) == -(-classes // 14)
+    assert parts_of(classes, 8).width <= 28

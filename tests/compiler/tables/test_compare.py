@@ -7,8 +7,8 @@ import pytest
 
 from thenar.compiler.boosting.stumps import Stumps, winners
 from thenar.compiler.tables.collapse import ScoreTables, collapse
-from thenar.compiler.tables.compare import Comparison, compare, float_slack, rounding_error
-from thenar.compiler.tables.quantise import quantise
+from thenar.compiler.tables.compare import Comparison, compare, float_slack
+from thenar.compiler.tables.quantise import quantise, rounding_error
 
 MakeStumps = Callable[..., Stumps]
 MakeRows = Callable[..., tuple[np.ndarray, np.ndarray]]
@@ -69,8 +69,8 @@ def test_the_slack_covers_what_doubles_lose_where_large_rows_cancel(make_rows: M
         whole = np.sum([integers.bias, *_at(integers.joint_rows, frame)], axis=0, dtype=int).tolist()
         errors += [abs(x * Fraction(integers.scale) - n) for x, n in zip(exact, whole, strict=True)]
         floats = tables.scores(bits[:1], np.where(frame, 100, 0).astype(np.uint16)[np.newaxis])[0] * integers.scale
-        assert np.abs(floats - whole).max() <= rounding_error(tables.n_inputs) + slack
-    assert max(errors) <= rounding_error(tables.n_inputs) + slack
+        assert np.abs(floats - whole).max() <= rounding_error(tables, integers.scale) + slack
+    assert max(errors) <= rounding_error(tables, integers.scale) + slack
     # Once that is more than the rounding to steps, the slack is no more than a hundred times what is lost.
     assert size < 1e12 or max(errors) > slack / 100
 

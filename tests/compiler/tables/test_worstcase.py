@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.tables.collapse import ScoreTables, collapse
-from thenar.compiler.tables.compare import float_slack, rounding_error
-from thenar.compiler.tables.quantise import quantise
+from thenar.compiler.tables.compare import float_slack
+from thenar.compiler.tables.quantise import quantise, rounding_error
 from thenar.compiler.tables.worstcase import Rounding, _Pairs
 from thenar.runtime.tables import IntegerTables
 
@@ -87,7 +87,7 @@ def test_the_worst_is_within_what_counting_inputs_promises(
     integers = quantise(tables, *make_rows(seed), width)
     rounding = Rounding(tables, integers)
     loss = rounding.worst_of_all().loss
-    assert 0 <= loss <= 2 * (rounding_error(tables.n_inputs) + float_slack(tables, integers.scale))
+    assert 0 <= loss <= 2 * (rounding_error(tables, integers.scale) + float_slack(tables, integers.scale))
     assert loss - 1 <= rounding.safe_margin() <= loss
 
 

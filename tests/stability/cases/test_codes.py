@@ -17,9 +17,10 @@ from thenar.compiler.recordings.coding import code_joint
 from thenar.compiler.recordings.columns import JointColumns
 from thenar.compiler.recordings.errors import RecordingError, TableError
 from thenar.compiler.recordings.importer import import_file
-from thenar.compiler.tables.collapse import HIGHEST_CODE, collapse
+from thenar.compiler.tables.collapse import collapse
 from thenar.compiler.tables.quantise import quantise
 from thenar.runtime.scores import Scorer
+from thenar.runtime.tables import HIGHEST_CODE
 from thenar.stability.cases.codes import EVERY_CODE, HARD_DOUBLES, NO_BITS, NO_CODES, NO_NUMBERS, hard_codes
 
 finite = st.floats(allow_nan=False, allow_infinity=False) | st.sampled_from(HARD_DOUBLES)

@@ -1,7 +1,7 @@
 /* thenar_glove_avr.S: the adding up, on an AVR; the .c holds the tables.
-   Layout for atmega2560: 16-bit entries, up to 6 switches a look-up, codes looked up in 256 bytes a joint, rows
-   added in line: the fastest of 30 layouts in 49152 bytes of flash, at most 163 cycles (417 by update()) and 2684
-   bytes.
+   Layout for atmega2560: 16-bit entries, up to 6 switches a look-up, codes compared with thresholds, up to 2 joints
+   a look-up, rows added in line: the fastest of 84 layouts in 49152 bytes of flash, at most 137 cycles (284 by
+   update()) and 1648 bytes.
 
    From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME_avr.S.j2. */
 
@@ -10,10 +10,10 @@
 
 #define STRIDE 6 /* bytes of a row */
 
-/* Make Z the address of the row whose number is in r30, of those that begin at `rows`. */
-.macro to_row rows
+/* Make Z the address of the row whose number is in register `number`, of those that begin at `rows`. */
+.macro to_row rows, number
     ldi   r31, STRIDE
-    mul   r30, r31
+    mul   \number, r31
     movw  r30, r0
     subi  r30, lo8(-(thenar_glove_rows + \rows))
     sbci  r31, hi8(-(thenar_glove_rows + \rows))
@@ -68,19 +68,19 @@
 .macro load_sums scores
     ldi   r30, lo8(thenar_glove_scores + \scores)
     ldi   r31, hi8(thenar_glove_scores + \scores)
-    ld    r18, Z+
-    ld    r19, Z+
-    ld    r20, Z+
-    ld    r21, Z+
-    ld    r22, Z+
-    ld    r23, Z+
+    ldd   r18, Z+0
+    ldd   r19, Z+1
+    ldd   r20, Z+2
+    ldd   r21, Z+3
+    ldd   r22, Z+4
+    ldd   r23, Z+5
 .endm
 
 /* Where an input is missing, have it left out and load the sums as they begin then; else go on at 1. */
 .macro start_if_missing scores
     lds   r30, thenar_glove_missing
     tst   r30
-    breq  1f
+    breq  1f /* 0 times */
     ldi   r26, lo8(\scores)
     ldi   r27, hi8(\scores)
     lds   r30, thenar_glove_stand_in
@@ -88,10 +88,12 @@
     icall
 .endm
 
-/* What the scores are of: codes of 8 bits, and otherwise the numbers of rows. All are 0 when the program begins, and
-   the scores are initialised accordingly. */
-    .local thenar_glove_seen
-    .comm thenar_glove_seen, 3
+/* What the scores are of: the rows that are in them, and joints' codes. When the program begins, all inputs
+   are 0, and the scores are initialised accordingly. */
+    .section .data.thenar_glove_seen, "aw", @progbits
+thenar_glove_seen:
+    .byte 0, 11
+    .zero 2
 
     .section .text.thenar_glove_classify, "ax", @progbits
 
@@ -100,10 +102,7 @@
 thenar_glove_classify:
 #ifdef __AVR_HAVE_ELPM__
     /* Tables beyond the first 64 KiB would be misread: stop. */
-    ldi   r30, hh8(thenar_glove_rows + 425)
-    cpse  r30, r1
-    jmp   abort
-    ldi   r30, hh8(thenar_glove_bins + 511)
+    ldi   r30, hh8(thenar_glove_rows + 455)
     cpse  r30, r1
     jmp   abort
 #endif
@@ -124,23 +123,30 @@ thenar_glove_classify:
     lds   r30, thenar_glove_input + 0
     andi  r30, 0x3f
     sts   thenar_glove_seen + 0, r30
-    to_row 0
+    to_row 0, r30
     add_row
 
-    /* thumb_rotation */
-    lds   r30, thenar_glove_input + 1
-    sts   thenar_glove_seen + 1, r30
-    ldi   r31, hi8(thenar_glove_bins + 0)
-    lpm   r30, Z
-    to_row 384
-    add_row
-
-    /* index_pij */
+    /* thumb_rotation, index_pij */
     lds   r30, thenar_glove_input + 2
+    sts   thenar_glove_seen + 3, r30
+    clr   r0
+    clr   r1
+    cpi   r30, lo8(91)
+    adc   r0, r1
+    cpi   r30, lo8(201)
+    adc   r0, r1
+    lds   r30, thenar_glove_input + 1
     sts   thenar_glove_seen + 2, r30
-    ldi   r31, hi8(thenar_glove_bins + 256)
-    lpm   r30, Z
-    to_row 408
+    lsl   r0
+    lsl   r0
+    cpi   r30, lo8(61)
+    adc   r0, r1
+    cpi   r30, lo8(62)
+    adc   r0, r1
+    cpi   r30, lo8(141)
+    adc   r0, r1
+    sts   thenar_glove_seen + 1, r0
+    to_row 384, r0
     add_row
 
     store_sums 0
@@ -182,19 +188,17 @@ thenar_glove_update:
     andi  r30, 0x3f
     lds   r31, thenar_glove_seen + 0
     cpse  r30, r31
-    rcall change_0_0
+1:  rcall change_0_0
 
-    /* thumb_rotation */
+    /* thumb_rotation, index_pij */
     lds   r30, thenar_glove_input + 1
-    lds   r31, thenar_glove_seen + 1
-    cpse  r30, r31
-    rcall change_0_1
-
-    /* index_pij */
-    lds   r30, thenar_glove_input + 2
     lds   r31, thenar_glove_seen + 2
+    cp    r30, r31
+    brne  1f
+    lds   r30, thenar_glove_input + 2
+    lds   r31, thenar_glove_seen + 3
     cpse  r30, r31
-    rcall change_0_2
+1:  rcall change_0_1
 
     store_sums 0
     jmp   thenar_glove_answer
@@ -208,64 +212,45 @@ change_0_0:
     push  r31
     and   r30, r0
     breq  1f
-    to_row 0
+    to_row 0, r30
     rcall add_changed
 1:  pop   r30
     tst   r30
     breq  1f
-    to_row 0
+    to_row 0, r30
     rcall subtract_changed
 1:  ret
 
 change_0_1:
-    sts   thenar_glove_seen + 1, r30
-    push  r31
-    rcall row_0_1
-    pop   r31
-    push  r30
-    mov   r30, r31
-    rcall row_0_1
-    pop   r31
-    cp    r30, r31
-    breq  1f
-    push  r31
-    to_row 384
-    rcall subtract_changed
-    pop   r30
-    to_row 384
-    rjmp add_changed
-1:  ret
-
-/* Make r30, a code, the number of its row. */
-row_0_1:
-    ldi   r31, hi8(thenar_glove_bins + 0)
-    lpm   r30, Z
-    ret
-
-change_0_2:
+    lds   r30, thenar_glove_input + 2
+    sts   thenar_glove_seen + 3, r30
+    clr   r0
+    clr   r1
+    cpi   r30, lo8(91)
+    adc   r0, r1
+    cpi   r30, lo8(201)
+    adc   r0, r1
+    lds   r30, thenar_glove_input + 1
     sts   thenar_glove_seen + 2, r30
-    push  r31
-    rcall row_0_2
-    pop   r31
-    push  r30
-    mov   r30, r31
-    rcall row_0_2
-    pop   r31
-    cp    r30, r31
+    lsl   r0
+    lsl   r0
+    cpi   r30, lo8(61)
+    adc   r0, r1
+    cpi   r30, lo8(62)
+    adc   r0, r1
+    cpi   r30, lo8(141)
+    adc   r0, r1
+    lds   r31, thenar_glove_seen + 1
+    cp    r31, r0
     breq  1f
+    sts   thenar_glove_seen + 1, r0
     push  r31
-    to_row 408
-    rcall subtract_changed
+    to_row 384, r0
+    rcall add_changed
     pop   r30
-    to_row 408
-    rjmp add_changed
+    to_row 384, r30
+    rjmp subtract_changed
 1:  ret
-
-/* Make r30, a code, the number of its row. */
-row_0_2:
-    ldi   r31, hi8(thenar_glove_bins + 256)
-    lpm   r30, Z
-    ret
 
 add_changed:
     add_row
@@ -291,11 +276,11 @@ thenar_glove_start_without:
     movw  r30, r26
     subi  r30, lo8(-(thenar_glove_start))
     sbci  r31, hi8(-(thenar_glove_start))
-    ld    r18, Z+
-    ld    r19, Z+
-    ld    r20, Z+
-    ld    r21, Z+
-    ld    r22, Z+
-    ld    r23, Z+
+    ldd   r18, Z+0
+    ldd   r19, Z+1
+    ldd   r20, Z+2
+    ldd   r21, Z+3
+    ldd   r22, Z+4
+    ldd   r23, Z+5
     ret
     .size thenar_glove_start_without, . - thenar_glove_start_without

@@ -1,6 +1,6 @@
 /* thenar_glove.h: recognises 3 grasp types from 6 switches and 2 joints of a glove.
-   Layout for this machine: 16-bit entries, up to 6 switches a look-up, codes looked up in 256 bytes a joint, as on
-   the smallest part that holds the build.
+   Layout for this machine: 16-bit entries, up to 6 switches a look-up, codes looked up in 256 bytes a joint, up to 2
+   joints a look-up, as on the smallest part that holds the build.
 
    From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME.h.j2. */
 #ifndef THENAR_GLOVE_H

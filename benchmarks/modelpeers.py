@@ -1,0 +1,232 @@
+"""The models that are compared: thenar's trainers, as they are and as deployed integers, and other people's.
+
+Settings are chosen by inner folds of the training rows, grouped as the outer ones are, where several are listed. Models
+marked `slow` take the first on sets of more than `FEW` rows.
+"""
+
+import importlib.util
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from modelsets import Cut
+from numpy.typing import NDArray
+
+from thenar.compiler.choosing import choose_training
+from thenar.compiler.samples import Samples, decided
+from thenar.compiler.tables.collapse import collapse, model_scores
+from thenar.compiler.tables.quantise import integer_scores, quantise
+from thenar.compiler.trainers.base import Training
+from thenar.runtime.manifest import AUTO, Options
+
+WEKA_JAR = Path("/usr/share/java/weka.jar")
+FEW, SEED = 2000, 1
+
+Answers = NDArray[np.intp]
+Given = Mapping[str, Any]
+# What a model makes of the rows of a fold with given settings: answers, also those of integers.
+Answering = Callable[[Cut, Given], tuple[Answers, Answers | None]]
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """A model: its settings to choose from, the first being known good, and what it answers, also as integers.
+
+    needs     a package, or "java", without which it is left out
+    additive  whether its scores are a sum over inputs
+    """
+
+    name: str
+    how: str
+    answers: Answering
+    settings: tuple[Given, ...] = ({},)
+    additive: bool = False
+    slow: bool = False
+    ours: bool = False
+    needs: str = "sklearn"
+
+    @property
+    def there(self) -> bool:
+        """Whether what it needs is installed."""
+        if self.needs == "java":
+            return WEKA_JAR.exists() and shutil.which("java") is not None
+        return importlib.util.find_spec(self.needs) is not None
+
+    def answered(self, cut: Cut) -> tuple[Answers, Answers | None]:
+        """Return the class of each row that is tested, and that of the integers, of settings chosen inside."""
+        given = self.settings[0]
+        if len(self.settings) > 1 and not (self.slow and len(cut.train.labels) > FEW):
+            given = max(self.settings, key=lambda each: self._inside(cut, each))  # the first of equal ones
+        return self.answers(cut, given)
+
+    def _inside(self, cut: Cut, given: Given) -> int:
+        right = 0
+        for fold in cut.inner():
+            part = replace(cut, train=cut.train.rows(fold.train), test=cut.train.rows(fold.test))
+            right += int(recognised(self.answers(part, given)[0], part.test).sum())
+        return right
+
+
+def recognised(answers: Answers, test: Samples) -> NDArray[np.bool_]:
+    """Return whether each trial is recognised as most of its frames are."""
+    _, first, trial = np.unique(test.trials, return_index=True, return_inverse=True)
+    given: NDArray[np.bool_] = decided(answers[np.newaxis], trial)[0] == test.labels[first]
+    return given
+
+
+def _trained(name: str) -> Answering:
+    def answers(cut: Cut, _: Given) -> tuple[Answers, Answers]:
+        train, test, options = cut.train, cut.test, Options(trainer=name)
+        training = Training.of(options)
+        if name == AUTO:
+            groups = train.subjects if cut.of == "new subject" else None
+            training = Training.chosen(choose_training(train, Training.candidates(options), groups=groups, of=cut.of))
+        model = training.train(train)
+        integers = quantise(collapse(model, train.n_switches), train.switches, train.codes)
+        floats = model_scores(model, test.switches, test.codes)
+        return floats.argmax(axis=1), integer_scores(integers, test.switches, test.codes).argmax(axis=1)
+
+    return answers
+
+
+def _fitted(make: Callable[[Given], Any], *, scaled: bool = False) -> Answering:
+    def answers(cut: Cut, given: Given) -> tuple[Answers, None]:
+        train = cut.train
+        X, asked = (np.hstack([part.switches, part.codes]).astype(np.float64) for part in (train, cut.test))
+        if scaled:
+            joints = slice(train.n_switches, None)
+            mean, spread = X[:, joints].mean(axis=0), X[:, joints].std(axis=0)
+            for part in (X, asked):
+                part[:, joints] = (part[:, joints] - mean) / np.where(spread > 0, spread, 1.0)
+        # Boosters want classes 0, 1, ...: a training part may lack one.
+        classes, labels = np.unique(train.labels, return_inverse=True)
+        return classes[np.asarray(make(given).fit(X, labels).predict(asked)).astype(np.intp).ravel()], None
+
+    return answers
+
+
+def _logistic(given: Given) -> Any:
+    from sklearn.linear_model import LogisticRegression
+
+    return LogisticRegression(max_iter=2000, **given)
+
+
+def _neighbours(given: Given) -> Any:
+    from sklearn.neighbors import KNeighborsClassifier
+
+    return KNeighborsClassifier(weights="distance", **given)
+
+
+def _support(given: Given) -> Any:
+    from sklearn.svm import SVC
+
+    return SVC(**given)
+
+
+def _forest(given: Given) -> Any:
+    from sklearn.ensemble import RandomForestClassifier
+
+    return RandomForestClassifier(500, random_state=SEED, **given)
+
+
+def _extra_trees(given: Given) -> Any:
+    from sklearn.ensemble import ExtraTreesClassifier
+
+    return ExtraTreesClassifier(500, random_state=SEED, **given)
+
+
+def _histograms(given: Given) -> Any:
+    from sklearn.ensemble import HistGradientBoostingClassifier
+
+    return HistGradientBoostingClassifier(max_iter=150, min_samples_leaf=5, random_state=SEED, **given)
+
+
+def _xgboost(given: Given) -> Any:
+    from xgboost import XGBClassifier
+
+    fixed = {"n_estimators": 200, "tree_method": "hist", "subsample": 0.8, "colsample_bytree": 0.5}
+    return XGBClassifier(**fixed, n_jobs=1, random_state=SEED, **given)
+
+
+def _lightgbm(given: Given) -> Any:
+    from lightgbm import LGBMClassifier  # pyright: ignore[reportMissingImports]
+
+    fixed = {"n_estimators": 200, "min_child_samples": 5, "subsample": 0.8, "subsample_freq": 1}
+    return LGBMClassifier(**fixed, colsample_bytree=0.5, n_jobs=1, random_state=SEED, verbose=-1, **given)
+
+
+def _ebm(given: Given) -> Any:
+    from interpret.glassbox import ExplainableBoostingClassifier  # pyright: ignore[reportMissingImports]
+
+    return ExplainableBoostingClassifier(outer_bags=4, n_jobs=1, random_state=SEED, **given)
+
+
+def _weka(cut: Cut, _: Given) -> tuple[Answers, None]:
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [Path(folder) / name for name in ("train.arff", "test.arff")]
+        for path, part in zip(paths, (cut.train, cut.test), strict=True):
+            _write_arff(path, part)
+        command = ["java", "-XX:+UseSerialGC", "-XX:ActiveProcessorCount=1", "-Xmx4g", "-cp", str(WEKA_JAR)]
+        command += ["weka.classifiers.meta.LogitBoost", "-t", str(paths[0]), "-T", str(paths[1]), "-p", "0"]
+        command += ["-I", "100", "-W", "weka.classifiers.trees.DecisionStump"]
+        printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    found = re.findall(r"^ *\d+ +\d+:g\d+ +\d+:g(\d+) ", printed, re.MULTILINE)
+    return np.array(found, np.intp), None
+
+
+def _write_arff(path: Path, part: Samples) -> None:
+    head = ["@relation grasps"]
+    head += [f"@attribute s{s} {{0,1}}" for s in range(part.n_switches)]
+    head += [f"@attribute j{j} numeric" for j in range(part.codes.shape[1])]
+    head += ["@attribute grasp {" + ",".join(f"g{k}" for k in range(part.n_classes)) + "}", "@data"]
+    inputs = zip(part.inputs.tolist(), part.labels.tolist(), strict=True)
+    path.write_text("\n".join(head + [",".join([*map(str, row), f"g{label}"]) for row, label in inputs]) + "\n")
+
+
+def _grid(**values: Sequence[Any]) -> tuple[Given, ...]:
+    return tuple(dict(zip(values, each, strict=True)) for each in product(*values.values()))
+
+
+OURS = tuple(
+    Model(name, how, _trained(name), additive=True, ours=True, needs="thenar")
+    for name, how in (
+        ("logitboost", "100 rounds, the paper's"),
+        ("logit", "as it is by default"),
+        ("sum", "as it is by default"),
+        (AUTO, "chosen by inner folds"),
+    )
+)
+PEERS = (
+    Model("logistic regression", "C of 4", _fitted(_logistic, scaled=True), _grid(C=[1, 0.1, 10, 100]), additive=True),
+    Model("k neighbours", "k of 4, by distance", _fitted(_neighbours, scaled=True), _grid(n_neighbors=[5, 1, 3, 10])),
+    Model(
+        "RBF SVM",
+        "C of 3, gamma of 4",
+        _fitted(_support, scaled=True),
+        _grid(C=[10, 1, 100], gamma=[0.03, 0.01, 0.1, 0.3]),
+    ),
+    Model("random forest", "500 trees", _fitted(_forest)),
+    Model("extra trees", "500 trees", _fitted(_extra_trees)),
+    Model(
+        "histogram boosting", "150 rounds, leaves of 2", _fitted(_histograms), _grid(max_leaf_nodes=[7, 31]), slow=True
+    ),
+    Model("XGBoost", "200 rounds, depth of 2", _fitted(_xgboost), _grid(max_depth=[3, 6]), slow=True, needs="xgboost"),
+    Model(
+        "LightGBM",
+        "200 rounds",
+        _fitted(_lightgbm),
+        _grid(num_leaves=[7, 31]),
+        slow=True,
+        needs="lightgbm",
+    ),
+    Model("EBM", "4 bags, no pairs", _fitted(_ebm), _grid(interactions=[0]), additive=True, needs="interpret"),
+    Model("EBM with pairs", "4 bags, 5 pairs", _fitted(_ebm), _grid(interactions=[5]), needs="interpret"),
+    Model("Weka LogitBoost", "100 rounds", _weka, additive=True, needs="java"),
+)

@@ -1,0 +1,269 @@
+"""Additive models held against the best of everybody's, on the same folds.
+
+    python benchmarks/models.py [--sets aml icub ...] [--models logit "RBF SVM" ...] [--data FOLDER] [--quick]
+    python benchmarks/models.py --learning-curve
+
+Folds keep trials apart, or subjects; the switches (the first 33 of ID3, or all where fewer) are placed inside each
+fold, and settings are chosen inside as well. What is answered is kept in --store: a run that is broken off goes on
+where it was, and what is there is printed. `--again MODEL` computes those anew. A set may be a .grasps file.
+"""
+
+import argparse
+import resource
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from time import process_time
+
+import msgspec
+import numpy as np
+from modelpeers import OURS, PEERS, Model, recognised
+from modelsets import CURVE, CURVE_SCENE, SETS, Cut, curve, cuts, load
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+from threadpoolctl import threadpool_limits
+
+from thenar.compiler.evaluation.rates import Rate
+from thenar.compiler.workers import in_workers
+from thenar.runtime.manifest import Of
+
+CONSOLE = Console(width=150)
+QUICK_SETS = ("icub", "aml")
+CURVE_MODELS = ("logitboost", "logit", "sum", "auto", "logistic regression", "random forest", "extra trees", "RBF SVM")
+# What a rival may be ahead by.
+WITHIN = 0.5
+
+
+class Answered(msgspec.Struct, frozen=True):
+    """What a model answered to the rows of one fold, in their order; `integers` of its deployed tables."""
+
+    set: str
+    of: Of
+    fold: str
+    model: str
+    cpu_s: float
+    answers: list[int]
+    integers: list[int] | None = None
+
+    @property
+    def key(self) -> tuple[str, str, str, str]:
+        """By what it is found again."""
+        return self.set, self.of, self.fold, self.model
+
+
+Task = tuple[str, Cut, Model]
+Cuts = dict[str, list[Cut]]
+Store = dict[tuple[str, str, str, str], Answered]
+
+
+def answered(task: Task) -> Answered:
+    """Return what a model answers, with the processor time of this process and of its children."""
+    name, cut, model = task
+    warnings.filterwarnings("ignore")
+    began = process_time() + _of_children()
+    with threadpool_limits(1):
+        answers, integers = model.answered(cut)
+    spent = process_time() + _of_children() - began
+    whole = None if integers is None else integers.tolist()
+    return Answered(name, cut.of, cut.name, model.name, round(spent, 3), answers.tolist(), whole)
+
+
+def _of_children() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def stored(path: Path) -> Store:
+    """Return what was answered before."""
+    lines = path.read_bytes().splitlines() if path.exists() else []
+    return {each.key: each for each in map(msgspec.json.Decoder(Answered).decode, lines)}
+
+
+def fill(store: Store, path: Path, work: Cuts, models: Sequence[Model], jobs: int) -> None:
+    """Let the models answer what is not in the store, and write it there."""
+    tasks = [
+        (name, cut, model)
+        for model in models
+        for name, found in work.items()
+        for cut in found
+        if (name, cut.of, cut.name, model.name) not in store
+    ]
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with Progress(*columns, console=Console(stderr=True)) as bar, path.open("ab") as file:
+        line = bar.add_task("folds", total=len(tasks))
+        for each in in_workers(answered, tasks, jobs):
+            file.write(msgspec.json.encode(each) + b"\n")
+            file.flush()
+            store[each.key] = each
+            bar.update(line, advance=1, description=f"{each.model}, {each.set}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Line:
+    """A model on all folds of a set: its rates, whether it recognised each trial (T,), processor seconds."""
+
+    model: Model
+    rate: Rate
+    integers: Rate | None
+    hits: NDArray[np.bool_]
+    cpu_s: float
+
+
+def lines(name: str, found: Sequence[Cut], models: Sequence[Model], store: Store) -> list[Line]:
+    """Return a line for each model that has answered all of these folds, the best first."""
+    made = []
+    for model in models:
+        told = [store.get((name, cut.of, cut.name, model.name)) for cut in found]
+        if all(told):
+            made.append(_line(model, found, [each for each in told if each is not None]))
+    return sorted(made, key=lambda line: -line.rate.mean)
+
+
+def _line(model: Model, found: Sequence[Cut], told: Sequence[Answered]) -> Line:
+    labels, trials, subjects = (
+        np.concatenate([getattr(cut.test, what) for cut in found]) for what in ("labels", "trials", "subjects")
+    )
+    of = found[0].of
+
+    def rate(answers: Sequence[list[int]]) -> Rate:
+        groups = subjects if of == "new subject" else None
+        return Rate.predicted(np.concatenate(answers), labels, trials, of=of, groups=groups)
+
+    whole = [each.integers for each in told if each.integers is not None]
+    hits = [recognised(np.array(each.answers, np.intp), cut.test) for each, cut in zip(told, found, strict=True)]
+    integers = rate(whole) if len(whole) == len(told) else None
+    cpu_s = sum(each.cpu_s for each in told)
+    return Line(model, rate([each.answers for each in told]), integers, np.concatenate(hits), cpu_s)
+
+
+def p_value(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
+    """Return McNemar's exact p of two models' trials: a fair coin for each that one alone recognised."""
+    from scipy.stats import binomtest
+
+    only, lost = int((one & ~other).sum()), int((other & ~one).sum())
+    return float(binomtest(only, only + lost).pvalue) if only + lost else 1.0
+
+
+def shown(name: str, of: Of, made: Sequence[Line]) -> Table:
+    """Return the table of one set and way to cut it."""
+    table = Table(title=f"{name}, {of}: {made[0].rate.total:,} trials")
+    for heading in ("", "additive", "settings"):
+        table.add_column(heading)
+    for heading in ("accuracy, %", "95 %", "as integers, %", "behind the best rival, points", "p", "CPU, s"):
+        table.add_column(heading, justify="right")
+    rival = next((line for line in made if not line.model.ours), None)
+    for line in made:
+        name, yes, how = line.model.name, "yes" if line.model.additive else "", line.model.how
+        of_integers = "" if line.integers is None else f"{100 * line.integers.mean:.2f}"
+        within = f"{100 * line.rate.low:.1f} to {100 * line.rate.high:.1f}"
+        gap, p = ("", "") if rival is None or line is rival else _against(line, rival)
+        numbers = (f"{100 * line.rate.mean:.2f}", within, of_integers, gap, p, f"{line.cpu_s:.1f}")
+        table.add_row(name, yes, how, *numbers, style="bold" if line.model.ours else "")
+    return table
+
+
+def _against(line: Line, rival: Line) -> tuple[str, str]:
+    return f"{100 * (rival.rate.mean - line.rate.mean):+.2f}", f"{p_value(line.hits, rival.hits):.2g}"
+
+
+def summary(every: dict[tuple[str, Of], list[Line]], name: str) -> Table:
+    """Return how far the best rival is ahead of model `name` on each set, and the best additive one behind it."""
+    table = Table(title=f"{name}: within {WITHIN} points of the best rival, ahead of every additive one?")
+    for heading in ("set", "", f"{name}, %", "best rival, %", "", "behind", "best additive rival, %", "", "ahead"):
+        table.add_column(heading, justify="right" if heading.endswith(("%", "behind", "ahead")) else "left")
+    for (which, of), made in every.items():
+        mine = next((line for line in made if line.model.name == name), None)
+        rivals = [line for line in made if not line.model.ours]
+        additive = [line for line in rivals if line.model.additive]
+        if mine is None or not additive:
+            continue
+        cells = [which, of, f"{100 * mine.rate.mean:.2f}"]
+        for rival, sign in ((rivals[0], 1), (additive[0], -1)):
+            gap = 100 * sign * (rival.rate.mean - mine.rate.mean)
+            met = gap <= WITHIN if sign > 0 else gap >= 0
+            cells += [f"{100 * rival.rate.mean:.2f}", rival.model.name, f"{gap:+.2f} {'yes' if met else 'NO'}"]
+        table.add_row(*cells)
+    return table
+
+
+def learnt(work: Cuts, models: Sequence[Model], store: Store) -> Table:
+    """Return the learning curve: the mean over training sets, of each number of repetitions."""
+    table = Table("repetitions of a type by a person", *map(str, CURVE), title=f"{CURVE_SCENE}, on fresh grasps, %")
+    table.add_row("training sets", *map(str, CURVE.values()), end_section=True)
+    for model in models:
+        cells = []
+        for name, found in work.items():
+            each = [line for cut in found for line in lines(name, [cut], [model], store)]
+            rates = [100 * line.rate.mean for line in each]
+            cells.append(f"{np.mean(rates):.2f}" if len(each) == len(found) else "-")
+        table.add_row(model.name, *cells)
+    return table
+
+
+def asked() -> argparse.Namespace:
+    """Return what the command line asks for."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sets", nargs="+", default=None, help=f"of {', '.join(SETS)}, or .grasps files")
+    parser.add_argument("--models", nargs="+", help="of " + ", ".join(model.name for model in OURS + PEERS))
+    parser.add_argument("--data", type=Path, default=Path("../shared/data"), help="folder of the real recordings")
+    parser.add_argument("--store", type=Path, default=Path("build/models.jsonl"))
+    parser.add_argument("--again", nargs="+", default=[], help="models whose stored answers are not used")
+    parser.add_argument("--quick", action="store_true", help=f"sets {' and '.join(QUICK_SETS)} only")
+    parser.add_argument("--learning-curve", action="store_true")
+    parser.add_argument("--jobs", type=int, default=1)
+    return parser.parse_args()
+
+
+def worked(options: argparse.Namespace) -> Cuts:
+    """Return the folds of each set that is there, or those of the learning curve."""
+    work: Cuts = {}
+    if options.learning_curve:
+        for repetitions, cut in curve():
+            work.setdefault(f"{CURVE_SCENE}, {repetitions} repetitions", []).append(cut)
+        return work
+    for name in options.sets or (QUICK_SETS if options.quick else SETS):
+        try:
+            work[name] = list(cuts(load(name, options.data)))
+        except FileNotFoundError as reason:
+            CONSOLE.print(f"left out: {name}: {reason}")
+    return work
+
+
+def wanted(options: argparse.Namespace) -> Iterator[Model]:
+    """Yield the models that are asked for and there."""
+    names = options.models or (CURVE_MODELS if options.learning_curve else None)
+    for model in OURS + PEERS:
+        if names is not None and model.name not in names:
+            continue
+        if model.there:
+            yield model
+        else:
+            CONSOLE.print(f"left out: {model.name}: no {model.needs}")
+
+
+def main() -> None:
+    """Let the models answer, and print the tables."""
+    options = asked()
+    models, work = list(wanted(options)), worked(options)
+    store = {key: each for key, each in stored(options.store).items() if each.model not in options.again}
+    fill(store, options.store, work, models, options.jobs)
+    if options.learning_curve:
+        CONSOLE.print(learnt(work, models, store))
+        return
+    every = {}
+    for name, found in work.items():
+        for of in dict.fromkeys(cut.of for cut in found):
+            part = [cut for cut in found if cut.of == of]
+            every[name, of] = lines(name, part, models, store)
+            CONSOLE.print(shown(name, of, every[name, of]))
+    for model in models:
+        if model.ours:
+            CONSOLE.print(summary(every, model.name))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,112 @@
+"""The additive logit where its problem is hard: classes that can be parted, copies, extreme penalties and weights."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from thenar.compiler.additive.logit import BIAS_SHARE, BIN_SHARE, BINS, TOLERANCE, ColumnTables, fit_logit
+from thenar.compiler.tables.quantise import integer_scores, quantise
+from thenar.runtime.tables import LIMIT
+
+from ..checks.integer_sums import largest_sum
+from ..checks.roundings import ROUNDING
+from ..finding import REFERENCE, Case, Finding, Worst
+from ..inputs.hard_data import HardSet, contradictory, intervals, noisy, separable, words
+from ..inputs.hard_tables import rows_of
+from ..reference.logit import Column, largest_derivative
+from ..reference.numbers import precisely
+
+CASE = Case(
+    title="Additive logit",
+    danger="scores grow without end, a step overshoots, or rounding ends the search before the minimum is reached",
+)
+
+# Pulls of scores to zero, and of neighbouring bins to each other.
+USUAL, TINY, HUGE = (1.0, 3.0), (1e-6, 0.0), (1e6, 1e6)
+
+
+def findings(full: bool) -> Iterator[Finding]:
+    """Yield how near the minimum each answer is, and what may not change it."""
+    at_rest = Worst("largest derivative at the answer", REFERENCE, 1.0, "x tolerance and rounding")
+    large = Worst("entries that are larger than the pull lets them be, or no numbers", "the loss of zeros", 0.0, "sets")
+    overflow = Worst("largest sum of the integer tables, any order", "all rows' extremes", LIMIT, "steps")
+    wrong = Worst("frames not named right by tables and integers", "their labels", 0.0, "frames")
+    changed = Worst("answers that rows in another order, or a constant column, change", "itself", 0.0, "answers")
+    for hard, pulls, parted in _fits(full):
+        at = f"{hard.name}, penalty {pulls[0]:g}"
+        tables = _fit(hard, pulls)
+        at_rest.see(_unrest(hard, tables, pulls), at)
+        bound = math.sqrt(2 * _weights(hard).sum() * math.log(hard.n_classes) / (pulls[0] * BIAS_SHARE))
+        large.see(float(not all((np.abs(rows) <= bound).all() for rows in (tables.bias, *tables.rows))), at)
+        scores = tables.score_tables(hard.n_switches)
+        integers = quantise(scores, hard.bits, hard.codes)
+        overflow.see(largest_sum(rows_of(integers)), at)
+        if parted:
+            named = tables.scores(hard.X).argmax(axis=1), integer_scores(integers, hard.bits, hard.codes).argmax(axis=1)
+            wrong.see(float(sum(np.count_nonzero(each != hard.labels) for each in named)), at, len(hard.X))
+        order = np.random.default_rng(1).permutation(len(hard.X))
+        turned = replace(hard, X=np.column_stack([hard.X, np.full(len(hard.X), 7)])[order], labels=hard.labels[order])
+        turned = replace(turned, weights=None if hard.weights is None else hard.weights[order])
+        again = _fit(turned, pulls)
+        same = all(map(np.array_equal, (tables.bias, *tables.rows), (again.bias, *again.rows[:-1])))
+        changed.see(float(not same or again.rows[-1].any()), at)
+    yield from (worst.finding() for worst in (at_rest, large, overflow, wrong, changed))
+    yield _copies()
+
+
+def _fits(full: bool) -> Iterator[tuple[HardSet, tuple[float, float], bool]]:
+    """Yield sets and pulls, and whether the answer must name every frame right."""
+    for classes in (2, 14, 33) if full else (2, 14):
+        for hard in (separable(classes, 1), separable(classes), words(classes)):
+            yield hard, USUAL, True
+            yield hard, TINY, True
+            yield hard, HUGE, False
+        yield intervals(min(classes, BINS), 1), TINY, True
+    yield separable(1000 if full else 60, 1), USUAL, True
+    for pulls in (USUAL, TINY, HUGE):
+        yield noisy(5, 40, 0.5, seed=3), pulls, False
+        yield contradictory([[10**12, 1], [1, 1]]), pulls, False
+        yield contradictory([[10**12, 0, 1], [1, 10**12, 0], [0, 1, 10**6]]), pulls, False
+
+
+def _weights(hard: HardSet) -> np.ndarray:
+    return np.ones(len(hard.labels)) if hard.weights is None else hard.weights
+
+
+def _fit(hard: HardSet, pulls: tuple[float, float]) -> ColumnTables:
+    penalty, smoothness = pulls
+    return fit_logit(hard.X, hard.labels, hard.n_classes, penalty=penalty, smoothness=smoothness, weights=hard.weights)
+
+
+@precisely()
+def _unrest(hard: HardSet, tables: ColumnTables, pulls: tuple[float, float]) -> float:
+    """Return the largest derivative as a share of what the tolerance, and rounding, allow.
+
+    Scores are exact. A probability of K classes is within K + 8 roundings; the grid of residuals, and what pulls a row,
+    which is at most all the weight there is, round a few times more.
+    """
+    weights, (penalty, smoothness) = _weights(hard), pulls
+    columns = [Column([0] * len(hard.X), [tables.bias.tolist()], [BIAS_SHARE * penalty], [])]
+    for x, edges, rows in zip(hard.X.T, tables.edges, tables.rows, strict=True):
+        bins = np.searchsorted(edges, x)
+        two = len(edges) < 2
+        pulled = [penalty] if two else [BIN_SHARE * penalty] * (len(edges) + 1)
+        own = rows[1:2] if two else rows[:-1]
+        columns.append(Column((bins - two).tolist(), own.tolist(), pulled, [smoothness] * (len(pulled) - 1)))
+    largest = largest_derivative(columns, hard.labels.tolist(), weights.tolist())
+    allowed = TOLERANCE + (hard.n_classes + 20) * 2 * ROUNDING
+    return float(largest / (allowed * float(weights.sum())))
+
+
+def _copies() -> Finding:
+    """Of equal columns none is preferred: each has the same rows, to the last bit."""
+    worst = Worst("copies of a column that do not share what it says equally", "each other", 0.0, "columns")
+    hard = noisy(5, 60, 0.3, seed=1)
+    doubled = replace(hard, X=np.column_stack([hard.X[:, :3], hard.X, hard.X[:, -1]]))
+    for pulls in (USUAL, TINY, HUGE):
+        rows = _fit(doubled, pulls).rows
+        for one, other in ((0, 3), (1, 4), (2, 5), (-1, -2)):
+            worst.see(float(not np.array_equal(rows[one], rows[other])), f"columns {one} and {other}, pulls {pulls}")
+    return worst.finding()

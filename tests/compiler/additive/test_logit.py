@@ -1,0 +1,216 @@
+"""The additive logit: scikit-learn's answer on the same design, and what must not change a bit of it."""
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import block_diag
+from sklearn.linear_model import LogisticRegression
+
+from thenar.compiler.additive.logit import BIAS_SHARE, BIN_SHARE, PENALTY, SMOOTHNESS, ColumnTables, fit_logit
+from thenar.compiler.boosting.boost import BoostingError, boost
+from thenar.compiler.elementary import softmax
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def grasps(seed: int, n: int = 60, bits: int = 6, joints: int = 2, classes: int = 3) -> tuple[Any, Any]:
+    rng = np.random.default_rng(seed)
+    labels = rng.integers(0, classes, size=n)
+    prototypes = rng.random((classes, bits)) < 0.4
+    switches = prototypes[labels] ^ (rng.random((n, bits)) < 0.15)
+    codes = rng.integers(1, 256, size=(n, joints)) // 3 + labels[:, None] * 9
+    return np.column_stack([switches, codes]).astype(np.int64), labels.astype(np.intp)
+
+
+def numbers(tables: ColumnTables) -> bytes:
+    slopes = (tables.lines[column].row for column in sorted(tables.lines))
+    return b"".join(part.tobytes() for part in (tables.bias, *tables.edges, *tables.rows, *slopes))
+
+
+@given(SEEDS, st.sampled_from([(0.05, 0.0), (1.0, 10.0), (4.0, 0.5)]))
+@settings(max_examples=10, deadline=None)
+def test_it_is_scikit_learns_answer_on_the_expanded_design(seed: int, pulls: tuple[float, float]) -> None:
+    X, labels = grasps(seed)
+    X = np.where(np.random.default_rng(seed).random(X.shape) < 0.1, np.nan, X)
+    X[:, :4] = np.nan_to_num(X[:, :4])
+    penalty, smoothness = pulls
+    tables = fit_logit(X, labels, 3, penalty=penalty, smoothness=smoothness, max_bins=5, tolerance=1e-11)
+    parts, penalties = [np.ones((len(X), 1))], [np.array([[BIAS_SHARE * penalty]])]
+    for x, edges in zip(X.T, tables.edges, strict=True):
+        bins = np.searchsorted(edges, x) + np.isnan(x)
+        if bins.max() < 2:
+            parts.append((bins == 1)[:, np.newaxis])
+            penalties.append(np.array([[penalty]]))
+            continue
+        parts.append(bins[:, np.newaxis] == np.arange(bins.max() + 1))
+        steps = np.diff(np.eye(bins.max() + 1), axis=0)[: len(edges)]
+        penalties.append(BIN_SHARE * penalty * np.eye(bins.max() + 1) + smoothness * steps.T @ steps)
+    spread = np.linalg.cholesky(np.linalg.inv(block_diag(*penalties)))
+    theirs = LogisticRegression(C=1.0, fit_intercept=False, tol=1e-10, solver="newton-cg", max_iter=1000)
+    theirs.fit(np.hstack(parts) @ spread, labels)
+    found = np.hstack(parts) @ (spread @ theirs.coef_.T)
+    np.testing.assert_allclose(tables.scores(X), found, atol=1e-5)
+
+
+@given(SEEDS, st.sampled_from([0.1, 3.0]))
+@settings(max_examples=10, deadline=None)
+def test_lines_are_scikit_learns_answer_on_scaled_codes(seed: int, smoothness: float) -> None:
+    X, labels = grasps(seed)
+    X[:, :6] *= 7  # of two values, that need not be 0 and 1
+    weights = np.random.default_rng(seed).integers(1, 4, len(X)).astype(float)
+    tables = fit_logit(X, labels, 3, smoothness=smoothness, linear=True, tolerance=1e-10, weights=weights)
+    deviation = np.sqrt(np.average((X[:, 6:] - np.average(X[:, 6:], 0, weights)) ** 2, 0, weights))
+    pulls = np.r_[BIAS_SHARE, np.ones(6), (BIN_SHARE + smoothness) * deviation**2]
+    design = np.column_stack([np.ones(len(X)), X[:, :6] / 7, X[:, 6:] - np.average(X[:, 6:], 0, weights)])
+    theirs = LogisticRegression(C=1.0, fit_intercept=False, tol=1e-9, solver="newton-cg", max_iter=1000)
+    theirs.fit(design / np.sqrt(pulls), labels, weights)
+    # A column is centred to the half of a 512th of its range, and so is what pulls its bias.
+    np.testing.assert_allclose(tables.scores(X), (design / np.sqrt(pulls)) @ theirs.coef_.T, atol=2e-3)
+    # Beyond what was trained on a line is flat; a missing value adds the mean.
+    beyond = np.vstack([X[:1], X[:1]]).astype(float)
+    beyond[0, 6:], beyond[1, 6:] = X[:, 6:].max(axis=0), 1e6
+    assert np.ptp(tables.scores(beyond), axis=0).max() == 0
+    beyond[0, 6:], beyond[1, 6:] = np.nan, np.average(X[:, 6:], 0, weights)
+    missing, mean = tables.scores(beyond)
+    np.testing.assert_allclose(missing, mean, atol=1e-9)
+
+
+@pytest.mark.parametrize("unit", [1, 1000, 2.0**-20])
+def test_missing_values_of_a_line_have_a_row_of_their_own(unit: float) -> None:
+    X = np.array([[0.0], [1.0], [2.0], [5.0], [np.nan], [np.nan]]) * unit
+    labels = np.array([0, 0, 1, 1, 2, 2])
+    tables = fit_logit(X, labels, 3, smoothness=0.01, penalty=0.1, linear=True)
+    assert list(tables.lines) == [0]
+    assert tables.scores(X).argmax(axis=1).tolist() == labels.tolist()
+    np.testing.assert_allclose(
+        tables.scores(X), fit_logit(X / unit, labels, 3, smoothness=0.01, penalty=0.1, linear=True).scores(X / unit)
+    )
+
+
+@given(SEEDS)
+@settings(max_examples=10, deadline=None)
+def test_neither_the_order_of_rows_nor_that_of_columns_changes_a_bit(seed: int) -> None:
+    X, labels = grasps(seed)
+    rng, linear = np.random.default_rng(seed), bool(seed % 2)
+    tables = fit_logit(X, labels, 3, linear=linear)
+    rows, columns = rng.permutation(len(X)), rng.permutation(X.shape[1])
+    assert numbers(fit_logit(X[rows], labels[rows], 3, linear=linear)) == numbers(tables)
+    assert numbers(fit_logit(X[:, columns], labels, 3, linear=linear)) == numbers(tables.columns(columns.tolist()))
+
+
+@given(SEEDS)
+@settings(max_examples=10, deadline=None)
+def test_a_row_counts_as_often_as_it_weighs(seed: int) -> None:
+    X, labels = grasps(seed, n=40)
+    weights = np.random.default_rng(seed).integers(1, 5, len(X)).astype(float)
+    own: dict[str, Any] = {"max_bins": 4, "tolerance": 1e-11}
+    repeated = fit_logit(X.repeat(weights.astype(int), axis=0), labels.repeat(weights.astype(int)), 3, **own)
+    weighted = fit_logit(X, labels, 3, weights=weights, **own)
+    assert [edges.tolist() for edges in weighted.edges] == [edges.tolist() for edges in repeated.edges]
+    for ours, theirs in zip(weighted.rows, repeated.rows, strict=True):
+        np.testing.assert_allclose(ours, theirs, atol=1e-7)
+    halves = fit_logit(X, labels, 3, weights=weights / 2, penalty=PENALTY / 2, smoothness=SMOOTHNESS / 2, **own)
+    assert numbers(halves) == numbers(weighted)
+
+
+def test_a_looser_tolerance_gives_nearly_the_same_answer() -> None:
+    X, labels = grasps(5)
+    tight = fit_logit(X, labels, 3, tolerance=1e-12).scores(X)
+    np.testing.assert_allclose(fit_logit(X, labels, 3).scores(X), tight, atol=1e-3)
+    assert np.abs(fit_logit(X, labels, 3, tolerance=0.1).scores(X) - tight).max() > 1e-2
+
+
+def test_a_class_without_rows_is_unlikely_and_finite() -> None:
+    X, labels = grasps(1)
+    probability = softmax(np.ascontiguousarray(fit_logit(X, labels, 5).scores(X).T))
+    assert probability[3:].max() < 0.01
+    assert probability[3:].min() > 0
+
+
+def test_missing_values_have_a_row_of_their_own_or_add_the_mean() -> None:
+    X = np.array([[0.0], [0.0], [1.0], [1.0], [np.nan], [np.nan]])
+    labels = np.array([0, 0, 1, 1, 2, 2])
+    own = fit_logit(X, labels, 3, smoothness=0.0)
+    assert own.scores(X).argmax(axis=1).tolist() == labels.tolist()
+    x, weights = np.array([[0.0], [3.0], [5.0], [9.0]]), np.array([1.0, 2.0, 3.0, 1.0])
+    mean = fit_logit(x, np.array([0, 1, 0, 1]), 2, weights=weights)
+    np.testing.assert_allclose(mean.rows[0][4], weights @ mean.rows[0][:4] / 7, rtol=1e-12)
+    assert np.array_equal(mean.scores(np.array([[np.nan]]))[0], mean.bias + mean.rows[0][4])
+
+
+def test_smoothness_brings_neighbouring_bins_together() -> None:
+    X, labels = grasps(2, bits=0, joints=1)
+    apart = [np.abs(np.diff(fit_logit(X, labels, 3, smoothness=s).rows[0][:-1], axis=0)).max() for s in (0, 1, 100)]
+    assert apart[0] > 2 * apart[1] > 4 * apart[2]
+
+
+@pytest.mark.parametrize("linear", [False, True])
+def test_score_tables_add_what_the_columns_add(linear: bool) -> None:
+    X, labels = grasps(3)
+    fitted = fit_logit(X, labels, 3, linear=linear)
+    found = fitted.score_tables(6).scores(X[:, :6].astype(bool), X[:, 6:].astype(np.uint16))
+    np.testing.assert_allclose(found, fitted.scores(X), rtol=0, atol=1e-12)
+    # Edges between numbers that are no codes, and below all codes.
+    odd = ColumnTables(np.zeros(2), (np.array([-3.5, 1.2, 1.7, 4.0]),), (np.arange(12.0).reshape(6, 2),))
+    codes = np.arange(7, dtype=np.uint16)[:, np.newaxis]
+    assert np.array_equal(odd.score_tables(0).scores(np.zeros((7, 0), bool), codes), odd.scores(codes))
+
+
+@pytest.mark.parametrize(
+    ("changes", "because"),
+    [
+        ({"penalty": 0.0}, "penalty=0.0 must be above 0"),
+        ({"smoothness": float("inf")}, "smoothness=inf"),
+        ({"max_bins": 1}, "max_bins=1 must be at least 2"),
+        ({"tolerance": 0.0}, "tolerance=0.0 must be at least 1e-12"),
+        ({"weights": np.zeros(60)}, "not all zero"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(changes: dict[str, Any], because: str) -> None:
+    with pytest.raises(BoostingError, match=because):
+        fit_logit(*grasps(0), 3, **changes)
+
+
+@pytest.mark.slow
+def test_a_fit_takes_no_longer_than_a_hundred_rounds_of_boosting() -> None:
+    """Of the processor's time; the quickest of some runs, in turn."""
+    X, labels = grasps(1, n=4200, bits=160, joints=16, classes=14)
+
+    def seconds(work: Callable[[], Any]) -> float:
+        start = time.process_time()
+        work()
+        return time.process_time() - start
+
+    fits = [
+        (seconds(lambda: fit_logit(X, labels, 14)), seconds(lambda: boost(X, labels, 14, rounds=100))) for _ in range(3)
+    ]
+    ours, theirs = map(min, zip(*fits, strict=True))
+    assert ours < 1.1 * theirs
+
+
+_FIT = """
+import hashlib, numpy as np
+from thenar.compiler.additive.logit import fit_logit
+rng = np.random.default_rng(0)
+labels = rng.integers(0, 5, 400)
+X = np.column_stack([rng.random((400, 30)) < 0.2, rng.integers(0, 60, (400, 4)) + 9 * labels[:, None]])
+tables = fit_logit(X, labels, 5)
+print(hashlib.sha256(b"".join(part.tobytes() for part in (tables.bias, *tables.rows))).hexdigest())
+"""
+
+
+def test_threads_and_instruction_sets_change_no_bit() -> None:
+    settings = ({"OPENBLAS_NUM_THREADS": "1", "OPENBLAS_CORETYPE": "Nehalem"}, {"OPENBLAS_NUM_THREADS": "2"})
+    runs = [
+        subprocess.run([sys.executable, "-c", _FIT], env=os.environ | own, capture_output=True, text=True, check=True)
+        for own in settings
+    ]
+    assert len({run.stdout for run in runs}) == 1

@@ -1,0 +1,237 @@
+"""The fit is chosen inside the training rows: folds that part nothing, the rule, and what options leave open."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.compiler import TRAINERS, GraspSet, Options, Samples, ScoreTables, Setting, Trainer
+from thenar.compiler import choosing as module
+from thenar.compiler.choosing import choose_training, inner_folds
+from thenar.compiler.tables.collapse import Line, model_scores
+from thenar.compiler.trainers.base import TrainerError, Training, changed
+from thenar.runtime.manifest import fit_name
+
+
+class Pointer(Trainer):
+    """Believes one switch: closed is the second of two grasp types. Its tables have idle rows that are not zero."""
+
+    name = "pointer"
+    what = "one switch's opinion"
+    settings = (
+        Setting("switch", "Which.", int, 0),
+        Setting("idle", "Rows besides.", int, 0),
+        Setting("faith", "How sure it is.", float, 1.0),
+    )
+
+    def __init__(self, *tried: Mapping[str, float]) -> None:
+        self.tried = tried
+
+    def train(self, samples: Samples, settings: Mapping[str, Any], report: Any = None) -> ScoreTables:
+        rows = np.zeros((samples.n_switches, 2))
+        rows[settings["switch"], 1] = 2 * settings["faith"]
+        if settings["idle"]:
+            rows[-settings["idle"] :] += 1e-9
+        return ScoreTables(np.array([settings["faith"], 0.0]), rows, (), ())
+
+
+def _pointing(monkeypatch: pytest.MonkeyPatch, *tried: Mapping[str, float]) -> tuple[Training, ...]:
+    monkeypatch.setitem(TRAINERS.__dict__, "_members", MappingProxyType({"pointer": Pointer(*tried)}))
+    return Training.candidates(Options())
+
+
+def _samples(*wrong: list[int], n: int = 60, idle: int = 20, subjects: int = 1) -> Samples:
+    """Return two grasp types, and switches that tell them apart but in these rows, and others that tell nothing."""
+    labels = np.arange(n) // subjects % 2
+    closed = np.zeros((n, len(wrong) + idle), bool)
+    for switch, rows in enumerate(wrong):
+        closed[:, switch] = labels == 1
+        closed[rows, switch] ^= True
+    return Samples(closed, np.zeros((n, 0), np.uint16), labels, ("cup", "pen"), subjects=np.arange(n) % subjects)
+
+
+@given(st.data(), st.integers(1, 7), st.integers(1, 9))
+def test_inner_folds_part_no_trial_and_no_group(data: st.DataObject, n_groups: int, n_trials: int) -> None:
+    """Each group has trials of its own, of some frames in any order."""
+    trials = np.repeat(np.arange(n_groups * n_trials), 2)
+    order = np.array(data.draw(st.permutations(range(len(trials)))))
+    trials = trials[order]
+    groups, labels = np.array([f"g{trial // n_trials}" for trial in trials]), trials % 3
+    samples = Samples(
+        np.zeros((len(trials), 1), bool), np.zeros((len(trials), 0), np.uint16), labels, tuple("abc"), trials
+    )
+    for named in (None, groups):
+        folds = inner_folds(samples, 1, named)
+        assert bool(folds) == (n_groups * n_trials > 1)
+        tested = np.concatenate([fold.test for fold in folds]) if folds else np.arange(len(trials))
+        assert np.array_equal(np.sort(tested), np.arange(len(trials)))
+        for fold in folds:
+            assert len(fold.train)
+            assert not set(trials[fold.train]) & set(trials[fold.test])
+            assert named is None or n_groups < 3 or not set(groups[fold.train]) & set(groups[fold.test])
+
+
+@given(st.lists(st.integers(-1, 1), min_size=2, max_size=30))
+def test_the_error_of_independent_trials_is_that_of_a_mean(values: list[int]) -> None:
+    gains = np.array(values)
+    expected = gains.std(ddof=1) / np.sqrt(len(gains))
+    assert module._error(gains, np.arange(len(gains))) == pytest.approx(expected, abs=1e-12)
+    # A cluster's trials that are all alike are one piece of evidence.
+    assert module._error(np.repeat(gains, 5), np.repeat(np.arange(len(gains)), 5)) == pytest.approx(expected, abs=1e-12)
+
+
+def test_of_one_candidate_no_fold_is_made(grasp_set: GraspSet, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "inner_folds", lambda *_: pytest.fail("worked in vain"))
+    candidates = Training.candidates(Options(rounds=3))
+    fitting = choose_training(Samples.of(grasp_set), candidates)
+    assert (fitting.trainer, fitting.compared) == ("logitboost", ())
+    assert (Training.chosen(fitting),) == candidates
+
+
+@pytest.mark.parametrize("by", [None, "subject"])
+def test_every_candidate_is_scored_as_if_it_were_trained_alone(
+    make_set: Callable[..., GraspSet], by: str | None
+) -> None:
+    """An oracle in a few lines, of trials with several frames; staged rounds are those of trainings of their own."""
+    grasp_set = make_set(subjects=4, frames=3)
+    samples = Samples.of(grasp_set)
+    groups = grasp_set.subjects if by else None
+    candidates = [Training.of(Options(trainer="logitboost", rounds=rounds)) for rounds in (2, 9)]
+    candidates.append(Training.of(changed(Options(), {"trainer": "logit", "max_bins": 4})))
+    folds = inner_folds(samples, 5, groups)
+    expected = []
+    for candidate in candidates:
+        hits, loss = 0, 0.0
+        for fold in folds:
+            learning, test = samples.rows(fold.train), samples.rows(fold.test)
+            scores = model_scores(candidate.train(learning), test.switches, test.codes)
+            for trial in np.unique(test.trials):
+                own = scores[test.trials == trial]
+                label = test.labels[test.trials == trial][0]
+                hits += np.bincount(own.argmax(axis=1)).argmax() == label
+                shares = np.exp(own) / np.exp(own).sum(axis=1, keepdims=True)
+                loss -= np.log(shares[:, label]).mean()
+        expected.append((hits, loss / 96))
+    fitting = choose_training(samples, candidates, seed=5, groups=groups, of="new subject")
+    assert (fitting.of, fitting.folds, fitting.tried) == ("new subject" if by else "pooled", len(folds), 3)
+    shown = {each.name: (each.correct, each.loss) for each in fitting.compared}
+    scored = {fit_name(each.trainer, each.settings): right for each, right in zip(candidates, expected, strict=True)}
+    for name, (correct, loss) in shown.items():
+        assert correct == scored[name][0]
+        assert loss == pytest.approx(scored[name][1], abs=1e-6)
+    assert {each.trainer for each in fitting.compared} == {"logitboost", "logit"}
+    assert max(each.correct for each in fitting.compared) == max(hits for hits, _ in expected)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_any_number_of_workers_chooses_the_same(grasp_set: GraspSet, jobs: int) -> None:
+    candidates = Training.candidates(Options(trainer="logitboost")) + Training.candidates(
+        changed(Options(), {"trainer": "logit", "max_bins": 4, "penalty": 1.0, "linear": 0})
+    )
+    seen: list[tuple[int, int]] = []
+    fitting = choose_training(Samples.of(grasp_set), candidates, jobs=jobs, report=lambda *done: seen.append(done))
+    assert fitting == choose_training(Samples.of(grasp_set), candidates)
+    assert seen == [(done, len(seen) + 1) for done in range(1, len(seen) + 1)]
+
+
+def test_the_best_is_chosen_where_others_are_clearly_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nine misses, two, and two others besides: the third is surer, but behind by more than a standard error."""
+    candidates = _pointing(monkeypatch, {"switch": 0}, {"switch": 1, "faith": 0.1}, {"switch": 2, "faith": 3.0})
+    samples = _samples([*range(9)], [0, 1], [0, 1, 2, 3, 4, 5])
+    fitting = choose_training(samples, candidates)
+    assert fitting.settings["switch"] == 1
+    assert fitting.why == "it recognises the most, 96.7 % of 60 trials in inner folds"
+    (shown,) = fitting.compared
+    assert (shown.correct, shown.total, shown.behind, shown.rows) == (58, 60, 0.0, 1.0)
+
+
+def test_within_one_standard_error_small_tables_win_and_of_these_the_lowest_loss(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One trial of difference is one standard error of it, or a little less."""
+    best = {"switch": 0, "idle": 700}
+    candidates = _pointing(monkeypatch, best, {"switch": 1, "faith": 0.1}, {"switch": 1, "faith": 1.0})
+    samples = _samples([0], [0, 1], idle=1000)
+    fitting = choose_training(samples, candidates)
+    assert fitting.settings == {"switch": 1.0, "idle": 0.0, "faith": 1.0}
+    assert fitting.why.startswith(
+        "it recognises 96.7 % of 60 trials in inner folds, within one standard error of the best, "
+    )
+    first, chosen = fitting.compared
+    assert (first.correct, first.behind, first.behind_error) == (59, 0.0, 0.0)
+    assert (first.rows, chosen.rows) == (701.0, 1.0)
+    assert chosen.behind == pytest.approx(1 / 60, abs=1e-6)
+    assert chosen.behind_error >= chosen.behind
+    # A kilobyte is small enough; equal in all, the first is taken.
+    candidates = _pointing(monkeypatch, {"switch": 0, "idle": 20}, {"switch": 1}, {"switch": 2})
+    assert choose_training(_samples([0], [0, 1], [0, 1]), candidates).settings["switch"] == 0
+    candidates = _pointing(monkeypatch, {"switch": 2}, {"switch": 1})
+    assert choose_training(_samples([0], [0, 1], [0, 1]), candidates).settings["switch"] == 2
+
+
+def test_what_holds_for_the_known_people_alone_is_not_chosen_for_new_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The misses of one switch are all of one subject: over people that is no clear lead, over trials it is."""
+    n, subjects = 60, 5
+    of_one = [row for row in range(n) if row % subjects == 0][:6]
+    samples = _samples([], of_one, subjects=subjects, idle=1000)
+    candidates = _pointing(monkeypatch, {"switch": 0, "idle": 700}, {"switch": 1})
+    assert choose_training(samples, candidates).settings["switch"] == 0
+    fitting = choose_training(samples, candidates, groups=samples.subjects, of="new subject")
+    assert fitting.settings["switch"] == 1
+    assert fitting.compared[-1].behind_error == pytest.approx(fitting.compared[-1].behind, abs=1e-6)
+
+
+def test_tables_are_counted_by_their_rows_in_use() -> None:
+    idle, bins = np.zeros((1, 2)), np.array([9, 20], np.uint16)
+    joints = (np.ones((3, 2)), idle, idle)
+    none = np.array([], np.uint16)
+    tables = ScoreTables(np.ones(2), np.eye(4, 2), (bins, none, none), joints, (Line(2, 0, 9, np.ones(2)),))
+    assert module._table_rows(tables) == 2 + 3 + 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "trainers"),
+    [
+        ({}, set(TRAINERS)),
+        ({"max_bins": 8}, set(TRAINERS)),
+        ({"rounds": 3}, {"logitboost"}),
+        ({"shrinkage": 0.5}, {"logitboost"}),
+        ({"penalty": 2.0}, {"logit"}),
+        ({"trainer": "logit"}, {"logit"}),
+        ({"trainer": "logitboost"}, {"logitboost"}),
+    ],
+)
+def test_settings_that_are_given_are_fixed_and_name_the_trainer_that_takes_them(
+    changes: dict[str, Any], trainers: set[str]
+) -> None:
+    candidates = Training.candidates(changed(Options(), changes))
+    assert {each.trainer for each in candidates} == trainers
+    assert len({repr(each) for each in candidates}) == len(candidates)
+    for each in candidates:
+        assert set(each.settings) == {setting.name for setting in TRAINERS[each.trainer].settings}
+        assert all(each.settings[name] == value for name, value in changes.items() if name != "trainer")
+
+
+@pytest.mark.parametrize(
+    "changes", [{"rounds": 3}, {"trainer": "logit", "penalty": 1.0, "smoothness": 2.0, "max_bins": 8, "linear": 0}]
+)
+def test_where_all_that_is_compared_is_given_one_candidate_is_left(changes: dict[str, Any]) -> None:
+    assert len(Training.candidates(changed(Options(), changes))) == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "because"),
+    [
+        ({"round": 3}, "no trainer takes the setting 'round'"),
+        ({"tolerance": 0.1, "round": 3}, "no trainer takes the setting 'round'"),
+        ({"trainer": "logit", "ties": 1.0}, "trainer 'logit' takes no setting 'ties'"),
+        ({"penalty": -1.0}, "penalty=-1.0 must be at least"),
+    ],
+)
+def test_what_no_trainer_takes_is_refused(changes: dict[str, Any], because: str) -> None:
+    with pytest.raises(TrainerError, match=because):
+        Training.candidates(changed(Options(), changes))
