@@ -9,8 +9,7 @@ is not installed is left out by name: apt-get install weka default-jre-headless,
 
 import os
 
-for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
-    os.environ[name] = "1"  # before numpy is loaded
+os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"  # before numpy is loaded
 
 import argparse
 import resource

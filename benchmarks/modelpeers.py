@@ -183,7 +183,7 @@ def _weka(cut: Cut, _: Given) -> tuple[Answers, None]:
 
 def _write_arff(path: Path, part: Samples) -> None:
     head = ["@relation grasps"]
-    head += [f"@attribute s{s} {{0,1}}" for s in range(part.n_switches)]
+    head += [f"@attribute s{s} numeric" for s in range(part.n_switches)]  # nominal ones are far worse on few rows
     head += [f"@attribute j{j} numeric" for j in range(part.codes.shape[1])]
     head += ["@attribute grasp {" + ",".join(f"g{k}" for k in range(part.n_classes)) + "}", "@data"]
     inputs = zip(part.inputs.tolist(), part.labels.tolist(), strict=True)

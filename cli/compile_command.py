@@ -51,9 +51,9 @@ _BOARD = "board"
 _SETTLED = ("preset", "prune", "inputs", "table_bits", "method", "keep", "width", "trainer")
 # Chosen by measurement: docs/commands.md shows what each brings. None sets both --keep and --prune.
 PRESETS: dict[str, dict[str, str]] = {
-    "smallest": {"method": "elimination", "keep": "8", "rounds": "25", "max-bins": "8", "table-bits": "8"},
+    "smallest": {"method": "elimination", "keep": "8", "max-bins": "8", "table-bits": "8"},
     "fastest": {"method": "elimination", "keep": "16", "inputs": "switches", "table-bits": "8"},
-    "best": {"method": "elimination", "keep": "33", "rounds": "50"},
+    "best": {"method": "elimination", "keep": "33"},
 }
 _GROUPS = {
     "Basics": ("output", "preset", "method", "keep", "prune", "inputs"),

@@ -106,6 +106,14 @@ class _TrainerOption(click.Option):
         return super().get_help_record(ctx)
 
 
+class _SettingOption(click.Option):
+    """Its help shows as its default what a trainer takes where it is not given, and not that it has no value."""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        record = super().get_help_record(ctx)
+        return record and (record[0], record[1].replace(f"({self.show_default})", str(self.show_default)))
+
+
 def trainer_option(default: str) -> Callable[[Command], Command]:
     """Return the option --trainer; where AUTO is its default, the trainer and its settings can be chosen."""
     kind = OneOf("trainer", lambda: (AUTO, *_trainers()) if default == AUTO else _trainers())
@@ -190,7 +198,7 @@ def _option(setting: "Setting", chosen: bool) -> click.Option:
     default = "chosen" if chosen else default.rstrip("]") if setting.default is None else str(setting.default)
     # Without a value it is not given.
     decls, shown = [f"--{setting.name.replace('_', '-')}", setting.name], default or False
-    return click.Option(decls, type=kind, show_default=shown, help=what)
+    return _SettingOption(decls, type=kind, show_default=shown, help=what)
 
 
 layout_option = click.option(

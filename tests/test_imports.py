@@ -97,6 +97,7 @@ ALLOWED = {
     "compiler.evaluation": (
         "runtime",
         "drivers.errors",
+        "compiler.choosing",
         "compiler.recordings",
         "compiler.placement",
         "compiler.boosting",

@@ -20,10 +20,10 @@ class AdditiveLogitClassifier(AdditiveClassifier):
 
     Parameters
     ----------
-    penalty : float, default=1.0
+    penalty : float, default=0.5
         Pull of scores towards zero: half of it times the sum of their squares is added to the loss; of bins a
         sixteenth of that, of the bias a thousandth.
-    smoothness : float, default=3.0
+    smoothness : float, default=2.0
         Pull of neighbouring bins towards each other: half of it times the sum of squares of their differences is added.
     max_bins : int, optional, default=16
         No input has more bins than this (2 or more); they hold rows as evenly as can be. None: one for each value.

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 BINS = 16
-PENALTY, SMOOTHNESS = 1.0, 3.0
+PENALTY, SMOOTHNESS = 0.5, 2.0
 # Of the penalty: what pulls each bin, whose neighbours hold it already, and the bias, which must only stay finite.
 BIN_SHARE, BIAS_SHARE = 2.0**-4, 2.0**-10
 # No derivative of the loss is larger at the answer than this, in the weight of all frames together.
@@ -43,7 +43,7 @@ TOLERANCE, FINEST = 1e-7, 1e-12
 # Of Newton's steps, of conjugate gradients in a step, and of halvings of a step: far more than was ever seen.
 _MOST_STEPS, _MOST_DIRECTIONS, _MOST_HALVINGS = 500, 2000, 40
 _ENOUGH = 1e-4  # of the slope that Armijo's rule wants to see
-_ROUNDING = 2.0**-46  # of the loss: a rise by less may be one of rounding
+_ROUNDING = 2.0**-50  # of the loss, for each entry of the rows: a rise by less may be one of rounding
 _MARKS = 512.0  # of a unit, in which a line measures its column: one or two units from end to end
 _UNSOLVED = 0.3  # of the gradient, that a step leaves
 
@@ -373,9 +373,10 @@ class _Fit:
     def _along(self, point: _Point, direction: Floats) -> _Point:
         """Return a point along the direction that is lower by enough: the whole step, or a half, a quarter of it ..."""
         slope, length = dot(direction, point.gradient), 1.0
+        noise = _ROUNDING * direction.size * point.loss
         for _ in range(_MOST_HALVINGS):
             there = self._at(point.rows + length * direction)
-            if there.loss <= point.loss + _ENOUGH * length * slope + _ROUNDING * point.loss:
+            if there.loss <= point.loss + _ENOUGH * length * slope + noise:
                 break
             length *= 0.5
         return there

@@ -150,7 +150,7 @@ def _study(made: BuildReport, jobs: int, progress: Progress | None) -> "tuple[St
         settings=settings,
     )
     try:
-        work = _TRAININGS * len(made.grasp_set) * options.rounds
+        work = _TRAININGS * len(made.grasp_set) * (options.rounds or USUAL_ROUNDS)
         return evaluate(made.grasp_set, options, little(work, jobs), progress), ""
     except EvaluationError as reason:
         return None, f"These recordings have none: {reason}."

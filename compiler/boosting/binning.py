@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-# Elements of the sums over a batch of cells: 256 KiB of doubles stay in a processor's cache.
-_BATCH_ELEMENTS = 1 << 15
+# Elements of the sums over a batch of cells: 512 KiB of doubles stay in a processor's cache.
+_BATCH_ELEMENTS = 1 << 16
 # Of the columns that are looked at together: 8 MiB of doubles.
 _BLOCK_ELEMENTS = 1 << 20
 # Columns of two values that share a partition of the rows, at most: 2^8 cells.

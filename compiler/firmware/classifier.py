@@ -14,8 +14,7 @@ from thenar.runtime.manifest import Calibration
 from thenar.runtime.tables import Slope
 
 from .assembly import assembly_values, calls_are_near, check_size
-from .costs import MOST_INLINE
-from .layout import NO_SWITCH, Field, JointLayout, Layout, Lookup, Parts
+from .layout import MOST_INLINE, NO_SWITCH, Field, JointLayout, Layout, Lookup, Parts
 from .words import Names, comment, inputs_in_words, string, switches_in_words
 
 _STARTS_PER_LINE = 4

@@ -6,10 +6,9 @@ they must be taken apart before they are added: 8 bits are for flash. Other comp
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-if TYPE_CHECKING:
-    from .layout import JointLayout, Layout
+from .layout import MOST_INLINE, JointLayout, Layout
 
 Unit = Literal["cycles", "instructions", ""]
 
@@ -63,7 +62,6 @@ _REPLACING = 17  # a row in update(), but for its words
 # below and above, where it can lie there; a code of 16 bits clamped; a code searched, and each step of the search.
 _FOUND, _COMPARED, _BELOW, _ABOVE, _WIDE = 5, 3, 4, 6, 13
 _SEARCHED, _SEARCH_STEP = 6, 14
-MOST_INLINE = 8  # thresholds are compared one by one; where there are more, they are searched
 # The distance of a code, and how much more in update(); in each part all but the products; and of each word of sums,
 # at the end and where entries are upper halves.
 _DISTANCE, _MOVED, _MULTIPLYING, _WORD, _HALVES = 14, 5, 17, 2, 8
@@ -81,7 +79,7 @@ _BYTES_LOSING, _FIELD, _MISSING = 290, 3, 3
 _STACK = 128
 
 
-def word_cost(layout: "Layout", core: Core) -> Cost:
+def word_cost(layout: Layout, core: Core) -> Cost:
     """Return what the portable C takes on a core, roughly."""
     parts, classes = len(layout.parts.firsts), layout.tables.n_classes
     words, finding = _words(layout), sum(_finding(layout, joint) for joint in layout.joints)
@@ -99,7 +97,7 @@ def word_cost(layout: "Layout", core: Core) -> Cost:
     return Cost(classify, update, flash + update_flash + losing, flash, _ram(layout))
 
 
-def _multiplying(layout: "Layout", core: Core) -> int:
+def _multiplying(layout: Layout, core: Core) -> int:
     """Return the instructions that slopes take."""
     slopes, parts = len(layout.tables.slopes), layout.parts
     if not slopes:
@@ -108,12 +106,12 @@ def _multiplying(layout: "Layout", core: Core) -> int:
     return slopes * _DISTANCE + len(parts.firsts) * (_MULTIPLYING + -(-parts.width // 2) * word)
 
 
-def _words(layout: "Layout") -> int:
+def _words(layout: Layout) -> int:
     """Return how many words a row has."""
     return -(-layout.parts.width * layout.entry_bits // 32)
 
 
-def _finding(layout: "Layout", joint: "JointLayout") -> int:
+def _finding(layout: Layout, joint: JointLayout) -> int:
     """Return the instructions that a joint takes in finding a row."""
     if joint.compared:
         steps = len(joint.thresholds)
@@ -126,7 +124,7 @@ def _finding(layout: "Layout", joint: "JointLayout") -> int:
     return _FOUND + _BELOW * (joint.first > 0) + _ABOVE * above
 
 
-def _flash(layout: "Layout") -> int:
+def _flash(layout: Layout) -> int:
     """Return the bytes of tables and code, update() left out, at most, roughly; the names of the grasp types come on
     top.
     """
@@ -146,7 +144,7 @@ def _flash(layout: "Layout") -> int:
     return rows + places + starts + code + sum(_joint_flash(layout, joint) for joint in layout.joints)
 
 
-def _joint_flash(layout: "Layout", joint: "JointLayout") -> int:
+def _joint_flash(layout: Layout, joint: JointLayout) -> int:
     """Return the bytes of code for a joint, its thresholds included."""
     steps = len(joint.thresholds)
     if not joint.compared:
@@ -156,7 +154,7 @@ def _joint_flash(layout: "Layout", joint: "JointLayout") -> int:
     return _BYTES_JOINT + _BYTES_SEARCHED + steps * layout.code_bits // 8
 
 
-def _ram(layout: "Layout") -> int:
+def _ram(layout: Layout) -> int:
     """Return the bytes of variables and stack, roughly."""
     classes = layout.tables.n_classes
     lost = len(layout.ports) + -(-layout.tables.n_joints // 8) + 4

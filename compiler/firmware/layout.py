@@ -30,8 +30,8 @@ from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.tables import COARSE, IntegerTables
 
 from . import FirmwareError
-from .costs import MOST_INLINE
 
+MOST_INLINE = 8  # thresholds are compared one by one; where there are more, they are searched
 MOST_ROWS = 256  # a bin is one byte
 MOST_BYTE = 127  # the largest bound of scores that are added up in a byte
 MOST_BINS = 256  # and so is what is left of a code when the first of a joint's bins is taken from it

@@ -16,8 +16,8 @@ class Logit(Trainer):
     name = "logit"
     what = "multinomial logistic regression on a table for each input"
     settings = (
-        Setting("penalty", "Pull of scores towards zero (logit).", float, 1.0, 1e-6, 1e6),
-        Setting("smoothness", "Pull of a joint's neighbouring bins towards each other (logit).", float, 3.0, 0.0, 1e6),
+        Setting("penalty", "Pull of scores towards zero (logit).", float, 0.5, 1e-6, 1e6),
+        Setting("smoothness", "Pull of a joint's neighbouring bins towards each other (logit).", float, 2.0, 0.0, 1e6),
         Setting(
             "max_bins", "At most so many bins a joint: smaller tables.  [default: no limit; logit: 16]", int, 16, 2
         ),

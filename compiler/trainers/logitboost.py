@@ -22,9 +22,9 @@ class LogitBoost(Trainer):
     rank = -1
     staged = True
     tried = (
-        {"rounds": 30, "max_bins": 16},
-        {"rounds": 100, "max_bins": 16},
-        {"rounds": 100, "max_bins": 16, "shrinkage": 0.3},
+        {"rounds": 30, "max_bins": 16, "ties": "least-used"},
+        {"rounds": 100, "max_bins": 16, "ties": "least-used"},
+        {"rounds": 100, "max_bins": 16, "ties": "least-used", "shrinkage": 0.3},
         {"rounds": 100},
     )
     settings = (
@@ -38,7 +38,8 @@ class LogitBoost(Trainer):
 
     def candidates(self, given: Mapping[str, Number]) -> tuple[dict[str, Number], ...]:
         """Return what is compared; given rounds are the paper's recipe, of which nothing else is left open."""
-        return super().candidates({"shrinkage": 1.0, "max_bins": None, **given} if "rounds" in given else given)
+        recipe = {"shrinkage": 1.0, "max_bins": None, "ties": "first"} if "rounds" in given else {}
+        return super().candidates({**recipe, **given})
 
     def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> "Stumps":
         """Return the ensemble. Raises BoostingError for settings that make no sense."""

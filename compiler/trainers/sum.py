@@ -22,6 +22,7 @@ class Sum(Trainer):
     what = "the sum of logitboost and logit"
     rank = 1
     staged = True
+    tried = ({"max_bins": 16, "ties": "least-used"},)
     settings = tuple(_SETTINGS.values())
 
     def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> "ScoreTables":

@@ -125,9 +125,9 @@ def test_a_harness_without_the_kept_switches_is_told_which(thenar: Thenar, set_f
 def test_a_preset_sets_options_and_explicit_ones_win(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
     given = ("compile", set_file, "-o", tmp_path / "build", "--folds", "0", "--no-report")
     for more, expected in (
-        (("--preset", "smallest"), ("elimination", 8, 25, 8)),
+        (("--preset", "smallest"), ("elimination", 8, None, 8)),
         (("--preset", "smallest", "--keep", "3", "--rounds", "5"), ("elimination", 3, 5, 8)),
-        (("--preset", "smallest", "--method", "id3"), ("id3", None, 25, 8)),
+        (("--preset", "smallest", "--method", "id3", "--rounds", "5"), ("id3", None, 5, 8)),
     ):
         assert thenar(*given, *more).returncode == 0
         options = Build.load(tmp_path / "build").manifest.options

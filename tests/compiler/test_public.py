@@ -92,11 +92,11 @@ def test_an_additive_logit_becomes_a_build_of_the_columns_that_it_gets(
 ) -> None:
     s = len(grasp_set.switch_names)
     chosen = ColumnTransformer([("codes", "passthrough", slice(s, None)), ("switches", SelectKBest(k=5), slice(s))])
-    classifier = AdditiveLogitClassifier(penalty=0.5, max_bins=None)
+    classifier = AdditiveLogitClassifier(penalty=0.7, max_bins=None)
     pipeline = make_pipeline(chosen, classifier).fit(X, grasp_set.grasps)
     made = compile(pipeline, grasp_set, tmp_path / "made", folds=2)
     options = made.manifest.options
-    assert (options.trainer, options.max_bins, options.settings) == ("logit", 65536, {"penalty": 0.5, "smoothness": 3})
+    assert (options.trainer, options.max_bins, options.settings) == ("logit", 65536, {"penalty": 0.7, "smoothness": 2})
     assert len(made.manifest.switches) == 5
     found = verify(tmp_path / "made", grasp_set)
     assert found.holds

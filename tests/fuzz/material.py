@@ -5,7 +5,7 @@ from functools import cache
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -96,8 +96,8 @@ def grasp_set() -> GraspSet:
 def build_files(linear: bool = False) -> dict[str, bytes]:
     """Return name -> content of the files that a build of the grasps is loaded from; its joints may be linear."""
     with TemporaryDirectory() as folder:
-        given = {"trainer": "logit", "linear": 1, "penalty": 1.0, "smoothness": 1.0, "max_bins": 8} if linear else {}
-        options = given or {"rounds": 4}
+        logit: dict[str, Any] = {"trainer": "logit", "linear": 1, "penalty": 1.0, "smoothness": 1.0, "max_bins": 8}
+        options = logit if linear else {"rounds": 4}
         compile_build(grasp_set(), Path(folder) / "build", folds=0, harness=harness(), **options)
         return {path.name: path.read_bytes() for path in sorted(Path(folder, "build").iterdir()) if path.is_file()}
 

@@ -66,7 +66,8 @@ def test_lines_are_scikit_learns_answer_on_scaled_codes(seed: int, smoothness: f
     X, labels = grasps(seed)
     X[:, :6] *= 7  # of two values, that need not be 0 and 1
     weights = np.random.default_rng(seed).integers(1, 4, len(X)).astype(float)
-    tables = fit_logit(X, labels, 3, smoothness=smoothness, linear=True, tolerance=1e-10, weights=weights)
+    own: dict[str, Any] = {"penalty": 1.0, "smoothness": smoothness, "linear": True}
+    tables = fit_logit(X, labels, 3, **own, tolerance=1e-10, weights=weights)
     deviation = np.sqrt(np.average((X[:, 6:] - np.average(X[:, 6:], 0, weights)) ** 2, 0, weights))
     pulls = np.r_[BIAS_SHARE, np.ones(6), (BIN_SHARE + smoothness) * deviation**2]
     design = np.column_stack([np.ones(len(X)), X[:, :6] / 7, X[:, 6:] - np.average(X[:, 6:], 0, weights)])

@@ -1,6 +1,7 @@
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -63,7 +64,7 @@ def test_builds_with_linear_joints_are_pythons_too(
 ) -> None:
     for name in TOOLS[kind]:
         tool(name)
-    given = {"penalty": 1.0, "smoothness": 1.0, "max_bins": 8, "linear": 1}
+    given: dict[str, Any] = {"penalty": 1.0, "smoothness": 1.0, "max_bins": 8, "linear": 1}
     made = compile_build(grasp_set, tmp_path / "build", trainer="logit", folds=0, table_bits=table_bits, **given)
     assert made.tables.slopes
     assert verify_firmware(made.folder, grasp_set, (kind,)).holds

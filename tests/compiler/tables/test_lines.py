@@ -89,7 +89,7 @@ def test_the_runtime_adds_up_what_arrays_add_up_and_nothing_of_what_is_lost(seed
     for row in range(len(bits)):
         assert (np.array(scorer.lanes(bits[row], codes[row])) - LANE_OFFSET == scores[row]).all()
         left = np.array(scorer.lanes_without(bits[row], codes[row], np.zeros(4, bool), lost)) - LANE_OFFSET
-        for joint in np.flatnonzero(lost):
+        for joint in np.flatnonzero(lost).tolist():
             mine = integers.joint_rows[joint][np.searchsorted(integers.thresholds[joint], codes[row, joint])].astype(
                 int
             )

@@ -14,7 +14,7 @@ from thenar.compiler.trainers.base import Training
 def test_its_scores_are_the_sums_of_both_scores(grasp_set: GraspSet, max_bins: int | None) -> None:
     samples = Samples.of(grasp_set)
 
-    def scores(trainer: str, **own: float) -> np.ndarray:
+    def scores(trainer: str, **own: float | str) -> np.ndarray:
         options = Options(trainer=trainer, max_bins=max_bins, settings=own)
         model = collapse(Training.of(options).train(samples), samples.n_switches)
         return model.scores(samples.switches, samples.codes)
