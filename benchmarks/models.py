@@ -5,7 +5,9 @@
 
 Folds keep trials apart, or subjects; the switches (the first 33 of ID3, or all where fewer) are placed inside each
 fold, and settings are chosen inside as well. What is answered is kept in --store: a run that is broken off goes on
-where it was, and what is there is printed. `--again MODEL` computes those anew. A set may be a .grasps file.
+where it was. `--again MODEL` computes that model anew, as after a change of code or of a set. A set may be a .grasps
+file. Real recordings are looked for in --data; peers and sets that are missing are named and left out. All of it takes
+hours, `--quick`, two small sets, minutes.
 """
 
 import argparse
@@ -93,13 +95,13 @@ def fill(store: Store, path: Path, work: Cuts, models: Sequence[Model], jobs: in
     ]
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     path.parent.mkdir(parents=True, exist_ok=True)
-    with Progress(*columns, console=Console(stderr=True)) as bar, path.open("ab") as file:
+    with Progress(*columns, console=Console(stderr=True, width=110)) as bar, path.open("ab") as file:
         line = bar.add_task("folds", total=len(tasks))
         for each in in_workers(answered, tasks, jobs):
             file.write(msgspec.json.encode(each) + b"\n")
             file.flush()
             store[each.key] = each
-            bar.update(line, advance=1, description=f"{each.model}, {each.set}")
+            bar.update(line, advance=1, description=f"{each.model}, {Path(each.set).stem}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

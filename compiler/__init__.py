@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from .recordings.graspset import GraspSet, Joint
     from .recordings.merging import merge, split
     from .samples import Samples
-    from .tables.collapse import ScoreTables
+    from .tables.collapse import Line, ScoreTables
     from .trainers.base import TRAINERS, Setting, Trainer
 
 _HOMES = {

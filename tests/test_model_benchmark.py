@@ -53,6 +53,7 @@ def test_our_trainers_their_integers_and_weka_recognise_most_grasps(grasps: Path
         assert integers is None or np.mean(answers == integers) > 0.98, model.name
 
 
+@pytest.mark.slow
 def test_a_second_run_prints_the_same_from_what_the_first_one_stored(grasps: Path, tmp_path: Path) -> None:
     store = tmp_path / "answers.jsonl"
     command = [sys.executable, str(BENCHMARKS / "models.py"), "--sets", str(grasps), "--store", str(store)]

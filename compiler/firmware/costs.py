@@ -1,8 +1,8 @@
 """What a classifier costs: in portable C, which adds words of two sums, by a model that is rough but not too low.
 
-The model is fitted to what qemu counts of code by arm-none-eabi-gcc 12 with -O2, for 3 to 28 classes and 4 to 23
-look-ups: 0 to 22 % above on an M0+, 0 to 17 % on an M4. Entries of 8 bits take longer there than those of 16 bits, for
-they must be taken apart before they are added: 8 bits are for flash. Other compilers and cores differ.
+The model is fitted to what qemu counts of code by arm-none-eabi-gcc 12 with -O2, for 3 to 28 classes and 2 to 23
+look-ups: 3 to 30 % above on an M0+ and on an M4. Entries of 8 bits that are added up in 16 take longer there than those
+of 16 bits, for they must be taken apart before they are added. Other compilers and cores differ.
 """
 
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ class Cost:
 class Core:
     """Instructions of a class, and how many more where classes are added up in parts; of a look-up; in each part of a
     look-up, of a word of two 16-bit entries, and of a word of four 8-bit entries; in update() of a word of two or of
-    four that is replaced; of a word of two sums that a slope adds to.
+    four that is replaced; of a word of two sums that a slope adds to; of a threshold that is compared.
     """
 
     a_class: int
@@ -51,27 +51,27 @@ class Core:
     replaced_pair: int
     replaced_quad: int
     product: int = 2
+    compared: int = 4
 
 
-CORTEX_M4 = Core(a_class=11, in_parts=2, lookup=5, part=3, pair=2, quad=5, replaced_pair=5, replaced_quad=16)
+CORTEX_M4 = Core(a_class=10, in_parts=3, lookup=0, part=0, pair=3, quad=6, replaced_pair=6, replaced_quad=19)
 """What other cores of 32 bits are taken to be like."""
 
 
-_REPLACING = 17  # a row in update(), but for its words
+_FIXED, _REPLACING = 20, 13  # of an answer; of a row in update(), but for its words
 # A joint in a look-up; more than for a code that is looked up directly: a threshold that is compared; a byte clamped
 # below and above, where it can lie there; a code of 16 bits clamped; a code searched, and each step of the search.
-_FOUND, _COMPARED, _BELOW, _ABOVE, _WIDE = 5, 3, 4, 6, 13
-_SEARCHED, _SEARCH_STEP = 6, 14
+_FOUND, _BELOW, _ABOVE, _WIDE = 4, 6, 4, 10
+_SEARCHED, _SEARCH_STEP = 16, 11
 # The distance of a code, and how much more in update(); in each part all but the products; and of each word of sums,
 # at the end and where entries are upper halves.
 _DISTANCE, _MOVED, _MULTIPLYING, _WORD, _HALVES = 14, 5, 17, 2, 8
 
 # Of code; where classes are added up in parts, that takes more.
-_BYTES, _BYTES_PARTS, _BYTES_LOOKUP, _BYTES_CLASS = 150, 250, 18, 13
-_BYTES_WORD, _BYTES_QUAD, _BYTES_START = 6, 16, 40
-_BYTES_UPDATE, _BYTES_UPDATE_PAIR, _BYTES_UPDATE_QUAD = 185, 9, 46
-_BYTES_JOINT, _BYTES_CLAMPED, _BYTES_COMPARED, _BYTES_SEARCHED = 8, 24, 10, 12
-_BYTES_SEARCH = 60
+_BYTES, _BYTES_PARTS, _BYTES_CLASS = 186, 432, 15
+_BYTES_WORD, _BYTES_QUAD, _BYTES_START = 7, 20, 41
+_BYTES_UPDATE, _BYTES_UPDATE_PAIR, _BYTES_UPDATE_QUAD = 172, 11, 40
+_BYTES_JOINT, _BYTES_CLAMPED, _BYTES_COMPARED, _BYTES_SEARCHED = 11, 35, 11, 55
 _BYTES_MULTIPLYING, _BYTES_PRODUCT, _BYTES_DISTANCE = 150, 30, 24
 # Of what replaces missing inputs, beside the table of their means; instructions that take a field of a port's byte, and
 # that see that nothing is missing.
@@ -82,12 +82,12 @@ _STACK = 128
 def word_cost(layout: Layout, core: Core) -> Cost:
     """Return what the portable C takes on a core, roughly."""
     parts, classes = len(layout.parts.firsts), layout.tables.n_classes
-    words, finding = _words(layout), sum(_finding(layout, joint) for joint in layout.joints)
+    words, finding = _words(layout), sum(_finding(layout, joint, core) for joint in layout.joints)
     finding += _MISSING + _FIELD * sum(map(len, layout.fields))
     word, replaced = (core.quad, core.replaced_quad) if layout.biased else (core.pair, core.replaced_pair)
     adding = parts * (core.part + words * word)
     replacing = _REPLACING + parts * words * replaced
-    answering = (core.a_class + (core.in_parts if parts > 1 else 0)) * classes + finding
+    answering = (core.a_class + (core.in_parts if parts > 1 else 0)) * classes + finding + _FIXED
     classify, update = (len(layout.lookups) * (core.lookup + each) + answering for each in (adding, replacing))
     multiplying, slopes = _multiplying(layout, core), len(layout.tables.slopes)
     classify, update = classify + multiplying, update + multiplying + _MOVED * slopes
@@ -111,11 +111,13 @@ def _words(layout: Layout) -> int:
     return -(-layout.parts.width * layout.entry_bits // 32)
 
 
-def _finding(layout: Layout, joint: JointLayout) -> int:
+def _finding(layout: Layout, joint: JointLayout, core: Core) -> int:
     """Return the instructions that a joint takes in finding a row."""
     if joint.compared:
         steps = len(joint.thresholds)
-        return _FOUND + (_COMPARED * steps if steps <= MOST_INLINE else _SEARCHED + _SEARCH_STEP * steps.bit_length())
+        return _FOUND + (
+            core.compared * steps if steps <= MOST_INLINE else _SEARCHED + _SEARCH_STEP * steps.bit_length()
+        )
     if len(joint.bins) == 1 << layout.code_bits:
         return _FOUND
     if layout.code_bits == 16:
@@ -134,9 +136,7 @@ def _flash(layout: Layout) -> int:
     starts = 2 * len(parts.firsts) * (2 * parts.width + 8)  # of the sums, constant and as they are in the beginning
     starts += 2 * layout.tables.n_classes + 4 * lookups  # scores, and rows added, in the beginning
     code = _BYTES + (_BYTES_PARTS if len(parts.firsts) > 1 else 0) + _BYTES_CLASS * parts.width
-    code += (_BYTES_LOOKUP + words * (_BYTES_QUAD if layout.biased else _BYTES_WORD)) * lookups + _BYTES_START * words
-    searched = any(joint.compared and len(joint.thresholds) > MOST_INLINE for joint in layout.joints)
-    code += _BYTES_SEARCH * searched
+    code += words * ((_BYTES_QUAD if layout.biased else _BYTES_WORD) * lookups + _BYTES_START)
     if slopes := len(layout.tables.slopes):
         lanes = -(-parts.width // 2)
         code += _BYTES_MULTIPLYING + _BYTES_PRODUCT * lanes + _BYTES_DISTANCE * slopes

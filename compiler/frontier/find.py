@@ -35,7 +35,7 @@ from .latency import Pace, latencies
 from .measure import TRIAL_S, measured
 from .plots import PICTURES, pictures
 from .points import SCHEMA, Frontier, FrontierError, Mark, Point, Tried, Way, frontier_to_bytes
-from .screen import QUICK_PRICE_S, Screened, screen
+from .screen import OTHER_TRAINERS, QUICK_PRICE_S, Screened, screen, screen_others
 from .search import Candidate, Search, available_inputs, curve_ways, ways
 from .stream import Stream, stream_of
 from .survey import Cuts, Survey, fit_s, path_s, settle_s
@@ -57,6 +57,8 @@ _UNTIMED = (
 # As it turns out: so many placements come on top of the finalists, for the marks; so many designs of a finalist are on
 # a front; so many of the placements that are tried are different ones; so many layouts are simulated besides.
 _MARKED, _DESIGNS, _DIFFERENT, _CHECKED = 3, 2, 0.8, 30
+# So many times as many placements as there are finalists are screened with the other trainers.
+_WIDER = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -266,19 +268,26 @@ def foreseen(survey: Survey) -> dict[str, float]:
     choices = sum(len(ways(name, n_switches)) for name in search.methods) * wired + ("joints" in kinds)
     rivals = sum(len(curve_ways(name, n_switches)) for name in search.rivals)
     trainers = [search.alone(name) for name in search.trainers]
-    settled = [each for each in trainers if len(each.candidates) > 1]
-    last = min(search.finalists + _MARKED, choices * len(trainers))
+    last, again = min(search.finalists + _MARKED, choices), min(_WIDER * search.finalists, choices)
     few = papers_depth(search)
+
+    def settling(some: Sequence[Search], sizes: Sequence[int]) -> float:
+        open_ones = [each for each in some if len(each.candidates) > 1]
+        return len(kinds) * sum(settle_s(each, size) for each in open_ones for size in sizes)
+
+    def screening(some: Sequence[Search]) -> float:
+        return sum(fit_s(each, ((each.screened,), ()), size) for each in some for size in train)
+
     return {
         "placements": sum(path_s(name, n) for name in methods for n in (rows, *train)),
         "rivals": sum(path_s(name, n) for name in search.rivals for n in train) if wired else 0.0,
-        "screening": _DIFFERENT
-        * choices
-        * sum(fit_s(each, ((each.screened,), ()), n) for each in trainers for n in train)
-        + rivals * sum(fit_s(search, ((search.screened,), ()), n) for n in train),
-        "settings": len(kinds) * sum(settle_s(each, n) for each in settled for n in (rows, *train)),
-        "finalists' settings": len(kinds) * sum(settle_s(each, n) for each in settled for n in more),
-        "times": _DIFFERENT * choices * len(trainers) * QUICK_PRICE_S,
+        "settings": settling(trainers[:1], (rows, *train)),
+        f"settings{OTHER_TRAINERS}": settling(trainers[1:], (rows, *train)),
+        "finalists' settings": settling(trainers, more),
+        "screening": (_DIFFERENT * choices + rivals) * screening(trainers[:1]),
+        f"screening{OTHER_TRAINERS}": again * screening(trainers[1:]),
+        "times": _DIFFERENT * choices * QUICK_PRICE_S,
+        f"times{OTHER_TRAINERS}": again * len(trainers[1:]) * QUICK_PRICE_S,
         "finalists' placements": sum(path_s(name, n) for name in methods for n in more),
         "finalists": last * sum(fit_s(search, (search.stages, search.tabled), n) for n in train),
         OTHERS: last * sum(fit_s(few, (few.stages, few.tabled), n) for n in more),
@@ -297,6 +306,7 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
             f"no placement that was tried can be built for {survey.equipment.model.target}: name other --methods or "
             "another --target"
         )
+    screened += screen_others(survey, finalists(screened, (), _WIDER * search.finalists))
     named = choices_to_mark(n_switches, survey.n_joints, search.trainers[0])
     closes = look_closely(survey, finalists(screened, list(named), search.finalists))
     every = [design for close in closes for design in designs(close, survey.equipment.joints)]

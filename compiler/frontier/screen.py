@@ -1,7 +1,7 @@
 """Screening: every placement at one number of rounds on the folds of one repeat, and in the fastest of its wirings."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from ..placement.methods.base import METHODS
 from ..samples import Columns
@@ -12,7 +12,9 @@ from .survey import Judged, Survey
 
 # How long a frame takes hardly depends on how many rounds and rows there were: tables of few tell it.
 _TABLED = Tabled(12, Shape(16))
-QUICK_PRICE_S = 0.5
+QUICK_PRICE_S = 0.3
+# What stages of trainers but the first are called besides.
+OTHER_TRAINERS = ", other trainers"
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,53 +33,56 @@ class Screened:
 
 
 def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
-    """Return how well and how fast every choice is that may be built, and everybody's curves, rivals' included."""
+    """Return how well and how fast every choice is that may be built, with the first trainer; and everybody's curves,
+    rivals' included.
+    """
     search, cuts, n_switches = survey.search, survey.cuts, len(survey.switch_names)
-    inputs = available_inputs(n_switches, survey.n_joints)
+    inputs, first = available_inputs(n_switches, survey.n_joints), search.trainers[0]
     every = [way for name in search.methods for way in ways(name, n_switches)]
     choices = [
-        Candidate(way, kind, trainer)
-        for trainer in search.trainers
-        for kind in inputs
-        for way in (every if kind != "joints" else (NO_SWITCHES,))
+        Candidate(way, kind, first) for kind in inputs for way in (every if kind != "joints" else (NO_SWITCHES,))
     ]
-    first = search.trainers[0]
     rivals = [Candidate(way, "switches", first) for name in search.rivals for way in curve_ways(name, n_switches)]
     survey.choose("placements", choices, (cuts.everything, *cuts.screening))
     # A placement that keeps nothing is none.
     choices = [one for one in choices if one.way == NO_SWITCHES or survey.columns(one, cuts.everything)]
     survey.choose("rivals", rivals, cuts.screening)
-    survey.settle("settings", survey.typical(choices), (cuts.everything, *cuts.screening))
-    shown = [*choices, *rivals]
-    fits = survey.fit("screening", shown, cuts.screening, lambda one: ((search.alone(one.trainer).screened,), ()))
-    rates = {}
-    for choice in shown:
-        rates[choice] = cuts.judged(cuts.by, {fold: fits[choice, fold].stages[-1] for fold in cuts.screening})
-    frames = _frames_us(survey, choices)
-    screened = tuple(
-        Screened(choice, survey.columns(choice, cuts.everything), rate, frames[choice])
-        for choice, rate in rates.items()
-        if choice in frames
-    )
+    rates = _rates(survey, "", [*choices, *rivals])
     names = dict.fromkeys([*search.methods, *search.rivals])
-    curves = {choice: rate for choice, rate in rates.items() if choice.trainer == first}
-    return screened, tuple(_curve(survey, name, curves) for name in names if "switches" in inputs)
+    curves = tuple(_curve(survey, name, rates) for name in names if "switches" in inputs)
+    return _screened(survey, "", choices, rates), curves
 
 
-def _frames_us(survey: Survey, choices: Sequence[Candidate]) -> dict[Candidate, float]:
-    """Return the frame times of the choices that can be built."""
+def screen_others(survey: Survey, worth: Sequence[Screened]) -> tuple[Screened, ...]:
+    """Return how well and how fast those are that are `worth` it, with each of the other trainers."""
+    choices = [replace(one.choice, trainer=name) for name in survey.search.trainers[1:] for one in worth]
+    return _screened(survey, OTHER_TRAINERS, choices, _rates(survey, OTHER_TRAINERS, choices)) if choices else ()
+
+
+def _rates(survey: Survey, stage: str, choices: Sequence[Candidate]) -> dict[Candidate, Judged]:
+    search, cuts = survey.search, survey.cuts
+    survey.settle(f"settings{stage}", survey.typical(choices), (cuts.everything, *cuts.screening))
+    rounds = {name: search.alone(name).screened for name in search.trainers}
+    fits = survey.fit(f"screening{stage}", choices, cuts.screening, lambda one: ((rounds[one.trainer],), ()))
+    return {one: cuts.judged(cuts.by, {fold: fits[one, fold].stages[-1] for fold in cuts.screening}) for one in choices}
+
+
+def _screened(
+    survey: Survey, stage: str, choices: Sequence[Candidate], rates: Mapping[Candidate, Judged]
+) -> tuple[Screened, ...]:
+    """Return the choices that can be built."""
     calls = []
     for choice in choices:
         columns = survey.columns(choice, survey.cuts.everything)
         names = tuple(survey.switch_names[column] for column in columns)
         some, training = survey.inputs(choice.joints, few=True), survey.training(choice)
         calls.append(price.call(QUICK_PRICE_S, some, names, columns, (_TABLED,), training, survey.equipment, None))
-    found = {}
-    for choice, (priced,) in zip(choices, survey.cache.ask("times", calls), strict=True):
+    found = []
+    for choice, (priced,) in zip(choices, survey.cache.ask(f"times{stage}", calls), strict=True):
         us = priced.fastest_us(survey.equipment.joints.us if choice.joints else 0.0)
         if us is not None and (priced.wired or choice.way == NO_SWITCHES):
-            found[choice] = us
-    return found
+            found.append(Screened(choice, survey.columns(choice, survey.cuts.everything), rates[choice], us))
+    return tuple(found)
 
 
 def _curve(survey: Survey, name: str, rates: dict[Candidate, Judged]) -> Curve:

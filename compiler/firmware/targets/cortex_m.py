@@ -148,7 +148,16 @@ MEMBER = (
         ram=16 << 10,
         clock_hz=48_000_000,
         core=Core(
-            a_class=13, in_parts=10, lookup=10, part=0, pair=3, quad=11, replaced_pair=7, replaced_quad=20, product=5
+            a_class=10,
+            in_parts=14,
+            lookup=2,
+            part=0,
+            pair=4,
+            quad=11,
+            replaced_pair=7,
+            replaced_quad=21,
+            product=5,
+            compared=6,
         ),
         flags=("-mcpu=cortex-m0plus", "-mthumb", "-O2", "-ffreestanding"),
         machine=Machine("microbit", 256 << 10, 16 << 10, 16_000_000),

@@ -48,6 +48,8 @@ def asked(folder: Path, grasp_set: GraspSet, **changes: Any) -> Request:
         "rounds": 6,
         "trainer": "logitboost",
     }
+    # Nothing is left to choose: no code has so many bins.
+    search["settings"] = {"shrinkage": 1.0, "max_bins": 65536}
     search |= {"repeats": 1, "finalists": 2, "seed": 1, "by": None}
     search |= {name: changes.pop(name) for name in list(changes) if name in search}
     return {"grasp_set": grasp_set, "output": folder / "out", "search": Search(**search), "jobs": 1} | changes
@@ -341,14 +343,17 @@ def _timeless(found: Frontier) -> tuple[object, ...]:
 def test_every_trainer_is_on_one_picture_and_what_compile_makes_of_a_point_is_what_the_point_says(
     tmp_path: Path, make_set: Make
 ) -> None:
-    request = asked(tmp_path, make_set(subjects=2), methods=("id3",), rivals=(), trainer="auto")
+    request = asked(tmp_path, make_set(subjects=2), methods=("id3",), rivals=(), trainer="auto", settings={})
     found = found_of(request)
     assert set(found.trainers) == {name for name, trainer in TRAINERS.items() if trainer.tried}
     drawn = (tmp_path / "out" / "frontier.svg").read_text()
     # Outlines: but each trainer has a line in the key, and the file another size than with one trainer.
     assert drawn != pictures(replace(found, tried=found.tried[:1]), "svg")["frontier"].decode()
     tried = {name: {(one.way, one.inputs) for one in found.tried if one.trainer == name} for name in found.trainers}
-    assert tried["logit"] == tried["logitboost"]
+    assert tried["logit"] <= tried["logitboost"]
+    # What is near the front with one trainer is tried with all.
+    best = max((one for one in found.tried if one.trainer == "logitboost"), key=lambda one: one.rate.mean)
+    assert (best.way, best.inputs) in tried["logit"]
     path = tmp_path / "out" / "frontier.json"
     for name in found.trainers:
         points = [point for point in found.points if point.setting.trainer == name]
@@ -366,7 +371,9 @@ def test_every_trainer_is_on_one_picture_and_what_compile_makes_of_a_point_is_wh
 
 
 def test_a_trainer_may_be_forced(tmp_path: Path, make_set: Make) -> None:
-    found = found_of(asked(tmp_path, make_set(), methods=("id3",), rivals=(), trainer="logit"))
+    found = found_of(
+        asked(tmp_path, make_set(), methods=("id3",), rivals=(), trainer="logit", settings={"penalty": 1.0})
+    )
     assert found.trainers == ("logit",)
     assert {point.setting.trainer for point in found.points} == {"logit"}
 
