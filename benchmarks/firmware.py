@@ -1,151 +1,193 @@
-"""What recognising costs a microcontroller: cycles, flash and RAM of thenar's firmware beside those of its peers.
+"""What recognising costs a microcontroller, thenar's firmware and its peers, from a frame's raw bytes to the grasp.
 
-    python benchmarks/firmware.py
+    python benchmarks/firmware.py [--quick]
 
-One run, one set of rows, the same folds: 33 switches and 16 joints (a byte each) of the simulated scene kamakura, 14
-grasp types, 100 rounds. Cycles are counted by libsimavr over the test rows of the first fold and, of thenar, its worst
-frame; instructions of a Cortex-M by qemu. Flash and RAM are the whole program's.
-Peers that are not installed (`make bench` installs them: emlearn, m2cgen, xgboost) are left out.
+33 switches and 16 joints (a byte each) of the simulated scene kamakura, 14 grasp types. Switches are placed and models
+trained on the training rows of each fold; accuracy is that of the deployed integers, in four folds and with each
+subject left out. Cycles are counted by libsimavr over the test rows of the first fold, the middle and the most, of
+thenar its worst frame included. Flash and RAM are the whole program's. A row is on the front where none is as good in
+both accuracies, the most cycles and flash, and better in one. Peers that are not installed are left out (`make bench`
+installs them), and those that do not fit an ATmega328P have no place on it.
 """
 
 import argparse
 import sys
-from collections.abc import Iterator
-from itertools import chain
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
 
 import numpy as np
-from firmwarecosts import Cost, Limits, instructions, of_ours, of_peer
-from firmwaredata import (
-    JOINTS,
-    ROUNDS,
-    SWITCHES,
-    Fold,
-    boosted,
-    folds,
-    material,
-    rates,
-    scores,
-    split,
-    tables,
-    two_changed,
-)
-from firmwarepeers import Peer, available, emlearn_forest, forest, m2cgen_stumps, plain_table, scaled
+from firmwarecosts import Cost, instructions, of_ours, of_peer
+from firmwaredata import CUTS, JOINTS, PORTS, SWITCHES, Answers, Fold, folds, rates, raw, split, two_changed
+from firmwarepeers import peers
+from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from thenar.compiler import TRAINERS
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.avr_costs import worst_frame
 from thenar.compiler.firmware.choose import choose
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS
+from thenar.compiler.tables.collapse import Model, collapse
+from thenar.compiler.tables.quantise import quantise
 from thenar.runtime.tables import IntegerTables
 
-# Trees and leaves of the forests tried: the one that recognises best among those that fit the part is the peer.
-FORESTS = ((10, 40), (10, 80), (15, 60), (20, 30), (20, 40), (20, 60), (30, 30), (30, 40), (40, 20), (60, 14))
 AVR, LARGER = TARGETS["avr328p"], TARGETS["avr2560"]
 CORES = (TARGETS["cortex-m0plus"], TARGETS["cortex-m4"])
-# Rows in which two switches change; rows that the slowest peer answers.
-CHANGES, PEER_ROWS = 500, 20
-CONSOLE = Console(width=160)
-COLUMNS = (
-    "",
-    "recognition, %",
-    "cycles (most)",
-    "flash",
-    "RAM + stack",
-    "answers differ",
-    "part",
-    "asked: cycles, flash, RAM",
+CHANGES, SLOW_ROWS = 500, 20  # rows in which two switches change; rows that a peer on the larger part answers
+CONSOLE = Console(width=170)
+COLUMNS = ("", *(f"{cut}, %" for cut in CUTS), "cycles (most)", "flash", "RAM + stack", "answers differ", "front")
+
+
+@dataclass(frozen=True)
+class Ours:
+    """Tables of a trainer with `settings`, in entries of so many bits; without joints where they are left out."""
+
+    trainer: str
+    bits: int
+    settings: tuple[tuple[str, Any], ...] = ()
+    joints: bool = True
+
+    @property
+    def name(self) -> str:
+        """What the table calls it."""
+        return f"thenar, {self.trainer}, {self.bits} bit" + ("" if self.joints else ", switches alone")
+
+    def integers(self, fold: Fold) -> IntegerTables:
+        """Return the integer tables of a fold."""
+        samples = fold.samples(joints=self.joints)
+        tables = collapse(_trained(self.trainer, self.settings, fold, self.joints), SWITCHES)
+        return quantise(tables, samples.switches, samples.codes, entry_bits=self.bits)
+
+    def answers(self, fold: Fold) -> Answers:
+        """Return what answers rows as the firmware of a fold does."""
+        layout = choose(self.integers(fold), AVR, entry_bits=self.bits).frontier[-1][0]
+        return lambda rows: layout.scores(*split(rows, joints=self.joints)).argmax(axis=1)
+
+
+BINS = ("max_bins", 8)
+OURS = (
+    Ours("logitboost", 16, (("rounds", 100), BINS)),
+    Ours("logitboost", 8, (("rounds", 100), BINS)),
+    Ours("logit", 16, (BINS,)),
+    Ours("logit", 8, (BINS,)),
+    Ours("logitboost", 8, (("rounds", 100), BINS), joints=False),
+    Ours("logit", 8, (BINS,), joints=False),
 )
 
-Line = tuple[str, ...]
+
+@cache
+def _trained(trainer: str, settings: tuple[tuple[str, Any], ...], fold: Fold, joints: bool) -> Model:
+    member = TRAINERS.named(trainer)
+    return member.train(fold.samples(joints=joints), member.candidates(dict(settings))[0] | dict(settings))
 
 
-def forests(cut: list[Fold]) -> Iterator[tuple[float, Peer, Cost]]:
-    """Yield, of emlearn's forests that fit the ATmega328P, recognition rate, C of the first fold, and cost."""
-    for trees, leaves in track(FORESTS, "forests", console=CONSOLE):
-        made = [forest(fold.X, fold.y, trees, leaves) for fold in cut]
-        peer = emlearn_forest(made[0], cut[0].asked, f"emlearn, forest of {trees}, at most {leaves} leaves")
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A row of the table: `rival` where it has a place among those that are compared."""
+
+    name: str
+    rates: tuple[float, ...]
+    cost: Cost
+    rival: bool = field(default=True)
+
+    def beats(self, other: "Line") -> bool:
+        """Whether it is nowhere worse than the other, and somewhere better."""
+        mine = (*(-rate for rate in self.rates), self.cost.most, self.cost.flash)
+        theirs = (*(-rate for rate in other.rates), other.cost.most, other.cost.flash)
+        return all(one <= two for one, two in zip(mine, theirs, strict=True)) and mine != theirs
+
+
+def _asked(layout: Layout, fold: Fold, *, joints: bool) -> tuple[NDArray[np.bool_], NDArray[np.uint16]]:
+    """Return the test rows, and the worst frame."""
+    (bits, codes), worst = split(fold.asked, joints=joints), worst_frame(layout)
+    return np.vstack([bits, worst[0]]), np.vstack([codes, worst[1]])
+
+
+def ours(cuts: Mapping[str, list[Fold]], what: Ours) -> Iterator[Line]:
+    """Yield the layouts of the first fold than which none is both faster and smaller."""
+    fold = cuts[CUTS[0]][0]
+    found = rates(cuts, what.answers)
+    for layout, _ in choose(what.integers(fold), AVR, entry_bits=what.bits).frontier:
+        size = max(map(len, layout.groups), default=0)
+        name = f"{what.name}: {layout.adding}, {layout.bins if what.joints else 'no codes'}, up to {size} switches"
+        frames = _asked(layout, fold, joints=what.joints)
+        yield Line(name, found, of_ours(layout, AVR, layout.frame_bytes(*frames), layout.scores(*frames)))
+
+
+def theirs(cuts: Mapping[str, list[Fold]]) -> Iterator[Line]:
+    """Yield the peers that are installed, those that do not fit the smaller part on the larger one."""
+    fold = cuts[CUTS[0]][0]
+    for peer in track([peer for peer in peers() if peer.available], "peers", console=CONSOLE):
+        found = rates(cuts, peer.answers_of)
+        model = peer.train(fold)
+        expected, files = peer.answers(model)(fold.asked), peer.files(model)
+        rows = raw(fold.asked)
         try:
-            cost = of_peer(peer, AVR)
-        except FirmwareError:
-            continue
-        answers = (model.predict(scaled(fold.asked)) == fold.truth for model, fold in zip(made, cut, strict=True))
-        right = sum(map(np.count_nonzero, answers))
-        yield 100 * right / sum(len(fold.truth) for fold in cut), peer, cost
+            yield Line(peer.name, found, of_peer(peer.name, files, rows, expected, AVR, peer.include))
+        except FirmwareError as lack:
+            CONSOLE.print(f"{lack}"[:200], markup=False)
+            some = slice(SLOW_ROWS)
+            try:
+                cost = of_peer(peer.name, files, rows[some], expected[some], LARGER, peer.include)
+            except FirmwareError as also:
+                CONSOLE.print(f"{also}"[:200], markup=False)
+            else:
+                yield Line(f"{peer.name} ({LARGER.part})", found, cost, rival=False)
 
 
-def peers(cut: list[Fold], found: dict[str, float]) -> Iterator[Line]:
-    """Yield the lines of the peers that are installed."""
-    fold = cut[0]
-    if available("m2cgen", "xgboost"):
-        peer = m2cgen_stumps(fold.X, fold.y, fold.asked[:PEER_ROWS], ROUNDS)
-        yield peer.name, "", *of_peer(peer, LARGER).cells, ""
-    wide = tables(boosted(fold), fold, 16)
-    plain = plain_table(wide, fold.asked, scores(wide, fold.asked).argmax(axis=1))
-    yield plain.name, f"{found['16']:.2f}", *of_peer(plain, AVR).cells, ""
-    if available("emlearn"):
-        rate, peer, cost = max(forests(cut), key=lambda forest: forest[0])
-        yield peer.name, f"{rate:.2f}", *cost.cells, ""
+def table(title: str, lines: Sequence[Line], shown: Callable[[Line], bool]) -> Table:
+    """Return the lines that are `shown` as a table, the front marked."""
+    made = Table(title=title, title_justify="left")
+    for column in COLUMNS:
+        made.add_column(column, justify="right" if column else "left")
+    for line in lines:
+        if shown(line):
+            mark = "*" if line.rival and _on_front(line, lines) else ""
+            made.add_row(line.name, *(f"{rate:.2f}" for rate in line.rates), *line.cost.cells, mark)
+    return made
 
 
-def fastest(integers: IntegerTables, fold: Fold, limits: Limits, entry_bits: int) -> tuple[Layout, Cost]:
-    """Return the fastest layout that keeps within flash and RAM when it is linked, and what it costs, its worst frame
-    included. Raises FirmwareError if none does.
-    """
-    for layout, _ in choose(integers, AVR, entry_bits=entry_bits).frontier:
-        bits, codes = split(fold.asked, joints=integers.n_joints > 0)
-        worst = worst_frame(layout)
-        bits, codes = np.vstack([bits, worst[0]]), np.vstack([codes, worst[1]])
-        cost = of_ours(layout, AVR, layout.frame_bytes(bits, codes), layout.scores(bits, codes))
-        if cost.flash <= limits.flash and cost.ram + cost.stack <= limits.ram:
-            return layout, cost
-    raise FirmwareError(
-        f"no layout of {entry_bits} bits keeps within {limits.flash} bytes of flash and {limits.ram} of RAM"
-    )
+def _on_front(line: Line, lines: Sequence[Line]) -> bool:
+    return not any(other.beats(line) for other in lines if other.rival)
 
 
-def ours(cut: list[Fold], found: dict[str, float]) -> Iterator[Line]:
-    """Yield the lines of thenar's classifiers of the first fold."""
-    fold = cut[0]
-    both, alone = boosted(fold), boosted(fold, joints=False)
-    for name, key, stumps, entry_bits, joints, limits in (
-        ("switches + joints, 16 bit", "16", both, 16, True, Limits(4500, 16_000, 100)),
-        ("switches + joints, 8 bit", "8", both, 8, True, Limits(2500, 9_000, 100)),
-        ("switches only, 16 bit", "switches", alone, 16, False, Limits(1700, 5_000, 80)),
-    ):
-        integers = tables(stumps, fold, entry_bits, joints=joints)
-        layout, cost = fastest(integers, fold, limits, entry_bits)
-        yield f"thenar, {name}", f"{found[key]:.2f}", *cost.cells, limits.verdict(cost)
-        changed = split(two_changed(fold, CHANGES, joints=joints), joints=joints)
-        cost = of_ours(layout, AVR, layout.frame_bytes(*changed), layout.scores(*changed), changes=True)
-        yield "  two switches changed", "", *cost.cells, Limits(900).verdict(cost)
-        for core in CORES if joints else ():
-            chosen = choose(integers, core).layout
-            bits, codes = split(fold.asked)
-            most = instructions(chosen, core, chosen.frame_bytes(bits, codes), chosen.scores(bits, codes))
-            asked = f"1,000: {'kept' if most <= 1000 else 'NOT KEPT'}"
-            name = f"  the same tables, {chosen.entry_bits}-bit entries"
-            yield name, "", f"{most:,} instructions", "", "", f"0 of {len(bits)}", core.part, asked
+def print_changes(cuts: Mapping[str, list[Fold]], what: Ours) -> None:
+    """Print what update() takes where two switches have changed, and what the tables take on cores of 32 bits."""
+    fold = cuts[CUTS[0]][0]
+    integers = what.integers(fold)
+    layout = choose(integers, AVR, entry_bits=what.bits).layout
+    changed = split(two_changed(fold, CHANGES, joints=what.joints), joints=what.joints)
+    cost = of_ours(layout, AVR, layout.frame_bytes(*changed), layout.scores(*changed), changes=True)
+    CONSOLE.print(f"{what.name}, two switches changed: {' | '.join(cost.cells)}")
+    frames = split(fold.asked, joints=what.joints)
+    for core in CORES:
+        chosen = choose(integers, core).layout
+        most = instructions(chosen, core, chosen.frame_bytes(*frames), chosen.scores(*frames))
+        CONSOLE.print(f"{what.name}, {core.title}: at most {most:,} instructions")
 
 
 def main() -> None:
-    """Print the table."""
-    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
-    title = f"{SWITCHES} switches + {JOINTS} joints, 14 grasp types, {ROUNDS} rounds"
-    table = Table(title=title, title_justify="left")
-    for column in COLUMNS:
-        table.add_column(column, justify="right" if column else "left")
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="only thenar's")
+    asked = parser.parse_args()
     try:
-        cut = folds(*material())
-        found = rates(cut, CONSOLE)
-        for line in chain(peers(cut, found), ours(cut, found)):
-            table.add_row(*line)
+        cuts = folds(CONSOLE)
+        lines = [line for what in track(OURS, "thenar", console=CONSOLE) for line in ours(cuts, what)]
+        lines += [] if asked.quick else theirs(cuts)
     except FirmwareError as lack:
         sys.exit(f"benchmarks/firmware.py: {lack}")
-    CONSOLE.print(table)
-    CONSOLE.print(f"recognition of the same stumps in floating point: {found['float']:.2f} %")
+    lines.sort(key=lambda line: (line.cost.part != AVR.part, line.cost.most))
+    title = f"{SWITCHES} switches in {PORTS} bytes + {JOINTS} joints, 14 grasp types, {AVR.part}, -Os, filling included"
+    CONSOLE.print(table(title, lines, lambda line: True))
+    CONSOLE.print(table("The front", lines, lambda line: line.rival and _on_front(line, lines)))
+    for what in OURS:
+        print_changes(cuts, what)
 
 
 if __name__ == "__main__":

@@ -1,11 +1,12 @@
-"""What a classifier takes of an AVR: compiled, linked, and run frame by frame in libsimavr."""
+"""What a classifier takes of an AVR, from the raw bytes of a frame to the grasp: compiled, linked, and run frame by
+frame in libsimavr.
+"""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from firmwarepeers import Peer
 from numpy.typing import NDArray
 
 from thenar.compiler.firmware import FirmwareError
@@ -17,9 +18,8 @@ from thenar.compiler.firmware.tools import AVR_COMPILER, call, find, workshop
 from thenar.compiler.firmware.words import numbered
 
 # As thenar's Makefiles compile: what is not called is not linked.
-_HOW = ("-Os", "-std=gnu99", "-w", "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections")
+_HOW = ("-Os", "-w", "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections")
 Frames = NDArray[np.uint8]
-Scores = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,36 +46,25 @@ class Cost:
             f"{self.flash:,}",
             f"{self.ram} + {self.stack}",
             f"{self.differing} of {self.rows}",
-            self.part,
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """What is asked of a classifier: cycles of its slowest frame, bytes of flash, of RAM with stack."""
-
-    cycles: int
-    flash: int = 1 << 20
-    ram: int = 1 << 20
-
-    def verdict(self, cost: Cost) -> str:
-        """Return what is asked, and whether it is kept."""
-        kept = cost.most <= self.cycles and cost.flash <= self.flash and cost.ram + cost.stack <= self.ram
-        asked = [f"{limit:,}" for limit in (self.cycles, self.flash, self.ram) if limit < 1 << 20]
-        return f"{', '.join(asked)}: {'kept' if kept else 'NOT KEPT'}"
-
-
-def _linked(folder: Path, sources: Mapping[str, str], part: str) -> tuple[int, int]:
+def _linked(folder: Path, sources: Mapping[str, str], part: str, include: Sequence[str] = ()) -> tuple[int, int]:
     """Link `program.elf` of the sources in the folder; return bytes of flash and RAM. Peers' warnings are theirs."""
-    code = sorted(path for path in sources if path.endswith((".c", ".S")))
-    call([find(AVR_COMPILER), f"-mmcu={part}", *_HOW, *code, "-lm", "-o", "program.elf"], folder)
+    code = sorted(path for path in sources if path.endswith((".c", ".cpp", ".S")))
+    paths = [f"-I{path}" for path in include]
+    call([find(AVR_COMPILER), f"-mmcu={part}", *_HOW, *paths, *code, "-lm", "-o", "program.elf"], folder)
     text, data, bss = call(["avr-size", "program.elf"], folder).decode().splitlines()[1].split()[:3]
     return int(text) + int(data), int(data) + int(bss)
 
 
-def of_ours(layout: Layout, target: Target, frames: Frames, expected: Scores, *, changes: bool = False) -> Cost:
+def of_ours(
+    layout: Layout, target: Target, frames: Frames, expected: NDArray[np.int64], *, changes: bool = False
+) -> Cost:
     """Return what thenar's classifier takes for frames whose scores (n, K) are known; with `changes`, update()'s cost
     for every frame but the first, which has nothing to start from.
+
+    The bytes of a frame are read where they come to lie, in its input: there is nothing to fill in.
     """
     files = classifier_files("glove", numbered(layout.tables), layout, avr=True)
     called = ("classify", "update") if changes else ("classify",)
@@ -92,26 +81,36 @@ def of_ours(layout: Layout, target: Target, frames: Frames, expected: Scores, *,
     return Cost(target.part, int(np.median(cycles)), most, flash, ram, answers.stack, differing, len(frames))
 
 
-def of_peer(peer: Peer, target: Target) -> Cost:
-    """Return what a peer's classifier takes. Raises FirmwareError if it does not fit."""
-    program = {"peer.c": peer.source, "main.c": "int predict(void);\nint main(void) { for (;;) predict(); }\n"}
+def of_peer(
+    name: str,
+    files: Mapping[str, str],
+    frames: Frames,
+    expected: NDArray[np.intp],
+    target: Target,
+    include: Sequence[str] = (),
+) -> Cost:
+    """Return what a peer's classifier takes of raw frames, of which its Python gives `expected`, filling included.
+
+    Raises FirmwareError if it does not fit.
+    """
+    program = {**files, "main.c": "int predict(void);\nint main(void) { for (;;) predict(); }\n"}
     with workshop(program) as folder:
-        flash, ram = _linked(folder, program, target.part)
-        if flash > target.flash:
-            raise FirmwareError(f"{peer.name} takes {flash} bytes of flash, {target.part} has {target.flash}")
+        flash, ram = _linked(folder, program, target.part, include)
+        if flash > target.flash or ram > target.ram:
+            raise FirmwareError(f"{name} takes {flash} bytes of flash and {ram} of RAM: not on an {target.part}")
         words = [line.split() for line in call(["avr-nm", "-P", "program.elf"], folder).decode().splitlines()]
         at = {word[0]: f"0x{word[2]}" for word in words if len(word) > 2}
-        places = [at["predict"], at["_end"], f"{at['input']}:{peer.features.shape[1]}", f"{at['input']}:1"]
+        places = [at["predict"], at["_end"], f"{at['input']}:{frames.shape[1]}", f"{at['input']}:1"]
         command = [str(harness("simavr_classify")), target.part, str(target.clock_hz), "program.elf", *places]
-        told = call(command, folder, peer.features.tobytes())
+        told = call(command, folder, frames.tobytes())
     record = np.dtype([("echo", "u1"), ("grasp", "<u2"), ("cycles", "<u4"), ("stack", "<u2")])
     found = np.frombuffer(told, record)
-    differing = int(np.count_nonzero(found["grasp"] != peer.expected))
+    differing = int(np.count_nonzero(found["grasp"] != expected))
     middle, most, stack = int(np.median(found["cycles"])), int(found["cycles"].max()), int(found["stack"].max())
     return Cost(target.part, middle, most, flash, ram, stack, differing, len(found))
 
 
-def instructions(layout: Layout, core: Target, frames: Frames, expected: Scores) -> int:
+def instructions(layout: Layout, core: Target, frames: Frames, expected: NDArray[np.int64]) -> int:
     """Return the most instructions that a frame takes on a Cortex-M. Raises FirmwareError if any score is wrong."""
     files = classifier_files("glove", numbered(layout.tables), layout, avr=False)
     answers = core.run(files, "glove", layout, frames)

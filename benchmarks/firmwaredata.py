@@ -1,28 +1,29 @@
-"""The rows on which firmware is measured: 33 switches and 16 joints of simulated grasps, a byte each; folds, tables."""
+"""The rows on which firmware is measured: 33 switches and 16 joints of simulated grasps, as bytes; folds and rates.
 
+Switches are placed on the training rows of each fold: nothing of a row that is asked was seen before.
+"""
+
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import track
-from sklearn.model_selection import StratifiedKFold
+from sklearn.model_selection import LeaveOneGroupOut, StratifiedKFold
 
-from thenar.compiler.boosting.boost import boost
-from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.placement.id3 import grow_id3
-from thenar.compiler.tables.collapse import collapse
-from thenar.compiler.tables.quantise import quantise
-from thenar.runtime.tables import IntegerTables
+from thenar.compiler.samples import Samples
 from thenar.simulator.running.simulation import simulate
 from thenar.simulator.scenes.decode import load_scene
 
-SWITCHES, JOINTS, ROUNDS, FOLDS, SEED = 33, 16, 100, 4, 1
-# Bins a joint: with more, recognition is the same, and tables are larger.
-MAX_BINS = 8
+SWITCHES, JOINTS, FOLDS, SEED = 33, 16, 4, 1
+PORTS = -(-SWITCHES // 8)
+CUTS = ("four-fold", "subject left out")
 
 Rows = NDArray[np.uint8]
 Labels = NDArray[np.intp]
+Answers = Callable[[Rows], Labels]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,25 +34,32 @@ class Fold:
     y: Labels
     asked: Rows
     truth: Labels
+    grasps: tuple[str, ...] = ()
+
+    def samples(self, *, joints: bool) -> Samples:
+        """Return the training rows for a trainer."""
+        return Samples(*split(self.X, joints=joints), self.y, self.grasps)
 
 
-def material() -> tuple[Rows, Labels]:
-    """Return the rows (n, 49) and their labels.
+def folds(console: Console) -> Mapping[str, list[Fold]]:
+    """Return the folds of each of CUTS, the same for everybody.
 
     Joint codes of half a degree become bytes of one degree: what a glove of 8 bits sends.
     """
     grasp_set = simulate(load_scene("kamakura")).grasp_set
-    labels = np.unique(grasp_set.labels, return_inverse=True)[1]
-    kept = grow_id3(grasp_set.switches, labels).inputs[:SWITCHES]
+    grasps, y = np.unique(grasp_set.labels, return_inverse=True)
     codes = grasp_set.codes[:, :JOINTS].astype(np.int64)
-    degrees = np.clip((codes - codes.min()) // 2 + 1, 1, 255)
-    return np.hstack([grasp_set.switches[:, list(kept)], degrees]).astype(np.uint8), labels
-
-
-def folds(X: Rows, y: Labels) -> list[Fold]:
-    """Return the stratified folds, the same for everybody."""
-    cut = StratifiedKFold(FOLDS, shuffle=True, random_state=SEED).split(X, y)
-    return [Fold(X[train], y[train], X[test], y[test]) for train, test in cut]
+    degrees = np.clip((codes - codes.min()) // 2 + 1, 1, 255).astype(np.uint8)
+    stratified = StratifiedKFold(FOLDS, shuffle=True, random_state=SEED).split(degrees, y)
+    cuts = zip(CUTS, (stratified, LeaveOneGroupOut().split(degrees, y, grasp_set.subjects)), strict=True)
+    found: dict[str, list[Fold]] = {}
+    for cut, parts in cuts:
+        found[cut] = []
+        for train, test in track(list(parts), f"placement, {cut}", console=console):
+            kept = list(grow_id3(grasp_set.switches[train], y[train]).inputs[:SWITCHES])
+            rows = np.hstack([grasp_set.switches[:, kept], degrees]).astype(np.uint8)
+            found[cut].append(Fold(rows[train], y[train], rows[test], y[test], tuple(map(str, grasps))))
+    return found
 
 
 def split(X: Rows, *, joints: bool = True) -> tuple[NDArray[np.bool_], NDArray[np.uint16]]:
@@ -59,43 +67,18 @@ def split(X: Rows, *, joints: bool = True) -> tuple[NDArray[np.bool_], NDArray[n
     return X[:, :SWITCHES].astype(bool), X[:, SWITCHES : SWITCHES + JOINTS * joints].astype(np.uint16)
 
 
-def boosted(fold: Fold, *, joints: bool = True) -> Stumps:
-    """Return LogitBoost's stumps of the fold."""
-    bits, codes = split(fold.X, joints=joints)
-    return boost(np.hstack([bits, codes]), fold.y, int(fold.y.max()) + 1, rounds=ROUNDS, max_bins=MAX_BINS)[0]
+def raw(X: Rows) -> Rows:
+    """Return rows as they come from the wires (n, 21): eight switches a byte, then a byte a joint."""
+    return np.hstack([np.packbits(X[:, :SWITCHES], axis=1, bitorder="little"), X[:, SWITCHES:]])
 
 
-def tables(stumps: Stumps, fold: Fold, entry_bits: int, *, joints: bool = True) -> IntegerTables:
-    """Return the stumps as integer tables."""
-    return quantise(collapse(stumps, SWITCHES), *split(fold.X, joints=joints), entry_bits=entry_bits)
-
-
-def scores(integers: IntegerTables, X: Rows) -> NDArray[np.int64]:
-    """Return the integer scores (n, K) of rows."""
-    bits, codes = split(X, joints=integers.n_joints > 0)
-    found: NDArray[np.int64] = integers.bias.astype(np.int64) + bits @ integers.switch_rows.astype(np.int64)
-    for column, thresholds, rows in zip(
-        codes.T, integers.thresholds, integers.joint_rows, strict=integers.n_joints > 0
-    ):
-        found += rows[np.searchsorted(thresholds, column)]
-    return found
-
-
-def rates(cut: list[Fold], console: Console) -> dict[str, float]:
-    """Return the recognition rates over all folds: of ours as floats, as 16 and as 8 bits, and of switches alone."""
-    right = dict.fromkeys(("float", "16", "8", "switches"), 0)
-    for fold in track(cut, "LogitBoost", console=console):
-        stumps = boosted(fold)
-        right["float"] += _right(stumps.scores(np.hstack(split(fold.asked))), fold)
-        for bits in (16, 8):
-            right[str(bits)] += _right(scores(tables(stumps, fold, bits), fold.asked), fold)
-        alone = tables(boosted(fold, joints=False), fold, 16, joints=False)
-        right["switches"] += _right(scores(alone, fold.asked), fold)
-    return {what: 100 * count / sum(len(fold.truth) for fold in cut) for what, count in right.items()}
-
-
-def _right(scores: NDArray[np.generic], fold: Fold) -> int:
-    return int(np.count_nonzero(scores.argmax(axis=1) == fold.truth))
+def rates(cuts: Mapping[str, list[Fold]], train: Callable[[Fold], Answers]) -> tuple[float, ...]:
+    """Return the share of rows, in percent, that is answered rightly, for each cut."""
+    found = []
+    for parts in cuts.values():
+        right = sum(int(np.count_nonzero(train(fold)(fold.asked) == fold.truth)) for fold in parts)
+        found.append(100 * right / sum(len(fold.truth) for fold in parts))
+    return tuple(found)
 
 
 def two_changed(fold: Fold, changes: int, *, joints: bool) -> Rows:

@@ -1,133 +1,266 @@
-"""Other people's models and code generators as C for the AVR, on the same inputs as thenar's firmware.
+"""Other people's models and code generators as C for the AVR, of the same rows and bytes as thenar's firmware.
 
-A peer's C defines `int predict(void)` over `input`, its features as it wants them. emlearn casts thresholds to integers
-and tests with <, so 0/1 features come as 0 and 2, and bytes doubled: thresholds between two of them are odd then, and
-none is lost ("scaled by hand").
+A peer's `predict` gets `input`, the bytes of the switches' ports and of the joints as they come from the wires, and
+fills in what it wants of them: that is part of what it takes. emlearn casts thresholds to integers and tests with <, so
+0/1 features come as 0 and 2, and codes doubled, as int16; or, as uint8, in steps of two degrees.
 """
 
 import importlib.util
-from dataclasses import dataclass
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cache, partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from firmwaredata import JOINTS, PORTS, SWITCHES, Answers, Fold, Rows
+from firmwarelogit import Groups, fitted, integer_logit
 from numpy.typing import NDArray
 
-from thenar.runtime.tables import IntegerTables
+FEATURES = SWITCHES + JOINTS
+# Trees and leaves of the forests tried.
+FORESTS = ((10, 40), (10, 80), (15, 60), (20, 30), (20, 60), (30, 40), (60, 14))
+LOGITS = (Groups(1, 3), Groups(3, 3), Groups(4, 3), Groups(4, 4), Groups(5, 3), Groups(6, 3), Groups(8, 3))
+HIDDEN = 16
+_FLOATS = "float"
 
-Rows = NDArray[np.uint8]
-Labels = NDArray[np.intp]
 
-
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Peer:
-    """What one peer makes of the training rows.
+    """A peer: what it learns of the training rows, and its code.
 
-    source    its C, with `input` and `predict`
-    features  (n, F) of the test rows, as bytes of `input`
-    expected  (n,) the classes that its Python side gives these rows
+    train    gives what answers rows, by its Python
+    files    of what was trained: name -> text, which define `predict` over `input`
+    needs    packages
+    include  folders of headers
     """
 
     name: str
-    source: str
-    features: NDArray[np.uint8]
-    expected: Labels
+    train: Callable[[Fold], Any]
+    files: Callable[[Any], dict[str, str]]
+    answers: Callable[[Any], Answers]
+    needs: tuple[str, ...] = ()
+    include: tuple[str, ...] = field(default=())
+
+    def answers_of(self, fold: Fold) -> Answers:
+        """Return what answers rows, trained on a fold's."""
+        return self.answers(self.train(fold))
+
+    @property
+    def available(self) -> bool:
+        """Whether its packages are installed."""
+        return all(importlib.util.find_spec(package) for package in self.needs)
 
 
-def available(*packages: str) -> bool:
-    """Return whether all of these are installed."""
-    return all(importlib.util.find_spec(package) for package in packages)
+def _filling(kind: str, *, step: int) -> str:
+    """Return the C that makes features of `input`: switches 0 and `step`; codes in steps of two where kind is uint8_t,
+    else times `step`.
+    """
+    lines = []
+    for port in range(PORTS):
+        lines.append(f"byte = input[{port}];")
+        for bit in range(min(8, SWITCHES - 8 * port)):
+            value = "(byte & 1) << 1" if step == 2 else "byte & 1"
+            lines.append(f"features[{8 * port + bit}] = {value}; byte >>= 1;")
+    code = "input[{0}] & 0xFE" if kind == "uint8_t" else f"({kind})input[{{0}}] * {step}" if step > 1 else "input[{0}]"
+    lines += [f"features[{SWITCHES + joint}] = {code.format(PORTS + joint)};" for joint in range(JOINTS)]
+    body = "\n    ".join(lines)
+    return (
+        f"uint8_t input[{PORTS + JOINTS}];\nstatic {kind} features[{FEATURES}];\n"
+        f"static void fill(void) {{\n    uint8_t byte;\n    {body}\n}}\n"
+    )
 
 
-def scaled(X: Rows) -> NDArray[np.int16]:
-    """Return the features doubled, so that no integer threshold falls on one."""
+def _plain(X: Rows) -> Rows:
+    return X
+
+
+def _doubled(X: Rows) -> NDArray[np.int16]:
     return X.astype(np.int16) * 2
 
 
-def forest(X: Rows, y: Labels, trees: int, leaves: int) -> Any:
-    """Return a fitted forest on doubled features."""
+def _coarse(X: Rows) -> Rows:
+    return np.hstack([X[:, :SWITCHES] * 2, X[:, SWITCHES:] & 0xFE])
+
+
+@cache
+def _forest(fold: Fold, trees: int, leaves: int, features: Callable[[Rows], Any] = _plain) -> Any:
     from sklearn.ensemble import RandomForestClassifier
 
-    return RandomForestClassifier(trees, max_leaf_nodes=leaves, random_state=1, n_jobs=1).fit(scaled(X), y)
+    return RandomForestClassifier(trees, max_leaf_nodes=leaves, random_state=1, n_jobs=1).fit(features(fold.X), fold.y)
 
 
-def emlearn_forest(model: Any, rows: Rows, name: str) -> Peer:
-    """Return emlearn's C, in line, hard votes, of a forest on doubled features; rows are those to answer."""
+def _of(features: Callable[[Rows], Any]) -> Callable[[Any], Answers]:
+    return lambda model: lambda rows: np.asarray(model.predict(features(rows)), np.intp)
+
+
+def _emlearn_forest(kind: str) -> Callable[[Any], dict[str, str]]:
+    def files(model: Any) -> dict[str, str]:
+        import emlearn  # pyright: ignore[reportMissingImports]
+
+        code = emlearn.convert(model, method="inline", dtype=kind).save(name="forest", format="c", include_proba=False)
+        call = f"int predict(void) {{ fill(); return (int)forest_predict(features, {FEATURES}); }}\n"
+        return {"peer.c": f"{code}\n{_filling(kind, step=2)}{call}"}
+
+    return files
+
+
+def _mlp(fold: Fold) -> Any:
+    from sklearn.neural_network import MLPClassifier
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+
+    return make_pipeline(StandardScaler(), MLPClassifier((HIDDEN,), max_iter=600, random_state=1)).fit(fold.X, fold.y)
+
+
+def _emlearn_mlp(model: Any) -> dict[str, str]:
+    """Return emlearn's network, with the standardisation put into the weights of its first layer."""
     import emlearn  # pyright: ignore[reportMissingImports]
 
-    converted = emlearn.convert(model, method="inline", dtype="int16_t")
-    code = converted.save(name="forest", format="c", include_proba=False)
-    source = f"""{code}
-int16_t input[{rows.shape[1]}];
-int predict(void);
-int predict(void) {{ return (int)forest_predict(input, {rows.shape[1]}); }}
-"""
-    features = np.ascontiguousarray(scaled(rows)).astype("<i2").view(np.uint8).reshape(len(rows), -1)
-    return Peer(name, source, features, model.predict(scaled(rows)).astype(np.intp))
+    scaler, network = model
+    weights, biases = network.coefs_[0] / scaler.scale_[:, np.newaxis], network.intercepts_[0]
+    network.coefs_[0], network.intercepts_[0] = weights, biases - scaler.mean_ @ weights
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "mlp.h"
+        emlearn.convert(network, method="inline").save(file=str(path), name="mlp")
+        code = path.read_text()
+    call = f"int predict(void) {{ fill(); return (int)mlp_predict(features, {FEATURES}); }}\n"
+    return {"peer.c": f"#include <stdint.h>\n{code}\n{_filling(_FLOATS, step=1)}{call}"}
 
 
-def m2cgen_stumps(X: Rows, y: Labels, rows: Rows, rounds: int) -> Peer:
-    """Return m2cgen's C of XGBoost's boosted stumps, as floating-point code of the AVR's four-byte doubles."""
-    import m2cgen  # pyright: ignore[reportMissingImports]
-    from xgboost import XGBClassifier  # pyright: ignore[reportMissingImports]
+def _include(package: str) -> tuple[str, ...]:
+    found = importlib.util.find_spec(package)
+    return () if found is None or found.origin is None else (str(Path(found.origin).parent),)
 
-    classes = int(y.max()) + 1
-    model = XGBClassifier(
-        n_estimators=rounds, max_depth=1, learning_rate=1.0, tree_method="exact", base_score=0.5,
-        num_parallel_tree=1, n_jobs=1,
-    ).fit(X, y)  # fmt: skip
-    code = m2cgen.export_to_c(model)
-    # Features as bytes on the wire, widened as its C asks for them.
-    source = f"""#include <stdint.h>
+
+def _in_cpp(header: str, declared: str, call: str) -> dict[str, str]:
+    what = "#include <stdint.h>\n#include <string.h>\n#include <math.h>\n"
+    text = f"{what}{header}\n{_filling(_FLOATS, step=1)}{declared}\n"
+    return {"peer.cpp": f'{text}extern "C" int predict(void) {{ fill(); return {call}; }}\n'}
+
+
+def _micromlgen(model: Any) -> dict[str, str]:
+    import micromlgen  # pyright: ignore[reportMissingImports]
+
+    code = micromlgen.port(model).replace("#include <cstdarg>", "#include <stdarg.h>").replace("#pragma once", "")
+    return _in_cpp(code, "static Eloquent::ML::Port::RandomForest forest;", "forest.predict(features)")
+
+
+def _everywhereml_forest(trees: int, leaves: int) -> Callable[[Fold], Any]:
+    def train(fold: Fold) -> Any:
+        from everywhereml.sklearn.ensemble import RandomForestClassifier  # pyright: ignore[reportMissingImports]
+
+        model = RandomForestClassifier(n_estimators=trees, max_leaf_nodes=leaves, random_state=1)
+        model.fit(fold.X, fold.y)
+        return model
+
+    return train
+
+
+def _everywhereml(model: Any) -> dict[str, str]:
+    clock = "static unsigned long micros(void) { return 0; }\n"  # it times itself by Arduino's clock
+    header = clock + model.to_arduino(instance_name="forest")
+    return _in_cpp(header, "", "forest.predict(features)")
+
+
+def _scores(code: str, classes: int) -> dict[str, str]:
+    """Return code that has `score(features, scores)`, with what takes the best."""
+    return {
+        "peer.c": f"""#include <stdint.h>
 {code}
-uint8_t input[{rows.shape[1]}];
-int predict(void);
+{_filling("double", step=1)}
 int predict(void) {{
-    double features[{rows.shape[1]}], scores[{classes}];
+    static double scores[{classes}];
     int best = 0;
-    for (uint8_t i = 0; i < {rows.shape[1]}; i++) features[i] = input[i];
+    fill();
     score(features, scores);
     for (uint8_t k = 1; k < {classes}; k++) if (scores[k] > scores[best]) best = k;
     return best;
 }}
 """
-    return Peer(f"m2cgen, XGBoost {rounds} x {classes} stumps", source, np.ascontiguousarray(rows), model.predict(rows))
+    }
 
 
-def plain_table(tables: IntegerTables, rows: Rows, expected: Labels) -> Peer:
-    """Return the merged tables as one would write them down first: a row per switch and bin, loops, thresholds."""
-    K, s, j = tables.n_classes, tables.n_switches, tables.n_joints
+def _m2cgen_logit(model: Any) -> dict[str, str]:
+    import m2cgen  # pyright: ignore[reportMissingImports]
 
-    def table(name: str, values: NDArray[Any], kind: str) -> str:
-        return f"static const {kind} {name}[] PROGMEM = {{{', '.join(map(str, values.ravel().tolist()))}}};\n"
+    logit, mean, deviation = model
+    raw = type(logit)()
+    raw.classes_, raw.n_features_in_ = logit.classes_, FEATURES
+    raw.coef_ = logit.coef_ / np.hstack([np.ones(SWITCHES), deviation])
+    raw.intercept_ = logit.intercept_ - raw.coef_[:, SWITCHES:] @ mean
+    return _scores(m2cgen.export_to_c(raw), len(raw.classes_))
 
-    bins = np.concatenate([np.asarray(rows_) for rows_ in tables.joint_rows])
-    firsts = np.cumsum([0, *(len(t) for t in tables.thresholds)])
-    source = (
-        "#include <stdint.h>\n#include <avr/pgmspace.h>\n"
-        + table("bias", tables.bias, "int16_t")
-        + table("switch_rows", tables.switch_rows, "int16_t")
-        + table("thresholds", np.concatenate(tables.thresholds), "uint8_t")
-        + table("firsts", firsts, "uint16_t")
-        + table("joint_rows", bins, "int16_t")
-        + f"""uint8_t input[{s + j}];
-int predict(void);
-static void add(int16_t *sums, const int16_t *row) {{
-    for (uint8_t k = 0; k < {K}; k++) sums[k] += (int16_t)pgm_read_word(&row[k]);
-}}
+
+def _logit_answers(model: Any) -> Answers:
+    logit, mean, deviation = model
+    return lambda X: logit.predict(np.hstack([X[:, :SWITCHES] > 0, (X[:, SWITCHES:] - mean) / deviation]))
+
+
+def _stumps(fold: Fold) -> Any:
+    from xgboost import XGBClassifier  # pyright: ignore[reportMissingImports]
+
+    return XGBClassifier(
+        n_estimators=100, max_depth=1, learning_rate=1.0, tree_method="hist", base_score=0.5, num_parallel_tree=1,
+        n_jobs=1,
+    ).fit(fold.X, fold.y)  # fmt: skip
+
+
+def _m2cgen_stumps(model: Any) -> dict[str, str]:
+    import m2cgen  # pyright: ignore[reportMissingImports]
+
+    return _scores(m2cgen.export_to_c(model), model.n_classes_)
+
+
+def _tl2cgen(model: Any) -> dict[str, str]:
+    import tl2cgen  # pyright: ignore[reportMissingImports]
+    import treelite  # pyright: ignore[reportMissingImports]
+
+    with tempfile.TemporaryDirectory() as folder:
+        tl2cgen.generate_c_code(treelite.sklearn.import_model(model), folder, params={})
+        files = {path.name: path.read_text() for path in Path(folder).glob("*.[ch]")}
+    header = files.pop("header.h").replace("void predict(", "void forest_predict(")
+    code = files.pop("main.c").replace("void predict(", "void forest_predict(")
+    classes = len(model.classes_)
+    call = f"""#include <stdint.h>
+#include "header.h"
+{_filling("double", step=1)}
 int predict(void) {{
-    int16_t sums[{K}];
+    static union Entry entries[{FEATURES}];
+    static double scores[{classes}];
     int best = 0;
-    for (uint8_t k = 0; k < {K}; k++) sums[k] = (int16_t)pgm_read_word(&bias[k]);
-    for (uint8_t i = 0; i < {s}; i++) if (input[i]) add(sums, &switch_rows[i * {K}]);
-    for (uint8_t a = 0; a < {j}; a++) {{
-        const uint16_t first = pgm_read_word(&firsts[a]), last = pgm_read_word(&firsts[a + 1]);
-        uint16_t bin = first;
-        while (bin < last && pgm_read_byte(&thresholds[bin]) < input[{s} + a]) bin++;
-        add(sums, &joint_rows[(bin + a) * {K}]);
-    }}
-    for (uint8_t k = 1; k < {K}; k++) if (sums[k] > sums[best]) best = k;
+    fill();
+    for (uint8_t i = 0; i < {FEATURES}; i++) entries[i].fvalue = features[i];
+    for (uint8_t k = 0; k < {classes}; k++) scores[k] = 0;
+    forest_predict(entries, 0, scores);
+    for (uint8_t k = 1; k < {classes}; k++) if (scores[k] > scores[best]) best = k;
     return best;
 }}
 """
-    )
-    return Peer("a straightforward merged table", source, np.ascontiguousarray(rows), expected)
+    return {"header.h": header, "forest.c": code, **files, "peer.c": call}
+
+
+def _with(trees: int, leaves: int, features: Callable[[Rows], Any] = _plain) -> Callable[[Fold], Any]:
+    return lambda fold: _forest(fold, trees, leaves, features)
+
+
+def peers() -> Iterator[Peer]:
+    """Yield the peers."""
+    for groups in LOGITS:
+        switches = "single switches" if groups.size == 1 else f"groups of {groups.size}"
+        name = f"int8 logistic regression by hand, {switches}, joints {2**groups.shift} times finer"
+        yield Peer(name, partial(integer_logit, groups=groups), lambda made: {"peer.S": made.source}, lambda made: made)
+    for kind, features, what in (("uint8_t", _coarse, "uint8, 2-degree steps"), ("int16_t", _doubled, "int16")):
+        for trees, leaves in FORESTS:
+            name = f"emlearn, forest {trees} x {leaves}, {what}"
+            yield Peer(name, _with(trees, leaves, features), _emlearn_forest(kind), _of(features), ("emlearn",))
+    yield Peer(f"emlearn, MLP of {HIDDEN}", _mlp, _emlearn_mlp, _of(_plain), ("emlearn",), _include("emlearn"))
+    small = (10, 40)
+    forest = f"forest {small[0]} x {small[1]}"
+    yield Peer(f"micromlgen, {forest}", _with(*small), _micromlgen, _of(_plain), ("micromlgen",))
+    train = _everywhereml_forest(*small)
+    yield Peer(f"everywhereml, {forest}", train, _everywhereml, _of(_plain), ("everywhereml",))
+    yield Peer(f"TL2cgen, {forest}", _with(*small), _tl2cgen, _of(_plain), ("tl2cgen", "treelite"))
+    yield Peer("m2cgen, logistic regression", fitted, _m2cgen_logit, _logit_answers, ("m2cgen",))
+    yield Peer("m2cgen, XGBoost 100 x 14 stumps", _stumps, _m2cgen_stumps, _of(_plain), ("m2cgen", "xgboost"))

@@ -128,7 +128,7 @@ def command(
     if calibration is not None:
         loaded = for_one_hand(loaded, load_calibration(calibration))
     wiring = None if board is None else load_board(board)
-    firmware = Firmware(loaded.tables, loaded.manifest, target, mode, name, wiring, flash_limit)
+    firmware = Firmware(loaded.tables, loaded.manifest, target, mode, name, wiring, flash_limit, loaded.scan)
     with progress("choosing a layout"):
         fit = firmware.fit
     measured = None

@@ -132,7 +132,7 @@ def print_firmware(found: "FirmwareVerification") -> None:
     console = out()
     console.print(f"firmware, on {found.rows} rows, {found.extreme} extreme and {found.random} random frames:")
     for check in found.checks:
-        console.print(f"  {check.part}, {_HOW[check.answer]}: {_outcome(check)}")
+        console.print(f"  {check.part}, {_HOW[check.answer]}{_MISSING[check.missing]}: {_outcome(check)}")
         if check.misnamed:
             console.print(f"    {check.misnamed} of the grasp types have ANOTHER NAME")
         if check.first is not None:
@@ -147,6 +147,7 @@ def print_firmware(found: "FirmwareVerification") -> None:
 
 
 _HOW = {"classify": "every frame from nothing", "update": "every frame from the one before"}
+_MISSING = {False: "", True: ", inputs missing"}
 
 
 def _outcome(check: "TargetCheck") -> str:

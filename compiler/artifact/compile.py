@@ -266,7 +266,7 @@ class Making:
             files[SCAN_NAME] = scanmap_to_bytes(self.scan)
         described = manifest_to_bytes(self._manifest(tested, files))
         manifest = manifest_from_bytes(described)
-        firmware, note = made_firmware(manifest, self.integers)
+        firmware, note = made_firmware(manifest, self.integers, self.scan)
         report = BuildReport(
             folder=target,
             manifest=manifest,

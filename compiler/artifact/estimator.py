@@ -88,7 +88,7 @@ class Build(LoadedBuild):
         FirmwareError
             If the target cannot hold the build, or these do not go together.
         """
-        files = Firmware(self.tables, self.manifest, target, mode, name, board, flash).files()
+        files = Firmware(self.tables, self.manifest, target, mode, name, board, flash, self.scan).files()
         write_folder(files, Path(folder), overwrite=overwrite)
         return tuple(Path(folder) / path for path in files)
 

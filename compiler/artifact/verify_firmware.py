@@ -4,6 +4,8 @@ And is the firmware that a build carries what would be made of it today?
 """
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
+from itertools import compress, product
 from pathlib import Path
 from typing import Literal
 
@@ -15,6 +17,7 @@ from thenar.runtime.build import Build
 from thenar.runtime.files import read_file
 from thenar.runtime.manifest import Calibration, Manifest, Switch
 from thenar.runtime.names import list_names
+from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.tables import IntegerTables
 
@@ -22,7 +25,8 @@ from ..firmware import FirmwareError
 from ..firmware.choose import Fit, fit_for, smallest_fit
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES, LIBRARY_NAME, Library, classifier_files
 from ..firmware.generate import LARGEST
-from ..firmware.probes import Answers, Probes, extreme_frames, joined, random_frames
+from ..firmware.layout import ports_of_scan
+from ..firmware.probes import Answers, Lost, Probes, extreme_frames, joined, lost_inputs, random_frames
 from ..firmware.targets import TARGETS
 from ..firmware.targets import kinds as every_kind
 from ..recordings.graspset import GraspSet, Joint
@@ -92,10 +96,10 @@ class Carried(Struct, frozen=True):
     outdated: tuple[str, ...]
 
 
-def made_firmware(manifest: Manifest, tables: IntegerTables) -> tuple[dict[str, str], str]:
+def made_firmware(manifest: Manifest, tables: IntegerTables, scan: ScanMap | None) -> tuple[dict[str, str], str]:
     """Return path in the build -> text of its firmware, and a sentence that says what for, or why there is none."""
     try:
-        fit = smallest_fit(tables)
+        fit = smallest_fit(tables, ports=ports_of_scan(scan))
         made = Library(LIBRARY_NAME, manifest, fit.choice.layout, fit.target.avr, fit.notes()).files
     except FirmwareError as reason:
         return {}, f"no firmware: {reason}"
@@ -106,7 +110,7 @@ def carried_firmware(folder: Path, build: Build) -> Carried:
     """Return how the firmware in the build `folder` stands."""
     if not (folder / FIRMWARE_NAME).is_dir():
         return Carried(False, ())
-    made, _ = made_firmware(build.manifest, build.tables)
+    made, _ = made_firmware(build.manifest, build.tables, build.scan)
     now = {name: text.encode() for name, text in made.items()}
     names = [f"{FIRMWARE_NAME}/{name}" for name in LIBRARY_FILES]
     return Carried(True, tuple(name for name in names if now.get(name) != _content(folder / name)))
@@ -120,7 +124,7 @@ def _content(path: Path) -> bytes | None:
 
 
 class Difference(Struct, frozen=True):
-    """A frame that is answered otherwise: which it is, what is closed and coded in it, and both answers."""
+    """A frame that is answered otherwise: which it is, what is closed, coded and missing in it, and both answers."""
 
     frame: str
     closed: tuple[str, ...]
@@ -129,6 +133,7 @@ class Difference(Struct, frozen=True):
     scores: tuple[int, ...]
     compiled_grasp: str
     compiled_scores: tuple[int, ...]
+    lost: tuple[str, ...] = ()
 
 
 class TargetCheck(Struct, frozen=True, kw_only=True):
@@ -136,6 +141,7 @@ class TargetCheck(Struct, frozen=True, kw_only=True):
 
     layout     which layout was compiled, and why
     answer     "classify": every frame from nothing; "update": from what changed since the frame before
+    missing    whether inputs are missing in all frames, in every second one alone
     frames     how many were answered, `differing` of them with another score or grasp type than in Python
     first      the first of those
     misnamed   how many grasp types thenar_NAME_grasp calls otherwise than the manifest; None: not asked, on an AVR
@@ -145,6 +151,7 @@ class TargetCheck(Struct, frozen=True, kw_only=True):
     part: str
     layout: str
     answer: Answer
+    missing: bool
     frames: int
     differing: int
     first: Difference | None
@@ -162,18 +169,30 @@ class FirmwareTrial:
         self._frames = joined(rows, extreme, random)
         pairs = zip(self._frames.bits, self._frames.codes, strict=True)
         self._scores = np.array([build.scorer.lanes(bits, codes) for bits, codes in pairs]) - LANE_OFFSET
+        self._lost = lost_inputs(build.tables, len(self._frames), _SEED)
 
-    def check(self, fit: Fit, answer: Answer) -> TargetCheck:
+    @cached_property
+    def _scores_without(self) -> NDArray[np.int64]:
+        """The scores where `_lost` inputs are missing."""
+        frames = zip(self._frames.bits, self._frames.codes, self._lost, strict=True)
+        switches = self._build.tables.n_switches
+        without = self._build.scorer.lanes_without
+        lanes = [without(bits, codes, lost[:switches], lost[switches:]) for bits, codes, lost in frames]
+        return np.array(lanes) - LANE_OFFSET
+
+    def check(self, fit: Fit, answer: Answer, *, missing: bool = False) -> TargetCheck:
         """Compile the classifier as `fit` says and hold its answers against Python's. Raises FirmwareError."""
-        answers = self._run(fit, incremental=answer == "update")
-        wrong = (answers.scores != self._scores).any(axis=1) | (answers.classes != self._scores.argmax(axis=1))
+        answers = self._run(fit, incremental=answer == "update", lost=self._lost if missing else None)
+        scores = self._scores_without if missing else self._scores
+        wrong = (answers.scores != scores).any(axis=1) | (answers.classes != scores.argmax(axis=1))
         return TargetCheck(
             part=fit.target.part,
             layout=fit.choice.why,
             answer=answer,
+            missing=missing,
             frames=len(wrong),
             differing=int(np.count_nonzero(wrong)),
-            first=self._difference(int(wrong.argmax()), answers) if wrong.any() else None,
+            first=self._difference(int(wrong.argmax()), answers, missing=missing) if wrong.any() else None,
             misnamed=self._misnamed(answers),
             worst=None if answers.cost is None else int(answers.cost.max()),
             unit=answers.unit,
@@ -185,22 +204,26 @@ class FirmwareTrial:
             return None
         return sum(name != grasp for name, grasp in zip(answers.names, self._build.grasps, strict=True))
 
-    def _run(self, fit: Fit, *, incremental: bool) -> Answers:
+    def _run(self, fit: Fit, *, incremental: bool, lost: Lost | None) -> Answers:
         layout, target = fit.choice.layout, fit.target
         files = classifier_files(LIBRARY_NAME, self._build.manifest, layout, avr=target.avr)
         frames = layout.frame_bytes(self._frames.bits, self._frames.codes)
-        return target.run(files, LIBRARY_NAME, layout, frames, incremental=incremental)
+        return target.run(files, LIBRARY_NAME, layout, frames, incremental=incremental, lost=lost)
 
-    def _difference(self, frame: int, answers: Answers) -> Difference:
+    def _difference(self, frame: int, answers: Answers, *, missing: bool) -> Difference:
+        scores = self._scores_without if missing else self._scores
+        described = self._build.manifest
+        inputs = [*(switch.name for switch in described.switches), *(joint.name for joint in described.joints)]
         build, bits, codes = self._build, self._frames.bits[frame], self._frames.codes[frame]
         return Difference(
             frame=self._name(frame),
             closed=tuple(switch.name for switch, bit in zip(build.manifest.switches, bits, strict=True) if bit),
             codes=tuple(codes.tolist()),
-            grasp=build.grasps[int(self._scores[frame].argmax())],
-            scores=tuple(self._scores[frame].tolist()),
+            grasp=build.grasps[int(scores[frame].argmax())],
+            scores=tuple(scores[frame].tolist()),
             compiled_grasp=self._grasp(int(answers.classes[frame])),
             compiled_scores=tuple(answers.scores[frame].tolist()),
+            lost=tuple(compress(inputs, self._lost[frame])) if missing else (),
         )
 
     def _name(self, frame: int) -> str:
@@ -241,26 +264,27 @@ def verify_firmware(
 
     "host" runs with the address and undefined behaviour sanitizers, "avr" is the smallest AVR that the classifier fits,
     "cortex-m" both cores. Each is run from nothing for every frame, and once more from the changes between frames, on
-    "host" and "cortex-m" with every switch set by set_switch() and every name asked for. Of a build that no AVR holds,
+    "host" and "cortex-m" with every switch set by set_switch() and every name asked for; and both again with inputs
+    missing, in turn and several at once. Of a build that no AVR holds,
     host runs the layout of the larger core. Raises FirmwareError where a tool is missing, a kind is none of
     `firmware.targets.kinds()`, or a part cannot hold the build, else as `verify` does.
     """
     if unknown := [kind for kind in kinds if kind not in every_kind()]:
         raise FirmwareError(f"nothing runs firmware for {unknown[0]!r}: choose among {', '.join(every_kind())}")
     build = Build.load(folder)
-    fits = [fit for kind in every_kind() if kind in kinds for fit in _fits(build.tables, kind)]
+    fits = [fit for kind in every_kind() if kind in kinds for fit in _fits(build, kind)]
     for fit in fits:
         if lack := fit.target.missing():
             raise FirmwareError(f"firmware for {fit.target.part} cannot be tried here: {lack}")
     bits, codes = select_inputs(grasp_set, build.manifest)
     extreme, random = extreme_frames(build.tables), random_frames(build.tables, RANDOM_FRAMES, _SEED)
     trial = FirmwareTrial(build, Probes(bits, codes), extreme, random)
-    runs = [(fit, answer) for fit in fits for answer in ANSWERS]
+    runs = list(product(fits, (False, True), ANSWERS))
     checks: list[TargetCheck] = []
-    for fit, answer in runs:
+    for fit, missing, answer in runs:
         if progress is not None:
             progress(len(checks), len(runs))
-        checks.append(trial.check(fit, answer))
+        checks.append(trial.check(fit, answer, missing=missing))
     return FirmwareVerification(
         rows=len(bits),
         extreme=len(extreme),
@@ -270,9 +294,10 @@ def verify_firmware(
     )
 
 
-def _fits(tables: IntegerTables, kind: str) -> list[Fit]:
+def _fits(build: Build, kind: str) -> list[Fit]:
     """Return the parts of a kind to try, each with its layout: of parts that are alike, the smallest that will do."""
+    tables, ports = build.tables, ports_of_scan(build.scan)
     targets = [target for target in TARGETS.values() if target.kind == kind]
     if all(target.alike for target in targets):
-        return [smallest_fit(tables, kind=kind)]
-    return [fit_for(target, tables) for target in targets]
+        return [smallest_fit(tables, kind=kind, ports=ports)]
+    return [fit_for(target, tables, ports=ports) for target in targets]

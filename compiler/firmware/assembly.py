@@ -1,11 +1,12 @@
 """The classifier in AVR assembly: which registers hold the sums, and where each look-up finds its row."""
 
 from collections.abc import Sequence
-from itertools import pairwise
+from functools import lru_cache
+from itertools import pairwise, product
 
 from . import FirmwareError
-from .layout import JointLayout, Layout, Lookup
-from .words import Names, comment
+from .layout import Field, JointLayout, Layout, Lookup
+from .words import Names, comment, switches_in_words
 
 # Free to use for a C function, and to be kept for its caller; of pairs the lower.
 _FREE, _KEPT = (18, 20, 22, 24, 26), (28, 16, 14, 12, 10, 8, 6, 4, 2)
@@ -73,8 +74,58 @@ def calls_are_near(layout: Layout) -> bool:
     joints = sum(_JOINT_BYTES + 4 * len(joint.thresholds) * joint.compared for joint in layout.joints)
     passes = len(layout.parts.firsts)
     wide = sum(4 * len(joint.thresholds) * joint.compared for joint in layout.joints) * (layout.code_bits == 16)
-    each = _LOOKUP_BYTES * len(layout.lookups) + _SLOPE_BYTES * len(layout.tables.slopes)
+    groups = [layout.fields[lookup.group] for lookup in layout.lookups if lookup.group is not None]
+    put_together = 2 * sum(len(group_lines(fields, [""] * len(fields), [""] * len(fields))) for fields in groups)
+    put_together += sum(4 * len(fields) for fields in groups)
+    each = put_together + _LOOKUP_BYTES * len(layout.lookups) + _SLOPE_BYTES * len(layout.tables.slopes)
     return each * passes + joints + wide < _NEAR_BYTES
+
+
+_MOST_MOVES, _BYTE = 4, range(8)
+
+
+@lru_cache(maxsize=512)
+def _moved(bit: int, width: int, to: int) -> tuple[str, ...]:
+    """Return the fewest instructions that bring `width` bits of a register from `bit` to `to` and clear all others;
+    `{}` is the register.
+    """
+
+    def after(moves: tuple[str, ...], place: int) -> int | None:
+        for move in moves:
+            place = (place + 4) % 8 if move == "swap" else place + (1 if move == "lsl" else -1)
+            if place not in _BYTE:
+                return None
+        return place
+
+    wanted = dict(zip(range(bit, bit + width), range(to, to + width), strict=True))
+    found: list[tuple[str, ...]] = []
+    for count in range(_MOST_MOVES + 1):
+        for moves in product(("swap", "lsl", "lsr"), repeat=count):
+            places = {place: after(moves, place) for place in _BYTE}
+            if all(places[place] == end for place, end in wanted.items()):
+                others = any(end is not None for place, end in places.items() if place not in wanted)
+                mask = (f"andi  {{}}, {((1 << width) - 1) << to:#04x}",) if others else ()
+                found.append((*(f"{move:<5} {{}}" for move in moves), *mask))
+    return min(found, key=len)
+
+
+def group_lines(fields: Sequence[Field], inputs: Sequence[str], seen: Sequence[str | None]) -> list[str]:
+    """Return the instructions that make the byte of a group of its fields' ports, at `inputs`, in r30; r31 is theirs to
+    use, r0 and r1 are not. What is read is kept where `seen` says.
+    """
+    lines: list[str] = []
+    for field, source, kept in zip(fields, inputs, seen, strict=True):
+        register = "r31" if lines else "r30"
+        lines.append(f"lds   {register}, {source}")
+        if kept is not None:
+            lines.append(f"sts   {kept}, {register}")
+        moved = [line.format(register) for line in _moved(field.bit, field.width, field.to)]
+        if register == "r31" and 2 * field.width <= len(moved) + 1:
+            for bit in range(field.width):
+                lines += [f"sbrc  r31, {field.bit + bit}", f"ori   r30, {1 << (field.to + bit):#04x}"]
+        else:
+            lines += [*moved, *(["or    r30, r31"] if register == "r31" else [])]
+    return lines
 
 
 def _registers(layout: Layout) -> list[int]:
@@ -90,10 +141,12 @@ def kept_registers(layout: Layout) -> list[int]:
     return [low + half for low in _registers(layout) for half in halves if low // 2 * 2 in _KEPT]
 
 
-def inputs_seen(layout: Layout) -> list[int]:
-    """Return the bytes of the frame of which update() keeps what they were: of inputs that make rows' numbers."""
+def inputs_seen(layout: Layout) -> list[tuple[int, int]]:
+    """Return the bytes of the frame of which update() keeps what they were, of inputs that make rows' numbers: for each
+    the look-up and the byte.
+    """
     return [
-        place
+        (lookup.index, place)
         for lookup in layout.lookups
         if lookup.joints and not prepared(layout)
         for place in _places(lookup, layout)
@@ -128,7 +181,7 @@ def _slope(name: str, names: Names, layout: Layout, at: int, first: int) -> Row:
     entries, each with the sums that it is added to, or subtracted from.
     """
     slope, bits, registers = layout.tables.slopes[at], layout.code_bits, _registers(layout)
-    place = len(layout.groups) + layout.padding + slope.joint * bits // 8
+    place = len(layout.ports) + layout.padding + slope.joint * bits // 8
     index = len(layout.lookups) + len(inputs_seen(layout)) + at
     return {
         "index": index,
@@ -187,12 +240,16 @@ class _Steps:
         }
         if step["inline"]:
             return step | self.finding(lookup)
-        source = self._found.get(lookup.index, self._input(lookup.group or 0))
-        return {**step, "sources": [{"input": source, "seen": seen}]}
+        if lookup.group is None or lookup.joints:
+            lines = [f"lds   r30, {self._found[lookup.index]}"]
+        else:
+            fields = layout.fields[lookup.group]
+            lines = group_lines(fields, [self._input(field.port) for field in fields], [None] * len(fields))
+        return {**step, "lines": lines}
 
     def finding(self, lookup: Lookup) -> Row:
         """Return how the number of a row is made of codes."""
-        sources = [self._source(place) for place in _places(lookup, self._layout)]
+        sources = [self._source(lookup, place) for place in _places(lookup, self._layout)]
         of_joint = dict(zip((joint.number for joint in lookup.joints), sources, strict=False))
         compared = [joint for joint in reversed(lookup.joints) if joint.compared]
         trimmed = [joint for joint in lookup.joints if not joint.compared]
@@ -211,7 +268,7 @@ class _Steps:
                 {**of_joint[joint.number], **self._bins(joint), "how": how}
                 for joint, how in zip(trimmed, _adding(len(trimmed), bool(compared), grouped), strict=True)
             ],
-            "group": sources[-1] if grouped else None,
+            "group": self._put_together(lookup, sources) if grouped else [],
             "register": 30 if trimmed or grouped else 0,
             "found": self._found.get(lookup.index),
         }
@@ -219,14 +276,20 @@ class _Steps:
     def _what(self, lookup: Lookup) -> str:
         groups = [self._layout.groups[lookup.group]] if lookup.group is not None else []
         joints = [comment(self.names.joints[joint.number].name) for joint in lookup.joints]
-        return ", ".join([*(f"switches {numbers[0]} to {numbers[-1]}" for numbers in groups), *joints])
+        return ", ".join([*map(switches_in_words, groups), *joints])
 
     def _input(self, place: int) -> str:
         return f"thenar_{self.name}_input + {place}"
 
-    def _source(self, place: int) -> Row:
-        wide = self._layout.code_bits == 16 and place >= len(self._layout.groups)
-        return {"input": self._input(place), "seen": self._seen.get(place), "wide": wide}
+    def _source(self, lookup: Lookup, place: int) -> Row:
+        wide = self._layout.code_bits == 16 and place >= len(self._layout.ports)
+        return {"input": self._input(place), "seen": self._seen.get((lookup.index, place)), "wide": wide}
+
+    def _put_together(self, lookup: Lookup, sources: Sequence[Row]) -> list[str]:
+        fields = self._layout.fields[lookup.group or 0]
+        ports = sources[-len(fields) :]
+        seen = [None if port["seen"] is None else str(port["seen"]) for port in ports]
+        return group_lines(fields, [str(port["input"]) for port in ports], seen)
 
     def _bins(self, joint: JointLayout) -> Row:
         first, last = joint.first, len(joint.bins) - 1
@@ -244,9 +307,9 @@ class _Steps:
 
 def _places(lookup: Lookup, layout: Layout) -> list[int]:
     """Return the bytes of the frame at which the inputs of a look-up begin, its joints first."""
-    codes = len(layout.groups) + layout.padding
+    codes = len(layout.ports) + layout.padding
     places = [codes + joint.number * layout.code_bits // 8 for joint in lookup.joints]
-    return places + ([] if lookup.group is None else [lookup.group])
+    return places + ([] if lookup.group is None else [field.port for field in layout.fields[lookup.group]])
 
 
 def _adding(count: int, before: bool, after: bool) -> list[str]:

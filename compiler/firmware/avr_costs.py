@@ -18,13 +18,13 @@ from thenar.firmware_templates.rendering import render
 
 from .assembly import assembly_values, calls_are_near, inputs_seen, kept_registers, prepared
 from .costs import NAME_BYTES, Cost
-from .layout import JointLayout, Layout, Lookup
+from .layout import Field, JointLayout, Layout, Lookup
 from .words import numbered
 
 # AVR Instruction Set Manual, DS40002198, table 5-1: cores AVRe (ATmega328P) and AVRe+ (ATmega2560), whose program
 # counter of three bytes makes calls and returns a cycle longer. A branch or a skip that is taken costs more.
-_ONE = "adc add and clr cp cpc cpi eor inc ldi lsl lsr mov movw neg ror sbc sbci sub subi tst"
-_TWO = "ld ldd lds mul muls pop push st sts"
+_ONE = "adc add and andi clr cp cpc cpi eor inc ldi lsl lsr mov movw neg or ori ror sbc sbci sub subi swap tst"
+_TWO = "icall ld ldd lds mul muls pop push st sts"
 _CYCLES = dict.fromkeys(_ONE.split(), 1) | dict.fromkeys(_TWO.split(), 2) | {"lpm": 3}
 _JUMPS = {"rjmp": 2, "jmp": 3}
 _CALLS = {"rcall": 3, "call": 4, "ret": 4}
@@ -36,7 +36,7 @@ Pick = Callable[[tuple[int, int]], int]
 
 
 class Instruction(NamedTuple):
-    """An instruction, where it may jump to or call, and how often if it ends a loop."""
+    """An instruction, where it may jump to or call, and how often it is met if it ends a loop; 0: it always jumps."""
 
     name: str
     target: str
@@ -133,10 +133,12 @@ class Assembly:
                 left[at] += 0 if each.name == "ret" else after + pick(self._from(to))
             elif each.name in _JUMPS:
                 left[at] = _JUMPS[each.name] + (pick(self._from(to)) if to >= 0 else 0)
-            elif each.name == "cpse":
+            elif each.name in ("cpse", "sbrc"):
                 left[at] = pick((1 + after, 1 + self._code[at + 1].size // 2 + left[at + 2]))
             elif not each.name.startswith("br"):
                 left[at] = _CYCLES[each.name] + after
+            elif not each.times:  # something is missing: what that takes is not counted
+                left[at] = 2 + left[to]
             elif to > at:
                 left[at] = pick((1 + after, 2 + left[to]))
             else:
@@ -160,6 +162,8 @@ def _times(comment: str) -> str:
 _LARGE = 5  # numbers from here on are multiplied by `mul`
 # Bytes of C code, rounded up; a table of bins begins at a page, and the compiler fills up its last one.
 _SET_SWITCH, _GRASP, _PAGE = 80, 40, 256
+_LOSING, _LOSING_JOINTS = 400, 300
+_LOST_RAM = 5  # how many inputs are missing, whether any is, and what is done then
 # Return addresses of update(), of what it calls about a change and of what that calls; a row's number in between.
 _CALLS_DEEP = 3
 
@@ -170,13 +174,15 @@ _DRAWN, _CLIMBED, _ROUNDS, _BETWEEN = 4096, 8, 20, 33
 
 
 class Counts(NamedTuple):
-    """The fewest cycles of classify, the most of it and of update, bytes of all code and of update alone."""
+    """The fewest cycles of classify, the most of it and of update, bytes of all code and of what is not needed to
+    classify.
+    """
 
     least: int
     classify: int
     update: int
     size: int
-    size_update: int
+    uncalled: int
 
     def plus(self, more: "Counts", times: int = 1) -> "Counts":
         """Return the sum of these and of `times` more."""
@@ -201,6 +207,11 @@ def _of_joint(layout: Layout, joint: JointLayout) -> tuple[int, ...]:
     return -1, joint.first > 0, joint.first + len(joint.bins) < 1 << layout.code_bits
 
 
+def _of_group(layout: Layout, lookup: Lookup) -> tuple[Field, ...]:
+    """Return what the code that puts a group together has of it, wherever its ports are."""
+    return () if lookup.group is None else tuple(replace(field, port=0) for field in layout.fields[lookup.group])
+
+
 @lru_cache(maxsize=4096)
 def _counted(part: _Part, near: bool, elpm: bool) -> Counts:
     """Return what there is to count in the assembly of a layout of these look-ups alone."""
@@ -210,7 +221,8 @@ def _counted(part: _Part, near: bool, elpm: bool) -> Counts:
     common |= {"classes": layout.tables.n_classes, "n_rows": layout.n_rows}
     found = Assembly(render("classifier/thenar_NAME_avr.S.j2", **common, **values), elpm=elpm)
     _, update = found.cycles("thenar_x_update")
-    return Counts(*found.cycles("thenar_x_classify"), update, found.size(), found.size(".text.thenar_x_update"))
+    uncalled = found.size(".text.thenar_x_update") + found.size(".text.thenar_x_start_without")
+    return Counts(*found.cycles("thenar_x_classify"), update, found.size(), uncalled)
 
 
 class AvrCosts:
@@ -237,7 +249,7 @@ class AvrCosts:
 
     def _count(self, *lookups: Lookup) -> Counts:
         shapes = tuple(
-            (lookup.group is None, tuple([_of_joint(self._layout, joint) for joint in lookup.joints]))
+            (_of_group(self._layout, lookup), tuple([_of_joint(self._layout, joint) for joint in lookup.joints]))
             for lookup in lookups
         )
         return _counted(_Part((shapes, self._of_all), self._layout, lookups), self._near, self._counter == 3)
@@ -247,7 +259,7 @@ class AvrCosts:
         """What the classifier takes at most, a few bytes more of flash and RAM."""
         names = NAME_BYTES * (self._layout.tables.n_classes + 1)
         flash, counts = self.flash + names, self._counts
-        return Cost(counts.classify, counts.update, flash, flash - counts.size_update, self.ram)
+        return Cost(counts.classify, counts.update, flash, flash - counts.uncalled - self._losing, self.ram)
 
     @property
     def fixed_cycles(self) -> int:
@@ -264,18 +276,26 @@ class AvrCosts:
         """Bytes of tables and code, at most; the names of the grasp types come on top."""
         layout, parts = self._layout, self._layout.parts
         tables = layout.n_rows * len(parts.firsts) * parts.width * layout.entry_bits // 8
-        tables += 2 * layout.tables.n_switches * (2 if len(layout.groups) > 255 else 1)
+        tables += 2 * layout.tables.n_switches * (2 if len(layout.ports) > 255 else 1)
         tables += 2 * layout.tables.n_classes + self._variables  # what they are in the beginning
         bins = sum(len(joint.bins) for joint in layout.joints)
         tables += bins + (2 * (_PAGE - 1) if layout.bins == "direct" and bins else 0)
-        return tables + self._counts.size + _GRASP + (_SET_SWITCH if layout.groups else 0)
+        return tables + self._losing + self._counts.size + _GRASP + (_SET_SWITCH if layout.groups else 0)
 
     @property
     def ram(self) -> int:
         """Bytes of variables and of the deepest stack, return address included."""
         found = sum(bool(lookup.joints) for lookup in self._layout.lookups) if prepared(self._layout) else 0
         stack = _CALLS_DEEP * self._counter + len(kept_registers(self._layout)) + 1
-        return self._layout.frame_size + 2 * self._layout.tables.n_classes + self._variables + found + stack
+        lost = len(self._layout.ports) + -(-self._layout.tables.n_joints // 8) + _LOST_RAM
+        # Scores as they are, and as they begin where an input is missing.
+        return self._layout.frame_size + 4 * self._layout.tables.n_classes + self._variables + found + lost + stack
+
+    @property
+    def _losing(self) -> int:
+        """Bytes of flash, without the assembly, of what replaces missing inputs by their means."""
+        means = self._layout.means.size * (1 if self._layout.narrow_means else 2)
+        return means + 2 * self._layout.tables.n_classes + (_LOSING if self._layout.groups else _LOSING_JOINTS)
 
 
 def rises(layout: Layout, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDArray[np.int64]:

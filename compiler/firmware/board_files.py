@@ -11,7 +11,7 @@ from thenar.runtime.tables import IntegerTables
 from . import FirmwareError
 from .board import Board, check_switches, glove_toml, key_names, rows_and_columns
 from .board_inputs import expanders_file, joints_file, matrix_file, pair, pins_file, text, wrapped
-from .layout import Layout
+from .layout import NO_SWITCH, Layout, Ports
 from .protocol import BoardConfig
 from .targets.avr import best_setting
 from .targets.base import Mode
@@ -144,7 +144,7 @@ def config_of(board: Board, switches: Sequence[str], tables: IntegerTables, *, r
 
 _MOST_GRASPS = 255  # a grasp is a byte on the line, and 255 says that there is none
 _WHOLE_US = 50_000  # between whole scans of a board that sends no heartbeats
-_NO_SWITCH, _NO_SWITCH_OF_MANY = 0xFF, 0xFFFF
+_BYTE = 0xFF
 _NUMBERS_A_LINE = 14
 
 
@@ -201,8 +201,6 @@ def _joints(identifier: str, names: Names, layout: Layout, board: Board) -> dict
 
 def _glove_main(identifier: str, names: Names, board: Board, joints: bool, early_exit: bool) -> str:
     switches = tuple(switch.name for switch in names.switches)
-    few, narrow = len(switches) < _NO_SWITCH, len(switches) <= _NO_SWITCH + 1
-    no_switch = _NO_SWITCH if few else _NO_SWITCH_OF_MANY
     return text(
         "glove_main.c",
         name=identifier,
@@ -211,24 +209,29 @@ def _glove_main(identifier: str, names: Names, board: Board, joints: bool, early
         attended=joints and board.cyberglove is not None,
         chips=bool(board.chips),
         early_exit=early_exit,
+        ghosts=board.matrix is not None and not board.matrix.diodes,
         whole_us=board.heartbeat_us or _WHOLE_US,
-        number_of_entry="(uint8_t)number" if narrow and not few else "number",
-        number_of_key="(uint8_t)key" if narrow else "key",
-        no_switch=no_switch,
-        table_type="uint8_t" if few else "uint16_t",
-        table_read="pgm_read_byte" if few else "pgm_read_word",
-        switch_of_key=_switch_of_key(board, switches, no_switch),
+        many_keys=len(key_names(board, switches)) > _BYTE,
+        keys_of_switches=_keys_of_switches(board, switches),
     )
 
 
-def _switch_of_key(board: Board, switches: Sequence[str], no_switch: int) -> list[str]:
-    """Return, in lines of C, the number of the switch of each key of a matrix; elsewhere key k is switch k."""
+def key_ports(board: Board, switches: Sequence[str]) -> Ports:
+    """Return the bytes of the bitmap of the board's keys, all of them, as ports of a build's `switches`."""
+    numbers = {name: number for number, name in enumerate(switches)}
+    keys = [numbers.get(key, NO_SWITCH) for key in key_names(board, switches)]
+    return tuple(tuple(keys[at : at + 8]) for at in range(0, len(keys), 8))
+
+
+def _keys_of_switches(board: Board, switches: Sequence[str]) -> list[str]:
+    """Return, in lines of C, the key of each switch of a matrix; elsewhere key k is switch k."""
     if board.matrix is None:
         return []
-    numbers = {name: number for number, name in enumerate(switches)}
-    keys = [numbers.get(key, no_switch) for key in key_names(board, switches)]
-    width = min(len(board.matrix.columns), _NUMBERS_A_LINE)
-    return [", ".join(f"{key}u" for key in keys[at : at + width]) for at in range(0, len(keys), width)]
+    places = {name: key for key, name in enumerate(key_names(board, switches))}
+    keys = [places[name] for name in switches]
+    return [
+        ", ".join(f"{key}u" for key in keys[at : at + _NUMBERS_A_LINE]) for at in range(0, len(keys), _NUMBERS_A_LINE)
+    ]
 
 
 def _inputs_in_words(board: Board) -> str:

@@ -13,7 +13,7 @@ from thenar.runtime.tables import IntegerTables
 
 from . import FirmwareError
 from .costs import Cost
-from .layout import LARGEST_GROUP, MOST_ROWS, SMALLEST_GROUP, Adding, Bins, Layout, Shared, arrange
+from .layout import LARGEST_GROUP, MOST_ROWS, SMALLEST_GROUP, Adding, Bins, Layout, Ports, Shared, arrange
 from .targets import TARGETS, Target
 
 Option = tuple[Layout, Cost]
@@ -35,8 +35,17 @@ class Choice:
     frontier: tuple[Option, ...]
 
 
-def choose(tables: IntegerTables, target: Target, *, flash: int | None = None, entry_bits: int | None = None) -> Choice:
+def choose(
+    tables: IntegerTables,
+    target: Target,
+    *,
+    ports: Ports | None = None,
+    flash: int | None = None,
+    entry_bits: int | None = None,
+) -> Choice:
     """Return the fastest layout of `tables` that takes at most `flash` bytes, of equally fast ones the smallest.
+
+    ports say how the switches come, as in `arrange`.
 
     flash is one of `flash_shares` unless given; entry_bits allows only 8 or 16, else both that are possible.
     Raises FirmwareError if no layout fits, the tables cannot be laid out, or the part has not as much flash.
@@ -45,7 +54,7 @@ def choose(tables: IntegerTables, target: Target, *, flash: int | None = None, e
         raise FirmwareError(
             f"the classifier cannot be allowed {flash} bytes of flash: {target.named} has {target.flash} bytes"
         )
-    options = [(layout, target.cost(layout)) for layout in _layouts(tables, target, entry_bits)]
+    options = [(layout, target.cost(layout)) for layout in _layouts(tables, target, ports, entry_bits)]
     best = frontier(options)
     for allowed in flash_shares(target) if flash is None else (flash,):
         for layout, cost in best:
@@ -78,7 +87,7 @@ def flash_shares(target: Target) -> tuple[int, int]:
     return min(target.flash // 2, target.most_flash), min(target.flash * 3 // 4, target.most_flash)
 
 
-def _layouts(tables: IntegerTables, target: Target, entry_bits: int | None) -> Iterator[Layout]:
+def _layouts(tables: IntegerTables, target: Target, ports: Ports | None, entry_bits: int | None) -> Iterator[Layout]:
     """Yield the layouts that there are. Raises FirmwareError if there is none, saying why not."""
     refused: FirmwareError | None = None
     found = False
@@ -86,7 +95,7 @@ def _layouts(tables: IntegerTables, target: Target, entry_bits: int | None) -> I
     for bits, size, bins in product((8, 16) if entry_bits is None else (entry_bits,), sizes, _bins(tables)):
         try:
             for shared in _sharings(tables, -(-tables.n_switches // size)):
-                layout = arrange(tables, group_size=size, entry_bits=bits, bins=bins, shared=shared)
+                layout = arrange(tables, ports=ports, group_size=size, entry_bits=bits, bins=bins, shared=shared)
                 found = True
                 yield from (replace(layout, adding=adding) for adding in _addings(target))
         except FirmwareError as reason:
@@ -177,18 +186,19 @@ class Fit:
         return f"for {self.target.part}: {self.choice.why}"
 
 
-def fit_for(target: Target, tables: IntegerTables, flash: int | None = None) -> Fit:
-    """Return the part that firmware for a target is for, and the layout chosen for it, in `flash` bytes where given.
+def fit_for(target: Target, tables: IntegerTables, flash: int | None = None, ports: Ports | None = None) -> Fit:
+    """Return the part that firmware for a target is for, and the layout chosen for it, in `flash` bytes where given;
+    `ports` as in `choose`.
 
     Raises FirmwareError if no layout fits.
     """
     if target.own_layout:
-        return Fit(target, choose(tables, target, flash=flash))
-    fit = smallest_fit(tables, flash=flash)
+        return Fit(target, choose(tables, target, ports=ports, flash=flash))
+    fit = smallest_fit(tables, flash=flash, ports=ports)
     return fit if target.any_part else Fit(target, fit.choice)
 
 
-def smallest_fit(tables: IntegerTables, *, kind: str = "", flash: int | None = None) -> Fit:
+def smallest_fit(tables: IntegerTables, *, kind: str = "", flash: int | None = None, ports: Ports | None = None) -> Fit:
     """Return the smallest part that holds the tables, of those that builds carry firmware for, or that are of `kind`;
     in `flash` bytes where given, or in all that the part has if that is less.
 
@@ -198,9 +208,10 @@ def smallest_fit(tables: IntegerTables, *, kind: str = "", flash: int | None = N
     *smaller, largest = sorted(candidates, key=lambda target: target.flash)
     for target in smaller:
         with suppress(FirmwareError):
-            return _fit(tables, target, flash)
-    return _fit(tables, largest, flash)
+            return _fit(tables, target, flash, ports)
+    return _fit(tables, largest, flash, ports)
 
 
-def _fit(tables: IntegerTables, target: Target, flash: int | None) -> Fit:
-    return Fit(target, choose(tables, target, flash=None if flash is None else min(flash, target.flash)))
+def _fit(tables: IntegerTables, target: Target, flash: int | None, ports: Ports | None) -> Fit:
+    most = None if flash is None else min(flash, target.flash)
+    return Fit(target, choose(tables, target, ports=ports, flash=most))

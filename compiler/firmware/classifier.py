@@ -14,8 +14,8 @@ from thenar.runtime.manifest import Calibration
 from thenar.runtime.tables import Slope
 
 from .assembly import assembly_values, calls_are_near, check_size
-from .layout import MOST_INLINE, JointLayout, Layout, Lookup, Parts
-from .words import Names, comment, inputs_in_words, string
+from .layout import MOST_INLINE, NO_SWITCH, Field, JointLayout, Layout, Lookup, Parts
+from .words import Names, comment, inputs_in_words, string, switches_in_words
 
 _STARTS_PER_LINE = 4
 _HIGHEST = 65535  # no code is above it
@@ -156,7 +156,11 @@ def _storing(lanes: int, biased: bool, shift: int) -> list[str]:
 def _find(name: str, layout: Layout, lookup: Lookup) -> list[str]:
     """Return the statement that finds the row of one look-up, in lines."""
     source = f"thenar_{name}_input."
-    found = [] if lookup.group is None else [f"{source}switches[{lookup.group}]"]
+    found: list[str] = []
+    if lookup.group is not None:
+        fields = layout.fields[lookup.group]
+        alone = len(fields) == 1 or not (lookup.joints or lookup.first_row)
+        found = [" | ".join(map(_field, fields)) if alone else f"({' | '.join(map(_field, fields))})"]
     for joint in lookup.joints:
         code = f"{source}codes[{joint.number}]"
         if joint.compared:
@@ -173,6 +177,13 @@ def _find(name: str, layout: Layout, lookup: Lookup) -> list[str]:
             found.append(f"thenar_{name}_bins[{_after(joint.first_bin, place)}]")
     statement = f"row[{lookup.index}] = &thenar_{name}_rows[{_after(lookup.first_row, ' + '.join(found))}];"
     return textwrap.wrap(statement, COLUMNS - 8, subsequent_indent=_INDENT, break_long_words=False)
+
+
+def _field(field: Field) -> str:
+    """Return the expression of a field of a port's byte, at its place in the group's."""
+    by, mask = field.bit - field.to, ((1 << field.width) - 1) << field.to
+    moved = f"((uint32_t)ports[{field.port}] {'>>' if by > 0 else '<<'} {abs(by)})" if by else f"ports[{field.port}]"
+    return f"({moved} & 0x{mask:02X}u)"
 
 
 def _lane_words(rows: list[list[int]], lanes: Sequence[tuple[int, int]]) -> list[str]:
@@ -239,7 +250,7 @@ def _lookup_lines(layout: Layout, names: Names, lookup: Lookup, columns: slice) 
     if lookup.group is not None:
         numbers = layout.groups[lookup.group]
         switches = [names.switches[number].name for number in numbers]
-        headings.append(f"switches {numbers[0]} to {numbers[-1]}: " + ", ".join(map(comment, switches)))
+        headings.append(f"{switches_in_words(numbers)}: " + ", ".join(map(comment, switches)))
         says = [_closed(switches, byte) for byte in range(1 << len(numbers))]
     for joint in lookup.joints:
         name = comment(names.joints[joint.number].name)
@@ -310,7 +321,7 @@ def classifier_files(
         check_size(layout)
     common = _common_values(name, names, layout, avr)
     texts: dict[str, dict[str, object]] = {
-        ".h": {"groups": _group_notes(names, layout), "joints": _joint_notes(names)},
+        ".h": {"ports": _port_notes(names, layout), "joints": _joint_notes(names)},
         ".c": _source_values(names, layout) | portable_values(name, layout),
     }
     if avr:
@@ -349,7 +360,7 @@ def _common_values(name: str, names: Names, layout: Layout, avr: bool) -> dict[s
         "avr": avr,
         "classes": n_classes,
         "switches": n_switches,
-        "n_groups": len(layout.groups),
+        "n_ports": len(layout.ports),
         "n_joints": n_joints,
         "class_type": _unsigned(n_classes),
         "switch_type": _unsigned(n_switches),
@@ -373,6 +384,7 @@ def _source_values(names: Names, layout: Layout) -> dict[str, object]:
     searched = [joint for joint in layout.joints if joint.compared and len(joint.thresholds) > MOST_INLINE]
     trimmed = [joint for joint in layout.joints if not joint.compared]
     steps = [step for joint in searched for step in joint.thresholds.tolist()]
+    means = layout.means
     return {
         "table": table_lines(layout, names),
         "bins": [line for joint in trimmed for line in _bin_lines(names, joint)],
@@ -382,11 +394,15 @@ def _source_values(names: Names, layout: Layout) -> dict[str, object]:
         "compared": bool(searched),
         "thresholds": number_lines(steps),
         "n_thresholds": len(steps),
+        "means": _mean_lines(means),
+        "mean_type": "int8_t" if layout.narrow_means else "int16_t",
+        "n_inputs": len(means),
+        "starts": number_lines(layout.start.tolist()),
         "open_scores": number_lines(layout.all_open.tolist()),
         "names": [string(grasp) for grasp in names.grasps],
         "longest_name": max(len(grasp.encode()) for grasp in names.grasps) + 1,
         "places": _place_lines(layout),
-        "group_type": _unsigned(len(layout.groups)),
+        "port_type": _unsigned(len(layout.ports)),
         "first_classes": number_lines(layout.parts.firsts),
         "avr_macros": avr_macros(layout.parts.width, layout.entry_bits),
     }
@@ -398,16 +414,26 @@ def _bin_lines(names: Names, joint: JointLayout) -> list[str]:
     return [*remark(comment(f"{name}, from code {joint.first} on")), *number_lines(joint.bins.tolist())]
 
 
+def _mean_lines(means: NDArray[np.int64]) -> list[str]:
+    """Return a row of the means in braces for each input, as words of 16 bits."""
+    lines = []
+    for row in means.astype(np.int16).tolist():
+        first, *more = number_lines(row)
+        held = [f"{_INDENT}{{{first.lstrip()}", *more]
+        lines += [*held[:-1], f"{held[-1].removesuffix(',')}}},"]
+    return lines
+
+
 def _place_lines(layout: Layout) -> list[str]:
-    """Return a line per group: for each of its switches the number of the group and the bit."""
-    return [
-        "    " + " ".join(f"{{{g}, {1 << bit}}}," for bit in range(len(numbers)))
-        for g, numbers in enumerate(layout.groups)
-    ]
+    """Return for each switch the number of its port and the bit, eight on a line."""
+    pairs = [f"{{{port}, {1 << bit}}}," for port, bit in layout.places]
+    return [_INDENT + " ".join(pairs[at : at + 8]) for at in range(0, len(pairs), 8)]
 
 
-def _group_notes(names: Names, layout: Layout) -> list[str]:
-    return [", ".join(comment(names.switches[number].name) for number in numbers) for numbers in layout.groups]
+def _port_notes(names: Names, layout: Layout) -> list[str]:
+    shown = (("-" if n == NO_SWITCH else comment(names.switches[n].name) for n in port) for port in layout.ports)
+    wrapped = (textwrap.wrap(", ".join(port), COLUMNS - 20, break_on_hyphens=False) for port in shown)
+    return [f"\n{' ' * 18}".join(lines) for lines in wrapped]
 
 
 def _joint_notes(names: Names) -> list[str]:

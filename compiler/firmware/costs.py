@@ -22,8 +22,9 @@ class Cost:
     cycles          that classify() takes for any frame; elsewhere than on an AVR instructions
     update_cycles   that update() takes, whatever has changed
     flash           bytes of all of it, with names of grasp types of up to 15 bytes
-    flash_classify  of these, bytes that a program has which never calls update(), where the linker leaves out what is
-                    not called (--gc-sections; code in C compiled with -ffunction-sections)
+    flash_classify  of these, bytes that a program has which never calls update() and never says that an input is
+                    missing, where the linker leaves out what is not called (--gc-sections; C compiled with
+                    -ffunction-sections -fdata-sections)
     ram             bytes, stack included, whichever of the two is called
     """
 
@@ -67,11 +68,14 @@ _SEARCHED, _SEARCH_STEP = 16, 11
 _DISTANCE, _MOVED, _MULTIPLYING, _WORD, _HALVES = 14, 5, 17, 2, 8
 
 # Of code; where classes are added up in parts, that takes more.
-_BYTES, _BYTES_PARTS, _BYTES_CLASS = 96, 432, 15
+_BYTES, _BYTES_PARTS, _BYTES_CLASS = 186, 432, 15
 _BYTES_WORD, _BYTES_QUAD, _BYTES_START = 7, 20, 41
 _BYTES_UPDATE, _BYTES_UPDATE_PAIR, _BYTES_UPDATE_QUAD = 172, 11, 40
 _BYTES_JOINT, _BYTES_CLAMPED, _BYTES_COMPARED, _BYTES_SEARCHED = 11, 35, 11, 55
 _BYTES_MULTIPLYING, _BYTES_PRODUCT, _BYTES_DISTANCE = 150, 30, 24
+# Of what replaces missing inputs, beside the table of their means; instructions that take a field of a port's byte, and
+# that see that nothing is missing.
+_BYTES_LOSING, _FIELD, _MISSING = 290, 3, 3
 _STACK = 128
 
 
@@ -79,6 +83,7 @@ def word_cost(layout: Layout, core: Core) -> Cost:
     """Return what the portable C takes on a core, roughly."""
     parts, classes = len(layout.parts.firsts), layout.tables.n_classes
     words, finding = _words(layout), sum(_finding(layout, joint, core) for joint in layout.joints)
+    finding += _MISSING + _FIELD * sum(map(len, layout.fields))
     word, replaced = (core.quad, core.replaced_quad) if layout.biased else (core.pair, core.replaced_pair)
     adding = parts * (core.part + words * word)
     replacing = _REPLACING + parts * words * replaced
@@ -88,7 +93,8 @@ def word_cost(layout: Layout, core: Core) -> Cost:
     classify, update = classify + multiplying, update + multiplying + _MOVED * slopes
     flash = _flash(layout) + NAME_BYTES * (classes + 1)
     update_flash = _BYTES_UPDATE + words * (_BYTES_UPDATE_QUAD if layout.biased else _BYTES_UPDATE_PAIR)
-    return Cost(classify, update, flash + update_flash, flash, _ram(layout))
+    losing = _BYTES_LOSING + layout.means.size * (1 if layout.narrow_means else 2)
+    return Cost(classify, update, flash + update_flash + losing, flash, _ram(layout))
 
 
 def _multiplying(layout: Layout, core: Core) -> int:
@@ -126,7 +132,7 @@ def _flash(layout: Layout) -> int:
     """
     parts, words, lookups = layout.parts, _words(layout), len(layout.lookups)
     rows = 4 * layout.n_rows * words * len(parts.firsts) + sum(len(joint.bins) for joint in layout.joints)
-    places = layout.tables.n_switches * (2 if len(layout.groups) <= 255 else 4)
+    places = layout.tables.n_switches * (2 if len(layout.ports) <= 255 else 4)
     starts = 2 * len(parts.firsts) * (2 * parts.width + 8)  # of the sums, constant and as they are in the beginning
     starts += 2 * layout.tables.n_classes + 4 * lookups  # scores, and rows added, in the beginning
     code = _BYTES + (_BYTES_PARTS if len(parts.firsts) > 1 else 0) + _BYTES_CLASS * parts.width
@@ -151,7 +157,8 @@ def _joint_flash(layout: Layout, joint: JointLayout) -> int:
 def _ram(layout: Layout) -> int:
     """Return the bytes of variables and stack, roughly."""
     classes = layout.tables.n_classes
-    frame = len(layout.groups) + layout.padding + layout.tables.n_joints * layout.code_bits // 8
+    lost = len(layout.ports) + -(-layout.tables.n_joints // 8) + 4
+    frame = len(layout.ports) + layout.padding + layout.tables.n_joints * layout.code_bits // 8
     rows = 2 * 4 * len(layout.lookups)  # pointers to those added, and in update() to those that are now
     slopes = 4 * len(layout.tables.slopes)  # distances added, and in update() those that are now
-    return frame + 2 * classes + 2 * (classes + 6) + rows + slopes + _STACK
+    return frame + 2 * classes + 4 * (classes + 6) + lost + rows + slopes + _STACK

@@ -11,14 +11,16 @@ from functools import cached_property
 from pathlib import Path
 
 from thenar.runtime.files import read_file
+from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.tables import IntegerTables
 
 from ..publication import check_folder, entries, publish_folder
 from . import FirmwareError
 from .board import Board
-from .board_files import board_files, board_makefile, config_of, exits_early, readings, switches_of
+from .board_files import board_files, board_makefile, config_of, exits_early, key_ports, readings, switches_of
 from .choose import Fit, fit_for, smallest_fit
 from .classifier import LIBRARY_NAME, Library
+from .layout import Ports, ports_of_scan
 from .protocol import decided_files, protocol_files
 from .targets import TARGETS, Target
 from .targets.base import Mode
@@ -33,6 +35,7 @@ class Firmware:
     mode         "classify": a library; "scan": a board that scans switches; "glove": one that also recognises
     name         what its files and functions are called: lower-case letters, digits and _, at most 32
     board        how the microcontroller is wired: needed by the modes scan and glove, and only by them
+    scan         how the build's harness is read, where it has one: a library takes its switches as they come from there
     flash        how many bytes of flash the classifier may take; None: half of the part's, three quarters where half
                  is too little
 
@@ -47,6 +50,7 @@ class Firmware:
     name: str = LIBRARY_NAME
     board: Board | None = None
     flash: int | None = None
+    scan: ScanMap | None = None
 
     def __post_init__(self) -> None:
         check_name(self.name)
@@ -71,7 +75,14 @@ class Firmware:
         """The part that it is for, and the layout chosen for it. Raises FirmwareError if no layout fits."""
         if self.mode == "scan":  # a board that only scans holds no classifier
             return smallest_fit(self.tables, flash=self.flash)
-        return fit_for(self._target, self.tables, self.flash)
+        return fit_for(self._target, self.tables, self.flash, self._ports)
+
+    @property
+    def _ports(self) -> Ports | None:
+        """How the switches come: eight keys of the board after eight, or as they are read of the build's harness."""
+        if self.board is None:
+            return ports_of_scan(self.scan)
+        return key_ports(self.board, tuple(switch.name for switch in self.names.switches))
 
     def library(self, notes: Sequence[str] = ()) -> Library:
         """Return the classifier alone, with lines for its opening comments."""

@@ -4,8 +4,10 @@ how a joint's code becomes a row.
     score_k = start_k + sum over look-ups l of rows_l[n_l, k] + sum over slopes of distance * row[k]
 
 where n_l is the byte of a group of switches, one bit per switch, or is added up from the codes of one or a few joints,
-or both. Every row is the exact sum of its switches' and joints' rows, so the scores are those of `IntegerTables`, bit
-for bit. There are three kinds of entries:
+or both. A frame holds the switches as they come, a byte for each port: eight wires of an expander, eight keys of a
+matrix, or eight kept switches in their order; a group is put together from fields of such bytes. Every row is the exact
+sum of its switches' and joints' rows, so the scores are those of `IntegerTables`, bit for bit. There are three kinds of
+entries:
 
     16 bits, added up in 16. They wrap around at will, for all scores fit; row 0 of a group of switches is zero, so that
              one switch's change is plus or minus row 2^bit.
@@ -15,13 +17,16 @@ for bit. There are three kinds of entries:
              entries are of their upper halves.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import chain
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.tables import COARSE, IntegerTables
 
 from . import FirmwareError
@@ -111,6 +116,43 @@ def check_joints(tables: IntegerTables, bins: Bins) -> None:
             )
 
 
+Ports = tuple[tuple[int, ...], ...]
+"""For each port the switches of its bits, bit 0 first, at most eight; NO_SWITCH where a bit shows none."""
+NO_SWITCH = -1
+
+
+def consecutive(n_switches: int) -> Ports:
+    """Return the ports of switches that are wired to nothing known: eight after eight."""
+    return tuple(tuple(range(first, min(first + 8, n_switches))) for first in range(0, n_switches, 8))
+
+
+def ports_of(pairs: Iterable[tuple[int, int]]) -> Ports:
+    """Return the ports of an answer, or of a bitmap of keys, of which `pairs` say bit and switch; bytes that show no
+    switch are left out.
+    """
+    ports: dict[int, list[int]] = {}
+    for bit, number in sorted(pairs):
+        ports.setdefault(bit // 8, [NO_SWITCH] * 8)[bit % 8] = number
+    return tuple(map(tuple, ports.values()))
+
+
+def ports_of_scan(scan: ScanMap | None) -> Ports | None:
+    """Return the ports of a build that was compiled for a harness: its boards', then its readings', byte by byte."""
+    if scan is None:
+        return None
+    return tuple(chain(*map(ports_of, (*scan.scanners, *(port.switches for port in scan.ports)))))
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """`width` bits of the byte of a port, from `bit` on, which are those of a group from `to` on."""
+
+    port: int
+    bit: int
+    width: int
+    to: int
+
+
 SMALLEST_GROUP, LARGEST_GROUP = 2, 6
 MOST_TABLE_ROWS = 65535  # their numbers are 16 bits wide
 
@@ -154,15 +196,16 @@ class Lookup:
         return sum(joint.most for joint in self.joints)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Layout:
-    """An arrangement of `tables` for K classes, s switches and j joints.
+    """An arrangement of `tables` for K classes, s switches and j joints, each switch in one of `ports`.
 
-    groups[g] are the numbers of the switches that share byte g of the frame, bit 0 first; rows of look-ups are int16,
+    groups[g] are the numbers of the switches of a group, bit 0 first; rows of look-ups are int16,
     uint8 or int8, as entry_bits and sum_bits say; code_bits as the function of that name says; start (K,) int64.
     """
 
     tables: IntegerTables
+    ports: Ports
     groups: tuple[tuple[int, ...], ...]
     entry_bits: int
     sum_bits: int
@@ -184,13 +227,13 @@ class Layout:
 
     @property
     def padding(self) -> int:
-        """Bytes, 0 or 1, between the groups' bytes and the codes, so that codes of 16 bits lie at even offsets."""
-        return len(self.groups) % 2 if self.code_bits == 16 else 0
+        """Bytes, 0 or 1, between the ports' bytes and the codes, so that codes of 16 bits lie at even offsets."""
+        return len(self.ports) % 2 if self.code_bits == 16 else 0
 
     @property
     def frame_size(self) -> int:
         """Bytes of a frame as `frame_bytes` makes them."""
-        return len(self.groups) + self.padding + self.tables.n_joints * self.code_bits // 8
+        return len(self.ports) + self.padding + self.tables.n_joints * self.code_bits // 8
 
     @property
     def parts(self) -> Parts:
@@ -214,6 +257,48 @@ class Layout:
         scores: NDArray[np.int64] = self.scores(*nothing)[0]
         return scores
 
+    @property
+    def places(self) -> tuple[tuple[int, int], ...]:
+        """The port and the bit of each switch."""
+        found = {n: (p, bit) for p, port in enumerate(self.ports) for bit, n in enumerate(port) if n != NO_SWITCH}
+        return tuple(found[number] for number in range(self.tables.n_switches))
+
+    @cached_property
+    def fields(self) -> tuple[tuple[Field, ...], ...]:
+        """What each group's byte is put together from: bits that follow each other in one port are one field."""
+        places, found = self.places, []
+        for numbers in self.groups:
+            fields: list[Field] = []
+            for to, (port, bit) in enumerate(places[number] for number in numbers):
+                last = fields[-1] if fields else None
+                if last is not None and (last.port, last.bit + last.width) == (port, bit):
+                    fields[-1] = replace(last, width=last.width + 1)
+                else:
+                    fields.append(Field(port, bit, 1, to))
+            found.append(tuple(fields))
+        return tuple(found)
+
+    def port_bytes(self, bits: NDArray[np.bool_]) -> NDArray[np.uint8]:
+        """Return the byte of each port (n, ports) for the switches (n, s)."""
+        shown = np.zeros((len(bits), len(self.ports), 8), bool)
+        for number, (port, bit) in enumerate(self.places):
+            shown[:, port, bit] = bits[:, number]
+        return np.packbits(shown, axis=2, bitorder="little")[:, :, 0]
+
+    @property
+    def means(self) -> NDArray[np.int64]:
+        """What each switch, then each joint, adds to the scores while it is missing, beyond what 0 adds: (s + j, K)."""
+        pairs = zip(self.tables.joint_means, self.tables.joint_rows, strict=True)
+        joints = [mean.astype(np.int64) - rows[0] for mean, rows in pairs]
+        for slope in self.tables.slopes:
+            joints[slope.joint] = joints[slope.joint] - slope.of(np.zeros(1, np.uint16))[0]
+        return np.vstack([self.tables.switch_means.astype(np.int64), *joints])
+
+    @property
+    def narrow_means(self) -> bool:
+        """Whether a byte holds each of the `means`."""
+        return bool((np.abs(self.means) <= MOST_BYTE).all())
+
     def group_bytes(self, bits: NDArray[np.bool_]) -> NDArray[np.uint8]:
         """Return the byte of each group (n, groups) for the switches (n, s)."""
         packed = np.zeros((len(bits), len(self.groups)), np.uint8)
@@ -234,7 +319,7 @@ class Layout:
         return scores if self.sum_bits == 16 else scores.astype(np.int8).astype(np.int64)
 
     def frame_bytes(self, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) -> NDArray[np.uint8]:
-        """Return what the firmware's input structure holds, (n, F): groups, padding, codes (little-endian).
+        """Return what the firmware's input structure holds, (n, F): ports, padding, codes (little-endian).
 
         Where a code has 8 bits, codes above 255 become 255: no threshold tells them apart.
         """
@@ -243,7 +328,7 @@ class Layout:
             held = np.minimum(codes, 255).astype(np.uint8)
         else:
             held = np.ascontiguousarray(codes, "<u2").view(np.uint8).reshape(len(bits), 2 * codes.shape[1])
-        return np.hstack([self.group_bytes(bits), padding, held])
+        return np.hstack([self.port_bytes(bits), padding, held])
 
 
 Shared = tuple[int | None, tuple[int, ...]]
@@ -253,6 +338,7 @@ Shared = tuple[int | None, tuple[int, ...]]
 def arrange(
     tables: IntegerTables,
     *,
+    ports: Ports | None = None,
     group_size: int = 5,
     n_groups: int | None = None,
     entry_bits: int = 16,
@@ -260,9 +346,11 @@ def arrange(
     adding: Adding = "called",
     shared: Sequence[Shared] = (),
 ) -> Layout:
-    """Return `tables` with the switches in groups of at most `group_size` (2 to 6), consecutive and as even as can be.
+    """Return `tables` with the switches in groups of at most `group_size` (2 to 6), in the order of `ports`.
 
-    There are as few groups as that size allows, or `n_groups` where given: more look-ups and less flash. What `shared`
+    There are as few groups as that size allows, or `n_groups` where given: more look-ups and less flash. They are as
+    even as can be, and none is of two ports where as few can do without. Where no wiring is known, `ports` are left
+    out, and switches follow each other by number. What `shared`
     names shares look-ups; every other group, and every other joint that has thresholds, has one of its own. Raises
     FirmwareError if the tables cannot be laid out so: 8-bit entries for look-ups that span more than 255 steps, more
     than 256 rows in a look-up, "direct" for codes of 16 bits, "trimmed" for thresholds further apart than 254 codes, no
@@ -274,7 +362,8 @@ def arrange(
         raise FirmwareError(f"entries of {entry_bits} bits: firmware has 8 or 16")
     check_joints(tables, bins)
     coarse = tables.grid if entry_bits == 8 else 1
-    groups = _grouped(tables.n_switches, group_size, n_groups)
+    ports = consecutive(tables.n_switches) if ports is None else ports
+    groups = _grouped(ports, group_size, n_groups)
     sum_bits = 8 if entry_bits == 8 and tables.bound <= MOST_BYTE and not tables.slopes else 16
     constant = [joint for joint, steps in enumerate(tables.thresholds) if len(steps) == 0]
     start = sum((tables.joint_rows[joint][0].astype(np.int64) for joint in constant), tables.bias.astype(np.int64))
@@ -309,7 +398,7 @@ def arrange(
         start, first_row = start + least, first_row + len(rows)
     if first_row > MOST_TABLE_ROWS:
         raise FirmwareError(f"{first_row} rows: firmware has at most {MOST_TABLE_ROWS}; keep fewer inputs")
-    return Layout(tables, groups, entry_bits, sum_bits, wide, bins, adding, start, tuple(made))
+    return Layout(tables, ports, groups, entry_bits, sum_bits, wide, bins, adding, start, tuple(made))
 
 
 def _all_shared(tables: IntegerTables, n_groups: int, shared: Sequence[Shared]) -> list[Shared]:
@@ -321,16 +410,21 @@ def _all_shared(tables: IntegerTables, n_groups: int, shared: Sequence[Shared]) 
     return sorted([*alone, *shared], key=lambda lookup: (lookup[0] is None, lookup[0] or 0, lookup[1]))
 
 
-def _grouped(n_switches: int, group_size: int, n_groups: int | None) -> tuple[tuple[int, ...], ...]:
+def _grouped(ports: Ports, group_size: int, n_groups: int | None) -> tuple[tuple[int, ...], ...]:
     if not SMALLEST_GROUP <= group_size <= LARGEST_GROUP:
         raise FirmwareError(f"groups of {group_size} switches: {SMALLEST_GROUP} to {LARGEST_GROUP} share a look-up")
-    if n_switches == 0:
-        return ()
-    fewest = -(-n_switches // group_size)
+    shown = [[number for number in port if number != NO_SWITCH] for port in ports]
+    switches = [*chain(*shown)]
+    fewest = -(-len(switches) // group_size)
     count = fewest if n_groups is None else n_groups
-    if not fewest <= count <= n_switches:
-        raise FirmwareError(f"{count} groups of at most {group_size} for {n_switches} switches: {fewest} or more")
-    return tuple(tuple(part.tolist()) for part in np.array_split(np.arange(n_switches), count))
+    if not fewest <= count <= len(switches):
+        raise FirmwareError(f"{count} groups of at most {group_size} for {len(switches)} switches: {fewest} or more")
+    within = [part for port in shown for part in _even(port, -(-len(port) // group_size))]
+    return tuple(within if len(within) == count else _even(switches, count))
+
+
+def _even(numbers: Sequence[int], count: int) -> list[tuple[int, ...]]:
+    return [tuple(part.tolist()) for part in np.array_split(np.asarray(numbers, int), count)] if count else []
 
 
 def _group_sums(tables: IntegerTables, numbers: Sequence[int]) -> NDArray[np.int64]:

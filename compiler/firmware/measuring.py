@@ -15,7 +15,7 @@ from .tools import STRICT, call, find, workshop
 
 _RANDOM = 2000
 # What stands in a section of its own can be left out where nothing calls it.
-_SECTIONS = "-ffunction-sections"
+_SECTIONS = ("-ffunction-sections", "-fdata-sections")
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +129,7 @@ def _size(library: Library, target: Target) -> tuple[int, int, int]:
     kept = [f"-Wl,-u,thenar_{library.name}_{function}" for function in ("classify", "set_switch", "grasp")]
     with workshop(library.files) as folder:
         compiling = [find(target.compiler), *target.flags]
-        call([*compiling, *STRICT, _SECTIONS, "-c", *sources], folder)
+        call([*compiling, *STRICT, *_SECTIONS, "-c", *sources], folder)
         # Variables that are common have no place, and no size for `size`, until they are linked.
         linked = [*compiling, "-r", "-nostdlib", "-Wl,-d", *(path.rsplit(".", 1)[0] + ".o" for path in sources)]
         call([*linked, "-o", "whole.elf"], folder)

@@ -22,6 +22,7 @@ from .layout import Layout, code_bits
 from .words import string
 
 Frames = NDArray[np.uint8]
+Lost = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,24 +78,45 @@ def answers_from(printed: bytes, frames: Frames, layout: Layout) -> Answers:
 
 
 def record_files(
-    name: str, layout: Layout, machine: Literal["host", "cortex"], answer: Literal["classify", "update"]
+    name: str,
+    layout: Layout,
+    machine: Literal["host", "cortex", "avr"],
+    answer: Literal["classify", "update"],
+    *,
+    lost: bool = False,
 ) -> dict[str, str]:
     """Return the files, name -> text, of the program that answers frames with the function `answer` of `name`.
 
-    For classify() it writes the groups' bytes into the input; for update() it calls set_switch() for every switch.
+    For classify() it writes the ports' bytes into the input; for update() it calls set_switch() for every switch. With
+    `lost`, frames come as `with_lost` makes them.
     """
+    values = {"name": name, "answer": answer, "lost_bytes": _lost_bytes(layout) if lost else 0}
+    files = {"main.c": render(f"checking/{machine}_main.c.j2", **values)}
+    if machine == "avr" and not lost:
+        return files
     record = render(
         "checking/record.h.j2",
-        name=name,
+        **values,
         classes=len(layout.start),
-        sizes=[len(numbers) for numbers in layout.groups],
-        by_switch=answer == "update",
+        ports=len(layout.ports),
+        places=[f"{{{port}, {bit}}}" for port, bit in layout.places] if answer == "update" else [],
+        switches=layout.tables.n_switches,
         padding=layout.padding,
         joints=layout.tables.n_joints,
         code_bytes=layout.code_bits // 8,
-        frame_bytes=layout.frame_size,
+        frame_bytes=layout.frame_size + (_lost_bytes(layout) if lost else 0),
+        answers=machine != "avr",
     )
-    return {"record.h": record, "main.c": render(f"checking/{machine}_main.c.j2", name=name, answer=answer)}
+    return files | {"record.h": record}
+
+
+def _lost_bytes(layout: Layout) -> int:
+    return -(-(layout.tables.n_switches + layout.tables.n_joints) // 8)
+
+
+def with_lost(frames: Frames, lost: Lost | None) -> Frames:
+    """Return the frames (n, F), before each of them a bit for each input, switches first, that is `lost` (n, s + j)."""
+    return frames if lost is None else np.hstack([np.packbits(lost, axis=1, bitorder="little"), frames])
 
 
 _BYTE, _WORD = 0xFF, 0xFFFF
@@ -162,6 +184,17 @@ def random_frames(tables: IntegerTables, n: int, seed: int) -> Probes:
         at = turns(tables, joint)
         codes[1::2, joint] = at[random.integers(0, len(at), len(codes[1::2]))]
     return Probes(bits, codes)
+
+
+def lost_inputs(tables: IntegerTables, n: int, seed: int) -> Lost:
+    """Return which inputs, switches first, are missing in n frames (n, s + j): in even ones one alone, each in turn, in
+    odd ones each with a probability of the frame's own, and in the last all.
+    """
+    random, inputs = np.random.Generator(np.random.PCG64(seed)), tables.n_switches + tables.n_joints
+    lost = random.random((n, inputs)) < random.random((n, 1))
+    lost[::2] = np.arange(inputs) == np.arange(len(lost[::2]))[:, np.newaxis] % inputs
+    lost[-1:] = True
+    return lost
 
 
 def turns(tables: IntegerTables, joint: int) -> NDArray[np.uint16]:

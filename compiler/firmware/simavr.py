@@ -7,18 +7,18 @@ The programs that run AVR code are linked to libsimavr, which is under the GPL 3
 import atexit
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
+from typing import Literal
 
 import numpy as np
 
-from thenar.firmware_templates.rendering import render
-
 from . import FirmwareError
 from .layout import Layout
-from .probes import Answers, Frames, check_frames
+from .probes import Answers, Frames, Lost, check_frames, record_files, with_lost
 from .tools import AVR_COMPILER, HOST_COMPILER, STRICT, Tool, call, find, lacking, workshop
 
 _CLOCK_HZ = 16_000_000  # of the simulated time, in which nothing is counted
@@ -86,6 +86,7 @@ def run(
     flags: Sequence[str],
     *,
     incremental: bool = False,
+    lost: Lost | None = None,
 ) -> Answers:
     """Return what the classifier `name` in `files` (file name -> text, for AVR) answers to frames (n, F).
 
@@ -93,28 +94,33 @@ def run(
     `stack` the most that any frame took, the return address included.
 
     incremental  each answer comes from update(), the change since the frame before, instead of classify()
+    lost         (n, s + j) inputs that are missing in each frame: neither cycles nor stack are those of an answer then
 
     Raises FirmwareError if compiler or simulator are missing, or the files do not compile without any warning or do not
     fit, or the program does not answer.
     """
     check_frames(frames, layout)
-    answer = "update" if incremental else "classify"
+    answer: Literal["classify", "update"] = "update" if incremental else "classify"
     command = [find(AVR_COMPILER), *STRICT, *flags]
     program = harness("simavr_classify")
-    main = {"main.c": render("checking/avr_main.c.j2", name=name, answer=answer)}
+    main = record_files(name, layout, "avr", answer, lost=lost is not None)
+    sent, function, held = (
+        with_lost(frames, lost),
+        answer if lost is None else "answer",
+        "input" if lost is None else "record",
+    )
     with workshop({**files, **main}) as folder:
         sources = sorted(path for path in (*files, *main) if path.endswith((".c", ".S")))
         call([*command, *sources, "-o", "classifier.elf"], folder)
         found = _symbols(folder)
         spans = (
-            _span(found, f"thenar_{name}_input", frames.shape[1]),
+            _span(found, f"thenar_{name}_{held}", sent.shape[1]),
             _span(found, f"thenar_{name}_scores", 2 * len(layout.start)),
         )
-        places = (hex(_symbol(found, symbol)[0]) for symbol in (f"thenar_{name}_{answer}", "_end"))
-        printed = call(
-            [str(program), part, str(_CLOCK_HZ), "classifier.elf", *places, *spans], folder, frames.tobytes()
-        )
-    return _answers(printed, len(frames), layout)
+        places = (hex(_symbol(found, symbol)[0]) for symbol in (f"thenar_{name}_{function}", "_end"))
+        printed = call([str(program), part, str(_CLOCK_HZ), "classifier.elf", *places, *spans], folder, sent.tobytes())
+    answers = _answers(printed, len(frames), layout)
+    return answers if lost is None else replace(answers, cost=None, unit="", stack=None)
 
 
 def _symbols(folder: Path) -> dict[str, tuple[int, int]]:

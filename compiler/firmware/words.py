@@ -2,6 +2,7 @@
 
 import hashlib
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.metadata import version
@@ -80,6 +81,14 @@ def inputs_in_words(switches: int, joints: int) -> str:
     """Return how many inputs there are, leaving out what there is none of: "31 switches and 1 joint"."""
     counts = ((switches, "switch", "switches"), (joints, "joint", "joints"))
     return " and ".join(f"{count} {one if count == 1 else more}" for count, one, more in counts if count)
+
+
+def switches_in_words(numbers: Sequence[int]) -> str:
+    """Return which switches these are: "switches 3 to 7", or each where they do not follow each other."""
+    first, last = numbers[0], numbers[-1]
+    if list(numbers) == list(range(first, last + 1)):
+        return f"switches {first} to {last}" if last > first else f"switch {first}"
+    return "switches " + ", ".join(map(str, numbers))
 
 
 def comment(text: str) -> str:

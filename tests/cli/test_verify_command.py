@@ -111,6 +111,7 @@ def test_a_difference_is_shown_with_both_answers(capsys: pytest.CaptureFixture[s
         part="cortex-m4",
         layout="",
         answer="update",
+        missing=False,
         frames=10,
         differing=2,
         first=first,

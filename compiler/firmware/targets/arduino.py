@@ -18,7 +18,7 @@ _FIRST_PIN = 2  # 0 and 1 are the serial port's
 _TYPES = ("frame", "class", "switch", "code")
 _FUNCTIONS = ("set_switch", "classify", "update", "grasp")
 _VARIABLES = ("input", "scores")
-_CONSTANTS = ("CLASSES", "SWITCHES", "GROUPS", "JOINTS")
+_CONSTANTS = ("CLASSES", "SWITCHES", "PORTS", "JOINTS")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,7 @@ from .base import Mode, Target
 if TYPE_CHECKING:
     from ..classifier import Library
     from ..layout import Layout
-    from ..probes import Answers, Frames
+    from ..probes import Answers, Frames, Lost
 
 _DIVIDERS = 4096
 _USUAL = (9600, 19_200, 38_400, 57_600, 76_800, 115_200, 230_400, 250_000, 500_000, 1_000_000, 2_000_000)
@@ -71,12 +71,19 @@ class Avr(Target):
         return missing()
 
     def run(
-        self, files: Mapping[str, str], name: str, layout: "Layout", frames: "Frames", *, incremental: bool = False
+        self,
+        files: Mapping[str, str],
+        name: str,
+        layout: "Layout",
+        frames: "Frames",
+        *,
+        incremental: bool = False,
+        lost: "Lost | None" = None,
     ) -> "Answers":
         """Return the answers to frames (n, F) in simavr, as the base says, with their cycles and their stack."""
         from ..simavr import run
 
-        return run(files, name, layout, frames, self.part, self.flags, incremental=incremental)
+        return run(files, name, layout, frames, self.part, self.flags, incremental=incremental, lost=lost)
 
 
 @dataclass(frozen=True, slots=True)

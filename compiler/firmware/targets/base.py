@@ -11,7 +11,7 @@ from ..tools import Tool
 if TYPE_CHECKING:
     from ..classifier import Library
     from ..layout import Layout
-    from ..probes import Answers, Frames
+    from ..probes import Answers, Frames, Lost
 
 Mode = Literal["classify", "scan", "glove"]
 
@@ -112,12 +112,21 @@ class Target:
         return f"thenar has no simulator of {self.named}"
 
     def run(
-        self, files: Mapping[str, str], name: str, layout: "Layout", frames: "Frames", *, incremental: bool = False
+        self,
+        files: Mapping[str, str],
+        name: str,
+        layout: "Layout",
+        frames: "Frames",
+        *,
+        incremental: bool = False,
+        lost: "Lost | None" = None,
     ) -> "Answers":
         """Return what the classifier `name` answers to frames (n, F), uint8 as `layout.frame_bytes` makes them.
 
         files        of `classifier_files(name, names, layout, avr=self.avr)`: file name -> text
         incremental  each answer comes from update(), the change since the frame before, instead of classify()
+        lost         (n, s + j) bool: the switches and the joints that are missing in each frame; what answers then take
+                     is not counted
 
         Raises FirmwareError if a tool is missing, or the files do not compile without any warning, do not fit, or do
         not run.

@@ -21,7 +21,7 @@ from .base import Target
 if TYPE_CHECKING:
     from ..classifier import Library
     from ..layout import Layout
-    from ..probes import Answers, Frames
+    from ..probes import Answers, Frames, Lost
 
 _SHIFT = 9
 STACK = 512  # bytes that the linker keeps free: main() and an answer take less
@@ -73,24 +73,25 @@ class CortexM(Target):
         frames: "Frames",
         *,
         incremental: bool = False,
+        lost: "Lost | None" = None,
         limit_s: float = LIMIT_S,
     ) -> "Answers":
         """Return the answers to frames (n, F) in qemu, as the base says, with the instructions that they took.
 
         limit_s  the emulator is stopped after that time, which is an error
         """
-        from ..probes import check_frames, record_files
+        from ..probes import check_frames, record_files, with_lost
 
         check_frames(frames, layout)
         assert self.compiler is not None
         compiler, emulator = find(self.compiler), find(ARM_EMULATOR)
-        main = record_files(name, layout, "cortex", "update" if incremental else "classify")
+        main = record_files(name, layout, "cortex", "update" if incremental else "classify", lost=lost is not None)
         bare = bare_files(self.machine.flash, self.machine.ram)
         sources = sorted(path for path in files if path.endswith(".c"))
         linked = ["-nostdlib", "-T", "link.ld", "main.c", "startup.c", *sources, "-lgcc", "-o", "classifier.elf"]
         quiet = ["-display", "none", "-monitor", "none", "-serial", "none"]
         counted = ["-icount", f"shift={_SHIFT}", "-semihosting-config", "enable=on,target=native"]
-        with workshop({**files, **main, **bare, "frames": frames.tobytes()}) as folder:
+        with workshop({**files, **main, **bare, "frames": with_lost(frames, lost).tobytes()}) as folder:
             call([compiler, *STRICT, *self.flags, *linked], folder)
             emulating = [emulator, "-M", self.machine.name, *quiet, *counted, "-kernel", "classifier.elf"]
             call(emulating, folder, limit_s=limit_s)

@@ -10,7 +10,7 @@ from .base import Target
 if TYPE_CHECKING:
     from ..classifier import Library
     from ..layout import Layout
-    from ..probes import Answers, Frames
+    from ..probes import Answers, Frames, Lost
 
 _SANITIZE = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
@@ -44,6 +44,7 @@ class Host(Target):
         frames: "Frames",
         *,
         incremental: bool = False,
+        lost: "Lost | None" = None,
         compiler: str | None = None,
         sanitize: bool = True,
     ) -> "Answers":
@@ -52,15 +53,17 @@ class Host(Target):
         compiler  "gcc" or "clang"; without it, the first that is installed
         sanitize  with the address and undefined behaviour sanitizers: a finding is an error
         """
-        from ..probes import answers_from, check_frames, names_in, record_files
+        from ..probes import answers_from, check_frames, names_in, record_files, with_lost
 
         check_frames(frames, layout)
         command = find(HOST_COMPILER if compiler is None else ((compiler,), compiler))
-        main = record_files(name, layout, "host", "update" if incremental else "classify")
+        main = record_files(name, layout, "host", "update" if incremental else "classify", lost=lost is not None)
         with workshop({**files, **main}) as folder:
             sources = sorted(path for path in (*files, *main) if path.endswith(".c"))
             call([command, *STRICT, "-O2", *(_SANITIZE if sanitize else ()), *sources, "-o", "classifier"], folder)
-            names, printed = names_in(call([str(folder / "classifier")], folder, frames.tobytes()), layout)
+            names, printed = names_in(
+                call([str(folder / "classifier")], folder, with_lost(frames, lost).tobytes()), layout
+            )
             return replace(answers_from(printed, frames, layout), names=names)
 
 

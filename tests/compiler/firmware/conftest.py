@@ -6,9 +6,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from thenar.compiler.firmware.probes import Answers, Probes, extreme_frames, joined, random_frames
+from thenar.compiler.firmware.probes import Answers, Lost, Probes, extreme_frames, joined, random_frames
 from thenar.runtime.build import Build
 from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Recognised, Switch
+from thenar.runtime.scores import LANE_OFFSET
 from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 MakeTables = Callable[..., IntegerTables]
@@ -78,12 +79,15 @@ def probed() -> Callable[[IntegerTables, int], Probes]:
 
 
 @pytest.fixture(scope="session")
-def same_as_python() -> Callable[[Answers, IntegerTables, Probes], None]:
-    """Return what holds every score and class against those that a Build computes."""
+def same_as_python() -> Callable[..., None]:
+    """Return what compares every score and class with those of a Build, which inputs are `lost` to."""
 
-    def compare(answers: Answers, tables: IntegerTables, frames: Probes) -> None:
-        build = Build(_describe(tables), tables)
-        scores = np.array([build.scores(bits, codes) for bits, codes in zip(frames.bits, frames.codes, strict=True)])
+    def compare(answers: Answers, tables: IntegerTables, frames: Probes, lost: Lost | None = None) -> None:
+        without = Build(_describe(tables), tables).scorer.lanes_without
+        s = tables.n_switches
+        gone = np.zeros((len(frames), s + tables.n_joints), bool) if lost is None else lost
+        held = zip(frames.bits, frames.codes, gone, strict=True)
+        scores = np.array([without(bits, codes, row[:s], row[s:]) for bits, codes, row in held]) - LANE_OFFSET
         assert np.array_equal(answers.scores, scores)
         assert np.array_equal(answers.classes, scores.argmax(axis=1))
 

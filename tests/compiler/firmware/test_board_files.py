@@ -95,7 +95,7 @@ def test_a_matrix_lists_rows_and_columns_and_finds_ghosts_only_without_diodes(ge
     assert columns == [("PB0", "01"), ("PB1", "02"), ("PC2", "04")]
     assert "#define SETTLE_CYCLES 112u" in source
     assert ("has_ghosts" in source) is not diodes
-    assert "    2u, 255u, 0u,\n    255u, 1u, 255u,\n" in files["main.c"]
+    assert "keys_of_switches[THENAR_MY_HAND_SWITCHES] PROGMEM = {\n    2u, 4u, 0u,\n" in files["main.c"]
 
 
 @pytest.mark.parametrize(("columns", "kind"), [(8, "uint8_t"), (9, "uint16_t"), (16, "uint16_t"), (17, "uint32_t")])

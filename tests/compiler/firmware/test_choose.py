@@ -19,12 +19,12 @@ SMALL = TARGETS["avr328p"]
 
 @pytest.fixture(scope="module")
 def tables(make_tables: MakeTables) -> IntegerTables:
-    return make_tables(1, classes=14, switches=33, joints=16, bins=18, reach=12)
+    return make_tables(1, classes=14, switches=33, joints=16, bins=16, reach=12)
 
 
 @pytest.fixture(scope="module")
 def wide_tables(make_tables: MakeTables) -> IntegerTables:
-    return make_tables(1, classes=14, switches=33, joints=16, bins=18, reach=300)
+    return make_tables(1, classes=14, switches=33, joints=16, bins=16, reach=300)
 
 
 def _scaled(target: Target, flash: int) -> Target:

@@ -28,8 +28,8 @@ int main(void)
 {
     for (unsigned number = 0; number < 40; number++) {
         thenar_hand_set_switch((thenar_hand_switch)number, true);
-        for (unsigned group = 0; group < THENAR_HAND_GROUPS; group++) {
-            printf("%d ", thenar_hand_input.switches[group]);
+        for (unsigned port = 0; port < THENAR_HAND_PORTS; port++) {
+            printf("%d ", thenar_hand_input.switches[port]);
         }
         puts(thenar_hand_grasp((thenar_hand_class)number));
         if (number % 2 == 1) {
@@ -55,7 +55,7 @@ def test_switches_are_set_by_number_and_grasps_named(tool: Tool, make_tables: Ma
         if number < 33:
             bits[number] = True
         grasp = manifest.grasps[number] if number < 14 else ""
-        assert said[number] == " ".join(map(str, layout.group_bytes(bits[np.newaxis])[0].tolist())) + " " + grasp
+        assert said[number] == " ".join(map(str, layout.port_bytes(bits[np.newaxis])[0].tolist())) + " " + grasp
         if number < 33:
             bits[number] = number % 2 == 0
     assert said[40] == ""

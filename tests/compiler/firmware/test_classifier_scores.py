@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from thenar.compiler.firmware import simavr
 from thenar.compiler.firmware.classifier import classifier_files
 from thenar.compiler.firmware.layout import Layout, arrange
-from thenar.compiler.firmware.probes import Answers, Probes, random_frames
+from thenar.compiler.firmware.probes import Lost, Probes, lost_inputs, random_frames
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.firmware.targets.host import MEMBER as HOST
 from thenar.runtime.manifest import Manifest
@@ -20,7 +20,7 @@ from thenar.runtime.tables import IntegerTables
 MakeTables = Callable[..., IntegerTables]
 Describe = Callable[[IntegerTables], Manifest]
 Probed = Callable[[IntegerTables, int], Probes]
-SameAsPython = Callable[[Answers, IntegerTables, Probes], None]
+SameAsPython = Callable[..., None]
 Tool = Callable[[str], str]
 
 _arrange: Callable[..., Layout] = arrange
@@ -46,6 +46,8 @@ def _case(bins: str = "direct", entry_bits: int = 16, constant: int | None = Non
     return Case(sizes, {"bins": bins, "entry_bits": entry_bits}, constant)
 
 
+WIRED = ((-1, 8, 0, -1, 1), (2, -1, -1, -1, -1, -1, 3, 4), (5, 7, -1, 6))
+MATRIX = ((8, 7, -1, 6, 5, 4, 3, -1), (-1,) * 8, (2, 0, 1))
 CASES = {
     "2 classes": _case(classes=2),
     "2 classes, bytes": _case(classes=2, entry_bits=8, bins="trimmed"),
@@ -71,6 +73,11 @@ CASES = {
     "a constant joint": _case(constant=1),
     "a constant joint, search": _case("search", constant=0),
     "a constant joint alone with switches": _case("search", joints=1, constant=0),
+    "ports of a harness": Case({}, {"ports": WIRED, "group_size": 3}),
+    "ports of a harness, groups of three of them, bytes": Case({}, {"ports": WIRED, "group_size": 6, "entry_bits": 8}),
+    "keys of a matrix, a byte without a switch": Case(
+        {}, {"ports": ((8, 7, -1, 6, 5, 4, 3, -1), (-1,) * 8, (2, 0, 1))}
+    ),
     "254 thresholds": _case("direct", joints=1, bins_=255),
     "48 look-ups, more than near calls reach": _case("trimmed", switches=160, joints=16, classes=4, reach=150),
 }
@@ -138,6 +145,34 @@ def test_assembly_scores_as_python_does(
     for incremental in (False, True):
         answers = TARGETS[part].run(files, "hand", layout, held, incremental=incremental)
         same_as_python(answers, layout.tables, frames)
+
+
+def _without_each(layout: Layout, frames: Probes) -> tuple[Probes, Lost]:
+    """Return every frame once with nothing missing, once without each of its inputs, and thrice without several."""
+    inputs, several = layout.tables.n_switches + layout.tables.n_joints, len(frames) * 3
+    alone = np.vstack([np.zeros((1, inputs), bool), np.eye(inputs, dtype=bool)])
+    lost = np.vstack([np.tile(alone, (len(frames), 1)), lost_inputs(layout.tables, several, 1)])
+    order = np.concatenate([np.repeat(np.arange(len(frames)), len(alone)), np.arange(several) % len(frames)])
+    return Probes(frames.bits[order], frames.codes[order]), lost
+
+
+@NAMED
+@pytest.mark.parametrize("target", ["host", "avr328p", "avr2560"])
+def test_the_mean_stands_in_for_every_input_that_is_missing_as_in_python(
+    avr: None,
+    arranged: Callable[[Case], Layout],
+    describe: Describe,
+    same_as_python: SameAsPython,
+    case: Case,
+    target: str,
+) -> None:
+    layout, part = arranged(case), TARGETS[target]
+    frames, lost = _without_each(layout, random_frames(layout.tables, 12, seed=2))
+    held = layout.frame_bytes(frames.bits, frames.codes)
+    files = classifier_files("hand", describe(layout.tables), layout, avr=part.avr)
+    for incremental in (False, True):
+        answers = part.run(files, "hand", layout, held, incremental=incremental, lost=lost)
+        same_as_python(answers, layout.tables, frames, lost)
 
 
 @pytest.fixture

@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.firmware import FirmwareError
-from thenar.compiler.firmware.layout import Bins, Layout, arrange, parts_of
+from thenar.compiler.firmware.layout import NO_SWITCH, Bins, Field, Layout, arrange, parts_of, ports_of_scan
 from thenar.compiler.firmware.probes import Probes
+from thenar.runtime.scanning.scanmap import Port, ScanMap
 from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
@@ -131,11 +132,38 @@ def test_a_constant_joint_is_part_of_the_start(make_tables: MakeTables, probed: 
     assert np.array_equal(layout.scores(frames.bits, frames.codes), plain_scores(tables, frames))
 
 
-def test_frames_hold_groups_then_codes(make_tables: MakeTables) -> None:
-    layout = arrange(make_tables(switches=7, joints=2))
-    bits = np.array([[1, 0, 0, 1, 0, 0, 1]], bool)
-    assert layout.frame_bytes(bits, np.array([[7, 254]], np.uint16)).tolist() == [[0b1001, 0b100, 7, 254]]
-    assert layout.frame_bytes(bits, np.array([[7, 60000]], np.uint16)).tolist() == [[0b1001, 0b100, 7, 255]]
+def test_frames_hold_the_bytes_of_ports_then_codes(make_tables: MakeTables) -> None:
+    tables, bits = make_tables(switches=7, joints=2), np.array([[1, 0, 0, 1, 0, 0, 1]], bool)
+    layout = arrange(tables)
+    assert layout.frame_bytes(bits, np.array([[7, 254]], np.uint16)).tolist() == [[0b1001001, 7, 254]]
+    assert layout.frame_bytes(bits, np.array([[7, 60000]], np.uint16)).tolist() == [[0b1001001, 7, 255]]
+    wired = arrange(tables, ports=((-1, 6, 0), (3, 4, 5, -1, 1, 2)))
+    assert wired.frame_bytes(bits, np.array([[7, 254]], np.uint16)).tolist() == [[0b110, 0b1, 7, 254]]
+
+
+def test_ports_of_a_harness_are_the_bytes_that_show_a_kept_switch_boards_first() -> None:
+    scan = ScanMap(1, "0" * 64, (Port(0, 1, "GPIO", ((17, 3), (1, 2)), True),), (((9, 0), (40, 1)),))
+    none = NO_SWITCH
+    assert ports_of_scan(scan) == (
+        (none, 0, *[none] * 6),
+        (1, *[none] * 7),
+        (none, 2, *[none] * 6),
+        (none, 3, *[none] * 6),
+    )
+    assert ports_of_scan(None) is None
+
+
+def test_groups_are_of_one_port_each_where_no_more_are_needed(make_tables: MakeTables) -> None:
+    eights = arrange(make_tables(switches=32), group_size=4)
+    assert [[(f.port, f.bit, f.width, f.to) for f in fields] for fields in eights.fields[:3]] == [
+        [(0, 0, 4, 0)],
+        [(0, 4, 4, 0)],
+        [(1, 0, 4, 0)],
+    ]
+    wired = arrange(make_tables(switches=9), ports=((-1, 8, 0, 1), (2, 3, 4), (5, 7, -1, 6)), group_size=3)
+    assert wired.groups == ((8, 0, 1), (2, 3, 4), (5, 7, 6))
+    assert [len(fields) for fields in wired.fields] == [1, 1, 2]
+    assert arrange(make_tables(switches=33)).fields[1] == (Field(0, 5, 3, 0), Field(1, 0, 2, 3))
 
 
 def test_wide_codes_are_little_endian_at_even_offsets(make_tables: MakeTables) -> None:

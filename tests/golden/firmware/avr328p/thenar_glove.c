@@ -1,7 +1,7 @@
 /* thenar_glove.c: tables and integer arithmetic; the header says how it is used.
    Layout for atmega328p: 16-bit entries, up to 6 switches a look-up, codes looked up in 256 bytes a joint, up to 2
-   joints a look-up, rows added in line: the fastest of 84 layouts in 16384 bytes of flash, at most 122 cycles (263
-   by update()) and 2092 bytes.
+   joints a look-up, rows added in line: the fastest of 84 layouts in 16384 bytes of flash, at most 128 cycles (269
+   by update()) and 2630 bytes.
 
    From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME.c.j2. */
 #include "thenar_glove.h"
@@ -14,6 +14,7 @@
 
 #define IN_FLASH PROGMEM
 #define READ(place) pgm_read_byte(&(place))
+#define READ_MEAN(place) pgm_read_word(&(place))
 #define PAGED __attribute__((aligned(256)))
 
 /* A row is an entry for every class; thenar_glove_avr.S adds them up. */
@@ -167,10 +168,22 @@ static const char names[CLASSES + 1u][14] IN_FLASH = {
 
 /* Where the input has each switch: byte and bit. */
 static const struct {
-    uint8_t group;
+    uint8_t port;
     uint8_t bit;
 } places[THENAR_GLOVE_SWITCHES] IN_FLASH = {
     {0, 1}, {0, 2}, {0, 4}, {0, 8}, {0, 16}, {0, 32},
+};
+
+/* What an input adds while it is missing, beyond what it does open or at code 0: switches, then joints. */
+static const int16_t means[8][CLASSES] IN_FLASH = {
+    {155, 102, -40},
+    {155, 102, -40},
+    {155, 102, -40},
+    {155, 102, -40},
+    {155, 102, -40},
+    {155, 102, -40},
+    {201, -178, -87},
+    {314, -35, -214},
 };
 
 thenar_glove_frame thenar_glove_input;
@@ -183,19 +196,64 @@ int16_t thenar_glove_scores[CLASSES] = {
 void thenar_glove_set_switch(thenar_glove_switch number, bool closed)
 {
     if (number < THENAR_GLOVE_SWITCHES) {
-        uint8_t *group = &thenar_glove_input.switches[READ(places[number].group)];
+        uint8_t *port = &thenar_glove_input.switches[READ(places[number].port)];
         const uint8_t bit = READ(places[number].bit);
 
-        *group = (uint8_t)(closed ? (*group | bit) : (*group & (uint8_t)~bit));
+        *port = (uint8_t)(closed ? (*port | bit) : (*port & (uint8_t)~bit));
     }
 }
+
+/* What is missing, laid out as the input, and how many of both. */
+static uint8_t lost_switches[THENAR_GLOVE_PORTS];
+static uint8_t lost_joints[(THENAR_GLOVE_JOINTS + 7u) / 8u];
+static uint16_t n_lost;
+#ifdef __AVR__
+/* While something is missing, what begins an answer; where nothing ever is, the linker leaves all of that out. */
+uint8_t thenar_glove_missing;
+void (*thenar_glove_stand_in)(void);
+
+int16_t thenar_glove_start[CLASSES] = {
+    120, -40, 7,
+};
+#endif
 
 const char *thenar_glove_grasp(thenar_glove_class grasp)
 {
     return names[(grasp < CLASSES) ? grasp : CLASSES];
 }
 
-#ifndef __AVR__
+#ifdef __AVR__
+void thenar_glove_start_without(void);
+void thenar_glove_leave_out(void);
+
+/* Open the switches that are missing, and make the codes of such joints 0. */
+void thenar_glove_leave_out(void)
+{
+    for (uint16_t port = 0u; port < THENAR_GLOVE_PORTS; port++) {
+        thenar_glove_input.switches[port] &= (uint8_t)~lost_switches[port];
+    }
+    for (uint16_t joint = 0u; joint < THENAR_GLOVE_JOINTS; joint++) {
+        if ((lost_joints[joint / 8u] & (1u << (joint % 8u))) != 0u) {
+            thenar_glove_input.codes[joint] = 0u;
+        }
+    }
+}
+
+/* Take the mean of an input that is missing into the scores, and into those that classify() begins with; or out. */
+static void replace_by_mean(uint16_t input, bool lost)
+{
+    for (uint16_t k = 0u; k < CLASSES; k++) {
+        const uint16_t mean = (uint16_t)(int16_t)READ_MEAN(means[input][k]);
+        const uint16_t steps = (uint16_t)(lost ? mean : (0u - mean));
+
+        thenar_glove_scores[k] = (int16_t)((uint16_t)thenar_glove_scores[k] + steps);
+        thenar_glove_start[k] = (int16_t)((uint16_t)thenar_glove_start[k] + steps);
+    }
+    n_lost = (uint16_t)(lost ? (n_lost + 1u) : (n_lost - 1u));
+    thenar_glove_missing = (n_lost > 0u) ? 1u : 0u;
+    thenar_glove_stand_in = thenar_glove_start_without;
+}
+#else
 #define LOOKUPS 2u
 #define LANES 2u /* words of two sums */
 
@@ -204,7 +262,7 @@ const char *thenar_glove_grasp(thenar_glove_class grasp)
 #define LANE(start, shift) (((uint32_t)(int32_t)(start) + 32768u) << (shift))
 #define START(a, b) (LANE(a, 0) + LANE(b, 16))
 
-static const uint32_t start[LANES] = {
+static uint32_t start[LANES] = {
     START(120, -40), START(7, 0),
 };
 
@@ -217,9 +275,24 @@ static uint32_t sums[LANES] = {
     START(-390, 180), START(317, 0),
 };
 
+/* Open the switches that are missing, and make the codes of such joints 0. */
+static void leave_out(void)
+{
+    for (uint16_t port = 0u; port < THENAR_GLOVE_PORTS; port++) {
+        thenar_glove_input.switches[port] &= (uint8_t)~lost_switches[port];
+    }
+    for (uint16_t joint = 0u; joint < THENAR_GLOVE_JOINTS; joint++) {
+        if ((lost_joints[joint / 8u] & (1u << (joint % 8u))) != 0u) {
+            thenar_glove_input.codes[joint] = 0u;
+        }
+    }
+}
+
 static void find_rows(const thenar_glove_row **row)
 {
-    row[0] = &thenar_glove_rows[thenar_glove_input.switches[0]];
+    const uint8_t *const ports = thenar_glove_input.switches;
+
+    row[0] = &thenar_glove_rows[(ports[0] & 0x3Fu)];
     row[1] = &thenar_glove_rows[64u + thenar_glove_bins[thenar_glove_input.codes[0]] + thenar_glove_bins[256u +
         thenar_glove_input.codes[1]]];
 }
@@ -276,6 +349,9 @@ static thenar_glove_class unpack(void)
 
 thenar_glove_class thenar_glove_classify(void)
 {
+    if (n_lost > 0u) {
+        leave_out();
+    }
     find_rows(added);
     add_up(start, sums);
     return unpack();
@@ -285,6 +361,9 @@ thenar_glove_class thenar_glove_update(void)
 {
     const thenar_glove_row *now[LOOKUPS];
 
+    if (n_lost > 0u) {
+        leave_out();
+    }
     find_rows(now);
     for (uint_fast16_t i = 0u; i < LOOKUPS; i++) {
         if (now[i] != added[i]) {
@@ -294,4 +373,51 @@ thenar_glove_class thenar_glove_update(void)
     }
     return unpack();
 }
+
+/* Add steps to the score of a class from now on, and to what classify() begins with. */
+static void shift_score(uint16_t k, uint32_t steps)
+{
+    const uint32_t shifted = steps << (16u * (k % 2u));
+    const uint16_t lane = (uint16_t)(k / 2u);
+
+    start[lane] += shifted;
+    sums[lane] += shifted;
+}
+
+/* Take the mean of an input that is missing into the scores, or out of them. */
+static void replace_by_mean(uint16_t input, bool lost)
+{
+    for (uint16_t k = 0u; k < CLASSES; k++) {
+        const uint32_t mean = (uint32_t)(int32_t)means[input][k];
+
+        shift_score(k, lost ? mean : (0u - mean));
+    }
+    n_lost = (uint16_t)(lost ? (n_lost + 1u) : (n_lost - 1u));
+}
 #endif
+
+void thenar_glove_lose_switch(thenar_glove_switch number, bool lost)
+{
+    if (number < THENAR_GLOVE_SWITCHES) {
+        uint8_t *port = &lost_switches[READ(places[number].port)];
+        const uint8_t bit = READ(places[number].bit);
+
+        if (((*port & bit) != 0u) != lost) {
+            *port ^= bit;
+            replace_by_mean(number, lost);
+        }
+    }
+}
+
+void thenar_glove_lose_joint(uint16_t number, bool lost)
+{
+    if (number < THENAR_GLOVE_JOINTS) {
+        uint8_t *eight = &lost_joints[number / 8u];
+        const uint8_t bit = (uint8_t)(1u << (number % 8u));
+
+        if (((*eight & bit) != 0u) != lost) {
+            *eight ^= bit;
+            replace_by_mean((uint16_t)(6u + number), lost);
+        }
+    }
+}

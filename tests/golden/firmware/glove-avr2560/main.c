@@ -1,8 +1,8 @@
 /* A glove that recognises by itself. It reads switches on port expanders, and tells the host of them and of the
    grasp type (protocol 1 of thenar's scanner board).
 
-   Without an input (a chip that does not answer, joints that do not come, a key that may be a ghost) the grasp is not
-   known: it is told as degraded, for the tables hold no stand-in for what is missing.
+   Where an input is missing (a chip that does not answer, joints that do not come) its mean stands in, and the grasp is
+   told as degraded. Without any input it is not known.
 
    A reset at any moment, even in the middle of a frame, ends that frame with a 00 and begins with a HELLO.
 
@@ -26,34 +26,51 @@
 /* So many of the host's bytes are taken before it is looked whether a scan is due: they may come without end. */
 #define BYTES_A_TURN 16u
 
-/* The keys as the classifier knows them. */
-static uint8_t seen[THENAR_BITMAP_BYTES];
+#if THENAR_GLOVE_PORTS != THENAR_BITMAP_BYTES
+#error "the classifier's ports are not the bytes of the board's keys"
+#endif
+
+/* What was there at the last scan: keys, and joints. */
+static uint8_t known_before[THENAR_BITMAP_BYTES];
+static bool joints_before = true;
+#define NOT_YET 0xFFFFu
+static uint16_t n_lost = NOT_YET; /* switches */
 
 bool thenar_port_send(const uint8_t *frame, uint8_t length)
 {
     return thenar_uart0_send(frame, length);
 }
 
-static void show_key(uint16_t key, bool closed)
-{
-    if (key < THENAR_KEYS) {
-        thenar_glove_set_switch((uint8_t)key, closed);
-    }
-}
-
-/* Show the classifier which keys are closed. */
+/* Show the classifier which keys are closed: the bytes of its ports are those of their bitmap. */
 static void show(const uint8_t *closed)
 {
-    for (uint8_t byte = 0u; byte < THENAR_BITMAP_BYTES; byte++) {
-        const uint8_t changed = (uint8_t)(seen[byte] ^ closed[byte]);
-        uint8_t mask = 1u;
+    (void)memcpy(thenar_glove_input.switches, closed, THENAR_BITMAP_BYTES);
+}
 
-        seen[byte] = closed[byte];
-        for (uint8_t bit = 0u; (bit < 8u) && (changed != 0u); bit++) {
-            if ((changed & mask) != 0u) {
-                show_key((uint16_t)((byte * 8u) + bit), (closed[byte] & mask) != 0u);
-            }
-            mask = (uint8_t)(mask << 1);
+static bool is_known(uint16_t number, const uint8_t *known)
+{
+    const uint16_t key = number;
+
+    return (known[key >> 3] & (uint8_t)(1u << (key & 7u))) != 0u;
+}
+
+/* Say to the classifier which inputs are missing, if that has changed. */
+static void lose(const uint8_t *known, bool joints)
+{
+    if ((n_lost == NOT_YET) || (memcmp(known, known_before, sizeof known_before) != 0)) {
+        (void)memcpy(known_before, known, sizeof known_before);
+        n_lost = 0u;
+        for (uint16_t number = 0u; number < THENAR_GLOVE_SWITCHES; number++) {
+            const bool lost = !is_known(number, known);
+
+            n_lost = (uint16_t)(n_lost + (lost ? 1u : 0u));
+            thenar_glove_lose_switch((thenar_glove_switch)number, lost);
+        }
+    }
+    if (joints != joints_before) {
+        joints_before = joints;
+        for (uint16_t joint = 0u; joint < THENAR_GLOVE_JOINTS; joint++) {
+            thenar_glove_lose_joint(joint, !joints);
         }
     }
 }
@@ -71,12 +88,15 @@ static uint16_t margin(uint8_t grasp)
     return (uint16_t)((uint16_t)thenar_glove_scores[grasp] - (uint16_t)second);
 }
 
-static void tell_grasp(uint8_t grasp, bool complete, uint8_t flags, uint32_t now_us)
+static void tell_grasp(uint8_t grasp, uint8_t flags, uint32_t now_us)
 {
-    if (complete) {
-        thenar_board_grasp(grasp, margin(grasp), flags, now_us);
-    } else {
+    const bool degraded = !joints_before || (n_lost > 0u);
+    const bool nothing = !joints_before && (n_lost == THENAR_GLOVE_SWITCHES);
+
+    if (nothing || (grasp == THENAR_NO_GRASP)) {
         thenar_board_grasp(THENAR_NO_GRASP, 0u, THENAR_GRASP_DEGRADED, now_us);
+    } else {
+        thenar_board_grasp(grasp, margin(grasp), (uint8_t)(flags | (degraded ? THENAR_GRASP_DEGRADED : 0u)), now_us);
     }
 }
 
@@ -97,11 +117,13 @@ static bool whole_is_due(uint32_t now_us)
 }
 
 /* Read port by port, until no state of the others could change the grasp type. The classifier is shown the switches as
-   they are read, those not read yet as open; debouncing is for what the host is told of the keys. */
+   they are read, those not read yet as open; debouncing is for what the host is told of the keys. While an input is
+   missing, everything is read. */
 static void scan(uint32_t now_us)
 {
-    const bool whole = whole_is_due(now_us);
-    bool complete = thenar_joints_read(now_us);
+    const bool joints = thenar_joints_read(now_us);
+    bool complete = joints && (n_lost == 0u);
+    const bool whole = whole_is_due(now_us) || !complete;
     bool decided = false;
     uint8_t closed[THENAR_BITMAP_BYTES];
     uint8_t known[THENAR_BITMAP_BYTES];
@@ -118,7 +140,11 @@ static void scan(uint32_t now_us)
     thenar_board_found(known);
     thenar_debounce(closed, known, now_us);
     thenar_board_scanned(closed, known, !decided, now_us);
-    tell_grasp(grasp, complete, decided ? THENAR_GRASP_EARLY : 0u, now_us);
+    if (!decided) {
+        lose(known, joints);
+        grasp = thenar_glove_update();
+    }
+    tell_grasp(grasp, decided ? THENAR_GRASP_EARLY : 0u, now_us);
 }
 
 int main(void)

@@ -146,10 +146,22 @@ static const char names[CLASSES + 1u][14] = {
 
 /* Where the input has each switch: byte and bit. */
 static const struct {
-    uint8_t group;
+    uint8_t port;
     uint8_t bit;
 } places[THENAR_GLOVE_SWITCHES] = {
     {0, 1}, {0, 2}, {0, 4}, {0, 8}, {0, 16}, {0, 32},
+};
+
+/* What an input adds while it is missing, beyond what it does open or at code 0: switches, then joints. */
+static const int16_t means[8][CLASSES] = {
+    {155, 102, -40},
+    {155, 102, -40},
+    {155, 102, -40},
+    {155, 102, -40},
+    {155, 102, -40},
+    {155, 102, -40},
+    {201, -178, -87},
+    {314, -35, -214},
 };
 
 thenar_glove_frame thenar_glove_input;
@@ -160,12 +172,17 @@ int16_t thenar_glove_scores[CLASSES] = {
 void thenar_glove_set_switch(thenar_glove_switch number, bool closed)
 {
     if (number < THENAR_GLOVE_SWITCHES) {
-        uint8_t *group = &thenar_glove_input.switches[places[number].group];
+        uint8_t *port = &thenar_glove_input.switches[places[number].port];
         const uint8_t bit = places[number].bit;
 
-        *group = (uint8_t)(closed ? (*group | bit) : (*group & (uint8_t)~bit));
+        *port = (uint8_t)(closed ? (*port | bit) : (*port & (uint8_t)~bit));
     }
 }
+
+/* What is missing, laid out as the input, and how many of both. */
+static uint8_t lost_switches[THENAR_GLOVE_PORTS];
+static uint8_t lost_joints[(THENAR_GLOVE_JOINTS + 7u) / 8u];
+static uint16_t n_lost;
 
 const char *thenar_glove_grasp(thenar_glove_class grasp)
 {
@@ -180,7 +197,7 @@ const char *thenar_glove_grasp(thenar_glove_class grasp)
 #define LANE(start, shift) (((uint32_t)(int32_t)(start) + 32768u) << (shift))
 #define START(a, b) (LANE(a, 0) + LANE(b, 16))
 
-static const uint32_t start[LANES] = {
+static uint32_t start[LANES] = {
     START(120, -40), START(7, 0),
 };
 
@@ -193,9 +210,24 @@ static uint32_t sums[LANES] = {
     START(-390, 180), START(317, 0),
 };
 
+/* Open the switches that are missing, and make the codes of such joints 0. */
+static void leave_out(void)
+{
+    for (uint16_t port = 0u; port < THENAR_GLOVE_PORTS; port++) {
+        thenar_glove_input.switches[port] &= (uint8_t)~lost_switches[port];
+    }
+    for (uint16_t joint = 0u; joint < THENAR_GLOVE_JOINTS; joint++) {
+        if ((lost_joints[joint / 8u] & (1u << (joint % 8u))) != 0u) {
+            thenar_glove_input.codes[joint] = 0u;
+        }
+    }
+}
+
 static void find_rows(const thenar_glove_row **row)
 {
-    row[0] = &thenar_glove_rows[thenar_glove_input.switches[0]];
+    const uint8_t *const ports = thenar_glove_input.switches;
+
+    row[0] = &thenar_glove_rows[(ports[0] & 0x3Fu)];
     row[1] = &thenar_glove_rows[64u + thenar_glove_bins[thenar_glove_input.codes[0]] + thenar_glove_bins[256u +
         thenar_glove_input.codes[1]]];
 }
@@ -252,6 +284,9 @@ static thenar_glove_class unpack(void)
 
 thenar_glove_class thenar_glove_classify(void)
 {
+    if (n_lost > 0u) {
+        leave_out();
+    }
     find_rows(added);
     add_up(start, sums);
     return unpack();
@@ -261,6 +296,9 @@ thenar_glove_class thenar_glove_update(void)
 {
     const thenar_glove_row *now[LOOKUPS];
 
+    if (n_lost > 0u) {
+        leave_out();
+    }
     find_rows(now);
     for (uint_fast16_t i = 0u; i < LOOKUPS; i++) {
         if (now[i] != added[i]) {
@@ -269,4 +307,51 @@ thenar_glove_class thenar_glove_update(void)
         }
     }
     return unpack();
+}
+
+/* Add steps to the score of a class from now on, and to what classify() begins with. */
+static void shift_score(uint16_t k, uint32_t steps)
+{
+    const uint32_t shifted = steps << (16u * (k % 2u));
+    const uint16_t lane = (uint16_t)(k / 2u);
+
+    start[lane] += shifted;
+    sums[lane] += shifted;
+}
+
+/* Take the mean of an input that is missing into the scores, or out of them. */
+static void replace_by_mean(uint16_t input, bool lost)
+{
+    for (uint16_t k = 0u; k < CLASSES; k++) {
+        const uint32_t mean = (uint32_t)(int32_t)means[input][k];
+
+        shift_score(k, lost ? mean : (0u - mean));
+    }
+    n_lost = (uint16_t)(lost ? (n_lost + 1u) : (n_lost - 1u));
+}
+
+void thenar_glove_lose_switch(thenar_glove_switch number, bool lost)
+{
+    if (number < THENAR_GLOVE_SWITCHES) {
+        uint8_t *port = &lost_switches[places[number].port];
+        const uint8_t bit = places[number].bit;
+
+        if (((*port & bit) != 0u) != lost) {
+            *port ^= bit;
+            replace_by_mean(number, lost);
+        }
+    }
+}
+
+void thenar_glove_lose_joint(uint16_t number, bool lost)
+{
+    if (number < THENAR_GLOVE_JOINTS) {
+        uint8_t *eight = &lost_joints[number / 8u];
+        const uint8_t bit = (uint8_t)(1u << (number % 8u));
+
+        if (((*eight & bit) != 0u) != lost) {
+            *eight ^= bit;
+            replace_by_mean((uint16_t)(6u + number), lost);
+        }
+    }
 }

@@ -1,7 +1,7 @@
 /* thenar_glove_avr.S: the adding up, on an AVR; the .c holds the tables.
    Layout for atmega328p: 16-bit entries, up to 6 switches a look-up, codes looked up in 256 bytes a joint, up to 2
-   joints a look-up, rows added in line: the fastest of 84 layouts in 16384 bytes of flash, at most 122 cycles (263
-   by update()) and 2092 bytes.
+   joints a look-up, rows added in line: the fastest of 84 layouts in 16384 bytes of flash, at most 128 cycles (269
+   by update()) and 2630 bytes.
 
    From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME_avr.S.j2. */
 
@@ -76,6 +76,18 @@
     ldd   r23, Z+5
 .endm
 
+/* Where an input is missing, have it left out and load the sums as they begin then; else go on at 1. */
+.macro start_if_missing scores
+    lds   r30, thenar_glove_missing
+    tst   r30
+    breq  1f /* 0 times */
+    ldi   r26, lo8(\scores)
+    ldi   r27, hi8(\scores)
+    lds   r30, thenar_glove_stand_in
+    lds   r31, thenar_glove_stand_in + 1
+    icall
+.endm
+
 /* What the scores are of: the rows that are in them, and joints' codes. When the program begins, all inputs
    are 0, and the scores are initialised accordingly. */
     .section .data.thenar_glove_seen, "aw", @progbits
@@ -99,15 +111,20 @@ thenar_glove_classify:
 #endif
     keep_registers
 
+    start_if_missing 0
+    rjmp  2f
+1:
     ldi   r18, lo8(120) /* power grip */
     ldi   r19, hi8(120)
     ldi   r20, lo8(-40) /* tip pinch */
     ldi   r21, hi8(-40)
     ldi   r22, lo8(7) /* lateral pinch */
     ldi   r23, hi8(7)
+2:
 
     /* switches 0 to 5 */
     lds   r30, thenar_glove_input + 0
+    andi  r30, 0x3f
     sts   thenar_glove_seen + 0, r30
     to_row 0, r30
     add_row
@@ -156,11 +173,14 @@ thenar_glove_answer:
     .type thenar_glove_update, @function
 thenar_glove_update:
     keep_registers
+    start_if_missing 0
+1:
 
     load_sums 0
 
     /* switches 0 to 5 */
     lds   r30, thenar_glove_input + 0
+    andi  r30, 0x3f
     lds   r31, thenar_glove_seen + 0
     cpse  r30, r31
 1:  rcall change_0_0
@@ -227,3 +247,27 @@ subtract_changed:
     subtract_row
     ret
     .size thenar_glove_update, . - thenar_glove_update
+
+    .section .text.thenar_glove_start_without, "ax", @progbits
+
+/* Leave out what is missing, and load the sums of the classes whose scores are X bytes behind the first. */
+    .global thenar_glove_start_without
+    .type thenar_glove_start_without, @function
+thenar_glove_start_without:
+    push  r26
+    push  r27
+    clr   r1
+    call  thenar_glove_leave_out
+    pop   r27
+    pop   r26
+    movw  r30, r26
+    subi  r30, lo8(-(thenar_glove_start))
+    sbci  r31, hi8(-(thenar_glove_start))
+    ldd   r18, Z+0
+    ldd   r19, Z+1
+    ldd   r20, Z+2
+    ldd   r21, Z+3
+    ldd   r22, Z+4
+    ldd   r23, Z+5
+    ret
+    .size thenar_glove_start_without, . - thenar_glove_start_without

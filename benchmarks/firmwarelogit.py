@@ -1,0 +1,172 @@
+"""Logistic regression in int8 as a careful engineer writes it for an AVR, by hand: joints are multiplied.
+
+Scores are relative to the last class, so that 13 sums, a pointer and two operands fill the registers. A code is clamped
+to the range that was trained on, and multiplied by an immediate weight of each class (`mulsu`). The sums of the joints
+are `shift` bits finer than the rest. After them come groups of switches, fields of the bytes as they are read, whose
+rows are bytes above the least of a class. No sum leaves 16 bits: that is checked for all rows there can be.
+"""
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import numpy as np
+from firmwaredata import JOINTS, PORTS, SWITCHES, Fold, Labels, Rows, split
+from numpy.typing import NDArray
+from sklearn.linear_model import LogisticRegression
+
+from thenar.compiler.firmware.assembly import group_lines
+from thenar.compiler.firmware.layout import Field
+
+_LIMIT, _BYTE = 32767, 255
+_SUMS = (2, 4, 6, 8, 10, 12, 14, 18, 20, 22, 24, 26, 28)  # r17:r16 are the operands, r31:r30 the pointer
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Groups:
+    """Groups of at most `size` switches, as many as that takes, and by how many bits the joints are finer."""
+
+    size: int
+    shift: int
+
+    @property
+    def numbers(self) -> list[list[int]]:
+        """The switches of each group."""
+        if 8 % self.size == 0:  # of one byte each
+            return [list(range(first, min(first + self.size, SWITCHES))) for first in range(0, SWITCHES, self.size)]
+        return [part.tolist() for part in np.array_split(np.arange(SWITCHES), -(-SWITCHES // self.size))]
+
+    @property
+    def fields(self) -> list[list[Field]]:
+        """Where the bits of each group are."""
+        found = []
+        for numbers in self.numbers:
+            parts: dict[int, list[int]] = {}
+            for number in numbers:
+                parts.setdefault(number // 8, []).append(number)
+            found.append([Field(p, held[0] % 8, len(held), held[0] - numbers[0]) for p, held in parts.items()])
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class IntegerLogit:
+    """Integers of a fitted model: bias (K - 1,), switches (s, K - 1), joints (j, K - 1), and each joint's range."""
+
+    groups: Groups
+    bias: Ints
+    switches: Ints
+    joints: Ints
+    low: Ints
+    high: Ints
+
+    def __call__(self, rows: Rows) -> Labels:
+        """Return the class of each row."""
+        bits, codes = split(rows)
+        held = np.clip(codes, self.low, self.high) - self.low
+        sums = (held @ self.joints) >> self.groups.shift
+        sums += self.bias + bits @ self.switches
+        answers: Labels = np.hstack([sums, np.zeros((len(rows), 1), np.int64)]).argmax(axis=1)
+        return answers
+
+    @cached_property
+    def tables(self) -> list[Ints]:
+        """The rows of each group, as sums, (2^n, K - 1)."""
+        found = []
+        for numbers in self.groups.numbers:
+            closed = np.arange(1 << len(numbers))[:, np.newaxis] >> np.arange(len(numbers)) & 1
+            found.append(closed @ self.switches[numbers])
+        return found
+
+    @property
+    def source(self) -> str:
+        """The assembly: `predict` over `input`, which holds the bytes of the switches and then the codes."""
+        leasts = [table.min(axis=0) for table in self.tables]
+        starts = (self.bias + sum(leasts)) << self.groups.shift
+        lines = _saved("push")
+        for register, start in zip(_SUMS, starts.tolist(), strict=True):
+            lines += [f"ldi r16, lo8({start})", f"ldi r17, hi8({start})", f"movw r{register}, r16"]
+        for joint in range(JOINTS):
+            lines += self._joint(joint)
+        for register in _SUMS:
+            lines += [f"asr r{register + 1}", f"ror r{register}"] * self.groups.shift
+        lines += [f"ldi r16, {len(_SUMS)}", "ldi r17, 0"]
+        first = 0
+        for fields, table in zip(self.groups.fields, self.tables, strict=True):
+            put_together = [line.replace("thenar__input", "input") for line in group_lines("", fields)]
+            lines += [f"lds r30, input + {fields[0].port}", *put_together, "mul r30, r16", "movw r30, r0"]
+            lines += [f"subi r30, lo8(-(rows + {first}))", f"sbci r31, hi8(-(rows + {first}))"]
+            for register in _SUMS:
+                lines += ["lpm r0, Z+", f"add r{register}, r0", f"adc r{register + 1}, r17"]
+            first += table.size
+        rows = np.concatenate([(table - least).ravel() for table, least in zip(self.tables, leasts, strict=True)])
+        text = "".join(f"    {line}\n" for line in [*lines, *_best(), "clr r1", *_saved("pop"), "ret"])
+        table_text = "".join(f"    .byte {', '.join(map(str, part))}\n" for part in np.array_split(rows, 40))
+        return (
+            f'    .comm input, {PORTS + JOINTS}\n    .section .progmem.rows, "a", @progbits\nrows:\n{table_text}'
+            f"    .balign 2\n    .text\n    .global predict\n    .type predict, @function\npredict:\n{text}"
+        )
+
+    def _joint(self, joint: int) -> list[str]:
+        low, span = int(self.low[joint]), int(self.high[joint] - self.low[joint])
+        lines = [f"lds r17, input + {PORTS + joint}", f"subi r17, {low}", "brcc 1f", "ldi r17, 0"]
+        lines += [f"1: cpi r17, {span}", "brlo 1f", f"ldi r17, {span}", "1:"]
+        for register, weight in zip(_SUMS, self.joints[joint].tolist(), strict=True):
+            if weight:
+                lines += [f"ldi r16, {weight & _BYTE}", "mulsu r16, r17", f"add r{register}, r0"]
+                lines += [f"adc r{register + 1}, r1"]
+        return lines
+
+
+def _saved(how: str) -> list[str]:
+    kept = [*range(2, 18), 28, 29]
+    return [f"{how} r{register}" for register in (kept if how == "push" else reversed(kept))]
+
+
+def _best() -> list[str]:
+    """Return what finds the first of the best: the last class, with 0, comes after all others."""
+    lines = [f"movw r30, r{_SUMS[0]}", "ldi r16, 0"]
+    for number, register in enumerate(_SUMS[1:], 1):
+        lines += [f"cp r30, r{register}", f"cpc r31, r{register + 1}", "brge 1f", f"movw r30, r{register}"]
+        lines += [f"ldi r16, {number}", "1:"]
+    return [*lines, "tst r31", "brpl 1f", f"ldi r16, {len(_SUMS)}", "1: mov r24, r16", "clr r25"]
+
+
+@cache
+def fitted(fold: Fold) -> tuple[LogisticRegression, NDArray[np.float64], NDArray[np.float64]]:
+    """Return the model of switches and standardised joints, and the joints' means and deviations."""
+    bits, codes = split(fold.X)
+    mean, deviation = codes.mean(axis=0), codes.std(axis=0) + 1e-9
+    model = LogisticRegression(C=1.0, max_iter=3000).fit(np.hstack([bits, (codes - mean) / deviation]), fold.y)
+    return model, mean, deviation
+
+
+def integer_logit(fold: Fold, groups: Groups) -> IntegerLogit:
+    """Return the integers of the finest scale at which weights, rows and sums fit."""
+    model, mean, deviation = fitted(fold)
+    codes = split(fold.X)[1].astype(np.int64)
+    low, high = codes.min(axis=0), codes.max(axis=0)
+    relative = (model.coef_ - model.coef_[-1])[:-1].T
+    switches, joints = relative[:SWITCHES], relative[SWITCHES:] / deviation[:, np.newaxis]
+    bias = (model.intercept_ - model.intercept_[-1])[:-1] - (mean - low) @ joints
+    scale = 4096.0
+    while True:
+        whole = IntegerLogit(
+            groups,
+            np.rint(bias * scale).astype(np.int64),
+            np.rint(switches * scale).astype(np.int64),
+            np.rint(joints * scale * 2**groups.shift).astype(np.int64),
+            low,
+            high,
+        )
+        if _fits(whole):
+            return whole
+        scale *= 0.99
+
+
+def _fits(made: IntegerLogit) -> bool:
+    spans = max(int(np.ptp(table, axis=0).max()) for table in made.tables)
+    reach = np.abs(made.joints) * (made.high - made.low)[:, np.newaxis]
+    leasts = sum(table.min(axis=0) for table in made.tables)
+    begun = (np.abs(made.bias + leasts) << made.groups.shift) + reach.sum(axis=0)
+    whole = (reach.sum(axis=0) >> made.groups.shift) + 1 + np.abs(made.bias) + np.abs(made.switches).sum(axis=0)
+    return spans <= _BYTE and np.abs(made.joints).max() <= 127 and max(begun.max(), whole.max()) <= _LIMIT
