@@ -28,8 +28,8 @@ Rows = NDArray[np.intp]
 # A training set of fewer trials than these is cut into so many inner folds, a larger one into two.
 _FOLDS = ((1500, 4), (20_000, 3))
 _LEAST_GROUPS = 3
-# Tables of eight kilobytes, at a byte an entry, fit the smallest microcontrollers; of larger ones, those up to a quarter
-# above the smallest are small.
+# Tables of eight kilobytes, at a byte an entry, fit the smallest microcontrollers; of larger ones, those up to a
+# quarter above the smallest are small.
 _SMALL, _LARGER = 8192, 1.25
 
 
