@@ -29,7 +29,7 @@ from rich.table import Table
 from thenar.compiler import TRAINERS
 from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.avr_costs import worst_frame
-from thenar.compiler.firmware.choose import choose
+from thenar.compiler.firmware.choose import choose, flash_shares
 from thenar.compiler.firmware.layout import Layout
 from thenar.compiler.firmware.targets import TARGETS
 from thenar.compiler.tables.collapse import Model, collapse
@@ -45,23 +45,27 @@ COLUMNS = ("", *(f"{cut}, %" for cut in CUTS), "cycles (most)", "flash", "RAM + 
 
 @dataclass(frozen=True)
 class Ours:
-    """Tables of a trainer with `settings`, in entries of so many bits; without joints where they are left out."""
+    """Tables of a trainer with `settings`, in entries and sums of so many bits; without joints where they are left out."""
 
     trainer: str
     bits: int
     settings: tuple[tuple[str, Any], ...] = ()
     joints: bool = True
+    width: int = 16
 
     @property
     def name(self) -> str:
         """What the table calls it."""
-        return f"thenar, {self.trainer}, {self.bits} bit" + ("" if self.joints else ", switches alone")
+        given = "".join(f", {name} {value}" for name, value in self.settings if name in ("max_bins", "linear"))
+        sums = "" if self.width == 16 else f", sums of {self.width}"
+        alone = "" if self.joints else ", switches alone"
+        return f"thenar, {self.trainer}{given}, {self.bits} bit{sums}{alone}"
 
     def integers(self, fold: Fold) -> IntegerTables:
         """Return the integer tables of a fold."""
         samples = fold.samples(joints=self.joints)
         tables = collapse(_trained(self.trainer, self.settings, fold, self.joints), SWITCHES)
-        return quantise(tables, samples.switches, samples.codes, entry_bits=self.bits)
+        return quantise(tables, samples.switches, samples.codes, self.width, self.bits)
 
     def answers(self, fold: Fold) -> Answers:
         """Return what answers rows as the firmware of a fold does."""
@@ -70,13 +74,18 @@ class Ours:
 
 
 BINS = ("max_bins", 8)
+FEW, LINE = (("max_bins", 5),), (("linear", 1), ("penalty", 0.3))
 OURS = (
     Ours("logitboost", 16, (("rounds", 100), BINS)),
     Ours("logitboost", 8, (("rounds", 100), BINS)),
     Ours("logit", 16, (BINS,)),
     Ours("logit", 8, (BINS,)),
+    Ours("logit", 8, FEW, width=9),
+    Ours("logit", 8, FEW, width=8),
+    Ours("logit", 8, LINE),
     Ours("logitboost", 8, (("rounds", 100), BINS), joints=False),
     Ours("logit", 8, (BINS,), joints=False),
+    Ours("logit", 8, (BINS,), joints=False, width=8),
 )
 
 
@@ -112,7 +121,9 @@ def ours(cuts: Mapping[str, list[Fold]], what: Ours) -> Iterator[Line]:
     """Yield the layouts of the first fold than which none is both faster and smaller."""
     fold = cuts[CUTS[0]][0]
     found = rates(cuts, what.answers)
-    for layout, _ in choose(what.integers(fold), AVR, entry_bits=what.bits).frontier:
+    for layout, expected in choose(what.integers(fold), AVR, entry_bits=what.bits).frontier:
+        if expected.flash > flash_shares(AVR)[1]:
+            continue
         size = max(map(len, layout.groups), default=0)
         name = f"{what.name}: {layout.adding}, {layout.bins if what.joints else 'no codes'}, up to {size} switches"
         frames = _asked(layout, fold, joints=what.joints)

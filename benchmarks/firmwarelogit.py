@@ -92,8 +92,8 @@ class IntegerLogit:
         lines += [f"ldi r16, {len(_SUMS)}", "ldi r17, 0"]
         first = 0
         for fields, table in zip(self.groups.fields, self.tables, strict=True):
-            put_together = [line.replace("thenar__input", "input") for line in group_lines("", fields)]
-            lines += [f"lds r30, input + {fields[0].port}", *put_together, "mul r30, r16", "movw r30, r0"]
+            lines += group_lines(fields, [f"input + {field.port}" for field in fields], [None] * len(fields))
+            lines += ["mul r30, r16", "movw r30, r0"]
             lines += [f"subi r30, lo8(-(rows + {first}))", f"sbci r31, hi8(-(rows + {first}))"]
             for register in _SUMS:
                 lines += ["lpm r0, Z+", f"add r{register}, r0", f"adc r{register + 1}, r17"]

@@ -19,7 +19,7 @@ import numpy as np
 from modelsets import Cut
 from numpy.typing import NDArray
 
-from thenar.compiler.choosing import choose_training
+from thenar.compiler.evaluation.choosing import choose_training
 from thenar.compiler.samples import Samples, decided
 from thenar.compiler.tables.collapse import collapse, model_scores
 from thenar.compiler.tables.quantise import integer_scores, quantise

@@ -97,10 +97,10 @@ ALLOWED = {
     "compiler.evaluation": (
         "runtime",
         "drivers.errors",
-        "compiler.choosing",
         "compiler.recordings",
         "compiler.placement",
         "compiler.boosting",
+        "compiler.elementary",
         "compiler.limits",
         "compiler.pictures",
         "compiler.samples",

@@ -10,7 +10,7 @@ from thenar.runtime.manifest import By, Fitting, Of, Options, Protocol, Recognis
 from thenar.runtime.tables import IntegerTables
 
 from ..boosting.stumps import Stumps
-from ..choosing import choose_training
+from ..evaluation.choosing import choose_training
 from ..evaluation.folds import Fold, leave_one_out, trial_folds
 from ..evaluation.populations import OF, groups_of
 from ..evaluation.rates import rated

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from thenar.runtime.manifest import Options
 
 from ..boosting.stumps import winners
-from ..choosing import choose_training
 from ..placement.methods.base import METHODS, PAPERS, Chooser
 from ..placement.methods.filters import random_placement
 from ..placement.thresholds import made_plain, taxel_thresholds, with_switches
@@ -21,6 +20,7 @@ from ..samples import Columns, Samples
 from ..tables.collapse import model_scores
 from ..trainers.base import TRAINERS, Training
 from ..workers import in_workers
+from .choosing import choose_training
 from .folds import Fold, Rows
 from .populations import Population, Protocol, Scheme, groups_of
 from .rivals import CLASSIFIERS

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from thenar.runtime.manifest import Fitting, Inputs
 
 from ..boosting.stumps import winners
-from ..choosing import choose_training
+from ..evaluation.choosing import choose_training
 from ..evaluation.folds import EvaluationError, Fold, Rows, leave_one_out, trial_folds
 from ..evaluation.rates import Rate
 from ..placement.methods.base import METHODS

@@ -135,8 +135,8 @@ def test_points_are_chosen_by_what_is_asked_for(make_set: Callable[..., GraspSet
 def test_every_fold_tests_rows_that_it_does_not_train_on(make_set: Callable[..., GraspSet]) -> None:
     grasp_set = make_set(subjects=2)
     # The rate by which points are not chosen is of one repeat.
-    for by, repeats in (("subject", 1), ("trial", SEARCH.repeats)):
-        cuts = Cuts.of(Samples.of(grasp_set), replace(SEARCH, by=by))
+    for search, repeats in ((replace(SEARCH, by="subject"), 1), (replace(SEARCH, by="trial"), SEARCH.repeats)):
+        cuts = Cuts.of(Samples.of(grasp_set), search)
         assert len((*cuts.screening, *cuts.others)) == repeats * SEARCH.folds + 2
         for fold in (*cuts.screening, *cuts.others):
             assert np.array_equal(np.sort(np.concatenate([fold.train, fold.test])), np.arange(len(grasp_set)))

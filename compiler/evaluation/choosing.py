@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Compared, Fitting, Of
 
-from .elementary import softmax_and_loss
-from .evaluation.folds import Fold, leave_one_out, trial_folds
-from .samples import Samples, decided
-from .tables.collapse import Model, ScoreTables, collapse, model_scores
-from .trainers.base import TRAINERS, Training
-from .workers import in_workers
+from ..elementary import softmax_and_loss
+from ..samples import Samples, decided
+from ..tables.collapse import Model, ScoreTables, collapse, model_scores
+from ..trainers.base import TRAINERS, Training
+from ..workers import in_workers
+from .folds import Fold, leave_one_out, trial_folds
 
 Rows = NDArray[np.intp]
 

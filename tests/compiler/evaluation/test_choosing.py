@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler import TRAINERS, GraspSet, Options, Samples, ScoreTables, Setting, Trainer
-from thenar.compiler import choosing as module
-from thenar.compiler.choosing import choose_training, inner_folds
+from thenar.compiler.evaluation import choosing as module
+from thenar.compiler.evaluation.choosing import choose_training, inner_folds
 from thenar.compiler.tables.collapse import Line, model_scores
 from thenar.compiler.trainers.base import TrainerError, Training, changed
 from thenar.runtime.manifest import fit_name
