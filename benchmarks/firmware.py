@@ -45,7 +45,7 @@ COLUMNS = ("", *(f"{cut}, %" for cut in CUTS), "cycles (most)", "flash", "RAM + 
 
 @dataclass(frozen=True)
 class Ours:
-    """Tables of a trainer with `settings`, in entries and sums of so many bits; without joints where they are left out."""
+    """Tables of a trainer with `settings`, in entries and sums of so many bits, and whether they have joints."""
 
     trainer: str
     bits: int
