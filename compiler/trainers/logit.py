@@ -26,12 +26,12 @@ class Logit(Trainer):
 
     # The smoothness that suits grows with the bins: each step is the smaller, the more there are.
     tried = (
-        {"penalty": 1.0, "smoothness": 1.0, "linear": 1},
-        {"penalty": 0.3, "smoothness": 1.0, "linear": 1},
         {"penalty": 1.0, "smoothness": 4.0, "max_bins": 16},
         {"penalty": 3.0, "smoothness": 24.0, "max_bins": 32},
         {"penalty": 1.0, "smoothness": 8.0, "max_bins": 32},
         {"penalty": 0.3, "smoothness": 1.5, "max_bins": 32},
+        {"penalty": 1.0, "smoothness": 1.0, "linear": 1},
+        {"penalty": 0.3, "smoothness": 1.0, "linear": 1},
     )
 
     def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> "ScoreTables":

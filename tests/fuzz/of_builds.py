@@ -34,6 +34,7 @@ from thenar.runtime.manifest import Manifest
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import scan_us
 
+_SEAL = 10  # bytes that say what a file is, and its format
 _DIGESTS = {TABLES_NAME: "tables_sha256", ENSEMBLE_NAME: "ensemble_sha256", SCAN_NAME: "scan_sha256"}
 
 
@@ -116,10 +117,16 @@ def _member(name: str, mutate: Mutate, sealed_again: Callable[[bytes], bytes]) -
         return sealed_again(mutate(data, random))
 
     def read(data: bytes, folder: Path) -> None:
-        files = {**build_files(), name: data}
+        # Of a build with linear joints, whose tables and ensemble are of other formats, which their first bytes say.
+        linear = data[:_SEAL] != build_files()[name][:_SEAL] and name != MANIFEST_NAME
+        files = {**build_files(linear), name: data}
         _use_build(make_folder(files if name == MANIFEST_NAME else _described(files), folder / "build"))
 
-    return Format(name, lambda: [build_files()[name], build_files(linear=True)[name]], changed, read)
+    def seeds() -> list[bytes]:
+        # A build.json names the checksums of the others, which are those of one build.
+        return [build_files()[name], *([] if name == MANIFEST_NAME else [build_files(linear=True)[name]])]
+
+    return Format(name, seeds, changed, read)
 
 
 def _mixed(data: bytes, random: Random) -> bytes:

@@ -43,7 +43,7 @@ def make_grasps() -> Callable[..., GraspSet]:
     return _make
 
 
-@pytest.fixture(scope="package", autouse=True)
+@pytest.fixture(scope="module", autouse=True)
 def _two_ways_to_train() -> Iterator[None]:
     """Let trainers compare few rounds, or few penalties: how they choose is tested where it is done."""
     with pytest.MonkeyPatch.context() as patched:

@@ -153,9 +153,9 @@ def test_within_one_standard_error_small_tables_win_and_of_these_the_lowest_loss
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """One trial of difference is one standard error of it, or a little less."""
-    best = {"switch": 0, "idle": 700}
+    best = {"switch": 0, "idle": 5000}
     candidates = _pointing(monkeypatch, best, {"switch": 1, "faith": 0.1}, {"switch": 1, "faith": 1.0})
-    samples = _samples([0], [0, 1], idle=1000)
+    samples = _samples([0], [0, 1], idle=6000)
     fitting = choose_training(samples, candidates)
     assert fitting.settings == {"switch": 1.0, "idle": 0.0, "faith": 1.0}
     assert fitting.why.startswith(
@@ -163,10 +163,10 @@ def test_within_one_standard_error_small_tables_win_and_of_these_the_lowest_loss
     )
     first, chosen = fitting.compared
     assert (first.correct, first.behind, first.behind_error) == (59, 0.0, 0.0)
-    assert (first.rows, chosen.rows) == (701.0, 1.0)
+    assert (first.rows, chosen.rows) == (5001.0, 1.0)
     assert chosen.behind == pytest.approx(1 / 60, abs=1e-6)
     assert chosen.behind_error >= chosen.behind
-    # A kilobyte is small enough; equal in all, the first is taken.
+    # Eight kilobytes are small enough; equal in all, the first is taken.
     candidates = _pointing(monkeypatch, {"switch": 0, "idle": 20}, {"switch": 1}, {"switch": 2})
     assert choose_training(_samples([0], [0, 1], [0, 1]), candidates).settings["switch"] == 0
     candidates = _pointing(monkeypatch, {"switch": 2}, {"switch": 1})
@@ -177,8 +177,8 @@ def test_what_holds_for_the_known_people_alone_is_not_chosen_for_new_ones(monkey
     """The misses of one switch are all of one subject: over people that is no clear lead, over trials it is."""
     n, subjects = 60, 5
     of_one = [row for row in range(n) if row % subjects == 0][:6]
-    samples = _samples([], of_one, subjects=subjects, idle=1000)
-    candidates = _pointing(monkeypatch, {"switch": 0, "idle": 700}, {"switch": 1})
+    samples = _samples([], of_one, subjects=subjects, idle=6000)
+    candidates = _pointing(monkeypatch, {"switch": 0, "idle": 5000}, {"switch": 1})
     assert choose_training(samples, candidates).settings["switch"] == 0
     fitting = choose_training(samples, candidates, groups=samples.subjects, of="new subject")
     assert fitting.settings["switch"] == 1
