@@ -47,7 +47,7 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
     # A placement that keeps nothing is none.
     choices = [one for one in choices if one.way == NO_SWITCHES or survey.columns(one, cuts.everything)]
     survey.choose("rivals", rivals, cuts.screening)
-    rates = _rates(survey, "", [*choices, *rivals])
+    rates = _rates(survey, "", choices, rivals)
     names = dict.fromkeys([*search.methods, *search.rivals])
     curves = tuple(_curve(survey, name, rates) for name in names if "switches" in inputs)
     return _screened(survey, "", choices, rates), curves
@@ -59,12 +59,15 @@ def screen_others(survey: Survey, worth: Sequence[Screened]) -> tuple[Screened, 
     return _screened(survey, OTHER_TRAINERS, choices, _rates(survey, OTHER_TRAINERS, choices)) if choices else ()
 
 
-def _rates(survey: Survey, stage: str, choices: Sequence[Candidate]) -> dict[Candidate, Judged]:
-    search, cuts = survey.search, survey.cuts
+def _rates(
+    survey: Survey, stage: str, choices: Sequence[Candidate], rivals: Sequence[Candidate] = ()
+) -> dict[Candidate, Judged]:
+    """Return the rates of choices and rivals; the rivals, which choose from no more than the folds, settle nothing."""
+    search, cuts, every = survey.search, survey.cuts, [*choices, *rivals]
     survey.settle(f"settings{stage}", survey.typical(choices), (cuts.everything, *cuts.screening))
     rounds = {name: search.alone(name).screened for name in search.trainers}
-    fits = survey.fit(f"screening{stage}", choices, cuts.screening, lambda one: ((rounds[one.trainer],), ()))
-    return {one: cuts.judged(cuts.by, {fold: fits[one, fold].stages[-1] for fold in cuts.screening}) for one in choices}
+    fits = survey.fit(f"screening{stage}", every, cuts.screening, lambda one: ((rounds[one.trainer],), ()))
+    return {one: cuts.judged(cuts.by, {fold: fits[one, fold].stages[-1] for fold in cuts.screening}) for one in every}
 
 
 def _screened(
