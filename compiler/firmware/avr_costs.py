@@ -122,6 +122,10 @@ class Assembly:
             return min(p for p in places if p > at) if target[-1] == "f" else max(p for p in places if p <= at)
         return self._labels[target][0] if target in self._labels else -1
 
+    def _stops(self, at: int) -> bool:
+        """Return whether an instruction leaves this assembly for good: no answer takes that way."""
+        return self._code[at].name in _JUMPS and self._at(self._code[at].target, at) < 0
+
     def _path(self, start: int, end: int, pick: Pick) -> int:
         """Return the fewest or the most cycles of code from `start` on until it comes to `end` or returns."""
         left = dict.fromkeys(range(end, end + 2), 0)  # cycles from an instruction on
@@ -134,7 +138,8 @@ class Assembly:
             elif each.name in _JUMPS:
                 left[at] = _JUMPS[each.name] + (pick(self._from(to)) if to >= 0 else 0)
             elif each.name in ("cpse", "sbrc"):
-                left[at] = pick((1 + after, 1 + self._code[at + 1].size // 2 + left[at + 2]))
+                skipped = 1 + self._code[at + 1].size // 2 + left[at + 2]
+                left[at] = skipped if self._stops(at + 1) else pick((1 + after, skipped))
             elif not each.name.startswith("br"):
                 left[at] = _CYCLES[each.name] + after
             elif not each.times:  # something is missing: what that takes is not counted
@@ -160,7 +165,7 @@ def _times(comment: str) -> str:
 
 
 _LARGE = 5  # numbers from here on are multiplied by `mul`
-# Bytes of C code, rounded up; a table of bins begins at a page, and the compiler fills up its last one.
+# Bytes of C code, rounded up; a table of whole pages of bins begins at one.
 _SET_SWITCH, _GRASP, _PAGE = 80, 40, 256
 _LOSING, _LOSING_JOINTS = 400, 300
 _LOST_RAM = 5  # how many inputs are missing, whether any is, and what is done then
@@ -259,7 +264,7 @@ class AvrCosts:
         """What the classifier takes at most, a few bytes more of flash and RAM."""
         names = NAME_BYTES * (self._layout.tables.n_classes + 1)
         flash, counts = self.flash + names, self._counts
-        return Cost(counts.classify, counts.update, flash, flash - counts.uncalled - self._losing, self.ram)
+        return Cost(counts.classify, counts.update, flash, flash - counts.uncalled - self.losing, self.ram)
 
     @property
     def fixed_cycles(self) -> int:
@@ -279,8 +284,8 @@ class AvrCosts:
         tables += 2 * layout.tables.n_switches * (2 if len(layout.ports) > 255 else 1)
         tables += 2 * layout.tables.n_classes + self._variables  # what they are in the beginning
         bins = sum(len(joint.bins) for joint in layout.joints)
-        tables += bins + (2 * (_PAGE - 1) if layout.bins == "direct" and bins else 0)
-        return tables + self._losing + self._counts.size + _GRASP + (_SET_SWITCH if layout.groups else 0)
+        tables += bins + (_PAGE - 1 if layout.bins == "direct" and bins else 0)
+        return tables + self.losing + self._counts.size + _GRASP + (_SET_SWITCH if layout.groups else 0)
 
     @property
     def ram(self) -> int:
@@ -292,8 +297,8 @@ class AvrCosts:
         return self._layout.frame_size + 4 * self._layout.tables.n_classes + self._variables + found + lost + stack
 
     @property
-    def _losing(self) -> int:
-        """Bytes of flash, without the assembly, of what replaces missing inputs by their means."""
+    def losing(self) -> int:
+        """Bytes of flash, at most and without the assembly, of what replaces missing inputs by their means."""
         means = self._layout.means.size * (1 if self._layout.narrow_means else 2)
         return means + 2 * self._layout.tables.n_classes + (_LOSING if self._layout.groups else _LOSING_JOINTS)
 

@@ -21,10 +21,10 @@ class Cost:
 
     cycles          that classify() takes for any frame; elsewhere than on an AVR instructions
     update_cycles   that update() takes, whatever has changed
-    flash           bytes of all of it, with names of grasp types of up to 15 bytes
+    flash           bytes of all of it, with names of grasp types of up to 15 bytes, of C compiled with
+                    -ffunction-sections -fdata-sections
     flash_classify  of these, bytes that a program has which never calls update() and never says that an input is
-                    missing, where the linker leaves out what is not called (--gc-sections; C compiled with
-                    -ffunction-sections -fdata-sections)
+                    missing, where the linker leaves out what is not called (--gc-sections)
     ram             bytes, stack included, whichever of the two is called
     """
 

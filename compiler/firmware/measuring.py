@@ -23,9 +23,9 @@ class Measured:
     """What a classifier took: its slowest frame in `unit`, by classify() and by update(), bytes of stack (None where
     not measured), flash and RAM.
 
-    flash is that of the whole, flash_classify what is left of it in a program that never calls update(). The numbers
-    that begin with most_ are those of the cost model: bounds on an AVR, where RAM is with the stack, and elsewhere
-    `rough`.
+    flash is that of the whole, flash_classify what is left of it in a program that never calls update() and never
+    says that an input is missing. The numbers that begin with most_ are those of the cost model: bounds on an AVR,
+    where RAM is with the stack, and elsewhere `rough`.
     """
 
     part: str
@@ -120,7 +120,7 @@ def _more_for_names(grasps: Sequence[str]) -> int:
 
 
 def _size(library: Library, target: Target) -> tuple[int, int, int]:
-    """Return the bytes of flash of the compiled files, of flash without update(), and of RAM."""
+    """Return the bytes of flash of the compiled files, of flash where only classify() is called, and of RAM."""
     if target.compiler is None or target.size is None:
         raise FirmwareError(
             f"the target {target.name} names no compiler and no program `size`: nothing can be measured"
