@@ -82,7 +82,8 @@ def test_firmware_is_compiled_and_held_against_python(
     assert "host, every frame from nothing: every score and grasp type of " in done.stdout
     assert "the build carries the firmware that thenar makes of it now" in done.stdout
     found = json.loads(thenar("verify", build_folder, set_file, "--firmware", "host", "--json").stdout)
-    assert [check["differing"] for check in found["firmware"]["checks"]] == [0, 0]
+    checks = found["firmware"]["checks"]
+    assert [(check["answer"], check["differing"]) for check in checks] == [("classify", 0), ("update", 0)] * 2
     assert found["holds"] is True
 
 
