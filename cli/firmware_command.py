@@ -176,7 +176,7 @@ def _print(fit: "Fit", measured: "Measured | None", *, frontier: bool, updates: 
 
 def _expected(fit: "Fit", updates: bool) -> str:
     cost = fit.choice.cost
-    less = "" if updates else f" ({cost.flash_classify} where nothing calls update())"
+    less = "" if updates else f" ({cost.flash_classify} where only classify() is called)"
     times = f"{cost.cycles} {fit.target.unit} a frame ({cost.update_cycles} by update())"
     return f"{fit.target.bound} {times}, {cost.flash} bytes of flash{less}, {cost.ram} of RAM"
 

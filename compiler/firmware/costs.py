@@ -1,8 +1,9 @@
 """What a classifier costs: in portable C, which adds words of two sums, by a model that is rough but not too low.
 
-The model is fitted to what qemu counts of code by arm-none-eabi-gcc 12 with -O2, for 3 to 28 classes and 2 to 23
-look-ups: 3 to 30 % above on an M0+ and on an M4. Entries of 8 bits that are added up in 16 take longer there than those
-of 16 bits, for they must be taken apart before they are added. Other compilers and cores differ.
+The model is fitted to what qemu counts of code by arm-none-eabi-gcc 12 with -O2, for 3 to 30 classes and 2 to 33
+look-ups, from the bytes of ports: 1 to 35 % above on an M0+ and on an M4; with two look-ups more. Entries of 8 bits
+that are added up in 16 take longer there than those of 16 bits, for they must be taken apart before they are added.
+Other compilers and cores differ.
 """
 
 from dataclasses import dataclass
@@ -39,7 +40,8 @@ class Cost:
 class Core:
     """Instructions of a class, and how many more where classes are added up in parts; of a look-up; in each part of a
     look-up, of a word of two 16-bit entries, and of a word of four 8-bit entries; in update() of a word of two or of
-    four that is replaced; of a word of two sums that a slope adds to; of a threshold that is compared.
+    four that is replaced; of a word of two sums that a slope adds to; of a threshold that is compared; how many more a
+    joint takes in a look-up than on an M4.
     """
 
     a_class: int
@@ -52,6 +54,7 @@ class Core:
     replaced_quad: int
     product: int = 2
     compared: int = 4
+    joint: int = 0
 
 
 CORTEX_M4 = Core(a_class=10, in_parts=3, lookup=0, part=0, pair=3, quad=6, replaced_pair=6, replaced_quad=19)
@@ -59,13 +62,16 @@ CORTEX_M4 = Core(a_class=10, in_parts=3, lookup=0, part=0, pair=3, quad=6, repla
 
 
 _FIXED, _REPLACING = 20, 13  # of an answer; of a row in update(), but for its words
+# More of a row in update() for each part but the first, and of a word there whose entries are upper halves; of a row of
+# words of four in a part of classify().
+_REPLACING_PART, _REPLACING_HALVES, _QUADS = 3, 6, 3
 # A joint in a look-up; more than for a code that is looked up directly: a threshold that is compared; a byte clamped
 # below and above, where it can lie there; a code of 16 bits clamped; a code searched, and each step of the search.
 _FOUND, _BELOW, _ABOVE, _WIDE = 4, 6, 4, 10
 _SEARCHED, _SEARCH_STEP = 16, 11
 # The distance of a code, and how much more in update(); in each part all but the products; and of each word of sums,
 # at the end and where entries are upper halves.
-_DISTANCE, _MOVED, _MULTIPLYING, _WORD, _HALVES = 14, 5, 17, 2, 8
+_DISTANCE, _MOVED, _MULTIPLYING, _WORD, _HALVES = 14, 5, 27, 2, 8
 
 # Of code; where classes are added up in parts, that takes more.
 _BYTES, _BYTES_PARTS, _BYTES_CLASS = 186, 432, 15
@@ -82,11 +88,12 @@ _STACK = 128
 def word_cost(layout: Layout, core: Core) -> Cost:
     """Return what the portable C takes on a core, roughly."""
     parts, classes = len(layout.parts.firsts), layout.tables.n_classes
-    words, finding = _words(layout), sum(_finding(layout, joint, core) for joint in layout.joints)
+    words, finding = _words(layout), sum(core.joint + _finding(layout, joint, core) for joint in layout.joints)
     finding += _MISSING + _FIELD * sum(map(len, layout.fields))
     word, replaced = (core.quad, core.replaced_quad) if layout.biased else (core.pair, core.replaced_pair)
-    adding = parts * (core.part + words * word)
-    replacing = _REPLACING + parts * words * replaced
+    replaced += _REPLACING_HALVES if layout.entry_shift else 0
+    adding = parts * (core.part + (_QUADS if layout.biased else 0) + words * word)
+    replacing = _REPLACING + _REPLACING_PART * (parts - 1) + parts * words * replaced
     answering = (core.a_class + (core.in_parts if parts > 1 else 0)) * classes + finding + _FIXED
     classify, update = (len(layout.lookups) * (core.lookup + each) + answering for each in (adding, replacing))
     multiplying, slopes = _multiplying(layout, core), len(layout.tables.slopes)

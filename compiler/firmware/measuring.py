@@ -60,7 +60,7 @@ class Measured:
             f"Measured on {self.part}: at most {self.time} {self.unit} a frame ({bound} {self.most_time}), "
             f"{self.update_time} by update() ({bound} {self.most_update_time}); "
             f"{self.flash} bytes of flash ({bound} {self.most_flash}), "
-            f"{self.flash_classify} where nothing calls update() ({bound} {self.most_flash_classify}); "
+            f"{self.flash_classify} where only classify() is called ({bound} {self.most_flash_classify}); "
             f"{self.ram} bytes of RAM{stack} ({bound} {self.most_ram})."
         )
 

@@ -50,7 +50,7 @@ def test_a_folder_is_written_and_the_layout_told_with_its_reason_and_what_to_do_
         rf"^expected: {'about' if 'cortex' in target else 'at most'} \d+ (cycles|instructions) a frame "
         r"\(\d+ by update\(\)\), "
         r"\d+ bytes of flash "
-        r"\(\d+ where nothing calls update\(\)\), \d+ of RAM$",
+        r"\(\d+ where only classify\(\) is called\), \d+ of RAM$",
         done.stdout,
         re.MULTILINE,
     )

@@ -82,7 +82,10 @@ def test_the_bound_of_flash_grows_with_long_names(make_tables: MakeTables, descr
     tables = make_tables()
     build = Build(describe(tables), tables)
     names = structs.replace(
-        build.manifest, grasps=tuple(f"a grasp with a name of {'quite ' * 20}some length, number {n}" for n in range(5))
+        build.manifest,
+        grasps=tuple(
+            f"a grasp with a name of such a length that no bound has room, number {n}, {40 * '.'}" for n in range(5)
+        ),
     )
     firmware = Firmware(tables, names, "avr328p")
     found = measure(firmware.library(), firmware.fit)
