@@ -170,7 +170,7 @@ def _find(name: str, layout: Layout, lookup: Lookup) -> list[str]:
                     f"({code} <= {step}u)" if step < _HIGHEST else "1" for step in joint.thresholds.tolist()
                 )
                 counted = f"(uint32_t)({counted})"
-            found.append(f"{joint.weight}u * {counted}" if joint.weight > 1 else counted)
+            found.append(f"({joint.weight}u * {counted})" if joint.weight > 1 else counted)
         else:
             whole = len(joint.bins) == 1 << layout.code_bits
             place = code if whole else f"clamped({code}, {joint.first}u, {len(joint.bins) - 1}u)"

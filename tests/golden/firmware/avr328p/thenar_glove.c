@@ -1,7 +1,7 @@
 /* thenar_glove.c: tables and integer arithmetic; the header says how it is used.
    Layout for atmega328p: 16-bit entries, up to 6 switches a look-up, codes looked up in 256 bytes a joint, up to 2
    joints a look-up, rows added in line: the fastest of 84 layouts in 16384 bytes of flash, at most 128 cycles (269
-   by update()) and 2630 bytes.
+   by update()) and 2375 bytes.
 
    From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME.c.j2. */
 #include "thenar_glove.h"
@@ -209,6 +209,9 @@ static uint8_t lost_joints[(THENAR_GLOVE_JOINTS + 7u) / 8u];
 static uint16_t n_lost;
 #ifdef __AVR__
 /* While something is missing, what begins an answer; where nothing ever is, the linker leaves all of that out. */
+extern uint8_t thenar_glove_missing;
+extern void (*thenar_glove_stand_in)(void);
+extern int16_t thenar_glove_start[CLASSES];
 uint8_t thenar_glove_missing;
 void (*thenar_glove_stand_in)(void);
 
@@ -245,11 +248,19 @@ static void replace_by_mean(uint16_t input, bool lost)
     for (uint16_t k = 0u; k < CLASSES; k++) {
         const uint16_t mean = (uint16_t)(int16_t)READ_MEAN(means[input][k]);
         const uint16_t steps = (uint16_t)(lost ? mean : (0u - mean));
+        const uint16_t score = (uint16_t)thenar_glove_scores[k];
+        const uint16_t first = (uint16_t)thenar_glove_start[k];
+        const uint16_t moved = (uint16_t)(score + steps);
+        const uint16_t first_moved = (uint16_t)(first + steps);
 
-        thenar_glove_scores[k] = (int16_t)((uint16_t)thenar_glove_scores[k] + steps);
-        thenar_glove_start[k] = (int16_t)((uint16_t)thenar_glove_start[k] + steps);
+        thenar_glove_scores[k] = (int16_t)moved;
+        thenar_glove_start[k] = (int16_t)first_moved;
     }
-    n_lost = (uint16_t)(lost ? (n_lost + 1u) : (n_lost - 1u));
+    if (lost) {
+        n_lost++;
+    } else {
+        n_lost--;
+    }
     thenar_glove_missing = (n_lost > 0u) ? 1u : 0u;
     thenar_glove_stand_in = thenar_glove_start_without;
 }
@@ -392,7 +403,11 @@ static void replace_by_mean(uint16_t input, bool lost)
 
         shift_score(k, lost ? mean : (0u - mean));
     }
-    n_lost = (uint16_t)(lost ? (n_lost + 1u) : (n_lost - 1u));
+    if (lost) {
+        n_lost++;
+    } else {
+        n_lost--;
+    }
 }
 #endif
 

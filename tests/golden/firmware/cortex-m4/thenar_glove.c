@@ -328,7 +328,11 @@ static void replace_by_mean(uint16_t input, bool lost)
 
         shift_score(k, lost ? mean : (0u - mean));
     }
-    n_lost = (uint16_t)(lost ? (n_lost + 1u) : (n_lost - 1u));
+    if (lost) {
+        n_lost++;
+    } else {
+        n_lost--;
+    }
 }
 
 void thenar_glove_lose_switch(thenar_glove_switch number, bool lost)

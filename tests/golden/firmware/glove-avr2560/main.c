@@ -34,7 +34,7 @@
 static uint8_t known_before[THENAR_BITMAP_BYTES];
 static bool joints_before = true;
 #define NOT_YET 0xFFFFu
-static uint16_t n_lost = NOT_YET; /* switches */
+static uint16_t switches_lost = NOT_YET; /* switches */
 
 bool thenar_port_send(const uint8_t *frame, uint8_t length)
 {
@@ -57,13 +57,13 @@ static bool is_known(uint16_t number, const uint8_t *known)
 /* Say to the classifier which inputs are missing, if that has changed. */
 static void lose(const uint8_t *known, bool joints)
 {
-    if ((n_lost == NOT_YET) || (memcmp(known, known_before, sizeof known_before) != 0)) {
+    if ((switches_lost == NOT_YET) || (memcmp(known, known_before, sizeof known_before) != 0)) {
         (void)memcpy(known_before, known, sizeof known_before);
-        n_lost = 0u;
+        switches_lost = 0u;
         for (uint16_t number = 0u; number < THENAR_GLOVE_SWITCHES; number++) {
             const bool lost = !is_known(number, known);
 
-            n_lost = (uint16_t)(n_lost + (lost ? 1u : 0u));
+            switches_lost = (uint16_t)(switches_lost + (lost ? 1u : 0u));
             thenar_glove_lose_switch((thenar_glove_switch)number, lost);
         }
     }
@@ -90,8 +90,8 @@ static uint16_t margin(uint8_t grasp)
 
 static void tell_grasp(uint8_t grasp, uint8_t flags, uint32_t now_us)
 {
-    const bool degraded = !joints_before || (n_lost > 0u);
-    const bool nothing = !joints_before && (n_lost == THENAR_GLOVE_SWITCHES);
+    const bool degraded = !joints_before || (switches_lost > 0u);
+    const bool nothing = !joints_before && (switches_lost == THENAR_GLOVE_SWITCHES);
 
     if (nothing || (grasp == THENAR_NO_GRASP)) {
         thenar_board_grasp(THENAR_NO_GRASP, 0u, THENAR_GRASP_DEGRADED, now_us);
@@ -122,7 +122,7 @@ static bool whole_is_due(uint32_t now_us)
 static void scan(uint32_t now_us)
 {
     const bool joints = thenar_joints_read(now_us);
-    bool complete = joints && (n_lost == 0u);
+    bool complete = joints && (switches_lost == 0u);
     const bool whole = whole_is_due(now_us) || !complete;
     bool decided = false;
     uint8_t closed[THENAR_BITMAP_BYTES];

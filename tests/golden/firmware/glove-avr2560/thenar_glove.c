@@ -168,6 +168,9 @@ static uint8_t lost_joints[(THENAR_GLOVE_JOINTS + 7u) / 8u];
 static uint16_t n_lost;
 #ifdef __AVR__
 /* While something is missing, what begins an answer; where nothing ever is, the linker leaves all of that out. */
+extern uint8_t thenar_glove_missing;
+extern void (*thenar_glove_stand_in)(void);
+extern int16_t thenar_glove_start[CLASSES];
 uint8_t thenar_glove_missing;
 void (*thenar_glove_stand_in)(void);
 
@@ -204,11 +207,19 @@ static void replace_by_mean(uint16_t input, bool lost)
     for (uint16_t k = 0u; k < CLASSES; k++) {
         const uint16_t mean = (uint16_t)(int16_t)READ_MEAN(means[input][k]);
         const uint16_t steps = (uint16_t)(lost ? mean : (0u - mean));
+        const uint16_t score = (uint16_t)thenar_glove_scores[k];
+        const uint16_t first = (uint16_t)thenar_glove_start[k];
+        const uint16_t moved = (uint16_t)(score + steps);
+        const uint16_t first_moved = (uint16_t)(first + steps);
 
-        thenar_glove_scores[k] = (int16_t)((uint16_t)thenar_glove_scores[k] + steps);
-        thenar_glove_start[k] = (int16_t)((uint16_t)thenar_glove_start[k] + steps);
+        thenar_glove_scores[k] = (int16_t)moved;
+        thenar_glove_start[k] = (int16_t)first_moved;
     }
-    n_lost = (uint16_t)(lost ? (n_lost + 1u) : (n_lost - 1u));
+    if (lost) {
+        n_lost++;
+    } else {
+        n_lost--;
+    }
     thenar_glove_missing = (n_lost > 0u) ? 1u : 0u;
     thenar_glove_stand_in = thenar_glove_start_without;
 }
@@ -253,8 +264,8 @@ static void find_rows(const thenar_glove_row **row)
 
     row[0] = &thenar_glove_rows[(ports[0] & 0x3Fu)];
     row[1] = &thenar_glove_rows[64u + (uint32_t)((thenar_glove_input.codes[0] <= 60u) + (thenar_glove_input.codes[0]
-        <= 61u) + (thenar_glove_input.codes[0] <= 140u)) + 4u * (uint32_t)((thenar_glove_input.codes[1] <= 90u) +
-        (thenar_glove_input.codes[1] <= 200u))];
+        <= 61u) + (thenar_glove_input.codes[0] <= 140u)) + (4u * (uint32_t)((thenar_glove_input.codes[1] <= 90u) +
+        (thenar_glove_input.codes[1] <= 200u)))];
 }
 
 /* Set the sums to the start and what the rows add. */
@@ -352,7 +363,11 @@ static void replace_by_mean(uint16_t input, bool lost)
 
         shift_score(k, lost ? mean : (0u - mean));
     }
-    n_lost = (uint16_t)(lost ? (n_lost + 1u) : (n_lost - 1u));
+    if (lost) {
+        n_lost++;
+    } else {
+        n_lost--;
+    }
 }
 #endif
 
