@@ -15,7 +15,7 @@
 #include "thenar_glove.h"
 
 #define CLASSES 3u
-#define LAST_PORT (THENAR_GLOVE_PORTS - 1u)
+#define LAST_PORT (THENAR_GLOVE_SCANNED_PORTS - 1u)
 
 /* By so many steps the leader (row) must be ahead of a rival (column) after a port: the most that the unread switches
    can bring the rival closer, and one more where the rival would win a tie. 65535: no lead is enough.

@@ -7,7 +7,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define THENAR_GLOVE_PORTS 2u
+#define THENAR_GLOVE_SCANNED_PORTS 2u
 
 /* Return whether the ports after `port` (numbers from 0, in the order in which they are read) can be left out.
 
