@@ -1,7 +1,7 @@
 /* thenar_glove.c: tables and integer arithmetic; the header says how it is used.
    Layout for atmega328p: 16-bit entries, up to 6 switches a look-up, codes looked up in 256 bytes a joint, up to 2
    joints a look-up, rows added in line: the fastest of 84 layouts in 16384 bytes of flash, at most 128 cycles (269
-   by update()) and 2630 bytes.
+   by update()) and 2375 bytes.
 
    From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME.c.j2. */
 #include "thenar_glove.h"
