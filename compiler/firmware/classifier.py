@@ -55,6 +55,7 @@ def portable_values(name: str, layout: Layout) -> dict[str, object]:
         "finds": [line for lookup in layout.lookups for line in _find(name, layout, lookup)],
         "n_lookups": len(layout.lookups),
         "adding": adding,
+        "begun": [f"from[{lane}]" if _started(lane, biased, layout.entry_shift) else "0u" for lane in range(n_lanes)],
         "storing": _storing(n_lanes, biased, layout.entry_shift),
         "replacing": replacing,
     }
@@ -144,13 +145,21 @@ def _arithmetic(lanes: int, biased: bool, shift: int) -> tuple[list[str], list[s
     return adding, replacing
 
 
+def _started(lane: int, biased: bool, shift: int) -> bool:
+    """Return whether a sum begins with what it starts from, rather than that it is added in the end."""
+    # An even sum must not where it says what the odd one beside it took too much; one that is shifted must not either.
+    # Every other one does: compilers put what is added last first, and then keep all rows until they have it.
+    return not biased or (lane % 2 == 1 and not shift)
+
+
 def _storing(lanes: int, biased: bool, shift: int) -> list[str]:
     """Return the statements that put the sums s0, s1..., in words of two, into sum[]."""
-    if not biased:
-        return [f"sum[{lane}] = s{lane};" for lane in range(lanes)]
-    sums = (f"s{lane} - ((s{lane - 1} >> 16) << 8)" if lane % 2 else f"s{lane}" for lane in range(lanes))
-    whole = (f"(({text}) << {shift})" if shift else text for text in sums)
-    return [f"sum[{lane}] = from[{lane}] + {text};" for lane, text in enumerate(whole)]
+    stored = []
+    for lane in range(lanes):
+        text = f"s{lane} - ((s{lane - 1} >> 16) << 8)" if biased and lane % 2 else f"s{lane}"
+        text = f"(({text}) << {shift})" if biased and shift else text
+        stored.append(f"sum[{lane}] = {'' if _started(lane, biased, shift) else f'from[{lane}] + '}{text};")
+    return stored
 
 
 def _find(name: str, layout: Layout, lookup: Lookup) -> list[str]:

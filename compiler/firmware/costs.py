@@ -39,9 +39,9 @@ class Cost:
 @dataclass(frozen=True, slots=True)
 class Core:
     """Instructions of a class, and how many more where classes are added up in parts; of a look-up; in each part of a
-    look-up, of a word of two 16-bit entries, and of a word of four 8-bit entries; in update() of a word of two or of
-    four that is replaced; of a word of two sums that a slope adds to; of a threshold that is compared; how many more a
-    joint takes in a look-up than on an M4.
+    look-up, of a word of two 16-bit entries, of four 8-bit entries, and of all of those together; in update() of a word
+    of two or of four that is replaced, and more of four upper halves; of a word of two sums that a slope adds to; of a
+    threshold that is compared.
     """
 
     a_class: int
@@ -50,21 +50,32 @@ class Core:
     part: int
     pair: int
     quad: int
+    quads: int
     replaced_pair: int
     replaced_quad: int
+    replaced_halves: int
     product: int = 2
     compared: int = 4
-    joint: int = 0
 
 
-CORTEX_M4 = Core(a_class=10, in_parts=3, lookup=0, part=0, pair=3, quad=6, replaced_pair=6, replaced_quad=19)
+CORTEX_M4 = Core(
+    a_class=10,
+    in_parts=3,
+    lookup=0,
+    part=0,
+    pair=3,
+    quad=5,
+    quads=2,
+    replaced_pair=6,
+    replaced_quad=19,
+    replaced_halves=0,
+)
 """What other cores of 32 bits are taken to be like."""
 
 
 _FIXED, _REPLACING = 20, 13  # of an answer; of a row in update(), but for its words
-# More of a row in update() for each part but the first, and of a word there whose entries are upper halves; of a row of
-# words of four in a part of classify().
-_REPLACING_PART, _REPLACING_HALVES, _QUADS = 3, 6, 3
+# More of a row in update() for each part but the first.
+_REPLACING_PART = 3
 # A joint in a look-up; more than for a code that is looked up directly: a threshold that is compared; a byte clamped
 # below and above, where it can lie there; a code of 16 bits clamped; a code searched, and each step of the search.
 _FOUND, _BELOW, _ABOVE, _WIDE = 4, 6, 4, 10
@@ -88,11 +99,11 @@ _STACK = 128
 def word_cost(layout: Layout, core: Core) -> Cost:
     """Return what the portable C takes on a core, roughly."""
     parts, classes = len(layout.parts.firsts), layout.tables.n_classes
-    words, finding = _words(layout), sum(core.joint + _finding(layout, joint, core) for joint in layout.joints)
+    words, finding = _words(layout), sum(_finding(layout, joint, core) for joint in layout.joints)
     finding += _MISSING + _FIELD * sum(map(len, layout.fields))
     word, replaced = (core.quad, core.replaced_quad) if layout.biased else (core.pair, core.replaced_pair)
-    replaced += _REPLACING_HALVES if layout.entry_shift else 0
-    adding = parts * (core.part + (_QUADS if layout.biased else 0) + words * word)
+    replaced += core.replaced_halves if layout.entry_shift else 0
+    adding = parts * (core.part + (core.quads if layout.biased else 0) + words * word)
     replacing = _REPLACING + _REPLACING_PART * (parts - 1) + parts * words * replaced
     answering = (core.a_class + (core.in_parts if parts > 1 else 0)) * classes + finding + _FIXED
     classify, update = (len(layout.lookups) * (core.lookup + each) + answering for each in (adding, replacing))

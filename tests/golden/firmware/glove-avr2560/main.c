@@ -26,8 +26,8 @@
 /* So many of the host's bytes are taken before it is looked whether a scan is due: they may come without end. */
 #define BYTES_A_TURN 16u
 
-#if THENAR_GLOVE_PORTS != THENAR_BITMAP_BYTES
-#error "the classifier's ports are not the bytes of the board's keys"
+#if THENAR_GLOVE_PORTS > THENAR_BITMAP_BYTES
+#error "the classifier's ports are more than the bytes of the board's keys"
 #endif
 
 /* What was there at the last scan: keys, and joints. */
@@ -41,10 +41,10 @@ bool thenar_port_send(const uint8_t *frame, uint8_t length)
     return thenar_uart0_send(frame, length);
 }
 
-/* Show the classifier which keys are closed: the bytes of its ports are those of their bitmap. */
+/* Show the classifier which keys are closed: the bytes of its ports are the first of their bitmap. */
 static void show(const uint8_t *closed)
 {
-    (void)memcpy(thenar_glove_input.switches, closed, THENAR_BITMAP_BYTES);
+    (void)memcpy(thenar_glove_input.switches, closed, THENAR_GLOVE_PORTS);
 }
 
 static bool is_known(uint16_t number, const uint8_t *known)
