@@ -158,10 +158,11 @@ def _roughly_explained(sums: SplitSums, totals: Floats, least: Floats) -> tuple[
     other = weight * all_response
     part -= other
     part *= part
+    lightest = least[:, np.newaxis]
     np.subtract(all_weight, weight, out=other)
-    other *= weight
-    other *= all_weight
-    np.maximum(other, least[:, np.newaxis] ** 3, out=other)
+    np.maximum(other, lightest, out=other)
+    other *= np.maximum(weight, lightest)
+    other *= np.maximum(all_weight, lightest)
     part /= other
     return part.max(axis=2), base
 

@@ -78,7 +78,7 @@ def test_a_frontier_of_the_trainer_has_one_stage_and_its_points_are_built(
     installed: Any, recordings: Path, tmp_path: Path
 ) -> None:
     words = " ".join(installed.thenar("frontier", "--help").split())
-    assert "naive-bayes" in words
+    assert "--trainer [auto|logitboost|logit|sum|naive-bayes]" in words
     assert "--joint-bins INTEGER RANGE Into how many bins naive Bayes cuts a joint. [default: 8; x>=2]" in words
 
     folder, build = tmp_path / "frontier", tmp_path / "build"

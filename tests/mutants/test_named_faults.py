@@ -112,8 +112,8 @@ FAULTS = (
     Fault(
         "a code at a threshold goes right, in the build",
         "runtime/scores.py",
-        "bins = map(bisect_left, self.thresholds",
-        "bins = map(__import__('bisect').bisect_right, self.thresholds",
+        "map(bisect_left, self.thresholds, codes)",
+        "map(__import__('bisect').bisect_right, self.thresholds, codes)",
         "tests/runtime/test_scorer.py",
     ),
     Fault(
