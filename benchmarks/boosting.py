@@ -74,7 +74,7 @@ def _weka_process(path: Path, rounds: int) -> float:
 
 def lightgbm_by(rows: bool) -> Callable[[NDArray[Any], NDArray[np.intp]], object]:
     """Return a training of LightGBM, its histograms made by rows or by columns."""
-    import lightgbm
+    import lightgbm  # pyright: ignore[reportMissingImports]
 
     options = {"objective": "multiclass", "num_class": CLASSES, "num_leaves": 2, "max_depth": 1, "num_threads": 1}
     options |= {"min_data_in_leaf": 1, "min_data_in_bin": 1, "feature_pre_filter": False, "verbosity": -1}
@@ -84,7 +84,7 @@ def lightgbm_by(rows: bool) -> Callable[[NDArray[Any], NDArray[np.intp]], object
 
 def xgboost(X: NDArray[Any], y: NDArray[np.intp]) -> object:
     """Train XGBoost on histograms."""
-    import xgboost as library
+    import xgboost as library  # pyright: ignore[reportMissingImports]
 
     options = {"objective": "multi:softprob", "num_class": CLASSES, "max_depth": 1, "tree_method": "hist", "nthread": 1}
     return library.train(options, library.DMatrix(X, y, nthread=1), ROUNDS)

@@ -149,7 +149,7 @@ def _histograms(given: Given) -> Any:
 
 
 def _xgboost(given: Given) -> Any:
-    from xgboost import XGBClassifier
+    from xgboost import XGBClassifier  # pyright: ignore[reportMissingImports]
 
     fixed = {"n_estimators": 200, "tree_method": "hist", "subsample": 0.8, "colsample_bytree": 0.5}
     return XGBClassifier(**fixed, n_jobs=1, random_state=SEED, **given)

@@ -160,7 +160,7 @@ def recorded(icub_table: Path, tmp_path_factory: pytest.TempPathFactory) -> Fram
     """A build of real recordings, and every one of their frames."""
     grasp_set, _ = import_file(icub_table, COLUMNS / "icub.toml")
     folder = tmp_path_factory.mktemp("icub") / "build"
-    manifest = compile_build(grasp_set, folder, folds=0).manifest
+    manifest = compile_build(grasp_set, folder, rounds=100, folds=0).manifest
     bits, codes = select_inputs(grasp_set, manifest)
     return Build.load(folder), bits, codes
 
