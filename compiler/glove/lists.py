@@ -92,6 +92,8 @@ def expectations(expected: Expected) -> Iterator[str]:
         yield f"The CyberGlove sends a record every {expected.glove_us:.0f} us at best."
     for rate in sorted(expected.rates, key=lambda rate: rate.protocol == "training"):
         yield f"Recognised, {rate}."
+    for sentence in () if expected.faults is None else expected.faults.sentences:
+        yield f"At worst, of the rows trained on: {sentence}."
 
 
 def _building(summary: SpecSummary) -> Iterator[str]:
