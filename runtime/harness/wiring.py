@@ -12,6 +12,8 @@ from msgspec import Meta, Struct, field
 
 from thenar.drivers.i2c.chips import CHIPS, Chip
 
+from ..taxels import TaxelSettings
+
 # A board's bitmap has no room for more.
 MOST_KEYS = 2000
 # Of the clock of a bus.
@@ -113,6 +115,7 @@ class Harness(_Table, frozen=True):
     scanners: tuple[ScannerWiring, ...] = field(default=(), name="scanner")
     buses: tuple[BusWiring, ...] = field(default=(), name="bus")
     debounce: Debounce = Debounce()
+    taxel_settings: TaxelSettings = field(default=TaxelSettings(), name="taxels")
 
     @property
     def switches(self) -> tuple[str, ...]:
