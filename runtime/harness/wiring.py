@@ -13,6 +13,8 @@ from msgspec import Meta, Struct, field
 from thenar.drivers.i2c.chips import CHIPS, Chip, Converter
 from thenar.drivers.spi.chips import SPI_CHIPS, SpiChip
 
+from ..taxels import TaxelSettings
+
 # A board's bitmap has no room for more.
 MOST_KEYS = 2000
 # A board's frame has no room for more.
@@ -160,6 +162,7 @@ class Harness(_Table, frozen=True):
     buses: tuple[BusWiring, ...] = field(default=(), name="bus")
     spi: tuple[SpiWiring, ...] = ()
     debounce: Debounce = Debounce()
+    taxel_settings: TaxelSettings = field(default=TaxelSettings(), name="taxels")
 
     @property
     def switches(self) -> tuple[str, ...]:
