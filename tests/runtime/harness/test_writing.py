@@ -17,6 +17,7 @@ from thenar.runtime.harness.wiring import (
 )
 from thenar.runtime.harness.writing import harness_to_toml
 from thenar.runtime.names import fault
+from thenar.runtime.taxels import TaxelSettings
 
 Load = Callable[[str], Harness]
 
@@ -59,6 +60,11 @@ def harnesses(draw: st.DrawFn) -> Harness:
         scanners=(board,),
         buses=(BusWiring(device="/dev/i2c-1", chips=tuple(chips)),),
         debounce=Debounce(enabled=draw(st.booleans()), release_ms=draw(st.floats(0.0, 1000.0))),
+        taxel_settings=TaxelSettings(
+            calibration=draw(st.none() | st.just("/a/c.toml")),
+            baseline=draw(st.booleans()),
+            drift=draw(st.floats(0, 1)),
+        ),
     )
 
 
