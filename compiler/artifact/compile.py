@@ -249,8 +249,9 @@ class Making:
         if self.harness is not None:
             self.scan = plan_scan(names, self.integers, self.harness, kept.switches, kept.codes)
         self.comparison = compare(trained.model, self.integers, kept.switches, kept.codes)
-        self._inputs = (*names, *(grasp_set.joint_names[joint] for joint in joints))
-        self._groups = groups_of(self.scan, len(names), len(joints))
+        self._inputs = (*names, *(grasp_set.joint_names[joint] for joint in trained.joints))
+        sources = [grasp_set.element_names[element.column] for element in trained.kept]
+        self._groups = groups_of(self.scan, sources, len(trained.joints))
         groups = tuple(self._groups.values())
         self.faults = count_faults(self.integers, kept.switches, kept.codes, kept.labels, kept.trials, groups)
 

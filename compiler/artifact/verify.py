@@ -219,11 +219,11 @@ def verify_faults(folder: str | Path, grasp_set: GraspSet, progress: Progress | 
     True
     """
     build = _build_for(folder, grasp_set)
-    bits, codes = select_inputs(grasp_set, build.manifest)
-    groups = groups_of(build.scan, build.tables.n_switches, build.tables.n_joints)
+    manifest = build.manifest
+    bits, codes = select_inputs(grasp_set, manifest)
+    groups = groups_of(build.scan, [switch.source for switch in manifest.switches], build.tables.n_joints)
     labels = _labels(np.array(build.grasps), grasp_set)
     found = count_faults(build.tables, bits, codes, labels, grasp_set.trial_ids, tuple(groups.values()), progress)
-    manifest = build.manifest
     names = [*(each.name for each in manifest.switches), *(each.name for each in manifest.joints)]
     stuck = (
         min(zip(*each, strict=True), key=lambda one: one[0]) for each in zip(found.stuck, found.values, strict=True)

@@ -7,9 +7,10 @@ Answers are found without sorting: with scores S_k, the largest of S_k * K + (K 
 score, the lowest of several, by its remainder.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations, islice, pairwise
+from itertools import combinations, islice, pairwise, zip_longest
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,21 +147,26 @@ class _Block:
             yield from (self.right(without + other) for other in self.lost[one + 1 :])
 
 
-def groups_of(scan: ScanMap | None, n_switches: int, n_joints: int) -> Mapping[str, Found]:
-    """Return the inputs that fail together, by what they fail with: a port, a chip or a board of the scan map, counted
-    from 1 as the harness has them, and the device that reads the joints.
+def groups_of(scan: ScanMap | None, sources: Sequence[str], n_joints: int) -> Mapping[str, Found]:
+    """Return the inputs that fail together, by what they fail with: a taxel of several levels; a port, a chip or a
+    board of the scan map, counted from 1 as the harness has them; and the device that reads the joints.
+
+    sources  of each kept switch its own name, or that of the taxel that it is a level of
     """
     found: dict[str, Found] = {}
+    for taxel, levels in Counter(sources).items():
+        if levels > 1:
+            found[f"taxel {taxel}"] = tuple(one for one, source in enumerate(sources) if source == taxel)
     for port in () if scan is None else scan.ports:
         chip = f"chip {port.chip + 1} of bus {port.bus + 1}"
-        own = tuple(switch for _, switch in port.switches)
-        found[f"port {port.reading} of {chip}"] = own
-        found[chip] = found.get(chip, ()) + own
-    for number, pairs in enumerate(() if scan is None else scan.scanners, 1):
-        if pairs:
-            found[f"scanner board {number}"] = tuple(switch for _, switch in pairs)
+        found[f"port {port.reading} of {chip}"] = port.elements
+        found[chip] = found.get(chip, ()) + port.elements
+    boards, taxels = ((), ()) if scan is None else (scan.scanners, scan.taxels)
+    for number, (keys, converted) in enumerate(zip_longest(boards, taxels, fillvalue=())):
+        if own := tuple(switch for *_, switch in (*keys, *converted)):
+            found[f"scanner board {number + 1}"] = own
     if n_joints:
-        found["the joints' device"] = tuple(range(n_switches, n_switches + n_joints))
+        found["the joints' device"] = tuple(range(len(sources), len(sources) + n_joints))
     return found
 
 

@@ -98,8 +98,9 @@ def test_the_worst_of_each_kind_is_the_first_of_several_with_the_names_of_its_in
     scan = ScanMap(
         1, "0" * 64, (Port(0, 1, "GPIOA", ((0, 2),), False), Port(0, 1, "GPIOB", ((0, 0),), False)), (((4, 1),),)
     )
-    groups = groups_of(scan, 3, 1)
+    groups = groups_of(scan, ("a", "pad", "pad"), 1)
     assert groups == {
+        "taxel pad": (1, 2),
         "port GPIOA of chip 2 of bus 1": (2,),
         "chip 2 of bus 1": (2, 0),
         "port GPIOB of chip 2 of bus 1": (0,),
