@@ -10,7 +10,7 @@ score, the lowest of several, by its remainder.
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations, islice, pairwise, zip_longest
+from itertools import combinations, islice, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -162,7 +162,7 @@ def groups_of(scan: ScanMap | None, sources: Sequence[str], n_joints: int) -> Ma
         found[f"port {port.reading} of {chip}"] = port.elements
         found[chip] = found.get(chip, ()) + port.elements
     boards, taxels = ((), ()) if scan is None else (scan.scanners, scan.taxels)
-    for number, (keys, converted) in enumerate(zip_longest(boards, taxels, fillvalue=())):
+    for number, (keys, converted) in enumerate(zip(boards, taxels or ((),) * len(boards), strict=True)):
         if own := tuple(switch for *_, switch in (*keys, *converted)):
             found[f"scanner board {number + 1}"] = own
     if n_joints:
