@@ -9,9 +9,10 @@ from fcntl import ioctl
 
 from ..closing import Closing
 from ..errors import DeviceError, SettingError
+from ..i2c.chips import Reading
 from ..names import shortened
 from ..ports import check_node, device_fault
-from .chips import SpiChip, Transfer
+from .chips import SpiChip
 
 # The kernel's linux/spi/spidev.h: struct spi_ioc_transfer, and _IOW('k', number, size of what is written).
 TRANSFER = struct.Struct("=QQIIHBBBBBB")
@@ -52,7 +53,7 @@ class SpiDevice(Closing):
             self.close()
             raise DeviceError(f"{self.device} cannot be opened: {_cause(error)}") from None
 
-    def prepare(self, transfers: Sequence[Transfer]) -> Callable[[], list[int | None]]:
+    def prepare(self, transfers: Sequence[Reading]) -> Callable[[], list[int | None]]:
         """Return what makes these transfers in one call, chip select high in between, and returns the code of each.
 
         None stands for an answer that is no converter's. It raises DeviceError when the device is gone.

@@ -8,7 +8,7 @@ from time import monotonic, perf_counter
 import msgspec
 
 from thenar.drivers.errors import ThenarError
-from thenar.drivers.i2c.bus import Scan
+from thenar.drivers.i2c.bus import Interleaved
 from thenar.drivers.scanner import BoardGrasp
 
 from ..harness.wiring import GloveWiring, Harness, ScannerWiring
@@ -144,7 +144,7 @@ def _gap(read: Callable[[], object]) -> float | None:
     return 1e6 * median(gaps) if gaps else None
 
 
-def _duration(scan: Scan) -> float:
+def _duration(scan: Interleaved) -> float:
     """Return the median time of a scan, in microseconds."""
     taken = []
     for _ in range(_SCANS):
