@@ -18,6 +18,7 @@ from ..scanning.propose import own_joints
 from ..scanning.scanmap import ScanMap
 from ..sources.base import slowest_us
 from ..sources.cyberglove import sensors_of
+from ..taxels import calibration_of, in_counts
 from .recogniser import LiveRecognizer
 from .sources import Sources
 
@@ -85,9 +86,15 @@ class System:
         )
 
     def sources(self, *, full_scan: bool = False) -> Sources:
-        """Return the devices; with `full_scan`, and for a sequential test, every scan goes to its end."""
+        """Return the devices; with `full_scan`, and for a sequential test, every scan goes to its end.
+
+        Raises SettingError if the calibration of the taxels cannot serve the build.
+        """
         early = None if full_scan or self.policy.error_rate is not None else (self.early_exit, self.joints())
-        return Sources(self.harness, self.switch_names, self.scan, early)
+        taxels = calibration_of(self.harness.taxel_settings)
+        return Sources(
+            self.harness, self.switch_names, in_counts(self.scan, self.build.manifest.switches, taxels), early
+        )
 
     def early_exit(self, ports: Sequence[Mask]) -> EarlyExit:
         """Return what ends a scan of these ports early without changing any decision.

@@ -63,7 +63,9 @@ def ports_of(harness: Harness, numbers: Mapping[str, int], levels: Levels | None
         port
         for bus, wiring in enumerate(harness.buses)
         for chip, wired in enumerate(wiring.chips)
-        for port in (_conversions(bus, chip, wired, levels or {}) if wired.measures else _ports(bus, chip, wired, numbers))
+        for port in (
+            _conversions(bus, chip, wired, levels or {}) if wired.measures else _ports(bus, chip, wired, numbers)
+        )
     )
     spi = (
         port

@@ -114,7 +114,9 @@ def _whole_us(ports: Sequence[Port], harness: Harness, ioctl_us: float) -> float
     slow = {port.bus for port in ports if waiting_us(reading_of(port, harness))}
     fast = [port for port in ports if port.bus not in slow]
     times = (*_selected_us(fast, harness, ioctl_us), *(t.us for t in _chip_times(fast, harness, ioctl_us)))
-    return fsum((*times, *(overlapped_us([p for p in ports if p.bus == bus], harness, ioctl_us) for bus in sorted(slow))))
+    return fsum(
+        (*times, *(overlapped_us([p for p in ports if p.bus == bus], harness, ioctl_us) for bus in sorted(slow)))
+    )
 
 
 def overlapped_us(ports: Sequence[Port], harness: Harness, ioctl_us: float = 0.0) -> float:
