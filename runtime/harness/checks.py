@@ -78,11 +78,7 @@ def _of_chip(place: Place, chip: ChipWiring, bus: BusWiring) -> Iterator[Fault]:
     if chip.closed == "high" and chip.measures:
         yield (
             (*place, "closed"),
-<<<<<<< HEAD
-            f"a {kind.name} measures taxels, which are closed above their thresholds: leave it out",
-=======
             f"a {kind.name} measures taxels: leave it out",
->>>>>>> main
         )
     if chip.closed == "high" and not kind.registers:  # what is not pulled down reads as high, whatever the switch does
         yield (*place, "closed"), f"a {kind.name} pulls its inputs up by itself: let switches pull them down"
@@ -129,18 +125,11 @@ def _of_elements(harness: Harness) -> Iterator[Fault]:
         for number, scanner in enumerate(harness.scanners):
             for key, names in (("switches", scanner.switches), ("taxels", scanner.taxels)):
                 yield from ((("scanner", number, key, place), name) for place, name in enumerate(names) if name)
-<<<<<<< HEAD
-        chips = [
-            (("bus", n, "chip", m), chip) for n, bus in enumerate(harness.buses) for m, chip in enumerate(bus.chips)
-        ]
-        for here, chip in (*chips, *((("spi", n), chip) for n, chip in enumerate(harness.spi))):
-=======
         chips: list[tuple[Place, ChipWiring | SpiWiring]] = [
             (("bus", n, "chip", m), chip) for n, bus in enumerate(harness.buses) for m, chip in enumerate(bus.chips)
         ]
         chips += [(("spi", n), chip) for n, chip in enumerate(harness.spi)]
         for here, chip in chips:
->>>>>>> main
             yield from (((*here, "pins", pin), name) for pin, name in chip.pins.items())
 
     yield from _of_names(wired(), "switch or taxel" if harness.taxels else "switch")

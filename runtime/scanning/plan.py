@@ -116,16 +116,8 @@ class Costs:
         chips: dict[tuple[int, int], int] = {}
         self._waits: list[int] = []
         for number, port in enumerate(ports):
-<<<<<<< HEAD
-            clock_hz, reading, mux = (
-                harness.line_of(port.bus).clock_hz,
-                reading_of(port, harness),
-                mux_of(port, harness),
-            )
-=======
             clock_hz, reading = harness.line_of(port.bus).clock_hz, reading_of(port, harness)
             mux = mux_of(port, harness)
->>>>>>> main
             channel = (port.bus, mux.address, mux.channel) if mux else ()
             way: list[_Room] = [room for room in (channel[:2], channel) if room in rooms]
             for room in way:
