@@ -55,7 +55,7 @@ def documented() -> Iterator[tuple[str, str, str]]:
 
 def test_every_key_is_there_with_its_default() -> None:
     found = list(documented())
-    nested = {"cyberglove", "scanner", "bus", "chip", "debounce"}
+    nested = {"cyberglove", "scanner", "bus", "chip", "spi", "debounce"}
     for table, kind in TABLES.items():
         tables = nested | ({"taxels"} if kind is Harness else set())
         keys = {field.encode_name: field for field in msgspec.structs.fields(kind) if field.encode_name not in tables}

@@ -76,7 +76,10 @@ def _of_chip(place: Place, chip: ChipWiring, bus: BusWiring) -> Iterator[Fault]:
         if pin in kind.not_inputs:
             yield (*place, "pins", pin), f"must not be an input: {kind.not_inputs[pin]}; use another pin"
     if chip.closed == "high" and chip.measures:
-        yield (*place, "closed"), f"a {kind.name} measures taxels, which are closed above their thresholds: leave it out"
+        yield (
+            (*place, "closed"),
+            f"a {kind.name} measures taxels: leave it out",
+        )
     if chip.closed == "high" and not kind.registers:  # what is not pulled down reads as high, whatever the switch does
         yield (*place, "closed"), f"a {kind.name} pulls its inputs up by itself: let switches pull them down"
     slowest = min(kind.clock_hz, tca9548a.CLOCK_HZ if chip.mux else kind.clock_hz)
@@ -122,11 +125,14 @@ def _of_elements(harness: Harness) -> Iterator[Fault]:
         for number, scanner in enumerate(harness.scanners):
             for key, names in (("switches", scanner.switches), ("taxels", scanner.taxels)):
                 yield from ((("scanner", number, key, place), name) for place, name in enumerate(names) if name)
-        chips = [(("bus", n, "chip", m), chip) for n, bus in enumerate(harness.buses) for m, chip in enumerate(bus.chips)]
-        for here, chip in (*chips, *((("spi", n), chip) for n, chip in enumerate(harness.spi))):
+        chips: list[tuple[Place, ChipWiring | SpiWiring]] = [
+            (("bus", n, "chip", m), chip) for n, bus in enumerate(harness.buses) for m, chip in enumerate(bus.chips)
+        ]
+        chips += [(("spi", n), chip) for n, chip in enumerate(harness.spi)]
+        for here, chip in chips:
             yield from (((*here, "pins", pin), name) for pin, name in chip.pins.items())
 
-    yield from _of_names(wired(), "switch or taxel" if harness.taxel_names else "switch")
+    yield from _of_names(wired(), "switch or taxel" if harness.taxels else "switch")
 
 
 def _of_names(named: Iterable[tuple[Place, str]], what: str) -> Iterator[Fault]:

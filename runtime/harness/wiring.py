@@ -172,10 +172,10 @@ class Harness(_Table, frozen=True):
         return (*keys, *(name for chip in chips for name in chip.numbered_pins.values()))
 
     @property
-    def taxel_names(self) -> tuple[str, ...]:
+    def taxels(self) -> tuple[str, ...]:
         """The names of all taxels that are wired: the boards', then the converters', channel by channel."""
         boards = (name for scanner in self.scanners for name in scanner.taxels if name)
-        chips = (chip for bus in self.buses for chip in bus.chips if chip.measures)
+        chips: list[ChipWiring | SpiWiring] = [chip for bus in self.buses for chip in bus.chips if chip.measures]
         return (*boards, *(name for chip in (*chips, *self.spi) for name in chip.numbered_pins.values()))
 
     def chip_of(self, bus: int, number: int) -> ChipWiring | SpiWiring:

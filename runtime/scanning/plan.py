@@ -13,8 +13,6 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from thenar.drivers.i2c.chips import Reading
-
 from ..errors import HarnessError
 from ..harness.wiring import Harness
 from ..names import list_names
@@ -118,7 +116,8 @@ class Costs:
         chips: dict[tuple[int, int], int] = {}
         self._waits: list[int] = []
         for number, port in enumerate(ports):
-            clock_hz, reading, mux = harness.line_of(port.bus).clock_hz, reading_of(port, harness), mux_of(port, harness)
+            clock_hz, reading = harness.line_of(port.bus).clock_hz, reading_of(port, harness)
+            mux = mux_of(port, harness)
             channel = (port.bus, mux.address, mux.channel) if mux else ()
             way: list[_Room] = [room for room in (channel[:2], channel) if room in rooms]
             for room in way:
@@ -249,10 +248,9 @@ def unwired(harness: Harness, switch_names: Sequence[str]) -> list[str]:
 def _pins(port: Port, harness: Harness) -> list[tuple[int, int]]:
     """Return the pins that a port's bits show, each with its switch; nothing if there is no such reading or bit."""
     try:
-        reading = reading_of(port, harness)
+        pins = reading_of(port, harness).pins
     except LookupError:
         return []
-    pins = reading.pins if isinstance(reading, Reading) else ()
     return [] if any(bit >= len(pins) for bit, _ in port.switches) else [(pins[bit], n) for bit, n in port.switches]
 
 

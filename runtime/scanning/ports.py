@@ -32,7 +32,7 @@ def levels_of(harness: Harness, switch_names: Sequence[str]) -> Levels:
 
     A name of a switch is none, whatever it looks like.
     """
-    taxels, pins = set(harness.taxel_names), set(harness.switches)
+    taxels, pins = set(harness.taxels), set(harness.switches)
     found: dict[str, list[Pair]] = {}
     for number, name in enumerate(switch_names):
         taxel, code = (name, 0) if name in taxels else taxel_and_code(name) or ("", 0)
@@ -59,16 +59,17 @@ def ports_of(harness: Harness, numbers: Mapping[str, int], levels: Levels | None
     """Return the fewest ports whose answers hold all switches of `numbers` that hang on chips, chip by chip, and the
     conversions of all taxels of `levels`.
     """
+    found = levels or {}
     expanders = (
         port
         for bus, wiring in enumerate(harness.buses)
         for chip, wired in enumerate(wiring.chips)
-        for port in (_conversions(bus, chip, wired, levels or {}) if wired.measures else _ports(bus, chip, wired, numbers))
+        for port in (_conversions(bus, chip, wired, found) if wired.measures else _ports(bus, chip, wired, numbers))
     )
     spi = (
         port
-        for bus, wired in enumerate(harness.spi, start=len(harness.buses))
-        for port in _conversions(bus, 0, wired, levels or {})
+        for bus, device in enumerate(harness.spi, start=len(harness.buses))
+        for port in _conversions(bus, 0, device, found)
     )
     return (*expanders, *spi)
 
@@ -110,7 +111,7 @@ def whole_scan(harness: Harness, switch_names: Sequence[str], *, every_taxel: bo
         for scanner in harness.scanners
     )
     boards = tuple(_board_levels(scanner, levels) for scanner in harness.scanners)
-    converted = dict.fromkeys(harness.taxel_names, ()) | levels if every_taxel else levels
+    converted = {taxel: levels.get(taxel, ()) for taxel in harness.taxels} if every_taxel else levels
     ports = ports_of(harness, numbers, converted)
     return ScanMap(SCHEMA, harness.fingerprint, ports, scanners, boards if any(boards) else ())
 

@@ -4,8 +4,8 @@ A transaction takes its SCL periods and the time for which the bus must be free 
 standard gives by speed: 4.7, 1.3 and 0.5 us up to 100 kHz, 400 kHz and above. Each transaction and each selection of a
 mux's channel is one system call, whose cost is the machine's own and is given by the caller.
 
-A converter that needs time begins its next conversion as soon as its last was read, and the bus reads other ports in the
-meantime: in the order of the scan what can be read, and it waits where nothing can.
+A converter that needs time begins its next conversion as soon as its last was read, and the bus reads other ports
+meanwhile: the first in the order of the scan that can be read. It waits where none can.
 """
 
 from collections import Counter
@@ -29,8 +29,8 @@ _FREE_FASTEST_US = 0.5
 
 
 class ChipTime(Struct, frozen=True):
-    """What one chip of a scan takes alone: harness.chip_of(bus, chip), by name; its readings; how many kept switches and
-    levels they show; microseconds, system calls and conversions included, selections of its channel not.
+    """What one chip of a scan takes alone: harness.chip_of(bus, chip), by name; its readings; how many kept switches,
+    levels included, they show; microseconds, system calls and conversions included, selections of its channel not.
     """
 
     bus: int
@@ -66,20 +66,20 @@ def free_us(clock_hz: int) -> float:
     return next((us for clock, us in _FREE_US if clock_hz <= clock), _FREE_FASTEST_US)
 
 
-def port_us(reading: Reading | Transfer, clock_hz: int) -> float:
+def port_us(reading: Reading, clock_hz: int) -> float:
     """Return what one reading takes on the wire, in microseconds: of a conversion also the transfer that begins it."""
     if isinstance(reading, Transfer):
         return reading.scl_periods * 1e6 / clock_hz + SELECT_US
     return reading.scl_periods * 1e6 / clock_hz + free_us(clock_hz) + start_us(reading, clock_hz)
 
 
-def start_us(reading: Reading | Transfer, clock_hz: int) -> float:
+def start_us(reading: Reading, clock_hz: int) -> float:
     """Return what the transfer that begins a conversion takes on the wire; 0 where there is none."""
     periods = reading.start_periods if isinstance(reading, Conversion) else 0
     return periods * 1e6 / clock_hz + free_us(clock_hz) if periods else 0.0
 
 
-def waiting_us(reading: Reading | Transfer) -> float:
+def waiting_us(reading: Reading) -> float:
     """Return how long a conversion takes from its beginning until it can be read; 0 where nothing has to wait."""
     return reading.us if isinstance(reading, Conversion) else 0.0
 
@@ -94,9 +94,9 @@ def mux_of(port: Port, harness: Harness) -> MuxChannel | None:
     return harness.buses[port.bus].chips[port.chip].mux if port.bus < len(harness.buses) else None
 
 
-def reading_of(port: Port, harness: Harness) -> Reading | Transfer:
+def reading_of(port: Port, harness: Harness) -> Reading:
     """Return the transaction that `port` names. Raises KeyError if its chip has none of that name."""
-    readings: Sequence[Reading | Transfer] = harness.chip_of(port.bus, port.chip).chip.readings
+    readings = harness.chip_of(port.bus, port.chip).chip.readings
     return {reading.name: reading for reading in readings}[port.reading]
 
 
@@ -114,7 +114,8 @@ def _whole_us(ports: Sequence[Port], harness: Harness, ioctl_us: float) -> float
     slow = {port.bus for port in ports if waiting_us(reading_of(port, harness))}
     fast = [port for port in ports if port.bus not in slow]
     times = (*_selected_us(fast, harness, ioctl_us), *(t.us for t in _chip_times(fast, harness, ioctl_us)))
-    return fsum((*times, *(overlapped_us([p for p in ports if p.bus == bus], harness, ioctl_us) for bus in sorted(slow))))
+    overlapped = (overlapped_us([port for port in ports if port.bus == bus], harness, ioctl_us) for bus in sorted(slow))
+    return fsum((*times, *overlapped))
 
 
 def overlapped_us(ports: Sequence[Port], harness: Harness, ioctl_us: float = 0.0) -> float:
@@ -209,7 +210,7 @@ def _chip_times(ports: Iterable[Port], harness: Harness, ioctl_us: float) -> Ite
         )
 
 
-def _alone_us(reading: Reading | Transfer, clock_hz: int, ioctl_us: float) -> float:
+def _alone_us(reading: Reading, clock_hz: int, ioctl_us: float) -> float:
     """Return what a reading takes where nothing else is read meanwhile."""
     calls = 2 if start_us(reading, clock_hz) else 1
     return port_us(reading, clock_hz) + waiting_us(reading) + calls * ioctl_us

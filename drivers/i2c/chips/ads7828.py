@@ -50,9 +50,7 @@ class Ads7828(Converter):
     bits = 12
     # The answer's second byte holds the lower eight bits, its first the upper four.
     readings = tuple(
-        Conversion(
-            f"CH{channel}", bytes((_command(channel),)), (channel,) * 4 + (-1,) * 4 + (channel,) * 8
-        )
+        Conversion(f"CH{channel}", bytes((_command(channel),)), (channel,) * 4 + (-1,) * 4 + (channel,) * 8)
         for channel in range(8)
     )
     registers = False
@@ -64,7 +62,7 @@ class Ads7828(Converter):
         footprint="Package_SO:TSSOP-16_4.4x5mm_P0.65mm",
         pins=(*(f"CH{n}" for n in range(8)), "GND", "REF", "COM", "A0", "A1", "SCL", "SDA", "VDD"),
         sure=False,
-        note="REF takes a capacitor to ground and the supply, COM goes to ground; compare symbol and pins before ordering",
+        note="REF is tied to the supply, COM to ground; compare symbol and pins before ordering",
         library="Analog_ADC",
     )
 

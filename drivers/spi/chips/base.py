@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ...i2c.chips.base import Package
+from ...i2c.chips.base import Package, Reading
 
 _BITS = 8
 # For so long chip select must be high between two transfers (MCP3208: 500 ns, MCP3008: 270 ns).
@@ -15,17 +15,18 @@ SELECT_US = 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class Transfer:
-    """One transaction that reads channel number `channel`, of this name: `sent` goes out while as many bytes come in."""
+class Transfer(Reading):
+    """One transaction that reads a channel, the only one of `pins`: as many bytes come in while `command` goes out."""
 
-    name: str
-    sent: bytes
-    channel: int
+    @property
+    def wire_bytes(self) -> int:
+        """Bytes on the wire."""
+        return len(self.command)
 
     @property
     def scl_periods(self) -> int:
-        """SCLK periods on the wire."""
-        return _BITS * len(self.sent)
+        """SCLK periods, of which a byte has no ninth."""
+        return _BITS * self.wire_bytes
 
 
 class SpiModel(ABC):
@@ -71,7 +72,11 @@ class SpiChip(ABC):
     @property
     def readings(self) -> tuple[Transfer, ...]:
         """What reads each channel, in their order."""
-        return tuple(Transfer(name, self.sent(channel), channel) for channel, name in enumerate(self.pins))
+        sent = (self.sent(channel) for channel in range(len(self.pins)))
+        return tuple(
+            Transfer(name, command, (channel,) * _BITS * len(command))
+            for channel, (name, command) in enumerate(zip(self.pins, sent, strict=True))
+        )
 
     def code(self, answer: bytes) -> int:
         """Return the code of an answer, whose last bits it is."""

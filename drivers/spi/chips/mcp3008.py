@@ -1,7 +1,9 @@
 """Microchip MCP3008 and MCP3004: the MCP3208 and MCP3204 with 10 bits, and faster (DS21295)."""
 
 from dataclasses import replace
+from typing import ClassVar
 
+from .base import SpiModel
 from .mcp3208 import Mcp3204, Mcp3204Model, Mcp3208, Mcp3208Model
 
 _START, _SINGLE = 0x01, 0x80
@@ -26,7 +28,7 @@ class Mcp3008(Mcp3208):
     rank = 3
     clock_hz, most_hz = 1_350_000, 3_600_000
     bits = 10
-    model = Mcp3008Model
+    model: ClassVar[type[SpiModel]] = Mcp3008Model
     package = replace(Mcp3208.package, part="MCP3008-I/SL", symbol="MCP3008")
 
     def sent(self, channel: int) -> bytes:

@@ -1,7 +1,9 @@
 """Microchip MCP3208 and MCP3204: eight or four channels of 12 bits, converted while the transfer goes on (DS21298)."""
 
-from .base import SpiChip, SpiModel
+from typing import ClassVar
+
 from ...i2c.chips.base import Package
+from .base import SpiChip, SpiModel
 
 _SOIC16 = "Package_SO:SOIC-16_3.9x9.9mm_P1.27mm"
 _SOIC14 = "Package_SO:SOIC-14_3.9x8.7mm_P1.27mm"
@@ -40,7 +42,7 @@ class Mcp3208(SpiChip):
     clock_hz, most_hz = 1_000_000, 2_000_000
     pins = tuple(f"CH{channel}" for channel in range(8))
     bits = 12
-    model: type[SpiModel] = Mcp3208Model
+    model: ClassVar[type[SpiModel]] = Mcp3208Model
     package = Package(
         part="MCP3208-CI/SL",
         maker="Microchip",
