@@ -67,9 +67,9 @@ _GROUPS = {
 
 
 def _chips() -> Iterable[str]:
-    from thenar.drivers.i2c.chips import CHIPS
+    from thenar.drivers.i2c.chips import expanders
 
-    return (*CHIPS, _BOARD)
+    return (*expanders(), _BOARD)
 
 
 class _ChipOption(click.Option):

@@ -36,7 +36,7 @@ class Samples:
         The number of each row's trial and subject: what is chosen by inner folds must not part them. None given: each
         row is a trial of its own, of one subject.
     taxels : ndarray of uint16, shape (n, t), optional
-        Codes of which training makes switches first, by thresholds that it learns: placement/thresholds.py.
+        Codes of which a placement makes bits first, by thresholds that it learns: placement/elements.py.
 
     Raises
     ------
@@ -120,11 +120,15 @@ class Samples:
         """Return the same rows with the switches `columns` alone, in their order, and all joints."""
         return replace(self, switches=self.switches[:, list(columns)])
 
+    def with_joints(self, joints: Columns) -> "Samples":
+        """Return the same rows with the joints `joints` alone, in their order."""
+        return replace(self, codes=self.codes[:, list(joints)])
+
     @property
     def inputs(self) -> NDArray[np.uint16]:
         """The inputs as one matrix (n, s + j): the switches' bits, then the joints' codes. There may be no taxels."""
         if self.taxels.shape[1]:
-            raise SamplesError("taxels are no inputs: make switches of them by thresholds first")
+            raise SamplesError("taxels are no inputs: make bits of them by thresholds first")
         return np.hstack([self.switches, self.codes], dtype=np.uint16)
 
     def kept(self, columns: Columns) -> NDArray[np.uint16]:

@@ -83,6 +83,8 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     trainer, settings : str, dict
         What makes the model, and the settings that only it takes, by name. "auto": of the trainers that take the
         settings given, the one that inner folds choose; with `rounds` that is LogitBoost.
+    levels : int or None
+        How many levels of a taxel there are to choose from, at most; None: as many as are usual.
     """
 
     prune: Count = _written(0)
@@ -100,6 +102,7 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     trainer: Name = AUTO
     settings: dict[Name, Given] = {}
     by: By | None = None
+    levels: Annotated[int, Meta(ge=1, le=65535)] | None = None
 
 
 class Compared(Struct, frozen=True, forbid_unknown_fields=True):
@@ -189,8 +192,8 @@ class Calibration(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Threshold(Struct, frozen=True, forbid_unknown_fields=True):
-    """What makes a switch of a taxel: it is closed at codes above `code`. `value`, in the unit of `taxel`, is midway to
-    the next code.
+    """A level of a taxel, what makes a switch of it: closed at codes above `code`. `value`, in the unit of `taxel`, is
+    midway to the next code.
     """
 
     code: Code
@@ -200,13 +203,19 @@ class Threshold(Struct, frozen=True, forbid_unknown_fields=True):
 
 class Switch(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """A kept switch: its column in the recordings, from 0, its name, and the information (bits) that it brought: to the
-    tree of ID3, or alone where another method chose it; of a taxel, which follow the switches, also the threshold.
+    tree of ID3, or alone where another method chose it; of a taxel, which follow the switches, also the threshold. A
+    taxel may have several, each a switch with a name of its own.
     """
 
     column: Count
     name: Name
     gain: Value
     threshold: Threshold | None = None
+
+    @property
+    def source(self) -> str:
+        """The name of the column and of the glove's input: its own, or that of the taxel that it is a level of."""
+        return self.name if self.threshold is None else self.threshold.taxel.name
 
     @property
     def closed(self) -> str:
@@ -382,11 +391,11 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
 
 
 def _wrong_columns(manifest: Manifest) -> Iterator[str]:
-    switches = [switch.column for switch in manifest.switches]
-    for columns in (switches, [joint.column for joint in manifest.joints]):
+    levels = [(switch.column, switch.threshold and switch.threshold.code) for switch in manifest.switches]
+    for columns in (levels, [joint.column for joint in manifest.joints]):
         if len(set(columns)) < len(columns):
             yield "takes two inputs from one column"
-    if max(switches, default=-1) >= manifest.source.switches:
+    if max((column for column, _ in levels), default=-1) >= manifest.source.switches:
         yield "keeps a switch that the recordings do not have"
 
 

@@ -14,6 +14,7 @@ from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Debounce, Glove
 from thenar.runtime.scanning import plan
 from thenar.runtime.scanning import plan as order
 from thenar.runtime.scanning.timing import port_us, select_us
+from thenar.runtime.taxels import TaxelSettings
 
 PAGE = (Path(__file__).parents[1] / "docs" / "harness.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
@@ -24,6 +25,7 @@ TABLES: dict[str, type[msgspec.Struct]] = {
     "`[[bus]]`": BusWiring,
     "`[[bus.chip]]`": ChipWiring,
     "`[debounce]`": Debounce,
+    "`[taxels]`": TaxelSettings,
 }
 
 
@@ -53,9 +55,10 @@ def documented() -> Iterator[tuple[str, str, str]]:
 
 def test_every_key_is_there_with_its_default() -> None:
     found = list(documented())
-    nested = {"cyberglove", "scanner", "bus", "chip", "debounce"}
+    nested = {"cyberglove", "scanner", "bus", "chip", "spi", "debounce"}
     for table, kind in TABLES.items():
-        keys = {field.encode_name: field for field in msgspec.structs.fields(kind) if field.encode_name not in nested}
+        tables = nested | ({"taxels"} if kind is Harness else set())
+        keys = {field.encode_name: field for field in msgspec.structs.fields(kind) if field.encode_name not in tables}
         assert sorted(key for where, key, _ in found if where == table) == sorted(keys)
         for where, key, default in found:
             if where == table and keys[key].default not in (msgspec.NODEFAULT, None, ()):

@@ -34,13 +34,13 @@ from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES
 from ..glove.files import NAMES, users_files
+from ..placement.elements import Element, names_of
 from ..placement.methods.base import METHODS
 from ..placement.ports import PortCosts, ports_of_whole_glove
-from ..placement.thresholds import with_switches
 from ..publication import check_folder, publish_folder, sweep
 from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet, Joint
-from ..samples import Columns, Samples
+from ..samples import Samples
 from ..tables.compare import Comparison, compare
 from ..trainers.base import SHARED, TRAINERS, Training, changed
 from . import CompileError
@@ -180,8 +180,7 @@ def compile_build(
     ports = ports or ports_of_whole_glove(None, grasp_set.element_names)
     groups = groups_for(grasp_set, asked)
     trained = train(samples, asked, steps.trained, ports, groups, jobs)
-    joints = tuple(range(samples.codes.shape[1]))
-    made = Making(grasp_set, samples, joints, asked, trained, harness)
+    made = Making(grasp_set, samples, asked, trained, harness)
     tested = cross_validated(
         samples, cuts, asked, partial(answers_of, samples, asked, ports, groups), jobs, steps.tested
     )
@@ -227,25 +226,23 @@ class _Steps:
 
 
 class Making:
-    """A build in the making: integers of what was trained, held against it, and how to read its switches.
-
-    `samples` have all switches, and the codes of `joints`, columns of the recordings.
+    """A build in the making: integers of what was trained on `samples`, held against it, and how to read its
+    switches.
     """
 
     def __init__(
         self,
         grasp_set: GraspSet,
         samples: Samples,
-        joints: Columns,
         options: Options,
         trained: Trained,
         harness: Wired | None,
     ) -> None:
-        self.grasp_set, self.samples, self.joints = grasp_set, samples, joints
+        self.grasp_set, self.samples = grasp_set, samples
         self.options, self.trained = options, trained
-        kept = with_switches(samples, trained.thresholds).keeping(trained.columns)
+        kept = trained.read(samples)
         self.integers = integers_of(trained, samples, options)
-        names = [grasp_set.element_names[column] for column in trained.columns]
+        names = names_of(grasp_set, trained.kept)
         self.harness = harness(names) if callable(harness) else harness
         self.scan = None
         if self.harness is not None:
@@ -296,7 +293,7 @@ class Making:
         digests = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
         grasp_set, options, fitting = self.grasp_set, self.options, self.trained.fitting
         rates = rates_of("training", self.samples, self.comparison.deployed, options.seed)
-        switches = zip(self.trained.columns, self.trained.gains, strict=True)
+        switches = zip(self.trained.kept, names_of(grasp_set, self.trained.kept), self.trained.gains, strict=True)
         return Manifest(
             schema=SCHEMA,
             checksum="",
@@ -313,8 +310,8 @@ class Making:
             ),
             options=options,
             grasps=self.samples.grasps,
-            switches=tuple(self._switch(column, gain) for column, gain in switches),
-            joints=tuple(_calibration(column, grasp_set.joints[column]) for column in self.joints),
+            switches=tuple(self._switch(*each) for each in switches),
+            joints=tuple(_calibration(column, grasp_set.joints[column]) for column in self.trained.joints),
             proof=_proof(self.integers, self.comparison, options.width),
             rates=rates if tested is None else (*rates, *tested.rates),
             stopped_after=self.trained.stopped_after,
@@ -323,11 +320,11 @@ class Making:
             fitting=fitting if fitting is not None and fitting.compared else None,
         )
 
-    def _switch(self, column: int, gain: float) -> Switch:
-        name, taxel = self.grasp_set.element_names[column], column - len(self.grasp_set.switch_names)
+    def _switch(self, element: Element, name: str, gain: float) -> Switch:
+        (column, code), taxel = element, element.column - len(self.grasp_set.switch_names)
         if taxel < 0:
             return Switch(column, name, gain)
-        joint, code = self.grasp_set.taxel_columns[taxel], self.trained.thresholds[taxel]
+        joint = self.grasp_set.taxel_columns[taxel]
         return Switch(column, name, gain, Threshold(code, float(joint.value(code + 0.5)), _calibration(taxel, joint)))
 
 

@@ -188,7 +188,7 @@ def check_scan(
 
     deployed (n,) are their classes as the integers run: what a whole scan gives.
     """
-    ports = [[switch for _, switch in port.switches] for port in scan.ports]
+    ports = [port.elements for port in scan.ports]
     frames = Decided(tables, ports, bits, codes)
     pending = np.ones(len(frames), bool)
     read, changed = 0, 0

@@ -206,8 +206,8 @@ def _remarks(
     for number, switch in enumerate(manifest.switches, start=1):
         if switch.threshold is not None:
             yield (
-                f"SW{number} is the taxel {switch.name}: set its comparator or converter to {switch.threshold.value:g} "
-                f"{switch.threshold.taxel.unit}; it is {switch.closed}"
+                f"SW{number} is of the taxel {switch.source}: set its comparator or converter to "
+                f"{switch.threshold.value:g} {switch.threshold.taxel.unit}; it is {switch.closed}"
             )
     joints = own_joints([joint.name for joint in manifest.joints])
     if joints and harness.cyberglove is None:

@@ -196,9 +196,9 @@ def scan_table(content: ReportContent) -> PlainTable | None:
         return None
     rows = []
     for order, port in enumerate(scan.ports, 1):
-        bus = harness.buses[port.bus]
-        where = (f"{bus.device} at {bus.clock_hz / 1000:g} kHz", bus.chips[port.chip].place, port.reading)
-        switches = ", ".join(names[switch] for _, switch in port.switches)
+        bus, chip = harness.line_of(port.bus), harness.chip_of(port.bus, port.chip)
+        where = (f"{bus.device} at {bus.clock_hz / 1000:g} kHz", chip.place, port.reading)
+        switches = ", ".join(names[switch] for switch in port.elements)
         us = microseconds(port_us(reading_of(port, harness), bus.clock_hz))
         rows.append((str(order), *where, switches, us))
     caption = "Transactions, in the order in which they are made; times on the wire, by arithmetic"

@@ -65,7 +65,7 @@ def _scene(effects: Sequence[str | tuple[str, EffectParameters]] = (), **changes
         "subjects": (Subject(name="A", hand_length_mm=185.0, hand_breadth_mm=83.0),),
         "repetitions": 8,
         "recording": Recording(lead_ms=30.0, hold_ms=250.0, release_ms=40.0),
-        "glove": Glove(),
+        "glove": Glove(taxels="all" if any(name.startswith("taxel.") for name, _ in pairs) else ()),
     }
     return Scene(effects=listed, **(usual | changes))  # type: ignore[arg-type]
 

@@ -212,7 +212,7 @@ def _bus_us(
 ) -> tuple[float, float, float]:
     """Return the time of a whole scan of the chips, and the mean time and number of ports of one that ends early."""
     costs = Costs(scan.ports, harness)
-    frames = Decided(tables, [[switch for _, switch in port.switches] for port in scan.ports], bits, codes)
+    frames = Decided(tables, [port.elements for port in scan.ports], bits, codes)
     always = beside.scan_us + beside.key_us * len(scan.switches)
     whole, weighted, shares, read = [always], [always], list[float](), 0
     for number, port in enumerate(scan.ports):

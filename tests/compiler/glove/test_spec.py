@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from thenar.compiler.glove.spec import SpecError, glove_spec
 from thenar.compiler.hand import HandShape
-from thenar.drivers.i2c.chips import CHIPS
+from thenar.drivers.i2c.chips import expanders
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import GloveWiring, Harness, ScannerWiring
 from thenar.runtime.manifest import Manifest
@@ -93,7 +93,7 @@ def test_a_strange_glove_is_described_without_places(manifest_of: Manifests, han
     assert summary.remarks[-1].startswith("where this glove's switches lie is not known")
 
 
-@pytest.mark.parametrize("kind", sorted(CHIPS))
+@pytest.mark.parametrize("kind", sorted(expanders()))
 def test_the_bill_counts_what_the_circuit_holds(manifest_of: Manifests, hand: HandShape, kind: str) -> None:
     names = hand.names[:30]
     spec = glove_spec(manifest_of(names), None, propose_harness(names, kind), hand)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from thenar.drivers.i2c.chips import CHIPS
+from thenar.drivers.i2c.chips import CHIPS, expanders
 from thenar.drivers.ports import port_fault
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.checks import faults
@@ -20,6 +20,7 @@ from thenar.runtime.harness.wiring import (
 )
 from thenar.runtime.harness.writing import harness_to_toml, write_record_us
 from thenar.runtime.names import fault
+from thenar.runtime.taxels import TaxelSettings
 
 Load = Callable[[str], Harness]
 
@@ -31,19 +32,21 @@ ports = names.filter(lambda name: not port_fault(name))
 def harnesses(draw: st.DrawFn) -> Harness:
     """Sound harnesses: chips of any kind, each behind a channel of its own if behind any."""
     left = iter(draw(st.lists(names, min_size=30, max_size=30, unique=True)))
-    chips = []
+    chips, switched = [], expanders().values()
     for address in draw(st.lists(st.integers(0, 7), max_size=3, unique=True)):
         kind = CHIPS[draw(st.sampled_from(sorted(CHIPS)))]
         usable = [pin for pin in kind.pins if pin not in kind.not_inputs]
         pins = draw(st.lists(st.sampled_from(usable), max_size=5, unique=True))
-        mux = draw(st.none() | st.builds(MuxChannel, address=st.just(0x73), channel=st.just(address)))
+        few = len(kind.addresses) < 8  # two of them may have one address
+        behind = st.builds(MuxChannel, address=st.just(0x73), channel=st.just(address))
+        mux = draw(behind if few else st.none() | behind)
         chips.append(
             ChipWiring(
                 kind=kind.name,
                 address=kind.addresses[address % len(kind.addresses)],
                 mux=mux,
                 pins={pin: next(left) for pin in pins},
-                closed=draw(st.sampled_from(["low", "high"] if kind.registers else ["low"])),
+                closed=draw(st.sampled_from(["low", "high"] if kind.registers and kind in switched else ["low"])),
             )
         )
     board = ScannerWiring(port="p", switches=("", *(next(left) for _ in range(draw(st.integers(0, 4))))))
@@ -62,6 +65,11 @@ def harnesses(draw: st.DrawFn) -> Harness:
         scanners=(board,),
         buses=(BusWiring(device="/dev/i2c-1", chips=tuple(chips)),),
         debounce=Debounce(enabled=draw(st.booleans()), release_ms=draw(st.floats(0.0, 1000.0))),
+        taxel_settings=TaxelSettings(
+            calibration=draw(st.none() | st.just("/a/c.toml")),
+            baseline=draw(st.booleans()),
+            drift=draw(st.floats(0, 1)),
+        ),
     )
 
 
