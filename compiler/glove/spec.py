@@ -32,8 +32,6 @@ from .layout import (
 )
 from .pattern import Pattern, pattern_of
 
-_SENSORS = 18
-
 
 class SpecError(ThenarError, ValueError):
     """There is no glove to describe, or not with this wiring."""
@@ -45,7 +43,7 @@ class Expected(Struct, frozen=True):
     scan_us      of all kept switches on expanders, in `transactions` transactions, selections of muxes included
     full_us      of all switches that are wired to expanders, kept or not
     boards_us    of a full bitmap of each scanner board
-    glove_us     between records of the CyberGlove; None where the build looks at no joint
+    glove_us     between records of the CyberGlove, of as many `sensors` as the build has joints; None where it has none
     rates        the recognition that was measured when the build was compiled
     """
 
@@ -53,6 +51,7 @@ class Expected(Struct, frozen=True):
     scan_us: float
     full_us: float
     boards_us: tuple[float, ...]
+    sensors: int
     glove_us: float | None
     rates: tuple[Recognised, ...]
 
@@ -68,7 +67,8 @@ def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> Expected
         boards_us=tuple(
             scanner_us(board) for board, pairs in zip(harness.scanners, scan.scanners, strict=True) if pairs
         ),
-        glove_us=None if glove is None else glove_us(glove, glove.sensors or _SENSORS),
+        sensors=len(manifest.joints),
+        glove_us=None if glove is None else glove_us(glove, len(manifest.joints)),
         rates=manifest.rates,
     )
 

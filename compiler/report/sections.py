@@ -226,9 +226,10 @@ def scan_sentences(content: ReportContent) -> Iterator[str]:
             f"{counted(len(board.switches), 'key')}, {microseconds(scanner_us(board))} µs a bitmap on its line."
         )
     if harness.cyberglove is not None and joints:
-        sensors = harness.cyberglove.sensors or joints
-        us = microseconds(glove_us(harness.cyberglove, sensors))
-        yield f"A record of the CyberGlove's {sensors} sensors takes {us} µs on its own line, beside the scan."
+        us, glove = microseconds(glove_us(harness.cyberglove, joints)), harness.cyberglove
+        how = "by the vendor's formula" if glove.record_us is None else "as it was measured"
+        record = f"A record of {counted(joints, 'sensor')} of the CyberGlove"
+        yield f"{record} takes {us} µs on its own line, {how}, beside the scan."
 
 
 def provenance(manifest: Manifest) -> Pairs:

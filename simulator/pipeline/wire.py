@@ -29,8 +29,7 @@ Feed = Callable[[bytes], list[bytes]]
 
 BAUD = 115_200
 _BITS_A_BYTE = 10
-# What the vendor's manual says of a sensor, as a public driver quotes it; its filter, which takes more, is off.
-_DIGITISED_US = 250 * glove.SENSORS
+_DIGITISED_US = round(glove.digitising_us(glove.SENSORS))
 
 
 def _send(parameters: EffectParameters, setting: Setting) -> Step:
