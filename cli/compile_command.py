@@ -216,7 +216,7 @@ def command(
             grasp_set,
             output,
             harness=given if chosen is None else chosen.wired(given),
-            ports=ports_of_whole_glove(given, grasp_set.element_names),
+            ports=ports_of_whole_glove(given, grasp_set.element_names, len(grasp_set.taxel_columns)),
             documents=documents,
             jobs=jobs,
             progress=told,
@@ -306,6 +306,8 @@ def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
         f"{proof.error:g} steps; {proof.covered} of {manifest.source.rows} rows are safe, {proof.changed} change class"
     )
     console.print(made.firmware, soft_wrap=True)
+    if manifest.faults is not None and manifest.faults.lost is not None:
+        console.print(f"worst of single inputs lost, rows trained on: {manifest.faults.sentences[0]}", soft_wrap=True)
     if made.harness is not None and made.scan is not None:
         _print_scan(made.scan, made.harness)
     if propose is not None:
