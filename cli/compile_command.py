@@ -366,8 +366,8 @@ def _print_chips(time: "ScanTime") -> None:
 
 
 def _in_all(scan: "ScanMap", harness: "Harness", time: "ScanTime") -> str:
-    count = len(scan.ports) + time.selects
+    count, what = len(scan.ports) + time.selects, "switches and taxels" if harness.taxel_names else "switches"
     return (
         f"a whole scan: {count} transaction{'s' if count > 1 else ''}, {time.us:.1f} us on the wire, "
-        f"{time.share:.1%} of the {time.full_us:.1f} us for all {harness.on_chips} wired switches{' and taxels' if harness.taxel_names else ''}"
+        f"{time.share:.1%} of the {time.full_us:.1f} us for all {harness.on_chips} wired {what}"
     )
