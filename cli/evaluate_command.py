@@ -216,7 +216,7 @@ def _print_learning(learning: "Learning") -> None:
     console.print(Text(learning.title, "bold"))
     console.print(grid)
     console.print(
-        learning.note or "Expected: a power law through the points. It is an extrapolation, not a measurement."
+        learning.note or "Expected: a power law through the points, so an extrapolation."
     )
 
 
