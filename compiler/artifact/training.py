@@ -11,7 +11,7 @@ from thenar.runtime.tables import MAX_JOINTS, IntegerTables
 
 from ..boosting.stumps import Stumps
 from ..evaluation.choosing import choose_training
-from ..evaluation.folds import Fold, leave_one_out, trial_folds
+from ..evaluation.folds import Fold, leave_groups_out, leave_one_out, trial_folds
 from ..evaluation.populations import OF, groups_of
 from ..evaluation.rates import rated
 from ..limits import check_inputs, check_memory, check_types
@@ -150,8 +150,6 @@ def integers_of(trained: Trained, samples: Samples, options: Options) -> Integer
 
 
 USUAL_ROUNDS = 100  # where a fit is chosen, its work is taken to be that of so many
-# A new subject, object or session costs a training for each, or for each of so many groups of them.
-_MOST_GROUPS = 10
 
 Test = Callable[[Fold], Answers]
 
@@ -192,9 +190,7 @@ def cuts_of(grasp_set: GraspSet, options: Options) -> tuple[Cut, ...]:
             leave_one_out(grasp_set.sessions[grasp_set.subjects == subject], f"session of subject {subject}")
     names = groups_of(grasp_set, by)
     assert names is not None
-    found, number = np.unique(names, return_inverse=True)
-    parts = names if len(found) <= _MOST_GROUPS else (number % _MOST_GROUPS).astype(np.str_)
-    return (Cut(OF[by], tuple(leave_one_out(parts, by)), names), pooled)
+    return (Cut(OF[by], tuple(leave_groups_out(names, by)), names), pooled)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

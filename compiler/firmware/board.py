@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct, field
 
-from thenar.drivers.i2c.chips import CHIPS
+from thenar.drivers.i2c.chips import CHIPS, expanders
 from thenar.runtime.harness import checks
 from thenar.runtime.harness.wiring import Baud, BusWiring, ChipWiring, Debounce, Harness, ScannerWiring
 from thenar.runtime.harness.writing import harness_to_toml
@@ -146,7 +146,7 @@ def glove_toml(name: str, board: Board, names: Names, port: str = "/dev/ttyACM0"
 
 Fault = tuple[Place, str]
 _TIMER_HZ = 400  # the clock's timer counts periods of 20 ms in eighths of the processor's clock
-_KINDS = tuple(kind for kind, chip in CHIPS.items() if chip.registers)
+_KINDS = tuple(kind for kind, chip in expanders().items() if chip.registers)
 _TOLERANCE = 0.025
 
 

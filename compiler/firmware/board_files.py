@@ -96,7 +96,7 @@ def harness_of(board: Board) -> Harness:
 
 def switches_of(ports: Sequence[Port]) -> list[list[int]]:
     """Return the numbers of the build's switches that each reading shows: the ports of an early exit."""
-    return [[switch for _, switch in port.switches] for port in ports]
+    return [list(port.elements) for port in ports]
 
 
 def exits_early(board: Board, ports: Sequence[Port]) -> bool:

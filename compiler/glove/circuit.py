@@ -137,8 +137,8 @@ def _add_expander(circuit: Circuit, unit: Unit, ends: Sequence[End]) -> None:
         return
     chip, package = wiring.chip, wiring.chip.package
     circuit.put(unit.ref, _kind(package, chip.pins), name=unit.place)
-    _add_power(circuit, unit.ref, package, wiring.address - chip.addresses[0])
     sda, scl = _wires(unit.bus, wiring.mux)
+    _add_power(circuit, unit.ref, package, wiring.address - chip.addresses[0], (sda, scl))
     circuit.join(sda, unit.ref, package.number("SDA"))
     circuit.join(scl, unit.ref, package.number("SCL"))
     if not chip.pulls_up:
@@ -148,16 +148,17 @@ def _add_expander(circuit: Circuit, unit: Unit, ends: Sequence[End]) -> None:
                 circuit.join(GROUND, unit.ref, package.number(pin))
 
 
-def _add_power(circuit: Circuit, ref: str, package: Package, above: int) -> None:
-    """Connect supply, ground, reset and address of a chip, so far above its lowest one."""
+def _add_power(circuit: Circuit, ref: str, package: Package, above: int, bus: tuple[str, str]) -> None:
+    """Connect supply, ground, reset and address of a chip on a bus, so far above its lowest one."""
+    nets = {"low": GROUND, "high": SUPPLY, "SDA": bus[0], "SCL": bus[1]}
     for number, name in enumerate(package.pins, start=1):
         if name in GROUND_PINS:
             circuit.join(GROUND, ref, str(number))
         if name in SUPPLY_PINS:
             circuit.join(SUPPLY, ref, str(number))
             circuit.between("C", _DECOUPLING, SUPPLY, GROUND)
-    for name, high in package.selects(above):
-        circuit.join(SUPPLY if high else GROUND, ref, package.number(name))
+    for name, to in package.selects(above):
+        circuit.join(nets[to], ref, package.number(name))
     if RESET in package.pins:
         circuit.join(f"{ref}_{RESET}", ref, package.number(RESET))
         circuit.between("R", _RESET_PULL, SUPPLY, f"{ref}_{RESET}")
@@ -166,7 +167,7 @@ def _add_power(circuit: Circuit, ref: str, package: Package, above: int) -> None
 def _add_muxes(circuit: Circuit, bus: int, channels: Sequence[tuple[int, int]], clock_hz: int) -> None:
     for address in dict.fromkeys(address for address, _ in channels):
         ref = circuit.next("U", _kind(tca9548a.PACKAGE, ()))
-        _add_power(circuit, ref, tca9548a.PACKAGE, address - tca9548a.ADDRESSES[0])
+        _add_power(circuit, ref, tca9548a.PACKAGE, address - tca9548a.ADDRESSES[0], _wires(bus, None))
         for wire, pin in zip(_wires(bus, None), ("SDA", "SCL"), strict=True):
             circuit.join(wire, ref, tca9548a.PACKAGE.number(pin))
         for channel in (channel for at, channel in channels if at == address):

@@ -5,7 +5,7 @@ from itertools import islice
 
 from thenar.drivers.cyberglove_protocol import SENSORS, sensors_with
 from thenar.drivers.i2c import tca9548a
-from thenar.drivers.i2c.chips import CHIPS, Chip
+from thenar.drivers.i2c.chips import CHIPS, Chip, expanders
 
 from ..errors import HarnessError
 from ..harness.wiring import MOST_KEYS, BusWiring, ChipWiring, GloveWiring, Harness, MuxChannel, ScannerWiring
@@ -29,8 +29,8 @@ def propose_harness(
     beyond the kind's addresses go behind a TCA9548A, those that come first stay before it. Raises HarnessError if there
     is no such kind, or no room for so many switches.
     """
-    if kind not in CHIPS:
-        raise HarnessError(f"there is no chip {kind!r}{nearest(kind, list(CHIPS))}")
+    if kind not in expanders():
+        raise HarnessError(f"there is no chip {kind!r}{nearest(kind, list(expanders()))}")
     chip = CHIPS[kind]
     inputs = _inputs(chip)
     left = iter(switch_names)

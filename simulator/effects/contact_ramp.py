@@ -17,7 +17,7 @@ from thenar.compiler.elementary import Floats
 
 from ..contact.model import Contact, ContactModel, Load
 from ..errors import SceneError
-from ..pipeline.batch import NEVER, Batch
+from ..pipeline.batch import NEVER, Batch, Ramp
 from ..pipeline.effect import Effect, EffectParameters, Setting, Together
 from ..streams import Draw
 
@@ -51,7 +51,9 @@ def prepare(parameters: Parameters, setting: Setting, contact: ContactModel) -> 
             grown = list(islice(found, below))
             draw.count("grips solved", len(batch) * below)
             draw.count("solver steps", sum(one.steps for one in grown))
-            _time(batch, grown, rise_us)
+            ramp = _time(batch, grown, rise_us)
+            if setting.taxels:
+                batch.ramp = ramp
 
     return act
 
@@ -62,8 +64,9 @@ def _loads(batch: Batch, levels: int) -> list[Load]:
     return [Load(*told, batch.grip_n * (level / levels)) for level in range(1, levels)]
 
 
-def _time(batch: Batch, grown: Sequence[Contact], rise_us: float) -> None:
-    """Enter when the switches of a batch close and open, from the contacts at the levels below the full grip.
+def _time(batch: Batch, grown: Sequence[Contact], rise_us: float) -> Ramp:
+    """Enter when the switches of a batch close and open, from the contacts at the levels below the full grip, and
+    return how their forces grow.
 
     A repetition that does not settle at one of them has not settled, and is told by what was left there.
     """
@@ -77,6 +80,7 @@ def _time(batch: Batch, grown: Sequence[Contact], rise_us: float) -> None:
         batch.settled = batch.settled & one.settled
         batch.residual_n = np.where(one.settled, batch.residual_n, np.maximum(batch.residual_n, one.residual_n))
         batch.residual_nmm = np.where(one.settled, batch.residual_nmm, np.maximum(batch.residual_nmm, one.residual_nmm))
+    return Ramp(forces, rise_us)
 
 
 def crossings(forces_n: Floats, thresholds_n: Floats, level_us: float) -> tuple[Integers, Integers]:
@@ -119,7 +123,7 @@ MEMBER = Effect(
         *("commanded_deg", "commanded_pose", "grip_n", "forces_n", "thresholds_n"),
         *("settled", "residual_n", "residual_nmm", "on_us", "off_us"),
     ),
-    writes=("on_us", "off_us", "settled", "residual_n", "residual_nmm"),
+    writes=("on_us", "off_us", "settled", "residual_n", "residual_nmm", "ramp"),
     timed=True,
     parameters=Parameters,
     together=prepare,

@@ -33,6 +33,17 @@ class Traffic:
 Integers = NDArray[np.int64]
 Bits = NDArray[np.bool_]
 
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ramp:
+    """How force grows: forces_n (levels + 1, n, s) at even steps of the grip, the first at contact, the last at
+    rise_us.
+    """
+
+    forces_n: Floats
+    rise_us: float
+
+
 # An object that slid so far was dropped: ours.
 SLID_OUT_MM = 20.0
 # The time of a switch that never closes or never opens.
@@ -60,11 +71,14 @@ class Batch:
     on_us, off_us (n, s)  when each switch closes and opens; NEVER
     frame_us    (n, F)    when each frame's scan begins
     delay_us              how much later each switch is read, as broadcasts to (n, F, s); None: at once
-    bits        (n, F, s) what the scanner reads
+    bits        (n, F, s) what the scanner reads; of a place with a taxel, what a switch there would say
     sensors_deg (n, F, 18) what the CyberGlove's sensors feel
     raw         (n, F, 18) uint8, its bytes, 1 to 255
     traffic               the bytes on the serial lines, while they are there
     lost        (n, F)    frames that did not arrive
+    ramp                  how the forces grow; None: at once. Kept where there are taxels
+    taxels_n    (n, F, t) the force that each taxel feels
+    taxels      (n, F, t) uint16, its counts; None: there are none
     """
 
     condition: Condition
@@ -91,6 +105,9 @@ class Batch:
     raw: NDArray[np.uint8] = field(init=False)
     traffic: Traffic = field(init=False)
     lost: Bits | None = None
+    ramp: Ramp | None = None
+    taxels_n: Floats = field(init=False)
+    taxels: NDArray[np.uint16] | None = None
 
     def __len__(self) -> int:
         return len(self.repetitions)

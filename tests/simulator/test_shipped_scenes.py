@@ -21,7 +21,10 @@ FAULTS = {
     "wire.lost_bytes",
     "wire.damaged_bytes",
 }
+PADS = {"taxel.gain", "taxel.creep", "taxel.crosstalk", "taxel.noise", "taxel.adc"}
 IN_TIME = {"hand.transition", "contact.ramp", "frame.jitter", "bus.latency"}
+
+ADDED = {"quick": set(), "faulty-glove": FAULTS, "continuous": IN_TIME, "kamakura-analog": PADS}
 
 
 def effects(scene: Scene) -> dict[str, EffectParameters]:
@@ -40,6 +43,7 @@ def test_these_scenes_are_shipped() -> None:
         "cutkosky-def",
         "faulty-glove",
         "kamakura",
+        "kamakura-analog",
         "kamakura-def",
         "quick",
     ]
@@ -84,7 +88,7 @@ def test_what_varies_varies_alike_in_all_shipped_scenes(name: str) -> None:
     assert {effect: effects(load_scene(name))[effect] for effect in usual} == usual
 
 
-@pytest.mark.parametrize(("name", "added"), [("quick", set()), ("faulty-glove", FAULTS), ("continuous", IN_TIME)])
+@pytest.mark.parametrize(("name", "added"), ADDED.items())
 def test_a_scene_lists_what_it_is_for_and_nothing_else(name: str, added: set[str]) -> None:
     assert effects(load_scene(name)).keys() - effects(load_scene("kamakura")).keys() == added
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from thenar.compiler.glove.files import spec_files
 from thenar.compiler.glove.spec import glove_spec
 from thenar.compiler.hand import HandShape
-from thenar.drivers.i2c.chips import CHIPS
+from thenar.drivers.i2c.chips import CHIPS, expanders
 from thenar.runtime.harness.loading import load_harness, parse_harness
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel, ScannerWiring
 from thenar.runtime.manifest import Manifest
@@ -53,7 +53,7 @@ def check_address(netlist: "Netlist", ref: str, chip: ChipWiring) -> None:
 
 
 @settings(deadline=None, max_examples=25)
-@given(kind=st.sampled_from(sorted(CHIPS)), data=st.data())
+@given(kind=st.sampled_from(sorted(expanders())), data=st.data())
 def test_every_kept_switch_reaches_one_input_and_the_scan_map_reads_it(
     read_netlist: Reader, manifest_of: Manifests, hand: HandShape, kind: str, data: st.DataObject
 ) -> None:
