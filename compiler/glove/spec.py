@@ -11,7 +11,7 @@ from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.manifest import Manifest, Recognised
 from thenar.runtime.names import list_names
-from thenar.runtime.scanning.plan import check_harness
+from thenar.runtime.scanning.plan import check_harness, unwired
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import own_joints, propose_cyberglove, propose_harness
 from thenar.runtime.scanning.scanmap import ScanMap
@@ -156,8 +156,7 @@ def _harness(manifest: Manifest, scan: ScanMap | None, harness: Harness | None, 
         return propose_harness(names, cyberglove=propose_cyberglove([joint.name for joint in manifest.joints]))
     if scan is not None:
         check_harness(scan, harness, names)
-    wired = set(harness.switches)
-    if lacking := [name for name in names if name not in wired]:
+    if lacking := unwired(harness, names):
         raise HarnessError(
             f"harness {harness.name!r} has no pin or key for {list_names(lacking)}, which the build keeps: "
             "add what is missing to its file"
