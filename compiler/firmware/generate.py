@@ -63,6 +63,11 @@ class Firmware:
             raise FirmwareError(f"the mode {self.mode} is written for {others}, not for {self.target}")
         elif self.board is None:
             raise FirmwareError(f"the mode {self.mode} needs a board.toml: how the microcontroller is wired")
+        elif self.mode == "glove" and len(keys_of(self.board, self.names.switches)) < len(self.names.switches):
+            raise FirmwareError(
+                "the build keeps levels of taxels, which firmware of the mode glove does not read: take the mode scan, "
+                "and recognise on the host"
+            )
         elif self.board.part != target.part:
             raise FirmwareError(f"the board has an {self.board.part}, the target {self.target} is {target.named}")
 
@@ -100,11 +105,6 @@ class Firmware:
     def _of_board(self, board: Board, library: Library) -> dict[str, str]:
         name, names, tables = self.name, self.names, self.tables
         switches, glove = keys_of(board, names.switches), self.mode == "glove"
-        if glove and len(switches) < len(names.switches):
-            raise FirmwareError(
-                "the build keeps levels of taxels, which firmware of the mode glove does not read: take the mode scan, "
-                "and recognise on the host"
-            )
         config = config_of(board, switches, tables, recognises=glove)
         files = protocol_files(config) | board_files(name, names, library.layout, board, self.mode)
         if glove:
