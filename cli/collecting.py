@@ -18,7 +18,6 @@ from thenar.runtime.errors import HarnessError
 from thenar.runtime.frames import now_us
 from thenar.runtime.harness.wiring import GloveWiring, Harness
 from thenar.runtime.live.sources import NOT_YET, DeviceState, Sources, Taken
-from thenar.runtime.live.system import sensor_names_of
 from thenar.runtime.recording.guide import Guide, Journal, Stage, Trial
 from thenar.runtime.recording.session import Collection, Session
 from thenar.runtime.recording.writer import Recorder
@@ -64,7 +63,8 @@ def collect(
     """
     if sys.stdin is None:
         raise click.UsageError("stdin is closed: the keys that lead through a collection come from there")
-    switches, sensors = harness.switches, sensor_names_of(harness.cyberglove)
+    switches, glove = harness.switches, harness.cyberglove
+    sensors = () if glove is None else glove.sensor_names
     check_names("column", (*switches, *harness.taxel_names, *sensors))
     scan = whole_scan(harness, switches, every_taxel=True)
     with ended_by_signals() as stop, Sources(harness, switches, scan) as sources:

@@ -124,14 +124,17 @@ class Glove:
         self.frames, self.lacking = 0, ""
         self.health: HealthReport | None = None
         self.recorder: Recorder | None = None
-        self._recognizer, self.sources = system.recognizer(), system.sources(full_scan=full_scan)
+        # A recording is to be learnt from: it holds all sensors.
+        devices = system.sources(full_scan=full_scan, all_sensors=record is not None)
+        self._recognizer, self.sources = system.recognizer(), devices
         self.feed: Feed = self.sources if feed is None else feed
         self._selector: PreshapeSelector | None = None
         if preshapes is not None:
             table = load_preshapes(preshapes)
             self.lacking, self._selector = table.check(loaded.grasps), PreshapeSelector(table)
         calibration = system.calibration
-        self._angles = None if calibration is None else AngleReader(system.sensor_names, calibration)
+        read = system.sensor_names if record is not None else system.read_sensors
+        self._angles = None if calibration is None else AngleReader(system.sensor_names, calibration, read)
         self._measured: GloveFrame | None = None
         self._newest_angles: JointAngles | None = None
         self._sinks, self._record, self._status = tuple(sinks), record, status

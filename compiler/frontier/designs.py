@@ -10,7 +10,6 @@ import numpy as np
 from ..evaluation.luck import Draws
 from ..evaluation.rates import Rate
 from ..trainers.base import TRAINERS, Training
-from .equipment import NO_TIME
 from .finalists import Close
 from .latency import POLICIES
 from .points import DecisionKind, Latency, Point, Recipe, Scan, Time, front
@@ -19,6 +18,7 @@ from .screen import Screened
 from .search import Candidate, Shape
 from .survey import Cuts, Judged
 from .timing.classify_times import Classified
+from .timing.scan_times import NO_TIME
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,9 +83,8 @@ class Design:
 Latencies = Mapping[tuple[Design, DecisionKind], Latency]
 
 
-def designs(close: Close, joints: Time) -> Iterator[Design]:
-    """Yield every way to build a finalist; reading the joints takes `joints`."""
-    read = joints if close.screened.choice.joints else NO_TIME
+def designs(close: Close, read: Time = NO_TIME) -> Iterator[Design]:
+    """Yield every way to build a finalist, whose joints take `read`."""
     for tables in close.priced:
         for classified in tables.classified:
             if not close.screened.columns:

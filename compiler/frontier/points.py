@@ -17,8 +17,8 @@ MAX_BYTES = 64 << 20
 
 # measured: wall time on this machine. simulated: cycles of the real firmware in a simulator. wire: arithmetic of clocks
 # and baud rates, held against an emulated bus. model: predicted by a model that was held against measured points.
-# given: by the user. unknown: left out of every sum.
-How = Literal["measured", "simulated", "wire", "model", "given", "unknown"]
+# formula: the vendor's, of a single source. given: by the user. unknown: left out of every sum.
+How = Literal["measured", "simulated", "wire", "model", "formula", "given", "unknown"]
 Scan = Literal["full", "early"]
 DecisionKind = Literal["single", "dwell", "sequential"]
 # What a rate is of: subjects who are left out, or rows of everybody in random folds of whole trials.

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import Harness
-from thenar.runtime.manifest import Manifest, Recognised
+from thenar.runtime.manifest import Faults, Manifest, Recognised
 from thenar.runtime.names import list_names
 from thenar.runtime.scanning.plan import check_harness, unwired
 from thenar.runtime.scanning.ports import whole_scan
@@ -32,8 +32,6 @@ from .layout import (
 )
 from .pattern import Pattern, pattern_of
 
-_SENSORS = 18
-
 
 class SpecError(ThenarError, ValueError):
     """There is no glove to describe, or not with this wiring."""
@@ -45,16 +43,19 @@ class Expected(Struct, frozen=True):
     scan_us      of all kept switches on expanders, in `transactions` transactions, selections of muxes included
     full_us      of all switches that are wired to expanders, kept or not
     boards_us    of a full bitmap of each scanner board
-    glove_us     between records of the CyberGlove; None where the build looks at no joint
+    glove_us     between records of the CyberGlove, of as many `sensors` as the build has joints; None where it has none
     rates        the recognition that was measured when the build was compiled
+    faults       what the worst faults leave of the rows trained on; None in specs of older builds
     """
 
     transactions: int
     scan_us: float
     full_us: float
     boards_us: tuple[float, ...]
+    sensors: int
     glove_us: float | None
     rates: tuple[Recognised, ...]
+    faults: Faults | None = None
 
 
 def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> Expected:
@@ -68,8 +69,10 @@ def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> Expected
         boards_us=tuple(
             scanner_us(board) for board, pairs in zip(harness.scanners, scan.scanners, strict=True) if pairs
         ),
-        glove_us=None if glove is None else glove_us(glove, glove.sensors or _SENSORS),
+        sensors=len(manifest.joints),
+        glove_us=None if glove is None else glove_us(glove, len(manifest.joints)),
         rates=manifest.rates,
+        faults=manifest.faults,
     )
 
 

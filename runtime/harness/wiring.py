@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta, Struct, field
 
+from thenar.drivers.cyberglove_protocol import SENSORS, SENSORS_18, SENSORS_22
 from thenar.drivers.i2c.chips import CHIPS, Chip, Converter
 from thenar.drivers.scanner_protocol import MOST_ASKED
 from thenar.drivers.spi.chips import SPI_CHIPS, SpiChip
@@ -36,6 +37,9 @@ class GloveWiring(_Table, frozen=True):
 
     baud         "auto" tries the usual ones
     rate_hz      None: as fast as it can
+    filter       whether the box's digital filter is on; None: as the box has it
+    record_us    what one record of all sensors takes, as measured (`thenar doctor --write`); None: by the formula
+    mask         whether sensors that no joint of a build is are left out of the records of a run
     sensors      None: the glove is asked
     calibration  path of its calibration; relative paths in a file count from that file's folder
     joints       our names of the wire's sensors, in wire order, where a build calls them otherwise than the driver
@@ -45,9 +49,22 @@ class GloveWiring(_Table, frozen=True):
     baud: Baud | Literal["auto"] = 115_200
     mode: Literal["stream", "poll"] = "stream"
     rate_hz: Annotated[float, Meta(gt=0.0, le=1000.0)] | None = None
+    filter: bool | None = None
+    record_us: Annotated[float, Meta(gt=0.0, le=1e6)] | None = None
+    mask: bool = True
     sensors: Literal[18, 22] | None = None
     calibration: Text | None = None
     joints: tuple[str, ...] = ()
+
+    @property
+    def all_sensors(self) -> int:
+        """How many sensors the glove must have: 18 where nothing says so."""
+        return len(self.joints) or self.sensors or SENSORS
+
+    @property
+    def sensor_names(self) -> tuple[str, ...]:
+        """The names of all its sensors in wire order: ours, or the driver's."""
+        return self.joints or (SENSORS_18 if self.all_sensors == SENSORS else SENSORS_22)
 
 
 class ScannerWiring(_Table, frozen=True):

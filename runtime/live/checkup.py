@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
-from statistics import median, median_low, pstdev
+from statistics import fmean, median, median_low, pstdev
 from time import monotonic, perf_counter
 
 import msgspec
@@ -25,12 +25,15 @@ from ..taxels import Taxels, calibration_of
 SLOW = 1.5
 _SCANS = 101
 _LISTEN_S = 1.0
+# The part that a finding on the record time of all sensors is of.
+RECORD = "a record"
 
 
 class Finding(msgspec.Struct, frozen=True):
     """What was found of a device; of a bus, chip by chip and as a whole.
 
-    predicted_us  from one record or full bitmap to the next, or what the readings take, by the arithmetic of the wire
+    predicted_us  from one record or full bitmap to the next, or what the readings take, by the arithmetic of the wire,
+                  of a CyberGlove by its vendor's formula
     measured_us   the same as it was, the median; None where nothing came
     remarks       what is missing, slow or odd, in sentences
     slow          whether it takes much longer than its wire does
@@ -45,31 +48,59 @@ class Finding(msgspec.Struct, frozen=True):
     slow: bool = False
 
 
-def check_up(harness: Harness, scan: ScanMap) -> Iterator[Callable[[], tuple[Finding, ...]]]:
-    """Yield a look at each device of `harness`, of its chips at those that `scan` reads: call it, it takes a second.
+def check_up(
+    harness: Harness, scan: ScanMap, sensors: Sequence[str] = ()
+) -> Iterator[Callable[[], tuple[Finding, ...]]]:
+    """Yield a look at each device of `harness`, of its chips at those that `scan` reads, of a CyberGlove at records of
+    these sensors alone, too: call it, it takes a second or a few.
 
     None raises because a device is not there: that is a finding.
     """
     if (glove := harness.cyberglove) is not None:
-        yield lambda: (_glove(glove),)
+        yield lambda: _glove(glove, sensors)
     for number in range(len(harness.scanners)):
         yield lambda number=number: _scanner(harness, number)  # type: ignore[misc]
     for bus in sorted({port.bus for port in scan.ports}):
         yield lambda bus=bus: _bus(harness, bus, scan)  # type: ignore[misc]
 
 
-def _glove(wiring: GloveWiring) -> Finding:
+def _glove(wiring: GloveWiring, read: Sequence[str]) -> tuple[Finding, ...]:
+    """Return what the glove is and how fast as it is wired, and what a record takes at best: of all its sensors, and of
+    those that are `read`, or half of them.
+    """
     device = GloveDevice(wiring)
-    predicted = max(device.period_us if wiring.rate_hz else 0.0, glove_us(wiring, device.sensors))
+    predicted = glove_us(wiring, device.sensors)
     try:
-        info = device.driver.open()
-        measured = _gap(lambda: device.read(_LISTEN_S))
-        remarks = (*info.notes, *_counted(device))
+        device.open()
+        measured, info = _gap(lambda: device.read(_LISTEN_S)), device.info
+        remarks = (*(() if info is None else info.notes), *_counted(device))
     except ThenarError as wrong:
-        return Finding(device.name, "", False, predicted, None, (str(wrong),))
+        return (Finding(device.name, "", False, predicted, None, (str(wrong),)),)
     finally:
         device.close()
-    return _told(Finding(device.name, info.text.strip(), True, predicted, measured, remarks))
+    found = _told(Finding(device.name, "" if info is None else info.text, True, predicted, measured, remarks))
+    some = read if 0 < len(read) < device.sensors else wiring.sensor_names[: device.sensors // 2]
+    fastest = msgspec.structs.replace(wiring, rate_hz=None, mode="stream", record_us=None)
+    return (found, _record(fastest, wiring.sensor_names), _record(fastest, some))
+
+
+def _record(wiring: GloveWiring, read: Sequence[str]) -> Finding:
+    """Return what a record of these sensors takes by the vendor's formula, and as it is."""
+    device = GloveDevice(wiring)
+    device.read_only(read)
+    predicted = glove_us(wiring, len(read))
+    part = RECORD if len(read) == device.sensors else f"{RECORD} of {len(read)} sensors"
+    try:
+        device.open()
+        measured, unmasked = _gap(lambda: device.read(_LISTEN_S), fmean), device.trouble()
+    except ThenarError as wrong:
+        return Finding(device.name, part, True, predicted, None, (str(wrong),))
+    finally:
+        device.close()
+    if unmasked or measured is None:
+        return Finding(device.name, part, True, predicted, measured, (unmasked or "no record comes",))
+    said = f"{measured:.0f} us were measured, {measured / predicted:.2f} of the vendor's formula, {predicted:.0f} us"
+    return Finding(device.name, part, True, predicted, measured, (said,))
 
 
 def _scanner(harness: Harness, number: int) -> tuple[Finding, ...]:
@@ -177,14 +208,16 @@ def _told(finding: Finding) -> Finding:
 _ADVICE = "does its clock run as fast as glove.toml says, and is the computer busy?"
 
 
-def _gap(read: Callable[[], object]) -> float | None:
-    """Return the median time between two frames that come within a second, in microseconds."""
+def _gap(read: Callable[[], object], middle: Callable[[list[float]], float] = median) -> float | None:
+    """Return the median time between two frames that come within a second, in microseconds; or their mean, which frames
+    that come in bunches do not change.
+    """
     end, came = monotonic() + _LISTEN_S, list[float]()
     while monotonic() < end:
         if read() is not None:
             came.append(perf_counter())
     gaps = [later - earlier for earlier, later in pairwise(came)]
-    return 1e6 * median(gaps) if gaps else None
+    return 1e6 * middle(gaps) if gaps else None
 
 
 def _duration(scan: Interleaved) -> float:

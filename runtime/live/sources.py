@@ -282,6 +282,7 @@ class Sources:
     switch_names  the switches wanted, in the order of the frames' bits: a build's kept switches
     scan          which ports of the I2C expanders to read, in which order
     early         what ends scans early where one device reads all switches, given the joints' codes; None: nothing does
+    sensors       the joints' sensors that somebody has a use for; None: all
 
     changed       whether a device came, went or failed otherwise since somebody set this to False
 
@@ -295,12 +296,16 @@ class Sources:
         switch_names: Sequence[str],
         scan: ScanMap,
         early: tuple[ExitOf, Joints] | None = None,
+        sensors: Sequence[str] | None = None,
     ) -> None:
         made = [(kind, source) for kind in SOURCES.values() for source in kind.sources(harness, switch_names, scan)]
         self._devices = tuple(source for _, source in made)
         self._readers = tuple(source for kind, source in made if kind.reads == "switches")
         self._gloves = tuple(source for kind, source in made if kind.reads == "joints")
         self._arrivals = Arrivals(len(switch_names), [reader.owned for reader in self._readers])
+        if sensors is not None:
+            for glove in self._gloves:
+                glove.read_only(sensors)
         alone = [reader for reader in self._readers if reader.owned]
         if early is not None and len(alone) == 1:
             alone[0].end_early(*early, self._arrivals.glove)

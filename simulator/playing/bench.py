@@ -14,7 +14,6 @@ from thenar.drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, 
 from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
-from thenar.runtime.sources.cyberglove import sensors_of
 
 from ..effects import wire_damaged_bytes, wire_lost_bytes
 from ..scenes.scene import Scene
@@ -90,7 +89,7 @@ class Bench:
             if harness.cyberglove is not None:
                 baud = harness.cyberglove.baud
                 line = self._line("cyberglove", _USUAL_BAUD if baud == "auto" else baud, stack)
-                self.glove = stack.enter_context(EmulatedCyberGlove(line, sensors=sensors_of(harness.cyberglove)))
+                self.glove = stack.enter_context(EmulatedCyberGlove(line, sensors=harness.cyberglove.all_sensors))
             self.scanners = tuple(
                 stack.enter_context(
                     EmulatedScanner(
