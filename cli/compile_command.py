@@ -216,7 +216,7 @@ def command(
             grasp_set,
             output,
             harness=given if chosen is None else chosen.wired(given),
-            ports=ports_of_whole_glove(given, grasp_set.element_names),
+            ports=ports_of_whole_glove(given, grasp_set.element_names, len(grasp_set.taxel_columns)),
             documents=documents,
             jobs=jobs,
             progress=told,
@@ -348,9 +348,10 @@ def _print_scan(scan: "ScanMap", harness: "Harness") -> None:
     if time.chips:
         _print_chips(time)
         out().print(_in_all(scan, harness, time))
-    for board, pairs in zip(harness.scanners, scan.scanners, strict=True):
+    for number, (board, pairs) in enumerate(zip(harness.scanners, scan.scanners, strict=True)):
+        levels = f", {len(scan.taxels[number])} levels of {len(board.taxels)} channels" if scan.taxels else ""
         out().print(
-            f"board {board.port}: {len(pairs)} kept switches of {len(board.switches)} keys, "
+            f"board {board.port}: {len(pairs)} kept switches of {len(board.switches)} keys{levels}, "
             f"{scanner_us(board):.0f} us a bitmap"
         )
 
@@ -365,9 +366,8 @@ def _print_chips(time: "ScanTime") -> None:
 
 
 def _in_all(scan: "ScanMap", harness: "Harness", time: "ScanTime") -> str:
-    wired = sum(len(chip.pins) for bus in harness.buses for chip in bus.chips)
-    count = len(scan.ports) + time.selects
+    count, what = len(scan.ports) + time.selects, "switches and taxels" if harness.taxel_names else "switches"
     return (
         f"a whole scan: {count} transaction{'s' if count > 1 else ''}, {time.us:.1f} us on the wire, "
-        f"{time.share:.1%} of the {time.full_us:.1f} us for all {wired} wired switches"
+        f"{time.share:.1%} of the {time.full_us:.1f} us for all {harness.on_chips} wired {what}"
     )

@@ -88,14 +88,15 @@ class _Asked:
         """Return what reading each switch costs."""
         from thenar.compiler.placement.ports import ports_of_whole_glove
         from thenar.runtime.harness.loading import load_harness
+        from thenar.runtime.scanning.plan import unwired
 
         harness = None if self.glove is None else load_harness(self.glove)
-        lacking = set() if harness is None else set(grasp_set.element_names) - set(harness.switches)
+        lacking = [] if harness is None else unwired(harness, grasp_set.element_names)
         if lacking:
             raise click.UsageError(
                 f"{self.glove} has no place for {min(lacking)!r} of {self.grasps}: name the whole glove's glove.toml."
             )
-        return ports_of_whole_glove(harness, grasp_set.element_names)
+        return ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
 
     def found(self) -> "Placement":
         """Return the placement."""

@@ -196,6 +196,12 @@ class Harness(_Table, frozen=True):
         chips: list[ChipWiring | SpiWiring] = [chip for bus in self.buses for chip in bus.chips if chip.measures]
         return (*boards, *(name for chip in (*chips, *self.spi) for name in chip.numbered_pins.values()))
 
+    @property
+    def on_chips(self) -> int:
+        """How many switches and taxels are wired to chips."""
+        chips: list[ChipWiring | SpiWiring] = [*(chip for bus in self.buses for chip in bus.chips), *self.spi]
+        return sum(len(chip.pins) for chip in chips)
+
     def chip_of(self, bus: int, number: int) -> ChipWiring | SpiWiring:
         """Return a chip as scan maps count: bus after bus, then every SPI device as a bus of one chip.
 
