@@ -83,7 +83,8 @@ class I2cDevice(Source):
         return frame
 
     def _until_decided(self, early: EarlyExit, joints: Joints, newest: Newest[GloveFrame]) -> SwitchFrame:
-        glove = newest.frame
+        # On demand, no scan ends by a record: what it leaves unread matters for none.
+        glove = None if early.on_demand else newest.frame
         early.start(joints.codes(now_us(), glove))
         closed = lost = 0
         for number, scan in enumerate(self._scans):
