@@ -17,7 +17,7 @@ from thenar.drivers.errors import SettingError
 
 from ..errors import FrameError
 from ..frames import Mask
-from ..scores import LiveScores, Scorer, reaches
+from ..scores import LiveScores, Scorer, joint_reaches, reaches
 from ..tables import IntegerTables
 
 _KEPT = 1 << 16
@@ -99,7 +99,10 @@ Ints = NDArray[np.int32]
 
 
 class Decided:
-    """Recorded frames under a set of ports. A set of ports is an integer: bit p is port p."""
+    """Recorded frames under a set of ports. A set of ports is an integer: bit p is port p.
+
+    on_demand: the joints are not known from the start. They are one more port, behind the last.
+    """
 
     def __init__(
         self,
@@ -107,6 +110,8 @@ class Decided:
         ports: Sequence[Sequence[int]],
         bits: NDArray[np.bool_],
         codes: NDArray[np.uint16],
+        *,
+        on_demand: bool = False,
     ) -> None:
         """Take the build's switches on each port, and the frames: bits (n, s) and codes (n, j).
 
@@ -121,9 +126,17 @@ class Decided:
         known = sorted(set(range(tables.n_switches)).difference(*ports))
         self._frames = len(bits)
         # No partial sum leaves int16 (IntegerTables), so nothing overflows here.
-        self._base = tables.joint_sums(codes) + bits[:, known].astype(np.int32) @ rows[known]
+        joints = tables.joint_sums(codes)
+        self._base = joints + bits[:, known].astype(np.int32) @ rows[known]
         self._shares = [bits[:, list(port)].astype(np.int32) @ rows[list(port)] for port in ports]
         self._reaches = [_reaches(tables, port) for port in ports]
+        if on_demand:
+            # As if they were lost; reading them adds the rest.
+            share = joints - (tables.bias + tables.joint_means.astype(np.int32).sum(axis=0))
+            self._base -= share
+            self._shares.append(share)
+            every = range(tables.n_classes)
+            self._reaches.append(np.array([joint_reaches(tables, leader) for leader in every], np.int32))
         self._counts: dict[int, int] = {}
 
     def __len__(self) -> int:
