@@ -306,6 +306,8 @@ def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
         f"{proof.error:g} steps; {proof.covered} of {manifest.source.rows} rows are safe, {proof.changed} change class"
     )
     console.print(made.firmware, soft_wrap=True)
+    if manifest.faults is not None and manifest.faults.lost is not None:
+        console.print(f"worst of single inputs lost, rows trained on: {manifest.faults.sentences[0]}", soft_wrap=True)
     if made.harness is not None and made.scan is not None:
         _print_scan(made.scan, made.harness)
     if propose is not None:

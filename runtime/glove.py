@@ -28,6 +28,7 @@ from .published import DeviceHealth, HealthReport, JointAngles
 from .recording.session import Session
 from .recording.writer import Recorder
 from .sinks.base import Fanout, Sink, SinkReport, open_sink
+from .taxels import calibration_of
 
 _REPORT_US = 1_000_000
 
@@ -234,4 +235,6 @@ class Glove:
             harness=harness_to_toml(system.harness),
             calibration=system.calibration,
             policy=system.policy,
+            taxels=system.harness.taxel_names,
+            taxel_calibration=calibration_of(system.harness.taxel_settings),
         )

@@ -13,7 +13,7 @@ from msgspec import Meta, Struct, field
 from msgspec.structs import replace
 
 from .errors import BuildError
-from .names import LONGEST_NAME, fault, shortened
+from .names import LONGEST_NAME, fault, list_names, shortened
 
 SCHEMA = 1
 MAX_BYTES = 16 << 20
@@ -284,6 +284,46 @@ class Recognised(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=
         return f"{self.title}: {100 * self.rate:.1f} %{',' if self.low is None else ''} {self.basis}"
 
 
+class Faulty(Struct, frozen=True, forbid_unknown_fields=True):
+    """A fault: what happens ("lost", "stuck closed", "stuck at codes 0 to 40", "lost with chip 1 of bus 1"), the names
+    of the inputs to which it does, and how many trials are recognised all the same.
+    """
+
+    what: Name
+    elements: tuple[Name, ...]
+    correct: Count
+
+
+class Faults(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """The worst fault of each kind on the rows trained on, in trials: of `total`, `correct` are recognised without one.
+
+    lost   one input lost, whose mean row stands in; stuck: one input stuck at a value
+    dead   all levels of a taxel lost, all on a port, a chip or a scanner board, where a wiring is known, or all joints
+    pair   two inputs lost; None of one input, and of so many that pairs were not looked at
+    """
+
+    total: Annotated[int, Meta(ge=1, le=2**53)]
+    correct: Count
+    lost: Faulty | None = None
+    stuck: Faulty | None = None
+    dead: Faulty | None = None
+    pair: Faulty | None = None
+
+    @property
+    def worst(self) -> tuple[Faulty, ...]:
+        """The worst of each kind."""
+        return tuple(each for each in (self.lost, self.stuck, self.dead, self.pair) if each is not None)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The worst of each kind in words: "thumb_distal_3 lost: 91.2 % of trials, 3.1 points less"."""
+        return tuple(
+            f"{list_names(each.elements)} {each.what}: {100 * each.correct / self.total:.1f} % of trials, "
+            f"{100 * (self.correct - each.correct) / self.total:.1f} points less"
+            for each in self.worst
+        )
+
+
 class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True):
     """The content of `build.json`.
 
@@ -292,6 +332,7 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
                      none
     scan_sha256      of scan.json; left out where the build was compiled for no harness
     fitting          how the fit was chosen; left out where the options leave no choice
+    faults           what faults of inputs leave of the rows trained on; None in builds of older versions
     """
 
     schema: int
@@ -310,6 +351,7 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     zero_gain_nodes: Count = 0
     scan_sha256: Digest | None = None
     fitting: Fitting | None = None
+    faults: Faults | None = None
 
     @property
     def fit(self) -> Fitting:
@@ -375,6 +417,12 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
     for settings in (fit.settings, *(each.settings for each in fit.compared)):
         texts += [text for text in (*settings, *settings.values()) if isinstance(text, str)]
     texts += [each.trainer for each in fit.compared]
+    faults = manifest.faults
+    known = {*(switch.name for switch in manifest.switches), *(joint.name for joint in manifest.joints)}
+    worst = () if faults is None else faults.worst
+    yield from _wrong_names("texts", (each.what for each in worst), 2 * LONGEST_NAME)
+    if not all(known.issuperset(each.elements) for each in worst):
+        yield "counts faults of an input that it does not have"
     yield from _wrong_names("texts", texts)
     yield from _wrong_names("texts", filter(None, [source.simulated]), 2 * LONGEST_NAME)
     yield from _wrong_columns(manifest)
@@ -386,6 +434,8 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
         yield "proves something of other tables than it describes"
     counted = [(rate.correct, rate.total) for rate in manifest.rates]
     counted += [(each.correct, each.total) for each in fit.compared]
+    if faults is not None:
+        counted += [(count, faults.total) for count in (faults.correct, *(each.correct for each in worst))]
     if any(correct > total for correct, total in counted) or manifest.stopped_after > fit.number("rounds"):
         yield "counts more than there is"
 

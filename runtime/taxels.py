@@ -18,13 +18,15 @@ from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta, Struct
+from msgspec.structs import replace
 
 from thenar.drivers.errors import SettingError
 
 from .calibration import code_of_value
 from .frames import Mask
-from .manifest import Calibration, Threshold
+from .manifest import Calibration, Switch, Threshold
 from .names import fault, list_names, shortened
+from .scanning.scanmap import ScanMap
 from .toml_source import read_source
 from .toml_struct import convert
 
@@ -124,6 +126,11 @@ class TaxelSettings(Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
     settle_s: Annotated[float, Meta(ge=0.0, le=3600.0)] = 1.0
 
 
+def calibration_of(settings: TaxelSettings) -> TaxelCalibration | None:
+    """Return the calibration that the settings name; None where they name none. Raises as `load_taxel_calibration`."""
+    return None if settings.calibration is None else load_taxel_calibration(Path(settings.calibration))
+
+
 def load_taxel_calibration(path: Path) -> TaxelCalibration:
     """Return the calibration that `thenar calibrate --taxels` wrote. Raises SettingError with file, line and key."""
     source = read_source(path, SettingError)
@@ -155,6 +162,25 @@ def count_limit(threshold: Threshold, calibration: TaxelCalibration | None) -> i
     if not rising:
         return ~first
     return first - 1 if first else ~COUNTS  # closed at every count
+
+
+def in_counts(scan: ScanMap, switches: Sequence[Switch], calibration: TaxelCalibration | None) -> ScanMap:
+    """Return a build's scan map with the limits of this glove's counts in place of the codes of levels: what sources
+    are given. Raises SettingError as `count_limit` does.
+    """
+
+    def limit(number: int, code: int) -> int:
+        threshold = switches[number].threshold
+        return code if threshold is None else count_limit(threshold, calibration)
+
+    ports = tuple(
+        replace(port, levels=tuple((limit(number, code), number) for code, number in port.levels))
+        if port.levels
+        else port
+        for port in scan.ports
+    )
+    boards = tuple(tuple((at, limit(number, code), number) for at, code, number in board) for board in scan.taxels)
+    return replace(scan, ports=ports, taxels=boards)
 
 
 def _check_counts(coded: Calibration, others: bool) -> None:
@@ -207,9 +233,10 @@ class Taxels:
     calibration  rest and press of each taxel, in counts. Of a taxel without, no baseline is followed, and no end of the
                  converter is a fault: nobody knows at which of them it rests
     settings     how baselines are followed
-    highest      the converter's highest count
+    highest      the converter's highest count; None: its ends are not looked at
 
     owned   the switches of all levels
+    counts  of each taxel when it was read last, what its baseline has moved taken off; None: it has a fault
     faults  what was wrong with each taxel when it was read last. An end of the converter is a fault where neither the
             rest, drifted as far as it may, nor the press of the calibration is near it: on the side of the rest an open
             wire, on the side of the press saturation
@@ -222,7 +249,7 @@ class Taxels:
         levels: Sequence[Sequence[Level]],
         calibration: TaxelCalibration | None = None,
         settings: TaxelSettings | None = None,
-        highest: int = 1023,
+        highest: int | None = None,
     ) -> None:
         settings = settings or TaxelSettings()
         self.names = tuple(names)
@@ -232,6 +259,7 @@ class Taxels:
         lines = [None if calibration is None else calibration.line(name) for name in names]
         self._follows = [_Baseline(line, settings) if line and settings.baseline else None for line in lines]
         self._ends = [_ends(line, settings, highest) for line in lines]
+        self.counts: list[int | None] = [None] * len(self.names)
         self.faults: list[TaxelFault] = [""] * len(self.names)
         self.drifts = [0] * len(self.names)
 
@@ -249,19 +277,22 @@ class Taxels:
             self.faults[place] = found
             if found or raw is None:
                 lost |= self._masks[place]
+                self.counts[place] = None
                 continue
             if (baseline := self._follows[place]) is not None:
                 self.drifts[place] = baseline.follow(time_us, raw)
-            count = raw - self.drifts[place]
+            self.counts[place] = count = raw - self.drifts[place]
             for limit, bit in self._levels[place]:
                 if (count if limit >= 0 else ~count) > limit:
                     closed |= bit
         return closed, lost
 
 
-def _ends(line: TaxelLine | None, settings: TaxelSettings, highest: int) -> tuple[int, int, TaxelFault, TaxelFault]:
+def _ends(
+    line: TaxelLine | None, settings: TaxelSettings, highest: int | None
+) -> tuple[int, int, TaxelFault, TaxelFault]:
     """Return at and below, and at and above which counts a taxel has a fault, and which."""
-    if line is None:
+    if line is None or highest is None:
         return -1, COUNTS, "", ""
     span, margin, rising = abs(line.press - line.rest), highest >> _END_SHIFT, line.press > line.rest
     # Where a sound taxel can be by itself: drifted from its rest, pressed as firmly as it was calibrated.

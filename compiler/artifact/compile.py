@@ -42,6 +42,7 @@ from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet, Joint
 from ..samples import Samples
 from ..tables.compare import Comparison, compare
+from ..tables.faults import count_faults, groups_of, worst_faults
 from ..trainers.base import SHARED, TRAINERS, Training, changed
 from . import CompileError
 from .documents import REPORT_NAME, SPEC_FOLDER, BuildReport, Documents, Progress
@@ -248,6 +249,11 @@ class Making:
         if self.harness is not None:
             self.scan = plan_scan(names, self.integers, self.harness, kept.switches, kept.codes)
         self.comparison = compare(trained.model, self.integers, kept.switches, kept.codes)
+        self._inputs = (*names, *(grasp_set.joint_names[joint] for joint in trained.joints))
+        sources = [grasp_set.element_names[element.column] for element in trained.kept]
+        self._groups = groups_of(self.scan, sources, len(trained.joints))
+        groups = tuple(self._groups.values())
+        self.faults = count_faults(self.integers, kept.switches, kept.codes, kept.labels, kept.trials, groups)
 
     def publish(
         self,
@@ -276,6 +282,7 @@ class Making:
             grasp_set=self.grasp_set,
             trained=self.trained,
             comparison=self.comparison,
+            faults=self.faults,
             confusion=None if tested is None else tested.confusion,
         )
         files |= {path: text.encode() for path, text in firmware.items()}
@@ -318,6 +325,7 @@ class Making:
             zero_gain_nodes=self.trained.zero_gain_nodes,
             scan_sha256=digests.get(SCAN_NAME),
             fitting=fitting if fitting is not None and fitting.compared else None,
+            faults=worst_faults(self.faults, self._inputs, self._groups),
         )
 
     def _switch(self, element: Element, name: str, gain: float) -> Switch:

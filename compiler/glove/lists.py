@@ -95,6 +95,8 @@ def expectations(expected: Expected) -> Iterator[str]:
         )
     for rate in sorted(expected.rates, key=lambda rate: rate.protocol == "training"):
         yield f"Recognised, {rate}."
+    for sentence in () if expected.faults is None else expected.faults.sentences:
+        yield f"At worst, of the rows trained on: {sentence}."
 
 
 def _building(summary: SpecSummary) -> Iterator[str]:

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import Harness
-from thenar.runtime.manifest import Manifest, Recognised
+from thenar.runtime.manifest import Faults, Manifest, Recognised
 from thenar.runtime.names import list_names
 from thenar.runtime.scanning.plan import check_harness
 from thenar.runtime.scanning.ports import whole_scan
@@ -45,6 +45,7 @@ class Expected(Struct, frozen=True):
     boards_us    of a full bitmap of each scanner board
     glove_us     between records of the CyberGlove, of as many `sensors` as the build has joints; None where it has none
     rates        the recognition that was measured when the build was compiled
+    faults       what the worst faults leave of the rows trained on; None in specs of older builds
     """
 
     transactions: int
@@ -54,6 +55,7 @@ class Expected(Struct, frozen=True):
     sensors: int
     glove_us: float | None
     rates: tuple[Recognised, ...]
+    faults: Faults | None = None
 
 
 def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> Expected:
@@ -70,6 +72,7 @@ def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> Expected
         sensors=len(manifest.joints),
         glove_us=None if glove is None else glove_us(glove, len(manifest.joints)),
         rates=manifest.rates,
+        faults=manifest.faults,
     )
 
 

@@ -12,6 +12,7 @@ from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, scan_u
 
 from ..placement.gain import entropy_bits
 from ..placement.methods.base import METHODS
+from ..tables.faults import FaultCounts
 from ..text import INDEPENDENT, NBSP, counted, microseconds, percent, sentence
 from ..trainers.base import TRAINERS
 from .content import PlainTable, ReportContent
@@ -183,6 +184,38 @@ def guarantee_table(content: ReportContent) -> PlainTable | None:
         ("Furthest that a sum can get from zero, steps", f"{abs(worst.reach):,}", f"{most:,}"),
     )
     return PlainTable("Differences beside their bounds", ("What", "Found", "Bound"), rows)
+
+
+def fault_table(content: ReportContent) -> PlainTable | None:
+    """Return what is left where each input is lost or stuck at its worst value, the worst first."""
+    found = content.faults
+    if found is None:
+        return None
+    names = (*content.switch_names, *(joint.name for joint in content.manifest.joints))
+    rows = []
+    for one in _worst_first(found):
+        left, value = min(zip(found.stuck[one], found.values[one], strict=True), key=lambda pair: pair[0])
+        rates = (f"{100 * count / found.total:.1f}" for count in (found.lost[one], left))
+        less = f"{100 * (found.correct - found.lost[one]) / found.total:.1f}"
+        lost, stuck = rates
+        rows.append((names[one], lost, less, stuck, value))
+    caption = f"Recognised with one input lost or stuck, % of {counted(found.total, 'trial')} trained on"
+    return PlainTable(caption, ("Input", "Lost", "Points less", "Stuck", "At"), tuple(rows), words=(0, 4))
+
+
+def _worst_first(found: FaultCounts) -> list[int]:
+    return sorted(range(len(found.lost)), key=found.lost.__getitem__)
+
+
+def fault_bars(content: ReportContent) -> tuple[tuple[str, float, float], ...]:
+    """Return for each input, the worst first: its name, the share of trials recognised without it, and with it."""
+    found = content.faults
+    if found is None:
+        return ()
+    names = (*content.switch_names, *(joint.name for joint in content.manifest.joints))
+    return tuple(
+        (names[one], found.lost[one] / found.total, found.correct / found.total) for one in _worst_first(found)
+    )
 
 
 def _share(count: int, total: int) -> str:

@@ -191,7 +191,7 @@ class Harness(_Table, frozen=True):
         return (*keys, *(name for chip in chips for name in chip.numbered_pins.values()))
 
     @property
-    def taxels(self) -> tuple[str, ...]:
+    def taxel_names(self) -> tuple[str, ...]:
         """The names of all taxels that are wired: the boards', then the converters', channel by channel."""
         boards = (name for scanner in self.scanners for name in scanner.taxels if name)
         chips: list[ChipWiring | SpiWiring] = [chip for bus in self.buses for chip in bus.chips if chip.measures]

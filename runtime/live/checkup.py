@@ -2,21 +2,24 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
-from statistics import fmean, median
+from statistics import fmean, median, median_low, pstdev
 from time import monotonic, perf_counter
 
 import msgspec
 
 from thenar.drivers.errors import ThenarError
-from thenar.drivers.i2c.bus import Scan
+from thenar.drivers.i2c.bus import Interleaved
 from thenar.drivers.scanner import BoardGrasp
 
-from ..harness.wiring import GloveWiring, Harness, ScannerWiring
+from ..frames import SwitchFrame
+from ..harness.wiring import GloveWiring, Harness
+from ..scanning.ports import whole_scan
 from ..scanning.scanmap import ScanMap
 from ..scanning.timing import ChipTime, glove_us, scan_us
 from ..sources.cyberglove import GloveDevice
 from ..sources.i2c import I2cDevice
 from ..sources.scanner import ScannerDevice
+from ..taxels import Taxels, calibration_of
 
 # So much slower than its wire a device may be: computers have other things to do, too.
 SLOW = 1.5
@@ -55,8 +58,8 @@ def check_up(
     """
     if (glove := harness.cyberglove) is not None:
         yield lambda: _glove(glove, sensors)
-    for wiring in harness.scanners:
-        yield lambda wiring=wiring: (_scanner(wiring, harness),)  # type: ignore[misc]
+    for number in range(len(harness.scanners)):
+        yield lambda number=number: _scanner(harness, number)  # type: ignore[misc]
     for bus in sorted({port.bus for port in scan.ports}):
         yield lambda bus=bus: _bus(harness, bus, scan)  # type: ignore[misc]
 
@@ -99,20 +102,60 @@ def _record(wiring: GloveWiring, read: Sequence[str]) -> Finding:
     return Finding(device.name, part, True, predicted, measured, (said,))
 
 
-def _scanner(wiring: ScannerWiring, harness: Harness) -> Finding:
-    device = ScannerDevice(wiring, harness.switches, harness.debounce)
+def _scanner(harness: Harness, number: int) -> tuple[Finding, ...]:
+    device = ScannerDevice(harness, number, harness.switches, whole_scan(harness, harness.switches))
+    frames: list[SwitchFrame] = []
+
+    def read() -> SwitchFrame | None:
+        frame = device.read(_LISTEN_S)
+        frames.extend([] if frame is None else [frame])
+        return frame
+
     try:
         hello = device.driver.open()
         device.close()
         device.open()
-        measured = _gap(lambda: device.read(_LISTEN_S))
+        measured = _gap(read)
         remarks = (*_recognising(device.driver.grasp), *_counted(device))
     except ThenarError as wrong:
-        return Finding(device.name, "", False, float(device.period_us), None, (str(wrong),))
+        return (Finding(device.name, "", False, float(device.period_us), None, (str(wrong),)),)
     finally:
         device.close()
-    board = f"board {hello.board}, firmware {hello.major}.{hello.minor}.{hello.patch}, {hello.keys} keys"
-    return _told(Finding(device.name, board, True, float(device.period_us), measured, remarks))
+    analog = device.driver.analog
+    channels = f", {analog.channels} channels of {analog.bits} bits" if analog is not None else ""
+    board = f"board {hello.board}, firmware {hello.major}.{hello.minor}.{hello.patch}, {hello.keys} keys{channels}"
+    found = Finding(device.name, board, True, float(device.period_us), measured, remarks)
+    highest = None if analog is None else (1 << analog.bits) - 1
+    wired = [name for name in harness.scanners[number].taxels if name]
+    return (_told(found), *taxel_findings(device.name, wired, harness, frames, highest))
+
+
+def taxel_findings(
+    device: str, names: Sequence[str], harness: Harness, frames: Sequence[SwitchFrame], highest: int | None
+) -> Iterator[Finding]:
+    """Yield what was seen of each taxel of these names: its counts, their noise, and what is wrong with it.
+
+    Without a calibration the ends of the converter are pointed out, but are no faults.
+    """
+    places = harness.taxel_names
+    calibration = calibration_of(harness.taxel_settings)
+    for name in names:
+        read = Taxels([name], [[]], calibration, harness.taxel_settings, highest)
+        place = places.index(name)
+        codes = [frame.taxels[place] for frame in frames if frame.taxels is not None]
+        wrong = []
+        for code in codes:
+            read.read(0, [code])
+            wrong.append(read.faults[0])
+        counts = [code for code in codes if code is not None]
+        fault = max(set(wrong), key=wrong.count) if wrong else "silent"
+        remarks: list[str] = [fault] if fault else []
+        if counts:
+            wander = max(counts) - min(counts)
+            remarks.insert(0, f"{median_low(counts)} counts, noise {pstdev(counts):.1f}, {wander} from end to end")
+            if not fault and highest is not None and median_low(counts) in (0, highest):
+                remarks.append("at the end of the converter: at rest, pressed hard, or an open wire")
+        yield Finding(device, f"taxel {name}", fault in ("", "saturated"), 0.0, None, tuple(remarks))
 
 
 def _recognising(grasp: BoardGrasp | None) -> tuple[str, ...]:
@@ -176,7 +219,7 @@ def _gap(read: Callable[[], object], middle: Callable[[list[float]], float] = me
     return 1e6 * middle(gaps) if gaps else None
 
 
-def _duration(scan: Scan) -> float:
+def _duration(scan: Interleaved) -> float:
     """Return the median time of a scan, in microseconds."""
     taken = []
     for _ in range(_SCANS):

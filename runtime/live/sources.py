@@ -250,12 +250,12 @@ class Arrivals:
         if time_us < 0:
             return None
         closed = lost = unread = 0
-        glove = None
+        glove, taxels = None, _joined_taxels([frame.taxels for frame in fresh if frame.taxels is not None])
         for frame in fresh:
             closed, lost, unread = closed | frame.closed, lost | frame.lost, unread | frame.unread
             if frame.unread and glove is None:
                 glove = frame.glove
-        return SwitchFrame(time_us, closed, lost | silent, unread, glove)
+        return SwitchFrame(time_us, closed, lost | silent, unread, glove, taxels)
 
     def _lose(self, now_us: int) -> None:
         """Join the parts anew, of which one may have fallen silent: that is news once."""
@@ -267,6 +267,13 @@ class Arrivals:
     def _wait_for_taking(self, frame: SwitchFrame | GloveFrame) -> None:
         self.overflowed += len(self._waiting) == _MOST_WAITING
         self._waiting.append(frame)
+
+
+def _joined_taxels(parts: Sequence[tuple[int | None, ...]]) -> tuple[int | None, ...] | None:
+    """Return the codes that the devices read, each its own taxels; None where none read any."""
+    if len(parts) < 2:
+        return parts[0] if parts else None
+    return tuple(next((code for code in codes if code is not None), None) for codes in zip(*parts, strict=True))
 
 
 class Sources:

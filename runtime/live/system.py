@@ -13,9 +13,11 @@ from ..harness.wiring import Harness
 from ..policy import Policy
 from ..scanning.decided import EarlyExit
 from ..scanning.plan import check_harness, plan_scan
+from ..scanning.ports import wired_names
 from ..scanning.propose import own_joints
 from ..scanning.scanmap import ScanMap
 from ..sources.base import slowest_us
+from ..taxels import calibration_of, in_counts
 from .recogniser import LiveRecognizer
 from .sources import Sources
 
@@ -46,7 +48,7 @@ class System:
     @staticmethod
     def map_of(build: Build, harness: Harness) -> ScanMap:
         """Return the build's own scan map, or one that is planned now. Raises HarnessError if the two do not fit."""
-        names = [switch.name for switch in build.manifest.switches]
+        names = wired_names(harness, build.manifest.switches)
         if build.scan is not None:
             check_harness(build.scan, harness, names)
             return build.scan
@@ -99,10 +101,14 @@ class System:
     def sources(self, *, full_scan: bool = False, all_sensors: bool = False) -> Sources:
         """Return the devices; with `full_scan`, and for a sequential test, every scan goes to its end; with
         `all_sensors` the CyberGlove sends those as well that the build has no use for, whether or not they decide.
+
+        Raises SettingError if the calibration of the taxels cannot serve the build.
         """
         early = None if full_scan or self.policy.error_rate is not None else (self.early_exit, self.joints())
         sensors = None if all_sensors else self.read_sensors
-        return Sources(self.harness, self.switch_names, self.scan, early, sensors, on_demand=self.on_demand)
+        taxels = calibration_of(self.harness.taxel_settings)
+        scan = in_counts(self.scan, self.build.manifest.switches, taxels)
+        return Sources(self.harness, self.switch_names, scan, early, sensors, on_demand=self.on_demand)
 
     def early_exit(self, ports: Sequence[Mask]) -> EarlyExit:
         """Return what ends a scan of these ports early without changing any decision.

@@ -22,8 +22,8 @@ class Converter(EffectParameters, frozen=True):
     a thousandth of a newton a count.
     """
 
-    bits: Annotated[int, msgspec.Meta(ge=1, le=16)] = 16
-    full_n: Annotated[float, msgspec.Meta(gt=0.0, le=1000.0)] = 65.536
+    bits: Annotated[int, msgspec.Meta(ge=1, le=15)] = 15
+    full_n: Annotated[float, msgspec.Meta(gt=0.0, le=1000.0)] = 32.768
 
     def codes(self, newtons: Floats) -> Codes:
         """Return the counts of forces of any shape; what is below the first or above the last reads as these."""

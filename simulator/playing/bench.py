@@ -11,7 +11,7 @@ import numpy as np
 
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, EmulatedI2c
-from thenar.drivers.emulated.scanner import EmulatedScanner
+from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
 
@@ -73,12 +73,15 @@ class Bench:
         folder: Path,
         cable: Callable[[int], Cable | None] = lambda _line: None,
         adapter: AdapterKind = "any",
+        taxel_names: Sequence[str] = (),
+        bits: int = 10,
     ) -> None:
-        """Start the devices. cable(n) is what happens to the messages of serial line n.
+        """Start the devices. cable(n) is what happens to the messages of serial line n; boards convert to so many bits.
 
         Raises DeviceError if something that emulates is not installed.
         """
         self._numbers = {name: number for number, name in enumerate(switch_names)}
+        self._taxels = {name: number for number, name in enumerate(taxel_names)}
         self._folder, self._cable = folder, cable
         self.lines: list[PtyLine] = []
         with ExitStack() as stack:
@@ -89,7 +92,11 @@ class Bench:
                 self.glove = stack.enter_context(EmulatedCyberGlove(line, sensors=harness.cyberglove.all_sensors))
             self.scanners = tuple(
                 stack.enter_context(
-                    EmulatedScanner(self._line(f"scanner{number}", wiring.baud, stack), len(wiring.switches))
+                    EmulatedScanner(
+                        self._line(f"scanner{number}", wiring.baud, stack),
+                        len(wiring.switches),
+                        board=ScannerBoard(1, max(len(wiring.switches), 1), channels=len(wiring.taxels), bits=bits),
+                    )
                 )
                 for number, wiring in enumerate(harness.scanners)
             )
@@ -106,13 +113,15 @@ class Bench:
         self.lines.append(line)
         return line
 
-    def show(self, closed: Sequence[bool], sensors: bytes) -> None:
-        """Put one frame on all devices: which switches (s,) are closed, and the glove's sensors."""
+    def show(self, closed: Sequence[bool], sensors: bytes, taxels: Sequence[int] = ()) -> None:
+        """Put one frame on all devices: switches (s,) that are closed, the glove's sensors, the taxels' counts (t,)."""
         if self.glove is not None:
             self.glove.set(sensors)
         for scanner, wiring in zip(self.scanners, self.harness.scanners, strict=True):
             keys = [self._numbers.get(name) for name in wiring.switches]
             scanner.set(sum(1 << key for key, number in enumerate(keys) if number is not None and closed[number]))
+            numbers = [self._taxels.get(name) for name in wiring.taxels]
+            scanner.press([0 if number is None else taxels[number] for number in numbers])
         if self.i2c is not None:
             buses = self.harness.buses
             self.i2c.set_all([[levels_of(chip, closed, self._numbers) for chip in bus.chips] for bus in buses])

@@ -48,12 +48,6 @@ def lively(names: Iterable[str]) -> list[tuple]:
     return [(name, EFFECTS[name].parameters(**LIVELY.get(name, {}))) for name in names]
 
 
-def together(names: Iterable[str]) -> set[str]:
-    """Return those that a scene can list together: what happens on wires is not simulated for taxels."""
-    taxels = any(name.startswith("taxel.") for name in names)
-    return {name for name in names if not (taxels and name.startswith("wire."))}
-
-
 @pytest.fixture(scope="module")
 def record(make_scene: SceneMaker, make_batch: BatchMaker) -> Callable[..., tuple[Pipeline, Words, Batch]]:
     """Return a function of effects that simulates them on a batch and returns pipeline, all words drawn, and batch."""
@@ -98,7 +92,7 @@ def alone(record: Callable[..., tuple[Pipeline, Words, Batch]]) -> dict[str, tup
     return {name: record([name]) for name in NAMES}
 
 
-PAIRS = [pair for pair in combinations(NAMES, 2) if pair != CONTACTS and together(pair) == {*pair}]
+PAIRS = [pair for pair in combinations(NAMES, 2) if pair != CONTACTS]
 
 
 def test_all_that_can_draw_do(alone: dict[str, tuple[Pipeline, Words, Batch]]) -> None:
@@ -118,7 +112,7 @@ def test_adding_any_other_effect_leaves_its_draws_as_they_were(
 
 
 SUBSETS = st.sets(st.sampled_from(OTHERS)).flatmap(
-    lambda others: st.sampled_from(CONTACTS).map(lambda contact: {contact, *together(others)})
+    lambda others: st.sampled_from(CONTACTS).map(lambda contact: {contact, *others})
 )
 
 

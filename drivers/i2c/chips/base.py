@@ -15,6 +15,7 @@ SUPPLY = ("VDD", "VCC", "VCCI", "VCCP")
 GROUND = ("VSS", "GND", "EP")
 RESET = "RESET"
 TSSOP24 = "Package_SO:TSSOP-24_4.4x7.8mm_P0.65mm"
+SUPPLY_V = 3.3
 _SELECTS = ("A0", "A1", "A2", "ADDR")
 
 
@@ -223,6 +224,11 @@ class Converter(Chip):
     bits: ClassVar[int]
     volts: ClassVar[float | None] = None
     readings: ClassVar[tuple[Conversion, ...]]
+
+    @property
+    def highest(self) -> int:
+        """The code of the supply, 3.3 V, where a channel is saturated."""
+        return (1 << self.bits) - 1 if self.volts is None else int(SUPPLY_V / self.volts * (1 << self.bits))
 
     def code(self, answer: bytes) -> int:
         """Return the code of an answer: high byte first, the unused bits on top."""
