@@ -34,6 +34,7 @@ class Scorer:
     switch_rows, switch_means   s rows
     joint_means                 j rows
     joint_rows, thresholds      j lists: a row per bin, and the codes that part the bins; distances of a slope are bins
+    joints_lost                 what all joints add while they are lost
     size, unpack                of a sum that began with `start`: its bytes, and what makes K scores of them, each 2^15
                                 too high
     """
@@ -50,6 +51,16 @@ class Scorer:
         binned = [tables.binned(joint) for joint in range(tables.n_joints)]
         self.joint_rows = [_packed(rows, offsets) for _, rows in binned]
         self.thresholds: list[list[int]] = [thresholds.tolist() for thresholds, _ in binned]
+        self._pairs = [
+            (
+                *pair.joints,
+                *(steps.tolist() for steps in pair.thresholds),
+                [_packed(rows, offsets) for rows in pair.rows],
+            )
+            for pair in tables.pairs
+        ]
+        # Of all joints lost.
+        self.joints_lost = sum(self.joint_means) + self._pair_sum((0,) * tables.n_joints)
         self.reach = lru_cache(maxsize=_KEPT // tables.n_classes)(self._reach)
 
     @cached_property
@@ -70,7 +81,13 @@ class Scorer:
 
     def joint_sum(self, codes: Sequence[int]) -> int:
         """Return the sum of what all joints' codes add."""
-        return sum(map(getitem, self.joint_rows, map(bisect_left, self.thresholds, codes)))
+        return sum(map(getitem, self.joint_rows, map(bisect_left, self.thresholds, codes))) + self._pair_sum(codes)
+
+    def _pair_sum(self, codes: Sequence[int]) -> int:
+        total = 0
+        for one, other, steps, more, rows in self._pairs:
+            total += rows[bisect_left(steps, codes[one])][bisect_left(more, codes[other])]
+        return total
 
     def lanes_without(
         self, bits: ArrayLike, codes: ArrayLike, lost_switches: ArrayLike, lost_joints: ArrayLike
@@ -84,6 +101,7 @@ class Scorer:
         for joint, (code, lost) in enumerate(zip(joints, lost_codes, strict=True)):
             row = self.joint_rows[joint][bisect_left(self.thresholds[joint], code)]
             total += self.joint_means[joint] if lost else row
+        total += self._pair_sum([0 if lost else code for code, lost in zip(joints, lost_codes, strict=True)])
         return self.unpack(total.to_bytes(self.size, "little"))
 
     def _codes(self, codes: ArrayLike) -> list[int]:
@@ -133,7 +151,7 @@ class LiveScores:
         self._lost: Mask = 0
         self._closed, self._silent = scorer.start, 0
         self._codes: tuple[int, ...] | None = None
-        self._joints = sum(scorer.joint_means)
+        self._joints = scorer.joints_lost
 
     def joints(self, codes: Sequence[int] | None) -> None:
         """Take the codes of all joints; None: all are lost. Raises FrameError."""
@@ -142,7 +160,7 @@ class LiveScores:
             return
         scorer = self._scorer
         if taken is None:
-            self._joints = sum(scorer.joint_means)
+            self._joints = scorer.joints_lost
         elif len(taken) != len(scorer.thresholds):
             raise FrameError(f"{len(taken)} codes, the build has {len(scorer.thresholds)} joints")
         else:
