@@ -12,14 +12,15 @@ from msgspec import Meta, Struct, field
 
 from thenar.drivers.cyberglove_protocol import SENSORS, SENSORS_18, SENSORS_22
 from thenar.drivers.i2c.chips import CHIPS, Chip, Converter
+from thenar.drivers.scanner_protocol import MOST_ASKED
 from thenar.drivers.spi.chips import SPI_CHIPS, SpiChip
 
 from ..taxels import TaxelSettings
 
 # A board's bitmap has no room for more.
 MOST_KEYS = 2000
-# A board's frame has no room for more.
-MOST_CHANNELS = 128
+# An ANALOG of a board has no room for more.
+MOST_CHANNELS = MOST_ASKED
 # Of the clock of a bus.
 SLOWEST_HZ = 1000
 Text = Annotated[str, Meta(min_length=1)]
@@ -72,7 +73,7 @@ class ScannerWiring(_Table, frozen=True):
     """
 
     port: Text
-    switches: Annotated[tuple[str, ...], Meta(max_length=MOST_KEYS)]
+    switches: Annotated[tuple[str, ...], Meta(max_length=MOST_KEYS)] = ()
     baud: Baud = 1_000_000
     taxels: Annotated[tuple[str, ...], Meta(max_length=MOST_CHANNELS)] = ()
     mux: Literal["cd74hc4067"] | None = None

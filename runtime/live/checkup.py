@@ -150,7 +150,7 @@ def taxel_findings(
             read.read(0, [code])
             wrong.append(read.faults[0])
         counts = [code for code in codes if code is not None]
-        fault = max(set(wrong), key=wrong.count) if wrong else "silent"
+        fault = max(sorted(set(wrong)), key=wrong.count) if wrong else "silent"
         remarks: list[str] = [fault] if fault else []
         if counts:
             wander = max(counts) - min(counts)
