@@ -66,7 +66,7 @@ def disagreeing(frames: NDArray[np.intp], what: NDArray[np.generic]) -> NDArray[
 def _odd_columns(grasp_set: GraspSet) -> Iterator[Finding]:
     for kind, columns, names in (
         ("switch", grasp_set.switches, grasp_set.switch_names),
-        ("taxel", grasp_set.taxels, tuple(taxel.name for taxel in grasp_set.taxel_columns)),
+        ("taxel", grasp_set.taxels, grasp_set.taxel_names),
         ("joint", grasp_set.codes, grasp_set.joint_names),
     ):
         plural = "switches" if kind == "switch" else f"{kind}s"
