@@ -203,9 +203,9 @@ def command(
     options = asked_settings(context, asked) | _placed(context, asked)
     given = None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
-    hand = fitted_hand(layout, grasp_set.switch_names, None) if report else None
+    hand = fitted_hand(layout, grasp_set.element_names, None) if report else None
     if hand_length is not None:
-        fitted_hand(layout, grasp_set.switch_names, hand_length)
+        fitted_hand(layout, grasp_set.element_names, hand_length)
     chosen = None if from_frontier is None else picked(from_frontier, point, grasp_set)
     documents = Documents(hand, hand_length) if report else None
     if chosen is not None:

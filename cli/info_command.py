@@ -12,7 +12,7 @@ from .lines import echo
 
 if TYPE_CHECKING:
     from thenar.compiler.recordings.graspset import GraspSet
-    from thenar.compiler.recordings.summary import Summary
+    from thenar.compiler.recordings.summary import JointRange, Summary
 
 
 @click.command("info")
@@ -24,8 +24,8 @@ def command(grasps: Path, plot: Path | None) -> None:
     """Tell what GRASPS, a .grasps file, holds: counts, balance, odd columns and rows, and how separable it is.
 
     The ceiling is the rate of the best possible memory: no classifier that sees only these inputs is right more often
-    on these rows. The neighbour rate is that of frames by the nearest frame of another trial, with joints in standard
-    deviations.
+    on these rows. The neighbour rate is that of frames by the nearest frame of another trial, with joints and taxels
+    in standard deviations.
 
     \b
     Example:
@@ -53,17 +53,19 @@ def _draw(grasp_set: "GraspSet", path: Path) -> None:
 
 
 def _print(summary: "Summary", path: Path) -> None:
+    taxels = f"taxels {len(summary.taxels)}, " if summary.taxels else ""
     echo(
         f"{path}: {summary.rows} grasps of {len(summary.grasps)} types ({summary.taxonomy}); "
         f"subjects {len(summary.subjects)}, objects {len(summary.objects)}, "
-        f"switches {len(summary.switches)}, joints {len(summary.joints)}"
+        f"switches {len(summary.switches)}, {taxels}joints {len(summary.joints)}"
     )
     if summary.simulated:
         echo(f"simulated: {summary.simulated}")
     if summary.independent:
         echo(INDEPENDENT)
     _print_counts(summary)
-    _print_joints(summary)
+    for what, ranges in (("taxel", summary.taxels), ("joint", summary.joints)):
+        _print_ranges(what, ranges)
     _print_separability(summary)
     for warning in summary.warnings:
         echo(f"warning: {warning.message}")
@@ -79,12 +81,12 @@ def _print_counts(summary: "Summary") -> None:
         echo(f"{what}: " + ", ".join(f"{count.name} ({count.rows})" for count in counts))
 
 
-def _print_joints(summary: "Summary") -> None:
-    if not summary.joints:
+def _print_ranges(what: str, ranges: "tuple[JointRange, ...]") -> None:
+    if not ranges:
         return
     numbers = ("least", "largest", "distinct codes")
-    joints = table(("joint", "unit", *numbers), numbers, "Joints")
-    for joint in summary.joints:
+    joints = table((what, "unit", *numbers), numbers, f"{what.capitalize()}s")
+    for joint in ranges:
         ends = ("-" if end is None else f"{end:g}" for end in (joint.least, joint.largest))
         joints.add_row(joint.name, joint.unit, *ends, str(joint.codes))
     out().print(joints)

@@ -123,7 +123,7 @@ class Documents:
                 no_study=no_study,
                 frontier=self.frontier,
                 point=self.point,
-                hand=None if self.hand is None else self.hand.fitted(made.grasp_set.switch_names),
+                hand=None if self.hand is None else self.hand.fitted(made.grasp_set.element_names),
                 scan=made.scan,
                 harness=made.harness,
                 comparison=made.comparison,
