@@ -41,7 +41,7 @@ def command(glove: Path, build: Path | None, write: bool) -> None:
     harness = load_harness(glove)
     check_devices(harness, glove)
     loaded = None if build is None else Build.load(build)
-    scan = whole_scan(harness, harness.switches) if loaded is None else System.map_of(loaded, harness)
+    scan = whole_scan(harness, harness.switches, every_taxel=True) if loaded is None else System.map_of(loaded, harness)
     sensors = () if loaded is None else [joint.name for joint in loaded.manifest.joints]
     looks, found = list(check_up(harness, scan, sensors)), list(_calibration(harness, loaded))
     with progress("looking") as report:

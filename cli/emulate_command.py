@@ -95,7 +95,8 @@ def command(
     .mcap recording of a live run.
 
     A CyberGlove and scanner boards appear as serial ports in DIR, paced like the wire, with the wire effects that the
-    scene lists; expanders on /dev/i2c-N, through umockdev. With a COMMAND, that runs beside the emulated glove and sees
+    scene lists; expanders and converters on /dev/i2c-N and
+    /dev/spidevB.C, through umockdev. With a COMMAND, that runs beside the emulated glove and sees
     it: {glove} in it stands for the glove.toml that names the emulated ports. It is ended when the playing is over.
 
     \b

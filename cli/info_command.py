@@ -5,12 +5,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from thenar.compiler.text import INDEPENDENT
+from thenar.compiler.text import INDEPENDENT, inputs_read
 
 from .common import existing_file, json_flag, keep_apart, out, overwrite_flag, picture_file, progress, show, table
 from .lines import echo
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from thenar.compiler.recordings.graspset import GraspSet
     from thenar.compiler.recordings.summary import JointRange, Summary
 
@@ -24,8 +26,8 @@ def command(grasps: Path, plot: Path | None) -> None:
     """Tell what GRASPS, a .grasps file, holds: counts, balance, odd columns and rows, and how separable it is.
 
     The ceiling is the rate of the best possible memory: no classifier that sees only these inputs is right more often
-    on these rows. The neighbour rate is that of frames by the nearest frame of another trial, with joints and taxels
-    in standard deviations.
+    on these rows. The neighbour rate is that of frames by the nearest frame of another trial, with joints in standard
+    deviations.
 
     \b
     Example:
@@ -53,19 +55,18 @@ def _draw(grasp_set: "GraspSet", path: Path) -> None:
 
 
 def _print(summary: "Summary", path: Path) -> None:
-    taxels = f"taxels {len(summary.taxels)}, " if summary.taxels else ""
     echo(
         f"{path}: {summary.rows} grasps of {len(summary.grasps)} types ({summary.taxonomy}); "
         f"subjects {len(summary.subjects)}, objects {len(summary.objects)}, "
-        f"switches {len(summary.switches)}, {taxels}joints {len(summary.joints)}"
+        f"{inputs_read(len(summary.switches), len(summary.taxels), len(summary.joints))}"
     )
     if summary.simulated:
         echo(f"simulated: {summary.simulated}")
     if summary.independent:
         echo(INDEPENDENT)
     _print_counts(summary)
-    for what, ranges in (("taxel", summary.taxels), ("joint", summary.joints)):
-        _print_ranges(what, ranges)
+    for kind, ranges in (("taxel", summary.taxels), ("joint", summary.joints)):
+        _print_ranges(kind, ranges)
     _print_separability(summary)
     for warning in summary.warnings:
         echo(f"warning: {warning.message}")
@@ -81,15 +82,15 @@ def _print_counts(summary: "Summary") -> None:
         echo(f"{what}: " + ", ".join(f"{count.name} ({count.rows})" for count in counts))
 
 
-def _print_ranges(what: str, ranges: "tuple[JointRange, ...]") -> None:
+def _print_ranges(kind: str, ranges: "Sequence[JointRange]") -> None:
     if not ranges:
         return
     numbers = ("least", "largest", "distinct codes")
-    joints = table((what, "unit", *numbers), numbers, f"{what.capitalize()}s")
-    for joint in ranges:
-        ends = ("-" if end is None else f"{end:g}" for end in (joint.least, joint.largest))
-        joints.add_row(joint.name, joint.unit, *ends, str(joint.codes))
-    out().print(joints)
+    lines = table((kind, "unit", *numbers), numbers, f"{kind.capitalize()}s")
+    for each in ranges:
+        ends = ("-" if end is None else f"{end:g}" for end in (each.least, each.largest))
+        lines.add_row(each.name, each.unit, *ends, str(each.codes))
+    out().print(lines)
 
 
 def _print_separability(summary: "Summary") -> None:

@@ -14,6 +14,7 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
+from statistics import median_low
 from typing import Annotated, Literal
 
 import msgspec
@@ -36,6 +37,9 @@ Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 TaxelFault = Literal["", "silent", "open wire", "saturated"]
 # A level: the limit of its counts (see `count_limit`), and the number of the build's switch that it is.
 Level = tuple[int, int]
+
+# Counts of which the median is a press; what moves by less than so many was not moved.
+_IN_A_ROW, _LEAST_TRAVEL = 5, 10
 
 # Parts of a count in which a baseline moves: a share of the span in thousandths, a minute in microseconds.
 _MINUTE_US = 60_000_000
@@ -135,6 +139,28 @@ def load_taxel_calibration(path: Path) -> TaxelCalibration:
     """Return the calibration that `thenar calibrate --taxels` wrote. Raises SettingError with file, line and key."""
     source = read_source(path, SettingError)
     return convert(source, (), source.tables(), TaxelCalibration)
+
+
+def learnt_lines(
+    names: Sequence[str], rested: Sequence[Sequence[int | None]], pressed: Sequence[Sequence[int | None]], value: float
+) -> tuple[TaxelLine, ...]:
+    """Return the lines of the taxels that moved, from counts at rest and counts while each was pressed once.
+
+    The rest is the median; the press is the median of five counts in a row that lies furthest from it, so that a glitch
+    is none. What moved less than three times as far as the counts wandered at rest was not pressed.
+    """
+    lines = []
+    for place, name in enumerate(names):
+        counts = [code for codes in rested if (code := codes[place]) is not None]
+        moved = [code for codes in pressed if (code := codes[place]) is not None]
+        if not counts or len(moved) < _IN_A_ROW:
+            continue
+        rest = median_low(counts)
+        held = (median_low(moved[at : at + _IN_A_ROW]) for at in range(len(moved) - _IN_A_ROW + 1))
+        press = max(held, key=lambda count: abs(count - rest))
+        if abs(press - rest) >= max(_LEAST_TRAVEL, 3 * (max(counts) - min(counts))):
+            lines.append(TaxelLine(name, rest, press, value))
+    return tuple(lines)
 
 
 def count_limit(threshold: Threshold, calibration: TaxelCalibration | None) -> int:

@@ -178,7 +178,7 @@ def compile_build(
         check_trials(grasp_set, CompileError)
     cuts = cuts_of(grasp_set, asked)
     steps = _Steps(progress, sum(len(cut.folds) for cut in cuts))
-    ports = ports or ports_of_whole_glove(None, grasp_set.element_names)
+    ports = ports or ports_of_whole_glove(None, grasp_set.element_names, len(grasp_set.taxel_columns))
     groups = groups_for(grasp_set, asked)
     trained = train(samples, asked, steps.trained, ports, groups, jobs)
     made = Making(grasp_set, samples, asked, trained, harness)

@@ -97,7 +97,7 @@ class Documents:
         from ..glove.files import spec_files
 
         files = {REPORT_NAME: self._report(made, jobs, progress)}
-        if names := [switch.name for switch in made.manifest.switches]:
+        if names := list(dict.fromkeys(switch.source for switch in made.manifest.switches)):
             hand = None if self.hand is None else self.hand.fitted(names, self.hand_length)
             spec = spec_files(made.manifest, made.scan, made.harness, hand)
             files |= {f"{SPEC_FOLDER}/{name}": content for name, content in spec.items()}

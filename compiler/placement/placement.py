@@ -19,6 +19,7 @@ from .elements import Elements, bits_of, columns_of, elements_of, names_of, port
 from .gain import entropy_bits
 from .id3 import grow_id3
 from .inputs import PlacementError
+from .joints import kept_joints
 from .methods.base import METHODS, PAPERS
 from .optimum import Pairs, best_subset
 from .ports import PortCosts
@@ -140,6 +141,7 @@ class Placement:
     """The kept switches of a set, and how they were found.
 
     parameter  S, or how many switches to keep at most; joints: whether the joints had a say
+    kept_joints  the names of the kept joints, where some were to be chosen; n_levels: how many elements are levels
     all_names  the names of all elements there were: switches, and levels of taxels; grasps: the types that occur, which
                the tree's classes index
     tree       of the paper's ID3; exact: how far from the best, if that was asked for; study: of many subjects
@@ -156,6 +158,8 @@ class Placement:
     tree: Tree | None = None
     exact: Exactly | None = None
     study: Standard | None = None
+    kept_joints: tuple[str, ...] = ()
+    n_levels: int = 0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -201,6 +205,8 @@ class Placement:
         }
         if self.study is not None:
             found["study"] = self.study
+        if self.kept_joints:
+            found["kept_joints"] = self.kept_joints
         if self.tree is not None:
             found |= {
                 "kept_share": len(self.switches) / self.n_switches,
@@ -225,6 +231,7 @@ def place(
     exact: bool = False,
     on_round: Progress | None = None,
     levels: int | None = None,
+    keep_joints: int | None = None,
 ) -> Placement:
     """Choose elements of all rows of a set: switches, and levels of taxels.
 
@@ -247,6 +254,8 @@ def place(
         Called with (done, all) after every round of that search.
     levels : int, optional
         How many levels of a taxel there are to choose from, at most.
+    keep_joints : int, optional
+        How many joints to keep, chosen beside the kept switches; None: joints are not chosen.
 
     Raises
     ------
@@ -255,9 +264,10 @@ def place(
     PlacementError
         If the set has no switches, no rows, or more grasp types than a build can hold.
     """
-    samples = samples_of(grasp_set, joints=joints)
-    elements = elements_of(samples, levels)
-    samples = bits_of(samples, elements)
+    read = samples_of(grasp_set, joints=joints or keep_joints is not None)
+    elements = elements_of(read, levels)
+    read = bits_of(read, elements)
+    samples = read if joints else read.with_joints(())
     chosen = choose(samples, method, parameter, None if ports is None else ports_of(ports, elements))
     kept = kept_of(grasp_set, elements, chosen.columns)
     if chosen.tree is not None:
@@ -275,8 +285,10 @@ def place(
         rows=len(grasp_set),
         fingerprint=grasp_set.fingerprint(),
         all_names=names_of(grasp_set, elements),
+        n_levels=len(elements) - len(grasp_set.switch_names),
         grasps=samples.grasps,
         tree=chosen.tree,
+        kept_joints=() if keep_joints is None else _joints_kept(grasp_set, read.keeping(chosen.columns), keep_joints),
         exact=_exactly(samples, chosen.columns, partial(kept_of, grasp_set, elements), on_round) if exact else None,
     )
 
@@ -313,6 +325,12 @@ def kept_of(grasp_set: GraspSet, elements: Elements, columns: Columns) -> tuple[
         Kept(one.column, name, above=None if one.column < n_switches else one.code)
         for one, name in zip(kept, names_of(grasp_set, kept), strict=True)
     )
+
+
+def _joints_kept(grasp_set: GraspSet, samples: Samples, most: int) -> tuple[str, ...]:
+    if not grasp_set.joints:
+        raise PlacementError("the set has no joints to keep some of: leave --keep-joints out")
+    return tuple(grasp_set.joint_names[joint] for joint in kept_joints(samples, most))
 
 
 def _exactly(

@@ -79,11 +79,12 @@ def disagreeing(frames: NDArray[np.intp], what: NDArray[np.generic]) -> NDArray[
 
 
 def _odd_columns(grasp_set: GraspSet) -> Iterator[Finding]:
-    for plural, columns, names in (
-        ("switches", grasp_set.switches, grasp_set.switch_names),
-        ("taxels", grasp_set.taxels, tuple(taxel.name for taxel in grasp_set.taxel_columns)),
-        ("joints", grasp_set.codes, grasp_set.joint_names),
+    for kind, columns, names in (
+        ("switch", grasp_set.switches, grasp_set.switch_names),
+        ("taxel", grasp_set.taxels, tuple(taxel.name for taxel in grasp_set.taxel_columns)),
+        ("joint", grasp_set.codes, grasp_set.joint_names),
     ):
+        plural = "switches" if kind == "switch" else f"{kind}s"
         if constant := constant_columns(columns, names):
             message = f"{len(constant)} {plural} never change: {list_names(constant)}"
             yield Finding(f"constant {plural}", len(constant), message, columns=constant)
@@ -128,7 +129,7 @@ class Separability(msgspec.Struct, frozen=True):
 
     `ceiling` is the recognition rate of the best possible memory: the commonest grasp type of every distinct frame; no
     classifier that sees these inputs alone is right more often on these rows. `neighbour_rate` is the rate of frames by
-    the nearest frame of another trial (Euclidean; joints and taxels in standard deviations, switches as 0 and 1) over
+    the nearest frame of another trial (Euclidean; joints in standard deviations, switches as 0 and 1) over
     `neighbour_rows` rows, None without scikit-learn.
     """
 
@@ -140,18 +141,18 @@ class Separability(msgspec.Struct, frozen=True):
 
 
 def separabilities(grasp_set: GraspSet) -> tuple[Separability, ...]:
-    """Return the separability by switches, by taxels, by joints, and by all, as far as the set has them."""
-    there = {"switches": grasp_set.switch_names, "taxels": grasp_set.taxel_columns, "joints": grasp_set.joints}
-    kinds = [kind for kind, columns in there.items() if columns]
-    inputs = kinds + [{2: "both", 3: "all"}.get(len(kinds), "")] * (len(kinds) > 1)
+    """Return the separability by switches, by taxels, by joints, and by all of them, as far as the set has them."""
+    there = (("switches", grasp_set.switch_names), ("taxels", grasp_set.taxel_columns), ("joints", grasp_set.joints))
+    kinds = [name for name, columns in there if columns]
+    inputs = [*kinds, "both" if len(kinds) == 2 else "all"] if len(kinds) > 1 else kinds
     return tuple(_separability(grasp_set, name) for name in inputs) if len(grasp_set) else ()
 
 
 def _separability(grasp_set: GraspSet, inputs: str) -> Separability:
     every = inputs in ("both", "all")
     switches = grasp_set.switches[:, : None if every or inputs == "switches" else 0]
-    taxels = grasp_set.taxels[:, : None if every or inputs == "taxels" else 0]
-    codes = np.hstack([taxels, grasp_set.codes[:, : None if every or inputs == "joints" else 0]])
+    coded = (("taxels", grasp_set.taxels), ("joints", grasp_set.codes))
+    codes = np.hstack([part[:, : None if every or inputs == name else 0] for name, part in coded])
     frames = frame_numbers(switches, codes)
     rate, rows = _neighbour_rate(switches, codes, grasp_set.labels, grasp_set.trial_ids)
     return Separability(inputs, int(frames.max()) + 1, _ceiling(frames, grasp_set.labels), rate, rows)
@@ -202,7 +203,9 @@ class SwitchUse(msgspec.Struct, frozen=True):
 
 
 class JointRange(msgspec.Struct, frozen=True):
-    """Least and largest value of a joint or taxel in its unit, None in a set without rows; how many codes it takes."""
+    """Least and largest value of a joint or taxel in its unit, None in a set without rows; how many distinct codes it
+    takes.
+    """
 
     name: str
     unit: str
@@ -270,9 +273,9 @@ def _switches(grasp_set: GraspSet) -> tuple[SwitchUse, ...]:
     return tuple(map(SwitchUse, grasp_set.switch_names, closed.tolist()))
 
 
-def _ranges(columns: Sequence[Joint], matrix: NDArray[np.uint16]) -> tuple[JointRange, ...]:
+def _ranges(joints: Sequence[Joint], columns: NDArray[np.uint16]) -> tuple[JointRange, ...]:
     ranges = []
-    for joint, codes in zip(columns, matrix.T, strict=True):
+    for joint, codes in zip(joints, columns.T, strict=True):
         taken = np.unique(codes)
         ends: list[float] = joint.value(taken[[0, -1]]).tolist() if taken.size else []
         least, largest = min(ends, default=None), max(ends, default=None)

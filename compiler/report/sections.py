@@ -245,12 +245,11 @@ def scan_sentences(content: ReportContent) -> Iterator[str]:
         return
     if scan.ports:
         time = scan_us(scan, harness)
-        wired = sum(len(chip.pins) for bus in harness.buses for chip in bus.chips)
         muxes = f", {counted(time.selects, 'write')} to muxes among them" if time.selects else ""
         yield (
             f"A whole scan is {counted(len(scan.ports) + time.selects, 'transaction')}{muxes}: "
             f"{microseconds(time.us)} µs on the wire, {percent(time.share, NBSP)} of the "
-            f"{microseconds(time.full_us)} µs that all {wired} wired ones take."
+            f"{microseconds(time.full_us)} µs that all {harness.on_chips} wired ones take."
         )
     for board, pairs in zip(harness.scanners, scan.scanners, strict=True):
         yield (

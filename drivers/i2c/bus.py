@@ -138,14 +138,18 @@ class Scan:
         A 0 where the chip pulls up tells that it was reset.
         """
         member = port.member
-        if port.believed != (answer, member.checked):
+        if isinstance(port.reading, Conversion):
+            believed = member.zeros == member.checked  # a chip has many channels, and most rest at 0 V
+        else:
+            believed = port.believed == (answer, member.checked)
+        if not believed:
             self._keeper.feel()
             if member.present:
                 self._keeper.check(member)
             again = self._alone(port)
             if again is None:
                 return None
-            port.believed = (again, member.checked)
+            port.believed, member.zeros = (again, member.checked), member.checked
             answer = again
         return port.value(answer)
 

@@ -8,7 +8,6 @@ from time import monotonic, perf_counter
 import msgspec
 
 from thenar.drivers.errors import ThenarError
-from thenar.drivers.i2c.bus import Interleaved
 from thenar.drivers.scanner import BoardGrasp
 
 from ..frames import SwitchFrame
@@ -17,8 +16,9 @@ from ..scanning.ports import whole_scan
 from ..scanning.scanmap import ScanMap
 from ..scanning.timing import ChipTime, glove_us, scan_us
 from ..sources.cyberglove import GloveDevice
-from ..sources.i2c import I2cDevice
+from ..sources.i2c import I2cDevice, PortLevels
 from ..sources.scanner import ScannerDevice
+from ..sources.spi import SpiConverter
 from ..taxels import Taxels, calibration_of
 
 # So much slower than its wire a device may be: computers have other things to do, too.
@@ -61,15 +61,15 @@ def check_up(
     for number in range(len(harness.scanners)):
         yield lambda number=number: _scanner(harness, number)  # type: ignore[misc]
     for bus in sorted({port.bus for port in scan.ports}):
-        yield lambda bus=bus: _bus(harness, bus, scan)  # type: ignore[misc]
+        look = _bus if bus < len(harness.buses) else _spi
+        yield lambda bus=bus, look=look: look(harness, bus, scan)  # type: ignore[misc]
 
 
 def _glove(wiring: GloveWiring, read: Sequence[str]) -> tuple[Finding, ...]:
     """Return what the glove is and how fast as it is wired, and what a record takes at best: of all its sensors, and of
     those that are `read`, or half of them.
     """
-    device = GloveDevice(wiring)
-    predicted = glove_us(wiring, device.sensors)
+    device, predicted = GloveDevice(wiring), glove_us(wiring, wiring.all_sensors)
     try:
         device.open()
         measured, info = _gap(lambda: device.read(_LISTEN_S)), device.info
@@ -149,7 +149,7 @@ def taxel_findings(
             read.read(0, [code])
             wrong.append(read.faults[0])
         counts = [code for code in codes if code is not None]
-        fault = max(set(wrong), key=wrong.count) if wrong else "silent"
+        fault = max(sorted(set(wrong)), key=wrong.count) if wrong else "silent"
         remarks: list[str] = [fault] if fault else []
         if counts:
             wander = max(counts) - min(counts)
@@ -174,18 +174,47 @@ def _bus(harness: Harness, number: int, scan: ScanMap) -> tuple[Finding, ...]:
     try:
         device.open()
         found = [_chip(device, place, time) for place, time in enumerate(times.chips)]
-        whole = _duration(device.scan(None))
+        whole = _duration(device.scan(None).read)
+        frames = [device.read(_LISTEN_S) for _ in range(_SCANS)] if device.taxels else []
         way = (device.bus.trouble,) if device.bus.trouble else (f"reads {device.bus.way}",)
     except ThenarError as wrong:
         return (Finding(device.name, "", False, times.us, None, (str(wrong),)),)
     finally:
         device.close()
     there = all(finding.present for finding in found)
-    return (*found, _told(Finding(device.name, "a whole scan", there, times.us, whole if there else None, way)))
+    scanned = _told(Finding(device.name, "a whole scan", there, times.us, whole if there else None, way))
+    return (*found, scanned, *_taxels(device.name, device.taxels, harness, frames))
+
+
+def _spi(harness: Harness, bus: int, scan: ScanMap) -> tuple[Finding, ...]:
+    device = SpiConverter(harness, bus - len(harness.buses), scan)
+    ports = tuple(port for port in scan.ports if port.bus == bus)
+    (predicted,) = scan_us(msgspec.structs.replace(scan, ports=ports), harness).chips
+    try:
+        device.open()
+        measured = _duration(device.run)
+        frames = [device.read(_LISTEN_S) for _ in range(_SCANS)]
+        wrong = device.trouble()
+    except ThenarError as error:
+        return (Finding(device.name, "", False, predicted.us, None, (str(error),)),)
+    finally:
+        device.close()
+    there = not device.silent
+    remarks = (wrong,) if wrong and not there else ()
+    found = Finding(device.name, device.device.chip.name, there, predicted.us, measured if there else None, remarks)
+    return (_told(found), *_taxels(device.name, device.taxels, harness, frames))
+
+
+def _taxels(
+    device: str, taxels: Sequence[PortLevels], harness: Harness, frames: Sequence[SwitchFrame | None]
+) -> Iterator[Finding]:
+    came = [frame for frame in frames if frame is not None]
+    for taxel in taxels:
+        yield from taxel_findings(device, [taxel.name], harness, came, taxel.highest)
 
 
 def _chip(device: I2cDevice, place: int, time: ChipTime) -> Finding:
-    taken = _duration(device.scan(place))
+    taken = _duration(device.scan(place).read)
     state = device.bus.chips[place]
     if not state.present:
         return Finding(device.name, time.place, False, time.us, None, (state.last_error,))
@@ -220,12 +249,12 @@ def _gap(read: Callable[[], object], middle: Callable[[list[float]], float] = me
     return 1e6 * middle(gaps) if gaps else None
 
 
-def _duration(scan: Interleaved) -> float:
+def _duration(read: Callable[[], object]) -> float:
     """Return the median time of a scan, in microseconds."""
     taken = []
     for _ in range(_SCANS):
         start = perf_counter()
-        scan.read()
+        read()
         taken.append(perf_counter() - start)
     return 1e6 * median(taken)
 

@@ -19,7 +19,10 @@ _PERIOD_S = 0.001
 
 
 class SpiConverter(Source):
-    """SPI device number `number` of a harness, read as `scan` has it, whose levels are limits in counts."""
+    """SPI device number `number` of a harness, read as `scan` has it, whose levels are limits in counts.
+
+    silent  whether the last answers were no converter's
+    """
 
     def __init__(self, harness: Harness, number: int, scan: ScanMap) -> None:
         wiring = harness.spi[number]
@@ -33,7 +36,7 @@ class SpiConverter(Source):
         self.run: Callable[[], list[int | None]] = self.device.prepare([reading_of(port, harness) for port in ports])
         self._everything = len(harness.taxel_names)
         self._due = 0.0
-        self._silent = False
+        self.silent = False
 
     def open(self) -> None:
         """Open the device."""
@@ -44,7 +47,7 @@ class SpiConverter(Source):
         time.sleep(min(max(0.0, self._due - time.monotonic()), timeout_s))
         self._due = time.monotonic() + _PERIOD_S
         answers = self.run()
-        self._silent = None in answers
+        self.silent = None in answers
         closed = lost = 0
         codes: list[int | None] = [None] * self._everything
         for taxel, answer in zip(self.taxels, answers, strict=True):
@@ -60,7 +63,7 @@ class SpiConverter(Source):
     def trouble(self) -> str:
         """Return what is wrong with the converter or its taxels; "" if nothing is."""
         silent = [f"{self.device.chip.name} does not answer: check its supply, its wires and its chip select"]
-        return "; ".join(silent if self._silent else taxel_faults(self.taxels))
+        return "; ".join(silent if self.silent else taxel_faults(self.taxels))
 
     def close(self) -> None:
         """Close the device."""
