@@ -59,6 +59,12 @@ def method_option(destination: str = "method", default: str = "id3") -> Callable
 keep_option = click.option(
     "--keep", type=click.IntRange(1), metavar="M", help="How many switches to keep: for methods that take it."
 )
+levels_option = click.option(
+    "--levels", type=click.IntRange(1, 65535), metavar="L", help="Most levels of a taxel to choose from.  [default: 7]"
+)
+keep_joints_option = click.option(
+    "--keep-joints", type=click.IntRange(1), metavar="N", help="Keep the best N joints.  [default: all]"
+)
 prune_option = click.option(
     "--prune",
     type=click.IntRange(0),

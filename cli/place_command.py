@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from thenar.compiler.text import counted
+
 from .common import (
     OutputFile,
     existing_file,
@@ -26,8 +28,10 @@ from .lines import echo
 from .options import (
     WithMethods,
     hand_of,
+    keep_joints_option,
     keep_option,
     layout_option,
+    levels_option,
     limit_options,
     method_option,
     prune_option,
@@ -53,6 +57,8 @@ class _Asked:
     exact: bool
     crowd: bool
     joints: bool
+    levels: int | None
+    keep_joints: int | None
     glove: Path | None
     keep_these: tuple[str, ...]
     never: tuple[str, ...]
@@ -88,6 +94,7 @@ class _Asked:
                 self.crowd and not method.by_number,
                 "--crowd takes a method that keeps M switches",
             ),
+            (self.crowd and (self.levels or self.keep_joints), "--crowd takes neither --levels nor --keep-joints"),
             (
                 self.crowd and (self.limited or self.robust),
                 "--crowd looks for the placement of many subjects: it takes no limits and no --robust",
@@ -130,14 +137,15 @@ class _Asked:
         """Return what reading each switch costs."""
         from thenar.compiler.placement.ports import ports_of_whole_glove
         from thenar.runtime.harness.loading import load_harness
+        from thenar.runtime.scanning.plan import unwired
 
         harness = None if self.glove is None else load_harness(self.glove)
-        lacking = set() if harness is None else set(grasp_set.element_names) - set(harness.switches)
+        lacking = [] if harness is None else unwired(harness, grasp_set.element_names)
         if lacking:
             raise click.UsageError(
                 f"{self.glove} has no place for {min(lacking)!r} of {self.grasps}: name the whole glove's glove.toml."
             )
-        return ports_of_whole_glove(harness, grasp_set.element_names)
+        return ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
 
     def found(self) -> "Placement":
         """Return the placement."""
@@ -166,6 +174,8 @@ class _Asked:
                 robust=self.robust,
                 exact=self.exact,
                 on_round=report,
+                levels=self.levels,
+                keep_joints=self.keep_joints,
             )
 
 
@@ -173,6 +183,8 @@ class _Asked:
 @click.argument("grasps", type=existing_file)
 @method_option(default="id3; elimination with --crowd")
 @keep_option
+@levels_option
+@keep_joints_option
 @prune_option
 @limit_options
 @layout_option
@@ -242,7 +254,7 @@ def _print(placement: "Placement") -> None:
 
 
 def _sentences(placement: "Placement") -> Iterator[str]:
-    kept = f"{len(placement.switches)} of {placement.n_switches} switches"
+    kept = f"{len(placement.switches)} of {placement.n_switches} {_kind(placement)}"
     share = f"({len(placement.switches) / placement.n_switches:.0%})"
     if placement.study is not None:
         yield from _of_study(kept, placement.study)
@@ -256,8 +268,17 @@ def _sentences(placement: "Placement") -> Iterator[str]:
         yield from _of_tree(placement, tree)
     else:
         yield f"{kept} {share}{', beside the joints' if placement.joints else ''}. {placement.how}"
+    if taxels := {kept.number for kept in placement.switches if kept.above is not None}:
+        levels = sum(kept.above is not None for kept in placement.switches)
+        yield f"{counted(levels, 'level')} of {counted(len(taxels), 'taxel')}: a taxel is converted once"
+    if placement.kept_joints:
+        yield f"the best {counted(len(placement.kept_joints), 'joint')} beside them: {', '.join(placement.kept_joints)}"
     if placement.exact is not None:
         yield from _of_exact(placement.exact, len(placement.switches))
+
+
+def _kind(placement: "Placement") -> str:
+    return "elements" if placement.n_levels else "switches"
 
 
 def _of_tree(placement: "Placement", tree: "Tree") -> Iterator[str]:

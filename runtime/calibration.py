@@ -118,9 +118,13 @@ class AngleReader:
 
     __slots__ = ("_names", "_pick", "_tables")
 
-    def __init__(self, sensor_names: Sequence[str], calibration: GloveCalibration) -> None:
-        """Raise SettingError if the calibration, which is in degrees, knows none of the sensors."""
-        known = {sensor.name: sensor for sensor in calibration.sensors}
+    def __init__(
+        self, sensor_names: Sequence[str], calibration: GloveCalibration, read: Sequence[str] | None = None
+    ) -> None:
+        """Raise SettingError if the calibration, which is in degrees, knows none of the sensors; of which `read` are
+        measured, None: all.
+        """
+        known = {sensor.name: sensor for sensor in calibration.sensors if read is None or sensor.name in read}
         found = [(number, known[name]) for number, name in enumerate(sensor_names) if name in known]
         if not found:
             raise SettingError("the calibration knows none of the glove's sensors: it is of another glove")

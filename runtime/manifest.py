@@ -85,6 +85,8 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
         settings given, the one that inner folds choose; with `rounds` that is LogitBoost.
     levels : int or None
         How many levels of a taxel there are to choose from, at most; None: as many as are usual.
+    keep_joints : int or None
+        How many joints are kept, at most, chosen after the switches; None: all.
     robust : bool
         Choose and train for the worst single lost input.
     keep_these, never : tuple of str
@@ -109,6 +111,7 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     settings: dict[Name, Given] = {}
     by: By | None = None
     levels: Annotated[int, Meta(ge=1, le=65535)] | None = None
+    keep_joints: Annotated[int, Meta(ge=1, le=2**53)] | None = None
     robust: bool = False
     keep_these: tuple[Name, ...] = ()
     never: tuple[Name, ...] = ()

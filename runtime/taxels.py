@@ -14,17 +14,20 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
+from statistics import median_low
 from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta, Struct
+from msgspec.structs import replace
 
 from thenar.drivers.errors import SettingError
 
 from .calibration import code_of_value
 from .frames import Mask
-from .manifest import Calibration, Threshold
+from .manifest import Calibration, Switch, Threshold
 from .names import fault, list_names, shortened
+from .scanning.scanmap import ScanMap
 from .toml_source import read_source
 from .toml_struct import convert
 
@@ -34,6 +37,9 @@ Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 TaxelFault = Literal["", "silent", "open wire", "saturated"]
 # A level: the limit of its counts (see `count_limit`), and the number of the build's switch that it is.
 Level = tuple[int, int]
+
+# Counts of which the median is a press; what moves by less than so many was not moved.
+_IN_A_ROW, _LEAST_TRAVEL = 5, 10
 
 # Parts of a count in which a baseline moves: a share of the span in thousandths, a minute in microseconds.
 _MINUTE_US = 60_000_000
@@ -124,10 +130,37 @@ class TaxelSettings(Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
     settle_s: Annotated[float, Meta(ge=0.0, le=3600.0)] = 1.0
 
 
+def calibration_of(settings: TaxelSettings) -> TaxelCalibration | None:
+    """Return the calibration that the settings name; None where they name none. Raises as `load_taxel_calibration`."""
+    return None if settings.calibration is None else load_taxel_calibration(Path(settings.calibration))
+
+
 def load_taxel_calibration(path: Path) -> TaxelCalibration:
     """Return the calibration that `thenar calibrate --taxels` wrote. Raises SettingError with file, line and key."""
     source = read_source(path, SettingError)
     return convert(source, (), source.tables(), TaxelCalibration)
+
+
+def learnt_lines(
+    names: Sequence[str], rested: Sequence[Sequence[int | None]], pressed: Sequence[Sequence[int | None]], value: float
+) -> tuple[TaxelLine, ...]:
+    """Return the lines of the taxels that moved, from counts at rest and counts while each was pressed once.
+
+    The rest is the median; the press is the median of five counts in a row that lies furthest from it, so that a glitch
+    is none. What moved less than three times as far as the counts wandered at rest was not pressed.
+    """
+    lines = []
+    for place, name in enumerate(names):
+        counts = [code for codes in rested if (code := codes[place]) is not None]
+        moved = [code for codes in pressed if (code := codes[place]) is not None]
+        if not counts or len(moved) < _IN_A_ROW:
+            continue
+        rest = median_low(counts)
+        held = (median_low(moved[at : at + _IN_A_ROW]) for at in range(len(moved) - _IN_A_ROW + 1))
+        press = max(held, key=lambda count: abs(count - rest))
+        if abs(press - rest) >= max(_LEAST_TRAVEL, 3 * (max(counts) - min(counts))):
+            lines.append(TaxelLine(name, rest, press, value))
+    return tuple(lines)
 
 
 def count_limit(threshold: Threshold, calibration: TaxelCalibration | None) -> int:
@@ -155,6 +188,25 @@ def count_limit(threshold: Threshold, calibration: TaxelCalibration | None) -> i
     if not rising:
         return ~first
     return first - 1 if first else ~COUNTS  # closed at every count
+
+
+def in_counts(scan: ScanMap, switches: Sequence[Switch], calibration: TaxelCalibration | None) -> ScanMap:
+    """Return a build's scan map with the limits of this glove's counts in place of the codes of levels: what sources
+    are given. Raises SettingError as `count_limit` does.
+    """
+
+    def limit(number: int, code: int) -> int:
+        threshold = switches[number].threshold
+        return code if threshold is None else count_limit(threshold, calibration)
+
+    ports = tuple(
+        replace(port, levels=tuple((limit(number, code), number) for code, number in port.levels))
+        if port.levels
+        else port
+        for port in scan.ports
+    )
+    boards = tuple(tuple((at, limit(number, code), number) for at, code, number in board) for board in scan.taxels)
+    return replace(scan, ports=ports, taxels=boards)
 
 
 def _check_counts(coded: Calibration, others: bool) -> None:
@@ -207,9 +259,10 @@ class Taxels:
     calibration  rest and press of each taxel, in counts. Of a taxel without, no baseline is followed, and no end of the
                  converter is a fault: nobody knows at which of them it rests
     settings     how baselines are followed
-    highest      the converter's highest count
+    highest      the converter's highest count; None: its ends are not looked at
 
     owned   the switches of all levels
+    counts  of each taxel when it was read last, what its baseline has moved taken off; None: it has a fault
     faults  what was wrong with each taxel when it was read last. An end of the converter is a fault where neither the
             rest, drifted as far as it may, nor the press of the calibration is near it: on the side of the rest an open
             wire, on the side of the press saturation
@@ -222,7 +275,7 @@ class Taxels:
         levels: Sequence[Sequence[Level]],
         calibration: TaxelCalibration | None = None,
         settings: TaxelSettings | None = None,
-        highest: int = 1023,
+        highest: int | None = None,
     ) -> None:
         settings = settings or TaxelSettings()
         self.names = tuple(names)
@@ -232,6 +285,7 @@ class Taxels:
         lines = [None if calibration is None else calibration.line(name) for name in names]
         self._follows = [_Baseline(line, settings) if line and settings.baseline else None for line in lines]
         self._ends = [_ends(line, settings, highest) for line in lines]
+        self.counts: list[int | None] = [None] * len(self.names)
         self.faults: list[TaxelFault] = [""] * len(self.names)
         self.drifts = [0] * len(self.names)
 
@@ -249,19 +303,22 @@ class Taxels:
             self.faults[place] = found
             if found or raw is None:
                 lost |= self._masks[place]
+                self.counts[place] = None
                 continue
             if (baseline := self._follows[place]) is not None:
                 self.drifts[place] = baseline.follow(time_us, raw)
-            count = raw - self.drifts[place]
+            self.counts[place] = count = raw - self.drifts[place]
             for limit, bit in self._levels[place]:
                 if (count if limit >= 0 else ~count) > limit:
                     closed |= bit
         return closed, lost
 
 
-def _ends(line: TaxelLine | None, settings: TaxelSettings, highest: int) -> tuple[int, int, TaxelFault, TaxelFault]:
+def _ends(
+    line: TaxelLine | None, settings: TaxelSettings, highest: int | None
+) -> tuple[int, int, TaxelFault, TaxelFault]:
     """Return at and below, and at and above which counts a taxel has a fault, and which."""
-    if line is None:
+    if line is None or highest is None:
         return -1, COUNTS, "", ""
     span, margin, rising = abs(line.press - line.rest), highest >> _END_SHIFT, line.press > line.rest
     # Where a sound taxel can be by itself: drifted from its rest, pressed as firmly as it was calibrated.

@@ -8,9 +8,18 @@ import msgspec
 import pytest
 
 from thenar.drivers.i2c.chips import CHIPS
+from thenar.drivers.spi.chips import SPI_CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.loading import load_harness
-from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Debounce, GloveWiring, Harness, ScannerWiring
+from thenar.runtime.harness.wiring import (
+    BusWiring,
+    ChipWiring,
+    Debounce,
+    GloveWiring,
+    Harness,
+    ScannerWiring,
+    SpiWiring,
+)
 from thenar.runtime.scanning import plan
 from thenar.runtime.scanning import plan as order
 from thenar.runtime.scanning.timing import port_us, select_us
@@ -24,6 +33,7 @@ TABLES: dict[str, type[msgspec.Struct]] = {
     "`[[scanner]]`": ScannerWiring,
     "`[[bus]]`": BusWiring,
     "`[[bus.chip]]`": ChipWiring,
+    "`[[spi]]`": SpiWiring,
     "`[debounce]`": Debounce,
     "`[taxels]`": TaxelSettings,
 }
@@ -66,8 +76,8 @@ def test_every_key_is_there_with_its_default() -> None:
 
 
 def test_every_kind_of_chip_is_named() -> None:
-    (kinds,) = (text for _, key, _, text in rows("table | key") if key == "`kind`")
-    assert set(re.findall(r"`(\w+)`", kinds)) == set(CHIPS)
+    kinds = [text for _, key, _, text in rows("table | key") if key == "`kind`"]
+    assert [set(re.findall(r"`(\w+)`", text)) for text in kinds] == [set(CHIPS), set(SPI_CHIPS)]
 
 
 def test_the_times_are_those_of_the_arithmetic() -> None:

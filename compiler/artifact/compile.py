@@ -183,7 +183,7 @@ def compile_build(
         check_trials(grasp_set, CompileError)
     cuts = cuts_of(grasp_set, asked)
     steps = _Steps(progress, sum(len(cut.folds) for cut in cuts))
-    ports = ports or ports_of_whole_glove(None, grasp_set.element_names)
+    ports = ports or ports_of_whole_glove(None, grasp_set.element_names, len(grasp_set.taxel_columns))
     hand = hand or (None if documents is None else documents.hand)
     groups = groups_for(grasp_set, asked)
     limits = Limits.of(asked, grasp_set, {} if hand is None else hand.by_name)

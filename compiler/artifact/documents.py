@@ -97,7 +97,7 @@ class Documents:
         from ..glove.files import spec_files
 
         files = {REPORT_NAME: self._report(made, jobs, progress)}
-        if names := [switch.name for switch in made.manifest.switches]:
+        if names := list(dict.fromkeys(switch.source for switch in made.manifest.switches)):
             hand = None if self.hand is None else self.hand.fitted(names, self.hand_length)
             spec = spec_files(made.manifest, made.scan, made.harness, hand)
             files |= {f"{SPEC_FOLDER}/{name}": content for name, content in spec.items()}
@@ -123,7 +123,7 @@ class Documents:
                 no_study=no_study,
                 frontier=self.frontier,
                 point=self.point,
-                hand=None if self.hand is None else self.hand.fitted(made.grasp_set.switch_names),
+                hand=None if self.hand is None else self.hand.fitted(made.grasp_set.element_names),
                 scan=made.scan,
                 harness=made.harness,
                 comparison=made.comparison,

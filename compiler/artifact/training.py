@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.manifest import By, Fitting, Of, Options, Protocol, Recognised
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.tables import MAX_JOINTS, IntegerTables
 
 from ..boosting.stumps import Stumps
 from ..evaluation.choosing import choose_training
@@ -17,6 +17,7 @@ from ..evaluation.rates import rated
 from ..limits import check_inputs, check_memory, check_types
 from ..placement.constraints import Limits
 from ..placement.elements import Elements, bits_of, elements_of, ports_of
+from ..placement.joints import kept_joints
 from ..placement.methods.base import METHODS, PAPERS
 from ..placement.placement import choose
 from ..placement.ports import PortCosts
@@ -89,8 +90,11 @@ def samples_of(grasp_set: GraspSet, options: Options) -> Samples:
     if (found := len(np.unique(grasp_set.labels))) < 2:
         raise CompileError(f"the recordings hold {found} grasp type(s): there is nothing to tell apart")
     samples = Samples.of(grasp_set, wanted)
+    if options.keep_joints is not None and not samples.codes.shape[1]:
+        raise CompileError("there are no joints to keep some of: leave keep_joints (--keep-joints) out")
+    joints = min(options.keep_joints or MAX_JOINTS + 1, samples.codes.shape[1])
     check_types(found, CompileError)
-    check_inputs(found, min(options.keep or 0, len(grasp_set.element_names)), samples.codes.shape[1], CompileError)
+    check_inputs(found, min(options.keep or 0, len(grasp_set.element_names)), joints, CompileError)
     check_memory(len(samples.codes), found, CompileError)
     rounds = max(int(each.settings.get("rounds") or 0) for each in Training.candidates(options))
     if rounds * found > MAX_STUMPS:
@@ -117,7 +121,7 @@ def train(
     jobs    worker processes that compare fits
     limits  what the placement must obey
     """
-    elements, joints = elements_of(samples, options.levels), tuple(range(samples.codes.shape[1]))
+    elements = elements_of(samples, options.levels)
     samples = bits_of(samples, elements)
     # Without switches the tree is a leaf.
     method = options.placement if samples.n_switches else PAPERS
@@ -128,8 +132,10 @@ def train(
     columns = chosen.columns
     if not columns and not samples.codes.shape[1]:
         raise CompileError("no switch is worth keeping: lower --prune, or record switches that differ between grasps")
-    check_inputs(len(samples.grasps), len(columns), samples.codes.shape[1], CompileError)
     kept = samples.keeping(columns)
+    joints = kept_joints(kept, options.keep_joints)
+    kept = kept.with_joints(joints)
+    check_inputs(len(samples.grasps), len(columns), len(joints), CompileError)
     inputs = kept.inputs
     if not (inputs != inputs[0]).any():
         raise CompileError("no input differs between rows: there is nothing to tell grasp types apart by")

@@ -24,7 +24,7 @@ from ..tables.quantise import integer_scores, quantise
 from ..trainers.base import Training
 from .cache import Cache, stored
 from .equipment import Equipment
-from .points import By, Way
+from .points import By, Time, Way
 from .search import NO_SWITCHES, SHAPES, Candidate, Search, Shape
 
 # Expected seconds of one core, for so many rows: they only say how the time that is left is told.
@@ -193,6 +193,10 @@ class Survey:
     def _few(self) -> tuple[Samples, Samples]:
         spread = np.linspace(0, len(self.samples.labels) - 1, min(_FEW_ROWS, len(self.samples.labels))).astype(np.intp)
         return self._alone.rows(spread), self.samples.rows(spread)
+
+    def transfer(self, choice: Candidate) -> Time:
+        """Return what reading the joints of a choice takes."""
+        return self.equipment.records.of(self.n_joints if choice.joints else 0)
 
     def inputs(self, joints: bool, *, few: bool = False) -> Samples:
         """Return all rows, or a few of them, with the joints or without."""

@@ -12,14 +12,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.names import level_name
+
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
 from .exact import Counts
 from .gain import NodeCounts, best_position, first_of_most_gain, gain_bits
 from .ports import PortCosts
 
-# Candidates of one taxel: more of them gained nothing on iCub's taxels.
-LEVELS = 3
+# Candidates of one taxel. iCub's, 5 x 4 folds, all of them: 1 level 83.5 %, 3 95.2, 5 96.7, 8 98.1.
+LEVELS = 7
 
 
 class Element(NamedTuple):
@@ -104,7 +106,7 @@ def columns_of(elements: Elements) -> Columns:
 def names_of(grasp_set: GraspSet, elements: Elements) -> tuple[str, ...]:
     """Return the names: a switch's own; of a level, the taxel's with the code, as in "pad3>118"."""
     names, n_switches = grasp_set.element_names, len(grasp_set.switch_names)
-    return tuple(names[column] if column < n_switches else f"{names[column]}>{code}" for column, code in elements)
+    return tuple(names[column] if column < n_switches else level_name(names[column], code) for column, code in elements)
 
 
 def ports_of(ports: PortCosts, elements: Elements) -> PortCosts:

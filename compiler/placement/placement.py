@@ -21,6 +21,7 @@ from .elements import Elements, bits_of, columns_of, elements_of, names_of, port
 from .gain import entropy_bits
 from .id3 import grow_id3
 from .inputs import PlacementError
+from .joints import kept_joints
 from .methods.base import METHODS, PAPERS, Method
 from .optimum import Pairs, best_subset
 from .ports import PortCosts
@@ -175,6 +176,7 @@ class Placement:
     """The kept switches of a set, and how they were found.
 
     parameter  S, or how many switches to keep at most; joints: whether the joints had a say
+    kept_joints  the names of the kept joints, where some were to be chosen; n_levels: how many elements are levels
     all_names  the names of all elements there were: switches, and levels of taxels; grasps: the types that occur, which
                the tree's classes index
     tree       of the paper's ID3; exact: how far from the best, if that was asked for; study: of many subjects
@@ -191,6 +193,8 @@ class Placement:
     tree: Tree | None = None
     exact: Exactly | None = None
     study: Standard | None = None
+    kept_joints: tuple[str, ...] = ()
+    n_levels: int = 0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -236,6 +240,8 @@ class Placement:
         }
         if self.study is not None:
             found["study"] = self.study
+        if self.kept_joints:
+            found["kept_joints"] = self.kept_joints
         if self.tree is not None:
             found |= {
                 "kept_share": len(self.switches) / self.n_switches,
@@ -260,6 +266,7 @@ def place(
     exact: bool = False,
     on_round: Progress | None = None,
     levels: int | None = None,
+    keep_joints: int | None = None,
     limits: Limits | None = None,
     robust: bool = False,
 ) -> Placement:
@@ -284,6 +291,8 @@ def place(
         Called with (done, all) after every round of that search.
     levels : int, optional
         How many levels of a taxel there are to choose from, at most.
+    keep_joints : int, optional
+        How many joints to keep, chosen beside the kept switches; None: joints are not chosen.
     limits : Limits, optional
         What the placement must obey.
     robust : bool
@@ -296,9 +305,10 @@ def place(
     PlacementError
         If the set has no switches, no rows, or more grasp types than a build can hold.
     """
-    samples = samples_of(grasp_set, joints=joints)
-    elements = elements_of(samples, levels)
-    samples = bits_of(samples, elements)
+    read = samples_of(grasp_set, joints=joints or keep_joints is not None)
+    elements = elements_of(read, levels)
+    read = bits_of(read, elements)
+    samples = read if joints else read.with_joints(())
     own = None if ports is None else ports_of(ports, elements)
     bound = None if limits is None else limits.on(elements, own)
     chosen = choose(samples, method, parameter, own, bound, robust=robust)
@@ -319,11 +329,11 @@ def place(
         rows=len(grasp_set),
         fingerprint=grasp_set.fingerprint(),
         all_names=names_of(grasp_set, elements),
+        n_levels=len(elements) - len(grasp_set.switch_names),
         grasps=samples.grasps,
         tree=chosen.tree,
-        exact=_exactly(samples, chosen.columns, bound, partial(kept_of, grasp_set, elements), on_round)
-        if exact
-        else None,
+        kept_joints=() if keep_joints is None else _joints_kept(grasp_set, read.keeping(chosen.columns), keep_joints),
+        exact=_exactly(samples, chosen.columns, bound, name, on_round) if exact else None,
     )
 
 
@@ -359,6 +369,12 @@ def kept_of(grasp_set: GraspSet, elements: Elements, columns: Columns) -> tuple[
         Kept(one.column, name, above=None if one.column < n_switches else one.code)
         for one, name in zip(kept, names_of(grasp_set, kept), strict=True)
     )
+
+
+def _joints_kept(grasp_set: GraspSet, samples: Samples, most: int) -> tuple[str, ...]:
+    if not grasp_set.joints:
+        raise PlacementError("the set has no joints to keep some of: leave --keep-joints out")
+    return tuple(grasp_set.joint_names[joint] for joint in kept_joints(samples, most))
 
 
 def _exactly(

@@ -60,16 +60,17 @@ class PortCosts:
         return costs
 
 
-def ports_of_whole_glove(harness: Harness | None, names: Sequence[str]) -> PortCosts | None:
-    """Return what the ports cost that all switches `names` hang on: in `harness`, or where there is none, on as few
-    MCP23017 as will do, in the order of the names.
+def ports_of_whole_glove(harness: Harness | None, names: Sequence[str], taxels: int = 0) -> PortCosts | None:
+    """Return what the ports cost that all switches `names`, of which the last so many are taxels, hang on: in
+    `harness`, or where there is none, on as few MCP23017 and converters as will do, in the order of the names.
 
     None where a harness lacks switches, as that of a reduced glove does, or there is no room for so many.
     """
     if not names or (harness is not None and unwired(harness, names)):
         return None
     try:
-        return port_costs(harness or propose_harness(names), names)
+        switches = len(names) - taxels
+        return port_costs(harness or propose_harness(names[:switches], taxels=names[switches:]), names)
     except HarnessError:
         return None
 

@@ -83,11 +83,10 @@ def kept_table(content: ReportContent) -> PlainTable:
     """
     switches, tree, hand = content.manifest.switches, content.tree, content.hand
     entropy = 0.0 if tree is None else entropy_bits(list(tree.nodes[0].counts))
-    parts = {} if hand is None else dict(zip(hand.names, hand.parts.tolist(), strict=True))
     taxels = any(switch.threshold is not None for switch in switches)
     rows: list[tuple[str, ...]] = []
     for order, (switch, gain) in enumerate(zip(switches, accumulate(each.gain for each in switches), strict=True), 1):
-        part = "" if hand is None else hand.part_names[parts[switch.name]]
+        part = "" if hand is None else hand.part_names[hand.parts[hand.numbers_of([switch.name])[0]]]
         together = () if tree is None else (percent(gain / entropy, NBSP) if entropy else "",)
         rows.append((str(order), switch.name, part, str(switch.column), f"{switch.gain:.3f}", *together))
         if taxels:
@@ -246,12 +245,11 @@ def scan_sentences(content: ReportContent) -> Iterator[str]:
         return
     if scan.ports:
         time = scan_us(scan, harness)
-        wired = sum(len(chip.pins) for bus in harness.buses for chip in bus.chips)
         muxes = f", {counted(time.selects, 'write')} to muxes among them" if time.selects else ""
         yield (
             f"A whole scan is {counted(len(scan.ports) + time.selects, 'transaction')}{muxes}: "
             f"{microseconds(time.us)} µs on the wire, {percent(time.share, NBSP)} of the "
-            f"{microseconds(time.full_us)} µs that all {wired} wired ones take."
+            f"{microseconds(time.full_us)} µs that all {harness.on_chips} wired ones take."
         )
     for board, pairs in zip(harness.scanners, scan.scanners, strict=True):
         yield (
@@ -259,9 +257,10 @@ def scan_sentences(content: ReportContent) -> Iterator[str]:
             f"{counted(len(board.switches), 'key')}, {microseconds(scanner_us(board))} µs a bitmap on its line."
         )
     if harness.cyberglove is not None and joints:
-        sensors = harness.cyberglove.sensors or joints
-        us = microseconds(glove_us(harness.cyberglove, sensors))
-        yield f"A record of the CyberGlove's {sensors} sensors takes {us} µs on its own line, beside the scan."
+        us, glove = microseconds(glove_us(harness.cyberglove, joints)), harness.cyberglove
+        how = "by the vendor's formula" if glove.record_us is None else "as it was measured"
+        record = f"A record of {counted(joints, 'sensor')} of the CyberGlove"
+        yield f"{record} takes {us} µs on its own line, {how}, beside the scan."
 
 
 def provenance(manifest: Manifest) -> Pairs:

@@ -71,6 +71,7 @@ class ScannerBoard:
     clock_us       what its 32 bit clock shows at boot        board   its number
     channels, bits of its converter: it speaks version 2 where there are any
     channel_us     how long a channel takes, its multiplexer's settling included
+    codes          what the channels have now, in order, None for one that cannot be read; others have 0
 
     Without STATEs it sends an EVENT for every change. It does not debounce: what it is told of that it only says again.
     """
@@ -95,6 +96,7 @@ class ScannerBoard:
         self.debounce = SetDebounce(0, 0)
         self.analog = Channels(ANALOG_VERSION, 0, bits, 0, 0, channels)
         self.channel_us = channel_us
+        self.codes: Sequence[int | None] = ()
         self.overruns = self.refused = self.dropped = 0
         self._closed: Mask = 0
         self._lost: Mask = 0
@@ -128,13 +130,10 @@ class ScannerBoard:
         due += [self._analog_at] * (self.analog.analog_us > 0)
         return min(due, default=None)
 
-    def scan(
-        self, closed: Mask, now: int, *, unread: Mask = 0, whole: bool = True, codes: Sequence[int | None] = ()
-    ) -> list[bytes]:
+    def scan(self, closed: Mask, now: int, *, unread: Mask = 0, whole: bool = True) -> list[bytes]:
         """Read the keys and the converter, and return the frames that are due.
 
         unread  keys that keep their state, since they were not read      whole  whether all were tried: those are lost
-        codes   of the channels, in order, None for one that cannot be read, 0 for those that are not said
         """
         self._scan_at = None
         sent = self._keys(closed, unread, whole, now) if self._scanned or whole else []
@@ -143,12 +142,12 @@ class ScannerBoard:
             sent.append(self._sent(Faults(self._clock(now), *self._told, 0)))
         if self.analog.analog_us and now >= self._analog_at:
             self._analog_at = _after(self._analog_at, self.analog.analog_us, now)
-            sent.append(self._sent(Analog(self._clock(now), self.analog.token, self._converted(codes))))
+            sent.append(self._sent(Analog(self._clock(now), self.analog.token, self._converted())))
         return sent
 
-    def _converted(self, codes: Sequence[int | None]) -> tuple[int, ...]:
+    def _converted(self) -> tuple[int, ...]:
         """Return the codes of the channels that were asked for."""
-        whole, analog = [*codes, *[0] * self.analog.channels], self.analog
+        whole, analog = [*self.codes, *[0] * self.analog.channels], self.analog
         asked = [code for channel, code in enumerate(whole) if analog.wanted >> channel & 1]
         return tuple(UNREAD if code is None else min(max(code, 0), (1 << analog.bits) - 1) for code in asked)
 
@@ -270,7 +269,6 @@ class EmulatedScanner(Closing):
         self.board = board or ScannerBoard(1, switches)
         self._closed: Mask = 0
         self._lost: Mask = 0
-        self._codes: tuple[int | None, ...] = ()
         self._closing = False
         self._heard: deque[bytes] = deque()
         self._booted_us = monotonic_ns() // 1000
@@ -297,7 +295,7 @@ class EmulatedScanner(Closing):
     def press(self, codes: Sequence[int | None]) -> None:
         """Let the channels, in order, have these codes from now on; None: it cannot be read. Others have 0."""
         with self._condition:
-            self._codes = tuple(codes)
+            self.board.codes = tuple(codes)
 
     def recognise(self, grasp: int, margin: int, flags: int = 0) -> None:
         """Say that the board recognised grasp type number `grasp`, with the values of GRASP's fields."""
@@ -341,7 +339,7 @@ class EmulatedScanner(Closing):
                     self._send(self.board.receive(self._heard.popleft(), self._now()))
                 now, due = self._now(), self.board.next_us()
                 if due is not None and due <= now:
-                    self._send(self.board.scan(self._closed, now, unread=self._lost, codes=self._codes))
+                    self._send(self.board.scan(self._closed, now, unread=self._lost))
                 else:
                     self._condition.wait(None if due is None else (due - now) / 1e6)
 

@@ -132,7 +132,7 @@ def _of_elements(harness: Harness) -> Iterator[Fault]:
         for here, chip in chips:
             yield from (((*here, "pins", pin), name) for pin, name in chip.pins.items())
 
-    yield from _of_names(wired(), "switch or taxel" if harness.taxels else "switch")
+    yield from _of_names(wired(), "switch or taxel" if harness.taxel_names else "switch")
 
 
 def _of_names(named: Iterable[tuple[Place, str]], what: str) -> Iterator[Fault]:

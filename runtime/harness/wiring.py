@@ -10,15 +10,17 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta, Struct, field
 
+from thenar.drivers.cyberglove_protocol import SENSORS, SENSORS_18, SENSORS_22
 from thenar.drivers.i2c.chips import CHIPS, Chip, Converter
+from thenar.drivers.scanner_protocol import MOST_ASKED
 from thenar.drivers.spi.chips import SPI_CHIPS, SpiChip
 
 from ..taxels import TaxelSettings
 
 # A board's bitmap has no room for more.
 MOST_KEYS = 2000
-# A board's frame has no room for more.
-MOST_CHANNELS = 128
+# An ANALOG of a board has no room for more.
+MOST_CHANNELS = MOST_ASKED
 # Of the clock of a bus.
 SLOWEST_HZ = 1000
 Text = Annotated[str, Meta(min_length=1)]
@@ -34,7 +36,12 @@ class GloveWiring(_Table, frozen=True):
     """The CyberGlove: its port (a device, socket:// or rfc2217://), and how it is asked.
 
     baud         "auto" tries the usual ones
+    mode         "stream": it sends by its own clock; "poll": it is asked for every record; "demand": a run asks for one
+                 where the switches cannot decide without
     rate_hz      None: as fast as it can
+    filter       whether the box's digital filter is on; None: as the box has it
+    record_us    what one record of all sensors takes, as measured (`thenar doctor --write`); None: by the formula
+    mask         whether sensors that no joint of a build is are left out of the records of a run
     sensors      None: the glove is asked
     calibration  path of its calibration; relative paths in a file count from that file's folder
     joints       our names of the wire's sensors, in wire order, where a build calls them otherwise than the driver
@@ -42,11 +49,24 @@ class GloveWiring(_Table, frozen=True):
 
     port: Text
     baud: Baud | Literal["auto"] = 115_200
-    mode: Literal["stream", "poll"] = "stream"
+    mode: Literal["stream", "poll", "demand"] = "stream"
     rate_hz: Annotated[float, Meta(gt=0.0, le=1000.0)] | None = None
+    filter: bool | None = None
+    record_us: Annotated[float, Meta(gt=0.0, le=1e6)] | None = None
+    mask: bool = True
     sensors: Literal[18, 22] | None = None
     calibration: Text | None = None
     joints: tuple[str, ...] = ()
+
+    @property
+    def all_sensors(self) -> int:
+        """How many sensors the glove must have: 18 where nothing says so."""
+        return len(self.joints) or self.sensors or SENSORS
+
+    @property
+    def sensor_names(self) -> tuple[str, ...]:
+        """The names of all its sensors in wire order: ours, or the driver's."""
+        return self.joints or (SENSORS_18 if self.all_sensors == SENSORS else SENSORS_22)
 
 
 class ScannerWiring(_Table, frozen=True):
@@ -55,7 +75,7 @@ class ScannerWiring(_Table, frozen=True):
     """
 
     port: Text
-    switches: Annotated[tuple[str, ...], Meta(max_length=MOST_KEYS)]
+    switches: Annotated[tuple[str, ...], Meta(max_length=MOST_KEYS)] = ()
     baud: Baud = 1_000_000
     taxels: Annotated[tuple[str, ...], Meta(max_length=MOST_CHANNELS)] = ()
     mux: Literal["cd74hc4067"] | None = None
@@ -172,11 +192,17 @@ class Harness(_Table, frozen=True):
         return (*keys, *(name for chip in chips for name in chip.numbered_pins.values()))
 
     @property
-    def taxels(self) -> tuple[str, ...]:
+    def taxel_names(self) -> tuple[str, ...]:
         """The names of all taxels that are wired: the boards', then the converters', channel by channel."""
         boards = (name for scanner in self.scanners for name in scanner.taxels if name)
         chips: list[ChipWiring | SpiWiring] = [chip for bus in self.buses for chip in bus.chips if chip.measures]
         return (*boards, *(name for chip in (*chips, *self.spi) for name in chip.numbered_pins.values()))
+
+    @property
+    def on_chips(self) -> int:
+        """How many switches and taxels are wired to chips."""
+        chips: list[ChipWiring | SpiWiring] = [*(chip for bus in self.buses for chip in bus.chips), *self.spi]
+        return sum(len(chip.pins) for chip in chips)
 
     def chip_of(self, bus: int, number: int) -> ChipWiring | SpiWiring:
         """Return a chip as scan maps count: bus after bus, then every SPI device as a bus of one chip.

@@ -32,7 +32,7 @@ def levels_of(harness: Harness, switch_names: Sequence[str]) -> Levels:
 
     A name of a switch is none, whatever it looks like.
     """
-    taxels, pins = set(harness.taxels), set(harness.switches)
+    taxels, pins = set(harness.taxel_names), set(harness.switches)
     found: dict[str, list[Pair]] = {}
     for number, name in enumerate(switch_names):
         taxel, code = (name, 0) if name in taxels else taxel_and_code(name) or ("", 0)
@@ -111,7 +111,7 @@ def whole_scan(harness: Harness, switch_names: Sequence[str], *, every_taxel: bo
         for scanner in harness.scanners
     )
     boards = tuple(_board_levels(scanner, levels) for scanner in harness.scanners)
-    converted = {taxel: levels.get(taxel, ()) for taxel in harness.taxels} if every_taxel else levels
+    converted = {taxel: levels.get(taxel, ()) for taxel in harness.taxel_names} if every_taxel else levels
     ports = ports_of(harness, numbers, converted)
     return ScanMap(SCHEMA, harness.fingerprint, ports, scanners, boards if any(boards) else ())
 

@@ -14,6 +14,7 @@ from math import fsum
 
 from msgspec import Struct
 
+from thenar.drivers import cyberglove_protocol as glove_protocol
 from thenar.drivers.cyberglove_protocol import sending_us, shortest_us
 from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips import Conversion, Reading
@@ -26,6 +27,7 @@ from .scanmap import Port, ScanMap
 
 _FREE_US = ((100_000, 4.7), (400_000, 1.3))
 _FREE_FASTEST_US = 0.5
+_BAUD = 115_200
 
 
 class ChipTime(Struct, frozen=True):
@@ -179,9 +181,23 @@ def selections(ports: Iterable[Port], harness: Harness) -> tuple[tuple[int, ...]
     return tuple(room for room in rooms if alike[room[0], len(room)] > 1)
 
 
-def glove_us(glove: GloveWiring, sensors: int) -> float:
-    """Return the shortest period of a CyberGlove's records, in microseconds; at 115200 baud where it is to be found."""
-    return shortest_us(sensors, 115_200 if glove.baud == "auto" else glove.baud, status=True)
+def glove_us(glove: GloveWiring, sensors: int, *, wire_only: bool = False) -> float:
+    """Return the shortest period of a CyberGlove's records of so many sensors, in microseconds.
+
+    It is the vendor's formula (`shortest_us`), in the proportion in which `record_us` was measured to it for all
+    sensors; and no less than the period at which records are asked for. `wire_only` leaves out what the box takes to
+    digitise. The rate is 115200 baud where it is to be found. A record that is asked for takes the byte that asks, too.
+    """
+    baud = _BAUD if glove.baud == "auto" else glove.baud
+    asking_us = 0.0 if glove.mode == "stream" else sending_us(len(glove_protocol.POLL), baud)
+    if wire_only:
+        return asking_us + sending_us(sensors + glove_protocol.OVERHEAD + 1, baud)
+    filtered = bool(glove.filter)
+    us = shortest_us(sensors, baud, status=True, filtered=filtered)
+    if glove.record_us is not None:
+        us *= glove.record_us / shortest_us(glove.all_sensors, baud, status=True, filtered=filtered)
+    us += asking_us
+    return max(us, 1e6 / glove.rate_hz if glove.rate_hz else 0.0)
 
 
 def scanner_us(scanner: ScannerWiring) -> float:

@@ -18,7 +18,7 @@ from ..streams import Draw
 class Parameters(Converter, frozen=True):
     """How many bits, and at how many newtons they end."""
 
-    bits: Annotated[int, Meta(ge=1, le=16)] = 12
+    bits: Annotated[int, Meta(ge=1, le=15)] = 12
     full_n: Annotated[float, Meta(gt=0.0, le=1000.0)] = 10.0
 
 

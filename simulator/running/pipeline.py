@@ -197,10 +197,6 @@ def _check_taxels(listed: Sequence[Place], setting: Setting) -> None:
             raise SceneError(
                 f'effects.{name}: the glove has no taxels: say in [glove] which places are, as taxels = "all"'
             )
-        if setting.taxels and place.effect.on_wire:
-            raise SceneError(
-                f"effects.{name}: what happens on wires is simulated for switches and joints, not for taxels"
-            )
 
 
 def _prepared(place: Place, setting: Setting) -> Together:

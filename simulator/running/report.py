@@ -161,8 +161,9 @@ def grasp_set(
     )
     trials = rows.trial.astype(np.int64)
     read = (bits, switches, rows.codes, joints)
-    of_rows = (grasps, taxonomy, subjects, objects, trials, simulated)
-    return GraspSet(*read, *of_rows, taxels=rows.taxels, taxel_columns=taxels)
+    return GraspSet(
+        *(*read, grasps, taxonomy, subjects, objects, trials, simulated), taxels=rows.taxels, taxel_columns=taxels
+    )
 
 
 class GraspReport(msgspec.Struct, frozen=True):

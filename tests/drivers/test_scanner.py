@@ -197,9 +197,10 @@ def test_a_board_of_version_1_is_understood_and_has_no_channels(
 def test_a_board_of_version_2_says_nothing_new_to_a_host_of_version_1() -> None:
     """Which takes a HELLO of protocol 1 and 35 bytes, whatever its flags, and counts other kinds as misfits."""
     board = ScannerBoard(1, 8, channels=5)
+    board.codes = CODES
     sent = b"".join(board.boot(0))
     for now in range(0, 200_000, 1000):
-        sent += b"".join(board.scan(now // 7 & 0xFF, now, codes=CODES))
+        sent += b"".join(board.scan(now // 7 & 0xFF, now))
     frames = scanner_protocol.FrameDecoder().feed(sent)
     assert {found.kind for found in frames} == {Hello.KIND, Event.KIND, Heartbeat.KIND}
     assert (frames[0].payload[0], len(frames[0].payload)) == (1, 35)

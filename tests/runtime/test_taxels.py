@@ -6,13 +6,16 @@ from hypothesis import strategies as st
 
 from thenar.drivers.errors import SettingError
 from thenar.runtime.calibration import code_of_value
-from thenar.runtime.manifest import Calibration, Threshold
+from thenar.runtime.manifest import Calibration, Switch, Threshold
+from thenar.runtime.scanning.scanmap import Port, ScanMap
 from thenar.runtime.taxels import (
     TaxelCalibration,
     TaxelLine,
     Taxels,
     TaxelSettings,
     count_limit,
+    in_counts,
+    learnt_lines,
     load_taxel_calibration,
 )
 
@@ -179,3 +182,33 @@ def test_a_wrong_calibration_is_refused(tmp_path: Path, text: str, said: str) ->
     file.write_text(text)
     with pytest.raises(SettingError, match=said):
         load_taxel_calibration(file)
+
+
+@given(
+    rest=st.integers(0, 1000),
+    noise=st.integers(0, 5),
+    press=st.integers(0, 1000),
+    glitches=st.lists(st.integers(0, 1023), max_size=2),
+)
+def test_rest_and_press_are_learnt_though_there_are_glitches(
+    rest: int, noise: int, press: int, glitches: list[int]
+) -> None:
+    rested = [(rest - noise,), (rest,), (rest,), (rest + noise,), (rest,), (None,)]
+    pressed = [(code,) for code in (*[rest] * 9, *glitches, *[rest] * 9, *[press] * 9, *[rest] * 9)]
+    moved = abs(press - rest) >= max(10, 6 * noise)
+    assert learnt_lines(["pad"], rested, pressed, 2.0) == ((TaxelLine("pad", rest, press, 2.0),) if moved else ())
+
+
+def test_a_taxel_that_was_never_read_is_not_learnt() -> None:
+    assert learnt_lines(["a", "b"], [(None, 5)], [(None, 500)] * 9, 1.0) == (TaxelLine("b", 5, 500),)
+
+
+def test_a_scan_map_is_turned_into_counts() -> None:
+    switches = [Switch(0, "s", 0.0), Switch(1, "pad>60", 0.0, Threshold(60, 0.5, NEWTONS))]
+    port = Port(0, 0, "CH3", (), True, ((60, 1),))
+    scan = ScanMap(1, "0" * 64, (port, Port(0, 1, "A", ((0, 0),), False)), ((),), (((3, 60, 1),),))
+    counted = in_counts(scan, switches, TaxelCalibration(unit="N", taxels=(TaxelLine("pad", 100, 900, 2.0),)))
+    # Above 0.5 N by half a code of 0.01 N, of 400 counts a newton.
+    assert counted.ports[0].levels == ((302, 1),)
+    assert counted.taxels == (((3, 302, 1),),)
+    assert counted.ports[1] == scan.ports[1]

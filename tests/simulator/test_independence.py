@@ -27,7 +27,7 @@ BatchMaker = Callable[..., Batch]
 # An effect and where it drew, (seed, repetition, condition, subject): the words.
 Words = dict[tuple[str, tuple[int, ...]], bytes]
 
-SILENT_TAXELS = {"taxel.hysteresis", "taxel.creep", "taxel.crosstalk", "taxel.adc"}
+SILENT = {"frame.at_force", "taxel.hysteresis", "taxel.creep", "taxel.crosstalk", "taxel.adc"}
 OTHERS = [name for name in NAMES if name not in CONTACTS]
 # Parameters with which everybody who can draw does, and the contact models are quick.
 LIVELY: dict[str, dict[str, Any]] = {
@@ -46,12 +46,6 @@ LIVELY: dict[str, dict[str, Any]] = {
 
 def lively(names: Iterable[str]) -> list[tuple]:
     return [(name, EFFECTS[name].parameters(**LIVELY.get(name, {}))) for name in names]
-
-
-def together(names: Iterable[str]) -> set[str]:
-    """Return those that a scene can list together: what happens on wires is not simulated for taxels."""
-    taxels = any(name.startswith("taxel.") for name in names)
-    return {name for name in names if not (taxels and name.startswith("wire."))}
 
 
 @pytest.fixture(scope="module")
@@ -98,12 +92,12 @@ def alone(record: Callable[..., tuple[Pipeline, Words, Batch]]) -> dict[str, tup
     return {name: record([name]) for name in NAMES}
 
 
-PAIRS = [pair for pair in combinations(NAMES, 2) if pair != CONTACTS and together(pair) == {*pair}]
+PAIRS = [pair for pair in combinations(NAMES, 2) if pair != CONTACTS]
 
 
 def test_all_that_can_draw_do(alone: dict[str, tuple[Pipeline, Words, Batch]]) -> None:
     silent = {name for name in NAMES if not of(name, alone[name][1])}
-    assert silent == {*CONTACTS, "contact.ramp", "hand.transition", "switch.ghosting", *SILENT_TAXELS}
+    assert silent == {*CONTACTS, "contact.ramp", "hand.transition", "switch.ghosting", *SILENT}
 
 
 @pytest.mark.slow
@@ -118,7 +112,7 @@ def test_adding_any_other_effect_leaves_its_draws_as_they_were(
 
 
 SUBSETS = st.sets(st.sampled_from(OTHERS)).flatmap(
-    lambda others: st.sampled_from(CONTACTS).map(lambda contact: {contact, *together(others)})
+    lambda others: st.sampled_from(CONTACTS).map(lambda contact: {contact, *others})
 )
 
 

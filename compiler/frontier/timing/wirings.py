@@ -77,13 +77,18 @@ def wirings(given: Harness | None, target: str = "host") -> tuple[Wiring, ...]:
     An AVR reads its chips itself: without muxes, with registers, at 50 to 400 kHz, as board.toml has it. What is wired
     otherwise, a board of its own included, is none of its wirings.
     """
-    avr = target in TARGETS and "scan" in TARGETS[target].modes
+    avr = reads_by_itself(target)
     found = [] if given is None or not given.switches or (avr and not _of_an_avr(given)) else [_as_wired(given)]
     for chip in expanders().values():
         if chip.tried and (chip.registers or not avr):
             clocks = (hz for hz in CLOCKS_HZ if hz <= chip.clock_hz and (not avr or hz in _AVR_HZ))
             found += [Wiring(chip.name, hz, muxes=not avr) for hz in clocks]
     return tuple(found if avr else [*found, *(Wiring(BOARD, baud) for baud in BAUDS)])
+
+
+def reads_by_itself(target: str) -> bool:
+    """Return whether thenar's firmware for `target` reads the glove, with no computer besides."""
+    return target in TARGETS and "scan" in TARGETS[target].modes
 
 
 def names_of(count: int) -> list[str]:

@@ -125,12 +125,12 @@ def _varying(samples: Samples) -> Bits:
     return np.asarray(samples.switches.any(axis=0) & ~samples.switches.all(axis=0))
 
 
-def sampled(samples: Samples) -> Samples:
-    """Return MOST_ROWS rows at most, spread evenly over each class's rows, in order: classes keep their shares."""
-    if len(samples.labels) <= MOST_ROWS:
+def sampled(samples: Samples, most: int = MOST_ROWS) -> Samples:
+    """Return so many rows at most, spread evenly over each class's rows, in order: classes keep their shares."""
+    if len(samples.labels) <= most:
         return samples
     by_class = np.argsort(samples.labels, kind="stable")
-    spread = np.arange(MOST_ROWS) * len(by_class) // MOST_ROWS
+    spread = np.arange(most) * len(by_class) // most
     return samples.rows(np.sort(by_class[spread]))
 
 

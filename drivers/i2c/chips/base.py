@@ -11,10 +11,11 @@ from typing import ClassVar
 from ...errors import SettingError
 
 _BITS, _BITS_A_BYTE = 8, 9
-SUPPLY = ("VDD", "VCC", "VCCI", "VCCP")
-GROUND = ("VSS", "GND", "EP")
+SUPPLY = ("VDD", "VCC", "VCCI", "VCCP", "REF", "VREF")
+GROUND = ("VSS", "GND", "EP", "COM", "AGND", "DGND")
 RESET = "RESET"
 TSSOP24 = "Package_SO:TSSOP-24_4.4x7.8mm_P0.65mm"
+SUPPLY_V = 3.3
 _SELECTS = ("A0", "A1", "A2", "ADDR")
 
 
@@ -125,8 +126,9 @@ class Package:
     """A chip as a part to buy and to solder: part number, maker, KiCad's symbol and footprint.
 
     pins  the name of pin n of the data sheet's package at pins[n - 1], "NC" where there is nothing inside. Inputs are
-          called as the driver calls them, and the others SDA, SCL, INT, RESET, A0, A1, A2 (or ADDR), and by a supply's
-          or a ground's name (VDD, VCC, VCCI, VCCP; VSS, GND, EP).
+          called as the driver calls them, and the others SDA, SCL, INT, RESET, A0, A1, A2 (or ADDR), on SPI CLK, DIN,
+          DOUT, CS, and by the name of what is tied to the supply (VDD, VCC, VCCI, VCCP, REF, VREF) or to ground (VSS,
+          GND, EP, COM, AGND, DGND).
     sure  whether part number, pins and footprint are each confirmed by two sources
     note  what is not, or what to heed
     straps    where one pin, ADDR, selects among more than two addresses: what it is tied to, from the lowest on
@@ -223,6 +225,11 @@ class Converter(Chip):
     bits: ClassVar[int]
     volts: ClassVar[float | None] = None
     readings: ClassVar[tuple[Conversion, ...]]
+
+    @property
+    def highest(self) -> int:
+        """The code of the supply, 3.3 V, where a channel is saturated."""
+        return (1 << self.bits) - 1 if self.volts is None else int(SUPPLY_V / self.volts * (1 << self.bits))
 
     def code(self, answer: bytes) -> int:
         """Return the code of an answer: high byte first, the unused bits on top."""

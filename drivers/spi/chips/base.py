@@ -78,6 +78,12 @@ class SpiChip(ABC):
             for channel, (name, command) in enumerate(zip(self.pins, sent, strict=True))
         )
 
-    def code(self, answer: bytes) -> int:
-        """Return the code of an answer, whose last bits it is."""
-        return int.from_bytes(answer, "big") & (1 << self.bits) - 1
+    @property
+    def highest(self) -> int:
+        """The code of the supply, where a channel is saturated."""
+        return (1 << self.bits) - 1
+
+    def code(self, answer: bytes) -> int | None:
+        """Return the code of an answer, whose last bits it is; None where the null bit before it is none."""
+        code = int.from_bytes(answer, "big") & (2 << self.bits) - 1
+        return None if code >> self.bits else code

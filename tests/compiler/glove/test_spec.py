@@ -24,7 +24,8 @@ def test_without_a_harness_one_is_proposed_with_a_cyberglove_for_joints(manifest
     assert with_joints.summary.proposed
     assert without.harness == propose_harness(names)
     assert with_joints.harness.cyberglove == GloveWiring(port="/dev/ttyUSB0")
-    assert with_joints.summary.expected.glove_us is not None
+    read = with_joints.summary.expected.sensors
+    assert with_joints.summary.expected.glove_us == pytest.approx(250.0 * read + (read + 3) * 10e6 / 115_200)
     assert without.summary.expected.glove_us is None
 
 

@@ -1,6 +1,7 @@
 """A glove with taxels: forces frame by frame, counts, and the set that comes of them."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -110,9 +111,41 @@ def test_an_effect_on_taxels_needs_some(name: str, make_scene: Callable[..., Sce
         compile_pipeline(make_scene([name], glove=Glove()))
 
 
-def test_what_happens_on_wires_is_not_simulated_for_taxels(make_scene: Callable[..., Scene]) -> None:
-    with pytest.raises(SceneError, match=r"^effects\.wire\.lost_bytes: .* not for taxels"):
-        compile_pipeline(make_scene(["wire.lost_bytes"], glove=ALL))
+def test_counts_go_over_the_scanners_line_and_come_through_where_nothing_happens(
+    run: Callable[..., Batch],
+) -> None:
+    plain, sent = run(("taxel.noise",)), run(("taxel.noise", "wire.lost_bytes"))
+    assert plain.taxels is not None
+    assert sent.lost is not None
+    whole = np.flatnonzero(~sent.lost[:, 0])
+    assert whole.size
+    np.testing.assert_array_equal(sent.taxels[whole], plain.taxels[whole])
+
+
+def test_counts_that_are_lost_leave_those_of_the_frame_before(make_scene: Any, make_batch: Any) -> None:
+    effects = ["contact.ramp", ("wire.lost_bytes", EFFECTS["wire.lost_bytes"].parameters(rate=0.02))]
+    recording = Recording(rows="all", rate_hz=20.0, hold_ms=500.0)
+    found = []
+    for listed in (effects[:1], effects):
+        batch = make_batch(range(4))
+        compile_pipeline(make_scene(listed, glove=ALL, recording=recording)).run([batch], Ledger())
+        found.append(batch.taxels)
+    plain, damaged = found
+    # Two ANALOG frames of 122 and 38 taxels: each is a frame's own, the newest before it, or nothing yet.
+    for part in (slice(0, 122), slice(122, 160)):
+        for one, other in zip(plain[:, :, part], damaged[:, :, part], strict=True):
+            sources = [
+                next(at for at in range(frame, -2, -1) if at < 0 or (one[at] == other[frame]).all())
+                for frame in range(len(one))
+            ]
+            assert any(source < frame for frame, source in enumerate(sources)) or (one == other).all()
+            assert all((other[frame] == (one[at] if at >= 0 else 0)).all() for frame, at in enumerate(sources))
+    assert not np.array_equal(plain, damaged)
+
+
+def test_a_rate_that_the_line_has_no_time_for_is_refused(make_scene: Callable[..., Scene]) -> None:
+    with pytest.raises(SceneError, match="ask for at most 31"):
+        compile_pipeline(make_scene(["wire.lost_bytes", "frame.jitter"], glove=ALL))
 
 
 def test_a_place_that_the_glove_does_not_have_is_refused() -> None:
