@@ -239,7 +239,8 @@ class IntegerTables:
     def jointless(self) -> NDArray[np.int64]:
         """The bias and what all joints add while they are lost, (K,)."""
         lost = [self.all_choices(unit)[1].sum(axis=0)[-1] for unit in self.units]
-        return np.sum([self.bias.astype(np.int64), *lost], axis=0)
+        found: NDArray[np.int64] = np.sum([self.bias.astype(np.int64), *lost], axis=0)
+        return found
 
     def steps_of(self, joint: int) -> NDArray[np.int64]:
         """Return the codes after which what a joint adds changes, in order: its thresholds, and those in its pair."""
