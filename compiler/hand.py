@@ -91,6 +91,11 @@ class HandShape:
             labels=self.labels * factor,
         )
 
+    @property
+    def by_name(self) -> dict[str, tuple[float, float]]:
+        """Where each switch lies, mm, by its name."""
+        return {name: (x, y) for name, (x, y) in zip(self.names, self.places.tolist(), strict=True)}
+
     def knows(self, names: Sequence[str]) -> bool:
         """Return whether every one of `names` is a switch of this hand."""
         return set(names) <= set(self.names)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Protocol, Self
 
 from .build import Build
 from .calibration import AngleReader
-from .frames import GloveFrame, SwitchFrame
+from .frames import PERIODS, GloveFrame, SwitchFrame
 from .harness.loading import load_harness
 from .harness.wiring import Harness
 from .harness.writing import harness_to_toml
@@ -170,7 +171,7 @@ class Glove:
         """
         if self.stop.is_set():
             raise StopIteration
-        taken = self.feed.take()
+        taken = self._with_record(self.feed.take())
         now = taken.time_us
         moment = self._recognizer.step(now, time_ns() // 1000, taken.switches, taken.glove)
         grasp, measured = moment.grasp, taken.measured
@@ -203,6 +204,19 @@ class Glove:
     def reports(self) -> tuple[SinkReport, ...]:
         """Return how every sink is doing."""
         return self._fanout.reports()
+
+    def _with_record(self, taken: Taken) -> Taken:
+        """Return what was taken, with a record of the joints where they come on demand and the switches cannot decide
+        without: it is asked for, and awaited for as long as records count.
+        """
+        if self.feed is not self.sources:
+            return taken
+        end_us = taken.time_us + PERIODS * (self.sources.glove_period_us or 0)
+        while taken.time_us < end_us and self._recognizer.wants_record(taken.time_us, taken.switches, taken.glove):
+            self.sources.ask()
+            more = self.sources.take(end_us - taken.time_us)
+            taken = replace(more, arrived=(*taken.arrived, *more.arrived))
+        return taken
 
     def _look(self, now: int) -> None:
         self._due_us, self.sources.changed = now + _REPORT_US, False

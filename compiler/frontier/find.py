@@ -374,7 +374,10 @@ def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latenc
             fold.train,
             survey.columns(choice, fold),
             stream,
-            tuple(Pace(design.tables.tabled, design.frame.us, design.decisions) for design in mine),
+            tuple(
+                Pace(design.tables.tabled, design.frame.us, design.decisions, design.slow_us, design.asked)
+                for design in mine
+            ),
             survey.training(choice, fold),
         )
         for choice, mine in grouped.items()

@@ -4,6 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from msgspec.structs import replace
+
 from thenar.drivers.i2c.chips import expanders
 from thenar.runtime.files import read_file
 from thenar.runtime.harness.wiring import SLOWEST_HZ, Harness
@@ -69,7 +71,10 @@ class Picked:
             if given is not None and setting.wiring == AS_WIRED:
                 return given
             joints = () if setting.inputs == "switches" else self.joints
-            return Wiring(setting.wiring, setting.clock_hz).harness_of(kept, joints)
+            made = Wiring(setting.wiring, setting.clock_hz).harness_of(kept, joints)
+            if setting.scan == "demand" and made.cyberglove is not None:
+                return replace(made, cyberglove=replace(made.cyberglove, mode="demand"))
+            return made
 
         return harness_of
 

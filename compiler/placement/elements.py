@@ -18,8 +18,8 @@ from .exact import Counts
 from .gain import NodeCounts, best_position, first_of_most_gain, gain_bits
 from .ports import PortCosts
 
-# Candidates of one taxel: more of them gained nothing on iCub's taxels.
-LEVELS = 3
+# Candidates of one taxel. iCub's, 5 x 4 folds, all of them: 1 level 83.5 %, 3 95.2, 5 96.7, 8 98.1.
+LEVELS = 7
 
 
 class Element(NamedTuple):

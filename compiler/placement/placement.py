@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from itertools import accumulate
+from math import inf
 from typing import Any, Literal
 
 import msgspec
@@ -14,14 +15,17 @@ from ..elementary import LN_2
 from ..limits import check_types
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
+from .constraints import Bound, Limits
 from .cooccurrence import Cooccurrence
 from .elements import Elements, bits_of, columns_of, elements_of, names_of, ports_of
 from .gain import entropy_bits
 from .id3 import grow_id3
 from .inputs import PlacementError
-from .methods.base import METHODS, PAPERS
+from .joints import kept_joints
+from .methods.base import METHODS, PAPERS, Method
 from .optimum import Pairs, best_subset
 from .ports import PortCosts
+from .robust import most_robust
 from .tree import Tree
 
 Progress = Callable[[int, int], None]
@@ -40,17 +44,49 @@ class Chosen:
     tree: Tree | None
 
 
-def choose(samples: Samples, method: str = PAPERS, parameter: float = 0.0, ports: PortCosts | None = None) -> Chosen:
+def choose(
+    samples: Samples,
+    method: str = PAPERS,
+    parameter: float = 0.0,
+    ports: PortCosts | None = None,
+    limits: Bound | None = None,
+    *,
+    robust: bool = False,
+) -> Chosen:
     """Choose switches of `samples` by a method of `METHODS`, whose parameter is S or a number of switches.
 
-    `ports` are the costs for methods that heed them. Raises MemberError for a method that is not there, PlacementError
+    `ports` are the costs for methods that heed them, `limits` are obeyed by all methods; `robust` looks for the
+    placement whose worst lost switch costs least. Raises MemberError for a method that is not there, PlacementError
     where it cannot choose.
     """
+    tree, columns = None, Columns()
     if method == PAPERS:
-        tree = grow_id3(samples.switches, samples.labels, min_samples=int(parameter))
-        return Chosen(tree.inputs, tree.gains, tree)
-    columns = METHODS.named(method).chooser(samples, ports)(parameter)
+        rows = samples if limits is None else limits.without(samples)
+        tree = grow_id3(rows.switches, rows.labels, min_samples=int(parameter))
+        columns = tree.inputs
+    if robust or limits is not None or tree is None:
+        pick = partial(_picked, method=METHODS.named(method), parameter=parameter, ports=ports, limits=limits)
+        columns = most_robust(samples, pick) if robust else pick(samples)
+    if tree is not None and tree.inputs == columns:
+        return Chosen(columns, tree.gains, tree)
     return Chosen(columns, information_alone(samples, columns), None)
+
+
+def _picked(
+    samples: Samples, method: Method, parameter: float, ports: PortCosts | None, limits: Bound | None
+) -> Columns:
+    if limits is None:
+        return method.chooser(samples, ports)(parameter)
+    most = max(int(parameter), 0) if method.by_number else inf
+    if method.nested:
+        return limits.obeyed(method.chooser(limits.without(samples), ports)(samples.n_switches), most)
+    refused: list[int] = []
+    while True:
+        order = method.chooser(limits.without(samples, refused), ports)(parameter)
+        kept = limits.obeyed(order, most)
+        if len(kept) == most or set(order) <= set(kept):
+            return kept
+        refused += set(order) - set(kept)
 
 
 def information_alone(samples: Samples, columns: Columns) -> tuple[float, ...]:
@@ -140,6 +176,7 @@ class Placement:
     """The kept switches of a set, and how they were found.
 
     parameter  S, or how many switches to keep at most; joints: whether the joints had a say
+    kept_joints  the names of the kept joints, where some were to be chosen; n_levels: how many elements are levels
     all_names  the names of all elements there were: switches, and levels of taxels; grasps: the types that occur, which
                the tree's classes index
     tree       of the paper's ID3; exact: how far from the best, if that was asked for; study: of many subjects
@@ -156,6 +193,8 @@ class Placement:
     tree: Tree | None = None
     exact: Exactly | None = None
     study: Standard | None = None
+    kept_joints: tuple[str, ...] = ()
+    n_levels: int = 0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -201,6 +240,8 @@ class Placement:
         }
         if self.study is not None:
             found["study"] = self.study
+        if self.kept_joints:
+            found["kept_joints"] = self.kept_joints
         if self.tree is not None:
             found |= {
                 "kept_share": len(self.switches) / self.n_switches,
@@ -225,6 +266,9 @@ def place(
     exact: bool = False,
     on_round: Progress | None = None,
     levels: int | None = None,
+    keep_joints: int | None = None,
+    limits: Limits | None = None,
+    robust: bool = False,
 ) -> Placement:
     """Choose elements of all rows of a set: switches, and levels of taxels.
 
@@ -247,6 +291,12 @@ def place(
         Called with (done, all) after every round of that search.
     levels : int, optional
         How many levels of a taxel there are to choose from, at most.
+    keep_joints : int, optional
+        How many joints to keep, chosen beside the kept switches; None: joints are not chosen.
+    limits : Limits, optional
+        What the placement must obey.
+    robust : bool
+        Choose the placement whose worst lost switch costs least.
 
     Raises
     ------
@@ -255,11 +305,15 @@ def place(
     PlacementError
         If the set has no switches, no rows, or more grasp types than a build can hold.
     """
-    samples = samples_of(grasp_set, joints=joints)
-    elements = elements_of(samples, levels)
-    samples = bits_of(samples, elements)
-    chosen = choose(samples, method, parameter, None if ports is None else ports_of(ports, elements))
-    kept = kept_of(grasp_set, elements, chosen.columns)
+    read = samples_of(grasp_set, joints=joints or keep_joints is not None)
+    elements = elements_of(read, levels)
+    read = bits_of(read, elements)
+    samples = read if joints else read.with_joints(())
+    own = None if ports is None else ports_of(ports, elements)
+    bound = None if limits is None else limits.on(elements, own)
+    chosen = choose(samples, method, parameter, own, bound, robust=robust)
+    name = partial(kept_of, grasp_set, elements)
+    kept = name(chosen.columns)
     if chosen.tree is not None:
         entropy = entropy_bits(list(chosen.tree.nodes[0].counts))
         together = accumulate(chosen.gains)
@@ -275,9 +329,11 @@ def place(
         rows=len(grasp_set),
         fingerprint=grasp_set.fingerprint(),
         all_names=names_of(grasp_set, elements),
+        n_levels=len(elements) - len(grasp_set.switch_names),
         grasps=samples.grasps,
         tree=chosen.tree,
-        exact=_exactly(samples, chosen.columns, partial(kept_of, grasp_set, elements), on_round) if exact else None,
+        kept_joints=() if keep_joints is None else _joints_kept(grasp_set, read.keeping(chosen.columns), keep_joints),
+        exact=_exactly(samples, chosen.columns, bound, name, on_round) if exact else None,
     )
 
 
@@ -315,9 +371,19 @@ def kept_of(grasp_set: GraspSet, elements: Elements, columns: Columns) -> tuple[
     )
 
 
+def _joints_kept(grasp_set: GraspSet, samples: Samples, most: int) -> tuple[str, ...]:
+    if not grasp_set.joints:
+        raise PlacementError("the set has no joints to keep some of: leave --keep-joints out")
+    return tuple(grasp_set.joint_names[joint] for joint in kept_joints(samples, most))
+
+
 def _exactly(
-    samples: Samples, columns: Columns, kept: Callable[[Columns], tuple[Kept, ...]], on_round: Progress | None
+    samples: Samples,
+    columns: Columns,
+    limits: Bound | None,
+    kept: Callable[[Columns], tuple[Kept, ...]],
+    on_round: Progress | None,
 ) -> Exactly:
-    best = best_subset(samples, len(columns), starts=(columns,), on_round=on_round)
+    best = best_subset(samples, len(columns), starts=(columns,), on_round=on_round, limits=limits)
     alike = Pairs(samples).alike(columns)
     return Exactly(best.pairs, alike, best.alike, best.least, kept(best.columns), best.proved)

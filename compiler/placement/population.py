@@ -207,7 +207,8 @@ def place_for_crowd(
         switches=kept_of(grasp_set, study.elements, tuple(range(len(study.elements)))),
         rows=len(grasp_set),
         fingerprint=grasp_set.fingerprint(),
-        all_names=names_of(grasp_set, elements_of(samples)),
+        all_names=names_of(grasp_set, every := elements_of(samples)),
+        n_levels=len(every) - len(grasp_set.switch_names),
         grasps=samples.grasps,
         study=study,
     )

@@ -289,15 +289,25 @@ def options_set(manifest: Manifest) -> Pairs:
     fields = [field.name for field in msgspec.structs.fields(options) if field.name not in foreign]
     values = {name: getattr(options, name) for name in fields} | options.settings
     called = {name: "method" if name == "placement" else name.replace("_", "-") for name in values}
-    return tuple((f"--{called[name]}", _plain(value)) for name, value in values.items() if value is not None)
+    return tuple(
+        (f"--{called[name]}", _plain(value))
+        for name, value in values.items()
+        if value is not None and value is not False
+    )
 
 
 def commands(content: ReportContent) -> tuple[str, str]:
     """Return the commands that make the build again, and verify it."""
-    flags = "".join(f" {name} {shlex.quote(value)}" for name, value in options_set(content.manifest))
+    flags = "".join(
+        f" {name} {shlex.quote(value)}" if value else f" {name}" for name, value in options_set(content.manifest)
+    )
     glove = "" if content.scan is None else " --glove glove.toml"
     return f"thenar compile SET.grasps -o build/{flags}{glove}", "thenar verify build/ SET.grasps"
 
 
 def _plain(value: object) -> str:
+    if value is True:
+        return ""
+    if isinstance(value, tuple):
+        return ",".join(value)
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)

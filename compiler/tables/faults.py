@@ -161,11 +161,10 @@ def groups_of(scan: ScanMap | None, sources: Sequence[str], n_joints: int) -> Ma
         chip = f"chip {port.chip + 1} of bus {port.bus + 1}"
         found[f"port {port.reading} of {chip}"] = port.elements
         found[chip] = found.get(chip, ()) + port.elements
-    for boards in () if scan is None else (scan.scanners, scan.taxels):
-        for number, pairs in enumerate(boards, 1):
-            if own := tuple(switch for *_, switch in pairs):
-                board = f"scanner board {number}"
-                found[board] = found.get(board, ()) + own
+    boards, taxels = ((), ()) if scan is None else (scan.scanners, scan.taxels)
+    for number, (keys, converted) in enumerate(zip(boards, taxels or ((),) * len(boards), strict=True)):
+        if own := tuple(switch for *_, switch in (*keys, *converted)):
+            found[f"scanner board {number + 1}"] = own
     if n_joints:
         found["the joints' device"] = tuple(range(len(sources), len(sources) + n_joints))
     return found

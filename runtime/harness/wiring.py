@@ -36,6 +36,8 @@ class GloveWiring(_Table, frozen=True):
     """The CyberGlove: its port (a device, socket:// or rfc2217://), and how it is asked.
 
     baud         "auto" tries the usual ones
+    mode         "stream": it sends by its own clock; "poll": it is asked for every record; "demand": a run asks for one
+                 where the switches cannot decide without
     rate_hz      None: as fast as it can
     filter       whether the box's digital filter is on; None: as the box has it
     record_us    what one record of all sensors takes, as measured (`thenar doctor --write`); None: by the formula
@@ -47,7 +49,7 @@ class GloveWiring(_Table, frozen=True):
 
     port: Text
     baud: Baud | Literal["auto"] = 115_200
-    mode: Literal["stream", "poll"] = "stream"
+    mode: Literal["stream", "poll", "demand"] = "stream"
     rate_hz: Annotated[float, Meta(gt=0.0, le=1000.0)] | None = None
     filter: bool | None = None
     record_us: Annotated[float, Meta(gt=0.0, le=1e6)] | None = None

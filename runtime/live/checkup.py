@@ -69,8 +69,7 @@ def _glove(wiring: GloveWiring, read: Sequence[str]) -> tuple[Finding, ...]:
     """Return what the glove is and how fast as it is wired, and what a record takes at best: of all its sensors, and of
     those that are `read`, or half of them.
     """
-    device = GloveDevice(wiring)
-    predicted = glove_us(wiring, device.sensors)
+    device, predicted = GloveDevice(wiring), glove_us(wiring, wiring.all_sensors)
     try:
         device.open()
         measured, info = _gap(lambda: device.read(_LISTEN_S)), device.info

@@ -282,7 +282,8 @@ class Sources:
     switch_names  the switches wanted, in the order of the frames' bits: a build's kept switches
     scan          which ports of the I2C expanders to read, in which order
     early         what ends scans early where one device reads all switches, given the joints' codes; None: nothing does
-    sensors       the joints' sensors that somebody has a use for; None: all
+    sensors       the joints' sensors that somebody has a use for; None: all, and all the time
+    on_demand     whether a record of the joints comes only when asked for (`ask`)
 
     changed       whether a device came, went or failed otherwise since somebody set this to False
 
@@ -297,6 +298,8 @@ class Sources:
         scan: ScanMap,
         early: tuple[ExitOf, Joints] | None = None,
         sensors: Sequence[str] | None = None,
+        *,
+        on_demand: bool = False,
     ) -> None:
         made = [(kind, source) for kind in SOURCES.values() for source in kind.sources(harness, switch_names, scan)]
         self._devices = tuple(source for _, source in made)
@@ -305,7 +308,7 @@ class Sources:
         self._arrivals = Arrivals(len(switch_names), [reader.owned for reader in self._readers])
         if sensors is not None:
             for glove in self._gloves:
-                glove.read_only(sensors)
+                glove.read_only(sensors, on_demand=on_demand)
         alone = [reader for reader in self._readers if reader.owned]
         if early is not None and len(alone) == 1:
             alone[0].end_early(*early, self._arrivals.glove)
@@ -315,6 +318,11 @@ class Sources:
             Keeper[SwitchFrame | GloveFrame](source.name, source, self._taking(source), self._change)
             for source in self._devices
         ]
+
+    def ask(self) -> None:
+        """Ask for a record of the joints now, where they come on demand."""
+        for glove in self._gloves:
+            glove.ask()
 
     def _change(self) -> None:
         self.changed = True

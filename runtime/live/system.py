@@ -80,7 +80,14 @@ class System:
             switch_period_us=slowest_us(self.harness, self.scan, "switches"),
             glove_period_us=slowest_us(self.harness, self.scan, "joints"),
             policy=self.policy,
+            on_demand=self.on_demand,
         )
+
+    @property
+    def on_demand(self) -> bool:
+        """Whether records are asked for only where the switches cannot decide: a sequential test needs them all."""
+        glove, reads = self.harness.cyberglove, self.build.tables.n_switches > 0 < self.build.tables.n_joints
+        return reads and glove is not None and glove.mode == "demand" and self.policy.error_rate is None
 
     @property
     def read_sensors(self) -> tuple[str, ...]:
@@ -93,7 +100,7 @@ class System:
 
     def sources(self, *, full_scan: bool = False, all_sensors: bool = False) -> Sources:
         """Return the devices; with `full_scan`, and for a sequential test, every scan goes to its end; with
-        `all_sensors` the CyberGlove sends those as well that the build has no use for.
+        `all_sensors` the CyberGlove sends those as well that the build has no use for, whether or not they decide.
 
         Raises SettingError if the calibration of the taxels cannot serve the build.
         """
@@ -101,14 +108,15 @@ class System:
         sensors = None if all_sensors else self.read_sensors
         taxels = calibration_of(self.harness.taxel_settings)
         scan = in_counts(self.scan, self.build.manifest.switches, taxels)
-        return Sources(self.harness, self.switch_names, scan, early, sensors)
+        return Sources(self.harness, self.switch_names, scan, early, sensors, on_demand=self.on_demand)
 
     def early_exit(self, ports: Sequence[Mask]) -> EarlyExit:
         """Return what ends a scan of these ports early without changing any decision.
 
         Hand `start` the codes of the glove's record that the recogniser will be given with the scan.
         """
-        return EarlyExit(self.build.scorer, ports, lead=self.policy.lead_steps(self.build.tables.scale))
+        lead = self.policy.lead_steps(self.build.tables.scale)
+        return EarlyExit(self.build.scorer, ports, lead=lead, on_demand=self.on_demand)
 
     def joints(self) -> Joints:
         """Return what makes the build's joint codes of the CyberGlove's records."""

@@ -186,15 +186,17 @@ def glove_us(glove: GloveWiring, sensors: int, *, wire_only: bool = False) -> fl
 
     It is the vendor's formula (`shortest_us`), in the proportion in which `record_us` was measured to it for all
     sensors; and no less than the period at which records are asked for. `wire_only` leaves out what the box takes to
-    digitise. The rate is 115200 baud where it is to be found.
+    digitise. The rate is 115200 baud where it is to be found. A record that is asked for takes the byte that asks, too.
     """
     baud = _BAUD if glove.baud == "auto" else glove.baud
+    asking_us = 0.0 if glove.mode == "stream" else sending_us(len(glove_protocol.POLL), baud)
     if wire_only:
-        return sending_us(sensors + glove_protocol.OVERHEAD + 1, baud)
+        return asking_us + sending_us(sensors + glove_protocol.OVERHEAD + 1, baud)
     filtered = bool(glove.filter)
     us = shortest_us(sensors, baud, status=True, filtered=filtered)
     if glove.record_us is not None:
         us *= glove.record_us / shortest_us(glove.all_sensors, baud, status=True, filtered=filtered)
+    us += asking_us
     return max(us, 1e6 / glove.rate_hz if glove.rate_hz else 0.0)
 
 

@@ -156,7 +156,8 @@ class I2cDevice(Source):
         glove: GloveFrame | None = None
         if self._early is not None:
             early, joints, newest = self._early
-            glove = newest.frame
+            # On demand, no scan ends by a record: what it leaves unread matters for none.
+            glove = None if early.on_demand else newest.frame
             early.start(joints.codes(now_us(), glove))
         for group, answers in zip(self._groups, self._scan, strict=False):
             for number, answer in zip(group, answers, strict=True):

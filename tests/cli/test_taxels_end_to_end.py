@@ -1,11 +1,11 @@
 """Pads with levels from a set to recognition: compiled for a board, emulated, recognised, recorded, imported."""
 
 import json
-import subprocess
 import sys
 from bisect import bisect
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from thenar.runtime.recording.reader import Reader
 # In real time, over a pty.
 pytestmark = pytest.mark.slow
 
-Thenar = Callable[..., "subprocess.CompletedProcess[str]"]
+Thenar = Callable[..., Any]
 ROWS, CODES = 60, {"cup": (800, 100, 400), "pen": (100, 820, 380), "rod": (420, 430, 60)}
 GLOVE = '[[scanner]]\nport = "/dev/ttyACM0"\nswitches = ["s0"]\ntaxels = ["p0", "", "p1", "p2"]\n'
 

@@ -16,7 +16,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from thenar.drivers.cyberglove_protocol import SENSORS, sensors_with
+from thenar.drivers.cyberglove_protocol import POLL, SENSORS, sending_us, sensors_with
 from thenar.drivers.i2c.chips import Reading
 from thenar.runtime.harness.wiring import GloveWiring, Harness, ScannerWiring
 from thenar.runtime.scanning.decided import Decided
@@ -32,6 +32,8 @@ from .wirings import Wiring
 # So many evenly spaced frames decide on the order of ports; all of them, on how often a scan then ends early.
 _ORDERING = 200
 NO_TIME = Time(0.0, "wire")
+# The byte that asks a CyberGlove for a record.
+ASKING_US = sending_us(len(POLL), 115_200)
 # One transfer of a Raspberry Pi beside its wire. Doubtful: a kernel trace of a Pi 3 has 20 us from the call to the
 # adapter and 6 us back; others measured 300 us (Pi Zero) with an older library.
 PI_CALL_US = 30.0
@@ -152,6 +154,8 @@ class ScanTimes:
     how       "wire", or "model" where a firmware's own work is in it
     early_ports  how many ports of chips are read then, the mean over the same frames: after each of them the scores are
               looked at
+    alone_us, alone_ports  the same where the joints are read after the switches, if these do not decide
+    asked     in which share of the frames they do not
     """
 
     full_us: float
@@ -160,6 +164,9 @@ class ScanTimes:
     chips: int
     how: How
     early_ports: float
+    alone_us: float = 0.0
+    alone_ports: float = 0.0
+    asked: float = 1.0
 
 
 def scan_times(
@@ -184,9 +191,15 @@ def scan_times(
     scan = plan_scan(names, tables, harness, bits[rows], codes[rows])
     boards = [(board, keys) for board, keys in zip(harness.scanners, scan.scanners, strict=True) if keys]
     board_us = max((_board_us(board) for board, _ in boards), default=0.0)
-    full_us, early_us, early_ports = (
-        _bus_us(scan, harness, tables, bits, codes, beside) if scan.ports else (0.0, 0.0, 0.0)
-    )
+    ports = [port.elements for port in scan.ports]
+    known = Decided(tables, ports, bits, codes)
+    full_us, early_us, early_ports = _bus_us(scan, harness, known, beside) if ports else (0.0, 0.0, 0.0)
+    alone_us, alone_ports, asked = early_us, early_ports, 1.0
+    if tables.n_joints and len(bits):
+        unknown = Decided(tables, ports, bits, codes, on_demand=True)
+        asked = unknown.undecided((1 << len(ports)) - 1) / len(bits)
+        if ports:
+            _, alone_us, alone_ports = _bus_us(scan, harness, unknown, beside)
     return ScanTimes(
         full_us=max(full_us, board_us),
         early_us=max(early_us, board_us),
@@ -194,6 +207,9 @@ def scan_times(
         chips=len({(port.bus, port.chip) for port in scan.ports}) + len(boards),
         how="model" if boards or beside.scan_us else "wire",
         early_ports=early_ports,
+        alone_us=max(alone_us, board_us),
+        alone_ports=alone_ports,
+        asked=asked,
     )
 
 
@@ -202,17 +218,9 @@ def _board_us(board: ScannerWiring) -> float:
     return own.scan_us + own.key_us * len(board.switches) + scanner_us(board)
 
 
-def _bus_us(
-    scan: ScanMap,
-    harness: Harness,
-    tables: IntegerTables,
-    bits: NDArray[np.bool_],
-    codes: NDArray[np.uint16],
-    beside: Beside,
-) -> tuple[float, float, float]:
+def _bus_us(scan: ScanMap, harness: Harness, frames: Decided, beside: Beside) -> tuple[float, float, float]:
     """Return the time of a whole scan of the chips, and the mean time and number of ports of one that ends early."""
     costs = Costs(scan.ports, harness)
-    frames = Decided(tables, [port.elements for port in scan.ports], bits, codes)
     always = beside.scan_us + beside.key_us * len(scan.switches)
     whole, weighted, shares, read = [always], [always], list[float](), 0
     for number, port in enumerate(scan.ports):
