@@ -36,6 +36,7 @@ from .options import (
     keep_option,
     layout_option,
     levels_option,
+    limit_options,
     method_option,
     prune_option,
     trainer_option,
@@ -59,7 +60,8 @@ PRESETS: dict[str, dict[str, str]] = {
 }
 _GROUPS = {
     "Basics": ("output", "preset", "method", "keep", "levels", "keep_joints", "prune", "inputs"),
-    "Training": ("trainer",),
+    "Limits": ("keep_these", "never", "apart_mm", "at_most", "budget_us"),
+    "Training": ("trainer", "robust"),
     "Integer tables": ("table_bits", "width"),
     "The rates in build.json": ("folds", "seed", "by", "jobs"),
     "A point of a frontier": ("from_frontier", "point"),
@@ -113,6 +115,7 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
 @levels_option
 @keep_joints_option
 @prune_option
+@limit_options
 @click.option(
     "--inputs",
     type=click.Choice(["both", "switches", "joints"]),
@@ -188,6 +191,8 @@ def command(
         thenar compile set.grasps -o build/
         thenar compile set.grasps -o build/ --preset smallest
         thenar compile set.grasps -o build/ --method elimination --keep 16
+        thenar compile set.grasps -o build/ --method elimination --keep 39 --robust
+        thenar compile set.grasps -o build/ --method elimination --keep 16 --never palm_heel_6 --apart-mm 8
         thenar compile set.grasps -o build/ --glove glove.toml
         thenar compile set.grasps -o build/ --from frontier/frontier.json --point 7
     """
@@ -201,16 +206,17 @@ def command(
     _check_proposal(propose, chip, glove)
     _check_point(context, from_frontier, point)
     for name, value in (("--hand-length", hand_length), ("--layout", layout)):
-        if value is not None and not report:
+        if value is not None and not report and not (name == "--layout" and asked["apart_mm"]):
             raise click.UsageError(f"{name} is of the hand in spec/, which --no-report leaves out: give one of them.")
     keep_apart(recordings, layout, glove, propose, from_frontier)
     options = asked_settings(context, asked) | _placed(context, asked)
     given = None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
-    hand = fitted_hand(layout, grasp_set.element_names, None) if report else None
+    hand = fitted_hand(layout, grasp_set.element_names, None) if report or asked["apart_mm"] else None
     if hand_length is not None:
         fitted_hand(layout, grasp_set.element_names, hand_length)
     chosen = None if from_frontier is None else picked(from_frontier, point, grasp_set)
+    options["at_most_taxels"] = options.pop("at_most")
     documents = Documents(hand, hand_length) if report else None
     if chosen is not None:
         options |= chosen.options
@@ -221,6 +227,7 @@ def command(
             output,
             harness=given if chosen is None else chosen.wired(given),
             ports=ports_of_whole_glove(given, grasp_set.element_names, len(grasp_set.taxel_columns)),
+            hand=hand,
             documents=documents,
             jobs=jobs,
             progress=told,

@@ -87,6 +87,12 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
         How many levels of a taxel there are to choose from, at most; None: as many as are usual.
     keep_joints : int or None
         How many joints are kept, at most, chosen after the switches; None: all.
+    robust : bool
+        Choose and train for the worst single lost input.
+    keep_these, never : tuple of str
+        Switches and taxels that are kept in any case, and that are not.
+    apart_mm, at_most_taxels, budget_us : float, int, float; or None
+        The least distance of what is kept, the most taxels, and the most that a scan may take.
     """
 
     prune: Count = _written(0)
@@ -106,6 +112,12 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     by: By | None = None
     levels: Annotated[int, Meta(ge=1, le=65535)] | None = None
     keep_joints: Annotated[int, Meta(ge=1, le=2**53)] | None = None
+    robust: bool = False
+    keep_these: tuple[Name, ...] = ()
+    never: tuple[Name, ...] = ()
+    apart_mm: Annotated[float, Meta(gt=0.0, le=1e6)] | None = None
+    at_most_taxels: Count | None = None
+    budget_us: Annotated[float, Meta(ge=0.0, le=1e12)] | None = None
 
 
 class Compared(Struct, frozen=True, forbid_unknown_fields=True):
@@ -415,6 +427,7 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
     yield from _wrong_names("taxels", (taxel.name for taxel in taxels))
     options = manifest.options
     texts = [manifest.thenar, source.taxonomy, options.placement, options.trainer, *options.settings]
+    texts += [*options.keep_these, *options.never]
     fit = manifest.fit
     texts += [fit.trainer, *(value for value in options.settings.values() if isinstance(value, str))]
     for settings in (fit.settings, *(each.settings for each in fit.compared)):

@@ -34,6 +34,8 @@ from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES
 from ..glove.files import NAMES, users_files
+from ..hand import HandShape
+from ..placement.constraints import Limits
 from ..placement.elements import Element, names_of
 from ..placement.methods.base import METHODS
 from ..placement.ports import PortCosts, ports_of_whole_glove
@@ -118,6 +120,7 @@ def compile_build(
     *,
     harness: Wired | None = None,
     ports: PortCosts | None = None,
+    hand: HandShape | None = None,
     documents: Documents | None = None,
     jobs: int = -1,
     progress: Progress | None = None,
@@ -139,6 +142,8 @@ def compile_build(
         A wiring, or what makes one for the names of the kept switches: the build says how to read its switches there.
     ports : PortCosts, optional
         What reading each switch costs, for methods that ask; None: on a glove of as few MCP23017 as will do.
+    hand : HandShape, optional
+        Where the switches lie, for `apart_mm`; None: as the documents' hand has it.
     documents : Documents, optional
         A report and the spec of the glove, to go into the folder.
     jobs : int
@@ -179,11 +184,13 @@ def compile_build(
     cuts = cuts_of(grasp_set, asked)
     steps = _Steps(progress, sum(len(cut.folds) for cut in cuts))
     ports = ports or ports_of_whole_glove(None, grasp_set.element_names, len(grasp_set.taxel_columns))
+    hand = hand or (None if documents is None else documents.hand)
     groups = groups_for(grasp_set, asked)
-    trained = train(samples, asked, steps.trained, ports, groups, jobs)
+    limits = Limits.of(asked, grasp_set, {} if hand is None else hand.by_name)
+    trained = train(samples, asked, steps.trained, ports, groups, jobs, limits)
     made = Making(grasp_set, samples, asked, trained, harness)
     tested = cross_validated(
-        samples, cuts, asked, partial(answers_of, samples, asked, ports, groups), jobs, steps.tested
+        samples, cuts, asked, partial(answers_of, samples, asked, ports, groups, limits), jobs, steps.tested
     )
     return made.publish(target, tested, documents, jobs, progress)
 

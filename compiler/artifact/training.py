@@ -15,6 +15,7 @@ from ..evaluation.folds import Fold, leave_groups_out, leave_one_out, trial_fold
 from ..evaluation.populations import OF, groups_of
 from ..evaluation.rates import rated
 from ..limits import check_inputs, check_memory, check_types
+from ..placement.constraints import Limits
 from ..placement.elements import Elements, bits_of, elements_of, ports_of
 from ..placement.joints import kept_joints
 from ..placement.methods.base import METHODS, PAPERS
@@ -111,19 +112,23 @@ def train(
     ports: PortCosts | None = None,
     groups: Groups = None,
     jobs: int = 1,
+    limits: Limits | None = None,
 ) -> Trained:
     """Choose elements and fit, and train on them and the joints. Raises CompileError if no input tells grasps apart.
 
     ports   what reading switches and taxels costs, for methods that ask
     groups  what of each row (n,) is left out where the fit is to recognise new subjects, objects or sessions
     jobs    worker processes that compare fits
+    limits  what the placement must obey
     """
     elements = elements_of(samples, options.levels)
     samples = bits_of(samples, elements)
     # Without switches the tree is a leaf.
     method = options.placement if samples.n_switches else PAPERS
     parameter = options.keep or 0 if METHODS.named(method).by_number else options.prune
-    chosen = choose(samples, method, float(parameter), None if ports is None else ports_of(ports, elements))
+    own = None if ports is None else ports_of(ports, elements)
+    bound = None if limits is None else limits.on(elements, own)
+    chosen = choose(samples, method, float(parameter), own, bound, robust=options.robust)
     columns = chosen.columns
     if not columns and not samples.codes.shape[1]:
         raise CompileError("no switch is worth keeping: lower --prune, or record switches that differ between grasps")
@@ -136,7 +141,7 @@ def train(
         raise CompileError("no input differs between rows: there is nothing to tell grasp types apart by")
     candidates, of = Training.candidates(options), OF[options.by or "subject"]
     fitting = choose_training(kept, candidates, seed=options.seed, groups=groups, of=of, jobs=jobs, report=report)
-    model = Training.chosen(fitting).train(kept, report if len(candidates) == 1 else None)
+    model = Training.chosen(fitting, masked=options.robust).train(kept, report if len(candidates) == 1 else None)
     if fault := model_fault(model, kept.n_switches, kept.codes.shape[1], kept.n_classes):
         raise CompileError(f"trainer {fitting.trainer!r} made a model that {fault}: it is at fault")
     return Trained(elements, columns, chosen.gains, chosen.tree, model, joints, fitting)
@@ -203,14 +208,17 @@ class Tested:
     confusion: NDArray[np.intp]
 
 
-def answers_of(samples: Samples, options: Options, ports: PortCosts | None, groups: Groups, fold: Fold) -> Answers:
+def answers_of(
+    samples: Samples, options: Options, ports: PortCosts | None, groups: Groups, limits: Limits | None, fold: Fold
+) -> Answers:
     """Choose and train on the fold's training rows alone; return the classes that the integers give its test rows.
 
     Raises CompileError, which names the fold, as `train` does.
     """
     learning = samples.rows(fold.train)
     try:
-        trained = train(learning, options, ports=ports, groups=None if groups is None else groups[fold.train])
+        own = None if groups is None else groups[fold.train]
+        trained = train(learning, options, ports=ports, groups=own, limits=limits)
     except CompileError as wrong:
         raise CompileError(f"in fold {fold.name}: {wrong}, or do without folds (0)") from None
     tables = integers_of(trained, learning, options)

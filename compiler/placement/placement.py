@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from itertools import accumulate
+from math import inf
 from typing import Any, Literal
 
 import msgspec
@@ -14,15 +15,17 @@ from ..elementary import LN_2
 from ..limits import check_types
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
+from .constraints import Bound, Limits
 from .cooccurrence import Cooccurrence
 from .elements import Elements, bits_of, columns_of, elements_of, names_of, ports_of
 from .gain import entropy_bits
 from .id3 import grow_id3
 from .inputs import PlacementError
 from .joints import kept_joints
-from .methods.base import METHODS, PAPERS
+from .methods.base import METHODS, PAPERS, Method
 from .optimum import Pairs, best_subset
 from .ports import PortCosts
+from .robust import most_robust
 from .tree import Tree
 
 Progress = Callable[[int, int], None]
@@ -41,17 +44,49 @@ class Chosen:
     tree: Tree | None
 
 
-def choose(samples: Samples, method: str = PAPERS, parameter: float = 0.0, ports: PortCosts | None = None) -> Chosen:
+def choose(
+    samples: Samples,
+    method: str = PAPERS,
+    parameter: float = 0.0,
+    ports: PortCosts | None = None,
+    limits: Bound | None = None,
+    *,
+    robust: bool = False,
+) -> Chosen:
     """Choose switches of `samples` by a method of `METHODS`, whose parameter is S or a number of switches.
 
-    `ports` are the costs for methods that heed them. Raises MemberError for a method that is not there, PlacementError
+    `ports` are the costs for methods that heed them, `limits` are obeyed by all methods; `robust` looks for the
+    placement whose worst lost switch costs least. Raises MemberError for a method that is not there, PlacementError
     where it cannot choose.
     """
+    tree, columns = None, Columns()
     if method == PAPERS:
-        tree = grow_id3(samples.switches, samples.labels, min_samples=int(parameter))
-        return Chosen(tree.inputs, tree.gains, tree)
-    columns = METHODS.named(method).chooser(samples, ports)(parameter)
+        rows = samples if limits is None else limits.without(samples)
+        tree = grow_id3(rows.switches, rows.labels, min_samples=int(parameter))
+        columns = tree.inputs
+    if robust or limits is not None or tree is None:
+        pick = partial(_picked, method=METHODS.named(method), parameter=parameter, ports=ports, limits=limits)
+        columns = most_robust(samples, pick) if robust else pick(samples)
+    if tree is not None and tree.inputs == columns:
+        return Chosen(columns, tree.gains, tree)
     return Chosen(columns, information_alone(samples, columns), None)
+
+
+def _picked(
+    samples: Samples, method: Method, parameter: float, ports: PortCosts | None, limits: Bound | None
+) -> Columns:
+    if limits is None:
+        return method.chooser(samples, ports)(parameter)
+    most = max(int(parameter), 0) if method.by_number else inf
+    if method.nested:
+        return limits.obeyed(method.chooser(limits.without(samples), ports)(samples.n_switches), most)
+    refused: list[int] = []
+    while True:
+        order = method.chooser(limits.without(samples, refused), ports)(parameter)
+        kept = limits.obeyed(order, most)
+        if len(kept) == most or set(order) <= set(kept):
+            return kept
+        refused += set(order) - set(kept)
 
 
 def information_alone(samples: Samples, columns: Columns) -> tuple[float, ...]:
@@ -232,6 +267,8 @@ def place(
     on_round: Progress | None = None,
     levels: int | None = None,
     keep_joints: int | None = None,
+    limits: Limits | None = None,
+    robust: bool = False,
 ) -> Placement:
     """Choose elements of all rows of a set: switches, and levels of taxels.
 
@@ -256,6 +293,10 @@ def place(
         How many levels of a taxel there are to choose from, at most.
     keep_joints : int, optional
         How many joints to keep, chosen beside the kept switches; None: joints are not chosen.
+    limits : Limits, optional
+        What the placement must obey.
+    robust : bool
+        Choose the placement whose worst lost switch costs least.
 
     Raises
     ------
@@ -268,8 +309,11 @@ def place(
     elements = elements_of(read, levels)
     read = bits_of(read, elements)
     samples = read if joints else read.with_joints(())
-    chosen = choose(samples, method, parameter, None if ports is None else ports_of(ports, elements))
-    kept = kept_of(grasp_set, elements, chosen.columns)
+    own = None if ports is None else ports_of(ports, elements)
+    bound = None if limits is None else limits.on(elements, own)
+    chosen = choose(samples, method, parameter, own, bound, robust=robust)
+    name = partial(kept_of, grasp_set, elements)
+    kept = name(chosen.columns)
     if chosen.tree is not None:
         entropy = entropy_bits(list(chosen.tree.nodes[0].counts))
         together = accumulate(chosen.gains)
@@ -289,7 +333,7 @@ def place(
         grasps=samples.grasps,
         tree=chosen.tree,
         kept_joints=() if keep_joints is None else _joints_kept(grasp_set, read.keeping(chosen.columns), keep_joints),
-        exact=_exactly(samples, chosen.columns, partial(kept_of, grasp_set, elements), on_round) if exact else None,
+        exact=_exactly(samples, chosen.columns, bound, name, on_round) if exact else None,
     )
 
 
@@ -334,8 +378,12 @@ def _joints_kept(grasp_set: GraspSet, samples: Samples, most: int) -> tuple[str,
 
 
 def _exactly(
-    samples: Samples, columns: Columns, kept: Callable[[Columns], tuple[Kept, ...]], on_round: Progress | None
+    samples: Samples,
+    columns: Columns,
+    limits: Bound | None,
+    kept: Callable[[Columns], tuple[Kept, ...]],
+    on_round: Progress | None,
 ) -> Exactly:
-    best = best_subset(samples, len(columns), starts=(columns,), on_round=on_round)
+    best = best_subset(samples, len(columns), starts=(columns,), on_round=on_round, limits=limits)
     alike = Pairs(samples).alike(columns)
     return Exactly(best.pairs, alike, best.alike, best.least, kept(best.columns), best.proved)

@@ -83,11 +83,10 @@ def kept_table(content: ReportContent) -> PlainTable:
     """
     switches, tree, hand = content.manifest.switches, content.tree, content.hand
     entropy = 0.0 if tree is None else entropy_bits(list(tree.nodes[0].counts))
-    parts = {} if hand is None else dict(zip(hand.names, hand.parts.tolist(), strict=True))
     taxels = any(switch.threshold is not None for switch in switches)
     rows: list[tuple[str, ...]] = []
     for order, (switch, gain) in enumerate(zip(switches, accumulate(each.gain for each in switches), strict=True), 1):
-        part = "" if hand is None else hand.part_names[parts[switch.name]]
+        part = "" if hand is None else hand.part_names[hand.parts[hand.numbers_of([switch.name])[0]]]
         together = () if tree is None else (percent(gain / entropy, NBSP) if entropy else "",)
         rows.append((str(order), switch.name, part, str(switch.column), f"{switch.gain:.3f}", *together))
         if taxels:
@@ -289,15 +288,25 @@ def options_set(manifest: Manifest) -> Pairs:
     fields = [field.name for field in msgspec.structs.fields(options) if field.name not in foreign]
     values = {name: getattr(options, name) for name in fields} | options.settings
     called = {name: "method" if name == "placement" else name.replace("_", "-") for name in values}
-    return tuple((f"--{called[name]}", _plain(value)) for name, value in values.items() if value is not None)
+    return tuple(
+        (f"--{called[name]}", _plain(value))
+        for name, value in values.items()
+        if value is not None and value is not False
+    )
 
 
 def commands(content: ReportContent) -> tuple[str, str]:
     """Return the commands that make the build again, and verify it."""
-    flags = "".join(f" {name} {shlex.quote(value)}" for name, value in options_set(content.manifest))
+    flags = "".join(
+        f" {name} {shlex.quote(value)}" if value else f" {name}" for name, value in options_set(content.manifest)
+    )
     glove = "" if content.scan is None else " --glove glove.toml"
     return f"thenar compile SET.grasps -o build/{flags}{glove}", "thenar verify build/ SET.grasps"
 
 
 def _plain(value: object) -> str:
+    if value is True:
+        return ""
+    if isinstance(value, tuple):
+        return ",".join(value)
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
