@@ -34,6 +34,7 @@ class Scorer:
     switch_rows, switch_means   s rows
     joint_means                 j rows
     joint_rows, thresholds      j lists: a row per bin, and the codes that part the bins; distances of a slope are bins
+    joints_lost                 what all joints add while they are lost
     size, unpack                of a sum that began with `start`: its bytes, and what makes K scores of them, each 2^15
                                 too high
     """
@@ -52,6 +53,16 @@ class Scorer:
         self.thresholds: list[list[int]] = [thresholds.tolist() for thresholds, _ in binned]
         # Of a set of unread switches: the joints are unread as well, and scored as if they were lost.
         self.joints_bit: Mask = 1 << tables.n_switches
+        self._pairs = [
+            (
+                *pair.joints,
+                *(steps.tolist() for steps in pair.thresholds),
+                [_packed(rows, offsets) for rows in pair.rows],
+            )
+            for pair in tables.pairs
+        ]
+        # Of all joints lost.
+        self.joints_lost = sum(self.joint_means) + self._pair_sum((0,) * tables.n_joints)
         self.reach = lru_cache(maxsize=_KEPT // tables.n_classes)(self._reach)
 
     @cached_property
@@ -72,7 +83,13 @@ class Scorer:
 
     def joint_sum(self, codes: Sequence[int]) -> int:
         """Return the sum of what all joints' codes add."""
-        return sum(map(getitem, self.joint_rows, map(bisect_left, self.thresholds, codes)))
+        return sum(map(getitem, self.joint_rows, map(bisect_left, self.thresholds, codes))) + self._pair_sum(codes)
+
+    def _pair_sum(self, codes: Sequence[int]) -> int:
+        total = 0
+        for one, other, steps, more, rows in self._pairs:
+            total += rows[bisect_left(steps, codes[one])][bisect_left(more, codes[other])]
+        return total
 
     def lanes_without(
         self, bits: ArrayLike, codes: ArrayLike, lost_switches: ArrayLike, lost_joints: ArrayLike
@@ -86,6 +103,7 @@ class Scorer:
         for joint, (code, lost) in enumerate(zip(joints, lost_codes, strict=True)):
             row = self.joint_rows[joint][bisect_left(self.thresholds[joint], code)]
             total += self.joint_means[joint] if lost else row
+        total += self._pair_sum([0 if lost else code for code, lost in zip(joints, lost_codes, strict=True)])
         return self.unpack(total.to_bytes(self.size, "little"))
 
     def _codes(self, codes: ArrayLike) -> list[int]:
@@ -130,9 +148,10 @@ def joint_reaches(tables: IntegerTables, leader: int) -> NDArray[np.int64]:
     free to do its worst in one of its bins: it is the most there is.
     """
     found = np.zeros(tables.n_classes, np.int64)
-    for joint, mean in enumerate(tables.joint_means.astype(np.int64)):
-        rows = np.vstack([tables.choices(joint)[1].sum(axis=0), mean]) - mean
-        found += (rows - rows[:, leader, np.newaxis]).max(axis=0)
+    for unit in tables.units:
+        rows = tables.all_choices(unit)[1].sum(axis=0)
+        gains = rows - rows[-1]
+        found += (gains - gains[:, leader, np.newaxis]).max(axis=0)
     return found
 
 
@@ -152,7 +171,7 @@ class LiveScores:
         self._lost: Mask = 0
         self._closed, self._silent = scorer.start, 0
         self._codes: tuple[int, ...] | None = None
-        self._joints = sum(scorer.joint_means)
+        self._joints = scorer.joints_lost
 
     def joints(self, codes: Sequence[int] | None) -> None:
         """Take the codes of all joints; None: all are lost. Raises FrameError."""
@@ -161,7 +180,7 @@ class LiveScores:
             return
         scorer = self._scorer
         if taken is None:
-            self._joints = sum(scorer.joint_means)
+            self._joints = scorer.joints_lost
         elif len(taken) != len(scorer.thresholds):
             raise FrameError(f"{len(taken)} codes, the build has {len(scorer.thresholds)} joints")
         else:

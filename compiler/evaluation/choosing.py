@@ -153,8 +153,9 @@ def _models(trainings: list[Training], samples: Samples) -> Iterator[Model]:
 
 
 def _table_rows(tables: ScoreTables) -> int:
-    """Return how many rows of scores tables hold for inputs in use: one a switch, a bin of a joint, a line."""
+    """Return how many rows of scores tables hold for inputs in use: one a switch, a bin of a joint or pair, a line."""
     in_use = [len(rows) for rows in tables.joint_rows if rows.any()]
+    in_use += [pair.rows.size // tables.n_classes for pair in tables.pairs]
     return int(tables.switch_rows.any(axis=1).sum()) + sum(in_use) + sum(bool(line.row.any()) for line in tables.lines)
 
 

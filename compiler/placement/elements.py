@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.runtime.names import level_name
+
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
 from .exact import Counts
@@ -104,7 +106,7 @@ def columns_of(elements: Elements) -> Columns:
 def names_of(grasp_set: GraspSet, elements: Elements) -> tuple[str, ...]:
     """Return the names: a switch's own; of a level, the taxel's with the code, as in "pad3>118"."""
     names, n_switches = grasp_set.element_names, len(grasp_set.switch_names)
-    return tuple(names[column] if column < n_switches else f"{names[column]}>{code}" for column, code in elements)
+    return tuple(names[column] if column < n_switches else level_name(names[column], code) for column, code in elements)
 
 
 def ports_of(ports: PortCosts, elements: Elements) -> PortCosts:

@@ -10,6 +10,21 @@ from thenar.runtime.names import SHOWN, list_names
 
 from .errors import list_rows
 from .graspset import GraspSet, Joint
+from .trials import otsu
+
+
+def contacts(grasp_set: GraspSet) -> NDArray[np.bool_]:
+    """Return which elements (n, s + t) were touched: switches that closed, and taxels whose value is above Otsu's
+    threshold of all values in its unit: a taxel that is never pressed is not told by its noise.
+    """
+    pressed = np.zeros(grasp_set.taxels.shape, np.bool_)
+    units = np.array([taxel.unit for taxel in grasp_set.taxel_columns])
+    values = [taxel.value(codes) for taxel, codes in zip(grasp_set.taxel_columns, grasp_set.taxels.T, strict=True)]
+    for unit in np.unique(units):
+        own = np.flatnonzero(units == unit)
+        same = np.column_stack([values[place] for place in own])
+        pressed[:, own] = same > otsu(same.ravel())
+    return np.hstack([grasp_set.switches, pressed])
 
 
 class Finding(msgspec.Struct, frozen=True):
@@ -66,7 +81,7 @@ def disagreeing(frames: NDArray[np.intp], what: NDArray[np.generic]) -> NDArray[
 def _odd_columns(grasp_set: GraspSet) -> Iterator[Finding]:
     for kind, columns, names in (
         ("switch", grasp_set.switches, grasp_set.switch_names),
-        ("taxel", grasp_set.taxels, tuple(taxel.name for taxel in grasp_set.taxel_columns)),
+        ("taxel", grasp_set.taxels, grasp_set.taxel_names),
         ("joint", grasp_set.codes, grasp_set.joint_names),
     ):
         plural = "switches" if kind == "switch" else f"{kind}s"

@@ -83,11 +83,10 @@ def kept_table(content: ReportContent) -> PlainTable:
     """
     switches, tree, hand = content.manifest.switches, content.tree, content.hand
     entropy = 0.0 if tree is None else entropy_bits(list(tree.nodes[0].counts))
-    parts = {} if hand is None else dict(zip(hand.names, hand.parts.tolist(), strict=True))
     taxels = any(switch.threshold is not None for switch in switches)
     rows: list[tuple[str, ...]] = []
     for order, (switch, gain) in enumerate(zip(switches, accumulate(each.gain for each in switches), strict=True), 1):
-        part = "" if hand is None else hand.part_names[parts[switch.name]]
+        part = "" if hand is None else hand.part_names[hand.parts[hand.numbers_of([switch.name])[0]]]
         together = () if tree is None else (percent(gain / entropy, NBSP) if entropy else "",)
         rows.append((str(order), switch.name, part, str(switch.column), f"{switch.gain:.3f}", *together))
         if taxels:

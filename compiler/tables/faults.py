@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Faults, Faulty
 from thenar.runtime.scanning.scanmap import ScanMap
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.tables import IntegerTables, Pair
 
 Numbers = NDArray[np.intp]
 Steps = NDArray[np.int64]
@@ -61,7 +61,8 @@ def count_faults(
     switches first, then joints.
     """
     terms = [*_switches(tables), *_joints(tables)]
-    bins = (np.searchsorted(tables.binned(joint)[0], codes[:, joint]) for joint in range(tables.n_joints))
+    joined = [_Joined.of(tables, pair) for pair in tables.pairs]
+    bins = (np.searchsorted(_steps(tables, joint), codes[:, joint]) for joint in range(tables.n_joints))
     at = np.vstack([bits.T.astype(np.intp), *(column[np.newaxis] for column in bins)])
     order, trial = np.argsort(trials, kind="stable"), np.unique(np.sort(trials), return_inverse=True)[1]
     together = [(), *((element,) for element in range(len(terms))), *map(tuple, groups)]
@@ -69,7 +70,7 @@ def count_faults(
     cuts, found = _cuts(trial, max(1, _HELD // (tables.n_classes * (len(terms) + 1)))), np.zeros(0, np.int64)
     for number, (first, end) in enumerate(pairwise(cuts), 1):
         rows = order[first:end]
-        block = _Block(tables, terms, at[:, rows], labels[rows], trial[first:end])
+        block = _Block(tables, terms, joined, at[:, rows], labels[rows], trial[first:end])
         counts = np.fromiter(block.counts(together, pairs=few), np.int64)
         found = counts + found if found.size else counts
         if progress is not None:
@@ -101,17 +102,49 @@ def _switches(tables: IntegerTables) -> Iterator[_Term]:
 
 def _joints(tables: IntegerTables) -> Iterator[_Term]:
     for joint, mean in enumerate(tables.joint_means.astype(np.int64)):
-        steps, rows = tables.binned(joint)
+        (own, rows), steps = tables.binned(joint), _steps(tables, joint)
         ends = [-1, *steps.tolist()]
         words = [f"codes {low + 1} to {high}" for low, high in pairwise(ends)]
+        rows = rows[np.searchsorted(own, np.append(0, steps + 1))]
         yield _Term(rows.astype(np.int64), mean, (*words, f"codes above {ends[-1]}" if len(ends) > 1 else "any code"))
+
+
+def _steps(tables: IntegerTables, joint: int) -> Steps:
+    """Return the codes after which something of a joint changes; what it says up to the next is one value."""
+    return np.union1d(tables.binned(joint)[0], tables.steps_of(joint)).astype(np.int64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Joined:
+    """What two inputs add together: rows (values + 1, values + 1, K); the last value of each is that it is lost."""
+
+    inputs: tuple[int, int]
+    rows: Steps
+
+    @classmethod
+    def of(cls, tables: IntegerTables, pair: Pair) -> "_Joined":
+        codes = (np.concatenate([[0], _steps(tables, joint) + 1, [0]]) for joint in pair.joints)
+        bins = [np.searchsorted(steps, own) for steps, own in zip(pair.thresholds, codes, strict=True)]
+        one, other = pair.joints
+        return cls((tables.n_switches + one, tables.n_switches + other), pair.rows[np.ix_(*bins)].astype(np.int64))
+
+    def turned(self, first: int) -> tuple[int, Steps]:
+        """Return the other input than `first`, and the rows with the values of `first` first."""
+        one, other = self.inputs
+        return (other, self.rows) if first == one else (one, self.rows.swapaxes(0, 1))
 
 
 class _Block:
     """Some rows, whole trials of them: at (inputs, n) is the value of each input; labels and trials (n,), ascending."""
 
     def __init__(
-        self, tables: IntegerTables, terms: Sequence[_Term], at: Numbers, labels: Numbers, trials: Numbers
+        self,
+        tables: IntegerTables,
+        terms: Sequence[_Term],
+        joined: Sequence[_Joined],
+        at: Numbers,
+        labels: Numbers,
+        trials: Numbers,
     ) -> None:
         self._k = tables.n_classes
         self._labels, self._trial = labels, trials - trials[0]
@@ -126,6 +159,23 @@ class _Block:
             (term.mean * self._k)[:, None] - rows[:, values]
             for term, rows, values in zip(terms, self._terms, at, strict=True)
         ]
+        self._joined = {one: pair.turned(one) for pair in joined for one in pair.inputs}
+        # Of two that are lost together, by how much their own two differences are wrong.
+        self._both: dict[tuple[int, int], Steps] = {}
+        for pair in joined:
+            (one, other), now = pair.inputs, self._added(pair.inputs[0], at[pair.inputs[0]])
+            self.whole += now
+            alone = [self._added(each, -1) - now for each in pair.inputs]
+            self._both[pair.inputs] = (pair.rows[-1, -1] * self._k)[:, None] - now - sum(alone)
+            self.lost[one], self.lost[other] = (
+                self.lost[each] + more for each, more in zip(pair.inputs, alone, strict=True)
+            )
+
+    def _added(self, one: int, value: Numbers | int) -> Steps:
+        """Return what a paired input adds, (K, n), at this value in each row, together with the other of its pair."""
+        other, rows = self._joined[one]
+        found: Steps = rows[value, self._at[other]].T * self._k
+        return found
 
     def right(self, scores: Steps) -> int:
         """Return how many trials are recognised by scores (K, n)."""
@@ -138,13 +188,19 @@ class _Block:
     def counts(self, together: Sequence[Found], *, pairs: bool) -> Iterator[int]:
         """Yield the trials recognised with each group of inputs lost, each input stuck at each value, each two lost."""
         for group in together:
-            yield self.right(sum((self.lost[element] for element in group), self.whole))
-        for rows, at in zip(self._terms, self._at, strict=True):
-            without = self.whole - rows[:, at]
-            yield from (self.right(without + row[:, None]) for row in rows.T)
+            both = (more for pair, more in self._both.items() if {*pair} <= {*group})
+            yield self.right(sum(both, sum((self.lost[element] for element in group), self.whole)))
+        for one, (rows, at) in enumerate(zip(self._terms, self._at, strict=True)):
+            without, paired = self.whole - rows[:, at], one in self._joined
+            if paired:
+                without -= self._added(one, at)
+            for value, row in enumerate(rows.T):
+                more: Steps | int = self._added(one, value) if paired else 0
+                yield self.right(without + row[:, None] + more)
         for one, lost in enumerate(self.lost if pairs else ()):
             without = self.whole + lost
-            yield from (self.right(without + other) for other in self.lost[one + 1 :])
+            for other, more in enumerate(self.lost[one + 1 :], one + 1):
+                yield self.right(without + more + self._both.get((one, other), 0))
 
 
 def groups_of(scan: ScanMap | None, sources: Sequence[str], n_joints: int) -> Mapping[str, Found]:

@@ -226,8 +226,8 @@ class Training:
 def _asked(options: Options) -> list[tuple[Trainer, dict[str, Number]]]:
     """Return the trainers that may make the model, and the settings that are given to each.
 
-    A given setting that some trainers do not take is meant for the simplest that does: `rounds` for LogitBoost, and not
-    for a trainer that boosts and does more.
+    A given setting that some trainers do not take is meant for the simplest that does, with fewer settings than those
+    after it: `rounds` for LogitBoost, and not for a trainer that boosts and does more.
     """
     shared = {name: value for name in SHARED if (value := getattr(options, name)) is not None}
     if options.trainer != AUTO:
@@ -246,5 +246,6 @@ def _asked(options: Options) -> list[tuple[Trainer, dict[str, Number]]]:
         )
         raise TrainerError(f"{wrong}: leave it out")
     if len(takers) < len(names):
-        takers = [name for at, name in enumerate(takers) if not any(names[one] < names[name] for one in takers[:at])]
+        size = {name: len(names[name]) for name in takers}
+        takers = [name for at, name in enumerate(takers) if not any(size[one] < size[name] for one in takers[:at])]
     return [(TRAINERS[name], given) for name in takers]

@@ -132,7 +132,7 @@ class Decided:
         self._reaches = [_reaches(tables, port) for port in ports]
         if on_demand:
             # As if they were lost; reading them adds the rest.
-            share = joints - (tables.bias + tables.joint_means.astype(np.int32).sum(axis=0))
+            share = joints - tables.jointless.astype(np.int32)
             self._base -= share
             self._shares.append(share)
             every = range(tables.n_classes)

@@ -1,6 +1,7 @@
 """A batch: repetitions of one condition on their way through the pipeline."""
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,9 @@ from thenar.compiler.elementary import Floats
 from ..body.condition import Condition
 from ..contact.model import Contact, Load
 from ..streams import Site
+
+if TYPE_CHECKING:
+    from .ramp import Ramp
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,17 +36,6 @@ class Traffic:
 
 Integers = NDArray[np.int64]
 Bits = NDArray[np.bool_]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Ramp:
-    """How force grows: forces_n (levels + 1, n, s) at even steps of the grip, the first at contact, the last at
-    rise_us.
-    """
-
-    forces_n: Floats
-    rise_us: float
-
 
 # An object that slid so far was dropped: ours.
 SLID_OUT_MM = 20.0
@@ -76,7 +69,7 @@ class Batch:
     raw         (n, F, 18) uint8, its bytes, 1 to 255
     traffic               the bytes on the serial lines, while they are there
     lost        (n, F)    frames that did not arrive
-    ramp                  how the forces grow; None: at once. Kept where there are taxels
+    ramp                  how the forces grow; None: at once
     taxels_n    (n, F, t) the force that each taxel feels
     taxels      (n, F, t) uint16, its counts; None: there are none
     """
@@ -105,7 +98,7 @@ class Batch:
     raw: NDArray[np.uint8] = field(init=False)
     traffic: Traffic = field(init=False)
     lost: Bits | None = None
-    ramp: Ramp | None = None
+    ramp: "Ramp | None" = None
     taxels_n: Floats = field(init=False)
     taxels: NDArray[np.uint16] | None = None
 

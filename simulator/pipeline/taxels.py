@@ -11,7 +11,7 @@ from thenar.compiler.recordings.graspset import Joint
 
 from ..body.layout import murakami160
 from ..streams import Draw
-from .batch import Batch, Ramp
+from .batch import Batch
 from .effect import Effect, EffectParameters, Setting, Step
 
 Codes = NDArray[np.uint16]
@@ -50,26 +50,9 @@ def _feel(parameters: EffectParameters, setting: Setting) -> Step:
             pressed = (at >= 0) if setting.let_go_us is None else (at >= 0) & (at < setting.let_go_us)
             batch.taxels_n = np.where(pressed, forces[:, None], 0.0)
         else:
-            batch.taxels_n = _grown(batch.ramp, places, at, setting.let_go_us)
+            batch.taxels_n = batch.ramp.forces_at(at, places, setting.let_go_us)
 
     return step
-
-
-def _grown(ramp: Ramp, places: list[int], at_us: NDArray[np.int64], let_go_us: int | None) -> Floats:
-    """Return the forces (n, F, t) at times (n, F, t or 1): in straight lines from each level of grip to the next, and
-    back the same way after the hand lets go.
-    """
-    forces = ramp.forces_n[:, :, places]
-    levels = len(forces) - 1
-    since = at_us if let_go_us is None else np.minimum(at_us, let_go_us + ramp.rise_us - at_us)
-    way = np.clip(since / ramp.rise_us, 0.0, 1.0) * levels
-    below = np.minimum(way.astype(np.intp), levels - 1)
-    shape = (*at_us.shape[:2], len(places))
-    below, part = np.broadcast_to(below, shape), np.broadcast_to(way - below, shape)
-    rows, columns = np.arange(shape[0])[:, None, None], np.arange(shape[2])
-    first = forces[below, rows, columns]
-    grown: Floats = first + part * (forces[below + 1, rows, columns] - first)
-    return grown
 
 
 def _count(parameters: EffectParameters, setting: Setting) -> Step:

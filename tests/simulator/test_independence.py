@@ -27,7 +27,7 @@ BatchMaker = Callable[..., Batch]
 # An effect and where it drew, (seed, repetition, condition, subject): the words.
 Words = dict[tuple[str, tuple[int, ...]], bytes]
 
-SILENT_TAXELS = {"taxel.hysteresis", "taxel.creep", "taxel.crosstalk", "taxel.adc"}
+SILENT = {"frame.at_force", "taxel.hysteresis", "taxel.creep", "taxel.crosstalk", "taxel.adc"}
 OTHERS = [name for name in NAMES if name not in CONTACTS]
 # Parameters with which everybody who can draw does, and the contact models are quick.
 LIVELY: dict[str, dict[str, Any]] = {
@@ -97,7 +97,7 @@ PAIRS = [pair for pair in combinations(NAMES, 2) if pair != CONTACTS]
 
 def test_all_that_can_draw_do(alone: dict[str, tuple[Pipeline, Words, Batch]]) -> None:
     silent = {name for name in NAMES if not of(name, alone[name][1])}
-    assert silent == {*CONTACTS, "contact.ramp", "hand.transition", "switch.ghosting", *SILENT_TAXELS}
+    assert silent == {*CONTACTS, "contact.ramp", "hand.transition", "switch.ghosting", *SILENT}
 
 
 @pytest.mark.slow

@@ -45,6 +45,7 @@ DRAWS_NOTHING = {
     "contact.ramp",
     "bus.latency",
     "hand.transition",
+    "frame.at_force",
     "switch.ghosting",
     "taxel.hysteresis",
     "taxel.creep",

@@ -24,7 +24,9 @@ FAULTS = {
 PADS = {"taxel.gain", "taxel.creep", "taxel.crosstalk", "taxel.noise", "taxel.adc"}
 IN_TIME = {"hand.transition", "contact.ramp", "frame.jitter", "bus.latency"}
 
+ONSET = {*PADS, "contact.ramp", "frame.at_force"}
 ADDED = {"quick": set(), "faulty-glove": FAULTS, "continuous": IN_TIME, "kamakura-analog": PADS}
+ADDED["initial-contact"] = ONSET
 
 
 def effects(scene: Scene) -> dict[str, EffectParameters]:
@@ -42,6 +44,7 @@ def test_these_scenes_are_shipped() -> None:
         "cutkosky",
         "cutkosky-def",
         "faulty-glove",
+        "initial-contact",
         "kamakura",
         "kamakura-analog",
         "kamakura-def",

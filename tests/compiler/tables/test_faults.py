@@ -12,17 +12,22 @@ from thenar.compiler.tables import faults
 from thenar.compiler.tables.faults import count_faults, groups_of, worst_faults
 from thenar.runtime.scanning.scanmap import Port, ScanMap
 from thenar.runtime.scores import Scorer
-from thenar.runtime.tables import IntegerTables, Slope
+from thenar.runtime.tables import IntegerTables, Pair, Slope
 
 
-def tables_of(random: np.random.Generator, classes: int, switches: int, joints: int, *, slope: bool) -> IntegerTables:
+def tables_of(
+    random: np.random.Generator, classes: int, switches: int, joints: int, *, slope: bool, pair: bool = False
+) -> IntegerTables:
     def rows(*shape: int) -> np.ndarray:
         # Few different steps, so that scores tie.
         return random.integers(-3, 4, shape).astype(np.int16)
 
-    thresholds = tuple(
-        np.unique(random.integers(0, 30, random.integers(0, 4))).astype(np.uint16) for _ in range(joints)
-    )
+    def steps() -> np.ndarray:
+        return np.unique(random.integers(0, 30, random.integers(0, 4))).astype(np.uint16)
+
+    thresholds = tuple(steps() for _ in range(joints))
+    both = steps(), steps()
+    joined = Pair((0, joints - 1), both, rows(len(both[0]) + 1, len(both[1]) + 1, classes))
     line = Slope(0, 5, 15, 0, rows(classes).astype(np.int8))
     return IntegerTables(
         bias=rows(classes),
@@ -33,6 +38,7 @@ def tables_of(random: np.random.Generator, classes: int, switches: int, joints: 
         joint_means=rows(joints, classes),
         scale=1.0,
         slopes=(line,) if slope and joints else (),
+        pairs=(joined,) if pair and not slope and joints > 1 else (),
     )
 
 
@@ -52,14 +58,15 @@ def recognised(lanes: list[tuple[int, ...]], labels: np.ndarray, trials: np.ndar
     switches=st.integers(0, 4),
     joints=st.integers(0, 3),
     slope=st.booleans(),
+    pair=st.booleans(),
     own_trials=st.booleans(),
     held=st.sampled_from([1, 200, 1 << 23]),
 )
 def test_every_fault_is_counted_as_the_runtime_scores_it(
-    seed: int, classes: int, switches: int, joints: int, slope: bool, own_trials: bool, held: int
+    seed: int, classes: int, switches: int, joints: int, slope: bool, pair: bool, own_trials: bool, held: int
 ) -> None:
     random, n = np.random.default_rng(seed), 24
-    tables = tables_of(random, classes, switches, joints, slope=slope)
+    tables = tables_of(random, classes, switches, joints, slope=slope, pair=pair)
     bits, codes = random.random((n, switches)) < 0.5, random.integers(0, 32, (n, joints)).astype(np.uint16)
     trials = np.arange(n) if own_trials else random.integers(0, 6, n)
     # A label beyond the classes is a type that the build does not know.

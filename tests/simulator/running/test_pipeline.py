@@ -90,7 +90,7 @@ def test_the_order_of_everything(make_scene: SceneMaker) -> None:
     assert " ".join(order(make_scene(EVERYTHING))) == (
         "glove.recall hand.style hand.posture hand.object_pose hand.grip contact.quasistatic "
         "glove.threshold switch.threshold glove.close contact.ramp "
-        "glove.frames frame.jitter bus.latency "
+        "glove.frames frame.at_force frame.jitter bus.latency "
         "glove.sense hand.transition joint.noise joint.drift glove.encode glove.feel "
         "taxel.gain taxel.hysteresis taxel.creep taxel.crosstalk taxel.noise "
         "glove.sample glove.count "
