@@ -51,6 +51,8 @@ class Scorer:
         binned = [tables.binned(joint) for joint in range(tables.n_joints)]
         self.joint_rows = [_packed(rows, offsets) for _, rows in binned]
         self.thresholds: list[list[int]] = [thresholds.tolist() for thresholds, _ in binned]
+        # Of a set of unread switches: the joints are unread as well, and scored as if they were lost.
+        self.joints_bit: Mask = 1 << tables.n_switches
         self._pairs = [
             (
                 *pair.joints,
@@ -115,10 +117,15 @@ class Scorer:
         return values
 
     def _reach(self, leader: int, unread: Mask) -> tuple[int, ...]:
-        """Return the `reaches` of a leader as plain integers, kept for those that come again and again."""
+        """Return the `reaches` of a leader as plain integers, kept for those that come again and again; with
+        those of the joints where `unread` has the bit `joints_bit`.
+        """
         switches = [number for number in range(self.tables.n_switches) if unread >> number & 1]
-        found: list[int] = reaches(self.tables, leader, switches).tolist()
-        return tuple(found)
+        found = reaches(self.tables, leader, switches)
+        if unread & self.joints_bit:
+            found = found + joint_reaches(self.tables, leader)
+        steps: list[int] = found.tolist()
+        return tuple(steps)
 
 
 def reaches(tables: IntegerTables, leader: int, switches: Sequence[int]) -> NDArray[np.int64]:
@@ -132,6 +139,19 @@ def reaches(tables: IntegerTables, leader: int, switches: Sequence[int]) -> NDAr
     both = (rows[list(switches)].astype(np.int64) for rows in (tables.switch_rows, tables.switch_means))
     closed, lost = (rows - rows[:, leader, np.newaxis] for rows in both)
     found: NDArray[np.int64] = np.maximum(0, np.maximum(closed, lost)).sum(axis=0)
+    return found
+
+
+def joint_reaches(tables: IntegerTables, leader: int) -> NDArray[np.int64]:
+    """Return, for every class (K,), the most steps by which all joints, scored as if they were lost, can bring it
+    closer to class `leader` once they are read: whatever their codes are, or lost indeed, which adds nothing. Each is
+    free to do its worst in one of its bins: it is the most there is.
+    """
+    found = np.zeros(tables.n_classes, np.int64)
+    for unit in tables.units:
+        rows = tables.all_choices(unit)[1].sum(axis=0)
+        gains = rows - rows[-1]
+        found += (gains - gains[:, leader, np.newaxis]).max(axis=0)
     return found
 
 

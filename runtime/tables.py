@@ -213,7 +213,10 @@ class IntegerTables:
         return codes, np.stack([rows[np.searchsorted(thresholds, codes)], slope.of(codes)])
 
     def all_choices(self, unit: tuple[int, ...]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return all that a unit's joints can say, codes or LOST (c, joints), and the terms of each (t, c, K)."""
+        """Return all that a unit's joints can say, codes or LOST (c, joints), and the terms of each (t, c, K).
+
+        The last is that all of them are lost.
+        """
         pair = next((pair for pair in self.pairs if pair.joints == unit), None)
         if pair is None:
             codes, terms = self.choices(unit[0])
@@ -231,6 +234,13 @@ class IntegerTables:
         first, second = (each.ravel() for each in np.indices((len(one), len(other))))
         terms = np.stack([rows[first], more_rows[second], pair.rows[at[first], more_at[second]]])
         return np.column_stack([one[first], other[second]]), terms.astype(np.int64)
+
+    @property
+    def jointless(self) -> NDArray[np.int64]:
+        """The bias and what all joints add while they are lost, (K,)."""
+        lost = [self.all_choices(unit)[1].sum(axis=0)[-1] for unit in self.units]
+        found: NDArray[np.int64] = np.sum([self.bias.astype(np.int64), *lost], axis=0)
+        return found
 
     def steps_of(self, joint: int) -> NDArray[np.int64]:
         """Return the codes after which what a joint adds changes, in order: its thresholds, and those in its pair."""

@@ -143,7 +143,11 @@ def ports_of_scan(scan: ScanMap | None) -> Ports | None:
     """Return the ports of a build that was compiled for a harness: its boards', then its readings', byte by byte."""
     if scan is None:
         return None
-    return tuple(chain(*map(ports_of, (*scan.scanners, *(port.switches for port in scan.ports)))))
+    # Levels are bits of nothing: a device compares, and gives them in the order of their codes.
+    levels = [[level[-1] for level in board] for board in scan.taxels]
+    levels += [[switch for _, switch in port.levels] for port in scan.ports]
+    pairs = (*scan.scanners, *(port.switches for port in scan.ports), *map(enumerate, levels))
+    return tuple(chain(*map(ports_of, pairs)))
 
 
 @dataclass(frozen=True, slots=True)
