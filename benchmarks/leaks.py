@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from sklearn.neighbors import KNeighborsClassifier
 
 from thenar.compiler.evaluation.folds import Fold, leave_one_out, trial_folds, weka_folds
-from thenar.compiler.evaluation.plan import Data
 from thenar.compiler.evaluation.rates import Rate, rated
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.samples import Samples
 
 if TYPE_CHECKING:
     from thenar.runtime.manifest import Of
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 def predicted(grasp_set: GraspSet, folds: list[Fold]) -> NDArray[np.intp]:
     """Return the label (n,) of each row's nearest neighbour in the training rows of the fold that tests it."""
-    X, labels = Data.of(grasp_set).X, grasp_set.labels
+    X, labels = Samples.of(grasp_set).inputs, grasp_set.labels
     found = np.zeros_like(labels)
     for fold in folds:
         nearest = KNeighborsClassifier(1).fit(X[fold.train], labels[fold.train])

@@ -61,7 +61,7 @@ def of_glove(scene: Played, joints: Path, sensors: Literal[18, 22], seconds: flo
         EmulatedCyberGlove(line, sensors=sensors) as device,
         changing(scene, lambda _, raw: device.set((raw + raw)[:sensors])),
     ):
-        wiring = glove(scene, str(line.link), sensors)
+        wiring = msgspec.structs.replace(glove(scene, str(line.link), sensors), mask=False)
         with _metered(lambda: device.records) as sent_hz:
             run = _ran(joints, Harness(name="glove", cyberglove=wiring), seconds, folder)
     what = f"CyberGlove, {sensors} sensors, {line.baud} baud"

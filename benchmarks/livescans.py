@@ -110,7 +110,7 @@ def _predicted_us(scene: Played, harness: Harness, which: str, rows: Iterable[in
 def _until_decided(scene: Played, harness: Harness, scan: ScanMap, rows: Iterable[int]) -> Iterator[float]:
     """Yield for each row what the ports take that are read until the scan is decided."""
     build, costs = scene.build, Costs(scan.ports, harness)
-    groups = [sum(1 << switch for _, switch in port.switches) for port in scan.ports]
+    groups = [sum(1 << switch for switch in port.elements) for port in scan.ports]
     early = EarlyExit(build.scorer, groups, lead=Policy().lead_steps(build.tables.scale))
     sensors = [sensor.name for sensor in scene.performance.calibration.sensors]
     codes = CodeTables(build.manifest.joints, sensors, scene.performance.calibration)

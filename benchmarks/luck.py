@@ -91,7 +91,7 @@ def played(asked: tuple[int, GraspSet | None, Equipment]) -> Case:
         survey = Survey(grasp_set, SCENE, samples, None, search, cuts, equipment, asking)
         screened, _ = screen(survey)
         closes = look_closely(survey, finalists(screened, [], search.finalists))
-    several = [design for close in closes for design in designs(close, equipment.joints)]
+    several = [design for close in closes for design in designs(close, survey.transfer(close.screened.choice))]
     fronts = best_designs(several)
     luck = lucks(fronts, several, screened, cuts, seed)
     fresh = recorded(seed, more=MORE) if others is None else others

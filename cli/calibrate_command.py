@@ -1,4 +1,4 @@
-"""`thenar calibrate`: two points of each of a CyberGlove's sensors, pose by pose."""
+"""`thenar calibrate`: two points of each of a CyberGlove's sensors, pose by pose; rest and press of each taxel."""
 
 import os
 import select
@@ -11,7 +11,7 @@ import click
 from rich.live import Live
 from rich.table import Table
 
-from .common import Number, OutputFile, err, overwrite_flag, serial_port
+from .common import Number, OutputFile, err, existing_file, keep_apart, overwrite_flag, serial_port
 from .lines import echo
 
 if TYPE_CHECKING:
@@ -33,23 +33,44 @@ def _rate(_context: click.Context, _option: click.Parameter, text: str) -> int |
     return int(text)
 
 
+def _device(context: click.Context, argument: click.Parameter, text: str) -> str:
+    """Return the port; with --taxels the path of a glove.toml."""
+    if context.params.get("taxels"):
+        return str(existing_file.convert(text, argument, context))
+    return serial_port(context, argument, text)
+
+
 @click.command("calibrate")
-@click.argument("port", callback=serial_port)
+@click.argument("port", metavar="PORT|glove.toml", callback=_device)
 @click.option("-o", "--output", type=OutputFile(".toml"), required=True, help="The .toml file to write.")
 @overwrite_flag
 @click.option("--subject", help="Name of the subject.  [default: the file's name]")
 @click.option("--baud", callback=_rate, default="115200", show_default=True, help="Baud rate, or auto to find it.")
 @click.option("--sensors", type=click.Choice(["18", "22"]), help="Expected sensor count.  [default: as reported]")
+@click.option("--taxels", is_flag=True, is_eager=True, help="Calibrate the taxels of a glove.toml, not a CyberGlove.")
+@click.option("--newtons", type=Number(0.001, 1000), help="Force of the presses, where it is known; with --taxels.")
 @click.option("--hold", type=Number(0.05, 60), default=1.0, show_default=True, help="Seconds to hold a pose.")
-def command(port: str, output: Path, subject: str | None, baud: int | None, sensors: str | None, hold: float) -> None:
-    """Calibrate the CyberGlove at PORT (/dev/ttyUSB0, socket://HOST:PORT, ...) for the hand that wears it.
+def command(
+    port: str,
+    output: Path,
+    subject: str | None,
+    baud: int | None,
+    sensors: str | None,
+    taxels: bool,
+    newtons: float | None,
+    hold: float,
+) -> None:
+    """Calibrate the CyberGlove at PORT (/dev/ttyUSB0, socket://HOST:PORT, ...) for the hand that wears it; with
+    --taxels, the taxels of a glove.toml.
 
     One is asked for a flat hand, a fist and five more poses, sees what the sensors say, and takes each pose with Enter.
-    The file is written at the end: until then, Ctrl-C leaves an older one as it is.
+    Of taxels, rest and press are learnt: one presses nothing, then every taxel once. The file is written at the end:
+    until then, Ctrl-C leaves an older one as it is.
 
     \b
     Example:
         thenar calibrate /dev/ttyUSB0 -o anna.toml
+        thenar calibrate glove.toml --taxels -o pads.toml
     """
     from thenar.drivers.cyberglove import CyberGlove
     from thenar.runtime.files import write_atomically
@@ -58,6 +79,11 @@ def command(port: str, output: Path, subject: str | None, baud: int | None, sens
     wearer = subject or output.stem
     if reason := fault(wearer):
         raise click.UsageError(f"subject {shortened(repr(wearer))} {reason}: give another with --subject")
+    if taxels:
+        _calibrate_taxels(Path(port), output, wearer, newtons, hold)
+        return
+    if newtons is not None:
+        raise click.UsageError("--newtons is the force of presses on taxels: add --taxels")
     glove = CyberGlove(port, baud=baud, sensors=int(sensors) if sensors else None)
     try:
         guide = Guide(glove, glove.open(), hold)
@@ -68,6 +94,29 @@ def command(port: str, output: Path, subject: str | None, baud: int | None, sens
         raise click.ClickException(f"no sensor moved, so there is nothing to calibrate by: {output} is not written")
     write_atomically(output, calibrated.to_toml().encode("utf-8"))
     echo(f"{output}: {len(calibrated.sensors)} sensors of {calibrated.subject}")
+
+
+def _calibrate_taxels(glove: Path, output: Path, wearer: str, newtons: float | None, hold: float) -> None:
+    from msgspec.structs import replace
+
+    from thenar.runtime.files import write_atomically
+    from thenar.runtime.harness.loading import load_harness
+    from thenar.runtime.live.sources import Sources
+    from thenar.runtime.scanning.ports import whole_scan
+    from thenar.runtime.taxels import TaxelSettings
+
+    from .taxel_guide import TaxelGuide
+
+    keep_apart(glove, output)
+    harness = replace(load_harness(glove), taxel_settings=TaxelSettings())  # it may name the file that is to be written
+    if not harness.taxel_names:
+        raise click.UsageError(f"{glove.name} names no taxels: it takes `taxels` of a [[scanner]], or a converter")
+    with Sources(harness, (), whole_scan(harness, (), every_taxel=True)) as sources:
+        calibrated = TaxelGuide(harness, sources, hold).calibration(wearer, newtons)
+    if not calibrated.taxels:
+        raise click.ClickException(f"no taxel moved, so there is nothing to calibrate by: {output} is not written")
+    write_atomically(output, calibrated.to_toml().encode("utf-8"))
+    echo(f"{output}: {len(calibrated.taxels)} taxels of {calibrated.subject}; name it under [taxels] of {glove.name}")
 
 
 def _calibrated(guide: "Guide", subject: str) -> "GloveCalibration":

@@ -18,11 +18,11 @@ from thenar.runtime.errors import HarnessError
 from thenar.runtime.frames import now_us
 from thenar.runtime.harness.wiring import GloveWiring, Harness
 from thenar.runtime.live.sources import NOT_YET, DeviceState, Sources, Taken
-from thenar.runtime.live.system import sensor_names_of
 from thenar.runtime.recording.guide import Guide, Journal, Stage, Trial
 from thenar.runtime.recording.session import Collection, Session
 from thenar.runtime.recording.writer import Recorder
 from thenar.runtime.scanning.ports import whole_scan
+from thenar.runtime.taxels import calibration_of
 from thenar.runtime.toml_source import read_source
 
 from .common import err, of_device
@@ -63,9 +63,11 @@ def collect(
     """
     if sys.stdin is None:
         raise click.UsageError("stdin is closed: the keys that lead through a collection come from there")
-    switches, sensors = harness.switches, sensor_names_of(harness.cyberglove)
-    check_names("column", (*switches, *sensors))
-    with ended_by_signals() as stop, Sources(harness, switches, whole_scan(harness, switches)) as sources:
+    switches, glove = harness.switches, harness.cyberglove
+    sensors = () if glove is None else glove.sensor_names
+    check_names("column", (*switches, *harness.taxel_names, *sensors))
+    scan = whole_scan(harness, switches, every_taxel=True)
+    with ended_by_signals() as stop, Sources(harness, switches, scan) as sources:
         session = Session(
             thenar=version("thenar"),
             switches=switches,
@@ -73,6 +75,8 @@ def collect(
             harness=read_source(file, HarnessError).text,
             calibration=_calibration(harness.cyberglove),
             collection=collection,
+            taxels=harness.taxel_names,
+            taxel_calibration=calibration_of(harness.taxel_settings),
         )
         if journal is not None:
             _check_same_glove(journal, session)
@@ -125,6 +129,8 @@ def _check_same_glove(journal: Journal, session: Session) -> None:
         ("switches", begun.switches, session.switches),
         ("sensors", begun.sensors, session.sensors),
         ("calibration", begun.calibration, session.calibration),
+        ("taxels", begun.taxels, session.taxels),
+        ("calibration of taxels", begun.taxel_calibration, session.taxel_calibration),
     ):
         if before != now:
             raise SettingError(f"{journal.path} was begun with other {what}: name another --output for this glove")

@@ -228,8 +228,9 @@ def keep_apart(*paths: Path | None) -> None:
 
 def check_devices(harness: "Harness", path: Path) -> None:
     """Raise UsageError if the `harness` in `path` names no device: whatever is done with it would come to nothing."""
-    if harness.cyberglove is None and not harness.scanners and not harness.buses:
-        raise click.UsageError(f"{path.name} names no device: it takes a [cyberglove], a [[scanner]] or a [[bus]]")
+    if harness.cyberglove is None and not harness.scanners and not harness.buses and not harness.spi:
+        takes = "it takes a [cyberglove], a [[scanner]], a [[bus]] or an [[spi]]"
+        raise click.UsageError(f"{path.name} names no device: {takes}")
 
 
 class _Console(Console):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from thenar.compiler.text import INDEPENDENT
+from thenar.compiler.text import INDEPENDENT, counted, duration, listed
 from thenar.runtime.manifest import AUTO
 
 from .common import (
@@ -32,8 +32,11 @@ from .options import (
     Grouped,
     asked_settings,
     fitted_hand,
+    keep_joints_option,
     keep_option,
     layout_option,
+    levels_option,
+    limit_options,
     method_option,
     prune_option,
     trainer_option,
@@ -56,8 +59,9 @@ PRESETS: dict[str, dict[str, str]] = {
     "best": {"method": "elimination", "keep": "33"},
 }
 _GROUPS = {
-    "Basics": ("output", "preset", "method", "keep", "prune", "inputs"),
-    "Training": ("trainer",),
+    "Basics": ("output", "preset", "method", "keep", "levels", "keep_joints", "prune", "inputs"),
+    "Limits": ("keep_these", "never", "apart_mm", "at_most", "budget_us"),
+    "Training": ("trainer", "robust"),
     "Integer tables": ("table_bits", "width"),
     "The rates in build.json": ("folds", "seed", "by", "jobs"),
     "A point of a frontier": ("from_frontier", "point"),
@@ -67,9 +71,9 @@ _GROUPS = {
 
 
 def _chips() -> Iterable[str]:
-    from thenar.drivers.i2c.chips import CHIPS
+    from thenar.drivers.i2c.chips import expanders
 
-    return (*CHIPS, _BOARD)
+    return (*expanders(), _BOARD)
 
 
 class _ChipOption(click.Option):
@@ -108,7 +112,10 @@ def _preset(context: click.Context, _: click.Parameter, name: str | None) -> Non
 )
 @method_option()
 @keep_option
+@levels_option
+@keep_joints_option
 @prune_option
+@limit_options
 @click.option(
     "--inputs",
     type=click.Choice(["both", "switches", "joints"]),
@@ -184,6 +191,8 @@ def command(
         thenar compile set.grasps -o build/
         thenar compile set.grasps -o build/ --preset smallest
         thenar compile set.grasps -o build/ --method elimination --keep 16
+        thenar compile set.grasps -o build/ --method elimination --keep 39 --robust
+        thenar compile set.grasps -o build/ --method elimination --keep 16 --never palm_heel_6 --apart-mm 8
         thenar compile set.grasps -o build/ --glove glove.toml
         thenar compile set.grasps -o build/ --from frontier/frontier.json --point 7
     """
@@ -197,16 +206,17 @@ def command(
     _check_proposal(propose, chip, glove)
     _check_point(context, from_frontier, point)
     for name, value in (("--hand-length", hand_length), ("--layout", layout)):
-        if value is not None and not report:
+        if value is not None and not report and not (name == "--layout" and asked["apart_mm"]):
             raise click.UsageError(f"{name} is of the hand in spec/, which --no-report leaves out: give one of them.")
     keep_apart(recordings, layout, glove, propose, from_frontier)
     options = asked_settings(context, asked) | _placed(context, asked)
     given = None if glove is None else load_harness(glove)
     grasp_set = GraspSet.load(recordings)
-    hand = fitted_hand(layout, grasp_set.switch_names, None) if report else None
+    hand = fitted_hand(layout, grasp_set.element_names, None) if report or asked["apart_mm"] else None
     if hand_length is not None:
-        fitted_hand(layout, grasp_set.switch_names, hand_length)
+        fitted_hand(layout, grasp_set.element_names, hand_length)
     chosen = None if from_frontier is None else picked(from_frontier, point, grasp_set)
+    options["at_most_taxels"] = options.pop("at_most")
     documents = Documents(hand, hand_length) if report else None
     if chosen is not None:
         options |= chosen.options
@@ -216,7 +226,8 @@ def command(
             grasp_set,
             output,
             harness=given if chosen is None else chosen.wired(given),
-            ports=ports_of_whole_glove(given, grasp_set.element_names),
+            ports=ports_of_whole_glove(given, grasp_set.element_names, len(grasp_set.taxel_columns)),
+            hand=hand,
             documents=documents,
             jobs=jobs,
             progress=told,
@@ -293,8 +304,8 @@ def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
     manifest, proof = made.manifest, made.manifest.proof
     console = out()
     console.print(
-        f"{folder}: {len(manifest.grasps)} grasp types from {len(manifest.switches)} of {manifest.source.switches} "
-        f"switches and {len(manifest.joints)} joints; tables of {made.tables_bytes} bytes"
+        f"{folder}: {len(manifest.grasps)} grasp types from {_kept(manifest, made)}; "
+        f"tables of {made.tables_bytes} bytes"
     )
     _print_training(manifest)
     for rate in sorted(manifest.rates, key=lambda rate: rate.protocol == "training"):
@@ -306,6 +317,8 @@ def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
         f"{proof.error:g} steps; {proof.covered} of {manifest.source.rows} rows are safe, {proof.changed} change class"
     )
     console.print(made.firmware, soft_wrap=True)
+    if manifest.faults is not None and manifest.faults.lost is not None:
+        console.print(f"worst of single inputs lost, rows trained on: {manifest.faults.sentences[0]}", soft_wrap=True)
     if made.harness is not None and made.scan is not None:
         _print_scan(made.scan, made.harness)
     if propose is not None:
@@ -316,13 +329,33 @@ def _print(made: "BuildReport", folder: Path, propose: Path | None) -> None:
             console.print(joints)
 
 
+def _kept(manifest: "Manifest", made: "BuildReport") -> str:
+    """Return how many switches, levels and joints are kept: "3 of 8 switches and 18 joints"."""
+    taxels, total = len(made.grasp_set.taxel_columns), manifest.source.switches
+    levels = [switch.source for switch in manifest.switches if switch.threshold is not None]
+    found = []
+    if total > taxels or not taxels:
+        found.append(f"{len(manifest.switches) - len(levels)} of {total - taxels} switches")
+    if taxels:
+        found.append(f"{counted(len(levels), 'level')} of {len(set(levels))} of {counted(taxels, 'taxel')}")
+    several = manifest.options.keep_joints is not None
+    joints = f"{len(manifest.joints)} of {len(made.grasp_set.joints)}" if several else str(len(manifest.joints))
+    return listed([*found, f"{joints} joints"])
+
+
 def _print_training(manifest: "Manifest") -> None:
+    from thenar.drivers.cyberglove_protocol import shortest_us
+
     console = out()
     if manifest.switches:
         console.print(f"switches: {', '.join(switch.name for switch in manifest.switches)}", soft_wrap=True)
     for switch in manifest.switches:
         if switch.threshold is not None:
             console.print(f"{switch.name}: {switch.closed}, learnt")
+    if manifest.options.keep_joints is not None:
+        names = ", ".join(joint.name for joint in manifest.joints)
+        us = shortest_us(len(manifest.joints), 115_200, status=True)
+        console.print(f"joints: {names}; a CyberGlove's record of them takes {duration(us)}", soft_wrap=True)
     console.print(f"trained by {manifest.fit}{': ' if manifest.fit.why else ''}{manifest.fit.why}", soft_wrap=True)
     for each in manifest.fit.compared:
         console.print(f"  {each}", soft_wrap=True)
@@ -346,9 +379,10 @@ def _print_scan(scan: "ScanMap", harness: "Harness") -> None:
     if time.chips:
         _print_chips(time)
         out().print(_in_all(scan, harness, time))
-    for board, pairs in zip(harness.scanners, scan.scanners, strict=True):
+    for number, (board, pairs) in enumerate(zip(harness.scanners, scan.scanners, strict=True)):
+        levels = f", {len(scan.taxels[number])} levels of {len(board.taxels)} channels" if scan.taxels else ""
         out().print(
-            f"board {board.port}: {len(pairs)} kept switches of {len(board.switches)} keys, "
+            f"board {board.port}: {len(pairs)} kept switches of {len(board.switches)} keys{levels}, "
             f"{scanner_us(board):.0f} us a bitmap"
         )
 
@@ -363,9 +397,8 @@ def _print_chips(time: "ScanTime") -> None:
 
 
 def _in_all(scan: "ScanMap", harness: "Harness", time: "ScanTime") -> str:
-    wired = sum(len(chip.pins) for bus in harness.buses for chip in bus.chips)
-    count = len(scan.ports) + time.selects
+    count, what = len(scan.ports) + time.selects, "switches and taxels" if harness.taxel_names else "switches"
     return (
         f"a whole scan: {count} transaction{'s' if count > 1 else ''}, {time.us:.1f} us on the wire, "
-        f"{time.share:.1%} of the {time.full_us:.1f} us for all {wired} wired switches"
+        f"{time.share:.1%} of the {time.full_us:.1f} us for all {harness.on_chips} wired {what}"
     )

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import check_devices, existing_file, existing_folder, json_flag, of_device, out, progress, show, table
+from .common import check_devices, err, existing_file, existing_folder, json_flag, of_device, out, progress, show, table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -18,9 +18,13 @@ if TYPE_CHECKING:
 @click.command("doctor")
 @click.argument("glove", metavar="glove.toml", type=existing_file)
 @click.option("--build", metavar="BUILD", type=existing_folder, help="Look only at what this build reads of the glove.")
+@click.option("--write", is_flag=True, help="Write what a record of the CyberGlove takes (record_us) into glove.toml.")
 @json_flag
-def command(glove: Path, build: Path | None) -> None:
+def command(glove: Path, build: Path | None, write: bool) -> None:
     """Open every device of glove.toml and say what is there, how fast it is and how fast its wire would let it be.
+
+    Of a CyberGlove it measures a record of all sensors, and one of those that the build reads, or of half of them,
+    against the vendor's formula. With --write, `thenar frontier --glove glove.toml` goes by what was measured.
 
     Exit code 1 if something is missing; with --build, also if the build cannot work with the glove's calibration.
 
@@ -37,15 +41,29 @@ def command(glove: Path, build: Path | None) -> None:
     harness = load_harness(glove)
     check_devices(harness, glove)
     loaded = None if build is None else Build.load(build)
-    scan = whole_scan(harness, harness.switches) if loaded is None else System.map_of(loaded, harness)
-    looks, found = list(check_up(harness, scan)), list(_calibration(harness, loaded))
+    scan = whole_scan(harness, harness.switches, every_taxel=True) if loaded is None else System.map_of(loaded, harness)
+    sensors = () if loaded is None else [joint.name for joint in loaded.manifest.joints]
+    looks, found = list(check_up(harness, scan, sensors)), list(_calibration(harness, loaded))
     with progress("looking") as report:
         for number, look in enumerate(looks):
             found += look()
             report(number + 1, len(looks))
     show(found, _print)
+    if write:
+        _write(glove, found)
     if not all(finding.present for finding in found):
         click.get_current_context().exit(1)
+
+
+def _write(glove: Path, found: "Sequence[Finding]") -> None:
+    from thenar.runtime.harness.writing import write_record_us
+    from thenar.runtime.live.checkup import RECORD
+
+    measured = next((one.measured_us for one in found if one.part == RECORD), None)
+    if measured is None:
+        raise click.ClickException(f"no record of a CyberGlove was measured: {glove} is as it was")
+    write_record_us(glove, round(measured))
+    err().print(f"{glove}: record_us = {measured:.0f}", highlight=False)
 
 
 def _calibration(harness: "Harness", build: "Build | None") -> "Iterator[Finding]":

@@ -122,7 +122,7 @@ def _placements(hand: "HandShape", grasp_set: "GraspSet", prune: int) -> "Pictur
     from thenar.compiler.placement.placement import place_by_subject
     from thenar.simulator.handmaps.draw import kept
 
-    hand.numbers_of(grasp_set.switch_names)  # a foreign set is refused before a tree is grown
+    hand.numbers_of(grasp_set.element_names)  # a foreign set is refused before a tree is grown
     with progress("growing a tree of each hand") as report:
         return kept(hand, [(title, list(found.names)) for title, found in place_by_subject(grasp_set, prune, report)])
 

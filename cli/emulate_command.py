@@ -42,7 +42,8 @@ _GRACE_S = 5.0
 # Ctrl-C comes to the command too: it is given so long to end before it is told to.
 _BY_ITSELF_S = 1.0
 _FRAME_US = 10_000
-_HARNESS, _CALIBRATION = "glove.toml", "calibration.toml"
+_HARNESS, _CALIBRATION, _TAXELS = "glove.toml", "calibration.toml", "taxels.toml"
+_BITS = 10
 # What a shell adds to the number of the signal that ended a command.
 _KILLED = 128
 _PROCESSES = Path("/proc")
@@ -94,7 +95,8 @@ def command(
     .mcap recording of a live run.
 
     A CyberGlove and scanner boards appear as serial ports in DIR, paced like the wire, with the wire effects that the
-    scene lists; expanders on /dev/i2c-N, through umockdev. With a COMMAND, that runs beside the emulated glove and sees
+    scene lists; expanders and converters on /dev/i2c-N and
+    /dev/spidevB.C, through umockdev. With a COMMAND, that runs beside the emulated glove and sees
     it: {glove} in it stands for the glove.toml that names the emulated ports. It is ended when the playing is over.
 
     \b
@@ -110,16 +112,27 @@ def command(
     check_devices(harness, glove)
     worn = harness.cyberglove
     calibration = None if worn is None or worn.calibration is None else Path(worn.calibration)
-    keep_apart(glove, Path(source), calibration, folder / _HARNESS, folder / _CALIBRATION, log)
+    ours = (folder / name for name in (_HARNESS, _CALIBRATION, _TAXELS))
+    keep_apart(glove, Path(source), calibration, *ours, log)
     _check_folder(folder)
     performance, cable = _performance(source, subject, period_ms)
     if missing := [name for name in harness.switches if name not in performance.switch_names]:
         warning(f"{source} has no switch {list_names(missing)}: open all the time")
+    if missing := [name for name in harness.taxel_names if name not in performance.taxel_names]:
+        warning(f"{source} has no taxel {list_names(missing)}: 0 counts all the time")
     with ExitStack() as stack:
         stop = stack.enter_context(ended_by_signals())
         folder.mkdir(parents=True, exist_ok=True)
         bench = stack.enter_context(
-            Bench(harness, performance.switch_names, folder.resolve(), cable=cable, adapter=adapter)
+            Bench(
+                harness,
+                performance.switch_names,
+                folder.resolve(),
+                cable=cable,
+                adapter=adapter,
+                taxel_names=performance.taxel_names,
+                bits=max(_BITS, int(performance.taxels.max(initial=0)).bit_length()),
+            )
         )
         emulated = _write_harness(bench, performance, folder)
         note = stack.enter_context(_noting(log))
@@ -134,7 +147,7 @@ def command(
 def _check_folder(folder: Path) -> None:
     """Raise UsageError if `folder` holds files by the names of ours, and others: then they may be the user's."""
     there = {path.name for path in folder.iterdir() if not path.is_symlink()} if folder.is_dir() else set()
-    ours = there & {_HARNESS, _CALIBRATION}
+    ours = there & {_HARNESS, _CALIBRATION, _TAXELS}
     if ours and there - ours and not overwrites(click.get_current_context()):
         raise click.UsageError(f"{folder / min(ours)} is there already: add --overwrite, or name another --dir")
 
@@ -166,7 +179,7 @@ def _performance(source: str, subject: str | None, period_ms: float | None) -> t
 
 
 def _write_harness(bench: "Bench", performance: "Performance", folder: Path) -> Path:
-    """Write the harness that names the emulated ports, and the subject's calibration; return the harness's path."""
+    """Write the harness that names the emulated ports, and the subject's calibrations; return the harness's path."""
     from thenar.runtime.files import write_atomically
     from thenar.runtime.harness.writing import harness_to_toml
 
@@ -175,6 +188,10 @@ def _write_harness(bench: "Bench", performance: "Performance", folder: Path) -> 
         write_atomically(folder / _CALIBRATION, performance.calibration.to_toml().encode())
         glove = msgspec.structs.replace(harness.cyberglove, calibration=_CALIBRATION)
         harness = msgspec.structs.replace(harness, cyberglove=glove)
+    if performance.taxel_calibration is not None and harness.taxel_names:
+        write_atomically(folder / _TAXELS, performance.taxel_calibration.to_toml().encode())
+        settings = msgspec.structs.replace(harness.taxel_settings, calibration=_TAXELS)
+        harness = msgspec.structs.replace(harness, taxel_settings=settings)
     write_atomically(folder / _HARNESS, harness_to_toml(harness).encode())
     return folder / _HARNESS
 

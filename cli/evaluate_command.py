@@ -215,7 +215,7 @@ def _print_learning(learning: "Learning") -> None:
     console.print()
     console.print(Text(learning.title, "bold"))
     console.print(grid)
-    console.print(learning.note or "Expected: by a power law through the points. Nothing tells whether it goes on so.")
+    console.print(learning.note or "Expected: a power law through the points, so an extrapolation.")
 
 
 def _print_confusions(study: "Study") -> None:

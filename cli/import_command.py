@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from thenar.compiler.text import inputs_read
+
 from .common import (
     OutputFile,
     existing_file,
@@ -132,6 +134,7 @@ def _print(report: "ImportReport", output: Path) -> None:
         out().print(coding)
     echo(
         f"{output}: {report.rows} grasps of {report.grasp_types} types ({report.taxonomy}); "
-        f"subjects {report.subjects}, objects {report.objects}, switches {report.switches}, joints {report.joints}, "
+        f"subjects {report.subjects}, objects {report.objects}, "
+        f"{inputs_read(report.switches, report.taxels, report.joints)}, "
         f"trials {report.trials}"
     )

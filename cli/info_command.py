@@ -5,14 +5,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from thenar.compiler.text import INDEPENDENT
+from thenar.compiler.text import INDEPENDENT, inputs_read
 
 from .common import existing_file, json_flag, keep_apart, out, overwrite_flag, picture_file, progress, show, table
 from .lines import echo
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from thenar.compiler.recordings.graspset import GraspSet
-    from thenar.compiler.recordings.summary import Summary
+    from thenar.compiler.recordings.summary import JointRange, Summary
 
 
 @click.command("info")
@@ -56,14 +58,15 @@ def _print(summary: "Summary", path: Path) -> None:
     echo(
         f"{path}: {summary.rows} grasps of {len(summary.grasps)} types ({summary.taxonomy}); "
         f"subjects {len(summary.subjects)}, objects {len(summary.objects)}, "
-        f"switches {len(summary.switches)}, joints {len(summary.joints)}"
+        f"{inputs_read(len(summary.switches), len(summary.taxels), len(summary.joints))}"
     )
     if summary.simulated:
         echo(f"simulated: {summary.simulated}")
     if summary.independent:
         echo(INDEPENDENT)
     _print_counts(summary)
-    _print_joints(summary)
+    for kind, ranges in (("taxel", summary.taxels), ("joint", summary.joints)):
+        _print_ranges(kind, ranges)
     _print_separability(summary)
     for warning in summary.warnings:
         echo(f"warning: {warning.message}")
@@ -79,15 +82,15 @@ def _print_counts(summary: "Summary") -> None:
         echo(f"{what}: " + ", ".join(f"{count.name} ({count.rows})" for count in counts))
 
 
-def _print_joints(summary: "Summary") -> None:
-    if not summary.joints:
+def _print_ranges(kind: str, ranges: "Sequence[JointRange]") -> None:
+    if not ranges:
         return
     numbers = ("least", "largest", "distinct codes")
-    joints = table(("joint", "unit", *numbers), numbers, "Joints")
-    for joint in summary.joints:
-        ends = ("-" if end is None else f"{end:g}" for end in (joint.least, joint.largest))
-        joints.add_row(joint.name, joint.unit, *ends, str(joint.codes))
-    out().print(joints)
+    lines = table((kind, "unit", *numbers), numbers, f"{kind.capitalize()}s")
+    for each in ranges:
+        ends = ("-" if end is None else f"{end:g}" for end in (each.least, each.largest))
+        lines.add_row(each.name, each.unit, *ends, str(each.codes))
+    out().print(lines)
 
 
 def _print_separability(summary: "Summary") -> None:

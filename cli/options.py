@@ -10,7 +10,7 @@ from click.shell_completion import CompletionItem
 
 from thenar.runtime.manifest import AUTO
 
-from .common import Command, ListOf, Number, OneOf, existing_file
+from .common import Command, ListOf, Number, OneOf, existing_file, parted
 
 if TYPE_CHECKING:
     from thenar.compiler.hand import HandShape
@@ -59,6 +59,12 @@ def method_option(destination: str = "method", default: str = "id3") -> Callable
 keep_option = click.option(
     "--keep", type=click.IntRange(1), metavar="M", help="How many switches to keep: for methods that take it."
 )
+levels_option = click.option(
+    "--levels", type=click.IntRange(1, 65535), metavar="L", help="Most levels of a taxel to choose from.  [default: 7]"
+)
+keep_joints_option = click.option(
+    "--keep-joints", type=click.IntRange(1), metavar="N", help="Keep the best N joints.  [default: all]"
+)
 prune_option = click.option(
     "--prune",
     type=click.IntRange(0),
@@ -67,6 +73,41 @@ prune_option = click.option(
     show_default=True,
     help="Prune ID3's tree: nodes of fewer than S rows decide nothing.",
 )
+
+
+def _names(_: click.Context, __: click.Parameter, text: str | None) -> tuple[str, ...]:
+    return () if text is None else parted(text)
+
+
+def limit_options(command: Command) -> Command:
+    """Add the options that say what a placement must obey, and --robust."""
+    for option in (
+        click.option(
+            "--robust",
+            is_flag=True,
+            help="Choose for the worst single lost switch; train on rows with lost inputs.",
+        ),
+        click.option(
+            "--budget-us", type=Number(0), metavar="US", help="A scan of what is kept takes at most this, by its ports."
+        ),
+        click.option(
+            "--at-most",
+            type=(click.IntRange(0), click.Choice(["taxels"])),
+            callback=lambda _context, _parameter, most: None if most is None else most[0],
+            metavar="N taxels",
+            help="Keep at most so many taxels, with however many levels.",
+        ),
+        click.option(
+            "--apart-mm",
+            type=Number(0, min_open=True),
+            metavar="MM",
+            help="Least distance of any two that are kept.",
+        ),
+        click.option("--never", callback=_names, metavar="NAMES", help="Switches and taxels that are not kept: a,b."),
+        click.option("--keep-these", callback=_names, metavar="NAMES", help="Switches and taxels that are kept: a,b."),
+    ):
+        command = option(command)
+    return command
 
 
 class WithMethods(click.Command):

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from thenar.compiler.text import counted
+
 from .common import (
     OutputFile,
     existing_file,
@@ -23,9 +25,20 @@ from .common import (
     write_json,
 )
 from .lines import echo
-from .options import WithMethods, keep_option, method_option, prune_option
+from .options import (
+    WithMethods,
+    hand_of,
+    keep_joints_option,
+    keep_option,
+    layout_option,
+    levels_option,
+    limit_options,
+    method_option,
+    prune_option,
+)
 
 if TYPE_CHECKING:
+    from thenar.compiler.placement.constraints import Limits
     from thenar.compiler.placement.methods.base import Method
     from thenar.compiler.placement.placement import Exactly, Placement, Standard
     from thenar.compiler.placement.ports import PortCosts
@@ -44,7 +57,16 @@ class _Asked:
     exact: bool
     crowd: bool
     joints: bool
+    levels: int | None
+    keep_joints: int | None
     glove: Path | None
+    keep_these: tuple[str, ...]
+    never: tuple[str, ...]
+    apart_mm: float | None
+    at_most: int | None
+    budget_us: float | None
+    robust: bool
+    layout: Path | None
     jobs: int
     show_tree: bool
     draw: Path | None
@@ -72,30 +94,58 @@ class _Asked:
                 self.crowd and not method.by_number,
                 "--crowd takes a method that keeps M switches",
             ),
+            (self.crowd and (self.levels or self.keep_joints), "--crowd takes neither --levels nor --keep-joints"),
+            (
+                self.crowd and (self.limited or self.robust),
+                "--crowd looks for the placement of many subjects: it takes no limits and no --robust",
+            ),
+            (self.layout is not None and self.apart_mm is None, "--layout says where switches lie, for --apart-mm"),
             (self.joints and tree, "--joints is for other methods than the paper's ID3"),
         ):
             if wrong:
                 raise click.UsageError(reason)
         method.check_given(self.keep, self.prune)
-        if self.glove is not None and (self.crowd or not method.uses_ports):
+        if self.glove is not None and (self.crowd or not (method.uses_ports or self.budget_us is not None)):
             from thenar.compiler.placement.methods.base import METHODS
 
             heeding = ", ".join(name for name, each in METHODS.items() if each.uses_ports)
             raise click.UsageError(f"--glove says what scans cost: take it with a --method that weighs that: {heeding}")
         keep_apart(self.grasps, self.glove, self.draw, self.output)
 
+    @property
+    def limited(self) -> bool:
+        """Whether the placement must obey anything."""
+        given = (self.apart_mm, self.at_most, self.budget_us)
+        return bool(self.keep_these or self.never) or any(each is not None for each in given)
+
+    def limits(self, grasp_set: "GraspSet") -> "Limits | None":
+        """Return what the placement must obey."""
+        from thenar.compiler.placement.constraints import Limits
+        from thenar.runtime.manifest import Options
+
+        hand = hand_of(self.layout).by_name if self.apart_mm else {}
+        asked = Options(
+            keep_these=self.keep_these,
+            never=self.never,
+            apart_mm=self.apart_mm,
+            at_most_taxels=self.at_most,
+            budget_us=self.budget_us,
+        )
+        return Limits.of(asked, grasp_set, hand)
+
     def ports(self, grasp_set: "GraspSet") -> "PortCosts | None":
         """Return what reading each switch costs."""
         from thenar.compiler.placement.ports import ports_of_whole_glove
         from thenar.runtime.harness.loading import load_harness
+        from thenar.runtime.scanning.plan import unwired
 
         harness = None if self.glove is None else load_harness(self.glove)
-        lacking = set() if harness is None else set(grasp_set.element_names) - set(harness.switches)
+        lacking = [] if harness is None else unwired(harness, grasp_set.element_names)
         if lacking:
             raise click.UsageError(
                 f"{self.glove} has no place for {min(lacking)!r} of {self.grasps}: name the whole glove's glove.toml."
             )
-        return ports_of_whole_glove(harness, grasp_set.element_names)
+        return ports_of_whole_glove(harness, grasp_set.element_names, len(grasp_set.taxel_columns))
 
     def found(self) -> "Placement":
         """Return the placement."""
@@ -119,9 +169,13 @@ class _Asked:
                 float(self.prune if self.keep is None else self.keep),
                 method=method.name,
                 joints=self.joints,
-                ports=self.ports(grasp_set) if method.uses_ports else None,
+                ports=self.ports(grasp_set) if method.uses_ports or self.budget_us is not None else None,
+                limits=self.limits(grasp_set),
+                robust=self.robust,
                 exact=self.exact,
                 on_round=report,
+                levels=self.levels,
+                keep_joints=self.keep_joints,
             )
 
 
@@ -129,7 +183,11 @@ class _Asked:
 @click.argument("grasps", type=existing_file)
 @method_option(default="id3; elimination with --crowd")
 @keep_option
+@levels_option
+@keep_joints_option
 @prune_option
+@limit_options
+@layout_option
 @click.option("--joints", is_flag=True, help="Choose switches that add to the joints.  [default: switches alone]")
 @click.option(
     "--glove",
@@ -157,6 +215,7 @@ def command(**options: Any) -> None:
         thenar place set.grasps --prune 13 --draw tree.svg -o placement.json
         thenar place set.grasps --method elimination --keep 16 --exact
         thenar place set.grasps --method id3-cost --keep 16 --glove glove.toml
+        thenar place set.grasps --method elimination --keep 16 --keep-these thumb_distal_5 --apart-mm 8
         thenar place crowd.grasps --crowd --keep 16 --draw subjects.svg
     """
     asked = _Asked(**options)
@@ -195,7 +254,7 @@ def _print(placement: "Placement") -> None:
 
 
 def _sentences(placement: "Placement") -> Iterator[str]:
-    kept = f"{len(placement.switches)} of {placement.n_switches} switches"
+    kept = f"{len(placement.switches)} of {placement.n_switches} {_kind(placement)}"
     share = f"({len(placement.switches) / placement.n_switches:.0%})"
     if placement.study is not None:
         yield from _of_study(kept, placement.study)
@@ -209,8 +268,17 @@ def _sentences(placement: "Placement") -> Iterator[str]:
         yield from _of_tree(placement, tree)
     else:
         yield f"{kept} {share}{', beside the joints' if placement.joints else ''}. {placement.how}"
+    if taxels := {kept.number for kept in placement.switches if kept.above is not None}:
+        levels = sum(kept.above is not None for kept in placement.switches)
+        yield f"{counted(levels, 'level')} of {counted(len(taxels), 'taxel')}: a taxel is converted once"
+    if placement.kept_joints:
+        yield f"the best {counted(len(placement.kept_joints), 'joint')} beside them: {', '.join(placement.kept_joints)}"
     if placement.exact is not None:
         yield from _of_exact(placement.exact, len(placement.switches))
+
+
+def _kind(placement: "Placement") -> str:
+    return "elements" if placement.n_levels else "switches"
 
 
 def _of_tree(placement: "Placement", tree: "Tree") -> Iterator[str]:

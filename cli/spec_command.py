@@ -53,7 +53,7 @@ def command(
     loaded = Build.load(build)
     if output is not None:
         check_output(output)
-    hand = fitted_hand(layout, [switch.name for switch in loaded.manifest.switches], hand_length)
+    hand = fitted_hand(layout, list(dict.fromkeys(switch.source for switch in loaded.manifest.switches)), hand_length)
     pins = () if board is None else (_board_pins(board, loaded.manifest),)
     harness = _harness(build, loaded, glove, board)
     spec = glove_spec(loaded.manifest, loaded.scan, harness, hand, pins)

@@ -7,12 +7,12 @@ import click
 
 from thenar.compiler.text import INDEPENDENT
 
-from .common import ListOf, existing_file, existing_folder, json_flag, out, progress, show
+from .common import ListOf, existing_file, existing_folder, json_flag, out, progress, show, table
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from thenar.compiler.artifact.verify import Verification
+    from thenar.compiler.artifact.verify import FaultCheck, Verification
     from thenar.compiler.artifact.verify_firmware import Difference, FirmwareVerification, TargetCheck
     from thenar.compiler.tables.compare import WorstCase
 
@@ -34,8 +34,11 @@ def _kinds() -> tuple[str, ...]:
     default=(),
     help="Also compile the classifier for these, and run it there or in a simulator.",
 )
+@click.option(
+    "--faults", is_flag=True, help="Print instead what faults leave: each input lost or stuck, ports, chips, any two."
+)
 @json_flag
-def command(build: Path, recordings: Path, firmware: tuple[str, ...]) -> int:
+def command(build: Path, recordings: Path, firmware: tuple[str, ...], faults: bool) -> int:
     """Send every row through ensemble, float tables and integer tables, and hold the differences against their bounds.
 
     The worst that integers can do is not looked for among the rows: it is worked out, over every frame there is.
@@ -44,6 +47,9 @@ def command(build: Path, recordings: Path, firmware: tuple[str, ...]) -> int:
     10,000 random frames and on all extreme ones. host runs with sanitizers; avr on the smaller of ATmega328P and
     ATmega2560 that holds the build, in simavr; cortex-m on an M0+ and an M4, in qemu.
 
+    With --faults, every fault is put to every row: each input lost, whose mean row stands in, and stuck at each of its
+    values; each port, chip and board of the build's scan map dead; and any two inputs lost.
+
     Exits with 1 if a bound does not hold or an answer differs. The recordings need not be those that the build was
     compiled from.
 
@@ -51,11 +57,19 @@ def command(build: Path, recordings: Path, firmware: tuple[str, ...]) -> int:
     Example:
         thenar verify build/ set.grasps
         thenar verify build/ set.grasps --firmware host,avr,cortex-m
+        thenar verify build/ others.grasps --faults
     """
-    from thenar.compiler.artifact.verify import verify
+    from thenar.compiler.artifact.verify import verify, verify_faults
     from thenar.compiler.recordings.graspset import GraspSet
 
+    if faults and firmware:
+        raise click.UsageError("--faults counts what the tables recognise, --firmware compiles them: take one of them.")
     grasp_set = GraspSet.load(recordings)
+    if faults:
+        with progress("putting faults to rows") as report:
+            counted = verify_faults(build, grasp_set, report)
+        show(counted, _print_faults)
+        return 0
     with progress("verifying, compiling and running firmware" if firmware else "verifying") as report:
         found = verify(build, grasp_set, firmware, report)
     show(found, _print)
@@ -101,6 +115,22 @@ def _print(found: "Verification") -> None:
     if found.firmware is not None:
         print_firmware(found.firmware)
     console.print("holds" if found.holds else verdict(found.firmware))
+
+
+def _print_faults(found: "FaultCheck") -> None:
+    worst = found.worst
+    numbers = ("lost, %", "points less", "stuck, %")
+    lines = table(("input", *numbers, "at"), numbers, "Trials recognised with one input lost, or stuck at its worst")
+    for each in sorted(found.inputs, key=lambda each: each.lost):
+        rates = (f"{100 * count / worst.total:.1f}" for count in (each.lost, worst.correct - each.lost, each.stuck))
+        lines.add_row(each.name, *rates, each.value)
+    out().print(lines)
+    out().print(
+        f"without a fault: {100 * worst.correct / worst.total:.1f} %, {worst.correct:,} of {worst.total:,} trials"
+    )
+    out().print("the worst of each kind:")
+    for sentence in worst.sentences:
+        out().print(f"  {sentence}", soft_wrap=True)
 
 
 def _print_worst(console: "Console", worst: "WorstCase") -> None:

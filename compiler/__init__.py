@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .artifact.compile import compile_build
     from .artifact.documents import BuildReport, Documents
     from .artifact.estimator import Build, compile  # noqa: A004
-    from .artifact.verify import Verification, verify
+    from .artifact.verify import FaultCheck, Verification, verify, verify_faults
     from .boosting.boost import BoostingError
     from .boosting.classifier import LogitBoostClassifier
     from .evaluation.folds import EvaluationError
@@ -42,7 +42,7 @@ _HOMES = {
     ".artifact.documents": ("BuildReport", "Documents"),
     ".artifact": ("CompileError",),
     ".artifact.estimator": ("Build", "compile"),
-    ".artifact.verify": ("Verification", "verify"),
+    ".artifact.verify": ("FaultCheck", "Verification", "verify", "verify_faults"),
     ".boosting.boost": ("BoostingError",),
     ".boosting.classifier": ("LogitBoostClassifier",),
     ".evaluation.folds": ("EvaluationError",),
@@ -75,6 +75,7 @@ __all__ = [
     "CompileError",
     "Documents",
     "EvaluationError",
+    "FaultCheck",
     "Frontier",
     "GraspSet",
     "ID3Selector",
@@ -99,6 +100,7 @@ __all__ = [
     "merge",
     "split",
     "verify",
+    "verify_faults",
 ]
 
 

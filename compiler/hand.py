@@ -91,16 +91,27 @@ class HandShape:
             labels=self.labels * factor,
         )
 
+    @property
+    def by_name(self) -> dict[str, tuple[float, float]]:
+        """Where each switch lies, mm, by its name."""
+        return {name: (x, y) for name, (x, y) in zip(self.names, self.places.tolist(), strict=True)}
+
     def knows(self, names: Sequence[str]) -> bool:
-        """Return whether every one of `names` is a switch of this hand."""
-        return set(names) <= set(self.names)
+        """Return whether every one of `names` is a switch or taxel of this hand, or a level of one ("pad3>118")."""
+        return set(map(self._place_of, names)) <= set(self.names)
+
+    def _place_of(self, name: str) -> str:
+        return name if name in self.names else name.rpartition(">")[0]
 
     def numbers_of(self, names: Sequence[str]) -> NDArray[np.intp]:
-        """Return the numbers of the switches called `names`. Raises MapError naming the first strange one."""
+        """Return the numbers of the switches called `names`; of a level, its taxel's. Raises MapError naming the first
+        strange one.
+        """
         number = {name: number for number, name in enumerate(self.names)}
-        strange = next((name for name in names if name not in number), None)
+        places = list(map(self._place_of, names))
+        strange = next((name for name, place in zip(names, places, strict=True) if place not in number), None)
         if strange is not None:
-            if self.length_mm is not None and number.keys().isdisjoint(names):
+            if self.length_mm is not None and number.keys().isdisjoint(places):
                 raise MapError(f"where switch {strange!r} lies is not known: --layout takes a drawing of your glove")
             raise MapError(f"{strange!r} is no switch of the glove {self.glove}{nearest(strange, self.names)}")
-        return np.array([number[name] for name in names], dtype=np.intp)
+        return np.array([number[place] for place in places], dtype=np.intp)

@@ -60,6 +60,11 @@ def listed(parts: Sequence[str]) -> str:
 INDEPENDENT = "each row counts as a trial: whoever recorded them states that they are independent"
 
 
+def inputs_read(switches: int, taxels: int, joints: int) -> str:
+    """Return "switches 160, joints 18", and how many taxels where there are any."""
+    return f"switches {switches}, {f'taxels {taxels}, ' if taxels else ''}joints {joints}"
+
+
 def sentence(words: str) -> str:
     """Return words from within a sentence as a sentence."""
     return f"{words[:1].upper()}{words[1:].removesuffix('.')}."

@@ -9,9 +9,9 @@ Everything that the sources of the protocol disagree on is accepted either way, 
 
 import logging
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import monotonic, monotonic_ns
 from typing import Literal, Self
 
@@ -32,6 +32,7 @@ from .cyberglove_protocol import (
     RecordDecoder,
     Words,
     find_answer,
+    mask_of,
     masked_sensors,
     period_words,
     query,
@@ -128,12 +129,16 @@ class Wanted:
     poll     whether it shall be asked for each record, so that the host keeps the period
     sensors  how many it must have; None: as many as it says
     status   whether records shall carry the status byte
+    only     places, in wire order, of the sensors that it shall send; None: all
+    filtered  whether its digital filter shall be on; None: as it is
     """
 
     words: Words
     poll: bool
     sensors: int | None
     status: bool
+    only: frozenset[int] | None = None
+    filtered: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,25 +146,34 @@ class GloveInfo:
     """What was found at the end of the line.
 
     baud        its rate
-    sensors     how many bytes of sensors a record has, 18 or 22
-    names       what they measure, in wire order
+    total       how many sensors the glove has, 18 or 22
+    places      which of them, in wire order, records hold: all, or those that the box's mask lets through
+    names       what these measure, in wire order
     mask        the software mask, 3 bytes, the lowest bit of the first one first; empty where the box does not tell
     right_hand  for which hand it is; None where the box does not tell
     text        the box's information text
     status      whether records carry the status byte
     period_us   from one record to the next: as wanted, or the shortest that box and line should manage
-    notes       what is odd, in sentences for the user
+    unmasked    why all sensors are sent though fewer are wanted, in a sentence; "" where that is not so
+    notes       what else is odd, in sentences for the user
     """
 
     baud: int
-    sensors: int
+    total: int
+    places: tuple[int, ...]
     names: tuple[str, ...]
     mask: bytes
     right_hand: bool | None
     text: str
     status: bool
     period_us: int
+    unmasked: str = ""
     notes: tuple[str, ...] = ()
+
+    @property
+    def sensors(self) -> int:
+        """How many bytes of sensors a record has."""
+        return len(self.places)
 
 
 def find_line(url: str, rates: Sequence[int]) -> SerialLine:
@@ -191,35 +205,65 @@ def set_up(line: SerialLine, wanted: Wanted) -> GloveInfo:
     """
     dialogue = Dialogue(line)
     notes = _until_ready(dialogue, line.url)
-    sensors = _sensors(dialogue, line.url, wanted.sensors)
+    total = _sensors(dialogue, line.url, wanted.sensors)
     mask = _optional(dialogue, query("M")) or b""
+    every = masked if len(masked := masked_sensors(mask)) == total else _NAMES[total]
+    places, unmasked = tuple(range(total)), ""
+    if wanted.only is not None and 0 < len(wanted.only) < total:
+        some = tuple(sorted(wanted.only))
+        if _masked(dialogue, fewer := mask_of([every[place] for place in some])):
+            places, mask = some, fewer
+        else:
+            _masked(dialogue, mask_of(every))
+            unmasked = f"it takes no sensor mask: all {total} sensors are read, though {len(some)} are asked for"
     right, text = _optional(dialogue, query("R")), _optional(dialogue, INFORMATION) or b""
-    status = _configured(dialogue, wanted)
-    if wanted.status and not status:
-        notes += ("It sends no status byte: plug and wrist switch cannot be seen while it streams.",)
+    status, odd = _configured(dialogue, wanted)
     filtered = _optional(dialogue, query("F")) not in (None, b"\0")
-    told, shortest = told_us(wanted.words), shortest_us(sensors, line.baud, status=status, filtered=filtered)
+    if wanted.filtered not in (None, filtered):
+        odd += (f"Its digital filter stays {'on' if filtered else 'off'}, whatever it is told.",)
+    told, shortest = told_us(wanted.words), shortest_us(len(places), line.baud, status=status, filtered=filtered)
     if wanted.poll:
         shortest += sending_us(len(POLL), line.baud)
     return GloveInfo(
         baud=line.baud,
-        sensors=sensors,
-        names=masked if len(masked := masked_sensors(mask)) == sensors else _NAMES[sensors],
+        total=total,
+        places=places,
+        names=tuple(every[place] for place in places),
         mask=mask,
         right_hand=None if right is None else right != b"\0",
         text="".join(filter(str.isprintable, text.decode("ascii", "replace"))).strip(),
         status=status,
         period_us=round(max(told, shortest)),
-        notes=notes + _rate_note(told, shortest),
+        unmasked=unmasked,
+        notes=notes + odd + _rate_note(told, shortest),
     )
 
 
-def _configured(dialogue: Dialogue, wanted: Wanted) -> bool:
-    """Tell the box how to send, and return whether its records will carry the status byte."""
-    words = FASTEST if wanted.poll else wanted.words
-    dialogue.ask(setting("T", b"".join(word.to_bytes(2, "big") for word in words)))
+def _masked(dialogue: Dialogue, mask: bytes) -> bool:
+    """Let the box send the sensors of a mask, and return whether it says that it does."""
+    count = bytes([len(masked_sensors(mask))])
+    if _optional(dialogue, setting("M", mask)) is None:
+        return False
+    if _optional(dialogue, query("N")) != count:
+        _optional(dialogue, setting("N", count))
+    says = _optional(dialogue, query("M")) or b""
+    return masked_sensors(says) == masked_sensors(mask) and _optional(dialogue, query("N")) == count
+
+
+def _configured(dialogue: Dialogue, wanted: Wanted) -> tuple[bool, tuple[str, ...]]:
+    """Tell the box how to send; return whether its records will carry the status byte, and what it did not take."""
+    words = b"".join(word.to_bytes(2, "big") for word in (FASTEST if wanted.poll else wanted.words))
+    dialogue.ask(setting("T", words))
+    odd: tuple[str, ...] = ()
+    if _optional(dialogue, query("T")) not in (None, words):
+        odd = ("It keeps another period than it is told.",)
+    if wanted.filtered is not None:
+        _optional(dialogue, setting("F", bytes([wanted.filtered])))
     _optional(dialogue, setting("D", b"\0"))  # a box without time stamps has none to switch off
-    return _optional(dialogue, setting("U", bytes([wanted.status]))) is not None and wanted.status
+    status = _optional(dialogue, setting("U", bytes([wanted.status]))) is not None
+    if wanted.status and not status:
+        odd += ("It sends no status byte: plug and wrist switch cannot be seen while it streams.",)
+    return status and wanted.status, odd
 
 
 def _until_ready(dialogue: Dialogue, url: str) -> tuple[str, ...]:
@@ -235,6 +279,11 @@ def _until_ready(dialogue: Dialogue, url: str) -> tuple[str, ...]:
 def _sensors(dialogue: Dialogue, url: str, expected: int | None) -> int:
     answer = _optional(dialogue, query("N")) or _optional(dialogue, query("S"))
     count = answer[0] if answer else expected
+    if count not in (None, *_NAMES):
+        # A program that was cut off left a mask behind: thenar itself, as a rule.
+        has = _optional(dialogue, query("S"))
+        if has is not None and has[0] in _NAMES and _masked(dialogue, mask_of(_NAMES[has[0]])):
+            count = has[0]
     if count is None:
         raise DeviceError(f"{url}: the CyberGlove does not say how many sensors it has: say so (sensors = 18, or 22)")
     if expected is not None and count != expected:
@@ -275,6 +324,9 @@ class CyberGlove(Closing):
     rate_hz  records a second; None: as many as there can be
     sensors  18 or 22; None: as many as the glove says
     status   whether records shall carry the status byte
+    only     places, in wire order, of the sensors that are wanted; None: all. A box that does not send these alone,
+             by what it says or by what it sends, sends all: `GloveInfo.places` and `unmasked` say so
+    filtered  whether the box's digital filter shall be on; None: as it is
 
     Use it from one thread at a time. Raises SettingError for a rate that no glove can be told.
     """
@@ -288,12 +340,23 @@ class CyberGlove(Closing):
         rate_hz: float | None = None,
         sensors: int | None = None,
         status: bool = True,
+        only: Collection[int] | None = None,
+        filtered: bool | None = None,
     ) -> None:
         self.url = url
         self.counts = RecordCounts()
         self._rates = BAUD_RATES if baud is None else (baud,)
-        self._wanted = Wanted(period_words(rate_hz), poll=mode == "poll", sensors=sensors, status=status)
+        self._wanted = Wanted(
+            period_words(rate_hz),
+            poll=mode == "poll",
+            sensors=sensors,
+            status=status,
+            only=None if only is None else frozenset(only),
+            filtered=filtered,
+        )
         self._line: SerialLine | None = None
+        self._misfits = 0
+        self._unmasked = ""
         self._last_us = 0
 
     def open(self) -> GloveInfo:
@@ -305,8 +368,13 @@ class CyberGlove(Closing):
         line = find_line(self.url, self._rates)
         try:
             info = self._info = set_up(line, self._wanted)
+            if self._unmasked:
+                info = self._info = replace(info, unmasked=self._unmasked)
+            if info.unmasked:
+                _LOG.warning("%s: %s", self.url, info.unmasked)
             for note in info.notes:
                 _LOG.info("%s: %s", self.url, note)
+            self._misfits = self.counts.wrong_length
             periods_s = _SILENT_PERIODS * info.period_us / 1e6
             self._silent_s, self._noisy_s = max(_SILENT_S, periods_s), max(_NOISY_S, periods_s)
             self._start(line)
@@ -355,11 +423,12 @@ class CyberGlove(Closing):
         return self._ask(query(letter))
 
     def close(self) -> None:
-        """Stop the stream, where that is still possible, and close the line."""
+        """Stop the stream, let all sensors through again, where that is still possible, and close the line."""
         line, self._line = self._line, None
         if line is not None:
+            masked = self._info.sensors < self._info.total
             with suppress(DeviceError):
-                line.write(STOP)
+                line.write(STOP + setting("M", mask_of(_NAMES[self._info.total])).request if masked else STOP)
             line.close()
 
     def __enter__(self) -> Self:
@@ -419,6 +488,9 @@ class CyberGlove(Closing):
             self._quiet_from, self._expected, self._poll_at = now_us / 1e6, not polled, self._due
         elif now_us / 1e6 > self._given_up_at and self._expected:
             line.check_plugged()
+            if self._info.sensors < self._info.total and self.counts.wrong_length > self._misfits:
+                total, self._wanted = self._info.total, replace(self._wanted, only=None)
+                self._unmasked = f"its records are not what its sensor mask says: all {total} sensors are read"
             silent = now_us / 1e6 - self._heard_at > self._silent_s
             said = f"no byte for {self._silent_s:g}" if silent else f"no record for {self._noisy_s:g}"
             raise DeviceError(f"{self.url}: the CyberGlove has sent {said} s: check its power and the cable")

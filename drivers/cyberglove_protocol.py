@@ -91,6 +91,11 @@ def masked_sensors(mask: bytes) -> tuple[str, ...]:
     return tuple(name for slot, name in enumerate(_SLOTS) if name and bits >> slot & 1)
 
 
+def mask_of(names: Collection[str]) -> bytes:
+    """Return the mask of 3 bytes that lets these sensors through."""
+    return sum(1 << slot for slot, name in enumerate(_SLOTS) if name and name in names).to_bytes(3, "little")
+
+
 # The order on the wire. The 18-sensor glove has no sensors on the outermost finger joints; the wrist's are always last.
 SENSORS_18 = masked_sensors(MASK_18)
 SENSORS_22 = masked_sensors(MASK_22)

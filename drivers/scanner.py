@@ -1,4 +1,4 @@
-"""The switch-scanner board on a serial line: what it says, as sets of closed keys with their times."""
+"""The switch-scanner board on a serial line: what it says, as sets of closed keys, and codes, with their times."""
 
 import logging
 from collections import deque
@@ -7,11 +7,14 @@ from time import monotonic, monotonic_ns
 from typing import NamedTuple, Self
 
 from .closing import Closing
-from .errors import DeviceError
+from .errors import DeviceError, SettingError
 from .scanner_protocol import (
     DEGRADED,
     EARLY,
     NO_GRASP,
+    UNREAD,
+    Analog,
+    Channels,
     Faults,
     Frame,
     FrameCounts,
@@ -22,6 +25,7 @@ from .scanner_protocol import (
     Hello,
     Mask,
     MessageError,
+    SetChannels,
     SetDebounce,
     SetRate,
     ToBoard,
@@ -36,16 +40,18 @@ _LOG = logging.getLogger(__name__)
 
 
 class ScannerReading(NamedTuple):
-    """The keys at one time, in the host's monotonic microseconds.
+    """The keys at one time, in the host's monotonic microseconds; and where it is an ANALOG that came, the codes.
 
     known holds the keys of which anything can be said: none from a lost frame until the board has told all of its keys
     again, none that the board says it cannot read, and of a matrix without diodes only those that cannot be ghosts.
-    `closed` holds no others.
+    `closed` holds no others. codes are of the channels that were asked for (`Scanner.analog`), the lowest first, None
+    for one that could not be read.
     """
 
     time_us: int
     closed: Mask
     known: Mask
+    codes: tuple[int | None, ...] | None = None
 
 
 class BoardGrasp(NamedTuple):
@@ -96,6 +102,7 @@ class Scanner(Closing):
     hello   what the board last said of itself
     faults  what it last said of its own troubles; None: nothing yet
     grasp   what it last recognised by itself; None: nothing yet
+    analog  which channels it measures, how often, in how many bits; None before it answered `set_channels`
     times   gives readings their times: by `clock.trip_us` the last may be older, and `late_us` late came the last
             message with a time of its own
     """
@@ -109,14 +116,16 @@ class Scanner(Closing):
         self.hello: Hello | None = None
         self.faults: Faults | None = None
         self.grasp: BoardGrasp | None = None
+        self.analog: Channels | None = None
         self._decoder = FrameDecoder()
         self._sequence = self._received_bytes = 0
         self._keys = BoardKeys()
         self.times = BoardTimes()
         self._waiting: deque[Received] = deque()
         self._misfits = self._asked = 0
-        self._ask_at = 0.0
-        self._told: dict[int, SetRate | SetDebounce] = {}
+        self._ask_at = self._channels_at = 0.0
+        self._told: dict[int, SetRate | SetDebounce | SetChannels] = {}
+        self._token = 0
 
     def __enter__(self) -> Self:
         self.open()
@@ -150,8 +159,7 @@ class Scanner(Closing):
         reading = self._next()
         while reading is None:
             left = end - monotonic()
-            if not self._keys.trusted:
-                self._ask_for_state()
+            self._ask_again()
             self._receive(max(0.0, min(left, _ASK_AGAIN_S)))
             reading = self._next()
             if left <= 0:
@@ -168,6 +176,20 @@ class Scanner(Closing):
     def set_debounce(self, press_us: int, release_us: int) -> None:
         """Ask for debouncing on the board, as in Hello; answered as `set_rate` is."""
         self._tell(SetDebounce(press_us, release_us))
+
+    def set_channels(self, analog_us: int, wanted: Mask) -> None:
+        """Ask for the codes of these channels every `analog_us`, 0: never; once the answer was read, `analog` has it.
+
+        A board that restarts is told again. Raises SettingError for a board that has no analog channels.
+        """
+        if self.hello is not None and not self.hello.has_analog:
+            raise SettingError(
+                f"{self.url}: the board has no analog channels, its firmware speaks version 1 of the protocol: give it "
+                "firmware for a board.toml with [taxels]"
+            )
+        self.analog, self._token = None, self._token % 0xFF + 1
+        self._channels_at = monotonic() + _ASK_AGAIN_S
+        self._tell(SetChannels(self._token, analog_us, wanted, wanted.bit_length()))
 
     def close(self) -> None:
         """Close the line. Does no harm twice."""
@@ -192,7 +214,7 @@ class Scanner(Closing):
         for received in self._decoder.received(data):
             self._waiting.append((came_us, received))
 
-    def _tell(self, setting: SetRate | SetDebounce) -> None:
+    def _tell(self, setting: SetRate | SetDebounce | SetChannels) -> None:
         self._send(setting)
         self._told[setting.KIND] = setting
 
@@ -239,20 +261,34 @@ class Scanner(Closing):
         if isinstance(message, Hello):
             self._same(message)
             if received is not None and received.sequence == 0 and not message.token:  # it has booted
-                keys.restarted()
-                for setting in self._told.values():
-                    self._send(setting)
+                self._restarted()
         elif isinstance(message, Faults):
             self.faults = message
         elif isinstance(message, Grasp):
             flags, number = message.flags, None if message.grasp == NO_GRASP else message.grasp
             self.grasp = BoardGrasp(time_us, number, message.margin, bool(flags & DEGRADED), bool(flags & EARLY))
+        elif isinstance(message, Channels):
+            self._measures(message)
+        elif isinstance(message, Analog):
+            if (codes := self._codes(message)) is not None:
+                return ScannerReading(time_us, keys.closed & keys.known, keys.known, codes)
         elif message is not None:
             keys.heard(message)
             if keys.trusted:
                 known = keys.known
                 return ScannerReading(time_us, keys.closed & known, known)
         return ScannerReading(time_us, 0, 0) if was_trusted and not keys.trusted else None
+
+    def _restarted(self) -> None:
+        """Tell a board that has booted what it was told before."""
+        self._keys.restarted()
+        self.analog = None
+        for setting in self._told.values():
+            self._send(setting)
+
+    def _measures(self, message: Channels) -> None:
+        if message.token == self._token:
+            self.analog = message
 
     def _message(self, received: Frame | None) -> FromBoard | None:
         """Return what a frame says, None if it says nothing; then an event may have been lost."""
@@ -274,11 +310,24 @@ class Scanner(Closing):
             raise DeviceError(f"{self.url}: another scanner board answers than was opened: open it again")
         self.hello = hello
 
-    def _ask_for_state(self) -> None:
-        """Ask for a full bitmap, and again if none came."""
+    def _codes(self, message: Analog) -> tuple[int | None, ...] | None:
+        """Return the codes of the channels that were asked for last; None where they are of others."""
+        if self.analog is None or message.token != self.analog.token:
+            return None
+        if len(message.codes) != self.analog.wanted.bit_count():
+            self._misfits += 1
+            return None
+        return tuple(None if code == UNREAD else code for code in message.codes)
+
+    def _ask_again(self) -> None:
+        """Ask for a full bitmap where keys cannot be trusted, for channels where nothing answered that; and again."""
         now = monotonic()
-        if now >= self._ask_at:
+        if not self._keys.trusted and now >= self._ask_at:
             _LOG.info("%s: what the board said of its keys cannot be trusted: all of them are asked for", self.url)
             self._ask_at = now + _ASK_AGAIN_S
             self._asked += 1
             self._send(GetState())
+        asked = self._told.get(SetChannels.KIND)
+        if asked is not None and self.analog is None and now >= self._channels_at:
+            self._channels_at = now + _ASK_AGAIN_S
+            self._send(asked)

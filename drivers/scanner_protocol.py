@@ -8,9 +8,13 @@ damages one in 65536 passes.
 
 Integers are little-endian. A frame whose payload is not exactly what its kind asks for raises `MessageError`, and
 nothing else does. Times are the board's microseconds, modulo 2**32; sets of switches are one integer, bit k for key k.
+
+Version 2 is version 1 with analog channels: CHANNELS, ANALOG and SET_CHANNELS. A board of version 2 says so by a flag
+of its HELLO, and sends none of the new frames before it is asked to: a host of version 1 reads its keys as ever.
 """
 
 from binascii import crc_hqx
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass, field
 from struct import Struct, error
 from typing import ClassVar, Self
@@ -37,8 +41,13 @@ PROTOCOL = 1
 # What a HEARTBEAT carries besides its bitmap, and so how many keys a board can have.
 _TIME = Struct("<I")
 MOST_KEYS = 8 * (MAX_PAYLOAD - _TIME.size)
-# Flag of HELLO: keys stand in a matrix without diodes, where three closed corners of a rectangle close the fourth.
-WITHOUT_DIODES = 0x01
+# Flags of HELLO: keys stand in a matrix without diodes, where three closed corners of a rectangle close the fourth; and
+# the board speaks version 2, since it has analog channels.
+WITHOUT_DIODES, ANALOG = 0x01, 0x02
+ANALOG_VERSION = 2
+# Codes of channels in one ANALOG; the code of a channel that could not be read, and so the most bits of a code.
+MOST_ASKED, MOST_CHANNELS = 122, 255
+UNREAD, MOST_BITS = 0xFFFF, 15
 # What GRASP says where no grasp type was recognised.
 NO_GRASP = 255
 # Flags of GRASP: an input was missing; the scan ended as soon as the rest of the switches could not matter.
@@ -120,6 +129,13 @@ class MessageError(DeviceError):
     """A sound frame that does not carry what its kind asks for: another firmware, or one damage in 65536."""
 
 
+def _packed(layout: Struct, values: Sequence[int]) -> bytes:
+    try:
+        return layout.pack(*values)
+    except error as reason:
+        raise SettingError(f"no frame can carry {', '.join(map(str, values))}: {reason}") from reason
+
+
 class Fixed:
     """A message, a dataclass whose fields in their order are the values of `LAYOUT`."""
 
@@ -129,10 +145,7 @@ class Fixed:
 
     def payload(self) -> bytes:
         """Return what the frame carries. Raises SettingError for a value that its field cannot hold."""
-        try:
-            return self.LAYOUT.pack(*astuple(self))  # type: ignore[call-overload]
-        except error as reason:
-            raise SettingError(f"no frame can carry {self}: {reason}") from reason
+        return _packed(self.LAYOUT, astuple(self))  # type: ignore[call-overload]
 
     @classmethod
     def read(cls, payload: bytes, keys: int = 0) -> Self:
@@ -157,7 +170,7 @@ class Hello(Fixed):
     """What the board is, and how it works now: sent at boot, and in answer to PING, SET_RATE and SET_DEBOUNCE.
 
     token         that of the PING it answers, 0 where it answers none
-    flags         WITHOUT_DIODES
+    flags         WITHOUT_DIODES, ANALOG
     board         a number of this very board's own
     major, minor, patch  version of its firmware
     rows, columns key k stands at row k // columns, column k % columns; directly wired keys are one row
@@ -193,6 +206,11 @@ class Hello(Fixed):
         return self.rows * self.columns
 
     @property
+    def has_analog(self) -> bool:
+        """Whether the board has analog channels: it speaks version 2."""
+        return bool(self.flags & ANALOG)
+
+    @property
     def identity(self) -> tuple[int, int, int, int]:
         """What stays as it is while a board runs: its number, its flags, its rows and columns."""
         return self.board, self.flags, self.rows, self.columns
@@ -225,11 +243,11 @@ class _Bitmap:
     def payload(self) -> bytes:
         """Return what the frame carries: key k is bit k % 8 of byte k // 8.
 
-        Raises OverflowError where the set holds a key that there is not.
+        Raises OverflowError where the set holds a key that there is not, SettingError where a value does not fit.
         """
         *values, held, keys = astuple(self)  # type: ignore[call-overload]
         bitmap: bytes = held.to_bytes((keys + 7) // 8, "little")
-        return self.LAYOUT.pack(*values) + bitmap
+        return _packed(self.LAYOUT, values) + bitmap
 
     @classmethod
     def read(cls, payload: bytes, keys: int) -> Self:
@@ -330,6 +348,73 @@ class Lost(_Bitmap):
 
 
 @dataclass(frozen=True, slots=True)
+class Channels(_Bitmap):
+    """What a board of version 2 measures: sent in answer to SET_CHANNELS.
+
+    version    2                          token   that of the SET_CHANNELS it answers
+    bits       of a code, at most 15      analog_us  from ANALOG to ANALOG; 0: none is sent
+    wanted     the channels whose codes an ANALOG holds, of `channels` that there are
+    """
+
+    KIND: ClassVar[int] = 0x08
+    LAYOUT: ClassVar[Struct] = Struct("<BBBIB")
+
+    version: int
+    token: int
+    bits: int
+    analog_us: int
+    wanted: int
+    channels: int
+
+    def payload(self) -> bytes:
+        """Return what the frame carries. Raises OverflowError where the set holds a channel that there is not."""
+        head = (self.version, self.token, self.bits, self.analog_us, self.channels)
+        return self.LAYOUT.pack(*head) + self.wanted.to_bytes((self.channels + 7) // 8, "little")
+
+    @classmethod
+    def read(cls, payload: bytes, keys: int = 0) -> Self:
+        """Return the message. Raises MessageError."""
+        size = cls.LAYOUT.size
+        if len(payload) < size:
+            raise MessageError(f"a Channels of {len(payload)} bytes has no room for its fields")
+        version, token, bits, analog_us, channels = cls.LAYOUT.unpack_from(payload)
+        if not 1 <= bits <= MOST_BITS:
+            raise MessageError(f"codes of {bits} bits: there are 1 to {MOST_BITS}")
+        wanted = from_bitmap(payload[size:], channels)
+        if wanted.bit_count() > MOST_ASKED:
+            raise MessageError(f"{wanted.bit_count()} channels in an ANALOG: it has room for {MOST_ASKED}")
+        return cls(version, token, bits, analog_us, wanted, channels)
+
+
+@dataclass(frozen=True, slots=True)
+class Analog:
+    """The codes of the channels that were asked for, the lowest channel first; UNREAD for one that could not be read.
+
+    time_us  when the last of them was converted    token  that of the SET_CHANNELS that asked for them
+    """
+
+    KIND: ClassVar[int] = 0x09
+    LAYOUT: ClassVar[Struct] = Struct("<IB")
+
+    time_us: int
+    token: int
+    codes: tuple[int, ...]
+
+    def payload(self) -> bytes:
+        """Return what the frame carries."""
+        return self.LAYOUT.pack(self.time_us, self.token) + Struct(f"<{len(self.codes)}H").pack(*self.codes)
+
+    @classmethod
+    def read(cls, payload: bytes, keys: int = 0) -> Self:
+        """Return the message. Raises MessageError where the payload is of no whole number of codes."""
+        size = cls.LAYOUT.size
+        if len(payload) < size or (len(payload) - size) % 2:
+            raise MessageError(f"an Analog of {len(payload)} bytes holds no whole number of codes")
+        time_us, token = cls.LAYOUT.unpack_from(payload)
+        return cls(time_us, token, Struct(f"<{(len(payload) - size) // 2}H").unpack(payload[size:]))
+
+
+@dataclass(frozen=True, slots=True)
 class SetRate(Fixed):
     """How often to scan and to send, as in Hello; the Hello that answers says what the board made of it."""
 
@@ -370,12 +455,32 @@ class Ping(Fixed):
     token: int
 
 
-FromBoard = Hello | State | Heartbeat | Event | Faults | Grasp | Lost
-ToBoard = SetRate | SetDebounce | GetState | Ping
+@dataclass(frozen=True, slots=True)
+class SetChannels(_Bitmap):
+    """Send the codes of these channels, and no others, every `analog_us`; the CHANNELS that answers says what the board
+    made of it. Of more than MOST_ASKED channels it takes the lowest. `room` is how many the bitmap has room for.
+    """
+
+    KIND: ClassVar[int] = 0x15
+    LAYOUT: ClassVar[Struct] = Struct("<BI")
+
+    token: int
+    analog_us: int
+    wanted: int
+    room: int
+
+    @classmethod
+    def read(cls, payload: bytes, keys: int = 0) -> Self:
+        """Return the message. Raises MessageError."""
+        return super(SetChannels, cls).read(payload, 8 * max(0, len(payload) - cls.LAYOUT.size))
+
+
+FromBoard = Hello | State | Heartbeat | Event | Faults | Grasp | Lost | Channels | Analog
+ToBoard = SetRate | SetDebounce | GetState | Ping | SetChannels
 _FROM_BOARD: dict[int, type[FromBoard]] = {
-    kind.KIND: kind for kind in (Hello, State, Heartbeat, Event, Faults, Grasp, Lost)
+    kind.KIND: kind for kind in (Hello, State, Heartbeat, Event, Faults, Grasp, Lost, Channels, Analog)
 }
-_TO_BOARD: dict[int, type[ToBoard]] = {kind.KIND: kind for kind in (SetRate, SetDebounce, GetState, Ping)}
+_TO_BOARD: dict[int, type[ToBoard]] = {kind.KIND: kind for kind in (SetRate, SetDebounce, GetState, Ping, SetChannels)}
 
 
 def frame(message: FromBoard | ToBoard, sequence: int) -> Frame:
@@ -396,4 +501,4 @@ def to_board(received: Frame) -> ToBoard:
     kind = _TO_BOARD.get(received.kind)
     if kind is None:
         raise MessageError(f"no message to a scanner board has kind 0x{received.kind:02X}")
-    return kind.read(received.payload)
+    return kind.read(received.payload, 0)

@@ -3,7 +3,7 @@
 from itertools import combinations
 from time import monotonic_ns
 
-from .scanner_protocol import WITHOUT_DIODES, Event, FromBoard, Heartbeat, Hello, Lost, Mask, Ping, State
+from .scanner_protocol import WITHOUT_DIODES, Channels, Event, FromBoard, Heartbeat, Hello, Lost, Mask, Ping, State
 
 _MODULUS = 1 << 32
 # A ceramic resonator is wrong by up to 0.5 %: so much the offset may grow between two frames, 1/128 of what has passed.
@@ -185,7 +185,7 @@ class BoardTimes:
 
     def stamp(self, message: FromBoard | None, came_us: int) -> int:
         """Return the time of what came in. What carries none is taken to be as late as the last that did."""
-        if message is not None and not isinstance(message, State | Lost):
+        if message is not None and not isinstance(message, State | Lost | Channels):
             asked_us = self._asked.get(message.token) if isinstance(message, Hello) else None
             self.answered |= asked_us is not None
             self.late_us = came_us - self.clock.host_us(message.time_us, came_us, asked_us)

@@ -118,9 +118,13 @@ class AngleReader:
 
     __slots__ = ("_names", "_pick", "_tables")
 
-    def __init__(self, sensor_names: Sequence[str], calibration: GloveCalibration) -> None:
-        """Raise SettingError if the calibration, which is in degrees, knows none of the sensors."""
-        known = {sensor.name: sensor for sensor in calibration.sensors}
+    def __init__(
+        self, sensor_names: Sequence[str], calibration: GloveCalibration, read: Sequence[str] | None = None
+    ) -> None:
+        """Raise SettingError if the calibration, which is in degrees, knows none of the sensors; of which `read` are
+        measured, None: all.
+        """
+        known = {sensor.name: sensor for sensor in calibration.sensors if read is None or sensor.name in read}
         found = [(number, known[name]) for number, name in enumerate(sensor_names) if name in known]
         if not found:
             raise SettingError("the calibration knows none of the glove's sensors: it is of another glove")
@@ -161,7 +165,7 @@ def codes_of_bytes(joint: Calibration, calibration: GloveCalibration | None) -> 
     lines = {line.name: line for line in calibration.sensors}
     if joint.name not in lines:
         raise SettingError(f"the calibration has no sensor {joint.name!r}: calibrate the glove again")
-    return tuple(_code(joint, lines[joint.name].value(raw)) for raw in range(_BYTES))
+    return tuple(code_of_value(joint, lines[joint.name].value(raw)) for raw in range(_BYTES))
 
 
 def _raw(joint: Calibration) -> tuple[int, ...]:
@@ -173,15 +177,14 @@ def _raw(joint: Calibration) -> tuple[int, ...]:
     )
 
 
-def _code(joint: Calibration, value: float) -> int:
+def code_of_value(joint: Calibration, value: float) -> int:
+    """Return the code of a value of a joint or a taxel, held to 0..65535. Raises SettingError where that is none."""
     try:
         code = joint.code_a + (value - joint.value_a) / (
             (joint.value_b - joint.value_a) / (joint.code_b - joint.code_a)
         )
     except ZeroDivisionError:
-        raise SettingError(
-            f"the two points of joint {joint.name!r} in the build are no line: compile it again"
-        ) from None
+        raise SettingError(f"the two points of {joint.name!r} in the build are no line: compile it again") from None
     if math.isnan(code):
-        raise SettingError(f"the calibration of joint {joint.name!r} is no number: calibrate the glove again")
+        raise SettingError(f"the calibration of {joint.name!r} is no number: calibrate the glove again")
     return round(min(max(code, 0), _HIGHEST_CODE))

@@ -46,6 +46,7 @@ class SwitchFrame:
     unread   which were left unread, because with the joints of `glove` (None: lost) the leader could not be overtaken
              any more; joined with another frame of the glove, nothing would be certain
     glove    the glove's frame to join this one with, where the scan could have ended by it; None: the newest
+    taxels   the codes of the harness's taxels, in its order, None for those that were not read; None: none was
     """
 
     time_us: int
@@ -53,6 +54,7 @@ class SwitchFrame:
     lost: Mask = 0
     unread: Mask = 0
     glove: GloveFrame | None = None
+    taxels: tuple[int | None, ...] | None = None
 
 
 # A frame counts for so many of its periods: one more may be late, two may not.

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Protocol, Self
 
 from .build import Build
 from .calibration import AngleReader
-from .frames import GloveFrame, SwitchFrame
+from .frames import PERIODS, GloveFrame, SwitchFrame
 from .harness.loading import load_harness
 from .harness.wiring import Harness
 from .harness.writing import harness_to_toml
@@ -27,6 +28,7 @@ from .published import DeviceHealth, HealthReport, JointAngles
 from .recording.session import Session
 from .recording.writer import Recorder
 from .sinks.base import Fanout, Sink, SinkReport, open_sink
+from .taxels import calibration_of
 
 _REPORT_US = 1_000_000
 
@@ -123,14 +125,17 @@ class Glove:
         self.frames, self.lacking = 0, ""
         self.health: HealthReport | None = None
         self.recorder: Recorder | None = None
-        self._recognizer, self.sources = system.recognizer(), system.sources(full_scan=full_scan)
+        # A recording is to be learnt from: it holds all sensors.
+        devices = system.sources(full_scan=full_scan, all_sensors=record is not None)
+        self._recognizer, self.sources = system.recognizer(), devices
         self.feed: Feed = self.sources if feed is None else feed
         self._selector: PreshapeSelector | None = None
         if preshapes is not None:
             table = load_preshapes(preshapes)
             self.lacking, self._selector = table.check(loaded.grasps), PreshapeSelector(table)
         calibration = system.calibration
-        self._angles = None if calibration is None else AngleReader(system.sensor_names, calibration)
+        read = system.sensor_names if record is not None else system.read_sensors
+        self._angles = None if calibration is None else AngleReader(system.sensor_names, calibration, read)
         self._measured: GloveFrame | None = None
         self._newest_angles: JointAngles | None = None
         self._sinks, self._record, self._status = tuple(sinks), record, status
@@ -166,7 +171,7 @@ class Glove:
         """
         if self.stop.is_set():
             raise StopIteration
-        taken = self.feed.take()
+        taken = self._with_record(self.feed.take())
         now = taken.time_us
         moment = self._recognizer.step(now, time_ns() // 1000, taken.switches, taken.glove)
         grasp, measured = moment.grasp, taken.measured
@@ -200,6 +205,19 @@ class Glove:
         """Return how every sink is doing."""
         return self._fanout.reports()
 
+    def _with_record(self, taken: Taken) -> Taken:
+        """Return what was taken, with a record of the joints where they come on demand and the switches cannot decide
+        without: it is asked for, and awaited for as long as records count.
+        """
+        if self.feed is not self.sources:
+            return taken
+        end_us = taken.time_us + PERIODS * (self.sources.glove_period_us or 0)
+        while taken.time_us < end_us and self._recognizer.wants_record(taken.time_us, taken.switches, taken.glove):
+            self.sources.ask()
+            more = self.sources.take(end_us - taken.time_us)
+            taken = replace(more, arrived=(*taken.arrived, *more.arrived))
+        return taken
+
     def _look(self, now: int) -> None:
         self._due_us, self.sources.changed = now + _REPORT_US, False
         self.health = self._health.report(now, self.sources.health(), self.sources.overflowed)
@@ -217,4 +235,6 @@ class Glove:
             harness=harness_to_toml(system.harness),
             calibration=system.calibration,
             policy=system.policy,
+            taxels=system.harness.taxel_names,
+            taxel_calibration=calibration_of(system.harness.taxel_settings),
         )

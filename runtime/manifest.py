@@ -13,7 +13,7 @@ from msgspec import Meta, Struct, field
 from msgspec.structs import replace
 
 from .errors import BuildError
-from .names import LONGEST_NAME, fault, shortened
+from .names import LONGEST_NAME, fault, list_names, shortened
 
 SCHEMA = 1
 MAX_BYTES = 16 << 20
@@ -83,6 +83,16 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     trainer, settings : str, dict
         What makes the model, and the settings that only it takes, by name. "auto": of the trainers that take the
         settings given, the one that inner folds choose; with `rounds` that is LogitBoost.
+    levels : int or None
+        How many levels of a taxel there are to choose from, at most; None: as many as are usual.
+    keep_joints : int or None
+        How many joints are kept, at most, chosen after the switches; None: all.
+    robust : bool
+        Choose and train for the worst single lost input.
+    keep_these, never : tuple of str
+        Switches and taxels that are kept in any case, and that are not.
+    apart_mm, at_most_taxels, budget_us : float, int, float; or None
+        The least distance of what is kept, the most taxels, and the most that a scan may take.
     """
 
     prune: Count = _written(0)
@@ -100,6 +110,14 @@ class Options(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tru
     trainer: Name = AUTO
     settings: dict[Name, Given] = {}
     by: By | None = None
+    levels: Annotated[int, Meta(ge=1, le=65535)] | None = None
+    keep_joints: Annotated[int, Meta(ge=1, le=2**53)] | None = None
+    robust: bool = False
+    keep_these: tuple[Name, ...] = ()
+    never: tuple[Name, ...] = ()
+    apart_mm: Annotated[float, Meta(gt=0.0, le=1e6)] | None = None
+    at_most_taxels: Count | None = None
+    budget_us: Annotated[float, Meta(ge=0.0, le=1e12)] | None = None
 
 
 class Compared(Struct, frozen=True, forbid_unknown_fields=True):
@@ -189,8 +207,8 @@ class Calibration(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Threshold(Struct, frozen=True, forbid_unknown_fields=True):
-    """What makes a switch of a taxel: it is closed at codes above `code`. `value`, in the unit of `taxel`, is midway to
-    the next code.
+    """A level of a taxel, what makes a switch of it: closed at codes above `code`. `value`, in the unit of `taxel`, is
+    midway to the next code.
     """
 
     code: Code
@@ -200,13 +218,19 @@ class Threshold(Struct, frozen=True, forbid_unknown_fields=True):
 
 class Switch(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """A kept switch: its column in the recordings, from 0, its name, and the information (bits) that it brought: to the
-    tree of ID3, or alone where another method chose it; of a taxel, which follow the switches, also the threshold.
+    tree of ID3, or alone where another method chose it; of a taxel, which follow the switches, also the threshold. A
+    taxel may have several, each a switch with a name of its own.
     """
 
     column: Count
     name: Name
     gain: Value
     threshold: Threshold | None = None
+
+    @property
+    def source(self) -> str:
+        """The name of the column and of the glove's input: its own, or that of the taxel that it is a level of."""
+        return self.name if self.threshold is None else self.threshold.taxel.name
 
     @property
     def closed(self) -> str:
@@ -275,6 +299,46 @@ class Recognised(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=
         return f"{self.title}: {100 * self.rate:.1f} %{',' if self.low is None else ''} {self.basis}"
 
 
+class Faulty(Struct, frozen=True, forbid_unknown_fields=True):
+    """A fault: what happens ("lost", "stuck closed", "stuck at codes 0 to 40", "lost with chip 1 of bus 1"), the names
+    of the inputs to which it does, and how many trials are recognised all the same.
+    """
+
+    what: Name
+    elements: tuple[Name, ...]
+    correct: Count
+
+
+class Faults(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """The worst fault of each kind on the rows trained on, in trials: of `total`, `correct` are recognised without one.
+
+    lost   one input lost, whose mean row stands in; stuck: one input stuck at a value
+    dead   all levels of a taxel lost, all on a port, a chip or a scanner board, where a wiring is known, or all joints
+    pair   two inputs lost; None of one input, and of so many that pairs were not looked at
+    """
+
+    total: Annotated[int, Meta(ge=1, le=2**53)]
+    correct: Count
+    lost: Faulty | None = None
+    stuck: Faulty | None = None
+    dead: Faulty | None = None
+    pair: Faulty | None = None
+
+    @property
+    def worst(self) -> tuple[Faulty, ...]:
+        """The worst of each kind."""
+        return tuple(each for each in (self.lost, self.stuck, self.dead, self.pair) if each is not None)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The worst of each kind in words: "thumb_distal_3 lost: 91.2 % of trials, 3.1 points less"."""
+        return tuple(
+            f"{list_names(each.elements)} {each.what}: {100 * each.correct / self.total:.1f} % of trials, "
+            f"{100 * (self.correct - each.correct) / self.total:.1f} points less"
+            for each in self.worst
+        )
+
+
 class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True):
     """The content of `build.json`.
 
@@ -283,6 +347,7 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
                      none
     scan_sha256      of scan.json; left out where the build was compiled for no harness
     fitting          how the fit was chosen; left out where the options leave no choice
+    faults           what faults of inputs leave of the rows trained on; None in builds of older versions
     """
 
     schema: int
@@ -301,6 +366,7 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=Tr
     zero_gain_nodes: Count = 0
     scan_sha256: Digest | None = None
     fitting: Fitting | None = None
+    faults: Faults | None = None
 
     @property
     def fit(self) -> Fitting:
@@ -361,11 +427,18 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
     yield from _wrong_names("taxels", (taxel.name for taxel in taxels))
     options = manifest.options
     texts = [manifest.thenar, source.taxonomy, options.placement, options.trainer, *options.settings]
+    texts += [*options.keep_these, *options.never]
     fit = manifest.fit
     texts += [fit.trainer, *(value for value in options.settings.values() if isinstance(value, str))]
     for settings in (fit.settings, *(each.settings for each in fit.compared)):
         texts += [text for text in (*settings, *settings.values()) if isinstance(text, str)]
     texts += [each.trainer for each in fit.compared]
+    faults = manifest.faults
+    known = {*(switch.name for switch in manifest.switches), *(joint.name for joint in manifest.joints)}
+    worst = () if faults is None else faults.worst
+    yield from _wrong_names("texts", (each.what for each in worst), 2 * LONGEST_NAME)
+    if not all(known.issuperset(each.elements) for each in worst):
+        yield "counts faults of an input that it does not have"
     yield from _wrong_names("texts", texts)
     yield from _wrong_names("texts", filter(None, [source.simulated]), 2 * LONGEST_NAME)
     yield from _wrong_columns(manifest)
@@ -377,16 +450,18 @@ def _contradictions(manifest: Manifest) -> Iterator[str]:
         yield "proves something of other tables than it describes"
     counted = [(rate.correct, rate.total) for rate in manifest.rates]
     counted += [(each.correct, each.total) for each in fit.compared]
+    if faults is not None:
+        counted += [(count, faults.total) for count in (faults.correct, *(each.correct for each in worst))]
     if any(correct > total for correct, total in counted) or manifest.stopped_after > fit.number("rounds"):
         yield "counts more than there is"
 
 
 def _wrong_columns(manifest: Manifest) -> Iterator[str]:
-    switches = [switch.column for switch in manifest.switches]
-    for columns in (switches, [joint.column for joint in manifest.joints]):
+    levels = [(switch.column, switch.threshold and switch.threshold.code) for switch in manifest.switches]
+    for columns in (levels, [joint.column for joint in manifest.joints]):
         if len(set(columns)) < len(columns):
             yield "takes two inputs from one column"
-    if max(switches, default=-1) >= manifest.source.switches:
+    if max((column for column, _ in levels), default=-1) >= manifest.source.switches:
         yield "keeps a switch that the recordings do not have"
 
 

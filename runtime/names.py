@@ -10,14 +10,17 @@ __all__ = [
     "LONGEST_SHOWN",
     "SHOWN",
     "fault",
+    "level_name",
     "list_names",
     "nearest",
     "printable",
     "shortened",
     "sound_name",
+    "taxel_and_code",
 ]
 
 SHOWN = 5
+_CODE_DIGITS = 5
 # At most this many names are compared with one that is not among them.
 MOST_COMPARED = 1000
 
@@ -38,3 +41,14 @@ def list_names(names: Sequence[str], count: int | None = None) -> str:
     total = len(names) if count is None else count
     more = f" and {total - SHOWN} more" if total > SHOWN else ""
     return ", ".join(names[:SHOWN]) + more
+
+
+def level_name(taxel: str, code: int) -> str:
+    """Return the name of a level: of the bit that says whether a taxel's code is above `code`."""
+    return f"{taxel}>{code}"
+
+
+def taxel_and_code(level: str) -> tuple[str, int] | None:
+    """Return the taxel and the code in the name of a level, as `level_name` makes it; None where it is none."""
+    taxel, _, code = level.rpartition(">")
+    return (taxel, int(code)) if taxel and code.isascii() and code.isdecimal() and len(code) <= _CODE_DIGITS else None

@@ -34,6 +34,7 @@ class Scorer:
     switch_rows, switch_means   s rows
     joint_means                 j rows
     joint_rows, thresholds      j lists: a row per bin, and the codes that part the bins; distances of a slope are bins
+    joints_lost                 what all joints add while they are lost
     size, unpack                of a sum that began with `start`: its bytes, and what makes K scores of them, each 2^15
                                 too high
     """
@@ -50,6 +51,18 @@ class Scorer:
         binned = [tables.binned(joint) for joint in range(tables.n_joints)]
         self.joint_rows = [_packed(rows, offsets) for _, rows in binned]
         self.thresholds: list[list[int]] = [thresholds.tolist() for thresholds, _ in binned]
+        # Of a set of unread switches: the joints are unread as well, and scored as if they were lost.
+        self.joints_bit: Mask = 1 << tables.n_switches
+        self._pairs = [
+            (
+                *pair.joints,
+                *(steps.tolist() for steps in pair.thresholds),
+                [_packed(rows, offsets) for rows in pair.rows],
+            )
+            for pair in tables.pairs
+        ]
+        # Of all joints lost.
+        self.joints_lost = sum(self.joint_means) + self._pair_sum((0,) * tables.n_joints)
         self.reach = lru_cache(maxsize=_KEPT // tables.n_classes)(self._reach)
 
     @cached_property
@@ -70,7 +83,13 @@ class Scorer:
 
     def joint_sum(self, codes: Sequence[int]) -> int:
         """Return the sum of what all joints' codes add."""
-        return sum(map(getitem, self.joint_rows, map(bisect_left, self.thresholds, codes)))
+        return sum(map(getitem, self.joint_rows, map(bisect_left, self.thresholds, codes))) + self._pair_sum(codes)
+
+    def _pair_sum(self, codes: Sequence[int]) -> int:
+        total = 0
+        for one, other, steps, more, rows in self._pairs:
+            total += rows[bisect_left(steps, codes[one])][bisect_left(more, codes[other])]
+        return total
 
     def lanes_without(
         self, bits: ArrayLike, codes: ArrayLike, lost_switches: ArrayLike, lost_joints: ArrayLike
@@ -84,6 +103,7 @@ class Scorer:
         for joint, (code, lost) in enumerate(zip(joints, lost_codes, strict=True)):
             row = self.joint_rows[joint][bisect_left(self.thresholds[joint], code)]
             total += self.joint_means[joint] if lost else row
+        total += self._pair_sum([0 if lost else code for code, lost in zip(joints, lost_codes, strict=True)])
         return self.unpack(total.to_bytes(self.size, "little"))
 
     def _codes(self, codes: ArrayLike) -> list[int]:
@@ -97,10 +117,15 @@ class Scorer:
         return values
 
     def _reach(self, leader: int, unread: Mask) -> tuple[int, ...]:
-        """Return the `reaches` of a leader as plain integers, kept for those that come again and again."""
+        """Return the `reaches` of a leader as plain integers, kept for those that come again and again; with
+        those of the joints where `unread` has the bit `joints_bit`.
+        """
         switches = [number for number in range(self.tables.n_switches) if unread >> number & 1]
-        found: list[int] = reaches(self.tables, leader, switches).tolist()
-        return tuple(found)
+        found = reaches(self.tables, leader, switches)
+        if unread & self.joints_bit:
+            found = found + joint_reaches(self.tables, leader)
+        steps: list[int] = found.tolist()
+        return tuple(steps)
 
 
 def reaches(tables: IntegerTables, leader: int, switches: Sequence[int]) -> NDArray[np.int64]:
@@ -114,6 +139,19 @@ def reaches(tables: IntegerTables, leader: int, switches: Sequence[int]) -> NDAr
     both = (rows[list(switches)].astype(np.int64) for rows in (tables.switch_rows, tables.switch_means))
     closed, lost = (rows - rows[:, leader, np.newaxis] for rows in both)
     found: NDArray[np.int64] = np.maximum(0, np.maximum(closed, lost)).sum(axis=0)
+    return found
+
+
+def joint_reaches(tables: IntegerTables, leader: int) -> NDArray[np.int64]:
+    """Return, for every class (K,), the most steps by which all joints, scored as if they were lost, can bring it
+    closer to class `leader` once they are read: whatever their codes are, or lost indeed, which adds nothing. Each is
+    free to do its worst in one of its bins: it is the most there is.
+    """
+    found = np.zeros(tables.n_classes, np.int64)
+    for unit in tables.units:
+        rows = tables.all_choices(unit)[1].sum(axis=0)
+        gains = rows - rows[-1]
+        found += (gains - gains[:, leader, np.newaxis]).max(axis=0)
     return found
 
 
@@ -133,7 +171,7 @@ class LiveScores:
         self._lost: Mask = 0
         self._closed, self._silent = scorer.start, 0
         self._codes: tuple[int, ...] | None = None
-        self._joints = sum(scorer.joint_means)
+        self._joints = scorer.joints_lost
 
     def joints(self, codes: Sequence[int] | None) -> None:
         """Take the codes of all joints; None: all are lost. Raises FrameError."""
@@ -142,7 +180,7 @@ class LiveScores:
             return
         scorer = self._scorer
         if taken is None:
-            self._joints = sum(scorer.joint_means)
+            self._joints = scorer.joints_lost
         elif len(taken) != len(scorer.thresholds):
             raise FrameError(f"{len(taken)} codes, the build has {len(scorer.thresholds)} joints")
         else:

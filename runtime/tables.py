@@ -1,7 +1,7 @@
 """The integer score tables of a build, and `tables.bin`.
 
     score_k = bias_k + sum over switches s of bits_s * switch_rows[s, k] + sum over joints a of joint_rows[a][bin_a, k]
-              + sum over slopes l of distance_l * row_l[k]
+              + sum over slopes l of distance_l * row_l[k] + sum over pairs p of joints rows_p[bin_a, bin_b, k]
 
 where bin_a is the number of thresholds of joint a below its code, and distance_l how far its joint's code lies from the
 middle of a range (`Slope`). Distances and their rows are int8, everything else is int16, and no partial sum, in any
@@ -27,11 +27,18 @@ Tables with n > 0 slopes are of format 2, in which offset 6 holds n, and in whic
 
             8 n         joint, low, high, uint16, and gain, int16, of each slope
             K n         rows, int8, a row of K per slope
+
+Tables with n > 0 pairs of joints, and no slopes, are of format 3, in which offset 6 holds n, and in which follow
+
+            8 n         the joints a < b of each pair, and how many thresholds T_a and T_b it has for them, uint16
+            2 sum T     thresholds, uint16, pair after pair, a's before b's
+            2 sum R K   rows, int16, pair after pair, R = (T_a + 1)(T_b + 1): a's bins one by one, in each b's; K a row
 """
 
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +47,7 @@ from .errors import BuildError
 from .sealed import seal, unseal
 
 KIND = b"THNRTABL"
-PLAIN, SLOPED = 1, 2  # formats
+PLAIN, SLOPED, PAIRED = 1, 2, 3  # formats
 LIMIT = 32767
 MAX_CLASSES, MAX_SWITCHES, MAX_JOINTS = 1024, 4096, 256
 MAX_BYTES = 16 << 20
@@ -49,12 +56,35 @@ MAX_BYTES = 16 << 20
 COARSEST_SCALE, FINEST_SCALE = 2.0**-64, 2.0**30
 _COUNTS = struct.Struct("<HHHHd")
 _SLOPE = struct.Struct("<HHHh")
+_PAIR = struct.Struct("<HHHH")
 HIGHEST_CODE = 65535
 # The most that a range of codes may come to: a distance from its middle, and its negative, are one byte.
 WIDEST = 254
 COARSE = 256
+LOST = -1
+# What two joints of a pair can say together, each bin of one with each of the other: of more no bound is worked out.
+_MOST_CELLS = 1 << 20
 
 Rows = NDArray[np.int16]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pair:
+    """What two joints add together: a row for each bin of the one and each of the other, of integers or floats.
+
+    joints (a, b), a < b; thresholds (T_a,) and (T_b,) uint16, strictly increasing; rows (T_a + 1, T_b + 1, K). A joint
+    that is missing counts as code 0 here.
+    """
+
+    joints: tuple[int, int]
+    thresholds: tuple[NDArray[np.uint16], NDArray[np.uint16]]
+    rows: NDArray[Any]
+
+    def of(self, codes: NDArray[np.integer]) -> NDArray[Any]:
+        """Return what the codes (n, j) of all joints add, (n, K)."""
+        one, other = (np.searchsorted(t, codes[:, a]) for a, t in zip(self.joints, self.thresholds, strict=True))
+        rows: NDArray[Any] = self.rows[one, other]
+        return rows
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,7 +135,7 @@ class IntegerTables:
 
     bias (K,), switch_rows (s, K), thresholds: j arrays uint16 (T_a,), joint_rows: j arrays (T_a + 1, K),
     switch_means (s, K), joint_means (j, K), scale in steps per unit of score; slopes of joints, at most one each, in
-    the order of the joints.
+    the order of the joints; or pairs of joints, each joint in one at most, in the order of their first joints.
     """
 
     bias: Rows
@@ -116,6 +146,7 @@ class IntegerTables:
     joint_means: Rows
     scale: float
     slopes: tuple[Slope, ...] = ()
+    pairs: tuple[Pair, ...] = ()
 
     def __post_init__(self) -> None:
         _check_counts(self.n_classes, self.n_switches, self.n_joints)
@@ -149,6 +180,12 @@ class IntegerTables:
         return max(int(_furthest(self, +1).max()), int(_furthest(self, -1).max()))
 
     @property
+    def units(self) -> tuple[tuple[int, ...], ...]:
+        """The joints, those of a pair together: what one of these adds is nothing to the others."""
+        paired = {joint: pair.joints for pair in self.pairs for joint in pair.joints}
+        return tuple(sorted({paired.get(joint, (joint,)) for joint in range(self.n_joints)}))
+
+    @property
     def grid(self) -> int:
         """What all rows of switches and bins are multiples of, where joints have slopes: 256 if they are, else 1."""
         rows = [self.switch_rows, *(rows for rows in self.joint_rows if len(rows) > 1)]
@@ -178,6 +215,41 @@ class IntegerTables:
         codes = codes[codes <= HIGHEST_CODE]
         return codes, np.stack([rows[np.searchsorted(thresholds, codes)], slope.of(codes)])
 
+    def all_choices(self, unit: tuple[int, ...]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return all that a unit's joints can say, codes or LOST (c, joints), and the terms of each (t, c, K).
+
+        The last is that all of them are lost.
+        """
+        pair = next((pair for pair in self.pairs if pair.joints == unit), None)
+        if pair is None:
+            codes, terms = self.choices(unit[0])
+            lost = np.zeros_like(terms[:, :1])
+            lost[0] = self.joint_means[unit[0]]
+            return np.append(codes, LOST)[:, np.newaxis], np.concatenate([terms, lost], axis=1)
+        parts = []
+        for joint, steps in zip(unit, pair.thresholds, strict=True):
+            own = self.thresholds[joint]
+            codes = np.append(np.unique(np.concatenate([[0], own.astype(np.int64) + 1, steps.astype(np.int64) + 1])), 0)
+            rows = self.joint_rows[joint][np.searchsorted(own, codes)]
+            rows[-1], there = self.joint_means[joint], np.arange(len(codes)) < len(codes) - 1
+            parts.append((np.where(there, codes, LOST), rows, np.searchsorted(steps, codes)))
+        (one, rows, at), (other, more_rows, more_at) = parts
+        first, second = (each.ravel() for each in np.indices((len(one), len(other))))
+        terms = np.stack([rows[first], more_rows[second], pair.rows[at[first], more_at[second]]])
+        return np.column_stack([one[first], other[second]]), terms.astype(np.int64)
+
+    @property
+    def jointless(self) -> NDArray[np.int64]:
+        """The bias and what all joints add while they are lost, (K,)."""
+        lost = [self.all_choices(unit)[1].sum(axis=0)[-1] for unit in self.units]
+        found: NDArray[np.int64] = np.sum([self.bias.astype(np.int64), *lost], axis=0)
+        return found
+
+    def steps_of(self, joint: int) -> NDArray[np.int64]:
+        """Return the codes after which what a joint adds changes, in order: its thresholds, and those in its pair."""
+        paired = (t for pair in self.pairs for a, t in zip(pair.joints, pair.thresholds, strict=True) if a == joint)
+        return np.unique(np.concatenate([self.thresholds[joint], *paired])).astype(np.int64)
+
     def binned(self, joint: int) -> tuple[NDArray[np.uint16], Rows]:
         """Return the thresholds of a joint and its rows, as they would be if each distance of its slope were a bin."""
         thresholds, rows, slope = self.thresholds[joint], self.joint_rows[joint], self.slope_of(joint)
@@ -197,6 +269,8 @@ class IntegerTables:
             sums += rows[np.searchsorted(thresholds, column, side="left")]
         for slope in self.slopes:
             sums += slope.of(codes[:, slope.joint]).astype(np.int32)
+        for pair in self.pairs:
+            sums += pair.of(codes)
         return sums
 
 
@@ -205,9 +279,8 @@ def _furthest(tables: IntegerTables, sign: int) -> NDArray[np.int64]:
     reach = np.maximum(sign * tables.bias.astype(np.int64), 0)
     switches = np.stack([tables.switch_rows, tables.switch_means]).astype(np.int64)
     reach += np.maximum(sign * switches, 0).max(axis=0).sum(axis=0)
-    for joint, mean in enumerate(tables.joint_means.astype(np.int64)):
-        onward = np.maximum(sign * tables.choices(joint)[1], 0).sum(axis=0)
-        reach += np.maximum(onward.max(axis=0), sign * mean)
+    for unit in tables.units:
+        reach += np.maximum(sign * tables.all_choices(unit)[1], 0).sum(axis=0).max(axis=0)
     return reach
 
 
@@ -238,9 +311,31 @@ def _check_shapes(tables: IntegerTables) -> None:
     for slope in tables.slopes:
         if slope.row.shape != (K,) or slope.row.dtype != np.int8:
             raise BuildError(f"the row of a slope is {slope.row.dtype} {slope.row.shape}, it must be int8 ({K},)")
+    _check_pairs(tables)
+    for a, pair in enumerate(tables.pairs):
+        one, other = pair.thresholds
+        expected[f"pairs[{a}].rows"] = (pair.rows, (len(one) + 1, len(other) + 1, K))
     for name, (rows, shape) in expected.items():
         if rows.shape != shape or rows.dtype != np.int16:
             raise BuildError(f"{name} is {rows.dtype} {rows.shape}, it must be int16 {shape}")
+
+
+def _check_pairs(tables: IntegerTables) -> None:
+    joints = [joint for pair in tables.pairs for joint in pair.joints]
+    if tables.slopes and joints:
+        raise BuildError("slopes and pairs: tables have one of both")
+    if len(set(joints)) < len(joints) or any(
+        not 0 <= a < b < tables.n_joints for a, b in (p.joints for p in tables.pairs)
+    ):
+        raise BuildError(f"pairs of joints {joints}: each is below {tables.n_joints}, and in one pair at most")
+    if joints[::2] != sorted(joints[::2]):
+        raise BuildError(f"pairs of joints {joints}: their first joints must rise")
+    for pair in tables.pairs:
+        if any(t.dtype != np.uint16 or np.any(t[1:] <= t[:-1]) for t in pair.thresholds):
+            raise BuildError(f"the thresholds of the pair of joints {pair.joints} are not strictly increasing")
+        one, other = (len(tables.thresholds[a]) + len(t) + 2 for a, t in zip(pair.joints, pair.thresholds, strict=True))
+        if one * other > _MOST_CELLS:
+            raise BuildError(f"joints {pair.joints} have {one} and {other} bins: too many for a pair")
 
 
 def _check_stored_scale(scale: float) -> None:
@@ -249,17 +344,26 @@ def _check_stored_scale(scale: float) -> None:
         raise BuildError(f"the scale is {scale!r}, in a file it must be at least 2^-64 steps per unit")
 
 
-def payload_bytes(n_classes: int, n_switches: int, thresholds: Sequence[int], n_slopes: int = 0) -> int:
-    """Return the length of the payload of tables of so many classes and switches; `thresholds` of each joint."""
-    rows = 1 + 2 * n_switches + sum(2 + count for count in thresholds)
-    words = len(thresholds) + sum(thresholds) + n_classes * rows
-    return _COUNTS.size + 2 * words + n_slopes * (_SLOPE.size + n_classes)
+def payload_bytes(
+    n_classes: int,
+    n_switches: int,
+    thresholds: Sequence[int],
+    n_slopes: int = 0,
+    pairs: Sequence[tuple[int, int]] = (),
+) -> int:
+    """Return the length of the payload of tables of so many classes and switches; `thresholds` of each joint, and of
+    both joints of `pairs`.
+    """
+    rows = 1 + 2 * n_switches + sum(2 + count for count in thresholds) + sum((a + 1) * (b + 1) for a, b in pairs)
+    words = len(thresholds) + sum(thresholds) + sum(a + b for a, b in pairs) + n_classes * rows
+    return _COUNTS.size + 2 * words + n_slopes * (_SLOPE.size + n_classes) + len(pairs) * _PAIR.size
 
 
 def tables_to_bytes(tables: IntegerTables) -> bytes:
     """Return the content of `tables.bin`. Raises BuildError if it is larger than 16 MiB or its scale too coarse."""
     _check_stored_scale(tables.scale)
-    header = _COUNTS.pack(tables.n_classes, tables.n_switches, tables.n_joints, len(tables.slopes), tables.scale)
+    more = len(tables.slopes) + len(tables.pairs)
+    header = _COUNTS.pack(tables.n_classes, tables.n_switches, tables.n_joints, more, tables.scale)
     counts = np.array([len(t) for t in tables.thresholds], dtype="<u2").tobytes()
     rows = (tables.bias, tables.switch_rows, tables.switch_means, tables.joint_means)
     parts = [header, counts, *(r.astype("<i2").tobytes() for r in rows)]
@@ -267,7 +371,10 @@ def tables_to_bytes(tables: IntegerTables) -> bytes:
     parts += [r.astype("<i2").tobytes() for r in tables.joint_rows]
     parts += [_SLOPE.pack(slope.joint, slope.low, slope.high, slope.gain) for slope in tables.slopes]
     parts += [slope.row.astype("<i1").tobytes() for slope in tables.slopes]
-    data = seal(KIND, SLOPED if tables.slopes else PLAIN, b"".join(parts))
+    parts += [_PAIR.pack(*pair.joints, *map(len, pair.thresholds)) for pair in tables.pairs]
+    parts += [each.astype("<u2").tobytes() for pair in tables.pairs for each in pair.thresholds]
+    parts += [pair.rows.astype("<i2").tobytes() for pair in tables.pairs]
+    data = seal(KIND, SLOPED if tables.slopes else PAIRED if tables.pairs else PLAIN, b"".join(parts))
     if len(data) > MAX_BYTES:
         raise BuildError(f"the tables need {len(data)} bytes, a build has at most {MAX_BYTES}: keep fewer inputs")
     return data
@@ -281,7 +388,7 @@ def tables_from_bytes(data: bytes, what: str = "tables.bin") -> IntegerTables:
     """
     if len(data) > MAX_BYTES:
         raise BuildError(f"{what} has {len(data)} bytes, a build has at most {MAX_BYTES}")
-    version, payload = unseal(data, KIND, SLOPED, what)
+    version, payload = unseal(data, KIND, PAIRED, what)
     try:
         return _parse(payload, version)
     except BuildError as wrong:
@@ -294,14 +401,20 @@ def _parse(payload: bytes, version: int) -> IntegerTables:
     K, s, j, n, scale = _COUNTS.unpack_from(payload)
     _check_counts(K, s, j)
     _check_stored_scale(scale)
-    if (n > 0) != (version == SLOPED):
-        raise BuildError(f"{n} slopes in format {version}: the two bytes at offset 6 are wrong")
+    if (n > 0) != (version in (SLOPED, PAIRED)):
+        raise BuildError(f"{n} slopes or pairs in format {version}: the two bytes at offset 6 are wrong")
     if len(payload) < _COUNTS.size + 2 * j:
         raise BuildError(f"{len(payload)} bytes of content are too few for {j} joints")
     counts = np.frombuffer(payload, "<u2", j, _COUNTS.size).tolist()
     sizes = [K, s * K, s * K, j * K, *counts, *((T + 1) * K for T in counts)]
-    expected = payload_bytes(K, s, counts, n)
-    if len(payload) != expected:
+    own = payload_bytes(K, s, counts)
+    pairs = (
+        list(_PAIR.iter_unpack(payload[own : own + n * _PAIR.size]))
+        if version == PAIRED and len(payload) >= own + n * _PAIR.size
+        else []
+    )
+    expected = payload_bytes(K, s, counts, n if version == SLOPED else 0, [(one, other) for _, _, one, other in pairs])
+    if len(payload) != expected or len(pairs) != (n if version == PAIRED else 0):
         raise BuildError(f"{len(payload)} bytes of content, its counts call for {expected}")
     words = np.frombuffer(payload, "<u2", sum(sizes), _COUNTS.size + 2 * j).astype(np.uint16)
     bias, switches, means, joint_means, *joints = np.split(words, np.cumsum(sizes)[:-1])
@@ -314,7 +427,21 @@ def _parse(payload: bytes, version: int) -> IntegerTables:
         switch_means=rows[1],
         joint_means=rows[2],
         scale=scale,
-        slopes=_parse_slopes(payload[len(payload) - n * (_SLOPE.size + K) :], n, K),
+        slopes=_parse_slopes(payload[own:], n, K) if version == SLOPED else (),
+        pairs=_parse_pairs(payload[own + n * _PAIR.size :], pairs, K) if pairs else (),
+    )
+
+
+def _parse_pairs(data: bytes, pairs: Sequence[tuple[int, ...]], K: int) -> tuple[Pair, ...]:
+    words = np.frombuffer(data, "<u2").astype(np.uint16)
+    sizes = [count for pair in pairs for count in pair[2:]] + [
+        (one + 1) * (other + 1) * K for _, _, one, other in pairs
+    ]
+    parts = np.split(words, np.cumsum(sizes)[:-1])
+    steps, rows = parts[: 2 * len(pairs)], parts[2 * len(pairs) :]
+    return tuple(
+        Pair((a, b), (steps[2 * at], steps[2 * at + 1]), rows[at].view(np.int16).reshape(one + 1, other + 1, K))
+        for at, (a, b, one, other) in enumerate(pairs)
     )
 
 

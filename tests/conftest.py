@@ -67,6 +67,19 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update-golden", action="store_true", help="write the files of tests/golden anew")
 
 
+# Rooms whose tests run devices and processes in real time. On a computer that is busy with something else one of them
+# may be late; only what is late three times in a row is wrong. The summary names those that were run again.
+IN_REAL_TIME = {"live", "cli", "drivers", "runtime"}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Let tests in real time be run again, at most twice."""
+    here = Path(__file__).parent
+    for item in items:
+        if item.path.relative_to(here).parts[0] in IN_REAL_TIME:
+            item.add_marker(pytest.mark.flaky(reruns=2))
+
+
 @pytest.fixture(scope="session")
 def update_golden(request: pytest.FixtureRequest) -> bool:
     return bool(request.config.getoption("--update-golden"))

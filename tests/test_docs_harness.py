@@ -8,12 +8,22 @@ import msgspec
 import pytest
 
 from thenar.drivers.i2c.chips import CHIPS
+from thenar.drivers.spi.chips import SPI_CHIPS
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.loading import load_harness
-from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Debounce, GloveWiring, Harness, ScannerWiring
+from thenar.runtime.harness.wiring import (
+    BusWiring,
+    ChipWiring,
+    Debounce,
+    GloveWiring,
+    Harness,
+    ScannerWiring,
+    SpiWiring,
+)
 from thenar.runtime.scanning import plan
 from thenar.runtime.scanning import plan as order
 from thenar.runtime.scanning.timing import port_us, select_us
+from thenar.runtime.taxels import TaxelSettings
 
 PAGE = (Path(__file__).parents[1] / "docs" / "harness.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
@@ -23,7 +33,9 @@ TABLES: dict[str, type[msgspec.Struct]] = {
     "`[[scanner]]`": ScannerWiring,
     "`[[bus]]`": BusWiring,
     "`[[bus.chip]]`": ChipWiring,
+    "`[[spi]]`": SpiWiring,
     "`[debounce]`": Debounce,
+    "`[taxels]`": TaxelSettings,
 }
 
 
@@ -53,9 +65,10 @@ def documented() -> Iterator[tuple[str, str, str]]:
 
 def test_every_key_is_there_with_its_default() -> None:
     found = list(documented())
-    nested = {"cyberglove", "scanner", "bus", "chip", "debounce"}
+    nested = {"cyberglove", "scanner", "bus", "chip", "spi", "debounce"}
     for table, kind in TABLES.items():
-        keys = {field.encode_name: field for field in msgspec.structs.fields(kind) if field.encode_name not in nested}
+        tables = nested | ({"taxels"} if kind is Harness else set())
+        keys = {field.encode_name: field for field in msgspec.structs.fields(kind) if field.encode_name not in tables}
         assert sorted(key for where, key, _ in found if where == table) == sorted(keys)
         for where, key, default in found:
             if where == table and keys[key].default not in (msgspec.NODEFAULT, None, ()):
@@ -63,8 +76,8 @@ def test_every_key_is_there_with_its_default() -> None:
 
 
 def test_every_kind_of_chip_is_named() -> None:
-    (kinds,) = (text for _, key, _, text in rows("table | key") if key == "`kind`")
-    assert set(re.findall(r"`(\w+)`", kinds)) == set(CHIPS)
+    kinds = [text for _, key, _, text in rows("table | key") if key == "`kind`"]
+    assert [set(re.findall(r"`(\w+)`", text)) for text in kinds] == [set(CHIPS), set(SPI_CHIPS)]
 
 
 def test_the_times_are_those_of_the_arithmetic() -> None:

@@ -71,6 +71,8 @@ def shown(value: object) -> set[str]:
         return {"required", ""}
     if value is None:
         return {"drawn", "1"}
+    if value == ():
+        return {"none"}
     if isinstance(value, str):
         return {f'`"{value}"`'}
     return {str(value), f"{value:g}"}

@@ -140,8 +140,13 @@ def fit_logit(
         scale = float(np.ldexp(1.0, -np.frexp(weights.max())[1]))
         weights = on_one_grid(weights * scale, len(X))
     held = np.ones(len(X)) if weights is None else weights
-    columns = _columns(X, max_bins, weights, held if linear else None)
-    rows = _Fit(columns, labels, n_classes, penalty * scale, smoothness * scale, weights).minimum(tolerance)
+    columns = columns_of(X, max_bins, weights, held if linear else None)
+    rows = Fit(columns, labels, n_classes, penalty * scale, smoothness * scale, weights).minimum(tolerance)
+    return tables_of(columns, rows, held)
+
+
+def tables_of(columns: Sequence["Column"], rows: Floats, held: Floats) -> ColumnTables:
+    """Return rows (r, K), those of a minimum, as tables; `held` (n,) are the frames' weights."""
     bias, *parts = np.split(rows, np.cumsum([1, *(column.n_rows for column in columns[:-1])])) if columns else [rows]
     bias, tables, lines = bias[0], [], {}
     for number, (column, own) in enumerate(zip(columns, parts, strict=True)):
@@ -187,20 +192,24 @@ def _marked(units: Floats) -> Floats:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Column:
+class Column:
     """A column of frames: its edges, the bin (n,) of each, the last for missing, and the first bin that has a row.
 
-    A line has one row instead of its only bin.
+    A line has one row instead of its only bin. Of two columns together, bins are the numbers of `cells`, row by row,
+    each of which has a row, and `smoothness` pulls neighbours in both directions.
     """
 
     edges: Floats
     bins: NDArray[np.intp]
     first: int
     line: _Ruler | None = None
+    cells: tuple[int, int] | None = None
+    smoothness: float = 0.0
 
     @property
     def n_rows(self) -> int:
-        return int(self.bins.max()) + 1 - self.first
+        """How many rows it has."""
+        return math.prod(self.cells) if self.cells else int(self.bins.max()) + 1 - self.first
 
     def entries(self) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
         """Return the frames, rows and values of the column's entries in the design, each (entries,)."""
@@ -230,26 +239,32 @@ class _Column:
         return np.vstack([table, mean])
 
 
-def _columns(
+def columns_of(
     X: NDArray[np.generic], max_bins: int | None, weights: Floats | None, straight: Floats | None
-) -> list[_Column]:
+) -> list[Column]:
     """Return the columns; those of more than two values as lines, if weights (n,) are given for it as `straight`."""
-    binned = bin_columns(X, max_bins, weights)
     columns = []
-    for number in range(X.shape[1]):
-        x, edges = np.asarray(X[:, number], np.float64), np.zeros(0)
-        if number in binned.home:
-            group, position = binned.home[number]
-            edges = np.array([group.threshold(position, split) for split in range(group.n_splits(position))])
+    for number, edges in enumerate(column_edges(X, max_bins, weights)):
+        x = np.asarray(X[:, number], np.float64)
         bins = _bins(x, edges)
         # One bin alone says what the bias does, and one of two what the other does not.
         if bins.max() < 2:
-            columns.append(_Column(edges, bins, 1))
+            columns.append(Column(edges, bins, 1))
         elif straight is None or not len(edges):
-            columns.append(_Column(edges, bins, 0))
+            columns.append(Column(edges, bins, 0))
         else:
-            columns.append(_Column(np.zeros(0), np.isnan(x).astype(np.intp), 0, _Ruler.of(x, straight)))
+            columns.append(Column(np.zeros(0), np.isnan(x).astype(np.intp), 0, _Ruler.of(x, straight)))
     return columns
+
+
+def column_edges(X: NDArray[np.generic], max_bins: int | None, weights: Floats | None = None) -> list[Floats]:
+    """Return the edges of each column's bins, none of a column without splits."""
+    binned, found = bin_columns(X, max_bins, weights), []
+    for number in range(X.shape[1]):
+        group, position = binned.home.get(number, (None, 0))
+        splits = range(group.n_splits(position)) if group is not None else ()
+        found.append(np.array([group.threshold(position, split) for split in splits if group is not None], np.float64))
+    return found
 
 
 def _bins(x: Floats, edges: Floats) -> NDArray[np.intp]:
@@ -268,12 +283,15 @@ class _Point:
     gradient: Floats
 
 
-class _Fit:
-    """The loss of rows W (r, K), and its minimum. Sums over frames are exact, as are those that decide."""
+class Fit:
+    """The loss of rows W (r, K), and its minimum. Sums over frames are exact, as are those that decide.
+
+    The rows are the bias, then those of each column.
+    """
 
     def __init__(
         self,
-        columns: list[_Column],
+        columns: Sequence[Column],
         labels: NDArray[np.intp],
         n_classes: int,
         penalty: float,
@@ -283,6 +301,7 @@ class _Fit:
         n, self._labels, self._weights = len(labels), labels, weights
         self._member = (labels[:, np.newaxis] == np.arange(n_classes)).astype(np.float64)
         self._total = float(n if weights is None else weights.sum())
+        self._grids: list[tuple[int, int, tuple[int, int], float]] = []
         frames, rows, values = [np.arange(n)], [np.zeros(n, np.intp)], [np.ones(n)]
         pull, joined, start = [np.array([BIAS_SHARE * penalty])], [np.zeros(0, np.intp)], 1
         for column in columns:
@@ -291,10 +310,12 @@ class _Fit:
             rows.append(start + own_rows)
             values.append(own_values)
             pull.append(column.pulls(penalty, smoothness))
-            if column.first == 0:
+            if column.cells:
+                self._grids.append((start, start + column.n_rows, column.cells, column.smoothness))
+            elif column.first == 0:
                 joined.append(np.arange(start, start + len(column.edges)))
             start += column.n_rows
-        self._design = _sparse(np.concatenate(values), np.concatenate(frames), np.concatenate(rows), (n, start))
+        self._design = sparse(np.concatenate(values), np.concatenate(frames), np.concatenate(rows), (n, start))
         self._by_row = self._design.T.tocsr()
         self._squares = self._by_row * self._by_row
         # How much the values of a frame, and those of a row, add up to, in the units of which they are multiples.
@@ -305,6 +326,9 @@ class _Fit:
         self._joint[np.concatenate(joined)] = smoothness
         ends = np.pad(self._joint, ((1, 1), (0, 0)))
         self._stiffness = self._pull + ends[1:] + ends[:-1]
+        for first, last, cells, between in self._grids:
+            neighbours = [np.minimum(np.arange(count), 1) + np.minimum(np.arange(count)[::-1], 1) for count in cells]
+            self._stiffness[first:last] += between * np.add.outer(*neighbours).reshape(-1, 1)
 
     def minimum(self, tolerance: float) -> Floats:
         """Return the rows at which no derivative is beyond `tolerance` times the weight of all frames."""
@@ -333,7 +357,19 @@ class _Fit:
         held, stepped = self._pull * rows, self._joint * (rows[1:] - rows[:-1])
         held[1:] += stepped
         held[:-1] -= stepped
+        for first, last, cells, between in self._grids:
+            block, more = (part[first:last].reshape(*cells, -1) for part in (rows, held))
+            down, across = between * (block[1:] - block[:-1]), between * (block[:, 1:] - block[:, :-1])
+            more[1:] += down
+            more[:-1] -= down
+            more[:, 1:] += across
+            more[:, :-1] -= across
         return held
+
+    def residuals(self, rows: Floats) -> tuple[Floats, Floats]:
+        """Return by how much the probabilities at these rows are too high, (n, K), and their spread."""
+        p = self._at(rows).probability
+        return p - self._member, p * (1.0 - p)
 
     def _over_frames(self, values: Floats) -> Floats:
         """Return the sums (r, K) of `values` (n, K), which are lost, times the weights, over the frames of each row."""
@@ -382,7 +418,8 @@ class _Fit:
         return there
 
 
-def _sparse(values: Floats, frames: NDArray[np.intp], rows: NDArray[np.intp], shape: tuple[int, int]) -> "csr_array":
+def sparse(values: Floats, frames: NDArray[np.intp], rows: NDArray[np.intp], shape: tuple[int, int]) -> "csr_array":
+    """Return a matrix of these values, at these frames and rows."""
     # Help of commands lists the trainers, and none of it takes scipy's half a second.
     from scipy.sparse import csr_array
 

@@ -34,14 +34,17 @@ from thenar.runtime.tables import IntegerTables, tables_to_bytes
 
 from ..firmware.classifier import FIRMWARE_NAME, LIBRARY_FILES
 from ..glove.files import NAMES, users_files
+from ..hand import HandShape
+from ..placement.constraints import Limits
+from ..placement.elements import Element, names_of
 from ..placement.methods.base import METHODS
 from ..placement.ports import PortCosts, ports_of_whole_glove
-from ..placement.thresholds import with_switches
 from ..publication import check_folder, publish_folder, sweep
 from ..recordings.frames import check_trials
 from ..recordings.graspset import GraspSet, Joint
-from ..samples import Columns, Samples
+from ..samples import Samples
 from ..tables.compare import Comparison, compare
+from ..tables.faults import count_faults, groups_of, worst_faults
 from ..trainers.base import SHARED, TRAINERS, Training, changed
 from . import CompileError
 from .documents import REPORT_NAME, SPEC_FOLDER, BuildReport, Documents, Progress
@@ -117,6 +120,7 @@ def compile_build(
     *,
     harness: Wired | None = None,
     ports: PortCosts | None = None,
+    hand: HandShape | None = None,
     documents: Documents | None = None,
     jobs: int = -1,
     progress: Progress | None = None,
@@ -138,6 +142,8 @@ def compile_build(
         A wiring, or what makes one for the names of the kept switches: the build says how to read its switches there.
     ports : PortCosts, optional
         What reading each switch costs, for methods that ask; None: on a glove of as few MCP23017 as will do.
+    hand : HandShape, optional
+        Where the switches lie, for `apart_mm`; None: as the documents' hand has it.
     documents : Documents, optional
         A report and the spec of the glove, to go into the folder.
     jobs : int
@@ -177,13 +183,14 @@ def compile_build(
         check_trials(grasp_set, CompileError)
     cuts = cuts_of(grasp_set, asked)
     steps = _Steps(progress, sum(len(cut.folds) for cut in cuts))
-    ports = ports or ports_of_whole_glove(None, grasp_set.element_names)
+    ports = ports or ports_of_whole_glove(None, grasp_set.element_names, len(grasp_set.taxel_columns))
+    hand = hand or (None if documents is None else documents.hand)
     groups = groups_for(grasp_set, asked)
-    trained = train(samples, asked, steps.trained, ports, groups, jobs)
-    joints = tuple(range(samples.codes.shape[1]))
-    made = Making(grasp_set, samples, joints, asked, trained, harness)
+    limits = Limits.of(asked, grasp_set, {} if hand is None else hand.by_name)
+    trained = train(samples, asked, steps.trained, ports, groups, jobs, limits)
+    made = Making(grasp_set, samples, asked, trained, harness)
     tested = cross_validated(
-        samples, cuts, asked, partial(answers_of, samples, asked, ports, groups), jobs, steps.tested
+        samples, cuts, asked, partial(answers_of, samples, asked, ports, groups, limits), jobs, steps.tested
     )
     return made.publish(target, tested, documents, jobs, progress)
 
@@ -227,30 +234,33 @@ class _Steps:
 
 
 class Making:
-    """A build in the making: integers of what was trained, held against it, and how to read its switches.
-
-    `samples` have all switches, and the codes of `joints`, columns of the recordings.
+    """A build in the making: integers of what was trained on `samples`, held against it, and how to read its
+    switches.
     """
 
     def __init__(
         self,
         grasp_set: GraspSet,
         samples: Samples,
-        joints: Columns,
         options: Options,
         trained: Trained,
         harness: Wired | None,
     ) -> None:
-        self.grasp_set, self.samples, self.joints = grasp_set, samples, joints
+        self.grasp_set, self.samples = grasp_set, samples
         self.options, self.trained = options, trained
-        kept = with_switches(samples, trained.thresholds).keeping(trained.columns)
+        kept = trained.read(samples)
         self.integers = integers_of(trained, samples, options)
-        names = [grasp_set.element_names[column] for column in trained.columns]
+        names = names_of(grasp_set, trained.kept)
         self.harness = harness(names) if callable(harness) else harness
         self.scan = None
         if self.harness is not None:
             self.scan = plan_scan(names, self.integers, self.harness, kept.switches, kept.codes)
         self.comparison = compare(trained.model, self.integers, kept.switches, kept.codes)
+        self._inputs = (*names, *(grasp_set.joint_names[joint] for joint in trained.joints))
+        sources = [grasp_set.element_names[element.column] for element in trained.kept]
+        self._groups = groups_of(self.scan, sources, len(trained.joints))
+        groups = tuple(self._groups.values())
+        self.faults = count_faults(self.integers, kept.switches, kept.codes, kept.labels, kept.trials, groups)
 
     def publish(
         self,
@@ -279,6 +289,7 @@ class Making:
             grasp_set=self.grasp_set,
             trained=self.trained,
             comparison=self.comparison,
+            faults=self.faults,
             confusion=None if tested is None else tested.confusion,
         )
         files |= {path: text.encode() for path, text in firmware.items()}
@@ -296,7 +307,7 @@ class Making:
         digests = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
         grasp_set, options, fitting = self.grasp_set, self.options, self.trained.fitting
         rates = rates_of("training", self.samples, self.comparison.deployed, options.seed)
-        switches = zip(self.trained.columns, self.trained.gains, strict=True)
+        switches = zip(self.trained.kept, names_of(grasp_set, self.trained.kept), self.trained.gains, strict=True)
         return Manifest(
             schema=SCHEMA,
             checksum="",
@@ -313,21 +324,22 @@ class Making:
             ),
             options=options,
             grasps=self.samples.grasps,
-            switches=tuple(self._switch(column, gain) for column, gain in switches),
-            joints=tuple(_calibration(column, grasp_set.joints[column]) for column in self.joints),
+            switches=tuple(self._switch(*each) for each in switches),
+            joints=tuple(_calibration(column, grasp_set.joints[column]) for column in self.trained.joints),
             proof=_proof(self.integers, self.comparison, options.width),
             rates=rates if tested is None else (*rates, *tested.rates),
             stopped_after=self.trained.stopped_after,
             zero_gain_nodes=self.trained.zero_gain_nodes,
             scan_sha256=digests.get(SCAN_NAME),
             fitting=fitting if fitting is not None and fitting.compared else None,
+            faults=worst_faults(self.faults, self._inputs, self._groups),
         )
 
-    def _switch(self, column: int, gain: float) -> Switch:
-        name, taxel = self.grasp_set.element_names[column], column - len(self.grasp_set.switch_names)
+    def _switch(self, element: Element, name: str, gain: float) -> Switch:
+        (column, code), taxel = element, element.column - len(self.grasp_set.switch_names)
         if taxel < 0:
             return Switch(column, name, gain)
-        joint, code = self.grasp_set.taxel_columns[taxel], self.trained.thresholds[taxel]
+        joint = self.grasp_set.taxel_columns[taxel]
         return Switch(column, name, gain, Threshold(code, float(joint.value(code + 0.5)), _calibration(taxel, joint)))
 
 

@@ -17,6 +17,7 @@ from ..evaluation.folds import EvaluationError
 from ..hand import HandShape
 from ..recordings.graspset import GraspSet
 from ..tables.compare import Comparison, worst_case
+from ..tables.faults import FaultCounts
 from ..workers import little
 from .training import USUAL_ROUNDS, Trained
 
@@ -51,6 +52,8 @@ class BuildReport:
         How to read the switches, and the wiring that this reads; None where it was compiled for none.
     grasp_set, trained, comparison
         What was trained on, what came of it, and its rows through the model, its tables and the integers.
+    faults : FaultCounts
+        What each fault of an input leaves of the rows trained on.
     confusion : ndarray of int, shape (K, K), or None
         How often rows of each grasp type were answered by each in the folds; None without folds.
     """
@@ -66,6 +69,7 @@ class BuildReport:
     grasp_set: GraspSet
     trained: Trained
     comparison: Comparison
+    faults: FaultCounts
     confusion: NDArray[np.intp] | None
 
 
@@ -93,7 +97,7 @@ class Documents:
         from ..glove.files import spec_files
 
         files = {REPORT_NAME: self._report(made, jobs, progress)}
-        if names := [switch.name for switch in made.manifest.switches]:
+        if names := list(dict.fromkeys(switch.source for switch in made.manifest.switches)):
             hand = None if self.hand is None else self.hand.fitted(names, self.hand_length)
             spec = spec_files(made.manifest, made.scan, made.harness, hand)
             files |= {f"{SPEC_FOLDER}/{name}": content for name, content in spec.items()}
@@ -119,10 +123,11 @@ class Documents:
                 no_study=no_study,
                 frontier=self.frontier,
                 point=self.point,
-                hand=None if self.hand is None else self.hand.fitted(made.grasp_set.switch_names),
+                hand=None if self.hand is None else self.hand.fitted(made.grasp_set.element_names),
                 scan=made.scan,
                 harness=made.harness,
                 comparison=made.comparison,
+                faults=made.faults,
                 worst=worst_case(made.trained.model, made.tables, made.comparison, made.manifest.grasps, names),
             )
         )

@@ -4,7 +4,9 @@ A sealed npz (recordings/arrays.py). Format 1, of LogitBoost: columns (M, K) int
 (M, K, 3) float64, with a JSON header {"n_inputs", "shrinkage"}. Format 2, of every other trainer: bias (K,),
 switch_rows (s, K), bins (j,) int64, thresholds (sum of bins - 1,) uint16 and joint_rows (sum of bins, K), else float64,
 with the header {}. Format 3, of those that have lines, holds in addition lines (n, 3) int64, the joint, the lowest and
-the highest code of each, and line_rows (n, K).
+the highest code of each, and line_rows (n, K). Format 4, of those that have pairs of joints, holds in addition to that
+of format 2 pairs (n, 4) int64, both joints and how many thresholds each has, pair_thresholds uint16, pair after pair,
+and pair_rows, (sum of cells, K).
 """
 
 from collections.abc import Mapping
@@ -16,14 +18,14 @@ from msgspec import Meta
 
 from thenar.runtime.errors import BuildError
 from thenar.runtime.sealed import seal, unseal
-from thenar.runtime.tables import HIGHEST_CODE, MAX_CLASSES, MAX_JOINTS, MAX_SWITCHES
+from thenar.runtime.tables import HIGHEST_CODE, MAX_CLASSES, MAX_JOINTS, MAX_SWITCHES, Pair
 
 from ..boosting.stumps import Stumps
 from ..recordings.arrays import AnyArray, pack, unpack
 from ..tables.collapse import Line, Model, ScoreTables
 
 KIND = b"THNRENSM"
-STUMPS, TABLES, LINES = 1, 2, 3  # formats
+STUMPS, TABLES, LINES, PAIRS = 1, 2, 3, 4  # formats
 MAX_BYTES = 1 << 30
 
 # Some hundred bytes less than these make a gigabyte: a column, a threshold and three values each.
@@ -34,6 +36,7 @@ _DTYPES = {
     TABLES: {"bias": "<f8", "switch_rows": "<f8", "bins": "<i8", "thresholds": "<u2", "joint_rows": "<f8"},
 }
 _DTYPES[LINES] = _DTYPES[TABLES] | {"lines": "<i8", "line_rows": "<f8"}
+_DTYPES[PAIRS] = _DTYPES[TABLES] | {"pairs": "<i8", "pair_thresholds": "<u2", "pair_rows": "<f8"}
 
 # Beyond what boosting gives (boost.LARGEST_Z_MAX), and of thresholds beyond every code.
 _LARGEST_VALUE, _LARGEST_THRESHOLD = 1e6, 1e6
@@ -67,6 +70,11 @@ def ensemble_to_bytes(model: Model) -> bytes:
             version = LINES
             arrays["lines"] = np.array([(line.joint, line.low, line.high) for line in model.lines])
             arrays["line_rows"] = np.stack([line.row for line in model.lines])
+        if model.pairs:
+            version = PAIRS
+            arrays["pairs"] = np.array([(*pair.joints, *map(len, pair.thresholds)) for pair in model.pairs])
+            arrays["pair_thresholds"] = np.concatenate([each for pair in model.pairs for each in pair.thresholds])
+            arrays["pair_rows"] = np.concatenate([pair.rows.reshape(-1, model.n_classes) for pair in model.pairs])
     written = {name: array.astype(_DTYPES[version][name]) for name, array in arrays.items()}
     return seal(KIND, version, pack(header, written))
 
@@ -77,7 +85,7 @@ def ensemble_from_bytes(data: bytes, what: str = "ensemble.bin") -> Model:
     Raises SealError for a file that is foreign, truncated, altered or newer, BuildError for one that contradicts
     itself.
     """
-    version, payload = unseal(data, KIND, LINES, what)
+    version, payload = unseal(data, KIND, PAIRS, what)
     header_bytes, arrays = unpack(payload, what)
     dtypes = _DTYPES.get(version, {})
     if {name: array.dtype for name, array in arrays.items()} != {n: np.dtype(d) for n, d in dtypes.items()}:
@@ -104,10 +112,11 @@ def model_fault(model: Model, n_switches: int, n_joints: int, n_classes: int) ->
         thresholds.dtype != np.uint16 or (np.diff(thresholds.astype(int)) < 1).any() for thresholds in model.thresholds
     ):
         return "has thresholds that are no codes, or do not rise"
-    if fault := _lines_fault(model):
+    if fault := _lines_fault(model) or _pairs_fault(model):
         return fault
     # Written so that what is no number fails as well.
-    numbers = (model.bias, model.switch_rows, *model.joint_rows, *(line.row for line in model.lines))
+    more = [line.row for line in model.lines] + [pair.rows for pair in model.pairs]
+    numbers = (model.bias, model.switch_rows, *model.joint_rows, *more)
     if not all((np.abs(rows) <= _LARGEST_VALUE).all() for rows in numbers):
         return "holds numbers beyond a million, or that are none"
     return ""
@@ -121,6 +130,24 @@ def _lines_fault(model: ScoreTables) -> str:
         return "has lines whose ends are no codes, or do not rise"
     if any(line.row.shape != model.bias.shape for line in model.lines):
         return f"has lines of other shapes than {model.n_classes} classes"
+    return ""
+
+
+def _pairs_fault(model: ScoreTables) -> str:
+    joints = [joint for pair in model.pairs for joint in pair.joints]
+    if not joints:
+        return ""
+    if model.lines:
+        return "has lines and pairs of joints: it may have one of both"
+    if any(not 0 <= a < b < len(model.joint_rows) for a, b in (pair.joints for pair in model.pairs)):
+        return "has pairs of joints that there are not"
+    if len(set(joints)) < len(joints) or joints[::2] != sorted(joints[::2]):
+        return "has pairs that share a joint, or not in the order of their joints"
+    for pair in model.pairs:
+        if any(each.dtype != np.uint16 or (np.diff(each.astype(int)) < 1).any() for each in pair.thresholds):
+            return "has pairs whose thresholds are no codes, or do not rise"
+        if pair.rows.shape != (*(len(each) + 1 for each in pair.thresholds), model.n_classes):
+            return "has pairs whose rows are of other shapes than their thresholds"
     return ""
 
 
@@ -149,7 +176,7 @@ def _tables(arrays: Mapping[str, AnyArray], what: str) -> ScoreTables:
     ends = np.cumsum(bins)[:-1]
     steps = np.split(thresholds, ends - np.arange(1, len(bins))) if len(bins) else []
     rows = np.split(joint_rows, ends) if len(bins) else []
-    tables = ScoreTables(bias, switch_rows, tuple(steps), tuple(rows), _lines(arrays, what))
+    tables = ScoreTables(bias, switch_rows, tuple(steps), tuple(rows), _lines(arrays, what), _pairs(arrays, what))
     if fault := model_fault(tables, len(switch_rows), len(bins), len(bias)):
         raise BuildError(f"{what} is damaged: it {fault}")
     return tables
@@ -162,3 +189,25 @@ def _lines(arrays: Mapping[str, AnyArray], what: str) -> tuple[Line, ...]:
     if lines.ndim != 2 or rows.ndim != 2 or lines.shape != (len(rows), 3) or not len(rows):
         raise BuildError(f"{what} is damaged: its lines are no table")
     return tuple(Line(joint, low, high, row) for (joint, low, high), row in zip(lines.tolist(), rows, strict=True))
+
+
+def _pairs(arrays: Mapping[str, AnyArray], what: str) -> tuple[Pair, ...]:
+    if "pairs" not in arrays:
+        return ()
+    pairs, steps = arrays["pairs"].astype(np.int64), arrays["pair_thresholds"].astype(np.uint16)
+    rows = arrays["pair_rows"].astype(np.float64)
+    if (pairs.ndim, steps.ndim, rows.ndim) != (2, 1, 2) or not pairs.size or pairs.shape[1] != 4:
+        raise BuildError(f"{what} is damaged: its pairs are no table")
+    counts = pairs[:, 2:]
+    if (counts < 0).any() or counts.max() > HIGHEST_CODE:
+        raise BuildError(f"{what} is damaged: its pairs have thresholds that are no codes")
+    cells = (counts + 1).prod(axis=1)
+    if counts.sum() != len(steps) or cells.sum() != len(rows):
+        raise BuildError(f"{what} is damaged: its pairs are of different tables")
+    own = iter(np.split(steps, np.cumsum(counts.ravel())[:-1]))
+    blocks = np.split(rows, np.cumsum(cells)[:-1])
+    found = (
+        (a, b, (next(own), next(own)), block.reshape(one + 1, other + 1, -1))
+        for (a, b, one, other), block in zip(pairs.tolist(), blocks, strict=True)
+    )
+    return tuple(Pair((a, b), thresholds, block) for a, b, thresholds, block in found)

@@ -23,6 +23,7 @@ from ..firmware.board import Board
 from ..firmware.classifier import LIBRARY_NAME
 from ..firmware.generate import Firmware, write_folder
 from ..firmware.targets.base import Mode
+from ..placement.elements import elements_of
 from ..placement.methods.base import METHODS, PAPERS
 from ..placement.placement import information_alone
 from ..placement.selectors import SwitchSelector
@@ -159,8 +160,8 @@ def compile(  # noqa: A001
     samples, classifier = Samples.of(grasp_set), _classifier(estimator)
     _columns(estimator, samples.inputs)
     samples = _labelled(samples, grasp_set, classifier.classes_)
-    trained, joints = _trained(estimator, samples)
-    inputs: Inputs = "both" if trained.columns and joints else "switches" if trained.columns else "joints"
+    trained = _trained(estimator, samples)
+    inputs: Inputs = "both" if trained.columns and trained.joints else "switches" if trained.columns else "joints"
     options = Options(
         inputs=inputs, folds=folds, seed=seed, table_bits=table_bits, width=width, placement="estimator", by=by
     )
@@ -169,7 +170,7 @@ def compile(  # noqa: A001
     cuts = cuts_of(grasp_set, options)
     options, gains = _placed_by(estimator, _trained_by(classifier, options))
     trained = replace(trained, gains=gains or information_alone(samples, trained.columns))
-    made = Making(grasp_set, _with_joints(samples, joints), joints, options, trained, harness)
+    made = Making(grasp_set, samples, options, trained, harness)
     test = partial(_answers_of, estimator, samples, options)
     tested = cross_validated(samples, cuts, options, test, jobs, progress or _silent)
     return made.publish(target, tested, documents, jobs, progress)
@@ -183,12 +184,8 @@ def _classifier(estimator: Any) -> Any:
     return estimator[-1] if hasattr(estimator, "steps") else estimator
 
 
-def _with_joints(samples: Samples, joints: Columns) -> Samples:
-    return replace(samples, codes=samples.codes[:, list(joints)])
-
-
-def _trained(estimator: Any, samples: Samples) -> tuple[Trained, Columns]:
-    """Return what an estimator has learnt from these samples, and the joints that it looks at."""
+def _trained(estimator: Any, samples: Samples) -> Trained:
+    """Return what an estimator has learnt from these samples, and the switches and joints that it looks at."""
     columns = _columns(estimator, samples.inputs)
     switches = tuple(column for column in columns if column < samples.n_switches)
     joints = tuple(column - samples.n_switches for column in columns if column >= samples.n_switches)
@@ -196,7 +193,7 @@ def _trained(estimator: Any, samples: Samples) -> tuple[Trained, Columns]:
     model = _model(classifier, columns, samples.n_switches)
     if fault := model_fault(model, len(switches), len(joints), len(classifier.classes_)):
         raise CompileError(f"the estimator has a model that {fault}: fit it on these recordings")
-    return Trained(switches, (), None, model), joints
+    return Trained(elements_of(samples), switches, (), None, model, joints)
 
 
 def _columns(estimator: Any, X: NDArray[np.uint16]) -> Columns:
@@ -286,8 +283,8 @@ def _answers_of(estimator: Any, samples: Samples, options: Options, fold: Fold) 
     """Fit a clone on the fold's training rows alone; return the classes that its integers give the test rows."""
     learnt, classes = samples.rows(fold.train), estimator.classes_
     fitted = clone(estimator).fit(learnt.inputs, classes[learnt.labels])
-    trained, joints = _trained(fitted, learnt)
-    tables = integers_of(trained, _with_joints(learnt, joints), options)
-    test = _with_joints(samples.rows(fold.test), joints).keeping(trained.columns)
+    trained = _trained(fitted, learnt)
+    tables = integers_of(trained, learnt, options)
+    test = trained.read(samples.rows(fold.test))
     found = _classifier(fitted).classes_[integer_scores(tables, test.switches, test.codes).argmax(axis=1)]
     return np.asarray((found[:, np.newaxis] == classes).argmax(axis=1))

@@ -7,18 +7,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thenar.runtime.manifest import By, Fitting, Of, Options, Protocol, Recognised
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.tables import MAX_JOINTS, IntegerTables
 
 from ..boosting.stumps import Stumps
 from ..evaluation.choosing import choose_training
-from ..evaluation.folds import Fold, leave_one_out, trial_folds
+from ..evaluation.folds import Fold, leave_groups_out, leave_one_out, trial_folds
 from ..evaluation.populations import OF, groups_of
 from ..evaluation.rates import rated
 from ..limits import check_inputs, check_memory, check_types
+from ..placement.constraints import Limits
+from ..placement.elements import Elements, bits_of, elements_of, ports_of
+from ..placement.joints import kept_joints
 from ..placement.methods.base import METHODS, PAPERS
 from ..placement.placement import choose
 from ..placement.ports import PortCosts
-from ..placement.thresholds import Thresholds, taxel_thresholds, with_switches
 from ..placement.tree import Tree
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
@@ -35,17 +37,32 @@ Groups = NDArray[np.str_] | None
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trained:
-    """The kept switches in the order in which they were chosen, and what each brought (bits): to the tree of ID3, which
-    is None where another method chose, and alone otherwise; the model; the thresholds above which the taxels, which
-    follow the switches, are closed; and how the fit was chosen.
+    """What was chosen and trained.
+
+    elements  switches, and levels of taxels, that there were to choose from
+    columns   places of the kept ones among them, in the order in which they were chosen
+    gains     what each of these brought (bits): to the tree of ID3, which is None where another method chose, and alone
+              otherwise
+    joints    columns of the kept joints
+    fitting   how the fit was chosen
     """
 
+    elements: Elements
     columns: Columns
     gains: tuple[float, ...]
     tree: Tree | None
     model: Model
-    thresholds: Thresholds = ()
+    joints: Columns
     fitting: Fitting | None = None
+
+    @property
+    def kept(self) -> Elements:
+        """The kept elements, in the order in which they were chosen."""
+        return tuple(self.elements[column] for column in self.columns)
+
+    def read(self, samples: Samples) -> Samples:
+        """Return what a glove of the kept elements and joints reads of these rows."""
+        return bits_of(samples.with_joints(self.joints), self.kept)
 
     @property
     def stopped_after(self) -> int:
@@ -73,8 +90,11 @@ def samples_of(grasp_set: GraspSet, options: Options) -> Samples:
     if (found := len(np.unique(grasp_set.labels))) < 2:
         raise CompileError(f"the recordings hold {found} grasp type(s): there is nothing to tell apart")
     samples = Samples.of(grasp_set, wanted)
+    if options.keep_joints is not None and not samples.codes.shape[1]:
+        raise CompileError("there are no joints to keep some of: leave keep_joints (--keep-joints) out")
+    joints = min(options.keep_joints or MAX_JOINTS + 1, samples.codes.shape[1])
     check_types(found, CompileError)
-    check_inputs(found, min(options.keep or 0, len(grasp_set.element_names)), samples.codes.shape[1], CompileError)
+    check_inputs(found, min(options.keep or 0, len(grasp_set.element_names)), joints, CompileError)
     check_memory(len(samples.codes), found, CompileError)
     rounds = max(int(each.settings.get("rounds") or 0) for each in Training.candidates(options))
     if rounds * found > MAX_STUMPS:
@@ -92,46 +112,49 @@ def train(
     ports: PortCosts | None = None,
     groups: Groups = None,
     jobs: int = 1,
+    limits: Limits | None = None,
 ) -> Trained:
-    """Choose the switches and the fit, and train on them and the joints. Raises CompileError if no input tells grasps
-    apart.
+    """Choose elements and fit, and train on them and the joints. Raises CompileError if no input tells grasps apart.
 
-    ports   what reading switches costs, for methods that ask
+    ports   what reading switches and taxels costs, for methods that ask
     groups  what of each row (n,) is left out where the fit is to recognise new subjects, objects or sessions
     jobs    worker processes that compare fits
+    limits  what the placement must obey
     """
-    thresholds = taxel_thresholds(samples)
-    samples = with_switches(samples, thresholds)
+    elements = elements_of(samples, options.levels)
+    samples = bits_of(samples, elements)
     # Without switches the tree is a leaf.
     method = options.placement if samples.n_switches else PAPERS
     parameter = options.keep or 0 if METHODS.named(method).by_number else options.prune
-    chosen = choose(samples, method, float(parameter), ports)
+    own = None if ports is None else ports_of(ports, elements)
+    bound = None if limits is None else limits.on(elements, own)
+    chosen = choose(samples, method, float(parameter), own, bound, robust=options.robust)
     columns = chosen.columns
     if not columns and not samples.codes.shape[1]:
         raise CompileError("no switch is worth keeping: lower --prune, or record switches that differ between grasps")
-    check_inputs(len(samples.grasps), len(columns), samples.codes.shape[1], CompileError)
     kept = samples.keeping(columns)
+    joints = kept_joints(kept, options.keep_joints)
+    kept = kept.with_joints(joints)
+    check_inputs(len(samples.grasps), len(columns), len(joints), CompileError)
     inputs = kept.inputs
     if not (inputs != inputs[0]).any():
         raise CompileError("no input differs between rows: there is nothing to tell grasp types apart by")
     candidates, of = Training.candidates(options), OF[options.by or "subject"]
     fitting = choose_training(kept, candidates, seed=options.seed, groups=groups, of=of, jobs=jobs, report=report)
-    model = Training.chosen(fitting).train(kept, report if len(candidates) == 1 else None)
+    model = Training.chosen(fitting, masked=options.robust).train(kept, report if len(candidates) == 1 else None)
     if fault := model_fault(model, kept.n_switches, kept.codes.shape[1], kept.n_classes):
         raise CompileError(f"trainer {fitting.trainer!r} made a model that {fault}: it is at fault")
-    return Trained(columns, chosen.gains, chosen.tree, model, thresholds, fitting)
+    return Trained(elements, columns, chosen.gains, chosen.tree, model, joints, fitting)
 
 
 def integers_of(trained: Trained, samples: Samples, options: Options) -> IntegerTables:
     """Return the integer tables of what was trained on these samples."""
-    kept = with_switches(samples, trained.thresholds).keeping(trained.columns)
+    kept = trained.read(samples)
     tables = collapse(trained.model, kept.n_switches)
     return quantise(tables, kept.switches, kept.codes, options.width, options.table_bits)
 
 
 USUAL_ROUNDS = 100  # where a fit is chosen, its work is taken to be that of so many
-# A new subject, object or session costs a training for each, or for each of so many groups of them.
-_MOST_GROUPS = 10
 
 Test = Callable[[Fold], Answers]
 
@@ -172,9 +195,7 @@ def cuts_of(grasp_set: GraspSet, options: Options) -> tuple[Cut, ...]:
             leave_one_out(grasp_set.sessions[grasp_set.subjects == subject], f"session of subject {subject}")
     names = groups_of(grasp_set, by)
     assert names is not None
-    found, number = np.unique(names, return_inverse=True)
-    parts = names if len(found) <= _MOST_GROUPS else (number % _MOST_GROUPS).astype(np.str_)
-    return (Cut(OF[by], tuple(leave_one_out(parts, by)), names), pooled)
+    return (Cut(OF[by], tuple(leave_groups_out(names, by)), names), pooled)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -187,18 +208,21 @@ class Tested:
     confusion: NDArray[np.intp]
 
 
-def answers_of(samples: Samples, options: Options, ports: PortCosts | None, groups: Groups, fold: Fold) -> Answers:
+def answers_of(
+    samples: Samples, options: Options, ports: PortCosts | None, groups: Groups, limits: Limits | None, fold: Fold
+) -> Answers:
     """Choose and train on the fold's training rows alone; return the classes that the integers give its test rows.
 
     Raises CompileError, which names the fold, as `train` does.
     """
     learning = samples.rows(fold.train)
     try:
-        trained = train(learning, options, ports=ports, groups=None if groups is None else groups[fold.train])
+        own = None if groups is None else groups[fold.train]
+        trained = train(learning, options, ports=ports, groups=own, limits=limits)
     except CompileError as wrong:
         raise CompileError(f"in fold {fold.name}: {wrong}, or do without folds (0)") from None
     tables = integers_of(trained, learning, options)
-    test = with_switches(samples.rows(fold.test), trained.thresholds).keeping(trained.columns)
+    test = trained.read(samples.rows(fold.test))
     return np.asarray(integer_scores(tables, test.switches, test.codes).argmax(axis=1))
 
 

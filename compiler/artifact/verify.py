@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from thenar.runtime.build import ENSEMBLE_NAME, Build, read_member
 from thenar.runtime.errors import BuildError
-from thenar.runtime.manifest import Unit
+from thenar.runtime.manifest import Faults, Unit
 from thenar.runtime.scanning.decided import Decided
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.tables import IntegerTables
@@ -19,6 +19,7 @@ from ..evaluation.rates import rated
 from ..recordings.graspset import GraspSet
 from ..tables.collapse import Model
 from ..tables.compare import Comparison, WorstCase, compare, worst_case
+from ..tables.faults import count_faults, groups_of, worst_faults
 from . import CompileError
 from .documents import Progress
 from .ensemble import MAX_BYTES, ensemble_from_bytes, model_fault
@@ -134,9 +135,7 @@ def verify(
     >>> verify("build", grasp_set).holds
     True
     """
-    if not len(grasp_set):
-        raise CompileError("the recordings have no rows: there is nothing to verify")
-    build = Build.load(folder)
+    build = _build_for(folder, grasp_set)
     model = _load_ensemble(Path(folder), build)
     bits, codes = select_inputs(grasp_set, build.manifest)
     comparison = compare(model, build.tables, bits, codes, progress)
@@ -165,6 +164,85 @@ def verify(
     )
 
 
+def _build_for(folder: str | Path, grasp_set: GraspSet) -> Build:
+    if not len(grasp_set):
+        raise CompileError("the recordings have no rows: there is nothing to verify")
+    return Build.load(folder)
+
+
+class InputFaults(Struct, frozen=True):
+    """How many trials are recognised where an input is lost, and where it is stuck at the value that leaves least."""
+
+    name: str
+    lost: int
+    stuck: int
+    value: str
+
+
+class FaultCheck(Struct, frozen=True):
+    """What faults leave of these recordings: the worst of each kind, and each input."""
+
+    worst: Faults
+    inputs: tuple[InputFaults, ...]
+
+
+def verify_faults(folder: str | Path, grasp_set: GraspSet, progress: Progress | None = None) -> FaultCheck:
+    """Put every fault of an input, and of the build's ports, chips and boards, to every row of recordings.
+
+    Parameters
+    ----------
+    folder : path
+        The build.
+    grasp_set : GraspSet
+        Recordings, compiled from or not. Columns are found by name.
+    progress : callable, optional
+        Called with (done, total) as blocks of rows are done.
+
+    Returns
+    -------
+    FaultCheck
+        Counts of trials, each recognised as most of its frames are.
+
+    Raises
+    ------
+    BuildError, SealError
+        If the folder is no sound build.
+    CompileError
+        If the recordings lack its inputs, or have no rows.
+
+    Examples
+    --------
+    >>> from thenar.compiler import GraspSet, compile_build, verify_faults
+    >>> grasp_set = GraspSet.load("set.grasps")
+    >>> report = compile_build(grasp_set, "build", rounds=5, folds=0)
+    >>> verify_faults("build", grasp_set).worst == report.manifest.faults
+    True
+    """
+    build = _build_for(folder, grasp_set)
+    manifest = build.manifest
+    bits, codes = select_inputs(grasp_set, manifest)
+    groups = groups_of(build.scan, [switch.source for switch in manifest.switches], build.tables.n_joints)
+    labels = _labels(np.array(build.grasps), grasp_set)
+    found = count_faults(build.tables, bits, codes, labels, grasp_set.trial_ids, tuple(groups.values()), progress)
+    names = [*(each.name for each in manifest.switches), *(each.name for each in manifest.joints)]
+    stuck = (
+        min(zip(*each, strict=True), key=lambda one: one[0]) for each in zip(found.stuck, found.values, strict=True)
+    )
+    return FaultCheck(
+        worst_faults(found, names, groups),
+        tuple(
+            InputFaults(name, lost, left, value)
+            for name, lost, (left, value) in zip(names, found.lost, stuck, strict=True)
+        ),
+    )
+
+
+def _labels(grasps: NDArray[np.str_], grasp_set: GraspSet) -> NDArray[np.intp]:
+    """Return the class of each row (n,); a type that the build does not know is none of its classes."""
+    known = np.append(grasp_set.grasps[:, None] == grasps, np.ones((len(grasp_set), 1), bool), axis=1)
+    return np.asarray(known.argmax(axis=1))
+
+
 def _load_ensemble(folder: Path, build: Build) -> Model:
     path = folder / ENSEMBLE_NAME
     model = ensemble_from_bytes(read_member(path, MAX_BYTES, build.manifest.ensemble_sha256), str(path))
@@ -188,7 +266,7 @@ def check_scan(
 
     deployed (n,) are their classes as the integers run: what a whole scan gives.
     """
-    ports = [[switch for _, switch in port.switches] for port in scan.ports]
+    ports = [port.elements for port in scan.ports]
     frames = Decided(tables, ports, bits, codes)
     pending = np.ones(len(frames), bool)
     read, changed = 0, 0
@@ -201,8 +279,7 @@ def check_scan(
 
 
 def _recognised(comparison: Comparison, grasps: NDArray[np.str_], grasp_set: GraspSet) -> tuple[Counted, ...]:
-    # A type that the build does not know is none of its classes.
-    labels = np.append(grasp_set.grasps[:, None] == grasps, np.ones((len(grasp_set), 1), bool), axis=1).argmax(axis=1)
+    labels = _labels(grasps, grasp_set)
     both = [
         rated(answers, labels, grasp_set.trial_ids, of="pooled")
         for answers in (comparison.trained, comparison.deployed)

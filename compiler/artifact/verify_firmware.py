@@ -38,7 +38,7 @@ def select_inputs(grasp_set: GraspSet, manifest: Manifest) -> tuple[NDArray[np.b
 
     Raises CompileError naming the inputs that the recordings lack, or joints whose codes mean something else there.
     """
-    switches = _columns("switches", [switch.name for switch in manifest.switches], grasp_set.element_names)
+    switches = _columns("switches", [switch.source for switch in manifest.switches], grasp_set.element_names)
     joints = _columns("joints", [joint.name for joint in manifest.joints], grasp_set.joint_names)
     for calibration, column in zip(manifest.joints, joints, strict=True):
         _check_calibration("joint", calibration, grasp_set.joints[column])
@@ -49,12 +49,12 @@ def select_inputs(grasp_set: GraspSet, manifest: Manifest) -> tuple[NDArray[np.b
 
 
 def _bits(grasp_set: GraspSet, switch: Switch, column: int) -> NDArray[np.bool_]:
-    """Return a kept switch (n,), or the taxel that it is made of above its threshold."""
+    """Return a kept switch (n,), or the level of a taxel that it is."""
     taxel = column - len(grasp_set.switch_names)
     if (taxel < 0) != (switch.threshold is None):
         here, built = ("a switch", "a taxel") if taxel < 0 else ("a taxel", "a switch")
         raise CompileError(
-            f"{switch.name} is {here} here, in the build {built}: import these recordings as the build's"
+            f"{switch.source} is {here} here, in the build {built}: import these recordings as the build's"
         )
     if switch.threshold is None:
         return grasp_set.switches[:, column]

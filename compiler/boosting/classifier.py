@@ -1,5 +1,6 @@
 """Additive classifiers as scikit-learn estimators, and LogitBoost on decision stumps as one."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Self
 
@@ -17,7 +18,7 @@ from .stumps import TIE, winners
 Floats = NDArray[np.float64]
 
 
-class AdditiveClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
+class AdditiveClassifier(ClassifierMixin, BaseEstimator, ABC):  # type: ignore[misc]
     """A classifier whose scores are a sum over inputs. One derived from it has a parameter `classes`, and learns."""
 
     classes: Sequence[Any] | None
@@ -90,6 +91,7 @@ class AdditiveClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         tags.input_tags.allow_nan = True
         return tags
 
+    @abstractmethod
     def _learn(
         self,
         inputs: NDArray[Any],
@@ -98,11 +100,10 @@ class AdditiveClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         progress: Callable[[int, int], None] | None,
     ) -> None:
         """Set what is learnt of inputs (n, d), class numbers (n,), and weights (n,) above 0."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _sums(self, inputs: NDArray[Any]) -> Floats:
         """Return the scores (n, K) of inputs (n, d)."""
-        raise NotImplementedError
 
     def _decided(self, scores: Floats) -> Floats:
         if len(self.classes_) != 2:

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..recordings.graspset import GraspSet
-from ..samples import decided
+from ..samples import Samples, decided
 from ..trainers.base import Training
-from .plan import COMPOSITIONS, Data, FoldFit, Progress, run_fits
+from .plan import COMPOSITIONS, Data, Planner, Progress, run_fits
 from .populations import populations
 from .rates import Rate, rated
 
@@ -101,9 +101,9 @@ def _further(progress: Progress, before: int, total: int) -> Progress:
 def _predicted(grasp_set: GraspSet, jobs: int, progress: Progress | None) -> dict[str, Labels]:
     """Return for each kind of inputs the label (n,) that each row was given when it was left out of training."""
     parts = populations(grasp_set, "trial", FOLDS, repeats=1, seed=SEED)
-    sizes = (len(grasp_set.switch_names), len(grasp_set.joints))
+    planner = Planner(parts, Samples.of(grasp_set, "switches"), len(grasp_set.joints), 0, (), SEED)
     fits = {
-        name: [FoldFit(fold, kind.columns((), *sizes), part.grasps) for part in parts for fold in part.folds]
+        name: [fit for part in parts for fit in planner.cell(part, kind, lambda *_: ()).fits]
         for name, kind in _KINDS.items()
     }
     everything = [fit for some in fits.values() for fit in some]

@@ -21,7 +21,7 @@ from ..samples import Samples, decided
 from ..tables.collapse import Model, ScoreTables, collapse, model_scores
 from ..trainers.base import TRAINERS, Training
 from ..workers import in_workers
-from .folds import Fold, leave_one_out, trial_folds
+from .folds import Fold, leave_groups_out, trial_folds
 
 Rows = NDArray[np.intp]
 
@@ -40,8 +40,8 @@ def inner_folds(samples: Samples, seed: int, groups: NDArray[np.generic] | None 
     """
     n_trials = len(np.unique(samples.trials))
     number = next((folds for most, folds in _FOLDS if n_trials < most), 2)
-    if groups is not None and len(found := np.unique(groups, return_inverse=True)[1]) and found.max() >= 2:
-        return leave_one_out((found % min(number, int(found.max()) + 1)).astype(np.str_), "group")
+    if groups is not None and len(np.unique(groups)) >= _LEAST_GROUPS:
+        return leave_groups_out(groups, "group", number)
     if n_trials < 2:
         return []
     return trial_folds(samples.labels, samples.trials, min(number, n_trials), seed)
@@ -153,8 +153,9 @@ def _models(trainings: list[Training], samples: Samples) -> Iterator[Model]:
 
 
 def _table_rows(tables: ScoreTables) -> int:
-    """Return how many rows of scores tables hold for inputs in use: one a switch, a bin of a joint, a line."""
+    """Return how many rows of scores tables hold for inputs in use: one a switch, a bin of a joint or pair, a line."""
     in_use = [len(rows) for rows in tables.joint_rows if rows.any()]
+    in_use += [pair.rows.size // tables.n_classes for pair in tables.pairs]
     return int(tables.switch_rows.any(axis=1).sum()) + sum(in_use) + sum(bool(line.row.any()) for line in tables.lines)
 
 

@@ -150,6 +150,19 @@ def leave_one_out(groups: NDArray[np.str_], what: str) -> list[Fold]:
     return [_fold(groups == name, name) for name in names]
 
 
+# With more of them, several subjects, objects or sessions are left out together.
+_MOST_GROUPS = 10
+
+
+def leave_groups_out(names: NDArray[np.generic], what: str, most: int = _MOST_GROUPS) -> list[Fold]:
+    """Return the folds of `leave_one_out`, or where there are more than `most` names in names (n,), that many folds,
+    each of several names.
+    """
+    found, number = np.unique(names, return_inverse=True)
+    parts = names if len(found) <= most else number % most
+    return leave_one_out(parts.astype(np.str_), what)
+
+
 def block_folds(trials: NDArray[np.int64], n_folds: int) -> list[Fold]:
     """Return folds by recording block: the trial numbers (n,), in order, cut into `n_folds` contiguous ranges.
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from thenar.runtime.manifest import Of
 
-from .folds import EvaluationError, Fold, Rows, leave_one_out, trial_folds
+from .folds import EvaluationError, Fold, Rows, leave_groups_out, trial_folds
 from .luck import Draws
 from .plan import CellPlan, Data, Planner, learners
 from .populations import NESTED, Population, Scheme
@@ -25,8 +25,6 @@ from .tables import Reader
 Floats = NDArray[np.float64]
 
 FURTHER, LEAST = (2, 4), 4
-# With more subjects, several are left out together.
-_MOST_GROUPS = 10
 _EXPONENTS = np.arange(1, 61) / 30  # of n, from 1/30 to 2
 
 
@@ -120,7 +118,7 @@ def plan_learning(
     everyone = np.arange(len(data.labels))
     several = len(np.unique(subjects)) > 1
     numbers = np.unique(subjects, return_inverse=True)[1]
-    parts = leave_one_out((numbers % _MOST_GROUPS).astype(np.str_), "subject") if scheme == "subject" else []
+    parts = leave_groups_out(subjects, "subject") if scheme == "subject" else []
     cuts, counts = [], []
     for repeat in range(repeats):
         random = np.random.default_rng((planner.seed, repeat))

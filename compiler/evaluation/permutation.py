@@ -61,7 +61,7 @@ class Permutations:
     def test(self, grasp_set: GraspSet, m: int, jobs: int, progress: Progress | None) -> Permuted:
         """Return the test of selected switches and joints, or of what of them there is; m > 0."""
         kind = ANGLE_SELECTED if grasp_set.joints else SELECTED
-        kind = kind if grasp_set.switch_names else ANGLE
+        kind = kind if grasp_set.element_names else ANGLE
         tasks = [(self, grasp_set, kind, number) for number in range(m + 1)]
         correct, total = _counted(tasks[0])
         shuffled = []
@@ -92,9 +92,9 @@ def _counted(task: tuple[Permutations, GraspSet, Composition, int]) -> tuple[int
     data = Data.of(made)
     found = {fit: predictions(data, fit, how.training) for cell in cells for fit in cell.fits}
     grasps = tuple(np.unique(made.labels).tolist())
-    n_switches, scheme = len(made.switch_names), how.scheme
+    scheme = how.scheme
     groups = groups_of(made, scheme)
-    reader = Reader(made.labels, made.trial_ids, grasps, n_switches, found, frozenset(), OF[scheme], groups)
+    reader = Reader(made.labels, made.trial_ids, grasps, found, frozenset(), OF[scheme], groups)
     rate, _ = reader.rates(cells)
     return rate.correct[0], rate.total
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from thenar.runtime.manifest import Options
 
 from ..boosting.stumps import winners
+from ..placement.elements import Elements, bits_of, elements_of
 from ..placement.methods.base import METHODS, PAPERS, Chooser
 from ..placement.methods.filters import random_placement
-from ..placement.thresholds import made_plain, taxel_thresholds, with_switches
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
 from ..tables.collapse import model_scores
@@ -25,7 +25,6 @@ from .folds import Fold, Rows
 from .populations import Population, Protocol, Scheme, groups_of
 from .rivals import CLASSIFIERS
 
-Inputs = NDArray[np.uint16]
 Labels = NDArray[np.intp]
 Progress = Callable[[int, int], None]
 # For each trainer, those ways to train among which each fit chooses.
@@ -34,40 +33,42 @@ Ways = Mapping[str, tuple[Training, ...]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Data:
-    """All rows that fits take columns of.
-
-    X                 (n, s + t + j): the switches' bits, then the codes of taxels and joints
-    labels, trials    (n,)
-    groups            (n,) what each row is left out with, None: its trial
+    """All rows that fits take elements and joints of; their labels (n,) in the taxonomy; groups (n,) are what each row
+    is left out with, None: its trial.
     """
 
-    X: Inputs
+    samples: Samples
     labels: Labels
-    trials: Rows
     groups: NDArray[np.str_] | None
 
     @classmethod
     def of(cls, grasp_set: GraspSet, scheme: Scheme = "trial") -> "Data":
         """Return the rows of a set."""
-        X = np.hstack([grasp_set.switches, grasp_set.taxels, grasp_set.codes], dtype=np.uint16)
-        return cls(X, grasp_set.labels, grasp_set.trial_ids, groups_of(grasp_set, scheme))
+        return cls(Samples.of(grasp_set), grasp_set.labels, groups_of(grasp_set, scheme))
+
+    @property
+    def trials(self) -> Rows:
+        """The trial (n,) of each row."""
+        return self.samples.trials
 
 
 @dataclass(frozen=True, slots=True)
 class FoldFit:
-    """Train on a fold's training rows and these columns, classes `grasps` (ascending labels); then test the fold.
+    """Train on a fold's training rows, these elements and joints, classes `grasps` (ascending labels); then test it.
 
-    The first `n_switches` columns are switches, of which the last `n_taxels` are taxels; the others are joints.
     `learner` is a trainer, at settings that it chooses from the training rows, or one of CLASSIFIERS; "": the trainer
-    and settings of the evaluation. Two fits are one if they are of the same `Fold` object, columns and learner.
+    and settings of the evaluation. Two fits are one if they are of the same `Fold` object, inputs and learner.
     """
 
     fold: Fold
-    columns: Columns
+    elements: Elements
+    joints: Columns
     grasps: tuple[int, ...]
-    n_switches: int = 0
-    n_taxels: int = 0
     learner: str = ""
+
+    def read(self, data: Data) -> Samples:
+        """Return all rows, of its inputs alone."""
+        return bits_of(data.samples.with_joints(self.joints), self.elements)
 
 
 def predictions(data: Data, fit: FoldFit, training: Training, ways: Ways | None = None) -> Labels:
@@ -78,33 +79,23 @@ def predictions(data: Data, fit: FoldFit, training: Training, ways: Ways | None 
     """
     grasps, rows = np.array(fit.grasps, dtype=np.intp), fit.fold.train
     trained = np.searchsorted(grasps, data.labels[rows])
-    if is_blind(data.X, fit):
+    if is_blind(data, fit):
         return np.full(len(fit.fold.test), grasps[np.bincount(trained).argmax()])
-    ends = (fit.n_switches - fit.n_taxels, fit.n_switches)
-    bits, taxels, codes = np.split(data.X[:, fit.columns], ends, axis=1)
-    learning = Samples(
-        bits[rows].astype(bool),
-        codes[rows],
-        trained,
-        tuple(map(str, fit.grasps)),
-        data.trials[rows],
-        taxels=taxels[rows],
-    )
-    thresholds = taxel_thresholds(learning)
-    learning = with_switches(learning, thresholds)
-    closed = np.hstack([bits > 0, taxels > np.array(thresholds, np.int64)])[fit.fold.test]
+    read = fit.read(data)
+    learning = replace(read.rows(rows), labels=trained, grasps=tuple(map(str, fit.grasps)))
+    test = read.rows(fit.fold.test)
     if fit.learner in CLASSIFIERS:
-        return grasps[CLASSIFIERS[fit.learner].answers(learning, np.hstack([closed, codes[fit.fold.test]]))]
+        return grasps[CLASSIFIERS[fit.learner].answers(learning, test.inputs)]
     if fit.learner:
         groups = None if data.groups is None else data.groups[rows]
         training = Training.chosen(choose_training(learning, (ways or {})[fit.learner], groups=groups))
-    return grasps[winners(model_scores(training.train(learning), closed, codes[fit.fold.test]))]
+    return grasps[winners(model_scores(training.train(learning), test.switches, test.codes))]
 
 
-def is_blind(X: Inputs, fit: FoldFit) -> bool:
-    """Return whether a fit has no column that varies among its training rows of X (n, d): nothing to tell apart by."""
-    rows = fit.fold.train
-    return not any((X[rows, column] != X[rows[0], column]).any() for column in fit.columns)
+def is_blind(data: Data, fit: FoldFit) -> bool:
+    """Return whether a fit has no input that varies among its training rows: nothing to tell apart by."""
+    inputs = fit.read(data).inputs[fit.fold.train]
+    return not (inputs != inputs[0]).any()
 
 
 def run_fits(
@@ -155,11 +146,10 @@ class Composition:
         """Whether it takes any switches."""
         return self.selected or self.others
 
-    def columns(self, placement: Columns, n_switches: int, n_joints: int) -> Columns:
-        """Return the ascending columns of `inputs` that it takes, given the selected switches."""
+    def elements(self, placement: Elements, every: Elements) -> Elements:
+        """Return which elements it takes, ascending, given those selected and those there are."""
         kept = set(placement)
-        switches = (s for s in range(n_switches) if (self.selected if s in kept else self.others))
-        return (*switches, *range(n_switches, n_switches + n_joints * self.angle))
+        return tuple(sorted([*kept] * self.selected + [one for one in every if one not in kept] * self.others))
 
 
 COMPOSITIONS = (
@@ -180,7 +170,7 @@ def available(n_switches: int, n_joints: int) -> tuple[Composition, ...]:
 
 
 TableName = Literal["compositions", "generality", "pruning", "baselines", "trainers"]
-Select = Callable[[Population, Fold], Columns]
+Select = Callable[[Population, Fold], Elements]
 
 RIVALS = ("cmim", "mutual-information")
 REFERENCE = "logitboost"  # of the trainers: the others are compared with it
@@ -228,7 +218,7 @@ class Planner:
     """Plans the tables for populations of one set.
 
     samples  of all rows, with n_joints joints besides; prune: S of the paper's placements; rivals: methods of the
-             baselines. A method learns once from the same rows.
+             baselines; levels: of a taxel, at most. A method learns once from the same rows.
     """
 
     parts: tuple[Population, ...]
@@ -238,7 +228,9 @@ class Planner:
     prune_list: tuple[int, ...]
     seed: int
     rivals: tuple[str, ...] = RIVALS
+    levels: int | None = None
     _choosers: dict[tuple[str, bytes], Chooser] = field(default_factory=dict, init=False, repr=False)
+    _elements: dict[bytes, Elements] = field(default_factory=dict, init=False, repr=False)
 
     def table(self, name: TableName, protocol: Protocol) -> list[RowPlan]:
         """Return the rows of a table under a protocol."""
@@ -257,7 +249,7 @@ class Planner:
         return [self._row(kind.name, kind.what, kind, chosen) for kind in kinds]
 
     def _generality(self, protocol: Protocol) -> list[RowPlan]:
-        def chosen_by(giver: Population, part: Population, fold: Fold) -> Columns:
+        def chosen_by(giver: Population, part: Population, fold: Fold) -> Elements:
             # Another subject's placement has never seen this subject's rows: both protocols agree on it.
             own = part is giver
             return self.own(protocol, part, fold) if own else self.chosen(PAPERS, giver.rows, self.prune)
@@ -270,7 +262,7 @@ class Planner:
     def _pruning(self, protocol: Protocol) -> list[RowPlan]:
         everyone = np.unique(np.concatenate([part.rows for part in self.parts]))
 
-        def pooled(least: int, part: Population, fold: Fold) -> Columns:
+        def pooled(least: int, part: Population, fold: Fold) -> Elements:
             return self.chosen(PAPERS, protocol.may_choose_pooled(everyone, fold), least)
 
         everything = self._row("all", "all switches", ALL_SWITCHES, lambda part, fold: ())
@@ -278,11 +270,13 @@ class Planner:
         return [everything, *pruned]
 
     def _baselines(self, protocol: Protocol) -> list[RowPlan]:
-        def rival(name: str, part: Population, fold: Fold) -> Columns:
+        def rival(name: str, part: Population, fold: Fold) -> Elements:
             return self.chosen(name, protocol.may_choose(part, fold), len(self.own(protocol, part, fold)))
 
-        def drawn(draw: int, part: Population, fold: Fold) -> Columns:
-            return random_placement(self._n_switches, len(self.own(protocol, part, fold)), self.seed + draw)
+        def drawn(draw: int, part: Population, fold: Fold) -> Elements:
+            every = self.elements(fold.train)
+            places = random_placement(len(every), len(self.own(protocol, part, fold)), self.seed + draw)
+            return tuple(every[place] for place in places)
 
         rivals = [METHODS.named(name) for name in self.rivals]
         draws = [self._row("random", f"mean of {DRAWS} draws", SELECTED, partial(drawn, draw)) for draw in range(DRAWS)]
@@ -308,19 +302,26 @@ class Planner:
     def _n_switches(self) -> int:
         return self.samples.n_switches + int(self.samples.taxels.shape[1])
 
-    def own(self, protocol: Protocol, part: Population, fold: Fold) -> Columns:
+    def own(self, protocol: Protocol, part: Population, fold: Fold) -> Elements:
         """Return the placement that ID3 chooses for a fold from the population's own rows, as the protocol allows."""
         return self.chosen(PAPERS, protocol.may_choose(part, fold), self.prune)
 
-    def chosen(self, method: str, rows: Rows, parameter: int) -> Columns:
-        """Return the switches that a method keeps from these rows, in whatever order they are given."""
+    def elements(self, rows: Rows) -> Elements:
+        """Return the elements that there are to choose from in these rows."""
+        key = rows.tobytes()
+        if key not in self._elements:
+            self._elements[key] = elements_of(self.samples.rows(rows), self.levels)
+        return self._elements[key]
+
+    def chosen(self, method: str, rows: Rows, parameter: int) -> Elements:
+        """Return the elements that a method keeps from these rows, in whatever order they are given."""
         if not self._n_switches:
             return ()
         rows = np.sort(rows)
-        key = (method, rows.tobytes())
+        key, elements = (method, rows.tobytes()), self.elements(rows)
         if key not in self._choosers:
-            self._choosers[key] = METHODS.named(method).chooser(made_plain(self.samples.rows(rows)))
-        return self._choosers[key](parameter)
+            self._choosers[key] = METHODS.named(method).chooser(bits_of(self.samples.rows(rows), elements))
+        return tuple(elements[place] for place in self._choosers[key](parameter))
 
     def _row(self, name: str, what: str, kind: Composition, select: Select, learner: str = "") -> RowPlan:
         return RowPlan(name, what, tuple(self.cell(part, kind, select, learner) for part in self.parts))
@@ -330,10 +331,8 @@ class Planner:
 
         def fit(fold: Fold) -> FoldFit:
             placement = select(part, fold) if kind.needs_placement else ()
-            columns = kind.columns(placement, self._n_switches, self.n_joints)
-            closing = [column for column in columns if column < self._n_switches]
-            taxels = sum(column >= self.samples.n_switches for column in closing)
-            return FoldFit(fold, columns, part.grasps, len(closing), taxels, learner)
+            elements = kind.elements(placement, self.elements(fold.train) if kind.others else ())
+            return FoldFit(fold, elements, tuple(range(self.n_joints * kind.angle)), part.grasps, learner)
 
         return CellPlan(part, tuple(tuple(map(fit, folds)) for folds in part.repeats))
 

@@ -189,12 +189,11 @@ def evaluate(
         how = Permutations(parts, options.scheme, options.folds, options.prune, options.seed, training)
         test = how.test(chosen, m, jobs, None if progress is None else _after(progress, len(predictions)))
     grasps = tuple(np.unique(chosen.labels).tolist())
-    blind = frozenset(fit for fit in predictions if is_blind(data.X, fit))
+    blind = frozenset(fit for fit in predictions if is_blind(data, fit))
     reader = Reader(
         chosen.labels,
         data.trials,
         grasps,
-        len(chosen.element_names),
         predictions,
         blind,
         OF[options.scheme],

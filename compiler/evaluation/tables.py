@@ -118,15 +118,14 @@ class RateTable:
 class Reader:
     """Reads rates off predictions.
 
-    labels, trials  (n,) of each row       n_switches   the set's
-    grasps          labels that occur      predictions  of each fit; blind: the fits that were
+    labels, trials  (n,) of each row       grasps  labels that occur
+    predictions     of each fit; blind: the fits that were
     of              what the rates are of, with the group (n,) that each row is left out with, None: its trial
     """
 
     labels: Labels
     trials: Rows
     grasps: tuple[int, ...]
-    n_switches: int
     predictions: Predictions
     blind: frozenset[FoldFit]
     of: Of
@@ -148,7 +147,7 @@ class Reader:
     def cell(self, plan: CellPlan, *, confusing: bool) -> Cell:
         """Return the cell of a plan, with its confusion matrix if `confusing`."""
         rate, frames = self.rates((plan,))
-        counts = [sum(column < self.n_switches for column in fit.columns) for fit in plan.fits]
+        counts = [len(fit.elements) for fit in plan.fits]
         blind = sum(fit in self.blind for fit in plan.fits)
         confusion = self._confusion(plan) if confusing else None
         return Cell(rate, frames, Spread.of(counts), blind, _draws(rate, len(plan.part.repeats)), confusion)

@@ -338,7 +338,7 @@ def worst_frame(layout: Layout) -> Frame:
 
 def _codes(layout: Layout, number: int) -> NDArray[np.uint16]:
     """Return codes of a joint that differ in row or time: the least of each bin and, below all bins, zero."""
-    steps, slope = layout.tables.thresholds[number].astype(np.int64) + 1, layout.tables.slope_of(number)
+    steps, slope = layout.tables.steps_of(number) + 1, layout.tables.slope_of(number)
     if slope is not None:
         between = np.linspace(slope.low, slope.high, _BETWEEN).astype(np.int64)
         steps = np.unique(np.concatenate([steps, between, [slope.low + 1, slope.high - 1]]))

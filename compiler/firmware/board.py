@@ -1,7 +1,7 @@
 """How a microcontroller is wired to a glove: the tables of `board.toml`, how they are read, and what they must satisfy.
 
 Keys are numbered as the board numbers them in its frames: with pins and chips, key k is the build's kept switch k, all
-in one row; in a matrix it is row * columns + column.
+in one row, levels of taxels left out; in a matrix it is row * columns + column. A board without a key says it has one.
 """
 
 from collections.abc import Iterator, Sequence
@@ -10,10 +10,12 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct, field
 
-from thenar.drivers.i2c.chips import CHIPS
+from thenar.drivers.i2c.chips import CHIPS, expanders
+from thenar.drivers.scanner_protocol import MOST_ASKED
 from thenar.runtime.harness import checks
 from thenar.runtime.harness.wiring import Baud, BusWiring, ChipWiring, Debounce, Harness, ScannerWiring
 from thenar.runtime.harness.writing import harness_to_toml
+from thenar.runtime.manifest import Switch
 from thenar.runtime.names import fault, list_names, nearest, shortened
 from thenar.runtime.toml_source import Place, TomlText, read_source, spelled
 from thenar.runtime.toml_struct import check_finite, convert
@@ -22,6 +24,8 @@ from . import FirmwareError
 from .targets.avr import AVRS, Avr, best_setting, near_rates
 from .words import Names
 
+# A CD74HC4067: its channels, and the pins that select one.
+MUX_CHANNELS, SELECT_PINS = 16, 4
 Microseconds = Annotated[int, Meta(ge=0, le=60_000_000)]
 ShortMicroseconds = Annotated[int, Meta(ge=0, le=65_535)]
 
@@ -68,6 +72,26 @@ class GloveUart(_Table, frozen=True):
     joints: tuple[str, ...] = ()
 
 
+class TaxelInputs(_Table, frozen=True):
+    """Taxels as voltages between 0 and AVCC on the part's converter, straight or behind CD74HC4067 multiplexers.
+
+    inputs     channels of the converter ("ADC0"): a taxel on each, or the common pin of a multiplexer
+    select     the pins that drive S0 to S3 of all multiplexers together; none: there are no multiplexers
+    names      the taxel of each channel of the board, "" for none: channel n of multiplexer m is channel 16 m + n
+    settle_us  for so long a channel is left to settle after the multiplexers were switched
+    """
+
+    inputs: Annotated[tuple[str, ...], Meta(min_length=1)]
+    names: Annotated[tuple[str, ...], Meta(min_length=1, max_length=MOST_ASKED)]
+    select: tuple[str, ...] = ()
+    settle_us: Annotated[int, Meta(ge=0, le=10_000)] = 100
+
+    @property
+    def per_input(self) -> int:
+        """How many channels an input has."""
+        return MUX_CHANNELS if self.select else 1
+
+
 class Board(_Table, frozen=True):
     """A microcontroller and what hangs on its pins; one that was loaded has been found sound.
 
@@ -89,6 +113,12 @@ class Board(_Table, frozen=True):
     chips: tuple[ChipWiring, ...] = field(default=(), name="chip")
     cyberglove: GloveUart | None = None
     analog: dict[str, str] = {}
+    taxels: TaxelInputs | None = None
+
+    @property
+    def channels(self) -> int:
+        """How many analog channels it tells the host of."""
+        return 0 if self.taxels is None else len(self.taxels.names)
 
     @property
     def microcontroller(self) -> Avr:
@@ -103,11 +133,17 @@ class Board(_Table, frozen=True):
         return (*self.pins, *(name for chip in self.chips for name in chip.numbered_pins.values()))
 
 
+def keys_of(board: Board, switches: Sequence[Switch]) -> tuple[str, ...]:
+    """Return the names of a build's switches that are keys of the board: all but the levels of its taxels."""
+    taxels = () if board.taxels is None else board.taxels.names
+    return tuple(each.name for each in switches if each.threshold is None or each.threshold.taxel.name not in taxels)
+
+
 def rows_and_columns(board: Board, switches: Sequence[str]) -> tuple[int, int]:
     """Return how many rows and columns of keys the board tells the host of; pins and chips are one row."""
     if board.matrix is not None:
         return len(board.matrix.rows), len(board.matrix.columns)
-    return 1, len(switches)
+    return 1, len(switches) or int(board.channels > 0)
 
 
 def key_names(board: Board, switches: Sequence[str]) -> tuple[str, ...]:
@@ -126,7 +162,7 @@ def check_switches(board: Board, switches: Sequence[str]) -> None:
             f"the board has no pin or key for {list_names(lacking)}, which the build keeps: add what is missing to "
             "its board.toml, or compile the build for the switches that are there"
         )
-    if not switches:
+    if not switches and not board.channels:
         raise FirmwareError(
             "the build keeps no switch, so there is nothing to scan: compile it with --inputs both or switches"
         )
@@ -137,16 +173,23 @@ def glove_toml(name: str, board: Board, names: Names, port: str = "/dev/ttyACM0"
 
     Raises FirmwareError if the board lacks a switch of the build.
     """
-    switches = tuple(switch.name for switch in names.switches)
+    switches = keys_of(board, names.switches)
     check_switches(board, switches)
-    line = ScannerWiring(port=port, baud=board.baud, switches=key_names(board, switches))
+    taxels = board.taxels
+    line = ScannerWiring(
+        port=port,
+        baud=board.baud,
+        switches=key_names(board, switches),
+        taxels=() if taxels is None else taxels.names,
+        mux="cd74hc4067" if taxels is not None and taxels.select else None,
+    )
     debounce = Debounce(enabled=not (board.debounce.press_us or board.debounce.release_us))
     return harness_to_toml(Harness(name=name, scanners=(line,), debounce=debounce))
 
 
 Fault = tuple[Place, str]
 _TIMER_HZ = 400  # the clock's timer counts periods of 20 ms in eighths of the processor's clock
-_KINDS = tuple(kind for kind, chip in CHIPS.items() if chip.registers)
+_KINDS = tuple(kind for kind, chip in expanders().items() if chip.registers)
 _TOLERANCE = 0.025
 
 
@@ -162,6 +205,8 @@ def faults(board: Board) -> Iterator[Fault]:
     if board.cyberglove is not None:
         yield from _of_glove(board.cyberglove, board)
     yield from _of_analog(board)
+    if board.taxels is not None:
+        yield from _of_taxels(board, board.taxels)
     yield from _of_pins(board)
     yield from _of_names(board)
 
@@ -190,7 +235,7 @@ def _of_inputs(board: Board) -> Iterator[Fault]:
     there: list[Place] = [(kind,) for kind, used in kinds.items() if used]
     if len(there) > 1:
         yield there[1], f"{spelled(there[0])} is there already: switches hang on pins, a matrix or chips, one of them"
-    if not there:
+    if not there and board.taxels is None:
         yield (), "no switch is wired: add [pins], [matrix] or [[chip]] tables"
     if board.early_exit and not board.chips:
         yield ("early_exit",), "only chips are read one after another: without [[chip]] there is nothing to save"
@@ -247,6 +292,26 @@ def _of_analog(board: Board) -> Iterator[Fault]:
         seen[channel] = joint
 
 
+def _of_taxels(board: Board, taxels: TaxelInputs) -> Iterator[Fault]:
+    if len(taxels.select) not in (0, SELECT_PINS):
+        yield ("taxels", "select"), f"{len(taxels.select)} pins: a CD74HC4067 is selected by {SELECT_PINS}, S0 to S3"
+    room = taxels.per_input * len(taxels.inputs)
+    if len(taxels.names) > room:
+        yield ("taxels", "names"), f"{len(taxels.names)} names for {room} channels"
+    channels, seen = board.microcontroller.analog, {at: f"analog.{name}" for name, at in board.analog.items()}
+    for number, channel in enumerate(taxels.inputs):
+        here: Place = ("taxels", "inputs", number)
+        if channel not in channels:
+            yield here, f"an {board.part} has no channel {channel!r}{nearest(channel, list(channels))}"
+        if channel in seen:
+            yield here, f"{channel} is {seen[channel]} already: one channel, one input"
+        seen[channel] = spelled(here)
+    rows = () if board.matrix is None else board.matrix.rows
+    for number, pin in enumerate(taxels.select):
+        if pin[:2] in {row[:2] for row in rows}:
+            yield ("taxels", "select", number), f"a row of the matrix is driven on port {pin[1:2]}: take another port"
+
+
 def _of_pins(board: Board) -> Iterator[Fault]:
     part = board.microcontroller
     taken = _held(board, part)
@@ -276,6 +341,10 @@ def _used(board: Board) -> Iterator[tuple[Place, str]]:
         yield from ((("matrix", "columns", n), pin) for n, pin in enumerate(board.matrix.columns))
     channels = board.microcontroller.analog
     yield from ((("analog", name), channels[at]) for name, at in board.analog.items() if channels.get(at))
+    if board.taxels is not None:
+        yield from ((("taxels", "select", n), pin) for n, pin in enumerate(board.taxels.select))
+        inputs = enumerate(board.taxels.inputs)
+        yield from ((("taxels", "inputs", n), channels[at]) for n, at in inputs if channels.get(at))
 
 
 def _of_names(board: Board) -> Iterator[Fault]:
@@ -290,6 +359,8 @@ def _of_names(board: Board) -> Iterator[Fault]:
     if board.matrix is not None:
         rows = enumerate(board.matrix.switches)
         named += [(("matrix", "switches", r, c), name) for r, row in rows for c, name in enumerate(row) if name]
+    if board.taxels is not None:
+        named += [(("taxels", "names", n), name) for n, name in enumerate(board.taxels.names) if name]
     seen: dict[str, Place] = {}
     for place, name in named:
         if reason := fault(name):

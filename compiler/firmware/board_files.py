@@ -9,7 +9,8 @@ from thenar.runtime.scanning.scanmap import Port
 from thenar.runtime.tables import IntegerTables
 
 from . import FirmwareError
-from .board import Board, check_switches, glove_toml, key_names, rows_and_columns
+from .board import Board, check_switches, glove_toml, key_names, keys_of, rows_and_columns
+from .board_channels import channels_files
 from .board_inputs import expanders_file, joints_file, matrix_file, pair, pins_file, text, wrapped
 from .layout import NO_SWITCH, Layout, Ports
 from .protocol import BoardConfig
@@ -86,7 +87,7 @@ def readings(board: Board, switches: Sequence[str], tables: IntegerTables) -> tu
     without chips. Raises FirmwareError if the board lacks a switch.
     """
     check_switches(board, switches)
-    return plan_scan(switches, tables, harness_of(board)).ports if board.chips else ()
+    return plan_scan(switches, tables, harness_of(board)).ports if board.chips and switches else ()
 
 
 def harness_of(board: Board) -> Harness:
@@ -96,7 +97,7 @@ def harness_of(board: Board) -> Harness:
 
 def switches_of(ports: Sequence[Port]) -> list[list[int]]:
     """Return the numbers of the build's switches that each reading shows: the ports of an early exit."""
-    return [[switch for _, switch in port.switches] for port in ports]
+    return [list(port.elements) for port in ports]
 
 
 def exits_early(board: Board, ports: Sequence[Port]) -> bool:
@@ -139,6 +140,7 @@ def config_of(board: Board, switches: Sequence[str], tables: IntegerTables, *, r
         press_us=board.debounce.press_us,
         release_us=board.debounce.release_us,
         fastest_us=shortest_scan_us(board, switches, tables, recognises=recognises),
+        channels=0 if recognises else board.channels,
     )
 
 
@@ -158,7 +160,7 @@ def board_files(name: str, names: Names, layout: Layout, board: Board, mode: Mod
     the board lacks a switch or, for a glove, a joint; if there are more than 255 grasp types to tell of; or if a scan
     takes longer than scan_us.
     """
-    switches = tuple(switch.name for switch in names.switches)
+    switches = keys_of(board, names.switches)
     check_switches(board, switches)
     if mode == "glove" and len(names.grasps) > _MOST_GRASPS:
         raise FirmwareError(f"{len(names.grasps)} grasp types: a board can tell {_MOST_GRASPS} apart")
@@ -171,7 +173,9 @@ def board_files(name: str, names: Names, layout: Layout, board: Board, mode: Mod
     if mode == "glove":
         files["main.c"] = _glove_main(name, names, board, bool(joints), exits_early(board, ports))
     else:
-        files["main.c"] = text("scan_main.c", about=_about_scanner(board), chips=len(ports))
+        files |= channels_files(board)
+        values = {"about": _about_scanner(board), "chips": len(ports), "channels": board.channels}
+        files["main.c"] = text("scan_main.c", **values)
     files["glove.toml"] = glove_toml(name, board, names)
     return files
 
@@ -181,7 +185,7 @@ def _inputs(board: Board, switches: Sequence[str], layout: Layout) -> dict[str, 
     files = {"thenar_keys.h": text("thenar_keys.h", what=_inputs_in_words(board), chips=len(ports))}
     if board.matrix is not None:
         return files | {"thenar_matrix.c": matrix_file(board, board.matrix)}
-    if board.pins:
+    if board.pins or not switches:
         return files | {"thenar_pins.c": pins_file(board, switches)}
     return files | twi_files(board) | {"thenar_expanders.c": expanders_file(board, ports, switches)}
 
@@ -238,12 +242,17 @@ def _inputs_in_words(board: Board) -> str:
     if board.matrix is not None:
         diodes = "with" if board.matrix.diodes else "without"
         return f"a matrix of {len(board.matrix.rows)} rows and {len(board.matrix.columns)} columns {diodes} diodes"
+    if not (board.pins or board.chips):
+        return "none, and the one that the protocol asks for is open"
     return "switches on pins" if board.pins else "switches on port expanders"
 
 
 def _about_scanner(board: Board) -> str:
     reads = f"A scanner board. It reads {_inputs_in_words(board)}, and tells the host of them"
-    return wrapped(f"{reads} (protocol 1 of thenar's scanner board).", 3)
+    if board.channels:
+        keys = f"{_inputs_in_words(board)}, and " if board.matrix is not None or board.pins or board.chips else ""
+        reads = f"A scanner board. It reads {keys}taxels on the part's converter, and tells the host of them"
+    return wrapped(f"{reads} (protocol {2 if board.channels else 1} of thenar's scanner board).", 3)
 
 
 def _about_glove(board: Board) -> str:

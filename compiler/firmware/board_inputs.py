@@ -158,7 +158,7 @@ def _hexed(data: bytes) -> str:
 
 
 # The converter is exact to its last bit up to this clock; a conversion takes 13 of its cycles.
-_CONVERTER_HZ, _CONVERSION_CYCLES = 200_000, 13
+_CONVERTER_HZ, CONVERSION_CYCLES = 200_000, 13
 _BYTES = range(1, 256)
 
 
@@ -190,31 +190,36 @@ def _adc_file(name: str, board: Board, joints: Sequence[Calibration]) -> str:
         raise FirmwareError(f"[analog] of the board has no channel for {list_names(lacking)}, which the build needs")
     channels = [board.analog[joint.name] for joint in joints]
     rows = [
-        {"name": comment(joint.name), "channel": channel, "number": _number(channel)}
+        {"name": comment(joint.name), "channel": channel, "number": channel_number(channel)}
         for joint, channel in zip(joints, channels, strict=True)
     ]
-    # The data sheet's ADPS: the clock divided by 2 to the power of 1 to 7.
-    prescaler = next(power for power in range(1, 8) if board.clock_hz >> power <= _CONVERTER_HZ)
+    prescaler = prescaler_of(board.clock_hz)
     return text(
         "thenar_adc.c",
         name=name,
         joints=rows,
         wide=len(board.microcontroller.analog) > 8,
         jtag=needs_jtag_off(board, (board.microcontroller.analog[channel] for channel in channels)),
-        disabled=_disabled(board, channels),
+        disabled=disabled_inputs(board, channels),
         prescaler=prescaler,
-        conversion_us=ceil(_CONVERSION_CYCLES * 2**prescaler * 1e6 / board.clock_hz),
+        conversion_us=ceil(CONVERSION_CYCLES * 2**prescaler * 1e6 / board.clock_hz),
     )
 
 
-def _number(channel: str) -> int:
+def prescaler_of(clock_hz: int) -> int:
+    """Return the data sheet's ADPS: the clock is divided by 2 to its power, 1 to 7."""
+    return next(power for power in range(1, 8) if clock_hz >> power <= _CONVERTER_HZ)
+
+
+def channel_number(channel: str) -> int:
+    """Return the number of a channel: 3 of "ADC3"."""
     return int(channel.removeprefix("ADC"))
 
 
-def _disabled(board: Board, channels: Sequence[str]) -> list[Row]:
+def disabled_inputs(board: Board, channels: Sequence[str]) -> list[Row]:
     """Return the digital inputs to switch off: DIDR0 is for channels 0 to 7, DIDR2 for 8 to 15, each bit a pin."""
     masks = {0: 0, 2: 0}
-    for number in (_number(channel) for channel in channels if board.microcontroller.analog[channel]):
+    for number in (channel_number(channel) for channel in channels if board.microcontroller.analog[channel]):
         masks[0 if number < 8 else 2] |= 1 << number % 8
     return [{"number": number, "mask": f"0x{mask:02X}"} for number, mask in masks.items() if mask]
 

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations, product
+from math import prod
 from textwrap import wrap
 from typing import get_args
 
@@ -13,7 +14,19 @@ from thenar.runtime.tables import IntegerTables
 
 from . import FirmwareError
 from .costs import Cost
-from .layout import LARGEST_GROUP, MOST_ROWS, SMALLEST_GROUP, Adding, Bins, Layout, Ports, Shared, arrange
+from .layout import (
+    LARGEST_GROUP,
+    MOST_ROWS,
+    SMALLEST_GROUP,
+    Adding,
+    Bins,
+    Layout,
+    Ports,
+    Shared,
+    arrange,
+    looked_up,
+    seen_by,
+)
 from .targets import TARGETS, Target
 
 Option = tuple[Layout, Cost]
@@ -110,13 +123,17 @@ def _sharings(tables: IntegerTables, n_groups: int) -> Iterator[tuple[Shared, ..
     """
     sizes = [len(part) for part in np.array_split(np.arange(tables.n_switches), n_groups)] if n_groups else []
     held: list[tuple[int, Shared]] = [(1 << size, (group, ())) for group, size in enumerate(sizes)]
-    held += [(len(steps) + 1, (None, (joint,))) for joint, steps in enumerate(tables.thresholds) if len(steps)]
+    seen = {number: dict(seen_by(tables, number)) for number in looked_up(tables)}
+    held += [(prod(len(steps) + 1 for steps in of.values()), (None, (number,))) for number, of in seen.items()]
     yield ()
     while True:
         pairs = [
             (one[0] * other[0] - one[0] - other[0], a, b)
             for (a, one), (b, other) in combinations(enumerate(held), 2)
-            if one[0] * other[0] <= MOST_ROWS and other[1][1] and (one[1][0] is None or other[1][0] is None)
+            if one[0] * other[0] <= MOST_ROWS
+            and other[1][1]
+            and (one[1][0] is None or other[1][0] is None)
+            and not any(seen[x].keys() & seen[y].keys() for x, y in product(one[1][1], other[1][1]))
         ]
         if not pairs:
             return

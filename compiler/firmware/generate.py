@@ -16,7 +16,7 @@ from thenar.runtime.tables import IntegerTables
 
 from ..publication import check_folder, entries, publish_folder
 from . import FirmwareError
-from .board import Board
+from .board import Board, keys_of
 from .board_files import board_files, board_makefile, config_of, exits_early, key_ports, readings, switches_of
 from .choose import Fit, fit_for, smallest_fit
 from .classifier import LIBRARY_NAME, Library
@@ -63,6 +63,11 @@ class Firmware:
             raise FirmwareError(f"the mode {self.mode} is written for {others}, not for {self.target}")
         elif self.board is None:
             raise FirmwareError(f"the mode {self.mode} needs a board.toml: how the microcontroller is wired")
+        elif self.mode == "glove" and len(keys_of(self.board, self.names.switches)) < len(self.names.switches):
+            raise FirmwareError(
+                "the build keeps levels of taxels, which firmware of the mode glove does not read: take the mode scan, "
+                "and recognise on the host"
+            )
         elif self.board.part != target.part:
             raise FirmwareError(f"the board has an {self.board.part}, the target {self.target} is {target.named}")
 
@@ -82,7 +87,7 @@ class Firmware:
         """How the switches come: eight keys of the board after eight, or as they are read of the build's harness."""
         if self.board is None:
             return ports_of_scan(self.scan)
-        return key_ports(self.board, tuple(switch.name for switch in self.names.switches))
+        return key_ports(self.board, keys_of(self.board, self.names.switches))
 
     def library(self, notes: Sequence[str] = ()) -> Library:
         """Return the classifier alone, with lines for its opening comments."""
@@ -99,7 +104,7 @@ class Firmware:
 
     def _of_board(self, board: Board, library: Library) -> dict[str, str]:
         name, names, tables = self.name, self.names, self.tables
-        switches, glove = tuple(switch.name for switch in names.switches), self.mode == "glove"
+        switches, glove = keys_of(board, names.switches), self.mode == "glove"
         config = config_of(board, switches, tables, recognises=glove)
         files = protocol_files(config) | board_files(name, names, library.layout, board, self.mode)
         if glove:

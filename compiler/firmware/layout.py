@@ -4,10 +4,10 @@ how a joint's code becomes a row.
     score_k = start_k + sum over look-ups l of rows_l[n_l, k] + sum over slopes of distance * row[k]
 
 where n_l is the byte of a group of switches, one bit per switch, or is added up from the codes of one or a few joints,
-or both. A frame holds the switches as they come, a byte for each port: eight wires of an expander, eight keys of a
-matrix, or eight kept switches in their order; a group is put together from fields of such bytes. Every row is the exact
-sum of its switches' and joints' rows, so the scores are those of `IntegerTables`, bit for bit. There are three kinds of
-entries:
+or both. What a pair of joints adds is a look-up of both, besides those that they have alone. A frame holds the switches
+as they come, a byte for each port: eight wires of an expander, eight keys of a matrix, or eight kept switches in their
+order; a group is put together from fields of such bytes. Every row is the exact sum of its switches' and joints' rows,
+so the scores are those of `IntegerTables`, bit for bit. There are three kinds of entries:
 
     16 bits, added up in 16. They wrap around at will, for all scores fit; row 0 of a group of switches is zero, so that
              one switch's change is plus or minus row 2^bit.
@@ -95,7 +95,8 @@ def _bins(thresholds: NDArray[np.uint16], weight: int, bins: Bins, code_bits: in
 
 def code_bits(tables: IntegerTables) -> int:
     """Return the width of the codes, 8 where no joint's thresholds or slope tell codes above 254 apart, else 16."""
-    last = [int(steps[-1]) + 1 for steps in tables.thresholds if len(steps)] + [slope.high for slope in tables.slopes]
+    steps = [tables.steps_of(joint) for joint in range(tables.n_joints)]
+    last = [int(each[-1]) + 1 for each in steps if len(each)] + [slope.high for slope in tables.slopes]
     return 16 if any(code > 255 for code in last) else 8
 
 
@@ -103,7 +104,9 @@ def check_joints(tables: IntegerTables, bins: Bins) -> None:
     """Raise FirmwareError if a joint's rows are more than a byte can number, or cannot be found by `bins`."""
     if bins == "direct" and code_bits(tables) == 16:
         raise FirmwareError('codes have 16 bits: their rows are found by "trimmed" or "search", not "direct"')
-    for number, steps in enumerate(tables.thresholds):
+    own = list(enumerate(tables.thresholds))
+    own += [each for pair in tables.pairs for each in zip(pair.joints, pair.thresholds, strict=True)]
+    for number, steps in own:
         if len(steps) + 1 > MOST_ROWS:
             raise FirmwareError(
                 f"joint {number} has {len(steps) + 1} rows, firmware has at most {MOST_ROWS} a joint: "
@@ -140,7 +143,11 @@ def ports_of_scan(scan: ScanMap | None) -> Ports | None:
     """Return the ports of a build that was compiled for a harness: its boards', then its readings', byte by byte."""
     if scan is None:
         return None
-    return tuple(chain(*map(ports_of, (*scan.scanners, *(port.switches for port in scan.ports)))))
+    # Levels are bits of nothing: a device compares, and gives them in the order of their codes.
+    levels = [[level[-1] for level in board] for board in scan.taxels]
+    levels += [[switch for _, switch in port.levels] for port in scan.ports]
+    pairs = (*scan.scanners, *(port.switches for port in scan.ports), *map(enumerate, levels))
+    return tuple(chain(*map(ports_of, pairs)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -339,7 +346,24 @@ class Layout:
 
 
 Shared = tuple[int | None, tuple[int, ...]]
-"""A look-up: the number of a group of switches or None, and those of joints."""
+"""A look-up: the number of a group of switches or None, and those of joints; pairs are numbered after all joints."""
+
+
+def seen_by(tables: IntegerTables, number: int) -> tuple[tuple[int, NDArray[np.uint16]], ...]:
+    """Return the joints that a number in `Shared` names, and their thresholds: a joint itself, or those of a pair; none
+    without thresholds.
+    """
+    if number < tables.n_joints:
+        joints: Iterable[tuple[int, NDArray[np.uint16]]] = ((number, tables.thresholds[number]),)
+    else:
+        pair = tables.pairs[number - tables.n_joints]
+        joints = zip(pair.joints, pair.thresholds, strict=True)
+    return tuple((joint, steps) for joint, steps in joints if len(steps))
+
+
+def looked_up(tables: IntegerTables) -> list[int]:
+    """Return the numbers, as in `Shared`, of joints and pairs that have more than one row."""
+    return [number for number in range(tables.n_joints + len(tables.pairs)) if seen_by(tables, number)]
 
 
 def arrange(
@@ -357,8 +381,8 @@ def arrange(
 
     There are as few groups as that size allows, or `n_groups` where given: more look-ups and less flash. They are as
     even as can be, and none is of two ports where as few can do without. Where no wiring is known, `ports` are left
-    out, and switches follow each other by number. What `shared`
-    names shares look-ups; every other group, and every other joint that has thresholds, has one of its own. Raises
+    out, and switches follow each other by number. What `shared` names shares look-ups, none of which sees a joint
+    twice; every other group, every pair and every other joint that has thresholds has one of its own. Raises
     FirmwareError if the tables cannot be laid out so: 8-bit entries for look-ups that span more than 255 steps, more
     than 256 rows in a look-up, "direct" for codes of 16 bits, "trimmed" for thresholds further apart than 254 codes, no
     inputs at all.
@@ -372,26 +396,26 @@ def arrange(
     ports = consecutive(tables.n_switches) if ports is None else ports
     groups = _grouped(ports, group_size, n_groups)
     sum_bits = 8 if entry_bits == 8 and tables.bound <= MOST_BYTE and not tables.slopes else 16
-    constant = [joint for joint, steps in enumerate(tables.thresholds) if len(steps) == 0]
-    start = sum((tables.joint_rows[joint][0].astype(np.int64) for joint in constant), tables.bias.astype(np.int64))
+    varying = set(looked_up(tables))
+    constant = (number for number in range(tables.n_joints + len(tables.pairs)) if number not in varying)
+    start = sum((_falling(tables, number)[0] for number in constant), tables.bias.astype(np.int64))
     wide = code_bits(tables)
     made: list[Lookup] = []
     first_row = first_bin = first_step = 0
     for group, numbers in _all_shared(tables, len(groups), shared):
         rows = np.zeros((1, tables.n_classes), np.int64) if group is None else _group_sums(tables, groups[group])
         weight, joints = len(rows), []
-        for number in numbers:
-            steps = tables.thresholds[number]
+        for number, steps in chain(*(seen_by(tables, each) for each in numbers)):
             first, held = _bins(steps, weight, bins, wide)
             joints.append(JointLayout(number, weight, steps, first, held, first_bin, first_step))
             first_bin, weight = first_bin + len(held), weight * (len(steps) + 1)
             first_step += len(steps) if len(held) == 0 and len(steps) > MOST_INLINE else 0
-            falling = tables.joint_rows[number][::-1].astype(np.int64)
-            rows = (falling[:, np.newaxis] + rows).reshape(-1, tables.n_classes)
+        for number in numbers:
+            rows = (_falling(tables, number)[:, np.newaxis] + rows).reshape(-1, tables.n_classes)
         if len(rows) > MOST_ROWS:
             raise FirmwareError(f"a look-up of {len(rows)} rows: firmware has at most {MOST_ROWS}")
         what = f"the look-up of switch group {group}" if group is not None else "the look-up of joints"
-        what += f" {', '.join(map(str, numbers))}" if numbers else ""
+        what += f" {', '.join(str(joint.number) for joint in joints)}" if joints else ""
         least = rows.min(axis=0) if entry_bits < sum_bits else 0 * rows[0]
         made.append(
             Lookup(
@@ -408,12 +432,20 @@ def arrange(
     return Layout(tables, ports, groups, entry_bits, sum_bits, wide, bins, adding, start, tuple(made))
 
 
+def _falling(tables: IntegerTables, number: int) -> NDArray[np.int64]:
+    """Return the rows that a joint adds, or a pair, of which the first joint's bins come one by one; from the last."""
+    if number < tables.n_joints:
+        return tables.joint_rows[number][::-1].astype(np.int64)
+    rows = tables.pairs[number - tables.n_joints].rows.astype(np.int64)
+    return rows.swapaxes(0, 1).reshape(-1, tables.n_classes)[::-1]
+
+
 def _all_shared(tables: IntegerTables, n_groups: int, shared: Sequence[Shared]) -> list[Shared]:
     """Return all look-ups: `shared`, every other group and every other joint with thresholds, groups first."""
     taken = {group for group, _ in shared}
-    placed = {joint for _, joints in shared for joint in joints}
+    placed = {number for _, numbers in shared for number in numbers}
     alone: list[Shared] = [(group, ()) for group in range(n_groups) if group not in taken]
-    alone += [(None, (joint,)) for joint, steps in enumerate(tables.thresholds) if len(steps) and joint not in placed]
+    alone += [(None, (number,)) for number in looked_up(tables) if number not in placed]
     return sorted([*alone, *shared], key=lambda lookup: (lookup[0] is None, lookup[0] or 0, lookup[1]))
 
 

@@ -16,7 +16,7 @@ from thenar.drivers.calibration import GloveCalibration
 from thenar.runtime.build import Build
 from thenar.runtime.calibration import codes_of_bytes
 from thenar.runtime.manifest import Calibration
-from thenar.runtime.tables import IntegerTables
+from thenar.runtime.tables import IntegerTables, Pair
 
 from . import FirmwareError
 
@@ -26,8 +26,8 @@ BYTES = 256
 def on_bytes(tables: IntegerTables, codes: Sequence[Sequence[int]]) -> IntegerTables:
     """Return tables whose joint codes are bytes: those of byte b are what `tables` gives for codes[joint][b].
 
-    codes holds, for each joint, the code of each of the 256 bytes (runtime.calibration.codes_of_bytes). Raises
-    FirmwareError where they are not that many.
+    codes holds, for each joint, the code of each of the 256 bytes (runtime.calibration.codes_of_bytes); byte 0, which
+    no glove sends, is code 0 to a pair, as a missing joint is. Raises FirmwareError where they are not that many.
     """
     if [len(joint) for joint in codes] != [BYTES] * tables.n_joints:
         raise FirmwareError(f"codes of {BYTES} bytes are needed for each of {tables.n_joints} joints")
@@ -40,7 +40,16 @@ def on_bytes(tables: IntegerTables, codes: Sequence[Sequence[int]]) -> IntegerTa
         thresholds=tuple(thresholds for thresholds, _ in pairs),
         joint_rows=tuple(rows for _, rows in pairs),
         slopes=kept,
+        pairs=tuple(_pair(pair, codes) for pair in tables.pairs),
     )
+
+
+def _pair(pair: Pair, codes: Sequence[Sequence[int]]) -> Pair:
+    asked = [np.append(0, codes[joint][1:]) for joint in pair.joints]
+    bins = [np.searchsorted(steps, each) for steps, each in zip(pair.thresholds, asked, strict=True)]
+    last = [np.flatnonzero(each[1:] != each[:-1]) for each in bins]
+    one, other = (each[np.append(at, BYTES - 1)] for each, at in zip(bins, last, strict=True))
+    return Pair(pair.joints, (last[0].astype(np.uint16), last[1].astype(np.uint16)), pair.rows[np.ix_(one, other)])
 
 
 def _joint(

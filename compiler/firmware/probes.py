@@ -201,7 +201,7 @@ def turns(tables: IntegerTables, joint: int) -> NDArray[np.uint16]:
     """Return, in order, 0, each threshold of a joint and the code after it, and the highest code; and where it has a
     slope, codes about its ends and some between.
     """
-    thresholds, slope = tables.thresholds[joint].astype(np.int64), tables.slope_of(joint)
+    thresholds, slope = tables.steps_of(joint), tables.slope_of(joint)
     codes = np.concatenate([[0, _top(tables)], thresholds, thresholds + 1])
     if slope is not None:
         between = np.linspace(slope.low, slope.high, _BETWEEN).astype(np.int64)

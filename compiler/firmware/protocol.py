@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from textwrap import wrap
 
+from thenar.drivers.scanner_protocol import MOST_ASKED, SetChannels, SetRate
 from thenar.firmware_templates.rendering import render
 from thenar.runtime.scanning.decided import EarlyExit
 from thenar.runtime.scores import Scorer
@@ -36,6 +37,7 @@ class BoardConfig:
     rows, columns  of its keys, one row: wired directly      diodes  whether the keys of a matrix have any
     board          its number                                scan_us from scan to scan, at least `fastest_us`
     state_us, heartbeat_us  from frame to frame, 0: none     press_us, release_us  debouncing, 0: none
+    channels       of its converter: with any it speaks version 2 of the protocol
 
     Raises FirmwareError where a value is out of its field's range, or there are more keys than `MOST_KEYS`.
     """
@@ -50,6 +52,7 @@ class BoardConfig:
     press_us: int = 0
     release_us: int = 0
     fastest_us: int = 100
+    channels: int = 0
 
     def __post_init__(self) -> None:
         for name, (least, most) in _RANGES.items():
@@ -60,6 +63,11 @@ class BoardConfig:
             raise FirmwareError(f"the board has {self.rows} x {self.columns} keys: it can tell of {MOST_KEYS}")
         if self.scan_us < self.fastest_us:
             raise FirmwareError(f"scan_us of the board is {self.scan_us}: it scans every {self.fastest_us} us at most")
+
+    @property
+    def kept(self) -> int:
+        """How much of a payload from the host is kept: a SET_RATE, or a SET_CHANNELS of all channels."""
+        return max(SetRate.LAYOUT.size, SetChannels.LAYOUT.size + (self.channels + 7) // 8)
 
     @property
     def keys(self) -> int:
@@ -77,6 +85,7 @@ _RANGES = {
     "press_us": (0, _LONGEST_DEBOUNCE_US),
     "release_us": (0, _LONGEST_DEBOUNCE_US),
     "fastest_us": (1, _FOREVER_US),
+    "channels": (0, MOST_ASKED),
 }
 
 
@@ -84,7 +93,7 @@ def protocol_files(config: BoardConfig) -> dict[str, str]:
     """Return name -> text of the C of a board: configuration, frames, debouncing and protocol."""
     return {
         "thenar_config.h": render("board/thenar_config.h.j2", config=config),
-        **{name: render(f"board/{name}.j2") for name in _PORTABLE},
+        **{name: render(f"board/{name}.j2", config=config) for name in _PORTABLE},
     }
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from ..evaluation.luck import Draws
 from ..evaluation.rates import Rate
 from ..trainers.base import TRAINERS, Training
-from .equipment import NO_TIME
 from .finalists import Close
 from .latency import POLICIES
 from .points import DecisionKind, Latency, Point, Recipe, Scan, Time, front
@@ -19,13 +18,14 @@ from .screen import Screened
 from .search import Candidate, Shape
 from .survey import Cuts, Judged
 from .timing.classify_times import Classified
+from .timing.scan_times import ASKING_US, NO_TIME
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Design:
     """A finalist built in one way: these tables in this layout, their switches read so (None: it reads none).
 
-    transfer  what reading the joints takes
+    record    what reading the joints takes; scan_kind "demand": of frames in which the switches do not decide
     measured  what classifying takes, simulated or timed; None: it is as the model has it
     """
 
@@ -34,7 +34,7 @@ class Design:
     classified: Classified
     wired: Wired | None
     scan_kind: Scan
-    transfer: Time
+    record: Time
     measured: Time | None = None
 
     @property
@@ -58,21 +58,45 @@ class Design:
         if self.wired is None:
             return Time(0.0, "wire")
         times = self.wired.scan
-        return Time(times.early_us if self.scan_kind == "early" else times.full_us, times.how)
+        us = {"full": times.full_us, "early": times.early_us, "demand": times.alone_us}[self.scan_kind]
+        return Time(us, times.how)
+
+    @property
+    def asked(self) -> float:
+        """In which share of the frames the joints are read."""
+        return self.wired.scan.asked if self.scan_kind == "demand" and self.wired is not None else 1.0
+
+    @property
+    def transfer(self) -> Time:
+        """Reading the joints, the mean; on demand with the byte that asks for them."""
+        if self.scan_kind != "demand":
+            return self.record
+        return Time(self.asked * (self.record.us + ASKING_US), self.record.how)
 
     @property
     def classify(self) -> Time:
         """Classifying, as often as it is done: a scan that may end early looks at the scores after every port that it
         reads, the mean over frames as the time of its scan is.
         """
-        once = self.measured or Time(self.classified.us, self.classified.how)
-        looks = self.wired.scan.early_ports if self.scan_kind == "early" and self.wired is not None else 1.0
+        once, looks = self.measured or Time(self.classified.us, self.classified.how), 1.0
+        if self.wired is not None and self.scan_kind != "full":
+            scan = self.wired.scan
+            looks = scan.early_ports if self.scan_kind == "early" else max(scan.alone_ports, 1.0) + scan.asked
         return Time(once.us * looks, once.how)
 
     @property
     def frame(self) -> Time:
-        """Reading everything, on lines of their own, and classifying."""
-        return Time(max(self.scan.us, self.transfer.us) + self.classify.us, self.classify.how)
+        """Reading everything, on lines of their own, and classifying; on demand one after the other."""
+        both = self.scan.us + self.transfer.us if self.scan_kind == "demand" else max(self.scan.us, self.transfer.us)
+        return Time(both + self.classify.us, self.classify.how)
+
+    @property
+    def slow_us(self) -> float | None:
+        """What a frame takes in which the joints are read, where that is not every one."""
+        if self.scan_kind != "demand" or self.wired is None:
+            return None
+        once = self.measured or Time(self.classified.us, self.classified.how)
+        return self.wired.scan.full_us + self.record.us + ASKING_US + 2 * once.us
 
     @property
     def decisions(self) -> tuple[DecisionKind, ...]:
@@ -83,16 +107,18 @@ class Design:
 Latencies = Mapping[tuple[Design, DecisionKind], Latency]
 
 
-def designs(close: Close, joints: Time) -> Iterator[Design]:
-    """Yield every way to build a finalist; reading the joints takes `joints`."""
-    read = joints if close.screened.choice.joints else NO_TIME
+def designs(close: Close, read: Time = NO_TIME) -> Iterator[Design]:
+    """Yield every way to build a finalist, whose joints take `read`."""
     for tables in close.priced:
         for classified in tables.classified:
             if not close.screened.columns:
                 yield Design(close, tables, classified, None, "full", read)
             for wired in tables.wired:
                 # Not where ending early never leaves anything out, as with boards.
-                kinds: tuple[Scan, ...] = ("full", "early") if wired.scan.early_us < wired.scan.full_us else ("full",)
+                kinds: list[Scan] = ["full", "early"] if wired.scan.early_us < wired.scan.full_us else ["full"]
+                # Of a CyberGlove; a record that is asked for always is better streamed.
+                if read.how in ("formula", "measured", "wire") and read.us and wired.scan.asked < 1.0:
+                    kinds.append("demand")
                 for kind in kinds:
                     yield Design(close, tables, classified, wired, kind, read)
 
@@ -269,4 +295,5 @@ def _point(
         chips=0 if wired is None else wired.scan.chips,
         compile_s=round(close.choosing_s + design.tables.seconds, 2),
         fronts=fronts,
+        asked=design.asked,
     )

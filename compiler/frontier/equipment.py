@@ -4,25 +4,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .cache import Cache, stored
-from .points import Time
 from .timing.classify_times import ClassifyModel
 from .timing.python_times import PythonCost
-from .timing.scan_times import Beside, beside_wire
+from .timing.scan_times import NO_RECORDS, Beside, Records, beside_wire
 from .timing.wirings import Wiring
 
 # Expected seconds.
 _CALIBRATION_S = 3.0
-NO_TIME = Time(0.0, "wire")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Equipment:
-    """The target's model, the wirings worth trying, what a transaction takes besides the wire, and the joints' time."""
+    """The target's model, the wirings worth trying, what a transaction takes beside the wire, and a record."""
 
     model: ClassifyModel
     wirings: tuple[Wiring, ...]
     beside: Beside
-    joints: Time = NO_TIME
+    records: Records = NO_RECORDS
 
     def fitting(self, names: Sequence[str]) -> tuple[Wiring, ...]:
         """Return the wirings that have a place for all of these switches; none where there are none to read."""
@@ -35,7 +33,7 @@ def calibrate(target: str) -> tuple[PythonCost | None, Beside]:
     return ClassifyModel(target).python, beside_wire(target)
 
 
-def equipment_for(target: str, wirings: tuple[Wiring, ...], cache: Cache, joints: Time = NO_TIME) -> Equipment:
+def equipment_for(target: str, wirings: tuple[Wiring, ...], cache: Cache, records: Records = NO_RECORDS) -> Equipment:
     """Return what may be built for `target`, measured here once."""
     ((python, beside),) = cache.ask("calibration", [calibrate.call(_CALIBRATION_S, target)])
-    return Equipment(ClassifyModel(target, python=python), wirings, beside, joints)
+    return Equipment(ClassifyModel(target, python=python), wirings, beside, records)

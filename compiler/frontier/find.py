@@ -9,6 +9,7 @@ from itertools import filterfalse
 from os.path import lexists
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Literal
 
 import numpy as np
 
@@ -39,10 +40,11 @@ from .screen import OTHER_TRAINERS, QUICK_PRICE_S, Screened, screen, screen_othe
 from .search import Candidate, Search, available_inputs, curve_ways, ways
 from .stream import Stream, stream_of
 from .survey import Cuts, Survey, fit_s, path_s, settle_s
-from .timing.scan_times import joints_time, scan_times
-from .timing.wirings import wirings
+from .timing.scan_times import records_of, scan_times
+from .timing.wirings import reads_by_itself, wirings
 from .words import csv_bytes
 
+RecordTime = Literal["formula", "wire"]
 FRONTIER_NAME, TABLE_NAME, STORE_NAME = "frontier.json", "frontier.csv", "store.jsonl"
 _DOCUMENTS = frozenset({FRONTIER_NAME, TABLE_NAME, *(f"{name}.svg" for name in PICTURES)})
 _EARLY = (
@@ -97,6 +99,8 @@ def find_frontier(
     wanted: Wanted | None = None,
     build: Path | None = None,
     joint_us: float | None = None,
+    record_time: RecordTime = "formula",
+    filtered: bool = False,
     stream: GraspSet | None = None,
     jobs: int = -1,
     cluster: str | None = None,
@@ -127,8 +131,13 @@ def find_frontier(
     build : Path, optional
         A build folder, to be marked beside the points.
     joint_us : float, optional
-        What reading the joints takes, in microseconds, where they are not a CyberGlove's. Without it that time is left
+        What reading all joints takes, in microseconds, where they are not a CyberGlove's. Without it that time is left
         out of every frame, and a sentence of `skipped` says so.
+    record_time : {"formula", "wire"}
+        What a CyberGlove's record takes, where the harness does not have it measured: the vendor's formula, or its
+        bytes on the line alone.
+    filtered : bool
+        Whether the formula is with the box's digital filter on.
     stream : GraspSet, optional
         Other recordings of the same glove, to measure decision latency on; usually the test rows of the first fold.
     jobs : int
@@ -165,9 +174,16 @@ def find_frontier(
         cache = Cache(store, report or _unheard, jobs=jobs, cluster=cluster)
         try:
             names = [joint.name for joint in grasp_set.joints]
-            joints = joints_time(names, joint_us, None if harness is None else harness.cyberglove)
-            equipment = equipment_for(target, wirings(harness, target), cache, joints)
-            untimed = (_UNTIMED.format(list_names(names)),) if joints.how == "unknown" else ()
+            records = records_of(
+                names,
+                joint_us,
+                None if harness is None else harness.cyberglove,
+                wire_only=record_time == "wire",
+                filtered=filtered,
+                masked=not reads_by_itself(target),
+            )
+            equipment = equipment_for(target, wirings(harness, target), cache, records)
+            untimed = (_UNTIMED.format(list_names(names)),) if records.how == "unknown" else ()
             renewed = (_RENEWED,) if store.renewed else ()
             survey = Survey(grasp_set, source, samples, ports, search, cuts, equipment, cache)
             played = _stream(survey, stream)
@@ -309,7 +325,7 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
     screened += screen_others(survey, finalists(screened, (), _WIDER * search.finalists))
     named = choices_to_mark(n_switches, survey.n_joints, search.trainers[0])
     closes = look_closely(survey, finalists(screened, list(named), search.finalists))
-    every = [design for close in closes for design in designs(close, survey.equipment.joints)]
+    every = [design for close in closes for design in designs(close, survey.transfer(close.screened.choice))]
     by_time, by_switches = best_designs(every)
     kept, checks, skipped = measured(with_whole_scans([*by_time, *by_switches]), survey.equipment, survey.cache)
     luck = lucks((by_time, by_switches), every, screened, survey.cuts, search.seed)
@@ -358,7 +374,10 @@ def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latenc
             fold.train,
             survey.columns(choice, fold),
             stream,
-            tuple(Pace(design.tables.tabled, design.frame.us, design.decisions) for design in mine),
+            tuple(
+                Pace(design.tables.tabled, design.frame.us, design.decisions, design.slow_us, design.asked)
+                for design in mine
+            ),
             survey.training(choice, fold),
         )
         for choice, mine in grouped.items()
@@ -417,7 +436,7 @@ def marks_of(named: dict[Candidate, str], closes: Sequence[Close], survey: Surve
         screened = close.screened
         if screened.choice in named:
             priced = next(tables for tables in close.priced if tables.tabled == tabled)
-            us = priced.fastest_us(survey.equipment.joints.us if screened.choice.joints else 0.0)
+            us = priced.fastest_us(survey.transfer(screened.choice).us)
             if us is not None:
                 found.append(Mark(named[screened.choice], len(screened.columns), close.tables[tabled].rate, us))
     return tuple(found)
@@ -444,7 +463,7 @@ def own_build(folder: Path, grasp_set: GraspSet, equipment: Equipment) -> Mark:
     bits = grasp_set.switches[:, _places(names, grasp_set.switch_names, folder)]
     codes = grasp_set.codes[:, _places(joints, [joint.name for joint in grasp_set.joints], folder)]
     scans = [scan_times(names, build.tables, wiring, bits, codes, equipment.beside).full_us for wiring in fitting]
-    frame_us = max(min(scans, default=0.0), equipment.joints.us * bool(joints)) + options[0].us
+    frame_us = max(min(scans, default=0.0), equipment.records.of(len(joints)).us) + options[0].us
     return Mark(
         f"build {folder.name}", len(names), Rate.counted((pooled[0].correct,), pooled[0].total, of="pooled"), frame_us
     )

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from thenar.runtime.live.decision import Decision, SequentialTest, Standing
 from thenar.runtime.policy import Policy
+from thenar.runtime.scanning.decided import Decided as Undecided
 from thenar.runtime.scores import LANE_OFFSET, Scorer
 from thenar.runtime.tables import IntegerTables
 
@@ -248,14 +249,20 @@ POLICIES: Mapping[DecisionKind, Policy] = MappingProxyType(
 
 
 class Pace(Struct, frozen=True):
-    """Tables that answer every `frame_us`, and the ways to decide on what they answer."""
+    """Tables that answer every `frame_us`, and the ways to decide on what they answer.
+
+    slow_us  what a frame takes in which the switches do not decide and the joints are read, a share `asked` of all:
+             then frame_us is the mean; None: all frames take as long
+    """
 
     tabled: Tabled
     frame_us: float
     decisions: tuple[DecisionKind, ...]
+    slow_us: float | None = None
+    asked: float = 1.0
 
 
-@stored(2)
+@stored(3)
 def latencies(
     samples: Samples, rows: Rows, columns: Columns, stream: Stream, paces: tuple[Pace, ...], training: Training
 ) -> tuple[tuple[Latency, ...], ...]:
@@ -266,6 +273,8 @@ def latencies(
     tables = {tabled: made for tabled, made, _ in tables_of(samples, rows, columns, wanted, training)}
     return tuple(
         tuple(latency(tables[pace.tabled], columns, stream, pace.frame_us, POLICIES[kind]) for kind in pace.decisions)
+        if pace.slow_us is None
+        else (latency_on_demand(tables[pace.tabled], columns, stream, pace),)
         for pace in paces
     )
 
@@ -297,7 +306,33 @@ def latency(tables: IntegerTables, columns: Sequence[int], stream: Stream, frame
     decided = decided_on(tables, columns, stream, step_us, policy)
     begun_us = stream.at_us - stream.at_us[0]
     held = _Held(begun_us[stream.arrivals], begun_us[stream.ends], stream.types[stream.arrivals])
-    return _measured(held, *_waits_and_errors(decided, step_us, held), step_us)
+    answered_us = (decided.frames + 1) * step_us
+    return _measured(held, *_waits_and_errors(answered_us, decided.types, held), step_us)
+
+
+def latency_on_demand(tables: IntegerTables, columns: Sequence[int], stream: Stream, pace: Pace) -> Latency:
+    """Return the latency, decided on single frames, where each is as long as its state makes it: one that the switches
+    decide is quick, any other waits for the joints.
+    """
+    assert pace.slow_us is not None
+    _check(tables, columns, stream, pace.frame_us)
+    quick_us = pace.slow_us if pace.asked >= 1 else (pace.frame_us - pace.asked * pace.slow_us) / (1 - pace.asked)
+    slow, quick = (max(round(us), 1) for us in (pace.slow_us, quick_us))
+    begun_us = stream.at_us - stream.at_us[0]
+    bits, codes = stream.bits[:, list(columns)], stream.codes
+    winners = integer_scores(tables, bits, codes).argmax(axis=1)
+    everything = Undecided(tables, [tuple(range(tables.n_switches))], bits, codes, on_demand=True)
+    steps_us = np.where(everything.after(1)[1], quick, slow)
+    answered, types, now = list[int](), list[int](), 0
+    states = zip(begun_us[1:].tolist(), steps_us.tolist(), winners.tolist(), strict=False)
+    for ends_us, step_us, winner in states:
+        if now < ends_us:
+            answered.append(now + step_us)
+            types.append(winner)
+            # Further frames of the state answer alike; the last may end after it.
+            now += -(-(ends_us - now) // step_us) * step_us
+    held = _Held(begun_us[stream.arrivals], begun_us[stream.ends], stream.types[stream.arrivals])
+    return _measured(held, *_waits_and_errors(np.array(answered), np.array(types), held), quick)
 
 
 def decided_on(
@@ -309,17 +344,15 @@ def decided_on(
     return decisions(tables, stretches(scores, stream.at_us, step_us), policy)
 
 
-def _waits_and_errors(decided: Decisions, step_us: int, held: _Held) -> tuple[Times, Times]:
+def _waits_and_errors(answered_us: Times, types: NDArray[np.intp], held: _Held) -> tuple[Times, Times]:
     """Return how long (g,) after arrival each grasp was first answered rightly, -1 where it was not before its end; and
-    how long of what was left of it then (g,) another type was the answer. The answer of frame n is there at
-    (n + 1) * step_us.
+    how long of what was left of it then (g,) another type was the answer. From answered_us[i] on it is types[i].
     """
-    answered_us = (decided.frames + 1) * step_us
     standing = np.maximum(np.searchsorted(answered_us, held.arrived_us, side="right") - 1, 0).tolist()
     beyond = np.searchsorted(answered_us, held.ended_us, side="right").tolist()
     waits_us, wrong_us = np.full(len(held.types), -1, np.int64), np.zeros(len(held.types), np.int64)
     for grasp, (first, last, right) in enumerate(zip(standing, beyond, held.types.tolist(), strict=True)):
-        answers = decided.types[first:last]
+        answers = types[first:last]
         found = np.flatnonzero(answers == right)
         if len(found):
             since_us = np.maximum(answered_us[first + found[0] : last], held.arrived_us[grasp])

@@ -4,7 +4,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from thenar.drivers.i2c.chips import CHIPS
+from msgspec.structs import replace
+
+from thenar.drivers.i2c.chips import expanders
 from thenar.runtime.files import read_file
 from thenar.runtime.harness.wiring import SLOWEST_HZ, Harness
 from thenar.runtime.names import shortened
@@ -69,7 +71,10 @@ class Picked:
             if given is not None and setting.wiring == AS_WIRED:
                 return given
             joints = () if setting.inputs == "switches" else self.joints
-            return Wiring(setting.wiring, setting.clock_hz).harness_of(kept, joints)
+            made = Wiring(setting.wiring, setting.clock_hz).harness_of(kept, joints)
+            if setting.scan == "demand" and made.cyberglove is not None:
+                return replace(made, cyberglove=replace(made.cyberglove, mode="demand"))
+            return made
 
         return harness_of
 
@@ -127,9 +132,10 @@ def _check(point: Point, grasp_set: GraspSet, what: str) -> None:
         raise FrontierError(f"{what} takes a trainer that is not there: {shortened(repr(setting.trainer))}")
     if TRAINERS[setting.trainer].staged != (setting.rounds is not None):
         raise FrontierError(f"{what} gives rounds to a trainer that takes none, or none to one that does")
-    if setting.wiring not in ("", AS_WIRED, BOARD, *CHIPS):
+    if setting.wiring not in ("", AS_WIRED, BOARD, *expanders()):
         raise FrontierError(f"{what} takes a wiring that is not there: {shortened(repr(setting.wiring))}")
-    if setting.wiring in CHIPS and not SLOWEST_HZ <= setting.clock_hz <= CHIPS[setting.wiring].clock_hz:
+    chip = expanders().get(setting.wiring)
+    if chip is not None and not SLOWEST_HZ <= setting.clock_hz <= chip.clock_hz:
         raise FrontierError(f"{what} runs its {setting.wiring} at {setting.clock_hz} Hz, which it cannot")
     if setting.wiring not in ("", AS_WIRED) and not Wiring(setting.wiring, setting.clock_hz).fits(point.switches):
         raise FrontierError(f"{what} has no room for its {len(point.switches)} switches on {setting.wiring}")

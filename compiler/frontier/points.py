@@ -17,9 +17,9 @@ MAX_BYTES = 64 << 20
 
 # measured: wall time on this machine. simulated: cycles of the real firmware in a simulator. wire: arithmetic of clocks
 # and baud rates, held against an emulated bus. model: predicted by a model that was held against measured points.
-# given: by the user. unknown: left out of every sum.
-How = Literal["measured", "simulated", "wire", "model", "given", "unknown"]
-Scan = Literal["full", "early"]
+# formula: the vendor's, of a single source. given: by the user. unknown: left out of every sum.
+How = Literal["measured", "simulated", "wire", "model", "formula", "given", "unknown"]
+Scan = Literal["full", "early", "demand"]
 DecisionKind = Literal["single", "dwell", "sequential"]
 # What a rate is of: subjects who are left out, or rows of everybody in random folds of whole trials.
 By = Literal["new subject", "pooled"]
@@ -101,8 +101,9 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     luck        by how much it looked better, as the best of all that was tried (`evaluation.luck`)
     frames      the same of single frames, as it came out (None: a trial has one frame)
     beside      the other of the two, as it came out (None: only one subject)
-    scan        reading the switches (the mean where it ends early); transfer: the joints
-    frame       max(scan, transfer) + classify: the two lie on lines of their own
+    scan        reading the switches (the mean where it ends early); transfer: the joints (on demand, the mean)
+    frame       max(scan, transfer) + classify: the two lie on lines of their own; on demand the sum of all three
+    asked       the share of frames in which the joints are read: below 1 on demand
     flash, ram  bytes of the classifier on its target; of the tables alone on host and pi
     fronts      on which lines of best points it lies: "frame", "switches", "latency"
     """
@@ -125,6 +126,7 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     chips: Count
     compile_s: Amount
     fronts: tuple[str, ...] = ()
+    asked: Share = 1.0
 
 
 class Tried(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):

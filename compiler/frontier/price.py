@@ -58,7 +58,7 @@ class PricedTables(Struct, frozen=True):
         return max(scan_us, joints_us) + self.classified[0].us
 
 
-@stored(1)
+@stored(2)
 def price(
     samples: Samples,
     names: tuple[str, ...],

@@ -82,7 +82,7 @@ def _screened(
         calls.append(price.call(QUICK_PRICE_S, some, names, columns, (_TABLED,), training, survey.equipment, None))
     found = []
     for choice, (priced,) in zip(choices, survey.cache.ask(f"times{stage}", calls), strict=True):
-        us = priced.fastest_us(survey.equipment.joints.us if choice.joints else 0.0)
+        us = priced.fastest_us(survey.transfer(choice).us)
         if us is not None and (priced.wired or choice.way == NO_SWITCHES):
             found.append(Screened(choice, survey.columns(choice, survey.cuts.everything), rates[choice], us))
     return tuple(found)

@@ -13,7 +13,7 @@ from thenar.runtime.manifest import Fitting, Inputs
 
 from ..boosting.stumps import winners
 from ..evaluation.choosing import choose_training
-from ..evaluation.folds import EvaluationError, Fold, Rows, leave_one_out, trial_folds
+from ..evaluation.folds import EvaluationError, Fold, Rows, leave_groups_out, trial_folds
 from ..evaluation.rates import Rate
 from ..placement.methods.base import METHODS
 from ..placement.ports import PortCosts
@@ -24,7 +24,7 @@ from ..tables.quantise import integer_scores, quantise
 from ..trainers.base import Training
 from .cache import Cache, stored
 from .equipment import Equipment
-from .points import By, Way
+from .points import By, Time, Way
 from .search import NO_SWITCHES, SHAPES, Candidate, Search, Shape
 
 # Expected seconds of one core, for so many rows: they only say how the time that is left is told.
@@ -36,8 +36,6 @@ _ROUND_S, _WHOLE_S, _TABLE_S = 0.004, 0.4, 0.03
 _TYPICAL = 33
 # What a frame takes is seen on tables of so many rows.
 _FEW_ROWS = 1000
-# With more subjects, several are left out together.
-_MOST_LEFT_OUT = 10
 
 
 # After which rounds models are tested, and of which of them tables are made.
@@ -71,12 +69,12 @@ class Cuts:
             raise EvaluationError(
                 "leaving a subject out needs two or more subjects: ask for trials in place of subjects"
             )
-        rows, groups = np.arange(len(trials)), np.unique(samples.subjects, return_inverse=True)[1] % _MOST_LEFT_OUT
+        rows = np.arange(len(trials))
         by_subject = (search.by or "subject") == "subject" and several
         seeds = range(search.seed, search.seed + (1 if by_subject else search.repeats))
         return cls(
             repeats=tuple(tuple(trial_folds(samples.labels, trials, search.folds, seed)) for seed in seeds),
-            subjects=tuple(leave_one_out(groups.astype(np.str_), "subject")) if several else (),
+            subjects=tuple(leave_groups_out(samples.subjects, "subject")) if several else (),
             everything=Fold(rows, rows[:0], "all"),
             by="new subject" if by_subject else "pooled",
             trials=trials,
@@ -195,6 +193,10 @@ class Survey:
     def _few(self) -> tuple[Samples, Samples]:
         spread = np.linspace(0, len(self.samples.labels) - 1, min(_FEW_ROWS, len(self.samples.labels))).astype(np.intp)
         return self._alone.rows(spread), self.samples.rows(spread)
+
+    def transfer(self, choice: Candidate) -> Time:
+        """Return what reading the joints of a choice takes."""
+        return self.equipment.records.of(self.n_joints if choice.joints else 0)
 
     def inputs(self, joints: bool, *, few: bool = False) -> Samples:
         """Return all rows, or a few of them, with the joints or without."""

@@ -29,7 +29,7 @@ COLUMNS = (
         "transfer_how",
     ),
     *("classify_us", "classify_how", "frame_us", "frame_how", "latency_mean_us", "latency_p99_us", "missed", "wrong"),
-    *("flash", "ram", "ports", "chips", "compile_s", "switches"),
+    *("flash", "ram", "ports", "chips", "compile_s", "switches", "asked"),
 )
 
 # They follow only where a point's trainer, or a setting of it, is not the default.
@@ -194,7 +194,7 @@ def _values(point: Point) -> Iterator[object]:
     for time in (point.scan, point.transfer, point.classify, point.frame):
         yield from _time(time)
     yield from (latency.mean_us, latency.p99_us, latency.missed, latency.wrong)
-    yield from (point.flash, point.ram, point.ports, point.chips, point.compile_s, _list(point.switches))
+    yield from (point.flash, point.ram, point.ports, point.chips, point.compile_s, _list(point.switches), point.asked)
 
 
 def _rate(rate: Rate | None) -> tuple[object, ...]:

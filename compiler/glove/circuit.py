@@ -9,16 +9,21 @@ from dataclasses import dataclass, field, replace
 
 from msgspec import Struct
 
+from thenar.drivers import cd74hc4067
 from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips.base import GROUND as GROUND_PINS
 from thenar.drivers.i2c.chips.base import RESET, Package
 from thenar.drivers.i2c.chips.base import SUPPLY as SUPPLY_PINS
-from thenar.runtime.harness.wiring import Harness, MuxChannel
+from thenar.runtime.harness.wiring import ChipWiring, Harness, MuxChannel, SpiWiring
 
 from .layout import GROUND, PUSH_BUTTON, SUPPLY, End, PlacedSwitch, Unit, Wire, net_of
 
 _HOST = ("VCC", "GND", "SDA", "SCL")
-_TYPES = {"SDA": "bidirectional", "SCL": "input", "INT": "open_collector", "NC": "no_connect", RESET: "input"}
+_TYPES = {
+    **{"SDA": "bidirectional", "SCL": "input", "INT": "open_collector", "NC": "no_connect", RESET: "input"},
+    **{"ALERT": "open_collector", "DOUT": "tri_state", cd74hc4067.COMMON: "passive"},
+}
+_SPI = {"CLK": "SCLK", "DIN": "MOSI", "DOUT": "MISO"}
 _ESTIMATE = "an estimate: straight ways and a quarter more, and 40 mm for the ends"
 _STRANDED = "stranded wire, AWG 30 or thinner, flexible"
 
@@ -119,12 +124,10 @@ _RESET_PULL = resistor("10k", "holds RESET high")
 
 def _add_expanders(circuit: Circuit, units: Sequence[Unit], ends: Sequence[End], harness: Harness) -> None:
     """Put in the expanders `units` and the muxes that they are behind, each bus with its plug and pull-ups."""
-    if not units:
-        return
     for unit in units:
         _add_expander(circuit, unit, [end for end in ends if end.unit == unit])
     for bus in dict.fromkeys(unit.bus for unit in units):
-        mine = [unit.wiring.mux for unit in units if unit.bus == bus and unit.wiring is not None]
+        mine = [unit.wiring.mux for unit in units if unit.bus == bus and isinstance(unit.wiring, ChipWiring)]
         channels = sorted({(mux.address, mux.channel) for mux in mine if mux is not None})
         clock_hz = harness.buses[bus].clock_hz
         _add_muxes(circuit, bus, channels, clock_hz)
@@ -133,31 +136,74 @@ def _add_expanders(circuit: Circuit, units: Sequence[Unit], ends: Sequence[End],
 
 def _add_expander(circuit: Circuit, unit: Unit, ends: Sequence[End]) -> None:
     wiring = unit.wiring
-    if wiring is None:
+    if not isinstance(wiring, ChipWiring):
         return
     chip, package = wiring.chip, wiring.chip.package
     circuit.put(unit.ref, _kind(package, chip.pins), name=unit.place)
-    _add_power(circuit, unit.ref, package, wiring.address - chip.addresses[0])
     sda, scl = _wires(unit.bus, wiring.mux)
+    _add_power(circuit, unit.ref, package, wiring.address - chip.addresses[0], (sda, scl))
     circuit.join(sda, unit.ref, package.number("SDA"))
     circuit.join(scl, unit.ref, package.number("SCL"))
     if not chip.pulls_up:
-        used = {end.pin for end in ends}
-        for pin in chip.pins:
-            if pin not in used:  # An input that floats draws current; these are never outputs.
-                circuit.join(GROUND, unit.ref, package.number(pin))
+        _ground_unused(circuit, unit, package, chip.pins, ends)
 
 
-def _add_power(circuit: Circuit, ref: str, package: Package, above: int) -> None:
-    """Connect supply, ground, reset and address of a chip, so far above its lowest one."""
+def _ground_unused(circuit: Circuit, unit: Unit, package: Package, pins: Sequence[str], ends: Sequence[End]) -> None:
+    """Ground the inputs that nothing hangs on: one that floats draws current, or disturbs its neighbours."""
+    used = {end.pin for end in ends}
+    for pin in pins:
+        if pin not in used:
+            circuit.join(GROUND, unit.ref, package.number(pin))
+
+
+def _add_spi(circuit: Circuit, units: Sequence[Unit], ends: Sequence[End]) -> None:
+    """Put in the converters on SPI, and a plug for each bus with a select line for each of them."""
+    lines: dict[str, list[str]] = {}
+    for unit in units:
+        if not isinstance(unit.wiring, SpiWiring):
+            continue
+        bus, _, chip = unit.wiring.device.rpartition("spidev")[2].partition(".")
+        package = unit.wiring.chip.package
+        circuit.put(unit.ref, _kind(package, unit.wiring.chip.pins), name=unit.place)
+        _add_power(circuit, unit.ref, package, 0, ("", ""))
+        select = f"CS{bus}_{chip}"
+        for pin, net in (*((pin, f"{name}{bus}") for pin, name in _SPI.items()), ("CS", select)):
+            circuit.join(net, unit.ref, package.number(pin))
+        _ground_unused(circuit, unit, package, unit.wiring.chip.pins, [end for end in ends if end.unit == unit])
+        lines.setdefault(bus, []).append(select)
+    for bus, selects in lines.items():
+        nets = (SUPPLY, GROUND, *(f"{name}{bus}" for name in _SPI.values()), *selects)
+        ref = circuit.next("J", header(len(nets)))
+        for number, net in enumerate(nets, start=1):
+            circuit.join(net, ref, str(number))
+        circuit.between("C", _BULK, SUPPLY, GROUND)
+
+
+def _add_multiplexers(circuit: Circuit, units: Sequence[Unit], ends: Sequence[End]) -> None:
+    """Put in the multiplexers of boards: a board selects one channel of all its own, and reads their commons."""
+    package = cd74hc4067.PACKAGE
+    inputs = tuple(f"I{channel}" for channel in range(cd74hc4067.CHANNELS))
+    for unit in units:
+        circuit.put(unit.ref, _kind(package, inputs), name=unit.place)
+        _add_power(circuit, unit.ref, package, 0, ("", ""))
+        circuit.join(GROUND, unit.ref, package.number(cd74hc4067.ENABLE))
+        for pin in cd74hc4067.SELECTS:
+            circuit.join(f"{unit.board}_{pin}", unit.ref, package.number(pin))
+        circuit.join(f"{unit.board}_{cd74hc4067.COMMON}{unit.bus}", unit.ref, package.number(cd74hc4067.COMMON))
+        _ground_unused(circuit, unit, package, inputs, [end for end in ends if end.unit == unit])
+
+
+def _add_power(circuit: Circuit, ref: str, package: Package, above: int, bus: tuple[str, str]) -> None:
+    """Connect supply, ground, reset and address of a chip on a bus, so far above its lowest one."""
+    nets = {"low": GROUND, "high": SUPPLY, "SDA": bus[0], "SCL": bus[1]}
     for number, name in enumerate(package.pins, start=1):
         if name in GROUND_PINS:
             circuit.join(GROUND, ref, str(number))
         if name in SUPPLY_PINS:
             circuit.join(SUPPLY, ref, str(number))
             circuit.between("C", _DECOUPLING, SUPPLY, GROUND)
-    for name, high in package.selects(above):
-        circuit.join(SUPPLY if high else GROUND, ref, package.number(name))
+    for name, to in package.selects(above):
+        circuit.join(nets[to], ref, package.number(name))
     if RESET in package.pins:
         circuit.join(f"{ref}_{RESET}", ref, package.number(RESET))
         circuit.between("R", _RESET_PULL, SUPPLY, f"{ref}_{RESET}")
@@ -166,7 +212,7 @@ def _add_power(circuit: Circuit, ref: str, package: Package, above: int) -> None
 def _add_muxes(circuit: Circuit, bus: int, channels: Sequence[tuple[int, int]], clock_hz: int) -> None:
     for address in dict.fromkeys(address for address, _ in channels):
         ref = circuit.next("U", _kind(tca9548a.PACKAGE, ()))
-        _add_power(circuit, ref, tca9548a.PACKAGE, address - tca9548a.ADDRESSES[0])
+        _add_power(circuit, ref, tca9548a.PACKAGE, address - tca9548a.ADDRESSES[0], _wires(bus, None))
         for wire, pin in zip(_wires(bus, None), ("SDA", "SCL"), strict=True):
             circuit.join(wire, ref, tca9548a.PACKAGE.number(pin))
         for channel in (channel for at, channel in channels if at == address):
@@ -211,7 +257,7 @@ def _kind(package: Package, inputs: Sequence[str]) -> Kind:
     pins = tuple((str(number), name, type_of(name)) for number, name in enumerate(package.pins, start=1))
     return Kind(
         package.part,
-        "Interface_Expansion",
+        package.library,
         package.symbol,
         package.footprint,
         pins,
@@ -240,6 +286,14 @@ _OWN_SWITCH = Kind(
     two_pins(("1", "2")),
     note="a contact between its two wires; a pad that is recorded as a voltage needs a comparator at its threshold",
 )
+_PAD = Kind(
+    "force sensing pad of your own",
+    "Device",
+    "R_Variable",
+    "",
+    two_pins(("1", "2")),
+    note="its resistance falls with force; it is the upper half of a divider between the supply and an analog input",
+)
 _DIODE = Kind(
     "Schottky, 30 V",
     "Device",
@@ -250,6 +304,7 @@ _DIODE = Kind(
 )
 # What wins against a chip's own pull-ups of 40 uA and more, and what pulls an input that has nothing of its own.
 _PULL_DOWN = resistor("4k7", "pulls an input down, against the chip's own pull-up")
+_DIVIDER = resistor("10k", "lower half of a pad's divider: as much as the pad has at the force that matters most")
 _PULL_UP = resistor("10k", "pulls up an input of a chip that has no pull-ups")
 
 
@@ -262,16 +317,21 @@ def glove_circuit(
     """
     circuit = Circuit()
     kind = _BUTTON if part_number == PUSH_BUTTON else replace(_OWN_SWITCH, part=part_number)
-    for switch in switches:
-        circuit.put(f"SW{switch.number}", kind, on_board=False, name=switch.name)
+    taxels = {end.switch for end in ends if end.taxel}
+    for place, switch in enumerate(switches):
+        circuit.put(f"SW{switch.number}", _PAD if place in taxels else kind, on_board=False, name=switch.name)
     _add_connectors(circuit, wires)
     units = _units(ends)
-    for unit in units:
-        if unit.wiring is None:
-            _add_board(circuit, [end for end in ends if end.unit == unit])
+    multiplexers = [unit for unit in units if unit.board]
+    for ref in sorted({unit.board or unit.ref for unit in units if unit.wiring is None}):
+        _add_board(
+            circuit, ref, [end for end in ends if end.unit.ref == ref], [m for m in multiplexers if m.board == ref]
+        )
     for end in ends:
         _add_signal(circuit, end, switches[end.switch])
-    _add_expanders(circuit, [unit for unit in units if unit.wiring is not None], ends, harness)
+    _add_spi(circuit, units, ends)
+    _add_multiplexers(circuit, multiplexers, ends)
+    _add_expanders(circuit, [unit for unit in units if isinstance(unit.wiring, ChipWiring)], ends, harness)
     return circuit
 
 
@@ -285,26 +345,26 @@ def _add_connectors(circuit: Circuit, wires: Sequence[Wire]) -> None:
             circuit.join(wire.net, ref, str(wire.pin))
 
 
-def _add_board(circuit: Circuit, ends: Sequence[End]) -> None:
-    """Put in a scanner board: a pin for every pin of its own that a kept switch needs, and one for ground."""
+def _add_board(circuit: Circuit, ref: str, ends: Sequence[End], multiplexers: Sequence[Unit]) -> None:
+    """Put in a scanner board: a pin for every pin of its own that a kept switch or a multiplexer needs, and ground."""
     signals = {end.pad: end.pin for end in ends}
-    nets = dict.fromkeys([*(end.other for end in ends), GROUND])
+    lines = [f"{ref}_{pin}" for pin in cd74hc4067.SELECTS] if multiplexers else []
+    lines += [f"{ref}_{cd74hc4067.COMMON}{unit.bus}" for unit in multiplexers]
+    nets = dict.fromkeys([*(end.other for end in ends), *lines, GROUND])
     named = {**signals, **{str(number): net for number, net in enumerate(nets, start=len(signals) + 1)}}
     pins = tuple((pad, name, "bidirectional") for pad, name in named.items())
-    unit = ends[0].unit
-    circuit.put(unit.ref, Kind("scanner board", "thenar", f"board_{unit.ref}", "", pins), on_board=False)
+    circuit.put(ref, Kind("scanner board", "thenar", f"board_{ref}", "", pins), on_board=False)
     for number, net in enumerate(nets, start=len(signals) + 1):
-        circuit.join(net, unit.ref, str(number))
-    if unit.diodes:
-        for pad, name in signals.items():
-            circuit.join(f"{unit.ref}_{name}", unit.ref, pad)
+        circuit.join(net, ref, str(number))
+    for end in {end.pad: end for end in ends if end.unit.diodes and not end.taxel}.values():
+        circuit.join(f"{ref}_{end.pin}", ref, end.pad)
 
 
 def _add_signal(circuit: Circuit, end: End, switch: PlacedSwitch) -> None:
     net = net_of(end, switch)
     circuit.join(net, f"SW{switch.number}", "1")
     circuit.join(end.other, f"SW{switch.number}", "2")
-    if end.unit.diodes:
+    if end.unit.diodes and not end.taxel:
         circuit.between("D", _DIODE, net, f"{end.unit.ref}_{end.pin}")
         return
     if Terminal(end.unit.ref, end.pad) not in circuit.nets[net]:
@@ -314,7 +374,10 @@ def _add_signal(circuit: Circuit, end: End, switch: PlacedSwitch) -> None:
 
 def _add_pull(circuit: Circuit, end: End, net: str) -> None:
     wiring = end.unit.wiring
-    if wiring is None:
+    if end.taxel:
+        circuit.between("R", _DIVIDER, net, GROUND)
+        return
+    if not isinstance(wiring, ChipWiring):
         return
     if end.other == SUPPLY:
         circuit.between("R", _PULL_DOWN, net, GROUND)
@@ -354,7 +417,7 @@ def bill_of(circuit: Circuit, wires: Sequence[Wire]) -> tuple[BillLine, ...]:
 
 
 def _pieces(kind: Kind, refs: Sequence[str]) -> BillLine:
-    what = {"Device": f"{_named(kind)} {kind.value}", "Connector_Generic": f"header or holes, {kind.value}"}
+    what = {"Device": f"{_named(kind)}{kind.value}", "Connector_Generic": f"header or holes, {kind.value}"}
     return BillLine(
         quantity=len(refs),
         unit="pcs",
@@ -369,7 +432,7 @@ def _pieces(kind: Kind, refs: Sequence[str]) -> BillLine:
 
 
 def _named(kind: Kind) -> str:
-    return {"R": "resistor", "C": "ceramic capacitor"}.get(kind.symbol, "diode")
+    return {"R": "resistor ", "C": "ceramic capacitor ", "R_Variable": ""}.get(kind.symbol, "diode ")
 
 
 def _wire_lines(wires: Sequence[Wire]) -> Iterator[BillLine]:

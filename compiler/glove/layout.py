@@ -2,13 +2,16 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import count
 from math import ceil, hypot
 
 import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
+from thenar.drivers import cd74hc4067
+from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, ScannerWiring, SpiWiring
+from thenar.runtime.scanning.ports import levels_of
 
 from ..hand import HandShape
 
@@ -26,7 +29,7 @@ Place = tuple[float, float]
 
 
 class PlacedSwitch(Struct, frozen=True):
-    """A switch of the reduced glove: number n is SWn everywhere.
+    """A switch of the reduced glove, or a taxel with all its levels: number n is SWn everywhere.
 
     part is the digit, or "palm"; side, where on it, left and right as drawn: the palm up, the thumb right. x_mm counts
     to the thumb's side and y_mm to the fingertips on the flat pattern, from the middle of the wrist's crease. All None
@@ -88,7 +91,7 @@ class BoardPins:
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """What reads switches: an expander at buses[bus].chips[chip] of a harness, or, without `wiring`, a scanner board.
+    """What reads switches: a chip of a harness, or, without `wiring`, a scanner board, or the multiplexer of a `board`.
 
     ref is its designator in the netlist; place, how messages and tables call it.
     """
@@ -96,15 +99,17 @@ class Unit:
     ref: str
     place: str
     bus: int = 0
-    wiring: ChipWiring | None = None
+    wiring: ChipWiring | SpiWiring | None = None
     diodes: bool = False
+    board: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class End:
     """Where a switch, by its number in the build, ends: pin is a name, pad the number that the netlist gives it.
 
-    other is the net of its other contact: ground, supply, or a row of the board's matrix.
+    other is the net of its other contact: ground, supply, or a row of the board's matrix. A taxel is the upper half of
+    a divider.
     """
 
     switch: int
@@ -112,6 +117,7 @@ class End:
     pin: str
     pad: str
     other: str
+    taxel: bool = False
 
 
 def as_soldered(harness: Harness, boards: Sequence[BoardPins | None]) -> Harness:
@@ -124,38 +130,71 @@ def as_soldered(harness: Harness, boards: Sequence[BoardPins | None]) -> Harness
     return replace(harness, scanners=scanners, buses=(*harness.buses, *behind.values()))
 
 
+def elements_of(harness: Harness, names: Sequence[str]) -> tuple[str, ...]:
+    """Return what is to be placed and wired of a build's switches and levels of these names: of a taxel its name, once,
+    at the place of its first level.
+    """
+    taxels = {number: taxel for taxel, pairs in levels_of(harness, names).items() for _, number in pairs}
+    return tuple(dict.fromkeys(taxels.get(number, name) for number, name in enumerate(names)))
+
+
 def ends_of(harness: Harness, names: Sequence[str], boards: Sequence[BoardPins | None] = ()) -> tuple[End, ...]:
     """Return the ends of the switches called `names`, in their order; each is wired once in the harness.
 
     boards[n] says what is known of the pins of scanner n; nothing, where it is None or left out.
     """
-    numbers = {name: number for number, name in enumerate(names)}
-    found = [*_of_chips(harness, numbers), *_of_boards(harness, numbers, boards)]
+    numbers, chips = {name: number for number, name in enumerate(names)}, count(1)
+    found = [*_of_chips(harness, numbers, chips), *_of_boards(harness, numbers, boards, chips)]
     return tuple(sorted(found, key=lambda end: end.switch))
 
 
-def _of_chips(harness: Harness, numbers: Mapping[str, int]) -> Iterator[End]:
-    used = 0
-    for bus, wiring in enumerate(harness.buses):
-        for chip in wiring.chips:
-            kept = {pin: name for pin, name in chip.pins.items() if name in numbers}
-            if not kept:
-                continue
-            used += 1
-            unit = Unit(f"U{used}", chip.place, bus, chip)
-            other = GROUND if chip.closed == "low" else SUPPLY
-            package = chip.chip.package
-            yield from (End(numbers[name], unit, pin, package.number(pin), other) for pin, name in kept.items())
+def _of_chips(harness: Harness, numbers: Mapping[str, int], used: Iterator[int]) -> Iterator[End]:
+    chips: list[tuple[int, ChipWiring | SpiWiring]] = [
+        (bus, chip) for bus, wiring in enumerate(harness.buses) for chip in wiring.chips
+    ]
+    for bus, chip in (*chips, *enumerate(harness.spi)):
+        kept = {pin: name for pin, name in chip.pins.items() if name in numbers}
+        if not kept:
+            continue
+        unit = Unit(f"U{next(used)}", chip.place, bus, chip)
+        taxels = isinstance(chip, SpiWiring) or chip.measures
+        other = SUPPLY if isinstance(chip, SpiWiring) or taxels or chip.closed == "high" else GROUND
+        number = chip.chip.package.number
+        yield from (End(numbers[name], unit, pin, number(pin), other, taxels) for pin, name in kept.items())
 
 
-def _of_boards(harness: Harness, numbers: Mapping[str, int], boards: Sequence[BoardPins | None]) -> Iterator[End]:
+def _of_multiplexers(
+    scanner: ScannerWiring, board: str, numbers: Mapping[str, int], used: Iterator[int]
+) -> Iterator[End]:
+    """Yield the ends of a board's taxels at its multiplexers, of which those without a kept taxel are left out."""
+    kept = [(channel, numbers[name]) for channel, name in enumerate(scanner.taxels) if name in numbers]
+    units: dict[int, Unit] = {}
+    for channel, switch in kept:
+        place, at = divmod(channel, cd74hc4067.CHANNELS)
+        if place not in units:
+            named = f"cd74hc4067 {place + 1} of the scanner board at {scanner.port}"
+            units[place] = Unit(f"U{next(used)}", named, place, board=board)
+        yield End(switch, units[place], f"I{at}", cd74hc4067.PACKAGE.number(f"I{at}"), SUPPLY, taxel=True)
+
+
+def _of_boards(
+    harness: Harness, numbers: Mapping[str, int], boards: Sequence[BoardPins | None], chips: Iterator[int]
+) -> Iterator[End]:
     for number, scanner in enumerate(harness.scanners):
         pins = boards[number] if number < len(boards) else None
         kept = [(key, numbers[name]) for key, name in enumerate(scanner.switches) if name in numbers]
         ref = f"A{number + 1}"
         unit = Unit(ref, f"scanner board at {scanner.port}", diodes=pins is not None and pins.diodes)
         signals = [f"key {key}" if pins is None else pins.signals[key] for key, _ in kept]
-        pads = {name: str(pad) for pad, name in enumerate(dict.fromkeys(signals), start=1)}
+        measured = (
+            [] if scanner.mux else [(at, numbers[name]) for at, name in enumerate(scanner.taxels) if name in numbers]
+        )
+        channels = [f"channel {channel}" for channel, _ in measured]
+        pads = {name: str(pad) for pad, name in enumerate(dict.fromkeys([*signals, *channels]), start=1)}
+        for (_, switch), signal in zip(measured, channels, strict=True):
+            yield End(switch, unit, signal, pads[signal], SUPPLY, taxel=True)
+        if scanner.mux:
+            yield from _of_multiplexers(scanner, ref, numbers, chips)
         for (key, switch), signal in zip(kept, signals, strict=True):
             low = "" if pins is None else pins.lows[key]
             yield End(switch, unit, signal, pads[signal], f"{ref}_{low}" if low else GROUND)
@@ -210,7 +249,7 @@ def net_of(end: End, switch: PlacedSwitch) -> str:
 
     The stroke keeps it apart from GND and VCC, whatever a switch is called.
     """
-    shared = end.unit.wiring is None and end.other != GROUND and not end.unit.diodes
+    shared = end.unit.wiring is None and end.other != GROUND and not end.unit.diodes and not end.taxel
     return f"{end.unit.ref}_{end.pin}" if shared else f"/{switch.name}"
 
 

@@ -89,9 +89,14 @@ def expectations(expected: Expected) -> Iterator[str]:
     for us in expected.boards_us:
         yield f"A scanner board's bitmap takes {us:.0f} us on its line."
     if expected.glove_us is not None:
-        yield f"The CyberGlove sends a record every {expected.glove_us:.0f} us at best."
+        yield (
+            f"The CyberGlove sends a record of {expected.sensors} sensors every {expected.glove_us:.0f} us at best, by "
+            "the vendor's formula or as glove.toml has it measured."
+        )
     for rate in sorted(expected.rates, key=lambda rate: rate.protocol == "training"):
         yield f"Recognised, {rate}."
+    for sentence in () if expected.faults is None else expected.faults.sentences:
+        yield f"At worst, of the rows trained on: {sentence}."
 
 
 def _building(summary: SpecSummary) -> Iterator[str]:

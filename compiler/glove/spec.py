@@ -9,10 +9,10 @@ from msgspec.structs import replace
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import Harness
-from thenar.runtime.manifest import Manifest, Recognised
+from thenar.runtime.manifest import Faults, Manifest, Recognised, Switch
 from thenar.runtime.names import list_names
-from thenar.runtime.scanning.plan import check_harness
-from thenar.runtime.scanning.ports import whole_scan
+from thenar.runtime.scanning.plan import check_harness, unwired
+from thenar.runtime.scanning.ports import whole_scan, wired_names
 from thenar.runtime.scanning.propose import own_joints, propose_cyberglove, propose_harness
 from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import glove_us, scan_us, scanner_us
@@ -26,13 +26,12 @@ from .layout import (
     Wire,
     as_soldered,
     crowded,
+    elements_of,
     ends_of,
     place_switches,
     wires_of,
 )
 from .pattern import Pattern, pattern_of
-
-_SENSORS = 18
 
 
 class SpecError(ThenarError, ValueError):
@@ -45,16 +44,19 @@ class Expected(Struct, frozen=True):
     scan_us      of all kept switches on expanders, in `transactions` transactions, selections of muxes included
     full_us      of all switches that are wired to expanders, kept or not
     boards_us    of a full bitmap of each scanner board
-    glove_us     between records of the CyberGlove; None where the build looks at no joint
+    glove_us     between records of the CyberGlove, of as many `sensors` as the build has joints; None where it has none
     rates        the recognition that was measured when the build was compiled
+    faults       what the worst faults leave of the rows trained on; None in specs of older builds
     """
 
     transactions: int
     scan_us: float
     full_us: float
     boards_us: tuple[float, ...]
+    sensors: int
     glove_us: float | None
     rates: tuple[Recognised, ...]
+    faults: Faults | None = None
 
 
 def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> Expected:
@@ -66,10 +68,14 @@ def expected_of(manifest: Manifest, scan: ScanMap, harness: Harness) -> Expected
         scan_us=time.us,
         full_us=time.full_us,
         boards_us=tuple(
-            scanner_us(board) for board, pairs in zip(harness.scanners, scan.scanners, strict=True) if pairs
+            scanner_us(board)
+            for number, board in enumerate(harness.scanners)
+            if scan.scanners[number] or (scan.taxels and scan.taxels[number])
         ),
-        glove_us=None if glove is None else glove_us(glove, glove.sensors or _SENSORS),
+        sensors=len(manifest.joints),
+        glove_us=None if glove is None else glove_us(glove, len(manifest.joints)),
         rates=manifest.rates,
+        faults=manifest.faults,
     )
 
 
@@ -121,11 +127,12 @@ def glove_spec(
     what its keys are wired to. Raises SpecError if the build keeps no switch, or has a scan map and no
     harness is given; HarnessError if the harness lacks a kept switch, or is not the scan map's.
     """
-    names = [switch.name for switch in manifest.switches]
-    if not names:
+    if not manifest.switches:
         raise SpecError("the build keeps no switch, so there is no glove to build: compile it with --inputs both")
-    wired = _harness(manifest, scan, harness, names)
-    read = whole_scan(wired, names) if scan is None else scan
+    wired = _harness(manifest, scan, harness)
+    asked = wired_names(wired, manifest.switches)
+    read = whole_scan(wired, asked) if scan is None else scan
+    names = elements_of(wired, asked)
     known = hand if hand is not None and hand.knows(names) else None
     switches = place_switches(names, known)
     soldered = as_soldered(wired, boards)
@@ -149,15 +156,16 @@ def glove_spec(
     return GloveSpec(summary, wired, read, circuit, pattern)
 
 
-def _harness(manifest: Manifest, scan: ScanMap | None, harness: Harness | None, names: Sequence[str]) -> Harness:
+def _harness(manifest: Manifest, scan: ScanMap | None, harness: Harness | None) -> Harness:
+    names = [switch.name for switch in manifest.switches]
     if harness is None:
         if scan is not None:
             raise SpecError("the build was compiled for a wiring of its own: name its glove.toml with --glove")
         return propose_harness(names, cyberglove=propose_cyberglove([joint.name for joint in manifest.joints]))
+    names = wired_names(harness, manifest.switches)
     if scan is not None:
         check_harness(scan, harness, names)
-    wired = set(harness.switches)
-    if lacking := [name for name in names if name not in wired]:
+    if lacking := unwired(harness, names):
         raise HarnessError(
             f"harness {harness.name!r} has no pin or key for {list_names(lacking)}, which the build keeps: "
             "add what is missing to its file"
@@ -203,12 +211,19 @@ def _remarks(
                 f"SW{first} and SW{second} are {apart} mm apart and their bodies {hand.body_mm:g} mm broad: move one "
                 "of them aside"
             )
-    for number, switch in enumerate(manifest.switches, start=1):
-        if switch.threshold is not None:
+    numbers = {switch.name: switch.number for switch in switches}
+    measured: dict[str, list[Switch]] = {}
+    for name, switch in zip(wired_names(harness, manifest.switches), manifest.switches, strict=True):
+        if switch.threshold is not None and name in numbers:
             yield (
-                f"SW{number} is the taxel {switch.name}: set its comparator or converter to {switch.threshold.value:g} "
-                f"{switch.threshold.taxel.unit}; it is {switch.closed}"
+                f"SW{numbers[name]} is of the taxel {switch.source}: set its comparator to "
+                f"{switch.threshold.value:g} {switch.threshold.taxel.unit}; it is {switch.closed}"
             )
+        elif switch.threshold is not None:
+            measured.setdefault(switch.source, []).append(switch)
+    for taxel, levels in measured.items():
+        closed = list_names([level.closed for level in levels])
+        yield f"SW{numbers[taxel]} is the taxel {taxel}, whose counts thenar compares: {closed}"
     joints = own_joints([joint.name for joint in manifest.joints])
     if joints and harness.cyberglove is None:
         yield joints

@@ -89,10 +89,16 @@ def best_per_cost(node: NodeCounts, costs: Counts) -> int | None:
     slack = error_bound(n, 3 * (classes + 1), 4) / costs[varying]
     close = varying[gains + slack >= (gains - slack).max()]
     close = close[np.lexsort((close, costs[close]))]
-    tables = node.tables(close)
-    plus = np.column_stack([tables.reshape(len(close), -1), np.full(len(close), n)])
+    return int(close[first_of_most_gain(node.tables(close), costs[close])])
+
+
+def first_of_most_gain(tables: Counts, costs: Counts | None = None) -> int:
+    """Return the first of several tables (m, K, values), of the rows of any nodes, whose n * gain (over its cost, which
+    must not descend) no other's exceeds, exactly.
+    """
+    plus = np.column_stack([tables.reshape(len(tables), -1), tables.sum(axis=(1, 2))])
     minus = np.column_stack([tables.sum(axis=1), tables.sum(axis=2)])
-    return int(close[first_best(plus, minus, costs[close])])
+    return first_best(plus, minus, costs)
 
 
 def _scores(node: NodeCounts) -> tuple[Floats, npt.NDArray[np.bool_]]:

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..samples import Columns, Samples
+from .constraints import Bound
 from .exact import Counts
 from .inputs import PlacementError
 
@@ -63,8 +64,11 @@ def best_subset(
     rounds: int = 10,
     starts: tuple[Columns, ...] = (),
     on_round: Callable[[int, int], None] | None = None,
+    limits: Bound | None = None,
 ) -> Subset:
     """Return the best subset of m switches that `rounds` integer programs find, and a bound on all others.
+
+    With `limits` that is of all subsets of at most m switches that obey them, as there may be none of m.
 
     starts    placements of at most m switches to start from besides the greedy one: the answer is no worse than they
     on_round  is called with (done, rounds) after every integer program
@@ -74,16 +78,17 @@ def best_subset(
     if m < 0 or rounds < 0:
         raise PlacementError(f"m = {m} and rounds = {rounds} must be at least 0")
     pairs = Pairs(samples)
-    search = _Search(pairs, min(m, len(pairs.varying)))
-    for start in dict.fromkeys([(), *(start[: search.m] for start in starts)]):
-        search.offer(swapped(pairs, filled(pairs, start, search.m)))
+    search = _Search(pairs, min(m, len(pairs.varying)) if limits is None else m, limits)
+    first = () if limits is None else limits.obeyed((), m)
+    for start in dict.fromkeys([first, *(start[: search.m] for start in starts)]):
+        search.offer(swapped(pairs, filled(pairs, start, search.m, limits), limits))
     nodes = 0
     while nodes < rounds and search.open:
         search.step()
         nodes += 1
         if on_round is not None:
             on_round(nodes, rounds)
-    order = filled(pairs, (), search.m, among=search.best)
+    order = filled(pairs, (), len(search.best), among=search.best)
     return Subset(order, pairs.total, search.alike, search.least, nodes)
 
 
@@ -150,37 +155,53 @@ def _squares(sizes: NDArray[np.generic]) -> int:
     return int(np.square(sizes.astype(np.int64)).sum())
 
 
-def filled(pairs: Pairs, columns: Columns, m: int, among: Columns | None = None) -> Columns:
+def filled(
+    pairs: Pairs, columns: Columns, m: int, limits: Bound | None = None, among: Columns | None = None
+) -> Columns:
     """Return `columns` and, after them, what tells most further pairs apart, one by one, until there are m.
+
+    With `limits` there may be fewer: what breaks none of them is taken as long as it tells any pairs apart.
 
     among  what may be taken (None: every switch that varies); it must hold enough. Ties go to the lowest number.
     """
     allowed = pairs.varying if among is None else np.array(sorted(among), dtype=np.intp)
     while len(columns) < m:
         open_ones = allowed[~np.isin(allowed, columns)]
+        if limits is not None:
+            open_ones = open_ones[limits.addable(columns)[open_ones]]
         gains = pairs.gains(columns)[open_ones]
+        if limits is not None and not gains.any():
+            break
         columns = (*columns, int(open_ones[gains.argmax()]))
     return columns
 
 
-def swapped(pairs: Pairs, columns: Columns) -> Columns:
-    """Return `columns` after exchanging one for a better one, over and over, until no exchange leaves fewer alike."""
+def swapped(pairs: Pairs, columns: Columns, limits: Bound | None = None) -> Columns:
+    """Return `columns` after exchanging one for a better one, over and over, until no exchange leaves fewer alike.
+
+    With `limits`, what must be kept stays.
+    """
     least = pairs.alike(columns)
     place = tried = 0
     while tried < len(columns):
-        other = filled(pairs, columns[:place] + columns[place + 1 :], len(columns))
+        rest = columns[:place] + columns[place + 1 :]
         tried += 1
-        if (found := pairs.alike(other)) < least:
-            columns, least, tried = other, found, 0
+        if limits is None or limits.whole(rest):
+            other = filled(pairs, rest, len(columns), limits)
+            if (found := pairs.alike(other)) < least:
+                columns, least, tried = other, found, 0
         place = (place + 1) % len(columns)
     return columns
 
 
 class Bounding:
-    """Lines  alike(T) >= alike - sum over a in T of gains[a]  that hold for every T of m of the `varying` switches."""
+    """Lines  alike(T) >= alike - sum over a in T of gains[a]  that hold for every T of m of the `varying` switches.
 
-    def __init__(self, varying: NDArray[np.intp], total: int, m: int) -> None:
-        self._varying, self._total, self._m = varying, max(total, 1), m
+    With limits, T are the sets of at most m switches that obey them, and `varying` holds what must be kept as well.
+    """
+
+    def __init__(self, varying: NDArray[np.intp], total: int, m: int, limits: Bound | None = None) -> None:
+        self._varying, self._total, self._m, self._limits = varying, max(total, 1), m, limits
         self._gains: list[NDArray[np.floating]] = []
         self._alike: list[float] = []
 
@@ -197,17 +218,25 @@ class Bounding:
         from scipy.optimize import Bounds, LinearConstraint, milp
 
         v = len(self._varying)
-        lines = np.column_stack([np.array(self._gains), np.ones(len(self._gains))])
-        size = np.append(np.ones(v), 0.0)
+        # Besides a variable a switch and the bound there is one for each taxel and port that limits count.
+        rows, most = (np.zeros((0, v)), np.zeros(0)) if self._limits is None else self._limits.rows(self._varying)
+        extra = rows.shape[1] - v
+        lines = np.column_stack([np.array(self._gains), np.zeros((len(self._gains), extra)), np.ones(len(self._gains))])
+        whole = np.append(np.ones(v + extra), 0.0)
+        size = np.append(np.ones(v), np.zeros(extra + 1))
+        fewest = self._m if self._limits is None else 0
+        constraints = [
+            LinearConstraint(lines, lb=np.array(self._alike)),
+            LinearConstraint(size[np.newaxis], lb=fewest, ub=self._m),
+        ]
+        if len(rows):
+            constraints.append(LinearConstraint(np.column_stack([rows, np.zeros(len(rows))]), ub=most))
         with _silent():
             found = milp(
-                np.append(np.zeros(v), 1.0),
-                constraints=[
-                    LinearConstraint(lines, lb=np.array(self._alike)),
-                    LinearConstraint(size[np.newaxis], lb=self._m, ub=self._m),
-                ],
-                integrality=size,
-                bounds=Bounds(0.0, np.append(np.ones(v), _UNIT)),
+                np.append(np.zeros(v + extra), 1.0),
+                constraints=constraints,
+                integrality=whole,
+                bounds=Bounds(0.0, np.append(np.ones(v + extra), _UNIT)),
                 options={"node_limit": _NODES, "mip_rel_gap": 0.0},
             )
         columns = () if found.x is None else tuple(self._varying[found.x[:v] > 0.5].tolist())
@@ -236,6 +265,7 @@ class _Search:
 
     pairs: Pairs
     m: int
+    limits: Bound | None = None
     bounding: Bounding = field(init=False)
     best: Columns = ()
     alike: int = field(init=False)
@@ -244,7 +274,10 @@ class _Search:
     _seen: set[frozenset[int]] = field(default_factory=set)
 
     def __post_init__(self) -> None:
-        self.bounding = Bounding(self.pairs.varying, self.pairs.total, self.m)
+        varying = self.pairs.varying
+        if self.limits is not None:
+            varying = np.union1d(varying, np.array([one for group in self.limits.groups for one in group], np.intp))
+        self.bounding = Bounding(varying, self.pairs.total, self.m, self.limits)
         self.alike = self.pairs.total
         everything: Columns = tuple(self.pairs.varying.tolist())
         self.least = self.pairs.alike(everything) if self.m else self.alike
@@ -269,7 +302,9 @@ class _Search:
         """Solve one integer program, and evaluate its answer."""
         least, columns = self.bounding.solve()
         self.least = min(max(self.least, least), self.alike)
-        self.stuck = len(columns) != self.m or not self.offer(columns)
+        if self.limits is not None and not self.limits.holds(columns):
+            columns = ()  # none was found
+        self.stuck = (len(columns) != self.m and self.limits is None) or not self.offer(columns)
 
 
 def _parts(columns: Columns) -> Iterator[Columns]:

@@ -2,24 +2,30 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import accumulate
+from math import inf
 from typing import Any, Literal
 
 import msgspec
 import numpy as np
+from msgspec.structs import replace
 
 from ..elementary import LN_2
 from ..limits import check_types
 from ..recordings.graspset import GraspSet
 from ..samples import Columns, Samples
+from .constraints import Bound, Limits
 from .cooccurrence import Cooccurrence
+from .elements import Elements, bits_of, columns_of, elements_of, names_of, ports_of
 from .gain import entropy_bits
 from .id3 import grow_id3
 from .inputs import PlacementError
-from .methods.base import METHODS, PAPERS
+from .joints import kept_joints
+from .methods.base import METHODS, PAPERS, Method
 from .optimum import Pairs, best_subset
 from .ports import PortCosts
-from .thresholds import made_plain
+from .robust import most_robust
 from .tree import Tree
 
 Progress = Callable[[int, int], None]
@@ -38,17 +44,49 @@ class Chosen:
     tree: Tree | None
 
 
-def choose(samples: Samples, method: str = PAPERS, parameter: float = 0.0, ports: PortCosts | None = None) -> Chosen:
+def choose(
+    samples: Samples,
+    method: str = PAPERS,
+    parameter: float = 0.0,
+    ports: PortCosts | None = None,
+    limits: Bound | None = None,
+    *,
+    robust: bool = False,
+) -> Chosen:
     """Choose switches of `samples` by a method of `METHODS`, whose parameter is S or a number of switches.
 
-    `ports` are the costs for methods that heed them. Raises MemberError for a method that is not there, PlacementError
+    `ports` are the costs for methods that heed them, `limits` are obeyed by all methods; `robust` looks for the
+    placement whose worst lost switch costs least. Raises MemberError for a method that is not there, PlacementError
     where it cannot choose.
     """
+    tree, columns = None, Columns()
     if method == PAPERS:
-        tree = grow_id3(samples.switches, samples.labels, min_samples=int(parameter))
-        return Chosen(tree.inputs, tree.gains, tree)
-    columns = METHODS.named(method).chooser(samples, ports)(parameter)
+        rows = samples if limits is None else limits.without(samples)
+        tree = grow_id3(rows.switches, rows.labels, min_samples=int(parameter))
+        columns = tree.inputs
+    if robust or limits is not None or tree is None:
+        pick = partial(_picked, method=METHODS.named(method), parameter=parameter, ports=ports, limits=limits)
+        columns = most_robust(samples, pick) if robust else pick(samples)
+    if tree is not None and tree.inputs == columns:
+        return Chosen(columns, tree.gains, tree)
     return Chosen(columns, information_alone(samples, columns), None)
+
+
+def _picked(
+    samples: Samples, method: Method, parameter: float, ports: PortCosts | None, limits: Bound | None
+) -> Columns:
+    if limits is None:
+        return method.chooser(samples, ports)(parameter)
+    most = max(int(parameter), 0) if method.by_number else inf
+    if method.nested:
+        return limits.obeyed(method.chooser(limits.without(samples), ports)(samples.n_switches), most)
+    refused: list[int] = []
+    while True:
+        order = method.chooser(limits.without(samples, refused), ports)(parameter)
+        kept = limits.obeyed(order, most)
+        if len(kept) == most or set(order) <= set(kept):
+            return kept
+        refused += set(order) - set(kept)
 
 
 def information_alone(samples: Samples, columns: Columns) -> tuple[float, ...]:
@@ -59,14 +97,16 @@ def information_alone(samples: Samples, columns: Columns) -> tuple[float, ...]:
 
 
 class Kept(msgspec.Struct, frozen=True, omit_defaults=True):
-    """One switch that is kept: its number in the set and its name; of ID3 also the bits it brought, and the share of
-    the grasp types' entropy that it and those before it brought together.
+    """One element that is kept: its number in the set, where switches come first, and its name; of ID3 also the bits
+    it brought, and the share of the grasp types' entropy that it and those before it brought together; of a level, the
+    code of its taxel that it is set above.
     """
 
     number: int
     name: str
     gain_bits: float | None = None
     cumulative_share: float | None = None
+    above: int | None = None
 
 
 class Exactly(msgspec.Struct, frozen=True):
@@ -110,13 +150,13 @@ class CurvePoint(msgspec.Struct, frozen=True):
 class Standard(msgspec.Struct, frozen=True):
     """How a placement for many subjects was found, and how well it serves them.
 
-    columns   learnt from all subjects with `aim`, in the order of the method
+    elements  learnt from all subjects with `aim`, in the order of the method
     aim       what did best among the subjects learnt from, the first of equal ones: `tried` says by how much
     held_out  subjects that the curve is measured on; subjects: all there are
     rows      that were learnt from for the placement
     """
 
-    columns: Columns
+    elements: Elements
     method: str
     aim: Aim
     subjects: int
@@ -125,13 +165,20 @@ class Standard(msgspec.Struct, frozen=True):
     tried: tuple[CurvePoint, ...]
     curve: tuple[CurvePoint, ...]
 
+    @property
+    def columns(self) -> Columns:
+        """The elements' columns in the set, where switches come first."""
+        return columns_of(self.elements)
+
 
 @dataclass(frozen=True, slots=True)
 class Placement:
     """The kept switches of a set, and how they were found.
 
     parameter  S, or how many switches to keep at most; joints: whether the joints had a say
-    all_names  the names of all switches of the set; grasps: the types that occur, which the tree's classes index
+    kept_joints  the names of the kept joints, where some were to be chosen; n_levels: how many elements are levels
+    all_names  the names of all elements there were: switches, and levels of taxels; grasps: the types that occur, which
+               the tree's classes index
     tree       of the paper's ID3; exact: how far from the best, if that was asked for; study: of many subjects
     """
 
@@ -146,15 +193,17 @@ class Placement:
     tree: Tree | None = None
     exact: Exactly | None = None
     study: Standard | None = None
+    kept_joints: tuple[str, ...] = ()
+    n_levels: int = 0
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of the kept switches."""
+        """The names of the kept elements."""
         return tuple(kept.name for kept in self.switches)
 
     @property
     def n_switches(self) -> int:
-        """The number of switches there were to choose from."""
+        """The number of elements there were to choose from."""
         return len(self.all_names)
 
     @property
@@ -191,6 +240,8 @@ class Placement:
         }
         if self.study is not None:
             found["study"] = self.study
+        if self.kept_joints:
+            found["kept_joints"] = self.kept_joints
         if self.tree is not None:
             found |= {
                 "kept_share": len(self.switches) / self.n_switches,
@@ -214,8 +265,12 @@ def place(
     ports: PortCosts | None = None,
     exact: bool = False,
     on_round: Progress | None = None,
+    levels: int | None = None,
+    keep_joints: int | None = None,
+    limits: Limits | None = None,
+    robust: bool = False,
 ) -> Placement:
-    """Choose switches of all rows of a set.
+    """Choose elements of all rows of a set: switches, and levels of taxels.
 
     Parameters
     ----------
@@ -229,11 +284,19 @@ def place(
     joints : bool
         Choose what helps most where the joints are read as well. Only elimination looks at them.
     ports : PortCosts or None
-        What reading each switch costs, for methods that heed it; None: all cost the same.
+        What reading each switch and taxel costs, for methods that heed it; None: all cost the same.
     exact : bool
         Also search for the best subset of as many switches.
     on_round : callable or None
         Called with (done, all) after every round of that search.
+    levels : int, optional
+        How many levels of a taxel there are to choose from, at most.
+    keep_joints : int, optional
+        How many joints to keep, chosen beside the kept switches; None: joints are not chosen.
+    limits : Limits, optional
+        What the placement must obey.
+    robust : bool
+        Choose the placement whose worst lost switch costs least.
 
     Raises
     ------
@@ -242,14 +305,20 @@ def place(
     PlacementError
         If the set has no switches, no rows, or more grasp types than a build can hold.
     """
-    samples = made_plain(samples_of(grasp_set, joints=joints))
-    chosen = choose(samples, method, parameter, ports)
-    kept = kept_of(grasp_set, chosen.columns)
+    read = samples_of(grasp_set, joints=joints or keep_joints is not None)
+    elements = elements_of(read, levels)
+    read = bits_of(read, elements)
+    samples = read if joints else read.with_joints(())
+    own = None if ports is None else ports_of(ports, elements)
+    bound = None if limits is None else limits.on(elements, own)
+    chosen = choose(samples, method, parameter, own, bound, robust=robust)
+    name = partial(kept_of, grasp_set, elements)
+    kept = name(chosen.columns)
     if chosen.tree is not None:
         entropy = entropy_bits(list(chosen.tree.nodes[0].counts))
         together = accumulate(chosen.gains)
         kept = tuple(
-            Kept(one.number, one.name, gain, so_far / entropy)
+            replace(one, gain_bits=gain, cumulative_share=so_far / entropy)
             for one, gain, so_far in zip(kept, chosen.gains, together, strict=True)
         )
     return Placement(
@@ -259,10 +328,12 @@ def place(
         switches=kept,
         rows=len(grasp_set),
         fingerprint=grasp_set.fingerprint(),
-        all_names=grasp_set.element_names,
+        all_names=names_of(grasp_set, elements),
+        n_levels=len(elements) - len(grasp_set.switch_names),
         grasps=samples.grasps,
         tree=chosen.tree,
-        exact=_exactly(grasp_set, samples, chosen.columns, on_round) if exact else None,
+        kept_joints=() if keep_joints is None else _joints_kept(grasp_set, read.keeping(chosen.columns), keep_joints),
+        exact=_exactly(samples, chosen.columns, bound, name, on_round) if exact else None,
     )
 
 
@@ -291,12 +362,28 @@ def samples_of(grasp_set: GraspSet, *, joints: bool) -> Samples:
     return Samples.of(grasp_set, "both" if joints else "switches")
 
 
-def kept_of(grasp_set: GraspSet, columns: Columns) -> tuple[Kept, ...]:
-    """Return switches with their names."""
-    return tuple(Kept(number, grasp_set.element_names[number]) for number in columns)
+def kept_of(grasp_set: GraspSet, elements: Elements, columns: Columns) -> tuple[Kept, ...]:
+    """Return elements, by their places among all, with their names."""
+    kept, n_switches = tuple(elements[column] for column in columns), len(grasp_set.switch_names)
+    return tuple(
+        Kept(one.column, name, above=None if one.column < n_switches else one.code)
+        for one, name in zip(kept, names_of(grasp_set, kept), strict=True)
+    )
 
 
-def _exactly(grasp_set: GraspSet, samples: Samples, columns: Columns, on_round: Progress | None) -> Exactly:
-    best = best_subset(samples, len(columns), starts=(columns,), on_round=on_round)
+def _joints_kept(grasp_set: GraspSet, samples: Samples, most: int) -> tuple[str, ...]:
+    if not grasp_set.joints:
+        raise PlacementError("the set has no joints to keep some of: leave --keep-joints out")
+    return tuple(grasp_set.joint_names[joint] for joint in kept_joints(samples, most))
+
+
+def _exactly(
+    samples: Samples,
+    columns: Columns,
+    limits: Bound | None,
+    kept: Callable[[Columns], tuple[Kept, ...]],
+    on_round: Progress | None,
+) -> Exactly:
+    best = best_subset(samples, len(columns), starts=(columns,), on_round=on_round, limits=limits)
     alike = Pairs(samples).alike(columns)
-    return Exactly(best.pairs, alike, best.alike, best.least, kept_of(grasp_set, best.columns), best.proved)
+    return Exactly(best.pairs, alike, best.alike, best.least, kept(best.columns), best.proved)

@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from ..boosting.boost import boost
 from ..boosting.stumps import winners
 from ..recordings.graspset import GraspSet
-from ..samples import Columns, Samples, decided
+from ..samples import Samples, decided
 from ..workers import in_workers
+from .elements import Element, Elements, bits_of, elements_of, names_of
 from .inputs import PlacementError
 from .methods.base import BEST, METHODS
 from .placement import Aim, CurvePoint, Placement, Progress, Served, Standard, kept_of, samples_of
-from .thresholds import made_plain, taxel_thresholds, with_switches
 
 Numbers = NDArray[np.intp]
 
@@ -94,16 +94,15 @@ class Crowd:
         return replace(self, samples=self.samples.rows(rows), subjects=self.subjects[rows])
 
 
-def rates(learnt: Crowd, asked: Crowd, columns: Columns, rounds: int) -> NDArray[np.float64]:
+def rates(learnt: Crowd, asked: Crowd, elements: Elements, rounds: int) -> NDArray[np.float64]:
     """Return the share of trials of every subject of `asked` that are recognised, in the order of their numbers.
 
-    LogitBoost of so many rounds learns the switches `columns`, and the joints if there are any, from `learnt`.
+    LogitBoost of so many rounds learns the elements, and the joints if there are any, from `learnt`.
     """
-    thresholds = taxel_thresholds(learnt.samples)
-    samples, others = (with_switches(crowd.samples, thresholds) for crowd in (learnt, asked))
-    stumps, _ = boost(samples.kept(columns), samples.labels, samples.n_classes, rounds=rounds)
+    samples, others = (bits_of(crowd.samples, elements) for crowd in (learnt, asked))
+    stumps, _ = boost(samples.inputs, samples.labels, samples.n_classes, rounds=rounds)
     _, first, trial = np.unique(asked.samples.trials, return_index=True, return_inverse=True)
-    found = decided(winners(stumps.scores(others.kept(columns)))[np.newaxis], trial)[0]
+    found = decided(winners(stumps.scores(others.inputs))[np.newaxis], trial)[0]
     numbers = np.unique(asked.subjects[first], return_inverse=True)[1]
     right = found == asked.samples.labels[first]
     return np.asarray(np.bincount(numbers, right) / np.bincount(numbers), dtype=np.float64)
@@ -118,18 +117,18 @@ def served(rates: NDArray[np.float64]) -> Served:
 
 @dataclass(slots=True)
 class Refining:
-    """The placement `kept` of a method, the switches `spare` that it would choose next, and how subjects of `crowd` are
+    """The placement `kept` of a method, the elements `spare` that it would choose next, and how subjects of `crowd` are
     served by what is tried: LogitBoost of `rounds` rounds learns from `rows` rows.
     """
 
     crowd: Crowd
-    kept: Columns
-    spare: Columns
+    kept: Elements
+    spare: Elements
     rows: int
     rounds: int
     seed: int
     _halves: tuple[tuple[Crowd, Crowd], ...] = field(init=False)
-    _known: dict[frozenset[int], NDArray[np.float64]] = field(default_factory=dict, init=False)
+    _known: dict[frozenset[Element], NDArray[np.float64]] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
         people = np.random.default_rng([self.seed, 2]).permutation(np.unique(self.crowd.subjects))
@@ -138,35 +137,35 @@ class Refining:
         asked = [half.drawn(_ASKED_OF_EACH * len(np.unique(half.subjects)), self.seed) for half in (other, one)]
         self._halves = tuple(zip(learnt, asked, strict=True))
 
-    def best(self, aim: Aim) -> Columns:
+    def best(self, aim: Aim) -> Elements:
         """Return the placement as the method chose it ("plain"), or after the exchanges that serve `aim` best.
 
         Nothing is exchanged without a gain, nor with fewer than ENOUGH_SUBJECTS.
         """
         if aim == "plain" or len(np.unique(self.crowd.subjects)) < ENOUGH_SUBJECTS:
             return self.kept
-        columns = self.kept
+        elements = self.kept
         for _ in range(EXCHANGES):
-            better = max([columns, *self._exchanges(columns)], key=lambda tried: self._value(tried, aim))
-            if better == columns:
+            better = max([elements, *self._exchanges(elements)], key=lambda tried: self._value(tried, aim))
+            if better == elements:
                 break
-            columns = better
-        return columns
+            elements = better
+        return elements
 
-    def _exchanges(self, columns: Columns) -> list[Columns]:
+    def _exchanges(self, elements: Elements) -> list[Elements]:
         edge = (*self.kept[-REACH:], *self.spare)
         return [
-            tuple(new if column == old else column for column in columns)
-            for old in columns
+            tuple(new if element == old else element for element in elements)
+            for old in elements
             if old in edge
             for new in edge
-            if new not in columns
+            if new not in elements
         ]
 
-    def _value(self, columns: Columns, aim: Aim) -> float:
-        key = frozenset(columns)
+    def _value(self, elements: Elements, aim: Aim) -> float:
+        key = frozenset(elements)
         if key not in self._known:
-            order = tuple(sorted(columns))
+            order = tuple(sorted(elements))
             parts = [rates(learnt, asked, order, self.rounds) for learnt, asked in self._halves]
             self._known[key] = np.concatenate(parts)
         found = served(self._known[key])
@@ -205,10 +204,11 @@ def place_for_crowd(
         method=method,
         parameter=float(keep),
         joints=joints,
-        switches=kept_of(grasp_set, study.columns),
+        switches=kept_of(grasp_set, study.elements, tuple(range(len(study.elements)))),
         rows=len(grasp_set),
         fingerprint=grasp_set.fingerprint(),
-        all_names=grasp_set.element_names,
+        all_names=names_of(grasp_set, every := elements_of(samples)),
+        n_levels=len(every) - len(grasp_set.switch_names),
         grasps=samples.grasps,
         study=study,
     )
@@ -238,11 +238,11 @@ def standard_placement(crowd: Crowd, take: Asked, jobs: int = 1, on_done: Progre
     points = _points(tasks, found)
     tried, curve = points[: len(AIMS)], points[len(AIMS) :]
     aim = max(tried, key=lambda point: point.served.worth).aim
-    columns = _refining(crowd, take, take.seed).best(aim)
+    elements = _refining(crowd, take, take.seed).best(aim)
     if on_done is not None:
         on_done(len(tasks) + 1, len(tasks) + 1)
     rows = len(crowd.drawn(take.rows, take.seed).subjects)
-    return Standard(columns, take.method, aim, len(people), len(asked), rows, tried, curve)
+    return Standard(elements, take.method, aim, len(people), len(asked), rows, tried, curve)
 
 
 def _apart(people: Numbers) -> tuple[Numbers, Numbers]:
@@ -274,15 +274,17 @@ def _work(task: _Task) -> tuple[int, tuple[Served, ...]]:
     learnt, asked = task.crowd.of(task.learnt), task.crowd.of(task.asked)
     refining = _refining(learnt, task.take, task.seed)
     placements = [refining.best(aim) for aim in AIMS]
-    found = {columns: served(rates(learnt, asked, columns, task.take.rounds)) for columns in placements}
-    return task.place, tuple(found[columns] for columns in placements)
+    found = {elements: served(rates(learnt, asked, elements, task.take.rounds)) for elements in placements}
+    return task.place, tuple(found[elements] for elements in placements)
 
 
 def _refining(crowd: Crowd, take: Asked, seed: int) -> Refining:
     """Return the method's placement, from rows drawn evenly over the subjects, ready to be bettered."""
-    choose = METHODS.named(take.method).chooser(made_plain(crowd.drawn(take.rows, seed).samples))
-    kept = choose(take.keep)
-    spare = tuple(column for column in choose(take.keep + REACH) if column not in kept)
+    samples = crowd.drawn(take.rows, seed).samples
+    elements = elements_of(samples)
+    choose = METHODS.named(take.method).chooser(bits_of(samples, elements))
+    kept, more = (tuple(elements[column] for column in choose(size)) for size in (take.keep, take.keep + REACH))
+    spare = tuple(element for element in more if element not in kept)
     return Refining(crowd, kept, spare, take.rows, take.rounds, seed)
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import Harness
-from thenar.runtime.scanning.plan import Costs, Unit, ports_in
+from thenar.runtime.scanning.plan import Costs, Unit, ports_in, unwired
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import scanner_us
@@ -60,16 +60,17 @@ class PortCosts:
         return costs
 
 
-def ports_of_whole_glove(harness: Harness | None, names: Sequence[str]) -> PortCosts | None:
-    """Return what the ports cost that all switches `names` hang on: in `harness`, or where there is none, on as few
-    MCP23017 as will do, in the order of the names.
+def ports_of_whole_glove(harness: Harness | None, names: Sequence[str], taxels: int = 0) -> PortCosts | None:
+    """Return what the ports cost that all switches `names`, of which the last so many are taxels, hang on: in
+    `harness`, or where there is none, on as few MCP23017 and converters as will do, in the order of the names.
 
     None where a harness lacks switches, as that of a reduced glove does, or there is no room for so many.
     """
-    if not names or (harness is not None and not set(names) <= set(harness.switches)):
+    if not names or (harness is not None and unwired(harness, names)):
         return None
     try:
-        return port_costs(harness or propose_harness(names), names)
+        switches = len(names) - taxels
+        return port_costs(harness or propose_harness(names[:switches], taxels=names[switches:]), names)
     except HarnessError:
         return None
 
@@ -89,9 +90,10 @@ def port_costs(harness: Harness, names: Sequence[str]) -> PortCosts:
             us[place] += share_us
     port_of: dict[int, int] = {}
     for number, port in enumerate(scan.ports):
-        port_of |= dict.fromkeys((switch for _, switch in port.switches), number)
-    for board, pairs in zip(harness.scanners, scan.scanners, strict=True):
-        port_of |= dict.fromkeys((switch for _, switch in pairs), len(us))
+        port_of |= dict.fromkeys(port.elements, number)
+    for number, board in enumerate(harness.scanners):
+        levels = scan.taxels[number] if scan.taxels else ()
+        port_of |= dict.fromkeys((switch for *_, switch in (*scan.scanners[number], *levels)), len(us))
         us.append(scanner_us(board))
     lacking = next((name for number, name in enumerate(names) if number not in port_of), None)
     if lacking is not None:

@@ -43,12 +43,16 @@ def code_joint(
         whole = bool((values == np.rint(values)).all()) and values.min() >= 0 and values.max() < CODES
         entry = replace(entry, codes=True) if whole else replace(entry, grid=sound_grid(values))
     joint = _joint(name, entry, float(values.min()))
-    codes = values if entry.codes else joint.code(values)
+    if isinstance(entry, TaxelColumns) and entry.bits is not None:
+        joint = _over_range(joint, entry.bits)
+        if (beyond := values > joint.code_b).any():
+            raise TableError(f"taxel {name!r}: {list_rows(rows[beyond])} exceed {entry.bits} bits: say how many it has")
+    codes = values if entry.is_counts else joint.code(values)
     outside = (codes < 0) | (codes >= CODES)
     if outside.any():
         cause = "check origin and calibration" if (codes < 0).any() else "take a coarser grid"
         raise TableError(f"joint {name!r}: {list_rows(rows[outside])} would get codes outside 0..{CODES - 1}: {cause}")
-    errors = np.zeros(1) if entry.codes else np.abs(joint.value(codes) - values)
+    errors = np.zeros(1) if entry.is_counts else np.abs(joint.value(codes) - values)
     step = abs(joint.step)
     cost = CodingCost(
         joint=name,
@@ -67,13 +71,19 @@ def _joint(name: str, entry: JointColumns, least: float) -> Joint:
     if entry.calibration is not None:
         points = entry.calibration
         return Joint(name, entry.unit, points.code_a, points.value_a, points.code_b, points.value_b)
-    if entry.codes:
+    if entry.is_counts:
         return Joint(name, entry.unit, 0, 0.0, 1, 1.0)
     steps = least / entry.step
     # Where the grid cannot be counted, no Joint will have it either.
     floor = math.floor(steps) * entry.step if math.isfinite(steps) else least
     origin = floor if entry.origin is None else entry.origin
     return Joint(name, entry.unit, 0, origin, _FAR, origin + _FAR * entry.step)
+
+
+def _over_range(joint: Joint, bits: int) -> Joint:
+    """Return the joint, calibrated at the ends of a converter's range."""
+    least, most = joint.value([0, top := 2**bits - 1]).tolist()
+    return Joint(joint.name, joint.unit, 0, least, top, most)
 
 
 # Codes between the ends of values that share a decimal place; those between the 1st and 99th percentiles of others.

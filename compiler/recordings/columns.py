@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from fnmatch import translate
 from itertools import islice
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import msgspec
 
@@ -66,29 +66,42 @@ class JointColumns(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
         """The grid's width, in `unit`."""
         return DEFAULT_GRID if self.grid is None else self.grid
 
+    @property
+    def is_counts(self) -> bool:
+        """Whether the columns hold codes."""
+        return self.codes
+
 
 class TaxelColumns(JointColumns, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True):
-    """Analog columns that become switches, closed above a threshold: a number, "otsu", found column by column, or
-    "learnt", found by training.
+    """Analog columns. They are kept as codes, as joints are, and a placement chooses their levels: threshold "learnt".
+    With another threshold, a number or "otsu", which is found column by column, they become switches, closed above it.
 
-    Until then the latter are codes, as joints are; where nothing is said of them, whole numbers are taken as codes,
-    and others are put on a sound grid.
+    Where nothing is said of the codes, whole numbers are taken as they are, and others are put on a sound grid. `bits`
+    states counts of a converter of so many bits: the ends of its range become the two points of the calibration.
     """
 
-    threshold: float | Literal["otsu", "learnt"]
+    threshold: float | Literal["otsu", "learnt"] = "learnt"
     unit: str = "counts"
+    bits: Annotated[int, msgspec.Meta(ge=1, le=16)] | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not isinstance(self.threshold, str) and not math.isfinite(self.threshold):
             raise ValueError(f"`threshold` must be a finite number, 'otsu' or 'learnt', not {self.threshold}")
         if self.threshold != "learnt" and self.is_coded:
-            raise ValueError("`codes`, `grid`, `origin` and `calibration` are for a threshold that is 'learnt'")
+            raise ValueError("`codes`, `bits`, `grid`, `origin` and `calibration` are for taxels without `threshold`")
+        if self.bits and (self.grid is not None or self.origin is not None):
+            raise ValueError("`grid` and `origin` are for values, `bits` is for counts: leave one out")
+
+    @property
+    def is_counts(self) -> bool:
+        """Whether the columns hold codes."""
+        return self.codes or self.bits is not None
 
     @property
     def is_coded(self) -> bool:
         """Whether it is said how the columns become codes."""
-        return self.codes or not (self.grid is None and self.origin is None and self.calibration is None)
+        return self.is_counts or not (self.grid is None and self.origin is None and self.calibration is None)
 
 
 class TextFormat(NamedTuple):
@@ -180,7 +193,7 @@ class Selection:
 
     @property
     def coded(self) -> tuple[tuple[str, JointColumns], ...]:
-        """The columns that become codes: the joints, then the taxels whose threshold is learnt."""
+        """The columns that become codes: the joints, then the taxels that stay analog."""
         return (*self.joints, *self.learnt)
 
 

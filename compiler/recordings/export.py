@@ -67,7 +67,7 @@ def columns_of(grasp_set: GraspSet, codes: bool = False) -> str:
     for joints in _alike(grasp_set.joints):
         lines += ["", "[[joints]]", *_entry(joints, codes)]
     for taxels in _alike(grasp_set.taxel_columns):
-        lines += ["", "[[taxels]]", 'threshold = "learnt"', *_entry(taxels, codes)]
+        lines += ["", "[[taxels]]", *_entry(taxels, codes)]
     return "\n".join([*lines, ""])
 
 

@@ -265,9 +265,14 @@ class GraspSet:
         return tuple(joint.name for joint in self.joints)
 
     @property
+    def taxel_names(self) -> tuple[str, ...]:
+        """The taxels' names, in the order of `taxels`."""
+        return tuple(taxel.name for taxel in self.taxel_columns)
+
+    @property
     def element_names(self) -> tuple[str, ...]:
-        """The names of what a placement chooses from: the switches, then the taxels."""
-        return (*self.switch_names, *(taxel.name for taxel in self.taxel_columns))
+        """The names of the columns that a placement chooses from: the switches, then the taxels."""
+        return (*self.switch_names, *self.taxel_names)
 
     @property
     def trial_ids(self) -> NDArray[np.intp]:

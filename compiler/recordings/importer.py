@@ -116,10 +116,10 @@ def _switches(reader: "_Reader", selection: Selection, notes: list[str]) -> NDAr
 
 
 def _joints(reader: "_Reader", selection: Selection) -> NDArray[np.float64]:
-    """Return what becomes codes: the joints, then the taxels whose threshold is learnt."""
+    """Return what becomes codes: the joints, then the taxels that stay analog."""
     joints = np.empty((len(reader.table.rows), len(selection.coded)), order="F")
     for number, (name, entry) in enumerate(selection.coded):
-        parse, expected = (codes, "codes 0..65535") if entry.codes else (numbers, "finite numbers")
+        parse, expected = (codes, "codes 0..65535") if entry.is_counts else (numbers, "finite numbers")
         joints[:, number] = reader.read(name, parse, expected)
     return joints
 
@@ -301,6 +301,7 @@ class ImportReport(msgspec.Struct, frozen=True):
     grasp_types: int
     taxonomy: str
     switches: int
+    taxels: int
     joints: int
     coding: tuple[CodingCost, ...]
     notes: tuple[str, ...]
@@ -353,6 +354,11 @@ def import_table(table: Table, columns: Columns) -> tuple[GraspSet, ImportReport
         *coarse(zip(costs, readings.joints.T, strict=True)),
         *find_oddities(grasp_set, readings.rows),
     ]
+    if taxels:
+        notes.append(
+            f"{len(taxels)} taxels stay analog: a placement chooses their levels; to make switches of them, say under "
+            '[[taxels]] of the columns.toml above which value they are closed (threshold = 0.4), or threshold = "otsu"'
+        )
     return grasp_set, report_of(table.what, grasp_set, costs, warnings, notes)
 
 
@@ -373,6 +379,7 @@ def report_of(
         grasp_types=len(np.unique(grasp_set.labels)),
         taxonomy=grasp_set.taxonomy.name,
         switches=len(grasp_set.switch_names),
+        taxels=len(grasp_set.taxel_columns),
         joints=len(grasp_set.joints),
         coding=coding,
         notes=tuple(notes),

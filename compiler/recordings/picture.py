@@ -1,4 +1,4 @@
-"""A set as a picture: how many grasps of each type, which switches each type closes, which values its joints take."""
+"""A set as a picture: how many grasps of each type, which switches and taxels each touches, and its joints' values."""
 
 from typing import TYPE_CHECKING
 
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ..pictures import painting, rendered
 from .errors import RecordingError
 from .graspset import GraspSet, Joint
+from .summary import contacts
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,7 +45,7 @@ def draw(grasp_set: GraspSet, kind: str) -> bytes:
 
 def _size(grasp_set: GraspSet) -> tuple[float, float]:
     """Return width and height in inches."""
-    width = max(9.0, 5.0 + 0.13 * min(len(grasp_set.switch_names), 120))
+    width = max(9.0, 5.0 + 0.13 * min(len(grasp_set.element_names), 120))
     return width, sum(_heights(grasp_set))
 
 
@@ -56,7 +57,7 @@ def _heights(grasp_set: GraspSet) -> list[float]:
 
 def _compose(figure: "Figure", grasp_set: GraspSet) -> None:
     parts = figure.subfigures(len(_heights(grasp_set)), 1, height_ratios=_heights(grasp_set), squeeze=False)[:, 0]
-    if grasp_set.switch_names:
+    if grasp_set.element_names:
         balance, contacts = parts[0].subplots(1, 2, width_ratios=(1, 3), sharey=True)
         _draw_contacts(contacts, grasp_set)
     else:
@@ -91,16 +92,23 @@ def _draw_balance(axes: "Axes", grasp_set: GraspSet) -> None:
 
 
 def _draw_contacts(axes: "Axes", grasp_set: GraspSet) -> None:
-    closed = np.stack([grasp_set.switches[grasp_set.labels == label].mean(axis=0) for label in _present(grasp_set)])
+    touched, kinds = contacts(grasp_set), {"switches": grasp_set.switch_names, "taxels": grasp_set.taxel_columns}
+    closed = np.stack([touched[grasp_set.labels == label].mean(axis=0) for label in _present(grasp_set)])
     image = axes.imshow(closed, aspect="auto", cmap="Blues", vmin=0, vmax=1, interpolation="nearest")
-    axes.figure.colorbar(image, ax=axes, label="share of rows closed", pad=0.01)
+    axes.figure.colorbar(
+        image,
+        ax=axes,
+        label="share of rows "
+        + " or ".join(["closed"] * bool(kinds["switches"]) + ["pressed"] * bool(kinds["taxels"])),
+        pad=0.01,
+    )
     axes.tick_params(axis="y", labelleft=False, left=False)
-    names = grasp_set.switch_names
+    names = grasp_set.element_names
     if len(names) <= _NAMED_SWITCHES:
         axes.set_xticks(np.arange(len(names)), list(map(_short, names)), rotation=90, fontsize=6)
     else:
-        axes.set_xlabel("number of the switch, from 0")
-    axes.set_title(f"contact on {len(names)} switches")
+        axes.set_xlabel("number of the switch or taxel, from 0" if kinds["taxels"] else "number of the switch, from 0")
+    axes.set_title("contact on " + " and ".join(f"{len(some)} {kind}" for kind, some in kinds.items() if some))
 
 
 def _draw_joints(part: "SubFigure", grasp_set: GraspSet) -> None:

@@ -45,6 +45,10 @@ _WORDS = {role: frozenset(word.removesuffix("s") or word for word in words.split
 _TYPES = 200
 # An unknown analog column is at rest in so many of its cells, in the lowest tenth of its range: then it is a pad.
 _AT_REST, _REST = 0.5, 0.1
+# Bits of the converters that there are.
+_CONVERTERS = (8, 10, 12, 14, 16)
+_PADS = ': a placement chooses their levels (threshold = 0.4, or "otsu", makes switches of them)'
+_CODES, _MOST_JOINTS = "whole numbers, taken as codes", 24
 # What is said of joints with values, before their grid.
 _NUMBERS = "numbers, coded on a grid of "
 
@@ -161,7 +165,7 @@ def propose(table: Table, text: TextFormat = PLAIN, remarks: Sequence[str] = ())
         **text._asdict(),
         switches=_globs((name for role in inputs if role.role == "switches" for name in role.columns), table.columns),
         taxels=tuple(
-            TaxelColumns(_globs(role.columns, table.columns), threshold="otsu")
+            TaxelColumns(_globs(role.columns, table.columns), bits=_bits_of(role, found))
             for role in inputs
             if role.role == "taxels"
         ),
@@ -282,6 +286,10 @@ def _inputs(columns: Sequence[_Column]) -> list[Role]:
     # Columns that are numbered alike are of one kind, whatever the range of each.
     for several in stems.values():
         found.setdefault(_input(several), []).extend(column.name for column in several)
+    if len(found.get(("joints", _CODES), ())) > _MOST_JOINTS:
+        found[("taxels", f"whole numbers in more columns than a hand has joints{_PADS}")] = found.pop(
+            ("joints", _CODES)
+        )
     order = ["switches", "taxels", "joints", "left out"]
     return [Role(tuple(alike), *key) for key, alike in sorted(found.items(), key=lambda item: order.index(item[0][0]))]
 
@@ -298,13 +306,25 @@ def _input(columns: Sequence[_Column]) -> tuple[str, str]:
     if all(column.bits for column in columns):
         return "switches", "0 and 1 only"
     if words & _WORDS["pad"]:
-        return "taxels", "pads by their names, closed above a threshold (Otsu)"
+        return "taxels", f"pads by their names{_PADS}"
     if not all(column.whole for column in columns) or values.min() < 0 or values.max() >= CODES:
         return "joints", f"{_NUMBERS}{sound_grid(values):g}"
-    rest = np.mean([np.mean(part <= part.min() + _REST * np.ptp(part)) for part in each])
+    # A pad rests at the lower end of its range; between supply and converter, at the upper one.
+    places = [(part - part.min()) / max(float(np.ptp(part)), 1.0) for part in each]
+    rest = max(np.mean([np.mean(place <= _REST) for place in of]) for of in (places, [1 - place for place in places]))
     if not words & _WORDS["joint"] and rest > _AT_REST:
-        return "taxels", "at rest in most rows, as a pad is: closed above a threshold (Otsu)"
-    return "joints", "whole numbers, taken as codes"
+        return "taxels", f"at rest in most rows, as a pad is{_PADS}"
+    return "joints", _CODES
+
+
+def _bits_of(role: Role, found: Sequence[_Column]) -> int | None:
+    """Return the bits of the smallest converter that gives these counts, None where they are none."""
+    each = [column.values for column in found if column.name in role.columns and column.values is not None]
+    whole = all(column.whole for column in found if column.name in role.columns)
+    if not whole or min(part.min() for part in each) < 0:
+        return None
+    most = max(part.max() for part in each)
+    return next((bits for bits in _CONVERTERS if most < 2**bits), None)
 
 
 def _no_input(column: _Column) -> str:

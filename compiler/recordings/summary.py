@@ -9,7 +9,22 @@ from numpy.typing import NDArray
 from thenar.runtime.names import SHOWN, list_names
 
 from .errors import list_rows
-from .graspset import GraspSet
+from .graspset import GraspSet, Joint
+from .trials import otsu
+
+
+def contacts(grasp_set: GraspSet) -> NDArray[np.bool_]:
+    """Return which elements (n, s + t) were touched: switches that closed, and taxels whose value is above Otsu's
+    threshold of all values in its unit: a taxel that is never pressed is not told by its noise.
+    """
+    pressed = np.zeros(grasp_set.taxels.shape, np.bool_)
+    units = np.array([taxel.unit for taxel in grasp_set.taxel_columns])
+    values = [taxel.value(codes) for taxel, codes in zip(grasp_set.taxel_columns, grasp_set.taxels.T, strict=True)]
+    for unit in np.unique(units):
+        own = np.flatnonzero(units == unit)
+        same = np.column_stack([values[place] for place in own])
+        pressed[:, own] = same > otsu(same.ravel())
+    return np.hstack([grasp_set.switches, pressed])
 
 
 class Finding(msgspec.Struct, frozen=True):
@@ -66,9 +81,10 @@ def disagreeing(frames: NDArray[np.intp], what: NDArray[np.generic]) -> NDArray[
 def _odd_columns(grasp_set: GraspSet) -> Iterator[Finding]:
     for kind, columns, names in (
         ("switch", grasp_set.switches, grasp_set.switch_names),
+        ("taxel", grasp_set.taxels, grasp_set.taxel_names),
         ("joint", grasp_set.codes, grasp_set.joint_names),
     ):
-        plural = "switches" if kind == "switch" else "joints"
+        plural = "switches" if kind == "switch" else f"{kind}s"
         if constant := constant_columns(columns, names):
             message = f"{len(constant)} {plural} never change: {list_names(constant)}"
             yield Finding(f"constant {plural}", len(constant), message, columns=constant)
@@ -81,7 +97,7 @@ def _odd_columns(grasp_set: GraspSet) -> Iterator[Finding]:
 
 
 def _odd_frames(grasp_set: GraspSet, rows: NDArray[np.int64]) -> Iterator[Finding]:
-    frames = frame_numbers(grasp_set.switches, grasp_set.codes)
+    frames = frame_numbers(grasp_set.switches, np.hstack([grasp_set.taxels, grasp_set.codes]))
     for kind, what, sentence in (
         ("frames shared by subjects", grasp_set.subjects, "have a frame that another subject has as well"),
         ("contradictory frames", grasp_set.grasps, "have a frame that another grasp type has as well"),
@@ -125,15 +141,18 @@ class Separability(msgspec.Struct, frozen=True):
 
 
 def separabilities(grasp_set: GraspSet) -> tuple[Separability, ...]:
-    """Return the separability by switches, by joints, and by both, as far as the set has them."""
-    choices = {"switches": bool(grasp_set.switch_names), "joints": bool(grasp_set.joints)}
-    inputs = [name for name, there in choices.items() if there] + ["both"] * all(choices.values())
+    """Return the separability by switches, by taxels, by joints, and by all of them, as far as the set has them."""
+    there = (("switches", grasp_set.switch_names), ("taxels", grasp_set.taxel_columns), ("joints", grasp_set.joints))
+    kinds = [name for name, columns in there if columns]
+    inputs = [*kinds, "both" if len(kinds) == 2 else "all"] if len(kinds) > 1 else kinds
     return tuple(_separability(grasp_set, name) for name in inputs) if len(grasp_set) else ()
 
 
 def _separability(grasp_set: GraspSet, inputs: str) -> Separability:
-    switches = grasp_set.switches if inputs != "joints" else grasp_set.switches[:, :0]
-    codes = grasp_set.codes if inputs != "switches" else grasp_set.codes[:, :0]
+    every = inputs in ("both", "all")
+    switches = grasp_set.switches[:, : None if every or inputs == "switches" else 0]
+    coded = (("taxels", grasp_set.taxels), ("joints", grasp_set.codes))
+    codes = np.hstack([part[:, : None if every or inputs == name else 0] for name, part in coded])
     frames = frame_numbers(switches, codes)
     rate, rows = _neighbour_rate(switches, codes, grasp_set.labels, grasp_set.trial_ids)
     return Separability(inputs, int(frames.max()) + 1, _ceiling(frames, grasp_set.labels), rate, rows)
@@ -184,7 +203,9 @@ class SwitchUse(msgspec.Struct, frozen=True):
 
 
 class JointRange(msgspec.Struct, frozen=True):
-    """Least and largest value of a joint in its unit, None in a set without rows; how many distinct codes it takes."""
+    """Least and largest value of a joint or taxel in its unit, None in a set without rows; how many distinct codes it
+    takes.
+    """
 
     name: str
     unit: str
@@ -212,6 +233,7 @@ class Summary(msgspec.Struct, frozen=True):
     subjects: tuple[Count, ...]
     objects: tuple[Count, ...]
     switches: tuple[SwitchUse, ...]
+    taxels: tuple[JointRange, ...]
     joints: tuple[JointRange, ...]
     separability: tuple[Separability, ...]
     warnings: tuple[Finding, ...]
@@ -234,7 +256,8 @@ def summarise(grasp_set: GraspSet) -> Summary:
         subjects=_counts(grasp_set.subjects),
         objects=_counts(grasp_set.objects),
         switches=_switches(grasp_set),
-        joints=_joints(grasp_set),
+        taxels=_ranges(grasp_set.taxel_columns, grasp_set.taxels),
+        joints=_ranges(grasp_set.joints, grasp_set.codes),
         separability=separabilities(grasp_set),
         warnings=find_oddities(grasp_set, np.arange(1, len(grasp_set) + 1)),
     )
@@ -250,9 +273,9 @@ def _switches(grasp_set: GraspSet) -> tuple[SwitchUse, ...]:
     return tuple(map(SwitchUse, grasp_set.switch_names, closed.tolist()))
 
 
-def _joints(grasp_set: GraspSet) -> tuple[JointRange, ...]:
+def _ranges(joints: Sequence[Joint], columns: NDArray[np.uint16]) -> tuple[JointRange, ...]:
     ranges = []
-    for joint, codes in zip(grasp_set.joints, grasp_set.codes.T, strict=True):
+    for joint, codes in zip(joints, columns.T, strict=True):
         taken = np.unique(codes)
         ends: list[float] = joint.value(taken[[0, -1]]).tolist() if taken.size else []
         least, largest = min(ends, default=None), max(ends, default=None)

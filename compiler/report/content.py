@@ -16,6 +16,7 @@ from ..frontier.points import Frontier
 from ..hand import HandShape
 from ..placement.tree import Tree
 from ..tables.compare import Comparison, WorstCase
+from ..tables.faults import FaultCounts
 
 
 class ReportError(ThenarError, ValueError):
@@ -37,6 +38,7 @@ class ReportContent:
     hand          where the recordings' switches lie
     scan, harness the scan map and the harness that it was made for
     comparison    the rows trained on, through the model, its tables and the integers
+    faults        what each fault of an input leaves of the rows trained on
     worst         the worst that integers can do, over every frame there is
 
     Raises ReportError where parts do not belong together.
@@ -58,6 +60,7 @@ class ReportContent:
     scan: ScanMap | None = None
     harness: Harness | None = None
     comparison: Comparison | None = None
+    faults: FaultCounts | None = None
     worst: WorstCase | None = None
 
     def __post_init__(self) -> None:

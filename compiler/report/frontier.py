@@ -15,7 +15,7 @@ from ..frontier.points import Frontier, Point, Time
 from ..frontier.words import LUCK, featured, folds_of, inputs_of, rates_of, summary, training_of, way_of, wiring_of
 from ..hand import HandShape
 from ..pictures import PALETTE
-from ..text import DASH, NBSP, counted, interval, microseconds, sentence
+from ..text import DASH, NBSP, counted, interval, microseconds, percent, sentence
 from .content import PlainTable
 from .hand import HandPicture, hand_picture
 
@@ -184,7 +184,8 @@ def _facts(point: Point, frontier: Frontier) -> Iterable[tuple[str, str]]:
     yield "Wiring", f"{_wiring(point)}; {counted(point.ports, 'port')}, {counted(point.chips, 'chip')}"
     layout = setting.layout and f"; {setting.layout}"
     yield "Tables", f"{training_of(setting)}, {setting.width} bits{layout}"
-    ending = "ends early" if setting.scan == "early" else "full"
+    asked = f"the joints are read in {percent(point.asked)} of frames, where the switches do not decide"
+    ending = {"full": "full", "early": "ends early", "demand": asked}[setting.scan]
     yield "Scan", f"{_time(point.scan)}; {ending}" if point.switches else DASH
     yield "Joints", DASH if setting.inputs == "switches" else _time(point.transfer)
     yield "Classify", _time(point.classify)

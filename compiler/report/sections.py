@@ -12,6 +12,7 @@ from thenar.runtime.scanning.timing import glove_us, port_us, reading_of, scan_u
 
 from ..placement.gain import entropy_bits
 from ..placement.methods.base import METHODS
+from ..tables.faults import FaultCounts
 from ..text import INDEPENDENT, NBSP, counted, microseconds, percent, sentence
 from ..trainers.base import TRAINERS
 from .content import PlainTable, ReportContent
@@ -82,11 +83,10 @@ def kept_table(content: ReportContent) -> PlainTable:
     """
     switches, tree, hand = content.manifest.switches, content.tree, content.hand
     entropy = 0.0 if tree is None else entropy_bits(list(tree.nodes[0].counts))
-    parts = {} if hand is None else dict(zip(hand.names, hand.parts.tolist(), strict=True))
     taxels = any(switch.threshold is not None for switch in switches)
     rows: list[tuple[str, ...]] = []
     for order, (switch, gain) in enumerate(zip(switches, accumulate(each.gain for each in switches), strict=True), 1):
-        part = "" if hand is None else hand.part_names[parts[switch.name]]
+        part = "" if hand is None else hand.part_names[hand.parts[hand.numbers_of([switch.name])[0]]]
         together = () if tree is None else (percent(gain / entropy, NBSP) if entropy else "",)
         rows.append((str(order), switch.name, part, str(switch.column), f"{switch.gain:.3f}", *together))
         if taxels:
@@ -185,6 +185,38 @@ def guarantee_table(content: ReportContent) -> PlainTable | None:
     return PlainTable("Differences beside their bounds", ("What", "Found", "Bound"), rows)
 
 
+def fault_table(content: ReportContent) -> PlainTable | None:
+    """Return what is left where each input is lost or stuck at its worst value, the worst first."""
+    found = content.faults
+    if found is None:
+        return None
+    names = (*content.switch_names, *(joint.name for joint in content.manifest.joints))
+    rows = []
+    for one in _worst_first(found):
+        left, value = min(zip(found.stuck[one], found.values[one], strict=True), key=lambda pair: pair[0])
+        rates = (f"{100 * count / found.total:.1f}" for count in (found.lost[one], left))
+        less = f"{100 * (found.correct - found.lost[one]) / found.total:.1f}"
+        lost, stuck = rates
+        rows.append((names[one], lost, less, stuck, value))
+    caption = f"Recognised with one input lost or stuck, % of {counted(found.total, 'trial')} trained on"
+    return PlainTable(caption, ("Input", "Lost", "Points less", "Stuck", "At"), tuple(rows), words=(0, 4))
+
+
+def _worst_first(found: FaultCounts) -> list[int]:
+    return sorted(range(len(found.lost)), key=found.lost.__getitem__)
+
+
+def fault_bars(content: ReportContent) -> tuple[tuple[str, float, float], ...]:
+    """Return for each input, the worst first: its name, the share of trials recognised without it, and with it."""
+    found = content.faults
+    if found is None:
+        return ()
+    names = (*content.switch_names, *(joint.name for joint in content.manifest.joints))
+    return tuple(
+        (names[one], found.lost[one] / found.total, found.correct / found.total) for one in _worst_first(found)
+    )
+
+
 def _share(count: int, total: int) -> str:
     return f"{count:,} of {total:,}" + (f" ({percent(count / total, NBSP)})" if total else "")
 
@@ -196,9 +228,9 @@ def scan_table(content: ReportContent) -> PlainTable | None:
         return None
     rows = []
     for order, port in enumerate(scan.ports, 1):
-        bus = harness.buses[port.bus]
-        where = (f"{bus.device} at {bus.clock_hz / 1000:g} kHz", bus.chips[port.chip].place, port.reading)
-        switches = ", ".join(names[switch] for _, switch in port.switches)
+        bus, chip = harness.line_of(port.bus), harness.chip_of(port.bus, port.chip)
+        where = (f"{bus.device} at {bus.clock_hz / 1000:g} kHz", chip.place, port.reading)
+        switches = ", ".join(names[switch] for switch in port.elements)
         us = microseconds(port_us(reading_of(port, harness), bus.clock_hz))
         rows.append((str(order), *where, switches, us))
     caption = "Transactions, in the order in which they are made; times on the wire, by arithmetic"
@@ -213,12 +245,11 @@ def scan_sentences(content: ReportContent) -> Iterator[str]:
         return
     if scan.ports:
         time = scan_us(scan, harness)
-        wired = sum(len(chip.pins) for bus in harness.buses for chip in bus.chips)
         muxes = f", {counted(time.selects, 'write')} to muxes among them" if time.selects else ""
         yield (
             f"A whole scan is {counted(len(scan.ports) + time.selects, 'transaction')}{muxes}: "
             f"{microseconds(time.us)} µs on the wire, {percent(time.share, NBSP)} of the "
-            f"{microseconds(time.full_us)} µs that all {wired} wired ones take."
+            f"{microseconds(time.full_us)} µs that all {harness.on_chips} wired ones take."
         )
     for board, pairs in zip(harness.scanners, scan.scanners, strict=True):
         yield (
@@ -226,9 +257,10 @@ def scan_sentences(content: ReportContent) -> Iterator[str]:
             f"{counted(len(board.switches), 'key')}, {microseconds(scanner_us(board))} µs a bitmap on its line."
         )
     if harness.cyberglove is not None and joints:
-        sensors = harness.cyberglove.sensors or joints
-        us = microseconds(glove_us(harness.cyberglove, sensors))
-        yield f"A record of the CyberGlove's {sensors} sensors takes {us} µs on its own line, beside the scan."
+        us, glove = microseconds(glove_us(harness.cyberglove, joints)), harness.cyberglove
+        how = "by the vendor's formula" if glove.record_us is None else "as it was measured"
+        record = f"A record of {counted(joints, 'sensor')} of the CyberGlove"
+        yield f"{record} takes {us} µs on its own line, {how}, beside the scan."
 
 
 def provenance(manifest: Manifest) -> Pairs:
@@ -256,15 +288,25 @@ def options_set(manifest: Manifest) -> Pairs:
     fields = [field.name for field in msgspec.structs.fields(options) if field.name not in foreign]
     values = {name: getattr(options, name) for name in fields} | options.settings
     called = {name: "method" if name == "placement" else name.replace("_", "-") for name in values}
-    return tuple((f"--{called[name]}", _plain(value)) for name, value in values.items() if value is not None)
+    return tuple(
+        (f"--{called[name]}", _plain(value))
+        for name, value in values.items()
+        if value is not None and value is not False
+    )
 
 
 def commands(content: ReportContent) -> tuple[str, str]:
     """Return the commands that make the build again, and verify it."""
-    flags = "".join(f" {name} {shlex.quote(value)}" for name, value in options_set(content.manifest))
+    flags = "".join(
+        f" {name} {shlex.quote(value)}" if value else f" {name}" for name, value in options_set(content.manifest)
+    )
     glove = "" if content.scan is None else " --glove glove.toml"
     return f"thenar compile SET.grasps -o build/{flags}{glove}", "thenar verify build/ SET.grasps"
 
 
 def _plain(value: object) -> str:
+    if value is True:
+        return ""
+    if isinstance(value, tuple):
+        return ",".join(value)
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)

@@ -12,7 +12,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.tables import HIGHEST_CODE
+from thenar.runtime.tables import HIGHEST_CODE, Pair
 
 from ..boosting.stumps import Stumps, spread
 from ..elementary import add_exactly
@@ -52,7 +52,7 @@ class Line:
 class ScoreTables:
     """F_k = bias_k + sum over switches s of bits_s * switch_rows[s, k] + sum over joints a of joint_rows[a][bin_a, k].
 
-    Linear joints add what their lines say besides.
+    Linear joints add what their lines say besides, pairs of joints a row for both codes.
 
     Parameters
     ----------
@@ -66,6 +66,8 @@ class ScoreTables:
         What a joint adds in each bin; of a joint that is nothing but linear one row of zeros.
     lines : tuple of Line, optional
         What some of the joints add in proportion to their codes, at most one a joint, in the order of the joints.
+    pairs : tuple of Pair, optional
+        What joints add two by two, each joint in one pair at most, in the order of their first joints; and no lines.
 
     Examples
     --------
@@ -82,6 +84,7 @@ class ScoreTables:
     thresholds: tuple[NDArray[np.uint16], ...]
     joint_rows: tuple[Floats, ...]
     lines: tuple[Line, ...] = ()
+    pairs: tuple[Pair, ...] = ()
 
     @property
     def n_inputs(self) -> int:
@@ -103,6 +106,8 @@ class ScoreTables:
             scores += rows[np.searchsorted(thresholds, column)]
         for line in self.lines:
             scores += line.of(codes)
+        for pair in self.pairs:
+            scores += pair.of(codes)
         return scores
 
 
@@ -117,7 +122,7 @@ def first_codes(*thresholds: NDArray[np.uint16]) -> NDArray[np.int64]:
 
 def added(one: ScoreTables, other: ScoreTables) -> ScoreTables:
     """Return tables whose scores are the sums of the scores of two, of the same inputs and classes; at most one of them
-    has lines.
+    has lines or pairs.
     """
     thresholds, joint_rows = [], []
     parts = zip(one.thresholds, one.joint_rows, other.thresholds, other.joint_rows, strict=True)
@@ -126,7 +131,9 @@ def added(one: ScoreTables, other: ScoreTables) -> ScoreTables:
         thresholds.append((codes[1:] - 1).astype(np.uint16))
         joint_rows.append(rows[np.searchsorted(steps, codes)] + more_rows[np.searchsorted(more_steps, codes)])
     bias, switch_rows = one.bias + other.bias, one.switch_rows + other.switch_rows
-    return ScoreTables(bias, switch_rows, tuple(thresholds), tuple(joint_rows), one.lines + other.lines)
+    return ScoreTables(
+        bias, switch_rows, tuple(thresholds), tuple(joint_rows), one.lines + other.lines, one.pairs + other.pairs
+    )
 
 
 # What trainers make: score tables, or an ensemble that collapses to them.

@@ -115,12 +115,19 @@ def float_slack(tables: ScoreTables, scale: float) -> float:
     With n inputs, j of them joints, u = 2^-53 and S the sum of the largest magnitudes of all rows, scale * u * S times
     j for the bias that `balance` sums up, 2 for its rows, each at most twice as large as before, 3 for scaling these
     and the bias, n for adding up the scores compared with and 1 for scaling them; and 2 for products of u. A line is
-    two rows more, each as large as it gets, and adds 4: a product, a sum, and two by which its middle moves.
+    two rows more, each as large as it gets, and adds 4: a product, a sum, and two by which its middle moves. A pair is
+    a row more, and adds 1.
     """
     rows = [tables.bias, *tables.switch_rows, *tables.joint_rows]
     rows += 2 * [line.row * (line.high - line.low) for line in tables.lines]
+    rows += [pair.rows for pair in tables.pairs]
     largest = sum(float(np.abs(row).max()) for row in rows)
-    return (tables.n_inputs + len(tables.joint_rows) + 4 * len(tables.lines) + 8) * 2.0**-53 * largest * scale
+    return (
+        (tables.n_inputs + len(tables.joint_rows) + 4 * len(tables.lines) + len(tables.pairs) + 8)
+        * 2.0**-53
+        * largest
+        * scale
+    )
 
 
 def compare(

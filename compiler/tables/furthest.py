@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.runtime.tables import HIGHEST_CODE, IntegerTables
+from thenar.runtime.tables import HIGHEST_CODE, LOST, IntegerTables
 
-OPEN, CLOSED, LOST = 0, 1, -1
+OPEN, CLOSED = 0, 1
 _SIGNS = 1, -1
 
 
@@ -17,9 +17,9 @@ class Furthest:
     """A frame, perhaps with inputs missing, whose rows added in this `order` get further from zero than any other's.
 
     The first `n_terms` of them give class `grasp` the partial sum `total`; the others lead back. order (n,) numbers the
-    terms: 0 the bias, then switches, then joints, then what slopes add, n of them. bits (s,) and codes (j,) with the
-    masks of what is missing, as the runtime takes them; `terms` (n, K) are the rows themselves, in the order of their
-    numbers.
+    terms: 0 the bias, then switches, then joints, then what slopes or pairs add, n of them. bits (s,) and codes (j,)
+    with the masks of what is missing, as the runtime takes them; `terms` (n, K) are the rows themselves, in the order
+    of their numbers.
     """
 
     grasp: int
@@ -46,11 +46,16 @@ def furthest(tables: IntegerTables, *, missing: bool = True) -> Furthest:
     sign = _SIGNS[way]
     picked = [int(np.argmax(onward[:, grasp])) for onward in onwards[way]]
     chosen = [(values[pick], terms[:, pick]) for (values, terms), pick in zip(choices, picked, strict=True)]
-    values = np.array([value for value, _ in chosen])
-    terms = np.stack([term[0] for _, term in chosen] + [term[1] for _, term in chosen if len(term) > 1])
+    first = 1 + tables.n_switches
+    switches, joints = np.array([value for value, _ in chosen[1:first]]), np.zeros(tables.n_joints, np.int64)
+    own, more = [term[0] for _, term in chosen[:first]], []
+    of_joints = np.zeros((tables.n_joints, tables.n_classes), np.int64)
+    for unit, (codes, term) in zip(tables.units, chosen[first:], strict=True):
+        joints[list(unit)], of_joints[list(unit)] = codes, term[: len(unit)]
+        more += list(term[len(unit) :])
+    terms = np.stack([*own, *of_joints, *more])
     onward = sign * terms[:, grasp] > 0
     order = np.concatenate([np.flatnonzero(onward), np.flatnonzero(~onward)])
-    switches, joints = values[1 : 1 + tables.n_switches], values[1 + tables.n_switches :]
     return Furthest(
         grasp=grasp,
         total=int(terms[onward, grasp].sum()),
@@ -65,14 +70,12 @@ def furthest(tables: IntegerTables, *, missing: bool = True) -> Furthest:
 
 
 def _choices(tables: IntegerTables, missing: bool) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
-    """Yield what bias, switches and joints can say, (c,), and the terms for it, (t, c, K). Missing comes last."""
+    """Yield what bias, switches, (c,), and units of joints, (c, joints), can say, and the terms for it, (t, c, K)."""
     last = slice(None if missing else -1)
     yield np.zeros(1, np.int64), tables.bias[np.newaxis, np.newaxis].astype(np.int64)
     for row, mean in zip(tables.switch_rows, tables.switch_means, strict=True):
         yield np.array([OPEN, CLOSED, LOST])[last], np.stack([0 * row, row, mean])[np.newaxis, last].astype(np.int64)
-    for joint, mean in enumerate(tables.joint_means.astype(np.int64)):
-        codes, terms = tables.choices(joint)
-        there = codes <= HIGHEST_CODE
-        means = np.zeros((len(terms), 1, len(mean)), np.int64)
-        means[0] = mean
-        yield np.append(codes[there], LOST)[last], np.concatenate([terms[:, there], means], axis=1)[:, last]
+    for unit in tables.units:
+        codes, terms = tables.all_choices(unit)
+        there = (codes <= HIGHEST_CODE).all(axis=1) & (missing | (codes != LOST).all(axis=1))
+        yield codes[there], terms[:, there]

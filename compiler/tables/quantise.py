@@ -48,7 +48,7 @@ def balance(tables: ScoreTables) -> ScoreTables:
     share = np.divide(wanted, room, out=np.zeros_like(room), where=room > 0).clip(0, 1)
     moved = lowest + share * spans
     rows = tuple(rows - shift for rows, shift in zip(tables.joint_rows, moved, strict=True))
-    return ScoreTables(tables.bias + moved.sum(axis=0), tables.switch_rows, tables.thresholds, rows, tables.lines)
+    return replace(tables, bias=tables.bias + moved.sum(axis=0), joint_rows=rows)
 
 
 def as_deployed(tables: ScoreTables, grid: int) -> ScoreTables:
@@ -108,7 +108,7 @@ def finest_scale(tables: ScoreTables, limit: float, widest: int, grid: int = 1) 
     if whole == 0:
         return 1.0
     outer = _outermost(tables)
-    most = limit + grid * (tables.n_inputs + 2) + WIDEST * len(tables.lines)
+    most = limit + grid * (tables.n_inputs + len(tables.pairs) + 2) + WIDEST * len(tables.lines)
     fits, too_fine = 0.0, min(most / whole, FINEST_SCALE)
     while (middle := (fits + too_fine) / 2) not in (fits, too_fine):
         if reach(outer, middle, grid=grid) <= limit and (grid > 1 or span(outer, middle) <= widest):
@@ -141,12 +141,12 @@ def kindest_scale(
 
 
 def rounding_error(tables: ScoreTables, scale: float, grid: int = 1) -> float:
-    """Return the most steps that rounding can move a score: half of one for the bias and for a joint's only row, half
-    of the `grid` for the row of each switch and bin, and for each line half of one times the largest distance, besides
-    what codes that become one differ by.
+    """Return the most steps that rounding can move a score: half of one for the bias, for a joint's only row and for
+    that of a pair, half of the `grid` for the row of each switch and bin, and for each line half of one times the
+    largest distance, besides what codes that become one differ by.
     """
     binned = sum(len(steps) > 0 for steps in tables.thresholds)
-    error = (tables.n_inputs + 1 + (grid - 1) * (len(tables.switch_rows) + binned)) / 2
+    error = (tables.n_inputs + len(tables.pairs) + 1 + (grid - 1) * (len(tables.switch_rows) + binned)) / 2
     for line in tables.lines:
         slope, _ = slope_of(line, scale)
         error += slope.zero / 2 + float(np.abs(line.row).max()) * scale * max(2.0**-slope.gain - 1, 0) / 2
@@ -200,6 +200,8 @@ def _whole_scores(tables: ScoreTables, scale: float, closed: Floats, codes: NDAr
     for line in tables.lines:
         slope, row = slope_of(line, scale)
         scores += slope.distances(codes[:, line.joint])[:, np.newaxis] * row
+    for pair in tables.pairs:
+        scores += np.rint(pair.of(codes) * scale)
     return scores
 
 
@@ -231,17 +233,19 @@ def _middle_rows(tables: ScoreTables, scale: float, grid: int, *, rounded: bool 
 def _outermost(tables: ScoreTables) -> ScoreTables:
     """Return the tables with each joint's largest and smallest rows alone: rounding keeps them outermost."""
     outer = (np.array([rows.max(axis=0), rows.min(axis=0)]) if len(rows) > 1 else rows for rows in tables.joint_rows)
-    return ScoreTables(tables.bias, tables.switch_rows, tables.thresholds, tuple(outer), tables.lines)
+    return replace(tables, joint_rows=tuple(outer))
 
 
 def _extremes(tables: ScoreTables, scale: float, *, rounded: bool = True, grid: int = 1) -> tuple[Floats, Floats]:
-    """Return the most and the least, zero included, that bias, switches and joints add, but for their lines:
-    (1 + s + j, K) each.
+    """Return the most and the least, zero included, that bias, switches, joints, but for their lines, and pairs add:
+    (1 + s + j + p, K) each.
     """
     bias, switches = tables.bias[np.newaxis] * scale, tables.switch_rows * scale
     if rounded:
         bias, switches = np.rint(bias), _whole(switches, grid)
     joints = _middle_rows(tables, scale, grid, rounded=rounded)
+    pairs = (pair.rows.reshape(-1, tables.n_classes) * scale for pair in tables.pairs)
+    joints += [np.rint(rows) if rounded else rows for rows in pairs]
     upper = np.vstack([bias, switches, *(rows.max(axis=0) for rows in joints)])
     lower = np.vstack([bias, switches, *(rows.min(axis=0) for rows in joints)])
     return np.maximum(upper, 0), np.minimum(lower, 0)
@@ -293,6 +297,7 @@ def quantise(
         joint_means=np.zeros((len(merged), len(tables.bias)), np.int16),
         scale=scale,
         slopes=tuple(replace(slope, row=row.astype(np.int8)) for slope, row in slopes),
+        pairs=tuple(replace(pair, rows=_rounded(pair.rows, scale)) for pair in balanced.pairs),
     )
     joint_means = []
     for joint, (column, steps, rows) in enumerate(zip(codes.T, balanced.thresholds, balanced.joint_rows, strict=True)):

@@ -4,8 +4,9 @@ What rounding takes from the lead of class k over class l is a sum over bias and
 
     scale * (F_k - F_l) - (I_k - I_l) = sum over inputs a of (e_a[k] - e_a[l])    with e_a = scale * row_a - steps_a,
 
-and no input knows of the others. So the most it can take is the sum of the most that it takes in each input, and the
-bits and codes at which it does so make up the frame. All of it is done in whole numbers: nothing is rounded here.
+and no input knows of the others, but for the joints of a pair, which are one input here. So the most it can take is the
+sum of the most that it takes in each input, and the bits and codes at which it does so make up the frame. All of it is
+done in whole numbers: nothing is rounded here.
 """
 
 from collections.abc import Iterator
@@ -42,12 +43,14 @@ class WorstFrame:
 class Rounding:
     """What rounding took from the rows of score tables when it made integer tables of them."""
 
-    __slots__ = ("_n_switches", "_pairs", "_step", "_values")
+    __slots__ = ("_n_switches", "_pairs", "_step", "_units", "_values")
 
     def __init__(self, tables: ScoreTables, integers: IntegerTables) -> None:
         """Compare the two, bin by bin of either. They must have the same classes and inputs."""
         choices = list(_choices(tables, integers))
-        self._n_switches = integers.n_switches
+        self._n_switches, self._units = integers.n_switches, integers.units
+        if (len(tables.switch_rows), len(tables.joint_rows)) != (integers.n_switches, integers.n_joints):
+            raise ValueError("the tables and the integers are of other inputs")
         self._values = [choice.values for choice in choices[1:]]
         errors, self._step = _errors(choices, integers.scale)
         self._pairs = _Pairs(errors)
@@ -58,9 +61,11 @@ class Rounding:
         # Of equal ones the first: an open switch, the lowest code.
         picked = [choice.index(max(choice)) for choice in taken]
         values = [values[pick] for values, pick in zip(self._values, picked[1:], strict=True)]
-        bits, codes = values[: self._n_switches], values[self._n_switches :]
+        bits, codes = values[: self._n_switches], np.zeros(sum(map(len, self._units)), np.uint16)
+        for unit, own in zip(self._units, values[self._n_switches :], strict=True):
+            codes[list(unit)] = own
         loss = Fraction(sum(map(max, taken)), self._step)
-        return WorstFrame(leader, rival, loss, np.array(bits, bool), np.array(codes, np.uint16))
+        return WorstFrame(leader, rival, loss, np.array(bits, bool), codes)
 
     def worst_of_all(self) -> WorstFrame:
         """Return the worst frame of the pair of classes that has the worst; of equal pairs of the first."""
@@ -158,8 +163,8 @@ class _Pairs:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Choice:
-    """What an input can say: values (c,), its rows (c, K) in units of score and in steps; and the row (K,) of its line,
-    which is added `times` (c,).
+    """What an input can say: values (c,), of the joints of a pair (c, 2), its rows in units of score, which are added
+    up, (t, c, K), and in steps (c, K); and the row (K,) of its line, which is added `times` (c,).
     """
 
     values: NDArray[np.int64]
@@ -170,22 +175,50 @@ class _Choice:
 
 
 def _choices(tables: ScoreTables, integers: IntegerTables) -> Iterator[_Choice]:
-    """Yield bias, switches and joints."""
+    """Yield bias, switches and joints, those of a pair together."""
     none, never = 0 * tables.bias, np.zeros(1, np.int64)
-    yield _Choice(np.zeros(1, np.int64), tables.bias[np.newaxis], integers.bias[np.newaxis], none, never)
+    yield _Choice(np.zeros(1, np.int64), tables.bias[np.newaxis, np.newaxis], integers.bias[np.newaxis], none, never)
     for row, steps in zip(tables.switch_rows, integers.switch_rows, strict=True):
-        yield _Choice(np.arange(2), np.stack([0 * row, row]), np.stack([0 * steps, steps]), none, never)
+        rows = np.stack([0 * row, row])[np.newaxis]
+        yield _Choice(np.arange(2), rows, np.stack([0 * steps, steps]), none, never)
     lines = {line.joint: line for line in tables.lines}
-    for joint, (one, other) in enumerate(zip(tables.thresholds, integers.thresholds, strict=True)):
+    for unit in integers.units:
+        if len(unit) == 2:
+            yield _of_pair(tables, integers, unit)
+            continue
+        joint = unit[0]
+        one, other = tables.thresholds[joint], integers.thresholds[joint]
         slope, line = integers.slope_of(joint), lines.get(joint)
         codes = first_codes(one, other) if slope is None else _turning_codes(slope, one, other)
-        rows = tables.joint_rows[joint][np.searchsorted(one, codes)]
-        steps = integers.joint_rows[joint][np.searchsorted(other, codes)].astype(np.int64)
+        rows, steps = _own(tables, integers, joint, codes)
         if slope is None or line is None:
-            yield _Choice(codes, rows, steps, none, never)
+            yield _Choice(codes, rows[np.newaxis], steps, none, never)
         else:
             above = np.clip(codes, line.low, line.high) - line.low
-            yield _Choice(codes, rows, steps + slope.of(codes), line.row, above)
+            yield _Choice(codes, rows[np.newaxis], steps + slope.of(codes), line.row, above)
+
+
+def _own(
+    tables: ScoreTables, integers: IntegerTables, joint: int, codes: NDArray[np.int64]
+) -> tuple[Floats, NDArray[np.int64]]:
+    """Return the rows (c, K) of codes (c,) of a joint, in units of score and in steps."""
+    rows = tables.joint_rows[joint][np.searchsorted(tables.thresholds[joint], codes)]
+    return rows, integers.joint_rows[joint][np.searchsorted(integers.thresholds[joint], codes)].astype(np.int64)
+
+
+def _of_pair(tables: ScoreTables, integers: IntegerTables, unit: tuple[int, ...]) -> _Choice:
+    """Return what the joints of a pair can say: every bin of the one with every one of the other."""
+    pair, whole = (next(pair for pair in each.pairs if pair.joints == unit) for each in (tables, integers))
+    each = [
+        first_codes(tables.thresholds[joint], integers.thresholds[joint], steps)
+        for joint, steps in zip(unit, pair.thresholds, strict=True)
+    ]
+    codes = np.stack(np.meshgrid(*each, indexing="ij"), axis=-1).reshape(-1, 2)
+    all_codes = np.zeros((len(codes), integers.n_joints), np.int64)
+    all_codes[:, list(unit)] = codes
+    (one, steps), (other, more) = (_own(tables, integers, joint, all_codes[:, joint]) for joint in unit)
+    rows = np.stack([one, other, pair.of(all_codes)])
+    return _Choice(codes, rows, steps + more + whole.of(all_codes), 0 * tables.bias, np.zeros(1, np.int64))
 
 
 def _turning_codes(slope: Slope, *thresholds: NDArray[np.uint16]) -> NDArray[np.int64]:
@@ -211,7 +244,7 @@ def _errors(choices: list[_Choice], scale: float) -> tuple[list[Exact], int]:
     step = below << -lowest
     errors = []
     for choice, (rows, line) in zip(choices, cut, strict=True):
-        whole = _whole(*rows, lowest) + choice.times.astype(object)[:, np.newaxis] * _whole(*line, lowest)
+        whole = _whole(*rows, lowest).sum(axis=0) + choice.times.astype(object)[:, np.newaxis] * _whole(*line, lowest)
         errors.append(whole * above - choice.steps.astype(object) * step)
     return errors, step
 

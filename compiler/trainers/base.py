@@ -171,10 +171,13 @@ SHARED = ("rounds", "shrinkage", "tolerance", "max_bins")
 
 @dataclass(frozen=True, slots=True)
 class Training:
-    """A trainer by its name, and values for all its settings: what a worker process needs to train."""
+    """A trainer by its name, and values for all its settings: what a worker process needs to train; `masked`: it learns
+    from rows in which inputs are lost as well.
+    """
 
     trainer: str
     settings: Mapping[str, Number]
+    masked: bool = False
 
     @classmethod
     def of(cls, options: Options) -> "Training":
@@ -183,7 +186,9 @@ class Training:
         """
         trainer, given = _asked(options)[0]
         return cls(
-            trainer.name, {setting.name: setting.default for setting in trainer.settings} | trainer.checked(given)
+            trainer.name,
+            {setting.name: setting.default for setting in trainer.settings} | trainer.checked(given),
+            options.robust,
         )
 
     @classmethod
@@ -195,27 +200,34 @@ class Training:
         asked = _asked(options)
         if options.trainer == AUTO and len(asked) > 1:
             asked = [(trainer, given) for trainer, given in asked if trainer.tried]
-        return tuple(cls(trainer.name, values) for trainer, given in asked for values in trainer.candidates(given))
+        return tuple(
+            cls(trainer.name, values, options.robust)
+            for trainer, given in asked
+            for values in trainer.candidates(given)
+        )
 
     @classmethod
-    def chosen(cls, fitting: Fitting) -> "Training":
+    def chosen(cls, fitting: Fitting, *, masked: bool = False) -> "Training":
         """Return the way that was chosen."""
-        return cls(fitting.trainer, TRAINERS.named(fitting.trainer).checked(fitting.settings))
+        return cls(fitting.trainer, TRAINERS.named(fitting.trainer).checked(fitting.settings), masked)
 
     def train(self, samples: "Samples", report: Report | None = None) -> "Model":
         """Return the trainer's model of `samples`."""
-        return TRAINERS.named(self.trainer).train(samples, self.settings, report)
+        return TRAINERS.named(self.trainer).train(self._rows(samples), self.settings, report)
 
     def stages(self, samples: "Samples", rounds: Sequence[int]) -> "tuple[Model, ...]":
         """Return the trainer's models of `samples` after each of these numbers of rounds."""
-        return TRAINERS.named(self.trainer).stages(samples, self.settings, rounds)
+        return TRAINERS.named(self.trainer).stages(self._rows(samples), self.settings, rounds)
+
+    def _rows(self, samples: "Samples") -> "Samples":
+        return samples.masked() if self.masked else samples
 
 
 def _asked(options: Options) -> list[tuple[Trainer, dict[str, Number]]]:
     """Return the trainers that may make the model, and the settings that are given to each.
 
-    A given setting that some trainers do not take is meant for the simplest that does: `rounds` for LogitBoost, and not
-    for a trainer that boosts and does more.
+    A given setting that some trainers do not take is meant for the simplest that does, with fewer settings than those
+    after it: `rounds` for LogitBoost, and not for a trainer that boosts and does more.
     """
     shared = {name: value for name in SHARED if (value := getattr(options, name)) is not None}
     if options.trainer != AUTO:
@@ -234,5 +246,6 @@ def _asked(options: Options) -> list[tuple[Trainer, dict[str, Number]]]:
         )
         raise TrainerError(f"{wrong}: leave it out")
     if len(takers) < len(names):
-        takers = [name for at, name in enumerate(takers) if not any(names[one] < names[name] for one in takers[:at])]
+        size = {name: len(names[name]) for name in takers}
+        takers = [name for at, name in enumerate(takers) if not any(size[one] < size[name] for one in takers[:at])]
     return [(TRAINERS[name], given) for name in takers]

@@ -126,7 +126,7 @@ class EmulatedCyberGlove(Closing):
             self._changed.wait_for(lambda: self._closing, seconds)
 
     def _count(self) -> int:
-        return self.state.settings["N"][0]
+        return len(self.state.sent())
 
     def _ticks(self) -> int:
         return int((monotonic() - self._started) * TICKS_HZ)

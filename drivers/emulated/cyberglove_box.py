@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import Literal
 
 from ..cyberglove_protocol import (
     ALWAYS,
@@ -44,6 +45,7 @@ class GloveState:
             raise SettingError(f"there are CyberGloves of 18 and of 22 sensors, not of {sensors}")
         self.sensors = sensors
         self.plugged = True
+        self.sends_all = False
         self._not_ready = not_ready
         self._all = masked_sensors(MASKS[sensors])
         self.values = bytes([100] * sensors)
@@ -100,7 +102,9 @@ class GloveState:
         return (STREAM if streamed else POLL) + self.sent() + stamp + status + fault + b"\0"
 
     def sent(self) -> bytes:
-        """Return the values of the sensors that mask and number let through."""
+        """Return the values of the sensors that mask and number let through, where it does as it says."""
+        if self.sends_all:
+            return self.values
         names = self._masked(self.settings["M"])[: self.settings["N"][0]]
         return bytes(self.values[self._all.index(name)] for name in names)
 
@@ -152,11 +156,14 @@ class Doubts:
     error_echo   whether an error answer begins with the command's echo
     stop_echo    whether a Ctrl-C is answered by itself and a NUL
     stray_nul    whether a NUL follows a text answer
+    mask         what becomes of a sensor mask: it is taken, the command is unknown, it is answered and ignored, or the
+                 box says that it has it and sends all sensors
     """
 
     error_echo: bool = True
     stop_echo: bool = False
     stray_nul: bool = False
+    mask: Literal["taken", "unknown", "ignored", "feigned"] = "taken"
 
 
 class CyberGloveBox:
@@ -164,6 +171,7 @@ class CyberGloveBox:
 
     def __init__(self, state: GloveState, text: str, doubts: Doubts) -> None:
         self.state, self.text, self.doubts = state, text, doubts
+        state.sends_all = doubts.mask == "feigned"
         self.streaming = False
         self._pending = b""
 
@@ -237,7 +245,8 @@ class CyberGloveBox:
             return 1
         if len(self._pending) < size:
             return 0
-        is_set = letter in "AC" or self.state.apply(letter, self._pending[1:size])
+        ignored = letter in "AC" or (letter == "M" and self.doubts.mask == "ignored")
+        is_set = ignored or self.state.apply(letter, self._pending[1:size])
         out.append(first + b"\0" if is_set else self._error(first, b"n"))
         return size
 
@@ -248,7 +257,7 @@ class CyberGloveBox:
             return 2 + (6 if second == bytes([_ALL_ACTUATORS]) else 2 * int.from_bytes(second, "big"))
         if letter == "C":  # all offsets and gains of the hardware, or one of them
             return 2 + 2 * (self.state.settings["N"][0] if second == b"A" else 1)
-        return 1 + SET[letter] if letter in SET else None
+        return 1 + SET[letter] if letter in SET and not (letter == "M" and self.doubts.mask == "unknown") else None
 
     def _text(self, first: bytes, out: list[bytes | Action]) -> int:
         if first == POLL.lower():

@@ -18,7 +18,8 @@ from typing import Any, Literal
 
 from ..closing import Closing
 from ..errors import DeviceError, SettingError
-from ..i2c.chips import CHIPS, Device
+from ..i2c.chips import CHIPS, Converter
+from ..spi.chips import SPI_CHIPS
 
 _PYTHON = "/usr/bin/python3"
 # Isolated, it has neither the current folder nor the user's on its path, whose modules are none of ours.
@@ -50,6 +51,14 @@ class EmulatedBus:
 
 
 @dataclass(frozen=True, slots=True)
+class EmulatedSpi:
+    """A converter of a kind at `device` (/dev/spidevB.C); None: nothing is wired to it, and its line is high."""
+
+    device: str
+    kind: str | None
+
+
+@dataclass(frozen=True, slots=True)
 class Traffic:
     """Bytes that went to and from one place, addresses included; `register` where the chip has registers."""
 
@@ -76,20 +85,26 @@ class WireCounters:
 
 
 class EmulatedI2c(Closing):
-    """The buses of a glove, served by a process of its own. Chips are numbered as they stand in their bus.
+    """The buses of a glove, served by a process of its own. Chips are numbered as they stand in their bus; SPI devices
+    are counted after the buses, each with one chip.
 
-    A client sees them if it runs with `environment`. Pins start high. Raises DeviceError, naming what to install, where
-    umockdev is missing, and SettingError for a chip that cannot be emulated.
+    A client sees them if it runs with `environment`. Pins start high, and channels at 0 V; the levels of a converter
+    are its channels' codes, 16 bits each. Raises DeviceError, naming what to install, where umockdev is missing, and
+    SettingError for a chip that cannot be emulated.
     """
 
-    def __init__(self, buses: Sequence[EmulatedBus]) -> None:
+    def __init__(self, buses: Sequence[EmulatedBus], spi: Sequence[EmulatedSpi] = ()) -> None:
         unknown = sorted({chip.kind for bus in buses for chip in bus.chips} - set(CHIPS))
+        unknown += sorted({chip.kind for chip in spi if chip.kind} - set(SPI_CHIPS))
         if unknown:
             raise SettingError(f"cannot emulate {', '.join(unknown)}; what can be emulated: {', '.join(CHIPS)}")
         wrapper = shutil.which("umockdev-wrapper")
         if wrapper is None:
             raise DeviceError(f"the program umockdev-wrapper is missing: {_INSTALL}")
-        self._levels = [[(1 << 24) - 1 for _ in bus.chips] for bus in buses]
+        self._levels = [
+            [0 if isinstance(CHIPS[chip.kind], Converter) else (1 << 24) - 1 for chip in bus.chips] for bus in buses
+        ]
+        self._levels += [[0] for _ in spi]
         self._errors = TemporaryFile("w+")  # noqa: SIM115 - it lives as long as the server; a pipe would fill up
         self._server = subprocess.Popen(
             [wrapper, _PYTHON, "-I", "-c", _SERVE, _folder(__name__), f"{__package__}.i2c_server"],
@@ -102,14 +117,14 @@ class EmulatedI2c(Closing):
         self._lock = Lock()
         self._root: str | None = None
         try:
-            self._root = self._tell([_described(bus) for bus in buses])
+            self._root = self._tell([*map(_described, buses), *map(_spi_described, spi)])
         except BaseException:
             self.close()
             raise
         self.environment = {"UMOCKDEV_DIR": str(self._root), "LD_PRELOAD": "libumockdev-preload.so.0"}
 
     def set_levels(self, bus: int, chip: int, levels: int) -> None:
-        """Set the pins of one chip: bit p is pin p; 1 is high, or open where the chip has a pull-up."""
+        """Set the pins of one chip: bit p is pin p, 1 is high or open; or a converter's codes."""
         self._levels[bus][chip] = levels
         self.set_all(self._levels)
 
@@ -228,9 +243,17 @@ def _described(bus: EmulatedBus) -> dict[str, Any]:
     return {**asdict(bus), "chips": chips}
 
 
+def _spi_described(chip: EmulatedSpi) -> dict[str, Any]:
+    model = None if chip.kind is None else _place_of(SPI_CHIPS.named(chip.kind).model)
+    return {"device": chip.device, "chips": [{"model": model}]}
+
+
 def _model(kind: str) -> tuple[str, str, str]:
+    return _place_of(CHIPS.named(kind).model)
+
+
+def _place_of(model: type) -> tuple[str, str, str]:
     """Return where another Python finds the class that emulates a chip: a folder of modules, module and name."""
-    model: type[Device] = CHIPS.named(kind).model
     return _folder(model.__module__), model.__module__, model.__qualname__
 
 

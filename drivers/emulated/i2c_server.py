@@ -11,6 +11,7 @@ import struct
 import sys
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,35 +21,50 @@ import gi
 gi.require_version("UMockdev", "1.0")
 from gi.repository import GLib, UMockdev  # noqa: E402
 
-from ..i2c.chips.base import Device  # noqa: E402
+from ..spi.chips.base import SpiModel  # noqa: E402
 from .i2c_wire import I2C_BLOCK, Adapter, Message, Station, TransferFault, Wire  # noqa: E402
 
 I2C_SLAVE, I2C_SLAVE_FORCE, I2C_FUNCS, I2C_RDWR, I2C_SMBUS = 0x703, 0x706, 0x705, 0x707, 0x720
 _READS = 0x0001
 _MESSAGE = struct.Struct("=HHHxxQ")
+SPI_MODE, SPI_SPEED, SPI_MESSAGE = 0x40016B01, 0x40046B04, 0x40006B00
+_SPI_TRANSFER = struct.Struct("=QQIIHBBBBBB")
 # A sleep this much shorter than the wait, then a spin: sleeping alone ends late by as much.
 _SPIN_S = 100e-6
 
 
-class EmulatedNode:
-    """One /dev/i2c-N. The handler runs in umockdev's thread; `lock` keeps it apart from the commands."""
+class EmulatedNode(ABC):
+    """A device node. The handler runs in umockdev's thread; `lock` keeps it apart from the commands."""
 
-    def __init__(self, testbed: Any, device: str, adapter: Adapter, paced: bool) -> None:
-        self.adapter, self._paced = adapter, paced
+    def __init__(self, testbed: Any, device: str, number: str, subsystem: str) -> None:
         self.lock = threading.Lock()
-        self._addresses: dict[int, int] = {}
         self._clients: set[int] = set()  # who has opened the node since it is there
         self._strangers: set[int] = set()  # who had it open when it went away
         self._handler = UMockdev.IoctlBase()
         self._handler.connect("handle-ioctl", self._on_ioctl)
         self._handler.connect("client-vanished", self._forget)
         name = device.removeprefix("/dev/")
-        sysfs = f"/devices/platform/{name}.i2c/{name}/i2c-dev/{name}"
-        number = f"E: MAJOR=89\nE: MINOR={name.rpartition('-')[2]}\n"
-        testbed.add_from_string(f"P: {sysfs}\nN: {name}\nE: SUBSYSTEM=i2c-dev\nE: DEVNAME={device}\n{number}")
+        sysfs = f"/devices/platform/{name}.{subsystem}/{name}/{subsystem}/{name}"
+        testbed.add_from_string(f"P: {sysfs}\nN: {name}\nE: SUBSYSTEM={subsystem}\nE: DEVNAME={device}\n{number}")
         testbed.attach_ioctl(device, self._handler)
         self._path = Path(testbed.get_root_dir() + device)
         self._away = self._path.with_name(f".{name}")
+
+    @abstractmethod
+    def show(self, levels: list[int]) -> None:
+        """Set the pins of all its chips."""
+
+    @abstractmethod
+    def counters(self) -> dict[str, Any]:
+        """Tell what went over the wire."""
+
+    @abstractmethod
+    def _do(self, client: Any) -> int:
+        """Do what a client asks for; raises OSError."""
+
+    @abstractmethod
+    def _spent_s(self) -> float:
+        """Return for how long the wire has been busy since the start; no longer than it takes, where it is unpaced."""
 
     def unplug(self) -> None:
         """Remove the node; who has it open is told ENODEV from now on."""
@@ -64,15 +80,13 @@ class EmulatedNode:
 
     def _on_ioctl(self, _: Any, client: Any) -> bool:
         start = time.monotonic()
-        wire = self.adapter.wire
         answer = (-1, errno.EIO)  # whatever happens here: who is not answered waits for ever
         try:
             with self.lock:
-                before = wire.scl_periods, wire.transfers
+                before = self._spent_s()
                 answer = self._answer(client)
-                took_s = wire.duration_s(wire.scl_periods - before[0], wire.transfers - before[1])
-            if self._paced:
-                _wait_until(start + took_s)
+                took_s = self._spent_s() - before
+            _wait_until(start + took_s)
         except (GLib.Error, AttributeError):
             return True  # the client was killed amid its call: to answer it would end this process
         except BaseException:
@@ -97,6 +111,35 @@ class EmulatedNode:
         if client in self._strangers:
             raise OSError(errno.ENODEV, "unplugged")
         self._clients.add(client)
+
+
+class I2cNode(EmulatedNode):
+    """One /dev/i2c-N."""
+
+    def __init__(self, testbed: Any, device: str, adapter: Adapter, paced: bool) -> None:
+        minor = device.rpartition("-")[2]
+        super().__init__(testbed, device, f"E: MAJOR=89\nE: MINOR={minor}\n", "i2c-dev")
+        self.adapter, self._paced = adapter, paced
+        self._addresses: dict[int, int] = {}
+
+    def show(self, levels: list[int]) -> None:
+        """Set the pins of all its chips."""
+        for station, value in zip(self.adapter.wire.stations, levels, strict=True):
+            station.device.levels = value
+
+    def counters(self) -> dict[str, Any]:
+        """Tell what went over the wire."""
+        wire = self.adapter.wire
+        return {
+            "calls": self.adapter.calls,
+            "transfers": wire.transfers,
+            "scl_periods": wire.scl_periods,
+            "traffic": [(*place, count) for place, count in wire.traffic.items()],
+        }
+
+    def _spent_s(self) -> float:
+        wire = self.adapter.wire
+        return wire.duration_s(wire.scl_periods, wire.transfers) if self._paced else 0.0
 
     def _do(self, client: Any) -> int:
         request, arg = client.get_request(), client.get_arg()
@@ -145,29 +188,56 @@ class EmulatedNode:
         return 0
 
 
+class SpiNode(EmulatedNode):
+    """One /dev/spidevB.C with a chip behind it, at the clock that its client asks for; None: nothing is there."""
+
+    def __init__(self, testbed: Any, device: str, chip: SpiModel | None) -> None:
+        super().__init__(testbed, device, "E: MAJOR=153\nE: MINOR=0\n", "spidev")
+        self._chip, self._spent, self._calls, self._transfers, self._bytes = chip, 0.0, 0, 0, 0
+
+    def show(self, levels: list[int]) -> None:
+        """Set the codes at the chip's channels."""
+        if self._chip is not None:
+            (self._chip.levels,) = levels
+
+    def counters(self) -> dict[str, Any]:
+        """Tell what went over the wire."""
+        return {"calls": self._calls, "transfers": self._transfers, "scl_periods": 8 * self._bytes, "traffic": []}
+
+    def _spent_s(self) -> float:
+        return self._spent
+
+    def _do(self, client: Any) -> int:
+        request, arg = client.get_request(), client.get_arg()
+        if request in (SPI_MODE, SPI_SPEED):
+            return 0
+        size = request >> 16 & 0x3FFF
+        if request & 0xC000FFFF != SPI_MESSAGE or not size or size % _SPI_TRANSFER.size:
+            raise OSError(errno.ENOTTY, "no such request")
+        self._calls += 1
+        table = arg.resolve(0, size)
+        total = 0
+        for number, (_, _, length, hz, *_) in enumerate(_SPI_TRANSFER.iter_unpack(bytes(table.retrieve()))):
+            at = _SPI_TRANSFER.size * number
+            sent = bytes(table.resolve(at, length).retrieve())
+            came = b"\xff" * length if self._chip is None else self._chip.transfer(sent)
+            table.resolve(at + 8, length).update(0, came)
+            self._transfers, self._bytes, total = self._transfers + 1, self._bytes + length, total + length
+            self._spent += 8 * length / hz
+        return total
+
+
 class Server:
-    """What the lines on stdin may ask for; a chip is its number on its bus."""
+    """What the lines on stdin may ask for; a chip is its number on its bus. SPI devices follow the buses."""
 
     def __init__(self, testbed: Any, buses: list[dict[str, Any]]) -> None:
-        self._nodes = [
-            EmulatedNode(
-                testbed,
-                bus["device"],
-                Adapter(
-                    Wire([Station(_model(*chip.pop("model")), **chip) for chip in bus["chips"]], bus["clock_hz"]),
-                    bus["adapter"],
-                ),
-                bus["paced"],
-            )
-            for bus in buses
-        ]
+        self._nodes = [_node(testbed, **bus) for bus in buses]
 
     def levels(self, every: list[list[int]]) -> None:
         """Set the pins of all chips of all buses."""
         for node, values in zip(self._nodes, every, strict=True):
             with node.lock:
-                for station, value in zip(node.adapter.wire.stations, values, strict=True):
-                    station.device.levels = value
+                node.show(values)
 
     def unplug(self, bus: int) -> None:
         """Take the adapter away."""
@@ -182,6 +252,7 @@ class Server:
     def fault(self, bus: int, name: str, arguments: list[Any]) -> None:
         """Let something go wrong: see `i2c.EmulatedI2c`, which has a method for each of them."""
         node = self._nodes[bus]
+        assert isinstance(node, I2cNode)
         with node.lock:
             _FAULTS[name](node.adapter, *arguments)
 
@@ -189,13 +260,18 @@ class Server:
         """Tell what went over the wire."""
         node = self._nodes[bus]
         with node.lock:
-            wire = node.adapter.wire
-            return {
-                "calls": node.adapter.calls,
-                "transfers": wire.transfers,
-                "scl_periods": wire.scl_periods,
-                "traffic": [(*place, count) for place, count in wire.traffic.items()],
-            }
+            return node.counters()
+
+
+def _node(
+    testbed: Any, device: str, chips: list[dict[str, Any]], clock_hz: int = 0, adapter: str = "", paced: bool = True
+) -> EmulatedNode:
+    """Return a bus; without an adapter an SPI device, whose one chip has no model where nothing is there."""
+    if not adapter:
+        (chip,) = chips
+        return SpiNode(testbed, device, None if chip["model"] is None else _model(*chip["model"])())
+    stations = [Station(_model(*chip.pop("model")), **chip) for chip in chips]
+    return I2cNode(testbed, device, Adapter(Wire(stations, clock_hz), adapter), paced)
 
 
 _FAULTS: dict[str, Callable[..., None]] = {
@@ -212,12 +288,11 @@ _FAULTS: dict[str, Callable[..., None]] = {
 }
 
 
-def _model(folder: str, module: str, name: str) -> type[Device]:
+def _model(folder: str, module: str, name: str) -> Any:
     """Return the class `name` of a chip's module, which the imports of `folder` find."""
     if folder not in sys.path:
         sys.path.append(folder)
-    model: type[Device] = getattr(importlib.import_module(module), name)
-    return model
+    return getattr(importlib.import_module(module), name)
 
 
 def _wait_until(moment: float) -> None:

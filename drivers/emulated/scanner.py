@@ -1,13 +1,21 @@
 """An emulated scanner board: what it sends when, and what it answers; and that board on a serial line."""
 
 from collections import deque
+from collections.abc import Sequence
+from dataclasses import replace
 from threading import Condition, Thread
 from time import monotonic_ns
 
 from ..closing import Closing
 from ..scanner_protocol import (
+    ANALOG,
+    ANALOG_VERSION,
+    MOST_ASKED,
     PROTOCOL,
+    UNREAD,
     WITHOUT_DIODES,
+    Analog,
+    Channels,
     Event,
     Faults,
     FrameDecoder,
@@ -20,6 +28,7 @@ from ..scanner_protocol import (
     Mask,
     MessageError,
     Ping,
+    SetChannels,
     SetDebounce,
     SetRate,
     State,
@@ -60,6 +69,9 @@ class ScannerBoard:
     rows, columns  of its keys; one row: wired directly       diodes  whether the keys of a matrix have any
     scan_us        from scan to scan                          state_us, heartbeat_us  of what it sends, 0: none
     clock_us       what its 32 bit clock shows at boot        board   its number
+    channels, bits of its converter: it speaks version 2 where there are any
+    channel_us     how long a channel takes, its multiplexer's settling included
+    codes          what the channels have now, in order, None for one that cannot be read; others have 0
 
     Without STATEs it sends an EVENT for every change. It does not debounce: what it is told of that it only says again.
     """
@@ -75,17 +87,23 @@ class ScannerBoard:
         heartbeat_us: int = 50_000,
         clock_us: int = 0,
         board: int = 1,
+        channels: int = 0,
+        bits: int = 10,
+        channel_us: int = 208,
     ) -> None:
         self.rows, self.columns, self.diodes, self.clock_us, self.board = rows, columns, diodes, clock_us, board
         self.rate = SetRate(scan_us, state_us, heartbeat_us)
         self.debounce = SetDebounce(0, 0)
+        self.analog = Channels(ANALOG_VERSION, 0, bits, 0, 0, channels)
+        self.channel_us = channel_us
+        self.codes: Sequence[int | None] = ()
         self.overruns = self.refused = self.dropped = 0
         self._closed: Mask = 0
         self._lost: Mask = 0
         self._scanned = False
         self._sequence = 0
         self._decoder = FrameDecoder()
-        self._state_at = self._heartbeat_at = self._faults_at = 0
+        self._state_at = self._heartbeat_at = self._faults_at = self._analog_at = 0
         self._scan_at: int | None = None
         self._told = (0, 0, 0)
 
@@ -109,10 +127,11 @@ class ScannerBoard:
             due += [self._state_at] * (self.rate.state_us > 0) + [self._heartbeat_at] * (self.rate.heartbeat_us > 0)
         due += [] if self._scan_at is None else [self._scan_at]
         due += [self._faults_at] * (self._told != self._faults())
+        due += [self._analog_at] * (self.analog.analog_us > 0)
         return min(due, default=None)
 
     def scan(self, closed: Mask, now: int, *, unread: Mask = 0, whole: bool = True) -> list[bytes]:
-        """Read the keys and return the frames that are due.
+        """Read the keys and the converter, and return the frames that are due.
 
         unread  keys that keep their state, since they were not read      whole  whether all were tried: those are lost
         """
@@ -121,7 +140,16 @@ class ScannerBoard:
         if self._told != self._faults() and now >= self._faults_at:
             self._told, self._faults_at = self._faults(), now + _FAULTS_EVERY_US
             sent.append(self._sent(Faults(self._clock(now), *self._told, 0)))
+        if self.analog.analog_us and now >= self._analog_at:
+            self._analog_at = _after(self._analog_at, self.analog.analog_us, now)
+            sent.append(self._sent(Analog(self._clock(now), self.analog.token, self._converted())))
         return sent
+
+    def _converted(self) -> tuple[int, ...]:
+        """Return the codes of the channels that were asked for."""
+        whole, analog = [*self.codes, *[0] * self.analog.channels], self.analog
+        asked = [code for channel, code in enumerate(whole) if analog.wanted >> channel & 1]
+        return tuple(UNREAD if code is None else min(max(code, 0), (1 << analog.bits) - 1) for code in asked)
 
     def recognised(self, grasp: int, margin: int, flags: int, now: int) -> list[bytes]:
         """Return what it sends of a grasp; a margin beyond what the frame can say is the largest that it can."""
@@ -150,7 +178,24 @@ class ScannerBoard:
                 self._state_at = self._heartbeat_at = now
             case SetDebounce():
                 self.debounce = message
+            case SetChannels():
+                return self._measure(message, now)
         return [self._sent(self._hello(message.token if isinstance(message, Ping) else 0, now))]
+
+    def _measure(self, asked: SetChannels, now: int) -> list[bytes]:
+        """Take other channels, the lowest of too many; a board without any does not understand."""
+        analog = self.analog
+        if not analog.channels:
+            self.refused += 1
+            return []
+        wanted = asked.wanted & (1 << analog.channels) - 1
+        while wanted.bit_count() > MOST_ASKED:
+            wanted ^= 1 << wanted.bit_length() - 1
+        least_us = max(_FASTEST_US, self.channel_us * wanted.bit_count())
+        analog_us = max(asked.analog_us, least_us) if asked.analog_us and wanted else 0
+        self.analog = replace(analog, token=asked.token, analog_us=analog_us, wanted=wanted)
+        self._analog_at = now + analog_us
+        return [self._sent(self.analog)]
 
     def _keys(self, closed: Mask, unread: Mask, whole: bool, now: int) -> list[bytes]:
         """Take a scan and return what it sends of keys. The first one tells all of them, and has no changes."""
@@ -185,7 +230,7 @@ class ScannerBoard:
         return self._sent(Heartbeat(self._clock(now), self._closed, self.rows * self.columns))
 
     def _hello(self, token: int, now: int) -> Hello:
-        flags = 0 if self.diodes else WITHOUT_DIODES
+        flags = (0 if self.diodes else WITHOUT_DIODES) | (ANALOG if self.analog.channels else 0)
         who = (PROTOCOL, flags, token, self.board, 1, 0, 0, self.rows, self.columns)
         rate, debounce = self.rate, self.debounce
         how = (rate.scan_us, rate.state_us, rate.heartbeat_us, debounce.press_us, debounce.release_us)
@@ -247,6 +292,11 @@ class EmulatedScanner(Closing):
             self.board.touch(self._now())
             self._condition.notify()
 
+    def press(self, codes: Sequence[int | None]) -> None:
+        """Let the channels, in order, have these codes from now on; None: it cannot be read. Others have 0."""
+        with self._condition:
+            self.board.codes = tuple(codes)
+
     def recognise(self, grasp: int, margin: int, flags: int = 0) -> None:
         """Say that the board recognised grasp type number `grasp`, with the values of GRASP's fields."""
         with self._condition:
@@ -256,7 +306,15 @@ class EmulatedScanner(Closing):
         """Start again as after a power cut, as `board` if given: numbers and clock from their beginnings."""
         with self._condition:
             old = self.board
-            self.board = board or ScannerBoard(old.rows, old.columns, diodes=old.diodes, board=old.board)
+            self.board = board or ScannerBoard(
+                old.rows,
+                old.columns,
+                diodes=old.diodes,
+                board=old.board,
+                channels=old.analog.channels,
+                bits=old.analog.bits,
+                channel_us=old.channel_us,
+            )
             self._booted_us = monotonic_ns() // 1000
             self._send(self.board.boot(0))
             self._condition.notify()

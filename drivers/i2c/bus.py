@@ -1,12 +1,13 @@
-"""An I2C bus with port expanders: which chips are there, how they do, and scans of their ports."""
+"""An I2C bus with port expanders and converters: which chips are there, how they do, and scans of their ports."""
 
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from time import monotonic
+from time import monotonic, sleep
 
 from ..closing import Closing
 from ..errors import DeviceError, SettingError
-from .chips import Chip, Reading
+from .chips import Chip, Conversion, Converter, Reading
 from .keeper import Keeper, PlacedChip, Route
 from .node import MOST_MESSAGES, REFUSED, Node, Query, Run, Way
 from .tca9548a import ADDRESSES, CHANNELS
@@ -14,15 +15,27 @@ from .tca9548a import ADDRESSES, CHANNELS
 
 @dataclass(eq=False, slots=True)
 class Port:
-    """A port to read: whose, how, and which bits of the answer a chip in order keeps at 1.
+    """A port to read: whose, and how.
 
     believed: an answer that looked wrong and was found to be right, and how often its chip had been checked by then.
     """
 
     member: PlacedChip
     query: Query
-    high: int
+    reading: Reading
     believed: tuple[bytes, int] | None = None
+
+    def value(self, answer: bytes) -> int:
+        """Return an answer as a number: of a converter its code, else bit i for pin reading.pins[i]."""
+        chip = self.member.chip
+        return chip.code(answer) if isinstance(chip, Converter) else int.from_bytes(answer, "little")
+
+    def doubtful(self, answer: bytes) -> bool:
+        """Return whether an answer looks as if SDA were held low, or the chip had been reset."""
+        if isinstance(self.reading, Conversion):
+            return not any(answer)
+        high = self.reading.high
+        return 0 in answer or int.from_bytes(answer, "little") & high != high
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +81,8 @@ class Scan:
         self._groups: list[tuple[Group, Run]] = []
 
     def read(self) -> list[int | None]:
-        """Return each port's answer, bit i being pin reading.pins[i]; None where the chip is absent or has failed.
+        """Return each port's answer: bit i is pin reading.pins[i], or the code of a conversion; None where the chip is
+        absent or has failed.
 
         Every answer was read in this call. Raises DeviceError if the device node is gone; after `open` it works again.
         """
@@ -88,11 +102,7 @@ class Scan:
             for (number, port), answer in zip(group.ports, found, strict=True):
                 if answer is None or not port.member.present:  # lost, maybe while its neighbours were read
                     continue
-                value = int.from_bytes(answer, "little")
-                if 0 in answer or value & port.high != port.high:
-                    answers[number] = self._doubt(port, answer)
-                else:
-                    answers[number] = value
+                answers[number] = self._doubt(port, answer) if port.doubtful(answer) else port.value(answer)
         return answers
 
     def _attend(self) -> None:
@@ -128,16 +138,120 @@ class Scan:
         A 0 where the chip pulls up tells that it was reset.
         """
         member = port.member
-        if port.believed != (answer, member.checked):
+        if isinstance(port.reading, Conversion):
+            believed = member.zeros == member.checked  # a chip has many channels, and most rest at 0 V
+        else:
+            believed = port.believed == (answer, member.checked)
+        if not believed:
             self._keeper.feel()
             if member.present:
                 self._keeper.check(member)
             again = self._alone(port)
             if again is None:
                 return None
-            port.believed = (again, member.checked)
+            port.believed, member.zeros = (again, member.checked), member.checked
             answer = again
-        return int.from_bytes(answer, "little")
+        return port.value(answer)
+
+
+class _Converting:
+    """A converter of a scan: which of its steps are left, which one converts, and until when it is busy."""
+
+    def __init__(self, node: Node, keeper: Keeper, member: PlacedChip) -> None:
+        self._node, self._keeper, self._member = node, keeper, member
+        self._conversions: dict[int, Conversion] = {}
+        self._left: deque[int] = deque()
+        self.converts: int | None = None
+        # What a scan that ended early has begun is not stopped: the chip takes no other before it is over.
+        self.until = 0.0
+
+    def add(self, step: int, conversion: Conversion) -> None:
+        """Take a step of the scan."""
+        self._conversions[step] = conversion
+
+    def restart(self) -> None:
+        """Begin a scan."""
+        self._left = deque(self._conversions)
+        self.converts = None
+
+    @property
+    def pending(self) -> bool:
+        """Whether something is left of it in this scan."""
+        return self.converts is not None or bool(self._left)
+
+    def begin(self) -> None:
+        """Begin the next conversion, if one is left and none goes on. A chip that is absent has nothing to wait for."""
+        if self.converts is not None or not self._left or monotonic() < self.until:
+            return
+        self.converts = step = self._left.popleft()
+        conversion, member = self._conversions[step], self._member
+        if member.present and self._keeper.attempt(member, lambda: self._start(conversion)):
+            self.until = monotonic() + conversion.us * 1e-6
+
+    def _start(self, conversion: Conversion) -> bool:
+        self._node.write(self._member.address, conversion.start)
+        return True
+
+    def ready(self, step: int) -> bool:
+        """Return whether this step can be read."""
+        return self.converts == step and monotonic() >= self.until
+
+    def was_read(self) -> None:
+        """Go on with the next."""
+        self.converts = None
+        self.begin()
+
+
+class Interleaved:
+    """Groups of ports, read in their order; conversions that take time are groups of one port.
+
+    Each converter begins its next conversion as soon as its last was read. While the next port of the scan converts,
+    the first of the later ones that can be read is read ahead: so counts `thenar.runtime.scanning.timing`.
+    """
+
+    def __init__(self, node: Node, keeper: Keeper, groups: Sequence[Sequence[Port]]) -> None:
+        self._scans = [Scan(node, keeper, group) for group in groups]
+        slow: dict[PlacedChip, _Converting] = {}
+        self._slow: dict[int, _Converting] = {}
+        for step, group in enumerate(groups):
+            for port in group:
+                if isinstance(port.reading, Conversion) and port.reading.start:
+                    chip = slow.setdefault(port.member, _Converting(node, keeper, port.member))
+                    chip.add(step, port.reading)
+                    self._slow[step] = chip
+        self._chips = tuple(slow.values())
+
+    def read(self) -> list[int | None]:
+        """Return the answers of all ports, as `Scan.read` does."""
+        return [answer for answers in self for answer in answers]
+
+    def __iter__(self) -> Iterator[list[int | None]]:
+        """Yield the answers of each group, as soon as it and all before it were read."""
+        if not self._slow:
+            for scan in self._scans:
+                yield scan.read()
+            return
+        for chip in self._chips:
+            chip.restart()
+        left, found = list(range(len(self._scans))), dict[int, list[int | None]]()
+        for step in range(len(self._scans)):
+            while step not in found:
+                able = self._able(left)
+                found[able] = self._scans[able].read()
+                left.remove(able)
+                if able in self._slow:
+                    self._slow[able].was_read()
+            yield found.pop(step)
+
+    def _able(self, left: Sequence[int]) -> int:
+        """Return the first step that can be read, waiting where none can."""
+        while True:
+            for chip in self._chips:
+                chip.begin()
+            able = next((step for step in left if step not in self._slow or self._slow[step].ready(step)), None)
+            if able is not None:
+                return able
+            sleep(max(0.0, min(chip.until for chip in self._chips if chip.pending) - monotonic()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,9 +306,18 @@ class I2cBus(Closing):
 
     def prepare(self, ports: Sequence[PortRead]) -> Scan:
         """Return what reads these ports, in this order, as often as it is asked."""
+        return Scan(self._node, self._keeper, self._made(ports))
+
+    def interleaved(self, groups: Sequence[Sequence[PortRead]]) -> Interleaved:
+        """Return what reads groups of ports, in this order, conversions overlapped with what else the bus does.
+
+        A conversion that takes time is a group of its own.
+        """
+        return Interleaved(self._node, self._keeper, [self._made(group) for group in groups])
+
+    def _made(self, ports: Sequence[PortRead]) -> list[Port]:
         read = ((self.chips[port.chip], port.reading) for port in ports)
-        made = [Port(chip, Query(chip.address, one.command, one.length), one.high) for chip, one in read]
-        return Scan(self._node, self._keeper, made)
+        return [Port(chip, Query(chip.address, one.command, one.length), one) for chip, one in read]
 
     @property
     def way(self) -> str:
@@ -217,12 +340,15 @@ class I2cBus(Closing):
         self._keeper.revision += 1
 
 
+_REGISTERS = Reading("registers", b"", ())
+
+
 def _control(member: PlacedChip) -> Port:
     watched = member.watched
     if watched is None:
         reading = member.chip.readings[0]
-        return Port(member, Query(member.address, reading.command, reading.length), 0)
-    return Port(member, Query(member.address, watched.data[:1], len(watched.expect)), 0)
+        return Port(member, Query(member.address, reading.command, reading.length), reading)
+    return Port(member, Query(member.address, watched.data[:1], len(watched.expect)), _REGISTERS)
 
 
 def _route(at: ChipAt) -> Route | None:

@@ -138,7 +138,7 @@ class PlacedChip:
     """A chip in its place on the bus at `device`, and how it is doing, which its keeper alone changes.
 
     `errors` counts what failed, retries that helped included; `last_error` stays. `due` is when it is seen to next;
-    `checked` counts its checks.
+    `checked` counts its checks; `zeros` is how many there were when zeros of it were last found right.
     """
 
     device: str
@@ -151,6 +151,7 @@ class PlacedChip:
     last_error: str = ""
     due: float = 0.0
     checked: int = 0
+    zeros: int = -1
 
     @property
     def watched(self) -> Write | None:

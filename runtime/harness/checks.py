@@ -1,15 +1,16 @@
 """What a harness must satisfy beyond the types of its fields. Faults come in an order in which the first one counts."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from thenar.drivers.errors import SettingError
 from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips import CHIPS
 from thenar.drivers.ports import device_fault, port_fault
+from thenar.drivers.spi.chips import SPI_CHIPS
 
 from ..names import fault, nearest, shortened
 from ..toml_source import Place, spelled
-from .wiring import BusWiring, ChipWiring, GloveWiring, Harness
+from .wiring import BusWiring, ChipWiring, GloveWiring, Harness, SpiWiring
 
 Fault = tuple[Place, str]
 _SENSORS = (18, 22)
@@ -22,9 +23,14 @@ def faults(harness: Harness) -> Iterator[Fault]:
     if harness.cyberglove is not None:
         yield from _of_glove(harness.cyberglove)
     yield from _of_devices(harness)
+    for number, scanner in enumerate(harness.scanners):
+        if scanner.mux and not scanner.taxels:
+            yield ("scanner", number, "mux"), "a multiplexer without taxels: name them, or leave it out"
     for number, bus in enumerate(harness.buses):
         yield from _of_bus(("bus", number), bus)
-    yield from _of_switches(harness)
+    for number, chip in enumerate(harness.spi):
+        yield from _of_spi(("spi", number), chip)
+    yield from _of_elements(harness)
 
 
 def _of_glove(glove: GloveWiring) -> Iterator[Fault]:
@@ -39,6 +45,7 @@ def _of_glove(glove: GloveWiring) -> Iterator[Fault]:
 def _of_devices(harness: Harness) -> Iterator[Fault]:
     places: list[tuple[Place, str]] = [(("scanner", n, "port"), line.port) for n, line in enumerate(harness.scanners)]
     places += [(("bus", n, "device"), bus.device) for n, bus in enumerate(harness.buses)]
+    places += [(("spi", n, "device"), chip.device) for n, chip in enumerate(harness.spi)]
     if harness.cyberglove is not None:
         places.insert(0, (("cyberglove", "port"), harness.cyberglove.port))
     seen: dict[str, Place] = {}
@@ -64,18 +71,35 @@ def _of_chip(place: Place, chip: ChipWiring, bus: BusWiring) -> Iterator[Fault]:
         kind.check_address(chip.address)
     except SettingError as reason:
         yield (*place, "address"), str(reason)
-    usable = [pin for pin in kind.pins if pin not in kind.not_inputs]
+    yield from _of_pins(place, chip, [pin for pin in kind.pins if pin not in kind.not_inputs])
     for pin in chip.pins:
-        if pin not in kind.pins:
-            yield (*place, "pins", pin), f"a {kind.name} has no pin {pin!r}{nearest(pin, usable)}"
         if pin in kind.not_inputs:
             yield (*place, "pins", pin), f"must not be an input: {kind.not_inputs[pin]}; use another pin"
+    if chip.closed == "high" and chip.measures:
+        yield (
+            (*place, "closed"),
+            f"a {kind.name} measures taxels: leave it out",
+        )
     if chip.closed == "high" and not kind.registers:  # what is not pulled down reads as high, whatever the switch does
         yield (*place, "closed"), f"a {kind.name} pulls its inputs up by itself: let switches pull them down"
     slowest = min(kind.clock_hz, tca9548a.CLOCK_HZ if chip.mux else kind.clock_hz)
     if bus.clock_hz > slowest:
         which = kind.name if slowest == kind.clock_hz else "TCA9548A"
         yield (*place[:2], "clock_hz"), f"{bus.clock_hz} Hz is too fast for the {which}: at most {slowest}"
+
+
+def _of_spi(place: Place, chip: SpiWiring) -> Iterator[Fault]:
+    if chip.kind not in SPI_CHIPS:
+        yield (*place, "kind"), f"there is no SPI converter {chip.kind!r}{nearest(chip.kind, list(SPI_CHIPS))}"
+    yield from _of_pins(place, chip, chip.chip.pins)
+    if chip.clock_hz > chip.chip.most_hz:
+        yield (*place, "clock_hz"), f"{chip.clock_hz} Hz is too fast for the {chip.kind}: at most {chip.chip.most_hz}"
+
+
+def _of_pins(place: Place, chip: ChipWiring | SpiWiring, usable: Sequence[str]) -> Iterator[Fault]:
+    for pin in chip.pins:
+        if pin not in chip.chip.pins:
+            yield (*place, "pins", pin), f"a {chip.kind} has no pin {pin!r}{nearest(pin, usable)}"
 
 
 def _of_addresses(place: Place, bus: BusWiring) -> Iterator[Fault]:
@@ -94,17 +118,21 @@ def _of_addresses(place: Place, bus: BusWiring) -> Iterator[Fault]:
         seen[channel][chip.address] = number
 
 
-def _of_switches(harness: Harness) -> Iterator[Fault]:
+def _of_elements(harness: Harness) -> Iterator[Fault]:
+    """A taxel and a switch may not share a name either: levels are named after their taxel."""
+
     def wired() -> Iterator[tuple[Place, str]]:
         for number, scanner in enumerate(harness.scanners):
-            keys = enumerate(scanner.switches)
-            yield from ((("scanner", number, "switches", key), name) for key, name in keys if name)
-        for number, bus in enumerate(harness.buses):
-            for index, chip in enumerate(bus.chips):
-                here = ("bus", number, "chip", index, "pins")
-                yield from (((*here, pin), name) for pin, name in chip.pins.items())
+            for key, names in (("switches", scanner.switches), ("taxels", scanner.taxels)):
+                yield from ((("scanner", number, key, place), name) for place, name in enumerate(names) if name)
+        chips: list[tuple[Place, ChipWiring | SpiWiring]] = [
+            (("bus", n, "chip", m), chip) for n, bus in enumerate(harness.buses) for m, chip in enumerate(bus.chips)
+        ]
+        chips += [(("spi", n), chip) for n, chip in enumerate(harness.spi)]
+        for here, chip in chips:
+            yield from (((*here, "pins", pin), name) for pin, name in chip.pins.items())
 
-    yield from _of_names(wired(), "switch")
+    yield from _of_names(wired(), "switch or taxel" if harness.taxel_names else "switch")
 
 
 def _of_names(named: Iterable[tuple[Place, str]], what: str) -> Iterator[Fault]:

@@ -15,14 +15,14 @@ from .wiring import Harness
 def load_harness(path: str | Path) -> Harness:
     """Return the harness in a TOML file; its name, where it has none, is the file's, or "glove" where that is no name.
 
-    The path of the calibration comes back absolute. Raises HarnessError with file, line and key.
+    The paths of calibrations come back absolute. Raises HarnessError with file, line and key.
     """
     file = Path(path)
     return _calibrated(_harness_of(read_source(file, HarnessError), file.stem), file.parent)
 
 
 def parse_harness(text: str, name: str) -> Harness:
-    """Return the harness that `text`, which messages call `name`, is; its calibration's path as it stands there.
+    """Return the harness that `text`, which messages call `name`, is; its calibrations' paths as they stand there.
 
     Raises HarnessError as `load_harness` does.
     """
@@ -39,8 +39,11 @@ def _harness_of(source: TomlText, name: str) -> Harness:
 
 
 def _calibrated(harness: Harness, folder: Path) -> Harness:
-    """Return the harness with the path of its calibration counted from `folder`."""
-    glove = harness.cyberglove
-    if glove is None or glove.calibration is None:
-        return harness
-    return replace(harness, cyberglove=replace(glove, calibration=str(folder.resolve() / glove.calibration)))
+    """Return the harness with the paths of its calibrations counted from `folder`."""
+    glove, taxels = harness.cyberglove, harness.taxel_settings
+    if glove is not None and glove.calibration is not None:
+        harness = replace(harness, cyberglove=replace(glove, calibration=str(folder.resolve() / glove.calibration)))
+    if taxels.calibration is not None:
+        taxels = replace(taxels, calibration=str(folder.resolve() / taxels.calibration))
+        harness = replace(harness, taxel_settings=taxels)
+    return harness

@@ -4,16 +4,23 @@ The structs are the tables of `glove.toml`, field by field; a harness that was l
 """
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta, Struct, field
 
-from thenar.drivers.i2c.chips import CHIPS, Chip
+from thenar.drivers.cyberglove_protocol import SENSORS, SENSORS_18, SENSORS_22
+from thenar.drivers.i2c.chips import CHIPS, Chip, Converter
+from thenar.drivers.scanner_protocol import MOST_ASKED
+from thenar.drivers.spi.chips import SPI_CHIPS, SpiChip
+
+from ..taxels import TaxelSettings
 
 # A board's bitmap has no room for more.
 MOST_KEYS = 2000
+# An ANALOG of a board has no room for more.
+MOST_CHANNELS = MOST_ASKED
 # Of the clock of a bus.
 SLOWEST_HZ = 1000
 Text = Annotated[str, Meta(min_length=1)]
@@ -29,7 +36,12 @@ class GloveWiring(_Table, frozen=True):
     """The CyberGlove: its port (a device, socket:// or rfc2217://), and how it is asked.
 
     baud         "auto" tries the usual ones
+    mode         "stream": it sends by its own clock; "poll": it is asked for every record; "demand": a run asks for one
+                 where the switches cannot decide without
     rate_hz      None: as fast as it can
+    filter       whether the box's digital filter is on; None: as the box has it
+    record_us    what one record of all sensors takes, as measured (`thenar doctor --write`); None: by the formula
+    mask         whether sensors that no joint of a build is are left out of the records of a run
     sensors      None: the glove is asked
     calibration  path of its calibration; relative paths in a file count from that file's folder
     joints       our names of the wire's sensors, in wire order, where a build calls them otherwise than the driver
@@ -37,19 +49,36 @@ class GloveWiring(_Table, frozen=True):
 
     port: Text
     baud: Baud | Literal["auto"] = 115_200
-    mode: Literal["stream", "poll"] = "stream"
+    mode: Literal["stream", "poll", "demand"] = "stream"
     rate_hz: Annotated[float, Meta(gt=0.0, le=1000.0)] | None = None
+    filter: bool | None = None
+    record_us: Annotated[float, Meta(gt=0.0, le=1e6)] | None = None
+    mask: bool = True
     sensors: Literal[18, 22] | None = None
     calibration: Text | None = None
     joints: tuple[str, ...] = ()
 
+    @property
+    def all_sensors(self) -> int:
+        """How many sensors the glove must have: 18 where nothing says so."""
+        return len(self.joints) or self.sensors or SENSORS
+
+    @property
+    def sensor_names(self) -> tuple[str, ...]:
+        """The names of all its sensors in wire order: ours, or the driver's."""
+        return self.joints or (SENSORS_18 if self.all_sensors == SENSORS else SENSORS_22)
+
 
 class ScannerWiring(_Table, frozen=True):
-    """A switch-scanner board: key k of the board is switches[k], "" where there is none."""
+    """A switch-scanner board: key k of the board is switches[k], "" where there is none; and channel c of its converter
+    taxels[c], 16 channels on each multiplexer `mux`, where it has any.
+    """
 
     port: Text
-    switches: Annotated[tuple[str, ...], Meta(max_length=MOST_KEYS)]
+    switches: Annotated[tuple[str, ...], Meta(max_length=MOST_KEYS)] = ()
     baud: Baud = 1_000_000
+    taxels: Annotated[tuple[str, ...], Meta(max_length=MOST_CHANNELS)] = ()
+    mux: Literal["cd74hc4067"] | None = None
 
 
 class MuxChannel(_Table, frozen=True):
@@ -60,7 +89,7 @@ class MuxChannel(_Table, frozen=True):
 
 
 class ChipWiring(_Table, frozen=True):
-    """A port expander: its kind (a key of CHIPS), where it is, and the switch on each of its pins.
+    """A port expander or a converter: its kind (a key of CHIPS), where it is, and the switch or taxel on each pin.
 
     closed says at what level of its pin a switch is closed: "low" where it pulls its pin down.
     """
@@ -78,9 +107,13 @@ class ChipWiring(_Table, frozen=True):
 
     @property
     def numbered_pins(self) -> dict[int, str]:
-        """The switches by the numbers of their pins, in the order of the numbers."""
-        names = CHIPS[self.kind].pins
-        return {number: self.pins[name] for number, name in enumerate(names) if name in self.pins}
+        """The switches, or taxels, by the numbers of their pins, in the order of the numbers."""
+        return _numbered(CHIPS[self.kind].pins, self.pins)
+
+    @property
+    def measures(self) -> bool:
+        """Whether taxels hang on it, not switches."""
+        return isinstance(self.chip, Converter)
 
     @property
     def place(self) -> str:
@@ -95,6 +128,41 @@ class BusWiring(_Table, frozen=True):
     device: Text
     clock_hz: Annotated[int, Meta(ge=SLOWEST_HZ, le=1_700_000)] = 100_000
     chips: tuple[ChipWiring, ...] = field(default=(), name="chip")
+
+
+class SpiWiring(_Table, frozen=True):
+    """A converter on SPI: its device, its kind (a key of SPI_CHIPS), its clock, None: its fastest at 3.3 V; and the
+    taxel on each of its channels.
+    """
+
+    device: Text
+    kind: str
+    hz: Annotated[int, Meta(ge=SLOWEST_HZ, le=50_000_000)] | None = field(default=None, name="clock_hz")
+    pins: dict[str, str] = {}
+
+    @property
+    def chip(self) -> SpiChip:
+        """What the driver knows of such a chip."""
+        return SPI_CHIPS[self.kind]
+
+    @property
+    def clock_hz(self) -> int:
+        """SCLK."""
+        return self.hz or self.chip.clock_hz
+
+    @property
+    def numbered_pins(self) -> dict[int, str]:
+        """The taxels by the numbers of their channels, in the order of the numbers."""
+        return _numbered(self.chip.pins, self.pins)
+
+    @property
+    def place(self) -> str:
+        """How messages call it."""
+        return f"{self.kind} at {self.device}"
+
+
+def _numbered(names: Sequence[str], pins: Mapping[str, str]) -> dict[int, str]:
+    return {number: pins[name] for number, name in enumerate(names) if name in pins}
 
 
 class Debounce(_Table, frozen=True):
@@ -112,13 +180,40 @@ class Harness(_Table, frozen=True):
     cyberglove: GloveWiring | None = None
     scanners: tuple[ScannerWiring, ...] = field(default=(), name="scanner")
     buses: tuple[BusWiring, ...] = field(default=(), name="bus")
+    spi: tuple[SpiWiring, ...] = ()
     debounce: Debounce = Debounce()
+    taxel_settings: TaxelSettings = field(default=TaxelSettings(), name="taxels")
 
     @property
     def switches(self) -> tuple[str, ...]:
         """The names of all switches that are wired: the boards', then the chips', pin by pin."""
         keys = (name for scanner in self.scanners for name in scanner.switches if name)
-        return (*keys, *(name for bus in self.buses for chip in bus.chips for name in chip.numbered_pins.values()))
+        chips = (chip for bus in self.buses for chip in bus.chips if not chip.measures)
+        return (*keys, *(name for chip in chips for name in chip.numbered_pins.values()))
+
+    @property
+    def taxel_names(self) -> tuple[str, ...]:
+        """The names of all taxels that are wired: the boards', then the converters', channel by channel."""
+        boards = (name for scanner in self.scanners for name in scanner.taxels if name)
+        chips: list[ChipWiring | SpiWiring] = [chip for bus in self.buses for chip in bus.chips if chip.measures]
+        return (*boards, *(name for chip in (*chips, *self.spi) for name in chip.numbered_pins.values()))
+
+    @property
+    def on_chips(self) -> int:
+        """How many switches and taxels are wired to chips."""
+        chips: list[ChipWiring | SpiWiring] = [*(chip for bus in self.buses for chip in bus.chips), *self.spi]
+        return sum(len(chip.pins) for chip in chips)
+
+    def chip_of(self, bus: int, number: int) -> ChipWiring | SpiWiring:
+        """Return a chip as scan maps count: bus after bus, then every SPI device as a bus of one chip.
+
+        Raises IndexError if there is none.
+        """
+        return self.buses[bus].chips[number] if bus < len(self.buses) else (self.spi[bus - len(self.buses)],)[number]
+
+    def line_of(self, bus: int) -> BusWiring | SpiWiring:
+        """Return a bus, or an SPI device, as scan maps count them."""
+        return self.buses[bus] if bus < len(self.buses) else self.spi[bus - len(self.buses)]
 
     @property
     def fingerprint(self) -> str:
@@ -134,3 +229,6 @@ class Harness(_Table, frozen=True):
             yield [
                 (chip.kind, chip.address, chip.mux, chip.closed, list(chip.numbered_pins.items())) for chip in bus.chips
             ]
+        if self.spi or any(scanner.taxels for scanner in self.scanners):
+            yield [(scanner.taxels, scanner.mux) for scanner in self.scanners]
+            yield [(chip.kind, list(chip.numbered_pins.items())) for chip in self.spi]

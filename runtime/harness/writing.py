@@ -1,12 +1,19 @@
-"""A Harness as the text of a `glove.toml`."""
+"""A Harness as the text of a `glove.toml`, and a file that says what was measured."""
 
 import re
+from pathlib import Path
 
 import msgspec
 import tomli_w
 
+from ..errors import HarnessError
+from ..files import write_atomically
+from ..toml_source import read_source
+from .loading import load_harness, parse_harness
 from .wiring import Harness
 
+_GLOVE = re.compile(r"(?ms)^\[cyberglove\][^\n]*\n(?:(?!^\[).)*")
+_RECORD_US = re.compile(r"(?m)^record_us[ \t]*=[^\n]*\n?")
 _ADDRESS = re.compile(r"^address = (\d+)$", re.MULTILINE)
 
 
@@ -14,3 +21,24 @@ def harness_to_toml(harness: Harness) -> str:
     """Return the text of a file that `load_harness` reads as `harness`; addresses are written in hex."""
     # tomli_w knows no hex; it writes every key on a line of its own and no line break inside a text.
     return _ADDRESS.sub(lambda found: f"address = 0x{int(found[1]):02X}", tomli_w.dumps(msgspec.to_builtins(harness)))
+
+
+def write_record_us(path: Path, us: int) -> None:
+    """Write into a `glove.toml` what a record of its CyberGlove takes; all else in the file stays as it is.
+
+    Raises HarnessError where the table of the CyberGlove is not spelled so that a line of it can be changed.
+    """
+    text = read_source(path, HarnessError).text
+
+    def measured(table: re.Match[str]) -> str:
+        head, _, rest = _RECORD_US.sub("", table[0]).partition("\n")
+        return f"{head}\nrecord_us = {us}\n{rest}"
+
+    changed, harness = _GLOVE.sub(measured, text, count=1), load_harness(path)
+    wanted = None
+    if harness.cyberglove is not None:
+        wanted = msgspec.structs.replace(harness.cyberglove, record_us=us, calibration=None)
+    found = parse_harness(changed, path.name).cyberglove
+    if found is None or msgspec.structs.replace(found, calibration=None) != wanted:
+        raise HarnessError(f"{path} has no table [cyberglove] on lines of its own: write `record_us = {us}` there")
+    write_atomically(path, changed.encode())

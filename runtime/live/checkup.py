@@ -1,33 +1,39 @@
 """A look at every device of a harness, one after the other: is it there, and is it as fast as its wire allows?"""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
-from statistics import median
+from statistics import fmean, median, median_low, pstdev
 from time import monotonic, perf_counter
 
 import msgspec
 
 from thenar.drivers.errors import ThenarError
-from thenar.drivers.i2c.bus import Scan
 from thenar.drivers.scanner import BoardGrasp
 
-from ..harness.wiring import GloveWiring, Harness, ScannerWiring
+from ..frames import SwitchFrame
+from ..harness.wiring import GloveWiring, Harness
+from ..scanning.ports import whole_scan
 from ..scanning.scanmap import ScanMap
 from ..scanning.timing import ChipTime, glove_us, scan_us
 from ..sources.cyberglove import GloveDevice
-from ..sources.i2c import I2cDevice
+from ..sources.i2c import I2cDevice, PortLevels
 from ..sources.scanner import ScannerDevice
+from ..sources.spi import SpiConverter
+from ..taxels import Taxels, calibration_of
 
 # So much slower than its wire a device may be: computers have other things to do, too.
 SLOW = 1.5
 _SCANS = 101
 _LISTEN_S = 1.0
+# The part that a finding on the record time of all sensors is of.
+RECORD = "a record"
 
 
 class Finding(msgspec.Struct, frozen=True):
     """What was found of a device; of a bus, chip by chip and as a whole.
 
-    predicted_us  from one record or full bitmap to the next, or what the readings take, by the arithmetic of the wire
+    predicted_us  from one record or full bitmap to the next, or what the readings take, by the arithmetic of the wire,
+                  of a CyberGlove by its vendor's formula
     measured_us   the same as it was, the median; None where nothing came
     remarks       what is missing, slow or odd, in sentences
     slow          whether it takes much longer than its wire does
@@ -42,47 +48,115 @@ class Finding(msgspec.Struct, frozen=True):
     slow: bool = False
 
 
-def check_up(harness: Harness, scan: ScanMap) -> Iterator[Callable[[], tuple[Finding, ...]]]:
-    """Yield a look at each device of `harness`, of its chips at those that `scan` reads: call it, it takes a second.
+def check_up(
+    harness: Harness, scan: ScanMap, sensors: Sequence[str] = ()
+) -> Iterator[Callable[[], tuple[Finding, ...]]]:
+    """Yield a look at each device of `harness`, of its chips at those that `scan` reads, of a CyberGlove at records of
+    these sensors alone, too: call it, it takes a second or a few.
 
     None raises because a device is not there: that is a finding.
     """
     if (glove := harness.cyberglove) is not None:
-        yield lambda: (_glove(glove),)
-    for wiring in harness.scanners:
-        yield lambda wiring=wiring: (_scanner(wiring, harness),)  # type: ignore[misc]
+        yield lambda: _glove(glove, sensors)
+    for number in range(len(harness.scanners)):
+        yield lambda number=number: _scanner(harness, number)  # type: ignore[misc]
     for bus in sorted({port.bus for port in scan.ports}):
-        yield lambda bus=bus: _bus(harness, bus, scan)  # type: ignore[misc]
+        look = _bus if bus < len(harness.buses) else _spi
+        yield lambda bus=bus, look=look: look(harness, bus, scan)  # type: ignore[misc]
 
 
-def _glove(wiring: GloveWiring) -> Finding:
-    device = GloveDevice(wiring)
-    predicted = max(device.period_us if wiring.rate_hz else 0.0, glove_us(wiring, device.sensors))
+def _glove(wiring: GloveWiring, read: Sequence[str]) -> tuple[Finding, ...]:
+    """Return what the glove is and how fast as it is wired, and what a record takes at best: of all its sensors, and of
+    those that are `read`, or half of them.
+    """
+    device, predicted = GloveDevice(wiring), glove_us(wiring, wiring.all_sensors)
     try:
-        info = device.driver.open()
-        measured = _gap(lambda: device.read(_LISTEN_S))
-        remarks = (*info.notes, *_counted(device))
+        device.open()
+        measured, info = _gap(lambda: device.read(_LISTEN_S)), device.info
+        remarks = (*(() if info is None else info.notes), *_counted(device))
     except ThenarError as wrong:
-        return Finding(device.name, "", False, predicted, None, (str(wrong),))
+        return (Finding(device.name, "", False, predicted, None, (str(wrong),)),)
     finally:
         device.close()
-    return _told(Finding(device.name, info.text.strip(), True, predicted, measured, remarks))
+    found = _told(Finding(device.name, "" if info is None else info.text, True, predicted, measured, remarks))
+    some = read if 0 < len(read) < device.sensors else wiring.sensor_names[: device.sensors // 2]
+    fastest = msgspec.structs.replace(wiring, rate_hz=None, mode="stream", record_us=None)
+    return (found, _record(fastest, wiring.sensor_names), _record(fastest, some))
 
 
-def _scanner(wiring: ScannerWiring, harness: Harness) -> Finding:
-    device = ScannerDevice(wiring, harness.switches, harness.debounce)
+def _record(wiring: GloveWiring, read: Sequence[str]) -> Finding:
+    """Return what a record of these sensors takes by the vendor's formula, and as it is."""
+    device = GloveDevice(wiring)
+    device.read_only(read)
+    predicted = glove_us(wiring, len(read))
+    part = RECORD if len(read) == device.sensors else f"{RECORD} of {len(read)} sensors"
+    try:
+        device.open()
+        measured, unmasked = _gap(lambda: device.read(_LISTEN_S), fmean), device.trouble()
+    except ThenarError as wrong:
+        return Finding(device.name, part, True, predicted, None, (str(wrong),))
+    finally:
+        device.close()
+    if unmasked or measured is None:
+        return Finding(device.name, part, True, predicted, measured, (unmasked or "no record comes",))
+    said = f"{measured:.0f} us were measured, {measured / predicted:.2f} of the vendor's formula, {predicted:.0f} us"
+    return Finding(device.name, part, True, predicted, measured, (said,))
+
+
+def _scanner(harness: Harness, number: int) -> tuple[Finding, ...]:
+    device = ScannerDevice(harness, number, harness.switches, whole_scan(harness, harness.switches))
+    frames: list[SwitchFrame] = []
+
+    def read() -> SwitchFrame | None:
+        frame = device.read(_LISTEN_S)
+        frames.extend([] if frame is None else [frame])
+        return frame
+
     try:
         hello = device.driver.open()
         device.close()
         device.open()
-        measured = _gap(lambda: device.read(_LISTEN_S))
+        measured = _gap(read)
         remarks = (*_recognising(device.driver.grasp), *_counted(device))
     except ThenarError as wrong:
-        return Finding(device.name, "", False, float(device.period_us), None, (str(wrong),))
+        return (Finding(device.name, "", False, float(device.period_us), None, (str(wrong),)),)
     finally:
         device.close()
-    board = f"board {hello.board}, firmware {hello.major}.{hello.minor}.{hello.patch}, {hello.keys} keys"
-    return _told(Finding(device.name, board, True, float(device.period_us), measured, remarks))
+    analog = device.driver.analog
+    channels = f", {analog.channels} channels of {analog.bits} bits" if analog is not None else ""
+    board = f"board {hello.board}, firmware {hello.major}.{hello.minor}.{hello.patch}, {hello.keys} keys{channels}"
+    found = Finding(device.name, board, True, float(device.period_us), measured, remarks)
+    highest = None if analog is None else (1 << analog.bits) - 1
+    wired = [name for name in harness.scanners[number].taxels if name]
+    return (_told(found), *taxel_findings(device.name, wired, harness, frames, highest))
+
+
+def taxel_findings(
+    device: str, names: Sequence[str], harness: Harness, frames: Sequence[SwitchFrame], highest: int | None
+) -> Iterator[Finding]:
+    """Yield what was seen of each taxel of these names: its counts, their noise, and what is wrong with it.
+
+    Without a calibration the ends of the converter are pointed out, but are no faults.
+    """
+    places = harness.taxel_names
+    calibration = calibration_of(harness.taxel_settings)
+    for name in names:
+        read = Taxels([name], [[]], calibration, harness.taxel_settings, highest)
+        place = places.index(name)
+        codes = [frame.taxels[place] for frame in frames if frame.taxels is not None]
+        wrong = []
+        for code in codes:
+            read.read(0, [code])
+            wrong.append(read.faults[0])
+        counts = [code for code in codes if code is not None]
+        fault = max(sorted(set(wrong)), key=wrong.count) if wrong else "silent"
+        remarks: list[str] = [fault] if fault else []
+        if counts:
+            wander = max(counts) - min(counts)
+            remarks.insert(0, f"{median_low(counts)} counts, noise {pstdev(counts):.1f}, {wander} from end to end")
+            if not fault and highest is not None and median_low(counts) in (0, highest):
+                remarks.append("at the end of the converter: at rest, pressed hard, or an open wire")
+        yield Finding(device, f"taxel {name}", fault in ("", "saturated"), 0.0, None, tuple(remarks))
 
 
 def _recognising(grasp: BoardGrasp | None) -> tuple[str, ...]:
@@ -100,18 +174,47 @@ def _bus(harness: Harness, number: int, scan: ScanMap) -> tuple[Finding, ...]:
     try:
         device.open()
         found = [_chip(device, place, time) for place, time in enumerate(times.chips)]
-        whole = _duration(device.scan(None))
+        whole = _duration(device.scan(None).read)
+        frames = [device.read(_LISTEN_S) for _ in range(_SCANS)] if device.taxels else []
         way = (device.bus.trouble,) if device.bus.trouble else (f"reads {device.bus.way}",)
     except ThenarError as wrong:
         return (Finding(device.name, "", False, times.us, None, (str(wrong),)),)
     finally:
         device.close()
     there = all(finding.present for finding in found)
-    return (*found, _told(Finding(device.name, "a whole scan", there, times.us, whole if there else None, way)))
+    scanned = _told(Finding(device.name, "a whole scan", there, times.us, whole if there else None, way))
+    return (*found, scanned, *_taxels(device.name, device.taxels, harness, frames))
+
+
+def _spi(harness: Harness, bus: int, scan: ScanMap) -> tuple[Finding, ...]:
+    device = SpiConverter(harness, bus - len(harness.buses), scan)
+    ports = tuple(port for port in scan.ports if port.bus == bus)
+    (predicted,) = scan_us(msgspec.structs.replace(scan, ports=ports), harness).chips
+    try:
+        device.open()
+        measured = _duration(device.run)
+        frames = [device.read(_LISTEN_S) for _ in range(_SCANS)]
+        wrong = device.trouble()
+    except ThenarError as error:
+        return (Finding(device.name, "", False, predicted.us, None, (str(error),)),)
+    finally:
+        device.close()
+    there = not device.silent
+    remarks = (wrong,) if wrong and not there else ()
+    found = Finding(device.name, device.device.chip.name, there, predicted.us, measured if there else None, remarks)
+    return (_told(found), *_taxels(device.name, device.taxels, harness, frames))
+
+
+def _taxels(
+    device: str, taxels: Sequence[PortLevels], harness: Harness, frames: Sequence[SwitchFrame | None]
+) -> Iterator[Finding]:
+    came = [frame for frame in frames if frame is not None]
+    for taxel in taxels:
+        yield from taxel_findings(device, [taxel.name], harness, came, taxel.highest)
 
 
 def _chip(device: I2cDevice, place: int, time: ChipTime) -> Finding:
-    taken = _duration(device.scan(place))
+    taken = _duration(device.scan(place).read)
     state = device.bus.chips[place]
     if not state.present:
         return Finding(device.name, time.place, False, time.us, None, (state.last_error,))
@@ -134,22 +237,24 @@ def _told(finding: Finding) -> Finding:
 _ADVICE = "does its clock run as fast as glove.toml says, and is the computer busy?"
 
 
-def _gap(read: Callable[[], object]) -> float | None:
-    """Return the median time between two frames that come within a second, in microseconds."""
+def _gap(read: Callable[[], object], middle: Callable[[list[float]], float] = median) -> float | None:
+    """Return the median time between two frames that come within a second, in microseconds; or their mean, which frames
+    that come in bunches do not change.
+    """
     end, came = monotonic() + _LISTEN_S, list[float]()
     while monotonic() < end:
         if read() is not None:
             came.append(perf_counter())
     gaps = [later - earlier for earlier, later in pairwise(came)]
-    return 1e6 * median(gaps) if gaps else None
+    return 1e6 * middle(gaps) if gaps else None
 
 
-def _duration(scan: Scan) -> float:
+def _duration(read: Callable[[], object]) -> float:
     """Return the median time of a scan, in microseconds."""
     taken = []
     for _ in range(_SCANS):
         start = perf_counter()
-        scan.read()
+        read()
         taken.append(perf_counter() - start)
     return 1e6 * median(taken)
 

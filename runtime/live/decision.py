@@ -36,6 +36,7 @@ class Standing:
 
     Without unread switches every number here is that of the frame. With some, `margin`, `lead` and `probability` are
     the least that any state of the unread switches, closed, open or lost, would have given: the true ones are no less.
+    `Scorer.joints_bit` among them says that the joints are unread, too.
     """
 
     __slots__ = ("_rivals", "_scorer", "_unread", "candidate", "lanes")
@@ -50,6 +51,12 @@ class Standing:
     def certain(self) -> bool:
         """Whether the candidate wins whatever the unread switches are; of equal scores the lowest number wins."""
         return self._rivals.index(max(self._rivals)) == self.candidate
+
+    def leads(self, lead: int) -> bool:
+        """Return whether the candidate wins, by `lead` steps at least, whatever the unread inputs are."""
+        best = self.lanes[self.candidate]
+        rivals = ((number, rival) for number, rival in enumerate(self._rivals) if number != self.candidate)
+        return all(rival + max(lead, number < self.candidate) <= best for number, rival in rivals)
 
     @property
     def margin(self) -> int:

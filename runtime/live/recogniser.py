@@ -58,8 +58,12 @@ class LiveRecognizer:
         switch_period_us: int | None = None,
         glove_period_us: int | None = None,
         policy: Policy | None = None,
+        on_demand: bool = False,
     ) -> None:
         """Take the names of the CyberGlove's sensors in wire order, and periods; None: there is no such device.
+
+        on_demand: records come only where they are asked for (`wants_record`). Joints that nobody read are not lost
+        where the switches decide without them.
 
         Raises SettingError if the CyberGlove cannot serve the build.
         """
@@ -75,6 +79,27 @@ class LiveRecognizer:
         self._missing = MissingInputs(build, self._policy.max_lost)
         self._decider, self._lead = _decider(build, self._policy), self._policy.lead_steps(tables.scale)
         self._number = 0
+        self._alone = LiveScores(build.scorer) if on_demand else None
+
+    def wants_record(self, now_us: int, switches: SwitchFrame | None, glove: GloveFrame | None) -> bool:
+        """Return whether a record that is newer than this frame is to be asked for: the frame cannot decide without."""
+        if self._alone is None:
+            return False
+        # Where no switch is read any more, records come as often as switches would.
+        silent = switches is None or not self._all_switches & ~switches.lost
+        since_us = now_us - self._longest_us if silent or switches is None else min(switches.time_us, now_us)
+        if glove is not None and glove.time_us >= since_us:
+            return False
+        return switches is None or self._without_joints(switches) is None
+
+    def _without_joints(self, frame: SwitchFrame) -> Standing | None:
+        """Return who leads in a frame whatever the joints are, None where they matter, or may not be left unread."""
+        if self._alone is None:
+            return None
+        lost, unread = frame.lost, frame.unread & ~frame.lost
+        lanes = self._alone.lanes(frame.closed & ~unread & ~lost, lost)
+        standing = Standing(lanes, self._scorer, unread | self._scorer.joints_bit)
+        return standing if standing.leads(self._lead) else None
 
     def step(self, now_us: int, unix_us: int, switches: SwitchFrame | None, glove: GloveFrame | None) -> Moment:
         """Return what is recognised at `now_us`, given what came in since the last step (None: nothing).
@@ -91,8 +116,9 @@ class LiveRecognizer:
         if codes is not self._scored:
             self._scores.joints(codes)
             self._scored = codes
-        standing, lost = self._standing(frame)
-        missing = self._missing.of(lost, codes is None)
+        known = None if codes is not None or frame is None else self._without_joints(frame)
+        standing, lost = self._standing(frame) if known is None or frame is None else (known, frame.lost)
+        missing = self._missing.of(lost, codes is None and known is None)
         seen_us = max(newest.time_us, self._joints.newest.time_us)
         if missing.too_much:
             self._decider.forget()

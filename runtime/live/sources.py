@@ -250,12 +250,12 @@ class Arrivals:
         if time_us < 0:
             return None
         closed = lost = unread = 0
-        glove = None
+        glove, taxels = None, _joined_taxels([frame.taxels for frame in fresh if frame.taxels is not None])
         for frame in fresh:
             closed, lost, unread = closed | frame.closed, lost | frame.lost, unread | frame.unread
             if frame.unread and glove is None:
                 glove = frame.glove
-        return SwitchFrame(time_us, closed, lost | silent, unread, glove)
+        return SwitchFrame(time_us, closed, lost | silent, unread, glove, taxels)
 
     def _lose(self, now_us: int) -> None:
         """Join the parts anew, of which one may have fallen silent: that is news once."""
@@ -269,12 +269,21 @@ class Arrivals:
         self._waiting.append(frame)
 
 
+def _joined_taxels(parts: Sequence[tuple[int | None, ...]]) -> tuple[int | None, ...] | None:
+    """Return the codes that the devices read, each its own taxels; None where none read any."""
+    if len(parts) < 2:
+        return parts[0] if parts else None
+    return tuple(next((code for code in codes if code is not None), None) for codes in zip(*parts, strict=True))
+
+
 class Sources:
     """The devices of `harness`, from entering this context to leaving it.
 
     switch_names  the switches wanted, in the order of the frames' bits: a build's kept switches
     scan          which ports of the I2C expanders to read, in which order
     early         what ends scans early where one device reads all switches, given the joints' codes; None: nothing does
+    sensors       the joints' sensors that somebody has a use for; None: all, and all the time
+    on_demand     whether a record of the joints comes only when asked for (`ask`)
 
     changed       whether a device came, went or failed otherwise since somebody set this to False
 
@@ -288,12 +297,18 @@ class Sources:
         switch_names: Sequence[str],
         scan: ScanMap,
         early: tuple[ExitOf, Joints] | None = None,
+        sensors: Sequence[str] | None = None,
+        *,
+        on_demand: bool = False,
     ) -> None:
         made = [(kind, source) for kind in SOURCES.values() for source in kind.sources(harness, switch_names, scan)]
         self._devices = tuple(source for _, source in made)
         self._readers = tuple(source for kind, source in made if kind.reads == "switches")
         self._gloves = tuple(source for kind, source in made if kind.reads == "joints")
         self._arrivals = Arrivals(len(switch_names), [reader.owned for reader in self._readers])
+        if sensors is not None:
+            for glove in self._gloves:
+                glove.read_only(sensors, on_demand=on_demand)
         alone = [reader for reader in self._readers if reader.owned]
         if early is not None and len(alone) == 1:
             alone[0].end_early(*early, self._arrivals.glove)
@@ -303,6 +318,11 @@ class Sources:
             Keeper[SwitchFrame | GloveFrame](source.name, source, self._taking(source), self._change)
             for source in self._devices
         ]
+
+    def ask(self) -> None:
+        """Ask for a record of the joints now, where they come on demand."""
+        for glove in self._gloves:
+            glove.ask()
 
     def _change(self) -> None:
         self.changed = True

@@ -5,23 +5,21 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from thenar.drivers.calibration import GloveCalibration
-from thenar.drivers.cyberglove_protocol import SENSORS_18, SENSORS_22
 
 from ..build import Build
 from ..calibration import Joints, load_calibration
 from ..frames import Mask
-from ..harness.wiring import GloveWiring, Harness
+from ..harness.wiring import Harness
 from ..policy import Policy
 from ..scanning.decided import EarlyExit
 from ..scanning.plan import check_harness, plan_scan
+from ..scanning.ports import wired_names
 from ..scanning.propose import own_joints
 from ..scanning.scanmap import ScanMap
 from ..sources.base import slowest_us
-from ..sources.cyberglove import sensors_of
+from ..taxels import calibration_of, in_counts
 from .recogniser import LiveRecognizer
 from .sources import Sources
-
-_NAMES = {18: SENSORS_18, 22: SENSORS_22}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,13 +42,13 @@ class System:
         glove = harness.cyberglove
         calibration = None if glove is None or glove.calibration is None else load_calibration(Path(glove.calibration))
         # A source of one's own sends the codes of the build's joints, in their order.
-        names = sensor_names_of(glove) or tuple(joint.name for joint in build.manifest.joints)
+        names = tuple(joint.name for joint in build.manifest.joints) if glove is None else glove.sensor_names
         return cls(build, harness, cls.map_of(build, harness), names, calibration, policy or Policy())
 
     @staticmethod
     def map_of(build: Build, harness: Harness) -> ScanMap:
         """Return the build's own scan map, or one that is planned now. Raises HarnessError if the two do not fit."""
-        names = [switch.name for switch in build.manifest.switches]
+        names = wired_names(harness, build.manifest.switches)
         if build.scan is not None:
             check_harness(build.scan, harness, names)
             return build.scan
@@ -82,30 +80,45 @@ class System:
             switch_period_us=slowest_us(self.harness, self.scan, "switches"),
             glove_period_us=slowest_us(self.harness, self.scan, "joints"),
             policy=self.policy,
+            on_demand=self.on_demand,
         )
 
-    def sources(self, *, full_scan: bool = False) -> Sources:
-        """Return the devices; with `full_scan`, and for a sequential test, every scan goes to its end."""
+    @property
+    def on_demand(self) -> bool:
+        """Whether records are asked for only where the switches cannot decide: a sequential test needs them all."""
+        glove, reads = self.harness.cyberglove, self.build.tables.n_switches > 0 < self.build.tables.n_joints
+        return reads and glove is not None and glove.mode == "demand" and self.policy.error_rate is None
+
+    @property
+    def read_sensors(self) -> tuple[str, ...]:
+        """The sensors that a run reads, in wire order: those of the build's joints, or all where it has none, or where
+        the harness sets no mask.
+        """
+        glove, joints = self.harness.cyberglove, {joint.name for joint in self.build.manifest.joints}
+        some = tuple(name for name in self.sensor_names if name in joints)
+        return some if some and glove is not None and glove.mask else self.sensor_names
+
+    def sources(self, *, full_scan: bool = False, all_sensors: bool = False) -> Sources:
+        """Return the devices; with `full_scan`, and for a sequential test, every scan goes to its end; with
+        `all_sensors` the CyberGlove sends those as well that the build has no use for, whether or not they decide.
+
+        Raises SettingError if the calibration of the taxels cannot serve the build.
+        """
         early = None if full_scan or self.policy.error_rate is not None else (self.early_exit, self.joints())
-        return Sources(self.harness, self.switch_names, self.scan, early)
+        sensors = None if all_sensors else self.read_sensors
+        taxels = calibration_of(self.harness.taxel_settings)
+        scan = in_counts(self.scan, self.build.manifest.switches, taxels)
+        return Sources(self.harness, self.switch_names, scan, early, sensors, on_demand=self.on_demand)
 
     def early_exit(self, ports: Sequence[Mask]) -> EarlyExit:
         """Return what ends a scan of these ports early without changing any decision.
 
         Hand `start` the codes of the glove's record that the recogniser will be given with the scan.
         """
-        return EarlyExit(self.build.scorer, ports, lead=self.policy.lead_steps(self.build.tables.scale))
+        lead = self.policy.lead_steps(self.build.tables.scale)
+        return EarlyExit(self.build.scorer, ports, lead=lead, on_demand=self.on_demand)
 
     def joints(self) -> Joints:
         """Return what makes the build's joint codes of the CyberGlove's records."""
         period_us = slowest_us(self.harness, self.scan, "joints")
         return Joints(self.build.manifest.joints, self.sensor_names, self.calibration, period_us)
-
-
-def sensor_names_of(glove: GloveWiring | None) -> tuple[str, ...]:
-    """Return the names of a CyberGlove's sensors in wire order: as its wiring has them, or the driver's for as many as
-    it says, 18 where it says nothing.
-    """
-    if glove is None:
-        return ()
-    return glove.joints or _NAMES[sensors_of(glove)]

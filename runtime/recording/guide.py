@@ -181,11 +181,15 @@ class Guide:
 
     def _lack(self, now_us: int) -> str:
         session = self._recorder.session
-        if session.switches and (self._switches is None or now_us - self._switches.time_us > FRESH_US):
-            return "the switches are silent"
-        if session.switches and self._switches is not None and (lost := self._switches.lost | self._switches.unread):
-            names = [name for place, name in enumerate(session.switches) if lost >> place & 1]
-            return f"switches cannot be read: {list_names(names)}"
+        if session.switches or session.taxels:
+            if self._switches is None or now_us - self._switches.time_us > FRESH_US:
+                return f"the {'switches' if session.switches else 'taxels'} are silent"
+            if lost := self._switches.lost | self._switches.unread:
+                names = [name for place, name in enumerate(session.switches) if lost >> place & 1]
+                return f"switches cannot be read: {list_names(names)}"
+            codes = self._switches.taxels or (None,) * len(session.taxels)
+            if names := [name for name, code in zip(session.taxels, codes, strict=True) if code is None]:
+                return f"taxels cannot be read: {list_names(names)}"
         if session.sensors and (self._glove is None or now_us - self._glove.time_us > FRESH_US):
             return "the CyberGlove is silent"
         if self._glove is not None and not self._glove.plugged:

@@ -25,14 +25,15 @@ LARGEST_RECORD = 16 << 20
 # What the name of the program in the file's header begins with.
 WRITER = "thenar "
 
-SWITCHES, GLOVE, GRASP, RECOGNITION, TRIALS = range(1, 6)
-# Channel number: (topic, type of its messages).
+SWITCHES, GLOVE, GRASP, RECOGNITION, TRIALS, TAXELS = range(1, 7)
+# Channel number: (topic, type of its messages). That of taxels is there only where the glove has some.
 CHANNELS = {
     SWITCHES: ("/thenar/switches", BYTES),
     GLOVE: ("/thenar/glove", BYTES),
     GRASP: ("/thenar/grasp", STRING),
     RECOGNITION: ("/thenar/recognition", STRING),
     TRIALS: ("/thenar/trials", STRING),
+    TAXELS: ("/thenar/taxels", BYTES),
 }
 _SCHEMAS = {name: number for number, name in enumerate(DEFINITIONS, start=1)}
 
@@ -45,7 +46,7 @@ class Tail:
 
     size: int = 0
     crc: int = 0
-    counts: dict[int, int] = field(default_factory=lambda: dict.fromkeys(CHANNELS, 0))
+    counts: dict[int, int] = field(default_factory=lambda: dict.fromkeys(range(SWITCHES, TAXELS), 0))
     first_ns: int | None = None
     last_ns: int = 0
     sessions: list[tuple[int, int]] = field(default_factory=list)
@@ -66,9 +67,11 @@ class Tail:
         self.last_ns = max(self.last_ns, log_ns)
 
 
-def beginning(version: str) -> bytes:
-    """Return what a recording by this version of thenar begins with, up to its first session."""
-    return MAGIC + _written(Header("ros2", f"{WRITER}{version}"), *_schemas(), *_channels())
+def beginning(version: str, tail: Tail | None = None) -> bytes:
+    """Return what a recording by this version of thenar, with the channels that `tail` counts, begins with, up to its
+    first session.
+    """
+    return MAGIC + _written(Header("ros2", f"{WRITER}{version}"), *_schemas(), *_channels(tail or Tail()))
 
 
 def session_record(session: Session) -> bytes:
@@ -91,7 +94,7 @@ def ending(tail: Tail) -> bytes:
     """Return what closes a recording: the end of its data, a summary, the footer."""
     data_end = _written(DataEnd(tail.crc))
     indices = [MetadataIndex(offset, length, METADATA) for offset, length in tail.sessions]
-    summary = _written(*_schemas(), *_channels(), _statistics(tail), *indices)
+    summary = _written(*_schemas(), *_channels(tail), _statistics(tail), *indices)
     start = tail.size + len(data_end)
     # The CRC of a summary covers the footer up to the CRC itself.
     open_footer = _written(Footer(start, 0, 0))[:-4]
@@ -103,16 +106,20 @@ def _schemas() -> list[McapRecord]:
     return [Schema(_SCHEMAS[name], text.encode(), "ros2msg", name) for name, text in DEFINITIONS.items()]
 
 
-def _channels() -> list[McapRecord]:
+def _channels(tail: Tail) -> list[McapRecord]:
     # The profile demands the key; empty, a player takes its own settings.
     qos = {"offered_qos_profiles": ""}
-    return [Channel(number, topic, "cdr", qos, _SCHEMAS[name]) for number, (topic, name) in CHANNELS.items()]
+    return [
+        Channel(number, topic, "cdr", qos, _SCHEMAS[name])
+        for number, (topic, name) in CHANNELS.items()
+        if number in tail.counts
+    ]
 
 
 def _statistics(tail: Tail) -> Statistics:
     return Statistics(
         attachment_count=0,
-        channel_count=len(CHANNELS),
+        channel_count=len(tail.counts),
         channel_message_counts=tail.counts,
         chunk_count=0,
         message_count=sum(tail.counts.values()),

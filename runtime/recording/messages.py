@@ -7,7 +7,8 @@ string's counts its NUL).
 A switch's byte has bit 0 set when it is closed, bit 1 when it could not be read, bit 2 when it was left unread: 0 open,
 1 closed, 2 or more not known. Where switches were left unread because of a record of the glove, that record follows
 them: its time in microseconds of the host's monotonic clock (8 bytes, little-endian), then its bytes. The bytes of a
-glove are its sensors in wire order, then its status byte if it sends one.
+glove are its sensors in wire order, then its status byte if it sends one. The codes of taxels, two bytes each,
+little-endian, FFFF for one that was not read, stand before the switches that were read with them.
 """
 
 from collections.abc import Sequence
@@ -125,6 +126,25 @@ def glove_frame(time_us: int, data: bytes, sensors: int) -> GloveFrame:
     if len(data) - sensors not in (0, 1):
         raise McapError(f"holds {len(data)} bytes, its session names {sensors} sensors")
     return GloveFrame(time_us, data[:sensors], data[sensors] if len(data) > sensors else None)
+
+
+_NOT_READ = 0xFFFF
+
+
+def taxel_bytes(codes: Sequence[int | None], taxels: int) -> bytes:
+    """Return the codes of so many taxels. Raises FrameError if it has another number, or a code does not fit."""
+    if len(codes) != taxels:
+        raise FrameError(f"a frame of {len(codes)} taxels, {taxels} are recorded")
+    if any(code is not None and not 0 <= code < _NOT_READ for code in codes):
+        raise FrameError(f"a taxel's code lies outside 0..{_NOT_READ - 1}")
+    return Struct(f"<{taxels}H").pack(*(_NOT_READ if code is None else code for code in codes))
+
+
+def taxel_codes(data: bytes, taxels: int) -> tuple[int | None, ...]:
+    """Return the codes that `taxel_bytes` wrote. Raises McapError."""
+    if len(data) != 2 * taxels:
+        raise McapError(f"holds {len(data)} bytes, its session names {taxels} taxels")
+    return tuple(None if code == _NOT_READ else code for code in Struct(f"<{taxels}H").unpack(data))
 
 
 def switch_matrix(masks: Sequence[Mask], switches: int) -> NDArray[np.bool_]:

@@ -1,7 +1,7 @@
 """A recording read back: sessions, frames, recognitions and labels in the order in which they were written."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
 from struct import Struct, error, pack
@@ -19,8 +19,8 @@ from ..errors import McapError
 from ..frames import GloveFrame, SwitchFrame
 from ..names import SHOWN, list_names, shortened
 from ..published import LiveGrasp
-from .layout import CHANNELS, GLOVE, LARGEST_RECORD, RECOGNITION, SWITCHES, TRIALS, WRITER, Tail
-from .messages import decode_bytes, decode_text, glove_frame, switch_frame
+from .layout import CHANNELS, GLOVE, LARGEST_RECORD, RECOGNITION, SWITCHES, TAXELS, TRIALS, WRITER, Tail
+from .messages import decode_bytes, decode_text, glove_frame, switch_frame, taxel_codes
 from .records import End, RawRecord, RecordStream, inside, kind_of
 from .session import METADATA, Label, Session, from_metadata
 
@@ -72,6 +72,7 @@ class Decoder:
         self._schemas: dict[int, str] = {}
         self._channels: dict[int, int | None] = {}
         self._indexed = False
+        self._codes: tuple[int | None, tuple[int | None, ...]] = None, ()
 
     def entries(self, record: RawRecord) -> Iterator[Entry]:
         """Yield what the record holds. Raises McapError, which goes on from "the record at byte 17 "."""
@@ -126,8 +127,13 @@ class Decoder:
         self._tail.add_message(channel, logged_ns)
         data = content[_MESSAGE.size :]
         time_us = (published_ns - session.clock_ns) // 1000
+        if channel == TAXELS:
+            self._codes = time_us, taxel_codes(decode_bytes(data), len(session.taxels))
+            return None
         if channel == SWITCHES:
-            return switch_frame(time_us, decode_bytes(data), len(session.switches), len(session.sensors))
+            frame = switch_frame(time_us, decode_bytes(data), len(session.switches), len(session.sensors))
+            coded_us, codes = self._codes
+            return frame if coded_us != time_us else replace(frame, taxels=codes)
         if channel == GLOVE:
             return glove_frame(time_us, decode_bytes(data), len(session.sensors))
         return _from_json(channel, decode_text(data))
@@ -138,9 +144,11 @@ class Decoder:
             self.passed.add(f"metadata {shortened(repr(metadata.name))}", record.offset)
             return
         before, session = self.session, from_metadata(metadata.metadata)
-        if before is not None and (before.switches, before.sensors) != (session.switches, session.sensors):
-            raise McapError("begins a session of another glove than that before it: its switches or sensors differ")
-        self.session = session
+        if before is not None and _wired(before) != _wired(session):
+            raise McapError(
+                "begins a session of another glove than that before it: its switches, taxels or sensors differ"
+            )
+        self.session, self._codes = session, (None, ())
         self._tail.add_session(record.end - record.offset)
         yield self.session
 
@@ -168,6 +176,10 @@ class Decoder:
         for record in inside(chunk.data, offset):
             yield from self.entries(record)
         self._indexed = True
+
+
+def _wired(session: Session) -> tuple[tuple[str, ...], ...]:
+    return session.switches, session.taxels, session.sensors
 
 
 class _Whole(ReadDataStream):

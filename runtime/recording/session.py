@@ -15,6 +15,7 @@ from thenar.drivers.calibration import GloveCalibration
 from ..errors import McapError
 from ..names import fault, shortened
 from ..policy import Policy
+from ..taxels import TaxelCalibration
 
 METADATA = "thenar"
 VERSION = 1
@@ -75,6 +76,8 @@ class Session(msgspec.Struct, frozen=True, kw_only=True):
     calibration  of the CyberGlove, if one was given
     policy       how grasps were decided on; None: by none, or by an early version that did not say
     collection   what was collected; None: an unlabelled run
+    taxels       names of the taxels, in the order of the frames' codes
+    taxel_calibration  of the taxels, if one was given
     clock_ns     nanoseconds since 1970 at which the monotonic clock of this session's frames was 0
     """
 
@@ -87,14 +90,19 @@ class Session(msgspec.Struct, frozen=True, kw_only=True):
     policy: Policy | None = None
     collection: Collection | None = None
     clock_ns: Number = 0
+    taxels: Annotated[tuple[str, ...], msgspec.Meta(max_length=_MOST_SWITCHES)] = ()
+    taxel_calibration: TaxelCalibration | None = None
 
 
 _FIELDS = fields(Session)
+# Written only where there are any: a glove without taxels is recorded as it ever was.
+_OF_TAXELS = ("taxels", "taxel_calibration")
 
 
 def to_metadata(session: Session) -> dict[str, str]:
     """Return `session` as the keys and texts of a Metadata record."""
-    texts = {field.name: _text(getattr(session, field.name)) for field in _FIELDS}
+    written = [field.name for field in _FIELDS if session.taxels or field.name not in _OF_TAXELS]
+    texts = {name: _text(getattr(session, name)) for name in written}
     return {"version": str(VERSION), **texts}
 
 
@@ -115,7 +123,7 @@ def from_metadata(texts: dict[str, str]) -> Session:
 
 
 def _check_names(session: Session) -> None:
-    names = {*session.switches, *session.sensors}
+    names = {*session.switches, *session.sensors, *session.taxels}
     if (collected := session.collection) is not None:
         names |= {collected.subject, collected.taxonomy, *collected.types}
         names |= {name for task in collected.tasks for name in (task.grasp, *task.objects)}

@@ -16,8 +16,8 @@ from thenar.drivers.errors import SettingError
 from ..files import write_atomically
 from ..frames import GloveFrame, SwitchFrame
 from ..published import LiveGrasp
-from .layout import GLOVE, GRASP, RECOGNITION, SWITCHES, TRIALS, Tail, beginning, ending, session_record
-from .messages import encode_bytes, encode_text, glove_bytes, switch_bytes
+from .layout import GLOVE, GRASP, RECOGNITION, SWITCHES, TAXELS, TRIALS, Tail, beginning, ending, session_record
+from .messages import encode_bytes, encode_text, glove_bytes, switch_bytes, taxel_bytes
 from .session import Label, Session
 
 SYNC_S = 1.0
@@ -124,7 +124,9 @@ class Recorder:
         if tail is not None and self._append(record := session_record(self.session)):
             self._tail.add_session(len(record))
         self._grasp = ""
-        self._switches, self._sensors = len(session.switches), len(session.sensors)
+        self._switches, self._sensors, self._taxels = len(session.switches), len(session.sensors), len(session.taxels)
+        if session.taxels:
+            self._tail.counts.setdefault(TAXELS, 0)
 
     @property
     def failure(self) -> str | None:
@@ -137,7 +139,11 @@ class Recorder:
         return sum(self._tail.counts.values())
 
     def switches(self, frame: SwitchFrame) -> None:
-        """Record a reading of the switches. Raises FrameError if it is not of this session's switches."""
+        """Record a reading of the switches, and the taxels' codes before it. Raises FrameError if it is of others than
+        this session's.
+        """
+        if frame.taxels is not None:
+            self._message(TAXELS, frame.time_us, encode_bytes(taxel_bytes(frame.taxels, self._taxels)))
         self._message(SWITCHES, frame.time_us, encode_bytes(switch_bytes(frame, self._switches, self._sensors)))
 
     def glove(self, frame: GloveFrame) -> None:
@@ -188,10 +194,12 @@ def _begun(path: Path, session: Session) -> Tail:
     """Make the file, its first session in it, and return its tail."""
     if path.exists():
         raise SettingError(f"{path} exists, and a recording is never written over: name another file")
-    first, record = beginning(session.thenar), session_record(session)
+    tail = Tail()
+    if session.taxels:
+        tail.counts[TAXELS] = 0
+    first, record = beginning(session.thenar, tail), session_record(session)
     # Whole or not at all, so that there is no file without a session.
     write_atomically(path, first + record, mode=_PRIVATE)
-    tail = Tail()
     tail.add_bytes(first + record)
     tail.add_session(len(record))
     return tail

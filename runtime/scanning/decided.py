@@ -17,7 +17,7 @@ from thenar.drivers.errors import SettingError
 
 from ..errors import FrameError
 from ..frames import Mask
-from ..scores import LiveScores, Scorer, reaches
+from ..scores import LiveScores, Scorer, joint_reaches, reaches
 from ..tables import IntegerTables
 
 _KEPT = 1 << 16
@@ -28,15 +28,19 @@ class EarlyExit:
 
     groups are the switches of each port, in the order in which ports are read; no switch may be in two of them. With a
     `lead` in steps, the scan goes on until the leader is sure to lead everybody by so much: a decision that asks for
-    such a lead (`Policy.lead`) is then the same as after the whole scan.
+    such a lead (`Policy.lead`) is then the same as after the whole scan. `on_demand`: the joints are read after the
+    switches, and only where these do not decide; until then nothing is known of them.
     """
 
-    def __init__(self, scorer: Scorer, groups: Sequence[Mask], *, lead: int = 0) -> None:
+    def __init__(self, scorer: Scorer, groups: Sequence[Mask], *, lead: int = 0, on_demand: bool = False) -> None:
         """Raise SettingError if a switch is in two groups or is none of the build's."""
         tables = scorer.tables
         self._groups = tuple(groups)
         self._later = _later(self._groups, tables.n_switches)
-        self._lead = lead
+        self._lead, self.on_demand = lead, on_demand
+        if on_demand:
+            self._later = [later | scorer.joints_bit for later in self._later]
+        self._all: Mask = (1 << tables.n_switches) - 1
         self._scores = LiveScores(scorer)
         self._reach = scorer.reach
         self._hurdles = lru_cache(maxsize=_KEPT // tables.n_classes)(self._hurdles_of)
@@ -45,18 +49,18 @@ class EarlyExit:
         self._lost: Mask = 0
 
     def start(self, codes: Sequence[int] | None, closed: Mask = 0, lost: Mask | None = None) -> None:
-        """Begin a scan: the joints' codes (None: lost), and what is known of switches that are of no port.
+        """Begin a scan: the joints' codes (None: lost; on demand: whatever), and what is known of switches of no port.
 
         With lost=None all of those are lost. Raises FrameError.
         """
         self._closed = closed & self._elsewhere
         self._lost = self._elsewhere if lost is None else lost & self._elsewhere
-        self._scores.joints(codes)
+        self._scores.joints(None if self.on_demand else codes)
 
     def after(self, port: int, closed: Mask, lost: Mask = 0) -> bool:
         """Take what port number `port` read, of its own switches; return whether the ports after it can be left out.
 
-        Ports come in order. After the last, with no `lead`, the answer is always yes.
+        Ports come in order. After the last, with no `lead`, the answer is always yes, if the joints are known.
         """
         group = self._groups[port]
         self._closed |= closed & group
@@ -68,7 +72,7 @@ class EarlyExit:
 
     def unread(self, port: int) -> Mask:
         """Return the switches of the ports after number `port`."""
-        return self._later[port]
+        return self._later[port] & self._all
 
     def _hurdles_of(self, port: int, leader: int) -> tuple[int, ...]:
         """Return what, added to a class's score, must not exceed the leader's: (K,), 0 for the leader itself."""
@@ -95,7 +99,10 @@ Ints = NDArray[np.int32]
 
 
 class Decided:
-    """Recorded frames under a set of ports. A set of ports is an integer: bit p is port p."""
+    """Recorded frames under a set of ports. A set of ports is an integer: bit p is port p.
+
+    on_demand: the joints are not known from the start. They are one more port, behind the last.
+    """
 
     def __init__(
         self,
@@ -103,6 +110,8 @@ class Decided:
         ports: Sequence[Sequence[int]],
         bits: NDArray[np.bool_],
         codes: NDArray[np.uint16],
+        *,
+        on_demand: bool = False,
     ) -> None:
         """Take the build's switches on each port, and the frames: bits (n, s) and codes (n, j).
 
@@ -117,9 +126,17 @@ class Decided:
         known = sorted(set(range(tables.n_switches)).difference(*ports))
         self._frames = len(bits)
         # No partial sum leaves int16 (IntegerTables), so nothing overflows here.
-        self._base = tables.joint_sums(codes) + bits[:, known].astype(np.int32) @ rows[known]
+        joints = tables.joint_sums(codes)
+        self._base = joints + bits[:, known].astype(np.int32) @ rows[known]
         self._shares = [bits[:, list(port)].astype(np.int32) @ rows[list(port)] for port in ports]
         self._reaches = [_reaches(tables, port) for port in ports]
+        if on_demand:
+            # As if they were lost; reading them adds the rest.
+            share = joints - tables.jointless.astype(np.int32)
+            self._base -= share
+            self._shares.append(share)
+            every = range(tables.n_classes)
+            self._reaches.append(np.array([joint_reaches(tables, leader) for leader in every], np.int32))
         self._counts: dict[int, int] = {}
 
     def __len__(self) -> int:

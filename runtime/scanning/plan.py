@@ -5,7 +5,7 @@ expected cost. A unit is a port, or units in a row that nothing else may come be
 nanoseconds, so that sums have no order; the cost of an order is the sum over its ports.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from typing import Union
 
@@ -20,7 +20,7 @@ from ..tables import IntegerTables
 from .decided import Decided, reach_of
 from .ports import whole_scan
 from .scanmap import Port, ScanMap
-from .timing import port_us, reading_of, select_us, selections
+from .timing import mux_of, port_us, reading_of, select_us, selections, waiting_us
 
 # Up to so many ports every order counts (2^n sets of ports); above, a good one is looked for.
 EXACT = 10
@@ -105,35 +105,56 @@ class Costs:
     """The costs of `ports`, by their numbers.
 
     units are all of them as nested tuples: what is behind one channel stays together, and where a bus has more muxes
-    than one, what is behind one mux.
+    than one, what is behind one mux. A bus with conversions that need time takes as long as its wire, or as the chip
+    whose conversions together take longest: they go on while the bus reads other ports.
     """
 
     def __init__(self, ports: Sequence[Port], harness: Harness) -> None:
         self._ns, rooms = list[int](), set(selections(ports, harness))
         opened: dict[_Room, tuple[int, int]] = {}
         nested: dict[_Room, dict[_Room, list[int]]] = {}
+        chips: dict[tuple[int, int], int] = {}
+        self._waits: list[int] = []
         for number, port in enumerate(ports):
-            bus = harness.buses[port.bus]
-            mux = bus.chips[port.chip].mux
+            clock_hz, reading = harness.line_of(port.bus).clock_hz, reading_of(port, harness)
+            mux = mux_of(port, harness)
             channel = (port.bus, mux.address, mux.channel) if mux else ()
             way: list[_Room] = [room for room in (channel[:2], channel) if room in rooms]
             for room in way:
-                opened[room] = (opened.get(room, (0, 0))[0] | 1 << number, round(1000 * select_us(bus.clock_hz)))
+                opened[room] = (opened.get(room, (0, 0))[0] | 1 << number, round(1000 * select_us(clock_hz)))
             outer, inner = (way[0], way[-1]) if way else ((number,), (number,))
             nested.setdefault(outer, {}).setdefault(inner, []).append(number)
-            self._ns.append(round(1000 * port_us(reading_of(port, harness), bus.clock_hz)))
+            self._ns.append(round(1000 * port_us(reading, clock_hz)))
+            self._waits.append(round(1000 * waiting_us(reading)))
+            chips[port.bus, port.chip] = chips.get((port.bus, port.chip), 0) | 1 << number
         self._rooms = tuple(opened.values())
         self.units: tuple[Unit, ...] = tuple(tuple(map(tuple, inside.values())) for inside in nested.values())
+        self._slow: list[tuple[int, tuple[int, ...]]] = []  # of each bus where something waits: its ports, chip by chip
+        for bus in dict.fromkeys(bus for bus, _ in chips):
+            mine = tuple(mask for (on, _), mask in chips.items() if on == bus)
+            if any(self._waits[port] for port in range(len(ports)) if sum(mine) >> port & 1):
+                self._slow.append((sum(mine), mine))
 
     def after(self, read: int, port: int) -> int:
         """Return what reading `port` takes after the ports `read`: the first behind a channel needs it selected."""
+        for every, chips in self._slow:
+            if every >> port & 1:
+                return self._elapsed((read | 1 << port) & every, chips) - self._elapsed(read & every, chips)
         return self._ns[port] + sum(ns for room, ns in self._rooms if room >> port & 1 and not read & room)
+
+    def _elapsed(self, read: int, chips: Sequence[int]) -> int:
+        """Return what a bus with these chips takes for the ports `read`, all of them its own."""
+        wire = sum(self._ns[port] for port in _numbers(read)) + sum(ns for room, ns in self._rooms if room & read)
+        slowest = max(sum(self._ns[port] + self._waits[port] for port in _numbers(read & chip)) for chip in chips)
+        return max(wire, slowest)
 
     def of(self, unit: Unit) -> int:
         """Return what reading a unit takes, with the selections that it alone needs."""
         ports = ports_in(unit)
         inside = sum(1 << port for port in ports)
-        return sum(self._ns[port] for port in ports) + sum(ns for room, ns in self._rooms if not room & ~inside)
+        # Conversions count as if nothing were read meanwhile.
+        own = sum(self._ns[port] + self._waits[port] for port in ports)
+        return own + sum(ns for room, ns in self._rooms if not room & ~inside)
 
     def expected(self, frames: Decided) -> Cost:
         """Return the time that reading a port takes over all `frames` that are not decided before.
@@ -145,6 +166,10 @@ class Costs:
             return self.after(read, port) * (frames.undecided(read) if read else len(frames))
 
         return cost
+
+
+def _numbers(ports: int) -> Iterator[int]:
+    return (port for port in range(ports.bit_length()) if ports >> port & 1)
 
 
 # Of more recorded frames than this, evenly spaced ones decide on the order.
@@ -165,15 +190,13 @@ def plan_scan(
     least wire time until a scan may stop, on average over them (exactly up to order.EXACT ports). Without frames, what
     can change scores most per microsecond comes first. Raises HarnessError if a switch is wired to nothing.
     """
-    wired = set(harness.switches)
-    lacking = [name for name in switch_names if name not in wired]
-    if lacking:
+    if lacking := unwired(harness, switch_names):
         raise HarnessError(
             f"harness {harness.name!r} has no pin or key for {list_names(lacking)}, which the build keeps: "
             "add what is missing to its file, or let --propose write one"
         )
     scan = whole_scan(harness, switch_names)
-    ports = [[switch for _, switch in port.switches] for port in scan.ports]
+    ports = [port.elements for port in scan.ports]
     costs = Costs(scan.ports, harness)
     if bits is None or not len(bits):
         order = _by_reach(costs.units, [reach_of(tables, port) for port in ports], costs)
@@ -201,13 +224,12 @@ def check_harness(scan: ScanMap, harness: Harness, switch_names: Sequence[str]) 
         for port in wired.ports
         for pin, switch in _pins(port, harness)
     }
-    right = scan.scanners == wired.scanners and all(
-        0 <= port.bus < len(harness.buses)
-        and port.chip < len(harness.buses[port.bus].chips)
-        and _pins(port, harness)
-        and all(
-            where.get((port.bus, port.chip, pin)) == (switch, port.closed_high) for pin, switch in _pins(port, harness)
-        )
+    conversions = {(port.bus, port.chip, port.reading): port for port in wired.ports if port.levels}
+    right = (scan.scanners, scan.taxels) == (wired.scanners, wired.taxels) and all(
+        conversions.get((port.bus, port.chip, port.reading)) == port
+        if port.levels
+        else bool(pins := _pins(port, harness))
+        and all(where.get((port.bus, port.chip, pin)) == (switch, port.closed_high) for pin, switch in pins)
         for port in scan.ports
     )
     if not right:
@@ -217,10 +239,18 @@ def check_harness(scan: ScanMap, harness: Harness, switch_names: Sequence[str]) 
         )
 
 
+def unwired(harness: Harness, switch_names: Sequence[str]) -> list[str]:
+    """Return which of these names hang on nothing: neither switches nor levels of taxels of the harness."""
+    read = set(whole_scan(harness, switch_names).switches)
+    return [name for number, name in enumerate(switch_names) if number not in read]
+
+
 def _pins(port: Port, harness: Harness) -> list[tuple[int, int]]:
     """Return the pins that a port's bits show, each with its switch; nothing if there is no such reading or bit."""
-    readings = harness.buses[port.bus].chips[port.chip].chip.readings
-    pins = next((reading.pins for reading in readings if reading.name == port.reading), ())
+    try:
+        pins = reading_of(port, harness).pins
+    except LookupError:
+        return []
     return [] if any(bit >= len(pins) for bit, _ in port.switches) else [(pins[bit], n) for bit, n in port.switches]
 
 

@@ -5,8 +5,40 @@ from itertools import combinations
 
 from thenar.drivers.i2c.chips import Chip, Reading
 
-from ..harness.wiring import ChipWiring, Harness
-from .scanmap import SCHEMA, Pair, Port, ScanMap
+from ..harness.wiring import ChipWiring, Harness, ScannerWiring, SpiWiring
+from ..manifest import Switch
+from ..names import level_name, taxel_and_code
+from .scanmap import SCHEMA, BoardLevel, Pair, Port, ScanMap
+
+# Of each taxel its levels: (code, number of the switch) pairs, ascending.
+Levels = Mapping[str, tuple[Pair, ...]]
+
+
+def wired_names(harness: Harness, switches: Sequence[Switch]) -> list[str]:
+    """Return the names under which a harness has a build's switches: of a level "pad3>57", whatever an older build
+    calls it, unless a comparator's pin has its name.
+    """
+    pins = set(harness.switches)
+    return [
+        switch.name
+        if switch.threshold is None or switch.name in pins
+        else level_name(switch.threshold.taxel.name, switch.threshold.code)
+        for switch in switches
+    ]
+
+
+def levels_of(harness: Harness, switch_names: Sequence[str]) -> Levels:
+    """Return which of these names are levels of taxels of the harness; a taxel's own name is its level above 0.
+
+    A name of a switch is none, whatever it looks like.
+    """
+    taxels, pins = set(harness.taxel_names), set(harness.switches)
+    found: dict[str, list[Pair]] = {}
+    for number, name in enumerate(switch_names):
+        taxel, code = (name, 0) if name in taxels else taxel_and_code(name) or ("", 0)
+        if taxel in taxels and name not in pins:
+            found.setdefault(taxel, []).append((code, number))
+    return {taxel: tuple(sorted(levels)) for taxel, levels in found.items()}
 
 
 def cover(chip: Chip, pins: Collection[int]) -> tuple[Reading, ...]:
@@ -23,14 +55,23 @@ def cover(chip: Chip, pins: Collection[int]) -> tuple[Reading, ...]:
     raise ValueError(f"a {chip.name} has no readings of its pins {sorted(wanted - _shown(chip.readings))}")
 
 
-def ports_of(harness: Harness, numbers: Mapping[str, int]) -> tuple[Port, ...]:
-    """Return the fewest ports whose answers hold all switches of `numbers` that hang on chips, chip by chip."""
-    return tuple(
+def ports_of(harness: Harness, numbers: Mapping[str, int], levels: Levels | None = None) -> tuple[Port, ...]:
+    """Return the fewest ports whose answers hold all switches of `numbers` that hang on chips, chip by chip, and the
+    conversions of all taxels of `levels`.
+    """
+    found = levels or {}
+    expanders = (
         port
         for bus, wiring in enumerate(harness.buses)
         for chip, wired in enumerate(wiring.chips)
-        for port in _ports(bus, chip, wired, numbers)
+        for port in (_conversions(bus, chip, wired, found) if wired.measures else _ports(bus, chip, wired, numbers))
     )
+    spi = (
+        port
+        for bus, device in enumerate(harness.spi, start=len(harness.buses))
+        for port in _conversions(bus, 0, device, found)
+    )
+    return (*expanders, *spi)
 
 
 def _ports(bus: int, number: int, wired: ChipWiring, numbers: Mapping[str, int]) -> list[Port]:
@@ -42,18 +83,42 @@ def _ports(bus: int, number: int, wired: ChipWiring, numbers: Mapping[str, int])
     return ports
 
 
+def _conversions(bus: int, number: int, wired: ChipWiring | SpiWiring, levels: Levels) -> list[Port]:
+    """Return a port for each taxel that has levels, of which there may be none: all levels of it are one conversion."""
+    readings = wired.chip.readings
+    return [
+        Port(bus, number, readings[channel].name, (), True, levels[taxel])
+        for channel, taxel in wired.numbered_pins.items()
+        if taxel in levels
+    ]
+
+
 def _shown(readings: Collection[Reading]) -> set[int]:
     return {pin for reading in readings for pin in reading.pins}
 
 
-def whole_scan(harness: Harness, switch_names: Sequence[str]) -> ScanMap:
-    """Return the map that reads the switches of these names, chip by chip with the fewest transactions.
+def whole_scan(harness: Harness, switch_names: Sequence[str], *, every_taxel: bool = False) -> ScanMap:
+    """Return the map that reads the switches and levels of these names, chip by chip with the fewest transactions.
 
-    Names that are wired to nothing are read by nobody.
+    Names that are wired to nothing are read by nobody. With `every_taxel`, taxels without levels are converted too: to
+    record their codes, not for a build.
     """
-    numbers = {name: number for number, name in enumerate(switch_names)}
+    levels = levels_of(harness, switch_names)
+    on_taxels = {number for pairs in levels.values() for _, number in pairs}
+    numbers = {name: number for number, name in enumerate(switch_names) if number not in on_taxels}
     scanners = tuple(
         tuple((key, numbers[name]) for key, name in enumerate(scanner.switches) if name in numbers)
         for scanner in harness.scanners
     )
-    return ScanMap(SCHEMA, harness.fingerprint, ports_of(harness, numbers), scanners)
+    boards = tuple(_board_levels(scanner, levels) for scanner in harness.scanners)
+    converted = {taxel: levels.get(taxel, ()) for taxel in harness.taxel_names} if every_taxel else levels
+    ports = ports_of(harness, numbers, converted)
+    return ScanMap(SCHEMA, harness.fingerprint, ports, scanners, boards if any(boards) else ())
+
+
+def _board_levels(scanner: ScannerWiring, levels: Levels) -> tuple[BoardLevel, ...]:
+    return tuple(
+        (channel, code, number)
+        for channel, taxel in enumerate(scanner.taxels)
+        for code, number in levels.get(taxel, ())
+    )

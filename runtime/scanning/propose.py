@@ -2,45 +2,77 @@
 
 from collections.abc import Iterator, Sequence
 from itertools import islice
+from typing import Literal
 
 from thenar.drivers.cyberglove_protocol import SENSORS, sensors_with
 from thenar.drivers.i2c import tca9548a
-from thenar.drivers.i2c.chips import CHIPS, Chip
+from thenar.drivers.i2c.chips import CHIPS, Chip, Converter, expanders
 
 from ..errors import HarnessError
-from ..harness.wiring import MOST_KEYS, BusWiring, ChipWiring, GloveWiring, Harness, MuxChannel, ScannerWiring
-from ..names import list_names, nearest
+from ..harness.wiring import (
+    MOST_CHANNELS,
+    MOST_KEYS,
+    BusWiring,
+    ChipWiring,
+    GloveWiring,
+    Harness,
+    MuxChannel,
+    ScannerWiring,
+)
+from ..names import list_names, nearest, taxel_and_code
 
 # What every board's I2C does, and most chips; slower where the chip is.
 CLOCK_HZ = 400_000
+# What reads taxels: the most channels on a bus, converted within the transfer that reads them.
+CONVERTER = "ads7828"
+# A board's converter has no more channels by itself; CD74HC4067 multiply them.
+_BOARD_CHANNELS = 8
 
 
 def propose_harness(
     switch_names: Sequence[str],
     kind: str = "mcp23017",
     *,
+    taxels: Sequence[str] = (),
     name: str = "proposed",
     device: str = "/dev/i2c-1",
     cyberglove: GloveWiring | None = None,
 ) -> Harness:
-    """Return a harness with all the switches on chips of one kind on one bus, the first names on the first chips.
+    """Return a harness with all the switches on chips of one kind on one bus, the first names on the first chips; and
+    `taxels`, and those whose levels are among the names, on converters.
 
     Each chip is read in one transaction, as few as the kind allows, and of as few the shortest on the wire. Chips
     beyond the kind's addresses go behind a TCA9548A, those that come first stay before it. Raises HarnessError if there
     is no such kind, or no room for so many switches.
     """
-    if kind not in CHIPS:
-        raise HarnessError(f"there is no chip {kind!r}{nearest(kind, list(CHIPS))}")
-    chip = CHIPS[kind]
-    inputs = _inputs(chip)
-    left = iter(switch_names)
-    # Pins are taken in their order, so that the last chip's are on as few ports as will do.
-    chips = tuple(
-        ChipWiring(kind=kind, address=address, mux=mux, pins=dict(zip(inputs, islice(left, len(inputs)), strict=False)))
-        for address, mux in _places(chip, -(-len(switch_names) // len(inputs)))
+    if kind not in expanders():
+        raise HarnessError(f"there is no chip {kind!r}{nearest(kind, list(expanders()))}")
+    switches, measured = _parted(switch_names, taxels)
+    chips = (*_hung(kind, switches), *_hung(CONVERTER, measured))
+    clock_hz = min([CLOCK_HZ, *(each.chip.clock_hz for each in chips)])
+    return Harness(
+        name=name,
+        cyberglove=cyberglove,
+        buses=(BusWiring(device=device, clock_hz=clock_hz, chips=chips),) if chips else (),
     )
-    bus = BusWiring(device=device, clock_hz=min(CLOCK_HZ, chip.clock_hz), chips=chips)
-    return Harness(name=name, cyberglove=cyberglove, buses=(bus,) if chips else ())
+
+
+def _parted(names: Sequence[str], taxels: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return the switches, and the taxels, levels of which may be among the names."""
+    levels = {name: level[0] for name in names if (level := taxel_and_code(name))}
+    return [name for name in names if name not in levels], list(dict.fromkeys((*levels.values(), *taxels)))
+
+
+def _hung(kind: str, names: Sequence[str]) -> tuple[ChipWiring, ...]:
+    """Return the chips of a kind with all the names; pins are taken in their order, so that the last chip's are on as
+    few ports as will do.
+    """
+    chip = CHIPS[kind]
+    inputs, left = _inputs(chip), iter(names)
+    return tuple(
+        ChipWiring(kind=kind, address=address, mux=mux, pins=dict(zip(inputs, islice(left, len(inputs)), strict=False)))
+        for address, mux in _places(chip, -(-len(names) // len(inputs)))
+    )
 
 
 def propose_board(
@@ -50,15 +82,18 @@ def propose_board(
     port: str = "/dev/ttyACM0",
     cyberglove: GloveWiring | None = None,
 ) -> Harness:
-    """Return a harness with all the switches on one scanner board, a key each, in their order.
+    """Return a harness with all the switches on one scanner board, a key each, in their order, and the taxels whose
+    levels are among the names on its converter.
 
-    Raises HarnessError if no board has so many keys.
+    Raises HarnessError if no board has so many keys or channels.
     """
-    if len(switch_names) > MOST_KEYS:
-        raise HarnessError(
-            f"{len(switch_names)} switches, one board has {MOST_KEYS} keys: share them between boards by hand"
-        )
-    board = ScannerWiring(port=port, switches=tuple(switch_names))
+    switches, taxels = _parted(switch_names, ())
+    kinds = (("switches", switches, MOST_KEYS, "keys"), ("taxels", taxels, MOST_CHANNELS, "channels"))
+    for what, names, most, places in kinds:
+        if len(names) > most:
+            raise HarnessError(f"{len(names)} {what}, one board has {most} {places}: share them between boards by hand")
+    mux: Literal["cd74hc4067"] | None = "cd74hc4067" if len(taxels) > _BOARD_CHANNELS else None
+    board = ScannerWiring(port=port, switches=tuple(switches), taxels=tuple(taxels), mux=mux)
     return Harness(name=name, cyberglove=cyberglove, scanners=(board,) if switch_names else ())
 
 
@@ -82,6 +117,8 @@ def own_joints(joints: Sequence[str]) -> str:
 
 def _inputs(chip: Chip) -> list[str]:
     """Return the names of the pins that one transaction can show and that may be inputs."""
+    if isinstance(chip, Converter):
+        return list(chip.pins)
     whole = max(chip.readings, key=lambda reading: reading.length)
     return [name for name in (chip.pins[pin] for pin in whole.pins if pin >= 0) if name not in chip.not_inputs]
 

@@ -18,38 +18,50 @@ MAX_BYTES = 4 << 20
 Number = Annotated[int, Meta(ge=0, le=65535)]
 # A bit of an answer, or a key of a board, and the number of the build's switch that it shows.
 Pair = tuple[Number, Number]
+# A channel of a board's converter, the code above which a level is closed, and the number of the build's switch.
+BoardLevel = tuple[Number, Number, Number]
 
 
-class Port(Struct, frozen=True, forbid_unknown_fields=True):
-    """One transaction: the reading of this name of chip `chip` of bus `bus`.
+class Port(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """One transaction: the reading of this name of chip `chip` of bus `bus`, the I2C buses first, then SPI devices.
 
     switches holds (bit of the answer, number of the build's switch) pairs; closed_high says that a bit of 1 is a closed
-    switch, as against one of 0.
+    switch, as against one of 0. A conversion, which reads one taxel, has `levels` in their place: (code, number of the
+    build's switch) pairs, closed above the code, codes ascending.
     """
 
     bus: Number
     chip: Number
     reading: Annotated[str, Meta(min_length=1)]
-    switches: Annotated[tuple[Pair, ...], Meta(min_length=1)]
+    switches: tuple[Pair, ...]
     closed_high: bool
+    levels: tuple[Pair, ...] = ()
+
+    @property
+    def elements(self) -> tuple[int, ...]:
+        """The numbers of the build's switches that it shows, levels included."""
+        return tuple(number for _, number in (*self.switches, *self.levels))
 
 
-class ScanMap(Struct, frozen=True, forbid_unknown_fields=True):
+class ScanMap(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """What to read of a glove, ports in the order in which to read them.
 
-    scanners holds, for every board of the harness, (key, number of the build's switch) pairs.
+    scanners holds, for every board of the harness, (key, number of the build's switch) pairs; taxels, where a board
+    measures levels, for every board its levels.
     """
 
     schema: int
     harness: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
     ports: tuple[Port, ...]
     scanners: tuple[tuple[Pair, ...], ...]
+    taxels: tuple[tuple[BoardLevel, ...], ...] = ()
 
     @property
     def switches(self) -> tuple[int, ...]:
         """The numbers of the build's switches that are read: the boards' first, then port by port."""
-        sources = (*self.scanners, *(port.switches for port in self.ports))
-        return tuple(switch for pairs in sources for _, switch in pairs)
+        keys = (switch for pairs in self.scanners for _, switch in pairs)
+        levels = (switch for board in self.taxels for *_, switch in board)
+        return (*keys, *levels, *(switch for port in self.ports for switch in port.elements))
 
 
 def scanmap_to_bytes(scan: ScanMap) -> bytes:
@@ -79,10 +91,18 @@ def _check_once(scan: ScanMap, what: str) -> None:
     for port in scan.ports:
         if reason := fault(port.reading):
             raise BuildError(f"{what}: the reading {shortened(repr(port.reading))} {reason}: compile the build again")
+        if bool(port.switches) == bool(port.levels):
+            raise BuildError(f"{what} has a port without switches, or with levels too: compile the build again")
+    if scan.taxels and (len(scan.taxels) != len(scan.scanners) or not any(scan.taxels)):
+        raise BuildError(f"{what} has taxels of other boards than it reads: compile the build again")
     readings = [(port.bus, port.chip, port.reading) for port in scan.ports]
     if len(set(readings)) < len(readings):
         raise BuildError(f"{what} reads a port twice: compile the build again")
-    sources = (*scan.scanners, *(port.switches for port in scan.ports))
-    for numbers in (scan.switches, *(tuple(bit for bit, _ in pairs) for pairs in sources)):
+    sources = (*scan.scanners, *(pairs for port in scan.ports for pairs in (port.switches, port.levels)))
+    levels = [[(channel, code) for channel, code, _ in board] for board in scan.taxels]
+    for numbers in (scan.switches, *([bit for bit, _ in pairs] for pairs in sources), *levels):
         if len(set(numbers)) < len(numbers):
             raise BuildError(f"{what} reads a bit or a switch twice: compile the build again")
+    for ascending in (*(port.levels for port in scan.ports), *scan.taxels):
+        if list(ascending) != sorted(ascending):
+            raise BuildError(f"{what} has levels out of order: compile the build again")

@@ -3,30 +3,36 @@
 A transaction takes its SCL periods and the time for which the bus must be free before the next START, which the
 standard gives by speed: 4.7, 1.3 and 0.5 us up to 100 kHz, 400 kHz and above. Each transaction and each selection of a
 mux's channel is one system call, whose cost is the machine's own and is given by the caller.
+
+A converter that needs time begins its next conversion as soon as its last was read, and the bus reads other ports
+meanwhile: the first in the order of the scan that can be read. It waits where none can.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from math import fsum
 
 from msgspec import Struct
 
+from thenar.drivers import cyberglove_protocol as glove_protocol
 from thenar.drivers.cyberglove_protocol import sending_us, shortest_us
 from thenar.drivers.i2c import tca9548a
-from thenar.drivers.i2c.chips import Reading
+from thenar.drivers.i2c.chips import Conversion, Reading
 from thenar.drivers.scanner_protocol import OVERHEAD
+from thenar.drivers.spi.chips import SELECT_US, Transfer
 
-from ..harness.wiring import GloveWiring, Harness, ScannerWiring
-from .ports import ports_of
+from ..harness.wiring import GloveWiring, Harness, MuxChannel, ScannerWiring
+from .ports import whole_scan
 from .scanmap import Port, ScanMap
 
 _FREE_US = ((100_000, 4.7), (400_000, 1.3))
 _FREE_FASTEST_US = 0.5
+_BAUD = 115_200
 
 
 class ChipTime(Struct, frozen=True):
-    """What one chip of a scan takes: harness.buses[bus].chips[chip], by name; its readings; how many kept switches they
-    show; microseconds, system calls included, selections of its channel not.
+    """What one chip of a scan takes alone: harness.chip_of(bus, chip), by name; its readings; how many kept switches,
+    levels included, they show; microseconds, system calls and conversions included, selections of its channel not.
     """
 
     bus: int
@@ -41,7 +47,8 @@ class ChipTime(Struct, frozen=True):
 class ScanTime(Struct, frozen=True):
     """What a whole scan takes: chip by chip in the order in which they are first read, selections, and all together.
 
-    full_us is a scan of all the switches that are wired to chips, kept or not, for comparison.
+    full_us is a scan of all the switches and taxels that are wired to chips, kept or not, for comparison. Where
+    conversions are overlapped, `us` is less than the sum of the chips.
     """
 
     chips: tuple[ChipTime, ...]
@@ -62,8 +69,21 @@ def free_us(clock_hz: int) -> float:
 
 
 def port_us(reading: Reading, clock_hz: int) -> float:
-    """Return what one reading takes on the wire, in microseconds."""
-    return reading.scl_periods * 1e6 / clock_hz + free_us(clock_hz)
+    """Return what one reading takes on the wire, in microseconds: of a conversion also the transfer that begins it."""
+    if isinstance(reading, Transfer):
+        return reading.scl_periods * 1e6 / clock_hz + SELECT_US
+    return reading.scl_periods * 1e6 / clock_hz + free_us(clock_hz) + start_us(reading, clock_hz)
+
+
+def start_us(reading: Reading, clock_hz: int) -> float:
+    """Return what the transfer that begins a conversion takes on the wire; 0 where there is none."""
+    periods = reading.start_periods if isinstance(reading, Conversion) else 0
+    return periods * 1e6 / clock_hz + free_us(clock_hz) if periods else 0.0
+
+
+def waiting_us(reading: Reading) -> float:
+    """Return how long a conversion takes from its beginning until it can be read; 0 where nothing has to wait."""
+    return reading.us if isinstance(reading, Conversion) else 0.0
 
 
 def select_us(clock_hz: int) -> float:
@@ -71,21 +91,81 @@ def select_us(clock_hz: int) -> float:
     return tca9548a.SCL_PERIODS * 1e6 / clock_hz + free_us(clock_hz)
 
 
+def mux_of(port: Port, harness: Harness) -> MuxChannel | None:
+    """Return the channel that a port is behind."""
+    return harness.buses[port.bus].chips[port.chip].mux if port.bus < len(harness.buses) else None
+
+
 def reading_of(port: Port, harness: Harness) -> Reading:
-    """Return the transaction that `port` names."""
-    chip = harness.buses[port.bus].chips[port.chip].chip
-    return next(reading for reading in chip.readings if reading.name == port.reading)
+    """Return the transaction that `port` names. Raises KeyError if its chip has none of that name."""
+    readings = harness.chip_of(port.bus, port.chip).chip.readings
+    return {reading.name: reading for reading in readings}[port.reading]
 
 
 def scan_us(scan: ScanMap, harness: Harness, ioctl_us: float = 0.0) -> ScanTime:
     """Return what a scan of the map takes, no port left out, with system calls of `ioctl_us` microseconds each."""
     chips = tuple(_chip_times(scan.ports, harness, ioctl_us))
     chosen = _selected_us(scan.ports, harness, ioctl_us)
-    everything = ports_of(harness, {name: number for number, name in enumerate(harness.switches)})
-    full = (*_selected_us(everything, harness, ioctl_us), *(t.us for t in _chip_times(everything, harness, ioctl_us)))
-    # fsum: the same ports in another order take the same time to the last bit.
-    us = fsum((*chosen, *(chip.us for chip in chips)))
-    return ScanTime(chips, len(chosen), fsum(chosen), us, fsum(full))
+    everything = whole_scan(harness, harness.switches, every_taxel=True).ports
+    us, full_us = (_whole_us(ports, harness, ioctl_us) for ports in (scan.ports, everything))
+    return ScanTime(chips, len(chosen), fsum(chosen), us, full_us)
+
+
+def _whole_us(ports: Sequence[Port], harness: Harness, ioctl_us: float) -> float:
+    """Return what reading these ports takes. fsum: in another order, the same to the last bit where nothing waits."""
+    slow = {port.bus for port in ports if waiting_us(reading_of(port, harness))}
+    fast = [port for port in ports if port.bus not in slow]
+    times = (*_selected_us(fast, harness, ioctl_us), *(t.us for t in _chip_times(fast, harness, ioctl_us)))
+    overlapped = (overlapped_us([port for port in ports if port.bus == bus], harness, ioctl_us) for bus in sorted(slow))
+    return fsum((*times, *overlapped))
+
+
+def overlapped_us(ports: Sequence[Port], harness: Harness, ioctl_us: float = 0.0) -> float:
+    """Return what reading these ports of one bus takes, conversions overlapped with what the bus does meanwhile."""
+    clock_hz = harness.line_of(ports[0].bus).clock_hz
+    route: MuxChannel | None = None
+    us = 0.0
+    for _ in range(2):  # the first scan leaves the mux as every further one finds it
+        us, route = _one_round(ports, harness, clock_hz, ioctl_us, route)
+    return us
+
+
+def _one_round(
+    ports: Sequence[Port], harness: Harness, clock_hz: int, ioctl_us: float, route: MuxChannel | None
+) -> tuple[float, MuxChannel | None]:
+    """Return how long one scan takes, and which channel is connected after it."""
+    now, ready = 0.0, dict[int, float]()
+    left = list(ports)
+
+    def transfer(port: Port, wire_us: float) -> None:
+        nonlocal now, route
+        mux = mux_of(port, harness)
+        if mux is not None and mux != route:
+            between = route is not None and route.address != mux.address
+            now += (1 + between) * (select_us(clock_hz) + ioctl_us)
+            route = mux
+        now += wire_us + ioctl_us
+
+    def begin(chip: int) -> None:
+        port = next((port for port in left if port.chip == chip), None)
+        if port is not None and (wait_us := waiting_us(reading := reading_of(port, harness))):
+            transfer(port, start_us(reading, clock_hz))
+            ready[chip] = now + wait_us
+
+    for chip in dict.fromkeys(port.chip for port in ports):
+        begin(chip)
+    while left:
+        first = {port.chip: port for port in reversed(left)}
+        able = [p for p in left if first[p.chip] is p or p.chip not in ready]
+        port = next((p for p in able if ready.get(p.chip, 0.0) <= now), None)
+        if port is None:
+            port = min(able, key=lambda p: ready[p.chip])
+            now = ready[port.chip]
+        left.remove(port)
+        reading = reading_of(port, harness)
+        transfer(port, port_us(reading, clock_hz) - start_us(reading, clock_hz))
+        begin(port.chip)
+    return now, route
 
 
 def selections(ports: Iterable[Port], harness: Harness) -> tuple[tuple[int, ...], ...]:
@@ -94,16 +174,30 @@ def selections(ports: Iterable[Port], harness: Harness) -> tuple[tuple[int, ...]
 
     A bus on which only one channel is read stays on it.
     """
-    places = [(port.bus, harness.buses[port.bus].chips[port.chip].mux) for port in ports]
+    places = [(port.bus, mux_of(port, harness)) for port in ports]
     channels = dict.fromkeys((bus, mux.address, mux.channel) for bus, mux in places if mux is not None)
     rooms: list[tuple[int, ...]] = [*channels, *dict.fromkeys((bus, mux) for bus, mux, _ in channels)]
     alike = Counter((room[0], len(room)) for room in rooms)
     return tuple(room for room in rooms if alike[room[0], len(room)] > 1)
 
 
-def glove_us(glove: GloveWiring, sensors: int) -> float:
-    """Return the shortest period of a CyberGlove's records, in microseconds; at 115200 baud where it is to be found."""
-    return shortest_us(sensors, 115_200 if glove.baud == "auto" else glove.baud, status=True)
+def glove_us(glove: GloveWiring, sensors: int, *, wire_only: bool = False) -> float:
+    """Return the shortest period of a CyberGlove's records of so many sensors, in microseconds.
+
+    It is the vendor's formula (`shortest_us`), in the proportion in which `record_us` was measured to it for all
+    sensors; and no less than the period at which records are asked for. `wire_only` leaves out what the box takes to
+    digitise. The rate is 115200 baud where it is to be found. A record that is asked for takes the byte that asks, too.
+    """
+    baud = _BAUD if glove.baud == "auto" else glove.baud
+    asking_us = 0.0 if glove.mode == "stream" else sending_us(len(glove_protocol.POLL), baud)
+    if wire_only:
+        return asking_us + sending_us(sensors + glove_protocol.OVERHEAD + 1, baud)
+    filtered = bool(glove.filter)
+    us = shortest_us(sensors, baud, status=True, filtered=filtered)
+    if glove.record_us is not None:
+        us *= glove.record_us / shortest_us(glove.all_sensors, baud, status=True, filtered=filtered)
+    us += asking_us
+    return max(us, 1e6 / glove.rate_hz if glove.rate_hz else 0.0)
 
 
 def scanner_us(scanner: ScannerWiring) -> float:
@@ -120,13 +214,19 @@ def _chip_times(ports: Iterable[Port], harness: Harness, ioctl_us: float) -> Ite
     for port in ports:
         by_chip.setdefault((port.bus, port.chip), []).append(port)
     for (bus, chip), group in by_chip.items():
-        wiring = harness.buses[bus]
+        line = harness.line_of(bus)
         yield ChipTime(
             bus=bus,
             chip=chip,
-            device=wiring.device,
-            place=wiring.chips[chip].place,
+            device=line.device,
+            place=harness.chip_of(bus, chip).place,
             readings=tuple(port.reading for port in group),
-            switches=sum(len(port.switches) for port in group),
-            us=sum(port_us(reading_of(port, harness), wiring.clock_hz) + ioctl_us for port in group),
+            switches=sum(len(port.elements) for port in group),
+            us=sum(_alone_us(reading_of(port, harness), line.clock_hz, ioctl_us) for port in group),
         )
+
+
+def _alone_us(reading: Reading, clock_hz: int, ioctl_us: float) -> float:
+    """Return what a reading takes where nothing else is read meanwhile."""
+    calls = 2 if start_us(reading, clock_hz) else 1
+    return port_us(reading, clock_hz) + waiting_us(reading) + calls * ioctl_us

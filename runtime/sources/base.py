@@ -65,6 +65,14 @@ class Source(ABC):
         """Return what is wrong though the device is open; "" if nothing is."""
         return ""
 
+    def read_only(self, sensors: Sequence[str], *, on_demand: bool) -> None:  # noqa: B027
+        """Be allowed to leave out of its frames, as 0, what sensors but these measure; and `on_demand` to deliver
+        frames only when asked for one. Called before `open`; what reads switches, or sends by itself, ignores it.
+        """
+
+    def ask(self) -> None:  # noqa: B027
+        """Be asked for a frame, on demand."""
+
     def end_early(self, exit_of: ExitOf, joints: Joints, glove: Newest[GloveFrame]) -> None:  # noqa: B027
         """Be allowed to leave switches unread that cannot change an answer: this source reads all that there are.
 

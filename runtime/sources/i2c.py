@@ -1,44 +1,93 @@
 """I2C buses of a harness, their ports read in the order of a scan map, to the end or until the rest cannot matter."""
 
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
-from thenar.drivers.i2c.bus import ChipAt, I2cBus, PortRead, Scan
+from thenar.drivers.i2c.bus import ChipAt, I2cBus, Interleaved, PortRead
+from thenar.drivers.i2c.chips import Conversion, Converter
+from thenar.drivers.spi.chips import SpiChip
 
 from ..calibration import Joints
 from ..frames import PERIODS, GloveFrame, Mask, Newest, Rewired, SwitchFrame, now_us
 from ..harness.wiring import Debounce, Harness
+from ..names import list_names
 from ..published import Count
-from ..scanning.decided import EarlyExit
 from ..scanning.scanmap import Port, ScanMap
 from ..scanning.timing import reading_of, scan_us
+from ..taxels import TaxelCalibration, Taxels, calibration_of
 from .base import SHORTEST_US, ExitOf, Source, SourceKind, debouncer_of, pause_us
+
+if TYPE_CHECKING:
+    from ..scanning.decided import EarlyExit
 
 # A bus whose chips are all gone is not asked in a busy loop.
 _NOBODY_THERE_S = 0.01
 
 
-class _PortSwitches:
-    """What the answer of a port says: which of its bits are inverted, the switches that they are, debounced."""
+class _Port(ABC):
+    """What the answers of a port say, debounced. targets are the switches that they show."""
 
-    def __init__(self, port: Port, debounce: Debounce) -> None:
-        self._inverted = 0 if port.closed_high else sum(1 << bit for bit, _ in port.switches)
-        self.switches = Rewired(port.switches)
+    targets: Mask
+
+    def __init__(self, debounce: Debounce) -> None:
         self._debounce, self._debouncer = debounce, debouncer_of(debounce)
         self._pause_us = pause_us(debounce)
         self._read_us = 0
 
-    def closed(self, answer: int, time_us: int) -> Mask:
-        """Return which switches are closed."""
-        closed = self.switches(answer ^ self._inverted)
-        if self._debouncer is not None and time_us - self._read_us > self._pause_us:
+    def states(self, answer: int | None) -> tuple[Mask, Mask]:
+        """Return which switches are closed, and which are lost, by an answer that came now; None: none came."""
+        time_us = now_us()
+        closed, lost = self._states(answer, time_us)
+        if self._debouncer is None or answer is None:
+            return closed, lost
+        if time_us - self._read_us > self._pause_us:
             self._debouncer = debouncer_of(self._debounce)
+            assert self._debouncer is not None
         self._read_us = time_us
-        return closed if self._debouncer is None else self._debouncer.update(time_us, closed, self.switches.targets)
+        return self._debouncer.update(time_us, closed, self.targets & ~lost) & ~lost, lost
+
+    @abstractmethod
+    def _states(self, answer: int | None, time_us: int) -> tuple[Mask, Mask]: ...
+
+
+class _PortSwitches(_Port):
+    """Bits of an answer, some of them inverted."""
+
+    def __init__(self, port: Port, debounce: Debounce) -> None:
+        super().__init__(debounce)
+        self._inverted = 0 if port.closed_high else sum(1 << bit for bit, _ in port.switches)
+        self._switches = Rewired(port.switches)
+        self.targets = self._switches.targets
+
+    def _states(self, answer: int | None, time_us: int) -> tuple[Mask, Mask]:
+        return (0, self.targets) if answer is None else (self._switches(answer ^ self._inverted), 0)
+
+
+class PortLevels(_Port):
+    """Levels of the taxel whose counts a conversion gives: its name, its place among the harness's taxels, and what
+    compares its counts.
+    """
+
+    def __init__(self, port: Port, harness: Harness, calibration: TaxelCalibration | None) -> None:
+        super().__init__(harness.debounce)
+        wired = harness.chip_of(port.bus, port.chip)
+        channel = [reading.name for reading in wired.chip.readings].index(port.reading)
+        self.name = wired.numbered_pins[channel]
+        self.place = harness.taxel_names.index(self.name)
+        self.highest = wired.chip.highest if isinstance(wired.chip, Converter | SpiChip) else None
+        self.taxels = Taxels([self.name], [port.levels], calibration, harness.taxel_settings, self.highest)
+        self.targets = self.taxels.owned
+
+    def _states(self, answer: int | None, time_us: int) -> tuple[Mask, Mask]:
+        return self.taxels.read(time_us, (answer,))
 
 
 class I2cDevice(Source):
-    """Bus number `number` of a harness, scanned as `scan` has it; only the chips that it names are touched."""
+    """Bus number `number` of a harness, scanned as `scan` has it, whose levels are limits in counts; only the chips in
+    it are touched.
+    """
 
     def __init__(self, harness: Harness, number: int, scan: ScanMap) -> None:
         wiring = harness.buses[number]
@@ -46,34 +95,52 @@ class I2cDevice(Source):
         self.name = f"i2c at {wiring.device}"
         self.period_us = _bus_period_us(scan, harness)
         self.longest_us = PERIODS * self.period_us
-        self._ports = [_PortSwitches(port, harness.debounce) for port in ports]
-        self.owned: Mask = sum(port.switches.targets for port in self._ports)
+        calibration = calibration_of(harness.taxel_settings)
+        self._ports = [
+            _PortSwitches(port, harness.debounce) if port.switches else PortLevels(port, harness, calibration)
+            for port in ports
+        ]
+        self._taxels = len(harness.taxel_names)
+        self.owned: Mask = sum(port.targets for port in self._ports)
         chips = sorted({port.chip for port in ports})
         chips_at = [_chip_at(harness, number, chip, ports) for chip in chips]
         self.bus = I2cBus(wiring.device, chips_at, clock_hz=wiring.clock_hz)
         self._reads = [PortRead(chips.index(port.chip), reading_of(port, harness)) for port in ports]
-        self._scans: list[Scan] = []
+        self._scan: Interleaved | None = None
+        self._groups: list[list[int]] = []
         self._early: tuple[EarlyExit, Joints, Newest[GloveFrame]] | None = None
         self._held_up = 0
 
+    @property
+    def taxels(self) -> tuple[PortLevels, ...]:
+        """The taxels that are read."""
+        return tuple(port for port in self._ports if isinstance(port, PortLevels))
+
     def end_early(self, exit_of: ExitOf, joints: Joints, glove: Newest[GloveFrame]) -> None:
         """Scan no further than until the ports not yet read cannot change the answer any more."""
-        self._early = exit_of([port.switches.targets for port in self._ports]), joints, glove
+        self._early = exit_of([port.targets for port in self._ports]), joints, glove
 
     def open(self) -> None:
         """Open the bus and set up its chips."""
         self.bus.open()
-        step = 1 if self._early else len(self._reads)
-        self._scans = [self.bus.prepare(self._reads[at : at + step]) for at in range(0, len(self._reads), step)]
+        self._groups = self._grouped(range(len(self._reads)), alone=self._early is not None)
+        self._scan = self.bus.interleaved([[self._reads[port] for port in group] for group in self._groups])
 
-    def scan(self, chip: int | None = None) -> Scan:
+    def scan(self, chip: int | None = None) -> Interleaved:
         """Return what reads all ports, or those of the bus's chip of this number, once more."""
-        return self.bus.prepare([read for read in self._reads if chip is None or read.chip == chip])
+        ports = [port for port, read in enumerate(self._reads) if chip is None or read.chip == chip]
+        return self.bus.interleaved([[self._reads[port] for port in group] for group in self._grouped(ports)])
+
+    def _grouped(self, ports: Sequence[int], *, alone: bool = False) -> list[list[int]]:
+        """Return which ports are read together: all but conversions that take time, where a scan goes to its end."""
+        slow = [port for port in ports if alone or _takes_time(self._reads[port])]
+        together = [port for port in ports if port not in slow]
+        return [*([together] if together else []), *([port] for port in slow)]
 
     def read(self, timeout_s: float) -> SwitchFrame | None:
         """Scan once."""
         began_us = now_us()
-        frame = self._whole() if self._early is None else self._until_decided(*self._early)
+        frame = self._scanned()
         if frame.time_us - began_us > self.longest_us:
             # A chip held the bus up: what was read before it is no news any more.
             frame = SwitchFrame(frame.time_us, 0, self.owned)
@@ -82,16 +149,28 @@ class I2cDevice(Source):
             time.sleep(min(timeout_s, _NOBODY_THERE_S))
         return frame
 
-    def _until_decided(self, early: EarlyExit, joints: Joints, newest: Newest[GloveFrame]) -> SwitchFrame:
-        glove = newest.frame
-        early.start(joints.codes(now_us(), glove))
-        closed = lost = 0
-        for number, scan in enumerate(self._scans):
-            shut, silent = self._decoded(number, scan.read()[0])
-            closed, lost = closed | shut, lost | silent
-            if early.after(number, shut, silent):
+    def _scanned(self) -> SwitchFrame:
+        assert self._scan is not None
+        closed = lost = unread = 0
+        codes: list[int | None] = [None] * self._taxels
+        glove: GloveFrame | None = None
+        if self._early is not None:
+            early, joints, newest = self._early
+            # On demand, no scan ends by a record: what it leaves unread matters for none.
+            glove = None if early.on_demand else newest.frame
+            early.start(joints.codes(now_us(), glove))
+        for group, answers in zip(self._groups, self._scan, strict=False):
+            for number, answer in zip(group, answers, strict=True):
+                port = self._ports[number]
+                shut, silent = port.states(answer)
+                closed, lost = closed | shut, lost | silent
+                if isinstance(port, PortLevels):
+                    codes[port.place] = answer
+            if self._early is not None and early.after(group[0], shut, silent):
+                unread = early.unread(group[0])
                 break
-        return SwitchFrame(now_us(), closed, lost, early.unread(number), glove)
+        taxels = tuple(codes) if any(code is not None for code in codes) else None
+        return SwitchFrame(now_us(), closed, lost, unread, glove, taxels)
 
     def counts(self) -> tuple[Count, ...]:
         """Return how many transfers there were, how many scans were too slow to count, and each chip's failures."""
@@ -103,30 +182,27 @@ class I2cDevice(Source):
     def trouble(self) -> str:
         """Return what is wrong with the bus, or with the chips that are absent; "" if nothing is."""
         absent = (chip.last_error for chip in self.bus.chips if not chip.present)
-        return self.bus.trouble or "; ".join(absent)
+        return self.bus.trouble or "; ".join((*absent, *taxel_faults(self.taxels)))
 
     def close(self) -> None:
         """Close the bus."""
         self.bus.close()
 
-    def _whole(self) -> SwitchFrame:
-        closed = lost = 0
-        for number, answer in enumerate(self._scans[0].read()):
-            shut, silent = self._decoded(number, answer)
-            closed, lost = closed | shut, lost | silent
-        return SwitchFrame(now_us(), closed, lost)
 
-    def _decoded(self, number: int, answer: int | None) -> tuple[Mask, Mask]:
-        """Return which switches of port `number` are closed, and which are lost."""
-        port = self._ports[number]
-        return (0, port.switches.targets) if answer is None else (port.closed(answer, now_us()), 0)
+def taxel_faults(taxels: Sequence[PortLevels]) -> list[str]:
+    """Return a sentence on the taxels that have faults, if any has: a lost one's chip is told of elsewhere."""
+    faulty = [f"{each.name}: {fault}" for each in taxels if (fault := each.taxels.faults[0]) not in ("", "silent")]
+    return [f"taxels with faults: {list_names(faulty)}"] if faulty else []
+
+
+def _takes_time(read: PortRead) -> bool:
+    return isinstance(read.reading, Conversion) and bool(read.reading.start)
 
 
 def _chip_at(harness: Harness, bus: int, number: int, ports: list[Port]) -> ChipAt:
     chip = harness.buses[bus].chips[number]
-    used = frozenset(
-        reading_of(port, harness).pins[bit] for port in ports if port.chip == number for bit, _ in port.switches
-    )
+    shown = [(reading_of(port, harness), port) for port in ports if port.chip == number]
+    used = frozenset(reading.pins[bit] for reading, port in shown for bit in ([b for b, _ in port.switches] or [0]))
     mux, channel = (None, None) if chip.mux is None else (chip.mux.address, chip.mux.channel)
     return ChipAt(chip.chip, chip.address, used, mux, channel)
 
@@ -137,12 +213,18 @@ def _bus_period_us(scan: ScanMap, harness: Harness) -> int:
 
 
 def _sources(harness: Harness, _names: Sequence[str], scan: ScanMap) -> Iterator[Source]:
-    return (I2cDevice(harness, bus, scan) for bus in sorted({port.bus for port in scan.ports}))
+    return (I2cDevice(harness, bus, scan) for bus in sorted(_buses(harness, scan)))
 
 
 def _periods_us(harness: Harness, scan: ScanMap) -> Iterator[int]:
-    if scan.ports:
+    if _buses(harness, scan):
         yield _bus_period_us(scan, harness)
 
 
-MEMBER = SourceKind("i2c", "Port expanders on an I2C bus: [[bus]].", "switches", _sources, _periods_us, rank=1)
+def _buses(harness: Harness, scan: ScanMap) -> set[int]:
+    return {port.bus for port in scan.ports if port.bus < len(harness.buses)}
+
+
+MEMBER = SourceKind(
+    "i2c", "Port expanders and converters on an I2C bus: [[bus]].", "switches", _sources, _periods_us, rank=1
+)

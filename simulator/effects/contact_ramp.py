@@ -11,18 +11,13 @@ from typing import Annotated
 
 import numpy as np
 from msgspec import Meta
-from numpy.typing import NDArray
-
-from thenar.compiler.elementary import Floats
 
 from ..contact.model import Contact, ContactModel, Load
 from ..errors import SceneError
 from ..pipeline.batch import NEVER, Batch
 from ..pipeline.effect import Effect, EffectParameters, Setting, Together
+from ..pipeline.ramp import Ramp, crossings
 from ..streams import Draw
-
-Integers = NDArray[np.int64]
-Bits = NDArray[np.bool_]
 
 
 class Parameters(EffectParameters, frozen=True):
@@ -63,11 +58,13 @@ def _loads(batch: Batch, levels: int) -> list[Load]:
 
 
 def _time(batch: Batch, grown: Sequence[Contact], rise_us: float) -> None:
-    """Enter when the switches of a batch close and open, from the contacts at the levels below the full grip.
+    """Enter when the switches of a batch close and open, from the contacts at the levels below the full grip, and how
+    forces grow.
 
     A repetition that does not settle at one of them has not settled, and is told by what was left there.
     """
     forces = np.array([np.zeros_like(batch.forces_n), *(one.forces_n for one in grown), batch.forces_n])
+    batch.ramp = Ramp(forces, rise_us)
     up_us, down_us = crossings(forces, batch.thresholds_n, rise_us / (len(grown) + 1))
     lets_go = (batch.off_us != NEVER) & (up_us != NEVER) & (down_us == NEVER)
     # Backwards from where the hand lets go, the force that first closed a switch is the last to keep it closed.
@@ -79,37 +76,6 @@ def _time(batch: Batch, grown: Sequence[Contact], rise_us: float) -> None:
         batch.residual_nmm = np.where(one.settled, batch.residual_nmm, np.maximum(batch.residual_nmm, one.residual_nmm))
 
 
-def crossings(forces_n: Floats, thresholds_n: Floats, level_us: float) -> tuple[Integers, Integers]:
-    """Return when (n, s) each switch closes for the first time and opens for the last, NEVER where it does not.
-
-    forces_n (levels + 1, n, s) come level_us apart, the first at 0; thresholds_n (s,). One that is closed at the end
-    does not open.
-    """
-    closed = forces_n > thresholds_n
-    levels = len(closed) - 1
-    first, last = closed.argmax(axis=0), levels - closed[::-1].argmax(axis=0)
-    up = np.where(first > 0, _between(forces_n, thresholds_n, np.maximum(first - 1, 0)) * level_us, 0.0)
-    down = _between(forces_n, thresholds_n, np.minimum(last, levels - 1)) * level_us
-    ever: Bits = np.logical_or.reduce(closed)
-    return _times(up, ever), _times(down, np.greater(ever, closed[-1]))
-
-
-def _between(forces_n: Floats, thresholds_n: Floats, level: NDArray[np.intp]) -> Floats:
-    """Return at which level, and what part of the way to the next, force passes the threshold; the level where it does
-    not: what is left to a threshold over hardly any change would overflow.
-    """
-    here = np.take_along_axis(forces_n, level[None], axis=0)[0]
-    change = np.take_along_axis(forces_n, level[None] + 1, axis=0)[0] - here
-    left = thresholds_n - here
-    passes = (np.abs(left) <= np.abs(change)) & (change != 0.0)
-    levels: Floats = level + np.where(passes, left, 0.0) / np.where(passes, change, 1.0)
-    return levels
-
-
-def _times(time_us: Floats, there: Bits) -> Integers:
-    return np.where(there, np.ceil(np.where(there, time_us, 0.0)).astype(np.int64), NEVER)
-
-
 MEMBER = Effect(
     name="contact.ramp",
     summary="the grip grows, and switches close one by one",
@@ -119,7 +85,7 @@ MEMBER = Effect(
         *("commanded_deg", "commanded_pose", "grip_n", "forces_n", "thresholds_n"),
         *("settled", "residual_n", "residual_nmm", "on_us", "off_us"),
     ),
-    writes=("on_us", "off_us", "settled", "residual_n", "residual_nmm"),
+    writes=("on_us", "off_us", "settled", "residual_n", "residual_nmm", "ramp"),
     timed=True,
     parameters=Parameters,
     together=prepare,

@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from thenar.compiler.hand import HandShape, MapError
 from thenar.compiler.pictures import on_paper, painting, rendered
 from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.recordings.summary import contacts as touches
 
 from .handmap import Floats
 
@@ -62,6 +63,19 @@ class Picture:
     hollow_mark: str = ""  # what the key writes into its hollow dot
 
 
+class _Words(NamedTuple):
+    """What happens to what is drawn: in a word, of one, and of several."""
+
+    word: str
+    full: str
+    plural: str
+
+
+_CLOSED = _Words("closed", "the switch closed", "switches closed")
+_PRESSED = _Words("pressed", "the taxel was pressed", "taxels pressed")
+_EITHER = _Words("touched", "the switch closed or the taxel was pressed", "switches and taxels touched")
+
+
 def all_switches(glove: HandShape, numbered: bool) -> Picture:
     """Return the glove with all its switches, with their numbers in the set (from 0) if `numbered`."""
     dots = tuple(Dot(f"{n} {name}", mark=str(n) if numbered else "") for n, name in enumerate(glove.names))
@@ -76,29 +90,32 @@ def all_switches(glove: HandShape, numbered: bool) -> Picture:
 
 
 def contacts(glove: HandShape, grasp_set: GraspSet, per_grasp: bool) -> Picture:
-    """Return how often each switch closed over all rows or, one hand each, in each grasp type that has rows.
+    """Return how often each switch closed, and each taxel was pressed (above Otsu's threshold of all readings),
+    over all rows or, one hand each, in each grasp type that has rows.
 
-    All hands share one scale, up to the largest share. Raises MapError if the set has no rows, no switches, or a switch
-    that the glove does not have.
+    All hands share one scale, up to the largest share. Raises MapError if the set has no rows, no switches or taxels,
+    or one that the glove does not have.
     """
-    if not grasp_set.switch_names:
+    if not grasp_set.element_names:
         raise MapError("the set has no switches to draw: it holds joints only")
     if not len(grasp_set):
         raise MapError("a set without rows has no contacts to draw")
-    numbers = glove.numbers_of(grasp_set.switch_names)
+    numbers = glove.numbers_of(grasp_set.element_names)
     groups = [np.arange(len(grasp_set))]
     titles = ["all grasps"]
     if per_grasp:
         present = np.unique(grasp_set.labels)
         groups = [np.flatnonzero(grasp_set.labels == label) for label in present]
         titles = [_type_title(grasp_set, label) for label in present]
-    closed = [grasp_set.switches[rows].sum(axis=0) for rows in groups]
+    touched, what = touches(grasp_set), _CLOSED if grasp_set.switch_names else _PRESSED
+    what = _EITHER if grasp_set.switch_names and grasp_set.taxel_columns else what
+    closed = [touched[rows].sum(axis=0) for rows in groups]
     top = max(float((count / len(rows)).max()) for count, rows in zip(closed, groups, strict=True)) or 1.0
     panels = (
-        _contact_panel(glove, title, numbers, count, len(rows), top)
+        _contact_panel(glove, title, numbers, count, len(rows), top, what)
         for title, count, rows in zip(titles, closed, groups, strict=True)
     )
-    return Picture(glove, tuple(panels), "share of grasps in which the switch closed", "never closed", top)
+    return Picture(glove, tuple(panels), f"share of grasps in which {what.full}", f"never {what.word}", top)
 
 
 def kept(glove: HandShape, placements: Sequence[tuple[str, Sequence[str]]]) -> Picture:
@@ -111,13 +128,19 @@ def kept(glove: HandShape, placements: Sequence[tuple[str, Sequence[str]]]) -> P
 
 
 def _contact_panel(
-    glove: HandShape, title: str, numbers: NDArray[np.intp], closed: NDArray[np.intp], rows: int, top: float
+    glove: HandShape,
+    title: str,
+    numbers: NDArray[np.intp],
+    closed: NDArray[np.intp],
+    rows: int,
+    top: float,
+    what: _Words,
 ) -> Panel:
     dots = [Dot(f"{name}: not in the set", absent=True) for name in glove.names]
     for number, count in zip(numbers.tolist(), closed.tolist(), strict=True):
-        hint = f"{glove.names[number]}: closed in {count} of {rows} grasps ({count / rows:.1%})"
+        hint = f"{glove.names[number]}: {what.word} in {count} of {rows} grasps ({count / rows:.1%})"
         dots[number] = Dot(hint, count / rows / top if count else None)
-    return Panel(title, f"{rows} grasps, {float(closed.sum()) / rows:.1f} switches closed on average", tuple(dots))
+    return Panel(title, f"{rows} grasps, {float(closed.sum()) / rows:.1f} {what.plural} on average", tuple(dots))
 
 
 def _type_title(grasp_set: GraspSet, label: int) -> str:
@@ -131,8 +154,12 @@ def _kept_panel(glove: HandShape, title: str, names: Sequence[str]) -> Panel:
     if twice is not None:
         raise MapError(f"{title}: switch {twice!r} is kept twice")
     dots = [Dot(f"{name}: left out") for name in glove.names]
-    for place, number in enumerate(numbers.tolist(), 1):
-        dots[number] = Dot(f"{glove.names[number]}: kept, number {place}", 1.0, str(place))
+    for place, (number, name) in reversed(list(enumerate(zip(numbers.tolist(), names, strict=True), 1))):
+        # Of the levels of a taxel, the first marks it.
+        more = dots[number].hint.partition(": ")[2] if dots[number].shade is not None else ""
+        level = name[len(glove.names[number]) :]
+        hint = f"{glove.names[number]}: kept, number {place}{f' (counts {level})' * bool(level)}"
+        dots[number] = Dot(hint + f", {more.removeprefix('kept, ')}" * bool(more), 1.0, str(place))
     return Panel(title, _counts(glove, numbers, f"of {len(dots)} kept"), tuple(dots))
 
 

@@ -1,6 +1,7 @@
 """A batch: repetitions of one condition on their way through the pipeline."""
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,9 @@ from thenar.compiler.elementary import Floats
 from ..body.condition import Condition
 from ..contact.model import Contact, Load
 from ..streams import Site
+
+if TYPE_CHECKING:
+    from .ramp import Ramp
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,11 +64,14 @@ class Batch:
     on_us, off_us (n, s)  when each switch closes and opens; NEVER
     frame_us    (n, F)    when each frame's scan begins
     delay_us              how much later each switch is read, as broadcasts to (n, F, s); None: at once
-    bits        (n, F, s) what the scanner reads
+    bits        (n, F, s) what the scanner reads; of a place with a taxel, what a switch there would say
     sensors_deg (n, F, 18) what the CyberGlove's sensors feel
     raw         (n, F, 18) uint8, its bytes, 1 to 255
     traffic               the bytes on the serial lines, while they are there
     lost        (n, F)    frames that did not arrive
+    ramp                  how the forces grow; None: at once
+    taxels_n    (n, F, t) the force that each taxel feels
+    taxels      (n, F, t) uint16, its counts; None: there are none
     """
 
     condition: Condition
@@ -91,6 +98,9 @@ class Batch:
     raw: NDArray[np.uint8] = field(init=False)
     traffic: Traffic = field(init=False)
     lost: Bits | None = None
+    ramp: "Ramp | None" = None
+    taxels_n: Floats = field(init=False)
+    taxels: NDArray[np.uint16] | None = None
 
     def __len__(self) -> int:
         return len(self.repetitions)

@@ -99,6 +99,7 @@ class Setting:
     period_us, first_us, hold_us, release_us   frames are scanned every period_us from first_us (the transition before
                           contact is negative) to hold_us, where the row is read out, and on through release_us more
     timed, on_wire        whether any effect of the scene is
+    taxels                numbers of the places that bear taxels, not switches
     """
 
     seed: int
@@ -110,6 +111,14 @@ class Setting:
     release_us: int
     timed: bool
     on_wire: bool
+    taxels: tuple[int, ...] = ()
+
+    @property
+    def let_go_us(self) -> int | None:
+        """When the hand lets go: as the frame after the read-out begins, so that a row that takes a while to read is
+        still whole. None where the recording ends before.
+        """
+        return self.hold_us + self.period_us if self.release_us > 0 else None
 
 
 # A scene imports the effects that it lists, and no other.

@@ -49,8 +49,7 @@ def _threshold(batch: Batch, setting: Setting) -> None:
 
 @_own("switch", "closes the switches that are pressed hard enough", ("forces_n", "thresholds_n"), ("on_us", "off_us"))
 def _close(batch: Batch, setting: Setting) -> None:
-    # The hand lets go when the frame after the read-out begins: a row that takes a while to read is still whole.
-    let_go_us = setting.hold_us + setting.period_us if setting.release_us > 0 else NEVER
+    let_go_us = NEVER if setting.let_go_us is None else setting.let_go_us
     closed = batch.forces_n > batch.thresholds_n
     batch.on_us = np.where(closed, 0, NEVER)
     batch.off_us = np.where(closed, let_go_us, NEVER)

@@ -1,11 +1,13 @@
 """The serial lines: frames sent as bytes, and what a driver makes of the bytes that arrive.
 
-Two lines of 115200 baud, 8 data bits, no parity, one stop bit: the scanner's STATE frames and the CyberGlove's streamed
-records, which the glove sends once it has digitised its sensors one by one: hence its 160 records a second at most.
+Two lines of 115200 baud, 8 data bits, no parity, one stop bit: the scanner's STATE frames, after each the ANALOG frames
+of its taxels, and the CyberGlove's streamed records, which the glove sends once it has digitised its sensors one by
+one: hence its 160 records a second at most.
 Between `SEND` and `RECEIVE` the wire effects do what they will with the bytes.
 """
 
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,17 +29,18 @@ Feed = Callable[[bytes], list[bytes]]
 
 BAUD = 115_200
 _BITS_A_BYTE = 10
-# What the vendor's manual says of a sensor, as a public driver quotes it; its filter, which takes more, is off.
-_DIGITISED_US = 250 * glove.SENSORS
+_DIGITISED_US = round(glove.digitising_us(glove.SENSORS))
 
 
 def _send(parameters: EffectParameters, setting: Setting) -> Step:
     _check_rate(setting)
 
     def send(batch: Batch, draw: Draw) -> None:
-        """Put bits on the line once their scan is through, raw once it is digitised from the frame's beginning on."""
+        """Put bits and counts on the line once their scan is through, raw once it is digitised from the frame's
+        beginning on.
+        """
         scanned = batch.frame_us if batch.delay_us is None else batch.frame_us + batch.delay_us.max(axis=-1)
-        states, records = _states(batch.bits), _records(batch.raw)
+        states, records = np.concatenate([_states(batch.bits), *_analogs(batch.taxels)], axis=2), _records(batch.raw)
         data = np.concatenate([states, records], axis=2)
         at_us = [_arrivals(scanned, states.shape[2]), _arrivals(batch.frame_us + _DIGITISED_US, records.shape[2])]
         batch.traffic = Traffic(data, np.concatenate(at_us, axis=2), np.ones(data.shape, np.bool_), states.shape[2])
@@ -47,7 +50,8 @@ def _send(parameters: EffectParameters, setting: Setting) -> Step:
 
 
 def _check_rate(setting: Setting) -> None:
-    state_us = _sent_us((len(murakami160()) + 7) // 8 + scanner.OVERHEAD)
+    state = (len(murakami160()) + 7) // 8 + scanner.OVERHEAD
+    state_us = _sent_us(state + sum(scanner.OVERHEAD + _width(part) for part in _parts(len(setting.taxels))))
     longest = max(state_us, _DIGITISED_US + _sent_us(glove.SENSORS + glove.OVERHEAD))
     if setting.timed and setting.period_us < longest:
         raise SceneError(
@@ -59,19 +63,32 @@ def _check_rate(setting: Setting) -> None:
 def receive(batch: Batch, draw: Draw) -> None:
     """Decode what arrived, as a driver does, and take for each frame the newest there is by the time it is due.
 
-    A switch frame or glove record that did not arrive leaves the one before it in place. Before the first: no contact,
+    A frame of switches or taxels or a glove record that did not arrive leaves the one before it in place. Before the
+    first: no contact,
     and the joints of the first to come. A repetition to which one of the lines brought nothing at all is not `settled`.
     """
     traffic, switches = batch.traffic, batch.bits.shape[2]
-    states, state_came = _received(traffic, slice(0, traffic.scanner), (switches + 7) // 8, _payloads)
+    line = slice(0, traffic.scanner)
+    states, state_came = _received(traffic, line, (switches + 7) // 8, partial(_payloads, scanner.STATE))
     records, record_came = _received(traffic, slice(traffic.scanner, None), glove.SENSORS, _sensors)
     state, record = _newest(state_came), _newest(record_came)
     record = np.where(record >= 0, record, np.argmax(record_came, axis=1)[:, None])
     bits = scanner.unpack_bits(np.take_along_axis(states, np.maximum(state, 0)[:, :, None], axis=1), switches)
     batch.bits = bits & (state >= 0)[:, :, None]
     batch.raw = np.take_along_axis(records, record[:, :, None], axis=1)
-    batch.lost = ~(state_came & record_came)
+    came = state_came & record_came
     batch.settled = batch.settled & state_came.any(axis=1) & record_came.any(axis=1)
+    if batch.taxels is not None:
+        taxels = np.zeros_like(batch.taxels)
+        for part in _parts(taxels.shape[2]):
+            codes, code_came = _received(traffic, line, _width(part), partial(_payloads, scanner.Analog.KIND, part))
+            last = _newest(code_came)
+            newest = np.take_along_axis(codes, np.maximum(last, 0)[:, :, None], axis=1)[:, :, _HEAD:]
+            taxels[:, :, part] = np.ascontiguousarray(newest).view("<u2") * (last >= 0)[:, :, None]
+            came &= code_came
+            batch.settled = batch.settled & code_came.any(axis=1)
+        batch.taxels = taxels
+    batch.lost = ~came
 
 
 def _states(bits: Bits) -> Bytes:
@@ -81,6 +98,36 @@ def _states(bits: Bits) -> Bytes:
         for number, payload in enumerate(repetition)
     ]
     return _matrix(sent, bits.shape[:2])
+
+
+# Time and token of an ANALOG, before its codes.
+_HEAD = scanner.Analog.LAYOUT.size
+
+
+def _parts(taxels: int) -> list[slice]:
+    """Return the taxels of each ANALOG: as many as it has room for."""
+    return [slice(first, min(first + scanner.MOST_ASKED, taxels)) for first in range(0, taxels, scanner.MOST_ASKED)]
+
+
+def _width(part: slice) -> int:
+    return _HEAD + 2 * int(part.stop - part.start)
+
+
+def _analogs(taxels: NDArray[np.uint16] | None) -> list[Bytes]:
+    if taxels is None:
+        return []
+    sent = []
+    for part in _parts(taxels.shape[2]):
+        # The first of its taxels for a token tells an ANALOG from the others.
+        head = scanner.Analog.LAYOUT.pack(0, part.start)
+        codes = taxels[:, :, part].astype("<u2")
+        frames = [
+            scanner.encode(scanner.Frame(scanner.Analog.KIND, number & 0xFF, head + one.tobytes()))
+            for repetition in codes
+            for number, one in enumerate(repetition)
+        ]
+        sent.append(_matrix(frames, taxels.shape[:2]))
+    return sent
 
 
 def _records(raw: Bytes) -> Bytes:
@@ -126,9 +173,16 @@ def _decoded(data: Bytes, at_us: Integers, feed: Feed) -> Iterator[tuple[int, by
         start = zero + 1
 
 
-def _payloads() -> Feed:
+def _payloads(kind: int, part: slice | None = None) -> Feed:
     decoder = scanner.FrameDecoder()
-    return lambda chunk: [frame.payload for frame in decoder.feed(chunk) if frame.kind == scanner.STATE]
+
+    def feed(chunk: bytes) -> list[bytes]:
+        found = [frame.payload for frame in decoder.feed(chunk) if frame.kind == kind]
+        return (
+            found if part is None else [each for each in found if len(each) >= _HEAD and each[_HEAD - 1] == part.start]
+        )
+
+    return feed
 
 
 def _sensors() -> Feed:
@@ -145,7 +199,7 @@ SEND = Effect(
     name="glove.send",
     summary="puts frames and records on the serial lines as bytes",
     stage="wire",
-    reads=("bits", "raw", "frame_us", "delay_us"),
+    reads=("bits", "raw", "frame_us", "delay_us", "taxels"),
     writes=("traffic",),
     on_wire=True,
     prepare=_send,
@@ -154,8 +208,8 @@ RECEIVE = Effect(
     name="glove.receive",
     summary="decodes the bytes that arrive, as a driver does",
     stage="wire",
-    reads=("traffic", "bits", "settled"),
-    writes=("bits", "raw", "lost", "settled"),
+    reads=("traffic", "bits", "settled", "taxels"),
+    writes=("bits", "raw", "lost", "settled", "taxels"),
     on_wire=True,
     prepare=lambda _parameters, _setting: receive,
 )

@@ -10,16 +10,16 @@ import msgspec
 import numpy as np
 
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
-from thenar.drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, EmulatedI2c
-from thenar.drivers.emulated.scanner import EmulatedScanner
+from thenar.drivers.emulated.i2c import AdapterKind, EmulatedBus, EmulatedChip, EmulatedI2c, EmulatedSpi
+from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
 from thenar.drivers.emulated.serial_line import PtyLine
-from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
-from thenar.runtime.sources.cyberglove import sensors_of
+from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, SpiWiring
 
 from ..effects import wire_damaged_bytes, wire_lost_bytes
 from ..scenes.scene import Scene
 
 _ALL_HIGH = (1 << 24) - 1
+_CODE_BITS = 16
 
 
 def levels_of(chip: ChipWiring, closed: Sequence[bool], numbers: Mapping[str, int]) -> int:
@@ -29,6 +29,12 @@ def levels_of(chip: ChipWiring, closed: Sequence[bool], numbers: Mapping[str, in
     """
     shut = sum(1 << pin for pin, name in chip.numbered_pins.items() if name in numbers and closed[numbers[name]])
     return shut if chip.closed == "high" else _ALL_HIGH & ~shut
+
+
+def codes_of(chip: ChipWiring | SpiWiring, taxels: Sequence[int], numbers: Mapping[str, int]) -> int:
+    """Return the counts at a converter's channels, 16 bits each; a taxel that is not among `numbers` is at 0."""
+    pins = chip.numbered_pins.items()
+    return sum(taxels[numbers[name]] << _CODE_BITS * channel for channel, name in pins if name in numbers)
 
 
 Cable = Callable[[bytes], bytes]
@@ -63,7 +69,7 @@ class Bench:
     """Emulated devices for every device of `harness`, their serial ports linked in `folder`.
 
     harness      the same harness with the ports where the emulated devices are
-    environment  what a process needs besides its own environment to see the emulated I2C buses
+    environment  what a process needs besides its own environment to see the emulated I2C buses and SPI devices
     lines        the serial lines, the CyberGlove's first, then the scanners'
     """
 
@@ -74,12 +80,15 @@ class Bench:
         folder: Path,
         cable: Callable[[int], Cable | None] = lambda _line: None,
         adapter: AdapterKind = "any",
+        taxel_names: Sequence[str] = (),
+        bits: int = 10,
     ) -> None:
-        """Start the devices. cable(n) is what happens to the messages of serial line n.
+        """Start the devices. cable(n) is what happens to the messages of serial line n; boards convert to so many bits.
 
         Raises DeviceError if something that emulates is not installed.
         """
         self._numbers = {name: number for number, name in enumerate(switch_names)}
+        self._taxels = {name: number for number, name in enumerate(taxel_names)}
         self._folder, self._cable = folder, cable
         self.lines: list[PtyLine] = []
         with ExitStack() as stack:
@@ -87,16 +96,21 @@ class Bench:
             if harness.cyberglove is not None:
                 baud = harness.cyberglove.baud
                 line = self._line("cyberglove", _USUAL_BAUD if baud == "auto" else baud, stack)
-                self.glove = stack.enter_context(EmulatedCyberGlove(line, sensors=sensors_of(harness.cyberglove)))
+                self.glove = stack.enter_context(EmulatedCyberGlove(line, sensors=harness.cyberglove.all_sensors))
             self.scanners = tuple(
                 stack.enter_context(
-                    EmulatedScanner(self._line(f"scanner{number}", wiring.baud, stack), len(wiring.switches))
+                    EmulatedScanner(
+                        self._line(f"scanner{number}", wiring.baud, stack),
+                        len(wiring.switches),
+                        board=ScannerBoard(1, max(len(wiring.switches), 1), channels=len(wiring.taxels), bits=bits),
+                    )
                 )
                 for number, wiring in enumerate(harness.scanners)
             )
             self.i2c: EmulatedI2c | None = None
-            if harness.buses:
-                self.i2c = stack.enter_context(EmulatedI2c([_emulated(bus, adapter) for bus in harness.buses]))
+            if harness.buses or harness.spi:
+                spi = [EmulatedSpi(wiring.device, wiring.kind) for wiring in harness.spi]
+                self.i2c = stack.enter_context(EmulatedI2c([_emulated(bus, adapter) for bus in harness.buses], spi))
             self._stack = stack.pop_all()
         self.harness = _moved(harness, folder)
         self.environment = {} if self.i2c is None else self.i2c.environment
@@ -107,16 +121,23 @@ class Bench:
         self.lines.append(line)
         return line
 
-    def show(self, closed: Sequence[bool], sensors: bytes) -> None:
-        """Put one frame on all devices: which switches (s,) are closed, and the glove's sensors."""
+    def show(self, closed: Sequence[bool], sensors: bytes, taxels: Sequence[int] = ()) -> None:
+        """Put one frame on all devices: switches (s,) that are closed, the glove's sensors, the taxels' counts (t,)."""
         if self.glove is not None:
             self.glove.set(sensors)
         for scanner, wiring in zip(self.scanners, self.harness.scanners, strict=True):
             keys = [self._numbers.get(name) for name in wiring.switches]
             scanner.set(sum(1 << key for key, number in enumerate(keys) if number is not None and closed[number]))
+            numbers = [self._taxels.get(name) for name in wiring.taxels]
+            scanner.press([0 if number is None else taxels[number] for number in numbers])
         if self.i2c is not None:
-            buses = self.harness.buses
-            self.i2c.set_all([[levels_of(chip, closed, self._numbers) for chip in bus.chips] for bus in buses])
+            spi = [[codes_of(chip, taxels, self._taxels)] for chip in self.harness.spi]
+            self.i2c.set_all(
+                [*([self._levels(chip, closed, taxels) for chip in bus.chips] for bus in self.harness.buses), *spi]
+            )
+
+    def _levels(self, chip: ChipWiring, closed: Sequence[bool], taxels: Sequence[int]) -> int:
+        return codes_of(chip, taxels, self._taxels) if chip.measures else levels_of(chip, closed, self._numbers)
 
     def close(self) -> None:
         """Stop all devices and take their ports away."""

@@ -1,7 +1,7 @@
 """What an emulated glove plays of a scene, a set of grasps or a recording, and the playing of it."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Event
 from time import monotonic_ns
@@ -10,13 +10,14 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.recordings.graspset import CODES, GraspSet, Joint
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.frames import GloveFrame, SwitchFrame
 from thenar.runtime.published import UNKNOWN, LiveGrasp
 from thenar.runtime.recording.messages import switch_matrix
 from thenar.runtime.recording.reader import Reader, check_made
 from thenar.runtime.recording.session import Label
+from thenar.runtime.taxels import TaxelCalibration, TaxelLine
 
 from ..body.cyberglove import SENSORS, USED, Calibration
 from ..errors import SceneError
@@ -25,6 +26,7 @@ from ..scenes.scene import Scene
 
 Bits = NDArray[np.bool_]
 Bytes = NDArray[np.uint8]
+Codes = NDArray[np.uint16]
 
 _WIRE = "wire."
 # Takes of every frame that is shown its number, its grasp type, and the monotonic clock in microseconds.
@@ -40,6 +42,8 @@ class Performance:
     grasps       (F,) str          the grasp types that are being made
     period_us                      from one frame to the next
     calibration  what the bytes mean on this subject's hand
+    taxels       (F, t) uint16     taxel_names  t names
+    taxel_calibration  what the taxels' counts mean; None: counts
     """
 
     switches: Bits
@@ -48,11 +52,18 @@ class Performance:
     grasps: NDArray[np.str_]
     period_us: int
     calibration: GloveCalibration
+    taxels: Codes = field(default_factory=lambda: np.empty((0, 0), np.uint16))
+    taxel_names: tuple[str, ...] = ()
+    taxel_calibration: TaxelCalibration | None = None
+
+    def __post_init__(self) -> None:
+        if not self.taxel_names:
+            object.__setattr__(self, "taxels", np.empty((len(self), 0), np.uint16))
 
     def __len__(self) -> int:
         return len(self.switches)
 
-    def play(self, show: Callable[[list[bool], bytes], None], log: Log, stop: Event) -> bool:
+    def play(self, show: Callable[[list[bool], bytes, list[int]], None], log: Log, stop: Event) -> bool:
         """Show all frames once, each `period_us` after the one before, whatever showing them takes: lateness does not
         add up. Returns False if `stop` was set before the last one had its time.
         """
@@ -61,7 +72,7 @@ class Performance:
             now_us = monotonic_ns() // 1000
             if stop.wait(max(start_us + row * self.period_us - now_us, 0) / 1e6):
                 return False
-            show(self.switches[row].tolist(), self.sensors[row].tobytes())
+            show(self.switches[row].tolist(), self.sensors[row].tobytes(), self.taxels[row].tolist())
             log(row, str(self.grasps[row]), monotonic_ns() // 1000)
         return not stop.wait(self.period_us / 1e6)
 
@@ -93,6 +104,9 @@ def of_scene(scene: Scene, subject: str | None = None, jobs: int = -1, progress:
         grasps=grasp_set.grasps,
         period_us=period_us,
         calibration=_in_points(calibration, one.name),
+        taxels=grasp_set.taxels,
+        taxel_names=tuple(taxel.name for taxel in grasp_set.taxel_columns),
+        taxel_calibration=_taxel_calibration(grasp_set.taxel_columns),
     )
 
 
@@ -116,8 +130,41 @@ def of_set(grasp_set: GraspSet, period_us: int, calibration: GloveCalibration | 
         order = np.argsort(given, kind="stable")
         sensors[:, SENSORS.index(joint.name)] = raw[order][_nearest(given[order], codes)]
     return Performance(
-        grasp_set.switches, grasp_set.switch_names, sensors, grasp_set.grasps, period_us, calibration=meant
+        grasp_set.switches,
+        grasp_set.switch_names,
+        sensors,
+        grasp_set.grasps,
+        period_us,
+        calibration=meant,
+        taxels=grasp_set.taxels,
+        taxel_names=tuple(taxel.name for taxel in grasp_set.taxel_columns),
+        taxel_calibration=_taxel_calibration(grasp_set.taxel_columns),
     )
+
+
+def _taxel_calibration(columns: tuple[Joint, ...]) -> TaxelCalibration | None:
+    """Return what says of codes that are played as counts what they mean; None where that is the counts themselves.
+
+    Raises SceneError where no calibration of a glove can say it.
+    """
+    meant = [taxel for taxel in columns if (taxel.code_a, taxel.code_b) != (taxel.value_a, taxel.value_b)]
+    if not meant:
+        return None
+    lines = []
+    for taxel in meant:
+        rest = round(float(taxel.code(0.0)))
+        press = max((taxel.code_a, taxel.code_b), key=lambda code: abs(code - rest))
+        value = float(taxel.value(press))
+        if (
+            taxel.unit != meant[0].unit
+            or not (0 <= rest < CODES and value > 0)
+            or abs(taxel.value(rest)) > 1e-6 * value
+        ):
+            raise SceneError(
+                f"taxel {taxel.name!r}: its codes cannot be a converter's counts of {meant[0].unit}: 0 is no code of it"
+            )
+        lines.append(TaxelLine(taxel.name, rest, press, value))
+    return TaxelCalibration(unit=meant[0].unit, taxels=tuple(lines))
 
 
 def _nearest(rising: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.intp]:
@@ -156,8 +203,8 @@ def _in_points(calibration: Calibration, subject: str) -> GloveCalibration:
     )
 
 
-# The switches, the sensors, and the grasp type of one moment.
-Moment = tuple[int, bytes, str]
+# The switches, the sensors, the taxels, and the grasp type of one moment.
+Moment = tuple[int, bytes, tuple[int, ...], str]
 
 
 def of_recording(path: Path, period_us: int, warn: Callable[[str], None] = lambda _: None) -> Performance:
@@ -175,15 +222,18 @@ def of_recording(path: Path, period_us: int, warn: Callable[[str], None] = lambd
         raise SceneError(f"{path.name}: holds no frame of a glove")
     names = reader.session.switches
     assert reader.end is not None
-    width = len(names) + len(rows[0][1]) + 4 * max(len(grasp) for _, _, grasp in rows)
+    width = len(names) + len(rows[0][1]) + 2 * len(rows[0][2]) + 4 * max(len(grasp) for *_, grasp in rows)
     check_made(f"{path.name}: what it plays", len(rows) * width, reader.end.size)
     return Performance(
-        switches=switch_matrix([closed for closed, _, _ in rows], len(names)),
+        switches=switch_matrix([closed for closed, *_ in rows], len(names)),
         switch_names=names,
-        sensors=np.frombuffer(b"".join(sensors for _, sensors, _ in rows), np.uint8).reshape(len(rows), -1),
-        grasps=np.array([grasp for _, _, grasp in rows]),
+        sensors=np.frombuffer(b"".join(sensors for _, sensors, *_ in rows), np.uint8).reshape(len(rows), -1),
+        grasps=np.array([grasp for *_, grasp in rows]),
         period_us=period_us,
         calibration=calibration,
+        taxels=np.array([codes for _, _, codes, _ in rows], np.uint16),
+        taxel_names=reader.session.taxels,
+        taxel_calibration=reader.session.taxel_calibration,
     )
 
 
@@ -191,20 +241,24 @@ def _ticks(reader: Reader, rest: bytes, period_us: int) -> Iterator[Moment]:
     """Yield a moment every `period_us`, from when all devices that the recording names have been read."""
     closed: int | None = 0 if not reader.session.switches else None
     sensors: bytes | None = rest if not reader.session.sensors else None
+    codes = None if reader.session.taxels else tuple[int, ...]()
     grasp, due_us = UNKNOWN, None
     for entry in reader:
         if isinstance(entry, SwitchFrame):
             closed = entry.closed
+            if entry.taxels is not None:
+                before = codes or (0,) * len(entry.taxels)
+                codes = tuple(old if code is None else code for old, code in zip(before, entry.taxels, strict=True))
         elif isinstance(entry, GloveFrame):
             sensors = entry.sensors
         elif isinstance(entry, LiveGrasp | Label):
             grasp = entry.grasp
         else:
             continue
-        if closed is None or sensors is None:
+        if closed is None or sensors is None or codes is None:
             continue
         if due_us is None:
             due_us = entry.time_us
         if entry.time_us >= due_us:
-            yield closed, sensors, grasp
+            yield closed, sensors, codes, grasp
             due_us += period_us

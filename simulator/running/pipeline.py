@@ -18,6 +18,7 @@ from ..errors import SceneError
 from ..pipeline.batch import Batch
 from ..pipeline.effect import EFFECTS, Effect, Place, Setting, Step, Together, in_order
 from ..pipeline.glove import STEPS
+from ..pipeline.taxels import STEPS as TAXEL_STEPS
 from ..scenes.scene import Scene
 from ..streams import Draw, Draws
 
@@ -139,6 +140,7 @@ def compile_pipeline(scene: Scene, without: str | None = None) -> Pipeline:
     """
     listed = list(_listed(scene, without))
     setting = scene.setting(place.effect for place in listed)
+    _check_taxels(listed, setting)
     own = [Place(effect, own=True) for effect in _own_steps(setting)]
     ordered = in_order([*own, *listed])
     acts = {place.effect.name: _prepared(place, setting) for place in own}
@@ -180,11 +182,21 @@ def _check_without(names: list[str], without: str | None) -> None:
 
 
 def _own_steps(setting: Setting) -> tuple[Effect, ...]:
+    steps = (*STEPS, *TAXEL_STEPS) if setting.taxels else STEPS
     if not setting.on_wire:
-        return STEPS
+        return steps
     from ..pipeline.wire import RECEIVE, SEND
 
-    return (*STEPS, SEND, RECEIVE)
+    return (*steps, SEND, RECEIVE)
+
+
+def _check_taxels(listed: Sequence[Place], setting: Setting) -> None:
+    for place in listed:
+        name = place.effect.name
+        if not setting.taxels and {"taxels", "taxels_n"} & {*place.effect.writes}:
+            raise SceneError(
+                f'effects.{name}: the glove has no taxels: say in [glove] which places are, as taxels = "all"'
+            )
 
 
 def _prepared(place: Place, setting: Setting) -> Together:

@@ -86,8 +86,9 @@ Codes = NDArray[np.uint16]
 class Rows:
     """m rows, s switches.
 
-    bits      (m, ceil(s / 8)) uint8   eight switches to the byte, the first in the highest bit
+    bits      (m, ceil(s / 8)) uint8   eight places to the byte, the first in the highest bit
     codes     (m, 16) uint16           the joints
+    taxels    (m, t) uint16
     condition (m,) uint32              number of the condition
     trial     (m,) uint32              place in the subject's session
     read_out  (m,) bool                the row of its repetition that is read while the object is held
@@ -95,6 +96,7 @@ class Rows:
 
     bits: NDArray[np.uint8]
     codes: Codes
+    taxels: Codes
     condition: NDArray[np.uint32]
     trial: NDArray[np.uint32]
     read_out: Bits
@@ -105,7 +107,7 @@ class Rows:
     def pick(self, index: Places) -> "Rows":
         """Return the rows that `index` picks, in its order."""
         picked = (self.condition[index], self.trial[index], self.read_out[index])
-        return Rows(self.bits[index], self.codes[index], *picked)
+        return Rows(self.bits[index], self.codes[index], self.taxels[index], *picked)
 
 
 def rows_of(batch: Batch, kept: Places, number: int, codes: Codes, held: int, *, every_frame: bool) -> Rows:
@@ -119,6 +121,7 @@ def rows_of(batch: Batch, kept: Places, number: int, codes: Codes, held: int, *,
     return Rows(
         bits=np.packbits(batch.bits[each], axis=1),
         codes=codes[each],
+        taxels=np.zeros((m, 0), np.uint16) if batch.taxels is None else batch.taxels[each],
         condition=np.full(m, number, dtype=np.uint32),
         trial=batch.trials[each[0]].astype(np.uint32),
         read_out=each[1] == held,
@@ -138,13 +141,19 @@ def joined(blocks: Sequence[Rows], subject: Places) -> Rows:
 def grasp_set(
     rows: Rows,
     conditions: Sequence[Condition],
-    switches: tuple[str, ...],
+    places: tuple[str, ...],
+    taxels: tuple[Joint, ...],
     joints: tuple[Joint, ...],
     taxonomy: Taxonomy,
     simulated: str,
 ) -> GraspSet:
-    """Return the set of grasps that `rows` of these conditions make; `simulated` says what made them."""
-    bits = np.unpackbits(rows.bits, axis=1, count=len(switches)).view(np.bool_)
+    """Return the set of grasps that `rows` of these conditions make; `simulated` says what made them.
+
+    Of the places of the glove, those that are no taxels are switches.
+    """
+    bits = np.unpackbits(rows.bits, axis=1, count=len(places)).view(np.bool_)
+    bits = bits if not taxels else bits[:, ~np.isin(places, [taxel.name for taxel in taxels])]
+    switches = tuple(place for place in places if place not in {taxel.name for taxel in taxels})
     bits.setflags(write=False)  # so that it is not copied
     grasps, subjects, objects = (
         np.array(names, dtype=np.str_)[rows.condition]
@@ -152,7 +161,9 @@ def grasp_set(
     )
     trials = rows.trial.astype(np.int64)
     read = (bits, switches, rows.codes, joints)
-    return GraspSet(*read, grasps, taxonomy, subjects, objects, trials, simulated)
+    return GraspSet(
+        *(*read, grasps, taxonomy, subjects, objects, trials, simulated), taxels=rows.taxels, taxel_columns=taxels
+    )
 
 
 class GraspReport(msgspec.Struct, frozen=True):

@@ -8,7 +8,7 @@ from time import perf_counter
 import numpy as np
 
 from thenar.compiler.elementary import Floats
-from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import published
 from thenar.compiler.workers import in_workers
 
@@ -18,6 +18,7 @@ from ..body.layout import murakami160
 from ..errors import SceneError
 from ..pipeline.batch import Batch, Integers
 from ..pipeline.effect import at_a_time, hold_frame
+from ..pipeline.taxels import IDEAL, Converter, taxel_places
 from ..planning.postures import Postures
 from ..scenes.scene import Scene, Subject
 from ..streams import Draw, Draws
@@ -153,7 +154,7 @@ def simulate(
     if not len(rows):
         why = _unsettled(scene, made)[0].why
         raise SceneError(f"scene {scene.name}: none of its {total} repetitions can be trusted; of the first, {why}")
-    found = _set_of(scene, plan, rows)
+    found = _set_of(scene, plan, rows, _taxels(scene, without))
     return Simulated(found, _report(scene, rows, found, made, perf_counter() - start, keep_unsettled=keep_unsettled))
 
 
@@ -205,11 +206,18 @@ def _gathered(answers: Iterator[_Done], total: int, progress: Progress | None) -
     return everything
 
 
-def _set_of(scene: Scene, plan: Sequence[Session], rows: Rows) -> GraspSet:
+def _taxels(scene: Scene, without: str | None) -> tuple[Joint, ...]:
+    """Return what the counts of the scene's taxels mean: as the effect that makes them has it."""
+    listed = (each.parameters for each in scene.effects if each.name != without)
+    converter = next((each for each in listed if isinstance(each, Converter)), IDEAL)
+    return tuple(converter.column(murakami160()[place].name) for place in taxel_places(scene.glove.taxels))
+
+
+def _set_of(scene: Scene, plan: Sequence[Session], rows: Rows, taxels: tuple[Joint, ...]) -> GraspSet:
     conditions = [condition for session in plan for condition in session.conditions]
-    switches = tuple(patch.name for patch in murakami160())
+    places = tuple(patch.name for patch in murakami160())
     joints = raw_joints() if scene.glove.codes == "raw" else common_joints()
-    return grasp_set(rows, conditions, switches, joints, published(scene.taxonomy), scene.origin)
+    return grasp_set(rows, conditions, places, taxels, joints, published(scene.taxonomy), scene.origin)
 
 
 def _report(scene: Scene, rows: Rows, found: GraspSet, made: _Done, seconds: float, *, keep_unsettled: bool) -> Report:

@@ -23,6 +23,7 @@ from ..body.hand import Hand, Size
 from ..body.shapes import Shape
 from ..errors import SceneError
 from ..pipeline.effect import Effect, EffectParameters, Setting
+from ..pipeline.taxels import taxel_places
 from ..streams import Draw, Draws, Site
 
 # No hand is smaller or larger.
@@ -77,12 +78,17 @@ class Recording(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
 class Glove(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The glove: where its switches lie, what closes them, and whether joint codes are the sensors' bare bytes ("raw")
-    or mapped through every subject's calibration to one scale ("common").
+    or mapped through every subject's calibration to one scale ("common"). The places `taxels`, by their names or those
+    of their segments, bear taxels instead of switches.
     """
 
     layout: Literal["murakami160"] = "murakami160"
     threshold_n: Annotated[float, msgspec.Meta(gt=0.0, le=20.0)] = 1.0
     codes: Literal["common", "raw"] = "common"
+    taxels: Literal["all"] | tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        taxel_places(self.taxels)
 
 
 class Listed(NamedTuple):
@@ -154,6 +160,7 @@ class Scene(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             # Whoever wants every frame wants frames, whether or not an effect lives in time.
             timed=recording.rows == "all" or any(effect.timed for effect in effects),
             on_wire=any(effect.on_wire for effect in effects),
+            taxels=taxel_places(self.glove.taxels),
         )
 
     @property

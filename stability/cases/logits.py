@@ -3,10 +3,14 @@
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
+from typing import Any
 
 import numpy as np
 
 from thenar.compiler.additive.logit import BIAS_SHARE, BIN_SHARE, BINS, TOLERANCE, ColumnTables, fit_logit
+from thenar.compiler.additive.pairs import fit_pairs
+from thenar.compiler.tables.collapse import ScoreTables
 from thenar.compiler.tables.quantise import integer_scores, quantise
 from thenar.runtime.tables import LIMIT
 
@@ -54,6 +58,7 @@ def findings(full: bool) -> Iterator[Finding]:
         changed.see(float(not same or again.rows[-1].any()), at)
     yield from (worst.finding() for worst in (at_rest, large, overflow, wrong, changed))
     yield _copies()
+    yield from _pairs(full)
 
 
 def _fits(full: bool) -> Iterator[tuple[HardSet, tuple[float, float], bool]]:
@@ -94,7 +99,8 @@ def _unrest(hard: HardSet, tables: ColumnTables, pulls: tuple[float, float]) -> 
         two = len(edges) < 2
         pulled = [penalty] if two else [BIN_SHARE * penalty] * (len(edges) + 1)
         own = rows[1:2] if two else rows[:-1]
-        columns.append(Column((bins - two).tolist(), own.tolist(), pulled, [smoothness] * (len(pulled) - 1)))
+        steps = [(number, number + 1, smoothness) for number in range(len(pulled) - 1)]
+        columns.append(Column((bins - two).tolist(), own.tolist(), pulled, steps))
     largest = largest_derivative(columns, hard.labels.tolist(), weights.tolist())
     allowed = TOLERANCE + (hard.n_classes + 20) * 2 * ROUNDING
     return float(largest / (allowed * float(weights.sum())))
@@ -110,3 +116,55 @@ def _copies() -> Finding:
         for one, other in ((0, 3), (1, 4), (2, 5), (-1, -2)):
             worst.see(float(not np.array_equal(rows[one], rows[other])), f"columns {one} and {other}, pulls {pulls}")
     return worst.finding()
+
+
+def _pairs(full: bool) -> Iterator[Finding]:
+    """Yield the same of tables of pairs of joints, where types are apart by two joints together, or by nothing."""
+    at_rest = Worst("largest derivative with pairs of joints", REFERENCE, 1.0, "x tolerance and rounding")
+    overflow = Worst("largest sum of integer tables with pairs", "what the tables prove", LIMIT, "steps")
+    wrong = Worst("frames of crossed joints not named right by integers", "their labels", 0.0, "frames")
+    changed = Worst("tables of pairs that rows in another order change", "themselves", 0.0, "tables")
+    for apart, (penalty, smoothness) in product((1, 1000), (USUAL, TINY, HUGE)):
+        random = np.random.default_rng(apart)
+        codes = random.integers(0, 4, (160 if full else 60, 4)).astype(np.uint16) * np.uint16(apart)
+        labels = ((codes[:, 0] > apart) ^ (codes[:, 1] > apart)).astype(np.intp)
+        none, order = np.zeros((len(codes), 0), bool), random.permutation(len(codes))
+        own: dict[str, Any] = {"penalty": penalty, "smoothness": smoothness, "pair_smoothness": smoothness}
+        for answers, parted in ((labels, penalty < 1), (random.permutation(labels), False)):
+            tables, again = (
+                fit_pairs(none[rows], codes[rows], answers[rows], 2, max_bins=8, **own) for rows in (slice(None), order)
+            )
+            at = f"codes {apart} apart, penalty {penalty:g}"
+            at_rest.see(_pairs_unrest(tables, codes, answers, penalty, smoothness), at)
+            integers = quantise(tables, none, codes)
+            overflow.see(float(integers.bound), at)
+            if parted:
+                named = integer_scores(integers, none, codes).argmax(axis=1)
+                wrong.see(float(np.count_nonzero(named != answers)), at, len(codes))
+            same = zip(_numbers(tables), _numbers(again), strict=True)
+            changed.see(float(not all(np.array_equal(one, other) for one, other in same)), at)
+    yield from (worst.finding() for worst in (at_rest, overflow, wrong, changed))
+
+
+def _numbers(tables: ScoreTables) -> list[np.ndarray]:
+    return [tables.bias, *tables.joint_rows, *(pair.rows for pair in tables.pairs)]
+
+
+@precisely()
+def _pairs_unrest(
+    tables: ScoreTables, codes: np.ndarray, labels: np.ndarray, penalty: float, smoothness: float
+) -> float:
+    columns, pull = [Column([0] * len(codes), [tables.bias.tolist()], [BIAS_SHARE * penalty], [])], BIN_SHARE * penalty
+    for steps, rows, x in zip(tables.thresholds, tables.joint_rows, codes.T, strict=True):
+        between = [(bin_, bin_ + 1, smoothness) for bin_ in range(len(steps))]
+        columns.append(Column(np.searchsorted(steps, x).tolist(), rows.tolist(), [pull] * len(rows), between))
+    for pair in tables.pairs:
+        down, across = pair.rows.shape[:2]
+        one, other = (np.searchsorted(t, codes[:, a]) for a, t in zip(pair.joints, pair.thresholds, strict=True))
+        cells = np.arange(down * across).reshape(down, across)
+        both = zip([*cells[1:].flat, *cells[:, 1:].flat], [*cells[:-1].flat, *cells[:, :-1].flat], strict=True)
+        between = [(int(b), int(a), smoothness) for a, b in both]
+        flat = pair.rows.reshape(down * across, -1).tolist()
+        columns.append(Column((one * across + other).tolist(), flat, [pull] * len(flat), between))
+    largest = largest_derivative(columns, labels.tolist(), [1.0] * len(codes))
+    return float(largest / ((TOLERANCE + 22 * 2 * ROUNDING) * len(codes)))

@@ -13,6 +13,7 @@ from thenar.compiler.evaluation.populations import Population, Scheme, populatio
 from thenar.compiler.evaluation.rates import ALIKE, UNITS, WEIGHT, Rate, clustered
 from thenar.compiler.evaluation.study import Options, evaluate
 from thenar.compiler.evaluation.tables import Cell
+from thenar.compiler.placement.elements import elements_of
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.trainers.base import Training
 from thenar.runtime.manifest import Unit
@@ -57,10 +58,11 @@ def differs(cell: Cell, tested: NDArray[np.intp]) -> bool:
 def guessed_untrained(grasp_set: GraspSet, scheme: Scheme) -> int:
     """Return how many tested rows are taken for a class that their fold was not trained on."""
     data = Data.of(grasp_set)
+    elements, joints = elements_of(data.samples), tuple(range(len(grasp_set.joints)))
     wrong = 0
     for part in parts_of(grasp_set, scheme):
         for fold in part.folds:
-            fit = FoldFit(fold, tuple(range(data.X.shape[1])), part.grasps, len(grasp_set.switch_names))
+            fit = FoldFit(fold, elements, joints, part.grasps)
             found = predictions(data, fit, Training("logitboost", {"rounds": 10}))
             wrong += int((~np.isin(found, data.labels[fold.train])).sum())
     return wrong

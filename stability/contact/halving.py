@@ -18,8 +18,8 @@ from thenar.simulator.contact.balance import USUAL, Pace
 from thenar.simulator.contact.model import Contact, Load
 from thenar.simulator.effects import contact_mujoco, switch_threshold
 from thenar.simulator.effects.contact_quasistatic import Parameters, Quasistatic
-from thenar.simulator.effects.contact_ramp import crossings
 from thenar.simulator.pipeline.batch import SLID_OUT_MM
+from thenar.simulator.pipeline.ramp import crossings
 from thenar.simulator.planning.postures import Postures
 from thenar.simulator.running.simulation import conditions_of
 from thenar.simulator.scenes.decode import load_scene

@@ -16,12 +16,12 @@ Rows = Sequence[Sequence[float]]
 
 
 class Column(NamedTuple):
-    """The row that each frame adds (n,), -1: none; rows (r, K), what pulls each (r,), and each to the next (r - 1,)."""
+    """The row that each frame adds (n,), -1: none; rows (r, K), what pulls each (r,), and some of them together."""
 
     added: Sequence[int]
     rows: Rows
     pulls: Sequence[float]
-    smoothness: Sequence[float]
+    smoothness: Sequence[tuple[int, int, float]]
 
 
 @precisely()
@@ -51,8 +51,8 @@ def _held(column: Column, sums: list[list[mpf]]) -> list[list[mpf]]:
     rows = [[mpf(entry) for entry in row] for row in column.rows]
     for row, pull, own in zip(rows, column.pulls, sums, strict=True):
         own[:] = [total + mpf(pull) * entry for total, entry in zip(own, row, strict=True)]
-    for number, smoothness in enumerate(column.smoothness):
-        steps = [mpf(smoothness) * (b - a) for a, b in zip(rows[number], rows[number + 1], strict=True)]
-        sums[number] = [total - step for total, step in zip(sums[number], steps, strict=True)]
-        sums[number + 1] = [total + step for total, step in zip(sums[number + 1], steps, strict=True)]
+    for one, other, smoothness in column.smoothness:
+        steps = [mpf(smoothness) * (b - a) for a, b in zip(rows[one], rows[other], strict=True)]
+        sums[one] = [total - step for total, step in zip(sums[one], steps, strict=True)]
+        sums[other] = [total + step for total, step in zip(sums[other], steps, strict=True)]
     return sums

@@ -9,6 +9,7 @@ from thenar.compiler import GraspSet, compile_build
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
+from thenar.drivers.emulated.cyberglove_box import Doubts
 from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
 from thenar.drivers.emulated.serial_line import PtyLine
 
@@ -36,13 +37,28 @@ def calibrated(harness: Path, *joints: str) -> None:
     harness.write_text(harness.read_text() + 'calibration = "anna.toml"\n')
 
 
-def test_what_is_there_is_said_with_both_times(thenar: Thenar, harness: Path) -> None:
-    done = thenar("doctor", harness, "--json")
+def test_what_is_there_is_said_with_both_times_and_a_record_against_the_formula(thenar: Thenar, harness: Path) -> None:
+    before = harness.read_text() + "# mine\n"
+    harness.write_text(before)
+    done = thenar("doctor", harness, "--json", "--write")
     assert done.returncode == 0, done.stderr
-    (found,) = json.loads(done.stdout)
-    assert found["present"]
-    assert found["predicted_us"] > 0
-    assert found["measured_us"] > 0
+    found = json.loads(done.stdout)
+    assert [one["part"] for one in found[1:]] == ["a record", "a record of 9 sensors"]
+    assert all(one["present"] and one["measured_us"] > 0 for one in found)
+    assert [round(one["predicted_us"]) for one in found] == [6323, 6323, round(9 * 250 + 12 * 10e6 / 115_200)]
+    assert "of the vendor's formula, 6323 us" in found[1]["remarks"][0]
+    assert found[1]["measured_us"] > found[2]["measured_us"] > 0.9 * found[2]["predicted_us"]
+    measured = round(found[1]["measured_us"])
+    assert harness.read_text() == before.replace("[cyberglove]\n", f"[cyberglove]\nrecord_us = {measured}\n")
+    assert thenar("doctor", harness, "--write").returncode == 0
+    assert harness.read_text().count("record_us") == 1
+
+
+def test_a_box_without_a_mask_is_found(thenar: Thenar, harness: Path, glove: EmulatedCyberGlove) -> None:
+    glove.box.doubts = Doubts(mask="ignored")
+    done = thenar("doctor", harness)
+    assert done.returncode == 0, done.stderr
+    assert "it takes no sensor mask" in " ".join(done.stdout.split())
 
 
 def test_a_port_that_is_not_there_is_exit_code_1(thenar: Thenar, tmp_path: Path) -> None:

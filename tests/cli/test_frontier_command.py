@@ -5,12 +5,14 @@ import json
 import shutil
 import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from thenar.compiler import GraspSet
 from thenar.compiler.frontier.points import Frontier, frontier_from_bytes
+from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.runtime import Build
 
 Thenar = Callable[..., subprocess.CompletedProcess[str]]
@@ -49,6 +51,21 @@ def test_points_are_numbered_from_the_fastest_on(found: Frontier) -> None:
     assert [point.number for point in found.points] == list(range(1, len(found.points) + 1))
     times = [point.frame.us for point in found.points]
     assert times == sorted(times)
+
+
+def test_a_record_is_the_vendors_formula_unless_the_wire_alone_is_asked_for(
+    thenar: Thenar, small_set: GraspSet, tmp_path: Path
+) -> None:
+    joints = tuple(replace(joint, name=name) for joint, name in zip(small_set.joints, SENSORS_18, strict=False))
+    replace(small_set, joints=joints).save(tmp_path / "set.grasps")
+    few = ("--methods", "id3", "--rivals", "none", "--rounds", 2, "--finalists", 1, "--repeats", 1, "--jobs", 1)
+    wire_us = round(5 * 10e6 / 115_200)
+    for options, how, us in (((), "formula", 500 + wire_us), (("--record-time", "wire"), "wire", wire_us)):
+        done = thenar("frontier", tmp_path / "set.grasps", "-o", tmp_path / "frontier", *few, *options)
+        assert done.returncode == 0, done.stderr
+        points = frontier_from_bytes((tmp_path / "frontier" / "frontier.json").read_bytes()).points
+        transfers = [point.transfer for point in points if point.setting.inputs != "switches"]
+        assert {(transfer.how, round(transfer.us)) for transfer in transfers} == {(how, us)}
 
 
 def test_no_point_of_the_frame_front_is_beaten_by_another(found: Frontier) -> None:

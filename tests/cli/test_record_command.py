@@ -16,10 +16,12 @@ import pytest
 
 from thenar.cli import run
 from thenar.compiler import GraspSet
+from thenar.compiler.recordings.graspset import Joint
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
-from thenar.drivers.emulated.scanner import EmulatedScanner
+from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.runtime.recording.guide import read_journal
+from thenar.runtime.taxels import TaxelCalibration, TaxelLine
 
 # Collections over ptys, in real time.
 pytestmark = pytest.mark.slow
@@ -193,6 +195,38 @@ def test_after_a_kill_the_same_command_goes_on_where_it_was(folder: Path, start:
     code, text = third.finish()
     assert code == 0, text
     assert "4 of 4 trials are done" in text
+
+
+def test_pads_are_recorded_beside_the_rest_and_survive_a_kill(
+    folder: Path, start: Start, scanner: EmulatedScanner, glove: EmulatedCyberGlove
+) -> None:
+    taxels = 'taxels = ["p0", "p1"]\n[taxels]\ncalibration = "pads.toml"\n'
+    (folder / "glove.toml").write_text(GLOVE.format(folder=folder) + taxels)
+    (folder / "pads.toml").write_text(TaxelCalibration(unit="N", taxels=(TaxelLine("p0", 100, 900, 2.0),)).to_toml())
+    scanner.reboot(ScannerBoard(1, 4, channels=2))
+    scanner.press((500, 40))
+    first = start("--seed", "5")
+    first.until(rb"Enter: start the countdown")
+    first.press(b"\r")
+    reviewed(first, 1)
+    first.press(b"\r")
+    reviewed(first, 2)
+    os.killpg(first.process.pid, signal.SIGKILL)
+    first.process.wait()
+    second = start()
+    second.until(rb"Enter: start the countdown")
+    second.press(b"\r")
+    reviewed(second, 2)
+    second.press(b"\r")
+    reviewed(second, 3)
+    second.press(b"q")
+    code, said = second.finish()
+    assert code == 0, said
+    grasp_set = GraspSet.load(folder / "set.grasps")
+    assert grasp_set.taxels.tolist() == [[500, 40]] * 2
+    assert grasp_set.taxel_columns == (Joint("p0", "N", 100, 0.0, 900, 2.0), Joint("p1", "counts", 0, 0.0, 1, 1.0))
+    assert run(["import", str(folder / "set.mcap"), "-o", str(folder / "again.grasps")]) == 0
+    assert (folder / "again.grasps").read_bytes() == (folder / "set.grasps").read_bytes()
 
 
 def test_redone_and_left_is_what_was_accepted(folder: Path, start: Start, scanner: EmulatedScanner) -> None:

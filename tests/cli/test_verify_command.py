@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec import to_builtins
 from msgspec.structs import replace as replace_fields
 
 from thenar.cli.verify_command import print_firmware, verdict
@@ -134,3 +135,31 @@ def test_a_difference_is_shown_with_both_answers(capsys: pytest.CaptureFixture[s
     ]
     assert verdict(found).endswith("a fault of thenar or of the compiler: report it, with the first frame shown")
     assert "compile the build again" not in verdict(found)
+
+
+def test_faults_are_put_to_every_row_and_the_worst_are_in_build_json_report_and_spec(
+    thenar: Thenar, set_file: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "build"
+    done = thenar("compile", set_file, "-o", folder, "--rounds", "5", "--folds", "0")
+    assert done.returncode == 0, done.stderr
+    printed = thenar("verify", folder, set_file, "--faults").stdout.splitlines()
+    found = json.loads(thenar("verify", folder, set_file, "--faults", "--json").stdout)
+    manifest = manifest_from_bytes((folder / "build.json").read_bytes())
+    assert manifest.faults is not None
+    assert found["worst"] == json.loads(json.dumps(to_builtins(manifest.faults)))
+    assert [each["name"] for each in found["inputs"]] == [
+        *(switch.name for switch in manifest.switches),
+        *(joint.name for joint in manifest.joints),
+    ]
+    assert min(each["lost"] for each in found["inputs"]) == found["worst"]["lost"]["correct"]
+    assert min(each["stuck"] for each in found["inputs"]) == found["worst"]["stuck"]["correct"]
+    page, spec = (folder / "report.html").read_text(), json.loads((folder / "spec" / "spec.json").read_text())
+    assert spec["expected"]["faults"] == found["worst"]
+    for sentence in manifest.faults.sentences:
+        assert f"  {sentence}" in printed
+        assert f"<li>{sentence.replace(chr(39), '&#39;')}</li>" in page
+    assert f"worst of single inputs lost, rows trained on: {manifest.faults.sentences[0]}" in done.stdout
+    refused = thenar("verify", folder, set_file, "--faults", "--firmware", "host")
+    assert refused.returncode == 2
+    assert "take one of them" in refused.stderr

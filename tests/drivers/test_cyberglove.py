@@ -8,11 +8,12 @@ from itertools import pairwise, product
 from pathlib import Path
 from random import Random
 from time import monotonic, monotonic_ns
+from typing import Literal
 
 import pytest
 
 from thenar.drivers.cyberglove import CyberGlove
-from thenar.drivers.cyberglove_protocol import MASK_18, MASK_22, SENSORS_18, SENSORS_22, Record
+from thenar.drivers.cyberglove_protocol import MASK_18, MASK_22, SENSORS_18, SENSORS_22, Record, mask_of
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.cyberglove_box import CyberGloveBox, Doubts, GloveState
 from thenar.drivers.emulated.serial_line import PtyLine
@@ -21,7 +22,7 @@ from thenar.drivers.serial_line import SerialLine
 
 SOON_S = 10.0
 VALUES = {18: bytes(range(60, 78)), 22: bytes(range(80, 102))}
-DOUBTS = [Doubts(*choice) for choice in product([False, True], repeat=3)]
+DOUBTS = [Doubts(*choice) for choice in product([False, True], [False, True], [False, True])]
 
 
 @pytest.fixture
@@ -435,13 +436,84 @@ def test_a_glove_of_another_number_of_sensors_than_said_is_refused(line: PtyLine
         CyberGlove(str(line.link), sensors=18).open()
 
 
-def test_a_glove_that_another_program_masked_is_refused_with_the_reason(line: PtyLine) -> None:
-    with EmulatedCyberGlove(line):
+def test_a_mask_that_another_program_left_is_taken_off_and_where_that_cannot_be_the_glove_is_refused(
+    line: PtyLine,
+) -> None:
+    with EmulatedCyberGlove(line) as emulated:
         with SerialLine(str(line.link), 115_200) as other:
             other.write(b"M\3\0\0")
             assert other.read(SOON_S)
+        emulated.set(VALUES[18])
+        with CyberGlove(str(line.link)) as glove:
+            assert read(glove).sensors == VALUES[18]
+    with EmulatedCyberGlove(line, doubts=Doubts(mask="unknown")) as emulated:
+        emulated.state.apply("M", b"\3\0\0")
         with pytest.raises(DeviceError, match="sends 2 sensors, neither 18 nor 22: another program masked some"):
             CyberGlove(str(line.link)).open()
+
+
+@pytest.mark.parametrize("sensors", [18, 22])
+@pytest.mark.parametrize("mode", ["stream", "poll"])
+def test_only_the_sensors_that_are_wanted_are_sent_and_all_again_once_it_is_closed(
+    line: PtyLine, sensors: int, mode: Literal["stream", "poll"]
+) -> None:
+    some, names = (17, 4, 5), {18: SENSORS_18, 22: SENSORS_22}[sensors]
+    with EmulatedCyberGlove(line, sensors=sensors) as emulated:
+        emulated.set(VALUES[sensors])
+        with CyberGlove(str(line.link), mode=mode, only=some) as glove:
+            for _ in range(3):
+                assert read(glove).sensors == bytes(VALUES[sensors][place] for place in sorted(some))
+            assert glove.ask("M") == mask_of([names[place] for place in some])
+            assert glove.counts.wrong_length == 0
+        end = monotonic() + SOON_S
+        while emulated.state.settings["M"] != {18: MASK_18, 22: MASK_22}[sensors] and monotonic() < end:
+            threading.Event().wait(0.01)
+        assert emulated.state.settings["N"] == bytes([sensors])
+
+
+def test_a_masked_record_comes_as_much_sooner_as_the_formula_says(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line):
+        info = CyberGlove(str(line.link), only=(4, 5, 9)).open()
+        assert info.period_us == round(3 * 250 + 6 * 10e6 / 115_200)
+        assert (info.places, info.names, info.total) == ((4, 5, 9), tuple(SENSORS_18[n] for n in (4, 5, 9)), 18)
+
+
+@pytest.mark.parametrize("doubt", ["unknown", "ignored"])
+def test_a_box_that_does_not_say_that_it_took_the_mask_sends_all_and_this_is_said(
+    line: PtyLine, doubt: Literal["unknown", "ignored"], caplog: pytest.LogCaptureFixture
+) -> None:
+    with EmulatedCyberGlove(line, doubts=Doubts(mask=doubt)) as emulated:
+        emulated.set(VALUES[18])
+        glove = CyberGlove(str(line.link), only=(4, 5))
+        info = glove.open()
+        assert info.places == tuple(range(18))
+        assert info.unmasked == "it takes no sensor mask: all 18 sensors are read, though 2 are asked for"
+        assert info.unmasked in caplog.text
+        assert read(glove).sensors == VALUES[18]
+        glove.close()
+
+
+def test_a_box_that_says_it_took_the_mask_and_did_not_is_read_whole_the_next_time(line: PtyLine) -> None:
+    with EmulatedCyberGlove(line, doubts=Doubts(mask="feigned")) as emulated:
+        emulated.set(VALUES[18])
+        glove = CyberGlove(str(line.link), only=(4, 5))
+        assert glove.open().sensors == 2
+        with pytest.raises(DeviceError, match="has sent no record"):
+            read(glove)
+        info = glove.open()
+        assert info.unmasked == "its records are not what its sensor mask says: all 18 sensors are read"
+        assert read(glove).sensors == VALUES[18]
+        glove.close()
+
+
+@pytest.mark.parametrize("wanted", [False, True])
+def test_the_filter_is_set_as_it_is_wanted_and_slows_the_records_down(line: PtyLine, wanted: bool) -> None:
+    with EmulatedCyberGlove(line) as emulated:
+        emulated.state.apply("F", bytes([not wanted]))
+        glove = CyberGlove(str(line.link), filtered=wanted)
+        assert glove.open().period_us == round(18 * (375.6 if wanted else 250) + 21 * 10e6 / 115_200)
+        assert emulated.state.is_on("F") == wanted
+        glove.close()
 
 
 def answering(line: PtyLine, answers: dict[bytes, bytes]) -> None:

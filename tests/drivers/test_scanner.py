@@ -16,7 +16,7 @@ from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
 from thenar.drivers.emulated.serial_line import PtyLine
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.scanner import Scanner, ScannerReading
-from thenar.drivers.scanner_protocol import Event, FromBoard, Heartbeat, Hello, State, frame
+from thenar.drivers.scanner_protocol import Event, FromBoard, Heartbeat, Hello, SetChannels, State, frame
 
 KEYS = 160
 EVERY = (1 << KEYS) - 1
@@ -101,6 +101,109 @@ def test_times_go_forward_and_are_never_later_than_now(line: PtyLine, start: Cal
             times.append(reading.time_us)
         assert times == sorted(times)
         assert times[-1] - times[0] > 100_000
+
+
+CODES = [1023, 0, 512, None, 7]
+
+
+def measured(scanner: Scanner, codes: tuple[int | None, ...]) -> ScannerReading:
+    return until(scanner, lambda reading: reading.codes == codes)
+
+
+def test_it_measures_the_channels_that_are_asked_for(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:
+    board = start(1, 8, channels=5)
+    board.press(CODES)
+    board.set(0b101)
+    with driver(line) as scanner:
+        assert scanner.hello is not None
+        assert scanner.hello.has_analog
+        until(scanner, lambda reading: reading.closed == 0b101 and reading.codes is None)
+        scanner.set_channels(2000, 0b111010)
+        began = now_us()
+        reading = measured(scanner, (0, None, 7))
+        assert (reading.closed, reading.known) == (0b101, 0xFF)
+        assert began <= reading.time_us + scanner.times.clock.trip_us
+        assert reading.time_us <= now_us()
+        assert scanner.analog is not None
+        assert (scanner.analog.channels, scanner.analog.bits, scanner.analog.wanted) == (5, 10, 0b11010)
+        scanner.set_channels(2000, 0b00101)
+        measured(scanner, (1023, 512))
+        board.press([1, 2, 3])
+        measured(scanner, (1, 3))
+        assert scanner.counts.misfits == 0
+
+
+def test_keys_go_on_beside_the_codes(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:
+    board = start(1, 8, channels=5)
+    with driver(line) as scanner:
+        scanner.set_channels(2000, 0b1)
+        for closed in (1, 3, 2, 0x80, 0):
+            board.set(closed)
+            until(scanner, lambda reading, closed=closed: reading.closed == closed)  # type: ignore[misc]
+        assert scanner.counts.gaps == 0
+
+
+def test_no_faster_than_the_converter(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:
+    start(1, 8, channels=5, channel_us=1000)
+    with driver(line) as scanner:
+        scanner.set_channels(100, 0b11111)
+        until(scanner, lambda reading: reading.codes is not None)
+        assert scanner.analog is not None
+        assert scanner.analog.analog_us == 5000
+
+
+def test_a_board_that_restarts_measures_again(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:
+    board = start(1, 8, channels=5)
+    board.press(CODES)
+    with driver(line) as scanner:
+        scanner.set_channels(2000, 0b11)
+        measured(scanner, (1023, 0))
+        board.reboot()
+        board.press([5, 6])
+        measured(scanner, (5, 6))
+
+
+def test_channels_are_asked_for_until_they_are_answered(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:
+    start(1, 8, channels=5).press(CODES)
+    with driver(line) as scanner:
+        kind = scanner_protocol.Channels.KIND
+        lost: list[bytes] = []
+
+        def lose(data: bytes) -> bytes:
+            if len(lost) < 2 and data[1] == kind:
+                lost.append(data)
+                return b""
+            return data
+
+        line.damage = lose
+        scanner.set_channels(2000, 0b11)
+        measured(scanner, (1023, 0))
+        assert len(lost) == 2
+
+
+def test_a_board_of_version_1_is_understood_and_has_no_channels(
+    line: PtyLine, start: Callable[..., EmulatedScanner]
+) -> None:
+    board = start(1, 8)
+    with driver(line) as scanner:
+        assert scanner.hello is not None
+        assert not scanner.hello.has_analog
+        with pytest.raises(SettingError, match="no analog channels, its firmware speaks version 1"):
+            scanner.set_channels(2000, 1)
+        assert board.board.receive(scanner_protocol.encode(frame(SetChannels(1, 0, 0, 0), 0)), 0) == []
+        assert board.board.refused == 1
+
+
+def test_a_board_of_version_2_says_nothing_new_to_a_host_of_version_1() -> None:
+    """Which takes a HELLO of protocol 1 and 35 bytes, whatever its flags, and counts other kinds as misfits."""
+    board = ScannerBoard(1, 8, channels=5)
+    board.codes = CODES
+    sent = b"".join(board.boot(0))
+    for now in range(0, 200_000, 1000):
+        sent += b"".join(board.scan(now // 7 & 0xFF, now))
+    frames = scanner_protocol.FrameDecoder().feed(sent)
+    assert {found.kind for found in frames} == {Hello.KIND, Event.KIND, Heartbeat.KIND}
+    assert (frames[0].payload[0], len(frames[0].payload)) == (1, 35)
 
 
 def test_a_silent_board_times_out_in_time(line: PtyLine, start: Callable[..., EmulatedScanner]) -> None:

@@ -8,13 +8,18 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from thenar.drivers import scanner_protocol
+from thenar.drivers.errors import SettingError
 from thenar.drivers.scanner_protocol import (
     DEGRADED,
     MAX_PAYLOAD,
+    MOST_ASKED,
     MOST_KEYS,
     OVERHEAD,
     PROTOCOL,
     STATE,
+    UNREAD,
+    Analog,
+    Channels,
     Event,
     Faults,
     Frame,
@@ -28,6 +33,7 @@ from thenar.drivers.scanner_protocol import (
     Lost,
     MessageError,
     Ping,
+    SetChannels,
     SetDebounce,
     SetRate,
     State,
@@ -206,9 +212,15 @@ FROM_BOARD: st.SearchStrategy[FromBoard] = st.one_of(
     st.builds(Faults, U32, U32, U32, U32, U32),
     st.builds(Grasp, U32, U8, U16, U8),
     st.builds(Lost, CLOSED, st.just(KEYS)),
+    st.builds(Channels, U8, U8, st.integers(1, 15), U32, st.integers(0, (1 << 20) - 1), st.integers(20, 255)),
+    st.builds(Analog, U32, U8, st.lists(U16, max_size=MOST_ASKED).map(tuple)),
 )
 TO_BOARD: st.SearchStrategy[ToBoard] = st.one_of(
-    st.builds(SetRate, U32, U32, U32), st.builds(SetDebounce, U16, U16), st.just(GetState()), st.builds(Ping, U16)
+    st.builds(SetRate, U32, U32, U32),
+    st.builds(SetDebounce, U16, U16),
+    st.just(GetState()),
+    st.builds(Ping, U16),
+    st.builds(SetChannels, U8, U32, st.integers(0, (1 << 24) - 1), st.sampled_from([24, 32, 248])),
 )
 
 # Every message with its bytes, as docs/scanner-board.md draws them.
@@ -224,6 +236,9 @@ DRAWN: list[tuple[FromBoard | ToBoard, int, str]] = [
     (Faults(0x01020304, 1, 2, 3, 4), 0x05, "04030201 01000000 02000000 03000000 04000000"),
     (Grasp(0x01020304, 5, 0x0123, 0x03), 0x06, "04030201 05 2301 03"),
     (Lost(1 << 8 | 1 << 39, 40), 0x07, "00 01 00 00 80"),
+    (Channels(2, 0x2A, 10, 5000, 1 << 0 | 1 << 9 | 1 << 15, 20), 0x08, "02 2a 0a 88130000 14 01 82 00"),
+    (Analog(0x01020304, 0x2A, (0, 0x03FF, 0xFFFF)), 0x09, "04030201 2a 0000 ff03 ffff"),
+    (SetChannels(0x2A, 5000, 1 << 0 | 1 << 9 | 1 << 15, 16), 0x15, "2a 88130000 01 82"),
     (SetRate(1000, 2000, 50_000), 0x11, "e8030000 d0070000 50c30000"),
     (SetDebounce(5000, 10_000), 0x12, "8813 1027"),
     (GetState(), 0x13, ""),
@@ -253,6 +268,8 @@ def test_what_is_written_is_read(message: FromBoard | ToBoard, number: int) -> N
 @given(st.one_of(FROM_BOARD, TO_BOARD), st.integers(1, 5), st.booleans())
 def test_another_length_is_refused(message: FromBoard | ToBoard, surplus: int, longer: bool) -> None:
     payload = message.payload()
+    if isinstance(message, Analog | SetChannels):  # their length says how many channels there are
+        payload, longer = payload[: 5 + isinstance(message, Analog)], False
     if not longer and len(payload) < surplus:
         return
     other = payload + bytes(surplus) if longer else payload[:-surplus]
@@ -285,6 +302,31 @@ def test_an_event_of_no_key_or_no_edge_is_refused(key: int, edge: int) -> None:
 def test_a_bitmap_that_holds_a_key_beyond_the_last_is_refused(keys: int, payload: bytes) -> None:
     with pytest.raises(MessageError, match="holds key 7"):
         from_board(Frame(State.KIND, 0, payload), keys)
+
+
+@pytest.mark.parametrize(
+    ("payload", "said"),
+    [
+        ("02 01 00 00000000 08 00", "codes of 0 bits"),
+        ("02 01 10 00000000 08 00", "codes of 16 bits"),
+        ("02 01 0a 00000000 07 80", "holds key 7"),
+        ("02 01 0a 00000000 7b" + "ff" * 15 + "07", "123 channels in an ANALOG"),
+    ],
+)
+def test_channels_that_cannot_be_are_refused(payload: str, said: str) -> None:
+    with pytest.raises(MessageError, match=said):
+        from_board(Frame(Channels.KIND, 0, bytes.fromhex(payload)), 0)
+
+
+def test_the_most_channels_just_fit_an_analog_frame() -> None:
+    assert len(encode(frame(Analog(0, 1, (UNREAD,) * MOST_ASKED), 0))) == 255
+    with pytest.raises(ValueError, match="at most 250"):
+        encode(frame(Analog(0, 1, (0,) * (MOST_ASKED + 1)), 0))
+
+
+def test_a_value_beyond_its_field_is_refused() -> None:
+    with pytest.raises(SettingError, match="no frame can carry 1, 4294967296"):
+        SetChannels(1, 1 << 32, 0, 0).payload()
 
 
 def test_a_board_of_another_protocol_is_told_so_whatever_follows() -> None:
@@ -333,5 +375,8 @@ def test_the_frames_in_the_documentation_are_sound_ones() -> None:
         Lost(1 << 8 | 1 << 39, 40),
         GetState(),
         Ping(0x1234),
+        SetChannels(0x2A, 5000, 1 << 0 | 1 << 9 | 1 << 15, 16),
+        Channels(2, 0x2A, 10, 5000, 1 << 0 | 1 << 9 | 1 << 15, 20),
+        Analog(0x01020304, 0x2A, (0, 1023, UNREAD)),
     ]
     assert decoder.counts == scanner_protocol.FrameCounts(frames=len(shown))

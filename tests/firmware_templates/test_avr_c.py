@@ -37,12 +37,17 @@ CHIPS = (
 )
 ANALOG = '[analog]\nthumb_rotation = "ADC1"\nwrist_yaw = "ADC7"\n'
 JOINTS = ("thumb_rotation", "wrist_yaw")
+TAXELS = (
+    '[taxels]\ninputs = ["ADC0", "ADC3"]\nselect = ["PD7", "PB2", "PB3", "PB4"]\n'
+    f"names = {['t0', '', *(f't{n}' for n in range(2, 20))]}\n"
+)
 SLOW = "scan_us = 5000\n"
 
 CASES: dict[str, tuple[str, Mode, tuple[str, ...]]] = {
     "pins": (PINS, "scan", ()),
     "pins that recognise": (PINS, "glove", ()),
     "pins and analog joints": (PINS + ANALOG, "glove", JOINTS),
+    "pins and taxels behind multiplexers": (PINS + TAXELS, "scan", ()),
     "matrix": (MATRIX.format("true"), "scan", ()),
     "matrix without diodes that recognises": (MATRIX.format("false"), "glove", ()),
     "chips": (CHIPS, "scan", ()),
@@ -50,6 +55,11 @@ CASES: dict[str, tuple[str, Mode, tuple[str, ...]]] = {
 }
 GLOVES: dict[str, tuple[str, Mode, tuple[str, ...]]] = {
     "chips and a CyberGlove": (f"early_exit = true\n{SLOW}{CHIPS}[cyberglove]\nuart = 3\n", "glove", SENSORS_18),
+    "taxels on channels of their own": (
+        '[taxels]\ninputs = ["ADC0", "ADC9"]\nnames = ["t0", "t1"]\n' + PINS,
+        "scan",
+        (),
+    ),
     "analog channels from 8 on": (PINS + ANALOG.replace("ADC1", "ADC9"), "glove", JOINTS),
     "a wide matrix and pins of JTAG": (
         '[matrix]\nrows = ["PA0"]\ncolumns = [{}]\ndiodes = false\nswitches = [["s0", "s1", "s2", "s3", "s4", "s5", '
@@ -157,6 +167,7 @@ def test_a_reset_by_the_watchdog_stops_it_before_anything_else_runs(tool: Tool, 
 
 JTAG: dict[str, tuple[str, Mode, tuple[str, ...]]] = {
     "pins": (PINS.replace("PB5", "PF4"), "scan", ()),
+    "taxels": (PINS + TAXELS.replace("ADC3", "ADC5"), "scan", ()),
     "matrix": (MATRIX.format("true").replace("PC3", "PF7"), "scan", ()),
     "analog joints": (PINS + ANALOG.replace("ADC1", "ADC5"), "glove", JOINTS),
 }

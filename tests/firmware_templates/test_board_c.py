@@ -24,6 +24,7 @@ from thenar.drivers.scanner_protocol import (
     Hello,
     Lost,
     Ping,
+    SetChannels,
     SetDebounce,
     SetRate,
     State,
@@ -40,6 +41,20 @@ PORT = """
 
 bool (*line)(const uint8_t *, uint8_t);
 
+#ifdef THENAR_CHANNELS
+uint32_t thenar_port_measure(const uint8_t *wanted_bitmap)
+{
+    uint32_t sweep_us = 0u;
+
+    for (unsigned channel = 0u; channel < THENAR_CHANNELS; channel++) {
+        if (((unsigned)wanted_bitmap[channel / 8u] >> (channel % 8u) & 1u) != 0u) {
+            sweep_us += 208u;
+        }
+    }
+    return sweep_us;
+}
+#endif
+
 bool thenar_port_send(const uint8_t *frame, uint8_t length)
 {
     return line(frame, length);
@@ -53,7 +68,14 @@ CONFIGS = {
     "300 keys without diodes": BoardConfig(
         20, 15, diodes=False, scan_us=500, heartbeat_us=7000, press_us=5000, release_us=10_000
     ),
+    "9 channels beside 12 keys": BoardConfig(1, 12, channels=9),
+    "122 channels, without diodes": BoardConfig(2, 4, diodes=False, channels=122),
 }
+
+
+def codes_at(clock_us: int, channels: int) -> list[int]:
+    """Return what the channels have at some time: anything."""
+    return [(clock_us // 7 + 37 * channel) % 1024 for channel in range(channels)]
 
 
 class Board:
@@ -103,6 +125,10 @@ class Board:
         keys = self.config.keys
         known = State(((1 << keys) - 1) & ~unread, keys).payload()
         self.library.thenar_board_scanned(State(closed, keys).payload(), known, whole, clock_us % WRAP)
+        if self.config.channels:
+            codes = codes_at(clock_us % WRAP, self.config.channels)
+            array = (ctypes.c_uint16 * len(codes))(*codes)
+            self.library.thenar_board_measured(array, ctypes.c_uint32(clock_us % WRAP))
         return self.sent()
 
     def grasp(self, grasp: int, margin: int, flags: int, clock_us: int) -> bytes:
@@ -143,6 +169,12 @@ class Model(ScannerBoard):
 
     def _read(self, closed: int) -> int:
         return closed
+
+    def scan(self, closed: int, now: int, *, unread: int = 0, whole: bool = True) -> list[bytes]:
+        self.codes, due_at = codes_at(self._clock(now), self.analog.channels), self._analog_at
+        sent = super().scan(closed, now, unread=unread, whole=whole)
+        self._analog_at = due_at if self.full else self._analog_at
+        return sent
 
     def grasp(self, grasp: int, margin: int, flags: int, now: int) -> list[bytes]:
         if not self.beaten and self._grasp == (grasp, flags & DEGRADED):
@@ -202,6 +234,8 @@ ASKED = st.one_of(
     st.builds(SetDebounce, SHORT, SHORT),
     st.just(GetState()),
     st.builds(Ping, SHORT),
+    st.builds(SetChannels, st.integers(0, 255), PERIODS, st.integers(0, (1 << 128) - 1), st.just(128)),
+    st.builds(SetChannels, st.integers(0, 255), PERIODS, st.integers(0, 255), st.just(8)),
 ).map(lambda message: scanner_protocol.encode(frame(message, 0)))
 UNKNOWN = st.builds(scanner_protocol.Frame, st.integers(0, 0x20), st.just(0), st.binary(max_size=20)).map(
     scanner_protocol.encode

@@ -14,7 +14,20 @@ from thenar.drivers import cyberglove_protocol, scanner_protocol
 from thenar.drivers.emulated.cyberglove_box import CyberGloveBox, Doubts, GloveState
 from thenar.drivers.emulated.scanner import ScannerBoard
 from thenar.drivers.errors import ThenarError
-from thenar.drivers.scanner_protocol import PROTOCOL, Event, FromBoard, GetState, Heartbeat, Hello, Ping, State, ToBoard
+from thenar.drivers.scanner_protocol import (
+    PROTOCOL,
+    Analog,
+    Channels,
+    Event,
+    FromBoard,
+    GetState,
+    Heartbeat,
+    Hello,
+    Ping,
+    SetChannels,
+    State,
+    ToBoard,
+)
 from thenar.drivers.scanner_state import BoardKeys, BoardTimes
 
 _KEYS = 40
@@ -66,7 +79,7 @@ def _answer(data: bytes) -> None:
 def _board_says() -> list[bytes]:
     hello = Hello(PROTOCOL, 0, 1, 1, 1, 0, 0, 1, _KEYS, 1000, 0, 50_000, 0, 0, 0)
     messages: list[FromBoard | ToBoard] = [hello, State(5, _KEYS), Heartbeat(7, 5, _KEYS), Event(9, 3, 1)]
-    messages += [Ping(1), GetState()]
+    messages += [Ping(1), GetState(), SetChannels(1, 5000, 5, 8), Channels(2, 1, 10, 5000, 5, 8), Analog(9, 1, (3, 7))]
     frames = [scanner_protocol.frame(message, number) for number, message in enumerate(messages)]
     return [scanner_protocol.encode(frame) for frame in frames] + [b"".join(map(scanner_protocol.encode, frames))]
 
@@ -95,9 +108,11 @@ def _board(data: bytes, _folder: Path) -> None:
     assert whole.feed(scanner_protocol.encode(_STATE)) == [_STATE]
     for keys in (BoardKeys(1, _KEYS), BoardKeys()):
         _heard(found, keys)
-    board = ScannerBoard(1, _KEYS)
-    for answer in scanner_protocol.FrameDecoder().feed(b"".join(board.receive(data, 0))):
-        scanner_protocol.from_board(answer, _KEYS)
+    for channels in (0, 8):
+        board = ScannerBoard(1, _KEYS, channels=channels)
+        answers = [*board.receive(data, 0), *board.scan(0, 1 << 32)]
+        for answer in scanner_protocol.FrameDecoder().feed(b"".join(answers)):
+            scanner_protocol.from_board(answer, _KEYS)
 
 
 def _heard(received: list[scanner_protocol.Frame], keys: BoardKeys) -> None:

@@ -17,6 +17,7 @@ from thenar.runtime.tables import (
     COARSEST_SCALE,
     KIND,
     MAX_BYTES,
+    PAIRED,
     PLAIN,
     SLOPED,
     IntegerTables,
@@ -191,11 +192,11 @@ def test_an_oversized_file_is_refused() -> None:
 
 
 def test_a_newer_file_is_refused_by_its_number() -> None:
-    with pytest.raises(SealError, match="format 3"):
-        tables_from_bytes(seal(KIND, 3, b""))
+    with pytest.raises(SealError, match="format 4"):
+        tables_from_bytes(seal(KIND, 4, b""))
 
 
-@given(payload=st.binary(max_size=300), version=st.sampled_from([PLAIN, SLOPED]))
+@given(payload=st.binary(max_size=300), version=st.sampled_from([PLAIN, SLOPED, PAIRED]))
 def test_any_sealed_content_is_read_or_refused_without_much_memory(payload: bytes, version: int) -> None:
     tracemalloc.start()
     try:

@@ -11,6 +11,8 @@
  *     rise 5                              microseconds that a wire of a pin needs to rise through its pull-up
  *     pin KEY PD2 GND                     a switch between a pin and ground, or two pins
  *     diode KEY PD2 PB0                   a switch and a diode, by which current flows from PD2 to PB0 only
+ *     mux 0 150 PB0 PB1 PB2 PB3           a CD74HC4067 at analog input 0, with these pins at S0 to S3; a channel that
+ *                                         is selected takes so many microseconds to settle
  *     chip mcp23017 0x20
  *     key KEY 0x20 7 low                  a switch at pin 7 of this chip, which reads low when it is closed
  *
@@ -21,6 +23,7 @@
  *     close KEY, open KEY                 a switch
  *     set KEYS                            all switches: bit k % 8 of byte k / 8 (hexadecimal) is key k
  *     volts CHANNEL MILLIVOLTS            what one of the analog inputs 0 to 7 has
+ *     volts CHANNEL N MILLIVOLTS          what channel N of the multiplexer at that input has
  *     reset                               the RESET pin: a chip that was sending a byte then holds SDA low for nine clocks
  *     brownout MICROSECONDS               no power for so long: RAM is garbage then, and the chips' registers are gone
  *     unplug ADDRESS, replug ADDRESS      a chip off the bus, and back as after power-on
@@ -44,13 +47,14 @@
 #include <simavr/avr_adc.h>
 
 #include "board_chips.h"
+#include "board_mux.h"
 #include "board_pins.h"
 #include "board_twi.h"
 #include "board_uart.h"
 #include "harness.h"
 
 /* ANALOG_INPUTS: libsimavr keeps the voltages of so many, whatever the part has. */
-enum { SLICE_US = 500, LONGEST = 1024, WORDS = 6, IN_FRAME = 3, SUPPLY_MV = 5000, ANALOG_INPUTS = 8 };
+enum { SLICE_US = 500, LONGEST = 1024, WORDS = 7, IN_FRAME = 3, SUPPLY_MV = 5000, ANALOG_INPUTS = 8 };
 
 static avr_t *avr;
 /* The program is where it should be in time when its cycles since `begun_cycle` took as long as it is since then. */
@@ -102,6 +106,8 @@ static void wire(char *text, const char *elf)
         pins_attach(avr, number(word[1], "time"));
     else if ((strcmp(word[0], "pin") == 0 || strcmp(word[0], "diode") == 0) && count == 4)
         pins_add((uint16_t)number(word[1], "key"), word[2], word[3], word[0][0] == 'd');
+    else if (strcmp(word[0], "mux") == 0 && count == 7)
+        mux_add(avr, number(word[1], "analog input"), number(word[2], "time"), word + 3);
     else if (strcmp(word[0], "chip") == 0 && count == 3)
         chips_add(word[1], (uint8_t)number(word[2], "address"));
     else if (strcmp(word[0], "key") == 0 && count == 5)
@@ -214,6 +220,8 @@ static bool obey(char *text)
     }
     if (count == 3 && strcmp(word[0], "volts") == 0)
         return volts(number(word[1], "channel"), number(word[2], "voltage"));
+    if (count == 4 && strcmp(word[0], "volts") == 0)
+        return mux_volts(number(word[1], "analog input"), number(word[2], "channel"), number(word[3], "voltage"));
     if (count == 3 && strcmp(word[0], "uart") == 0)
         return uart_plug((uint8_t)number(word[1], "UART"), strcmp(word[2], "on") == 0);
     return count == 2 && obey_with(word[0], word + 1, count);

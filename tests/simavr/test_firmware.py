@@ -3,11 +3,13 @@
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from threading import Event, Thread
 from time import monotonic
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 import serial
@@ -15,9 +17,10 @@ import serial
 from thenar.compiler.firmware.board import parse_board
 from thenar.compiler.firmware.generate import Firmware
 from thenar.drivers import scanner_protocol
+from thenar.drivers.scanner import Scanner, ScannerReading
 from thenar.drivers.scanner_protocol import Faults, FromBoard, GetState, Heartbeat, Hello, Lost, Ping, frame, from_board
 from thenar.runtime.build import Build
-from thenar.runtime.manifest import SCHEMA, Manifest, Options, Origin, Proof, Switch
+from thenar.runtime.manifest import SCHEMA, Calibration, Manifest, Options, Origin, Proof, Switch, Threshold
 from thenar.runtime.tables import IntegerTables
 
 SWITCHES = ("s0", "s1", "s2", "s3")
@@ -100,10 +103,11 @@ def firmware(
     """Return what starts the firmware of such a board.toml, wired as lines of simavr_board say."""
     with ExitStack() as stack:
 
-        def start(text: str, wiring: Sequence[str]) -> Running:
+        def start(text: str, wiring: Sequence[str], build: Build | None = None) -> Running:
+            used = build or small_build()
             request = Firmware(
-                small_build().tables,
-                small_build().manifest,
+                used.tables,
+                used.manifest,
                 "avr328p",
                 "scan",
                 board=parse_board(f'part = "atmega328p"\n{text}'),
@@ -184,3 +188,83 @@ def test_switches_on_pins_are_first_read_when_their_wires_have_risen(firmware: C
     beat = on.booted()[-1]
     assert isinstance(beat, Heartbeat)
     assert beat.closed == 0b0100
+
+
+def level_build() -> Build:
+    """Return the small build, whose last two switches are levels of one taxel."""
+    small = small_build()
+    taxel = Calibration(4, "p0", "counts", 0, 0.0, 1, 1.0)
+    levels = tuple(Switch(4, f"p0>{code}", 0.5, Threshold(code, code + 0.5, taxel)) for code in (300, 700))
+    manifest = msgspec.structs.replace(small.manifest, switches=(*small.manifest.switches[:2], *levels))
+    return Build(manifest, small.tables)
+
+
+def code_of(millivolts: int) -> int:
+    return min(millivolts * 1024 // 5000, 1023)
+
+
+def measured(scanner: Scanner, wanted: Sequence[int]) -> ScannerReading:
+    """Return the first reading of codes that lie within one of those."""
+    end, last = monotonic() + MOST_S, None
+    while monotonic() < end:
+        reading = scanner.read(0.5)
+        if reading is not None and reading.codes is not None:
+            last = reading
+            assert None not in reading.codes
+            if all(abs((code or 0) - right) <= 1 for code, right in zip(reading.codes, wanted, strict=True)):
+                return reading
+    raise AssertionError(f"codes {wanted} never came, at last {last}; {scanner.counts}, {scanner.analog}")
+
+
+MUX = (
+    '[taxels]\ninputs = ["ADC0", "ADC3"]\nselect = ["PB1", "PB2", "PB3", "PB4"]\nsettle_us = 200\n'
+    f"names = {[f'p{n}' for n in range(20)]}\n"
+)
+SELECT = "PB1 PB2 PB3 PB4"
+
+
+def test_voltages_behind_multiplexers_arrive_at_the_host(firmware: Callable[..., Running]) -> None:
+    """A channel takes 150 us to settle: one that were converted at once would have the voltage of the one before."""
+    on = firmware(
+        f'[pins]\ns0 = "PD2"\ns1 = "PD3"\n{MUX}',
+        ["rise 0", "pin 0 PD2 GND", f"mux 0 150 {SELECT}", f"mux 3 150 {SELECT}"],
+        level_build(),
+    )
+    millivolts = [(n * 1237) % 5000 for n in range(20)]
+    on.board.do(*(f"volts {3 * (n // 16)} {n % 16} {level}" for n, level in enumerate(millivolts)))
+    on.line.close()
+    with Scanner(str(on.board.ports["uart0"]), BAUD) as scanner:
+        assert scanner.hello is not None
+        assert (scanner.hello.has_analog, scanner.hello.keys) == (True, 2)
+        scanner.set_channels(1, (1 << 20) - 1)
+        measured(scanner, [code_of(level) for level in millivolts])
+        assert scanner.analog is not None
+        assert (scanner.analog.channels, scanner.analog.bits) == (20, 10)
+        # 20 conversions, and 2 for each of 16 selections, of 112 us.
+        assert scanner.analog.analog_us == (20 + 2 * 16) * 112
+        on.board.do("volts 0 3 4000", "volts 3 1 100", "close 0")
+        chosen = [3, 16, 17]
+        scanner.set_channels(1, sum(1 << n for n in chosen))
+        reading = measured(scanner, [code_of(4000), code_of(millivolts[16]), code_of(100)])
+        while not reading.closed:
+            next_one = scanner.read(0.5)
+            reading = reading if next_one is None else next_one
+        assert reading.closed == 0b01
+        on.board.do("reset")
+        measured(scanner, [code_of(4000), code_of(millivolts[16]), code_of(100)])
+        assert scanner.counts.misfits == 0
+
+
+def test_taxels_alone_on_inputs_of_their_own(firmware: Callable[..., Running]) -> None:
+    small = level_build()
+    levels = msgspec.structs.replace(small.manifest, switches=small.manifest.switches[2:])
+    tables = replace(small.tables, switch_rows=small.tables.switch_rows[2:], switch_means=small.tables.switch_means[2:])
+    on = firmware('[taxels]\ninputs = ["ADC1", "ADC6"]\nnames = ["p0", "p1"]\n', ["rise 0"], Build(levels, tables))
+    on.board.do("volts 1 2500", "volts 6 1000")
+    on.line.close()
+    with Scanner(str(on.board.ports["uart0"]), BAUD) as scanner:
+        scanner.set_channels(2000, 0b11)
+        reading = measured(scanner, [code_of(2500), code_of(1000)])
+        assert (reading.closed, reading.known) == (0, 1)
+        on.board.do("volts 1 5000", "volts 6 0")
+        measured(scanner, [1023, 0])

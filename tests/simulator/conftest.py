@@ -18,6 +18,8 @@ BAR = Cylinder(diameter_mm=40.0, length_mm=120.0)
 ROUND_IT_DEG = np.array([40.0, 20.0, 20.0, 20.0] + [0.0, 50.0, 45.0, 30.0] * 4)
 # Below the palm, along the knuckles: 90 degrees about the hand's dorsal axis.
 BESIDE_THE_PALM = np.array([95.0, 0.0, -34.0, 0.0, 0.0, np.pi / 2])
+# The segments whose places bear taxels, where a scene lists an effect on them: what a serial line has time for.
+PADS = ("thumb_distal", "index_distal", "index_proximal", "middle_distal")
 # The tips of all digits press: the last of each digit's seven spheres.
 TIPS = tuple(Pad(7 * digit + 6, 0.2) for digit in range(5))
 
@@ -65,7 +67,7 @@ def _scene(effects: Sequence[str | tuple[str, EffectParameters]] = (), **changes
         "subjects": (Subject(name="A", hand_length_mm=185.0, hand_breadth_mm=83.0),),
         "repetitions": 8,
         "recording": Recording(lead_ms=30.0, hold_ms=250.0, release_ms=40.0),
-        "glove": Glove(),
+        "glove": Glove(taxels=PADS if any(name.startswith("taxel.") for name, _ in pairs) else ()),
     }
     return Scene(effects=listed, **(usual | changes))  # type: ignore[arg-type]
 

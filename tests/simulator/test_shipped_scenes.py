@@ -21,7 +21,12 @@ FAULTS = {
     "wire.lost_bytes",
     "wire.damaged_bytes",
 }
+PADS = {"taxel.gain", "taxel.creep", "taxel.crosstalk", "taxel.noise", "taxel.adc"}
 IN_TIME = {"hand.transition", "contact.ramp", "frame.jitter", "bus.latency"}
+
+ONSET = {*PADS, "contact.ramp", "frame.at_force"}
+ADDED = {"quick": set(), "faulty-glove": FAULTS, "continuous": IN_TIME, "kamakura-analog": PADS}
+ADDED["initial-contact"] = ONSET
 
 
 def effects(scene: Scene) -> dict[str, EffectParameters]:
@@ -39,7 +44,9 @@ def test_these_scenes_are_shipped() -> None:
         "cutkosky",
         "cutkosky-def",
         "faulty-glove",
+        "initial-contact",
         "kamakura",
+        "kamakura-analog",
         "kamakura-def",
         "quick",
     ]
@@ -84,7 +91,7 @@ def test_what_varies_varies_alike_in_all_shipped_scenes(name: str) -> None:
     assert {effect: effects(load_scene(name))[effect] for effect in usual} == usual
 
 
-@pytest.mark.parametrize(("name", "added"), [("quick", set()), ("faulty-glove", FAULTS), ("continuous", IN_TIME)])
+@pytest.mark.parametrize(("name", "added"), ADDED.items())
 def test_a_scene_lists_what_it_is_for_and_nothing_else(name: str, added: set[str]) -> None:
     assert effects(load_scene(name)).keys() - effects(load_scene("kamakura")).keys() == added
 

@@ -4,7 +4,7 @@ recorded frames end it early.
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from fcntl import ioctl
@@ -13,15 +13,16 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from thenar.drivers.cyberglove_protocol import OVERHEAD, sending_us, sensors_with
+from thenar.drivers.cyberglove_protocol import POLL, SENSORS, sending_us, sensors_with
 from thenar.drivers.i2c.chips import Reading
 from thenar.runtime.harness.wiring import GloveWiring, Harness, ScannerWiring
 from thenar.runtime.scanning.decided import Decided
 from thenar.runtime.scanning.plan import Costs, plan_scan
 from thenar.runtime.scanning.scanmap import ScanMap
-from thenar.runtime.scanning.timing import reading_of, scanner_us
+from thenar.runtime.scanning.timing import glove_us, reading_of, scanner_us
 from thenar.runtime.tables import IntegerTables
 
 from ...firmware.targets import TARGETS
@@ -30,7 +31,9 @@ from .wirings import Wiring
 
 # So many evenly spaced frames decide on the order of ports; all of them, on how often a scan then ends early.
 _ORDERING = 200
-_BAUD = 115_200
+NO_TIME = Time(0.0, "wire")
+# The byte that asks a CyberGlove for a record.
+ASKING_US = sending_us(len(POLL), 115_200)
 # One transfer of a Raspberry Pi beside its wire. Doubtful: a kernel trace of a Pi 3 has 20 us from the call to the
 # adapter and 6 us back; others measured 300 us (Pi Zero) with an older library.
 PI_CALL_US = 30.0
@@ -151,6 +154,8 @@ class ScanTimes:
     how       "wire", or "model" where a firmware's own work is in it
     early_ports  how many ports of chips are read then, the mean over the same frames: after each of them the scores are
               looked at
+    alone_us, alone_ports  the same where the joints are read after the switches, if these do not decide
+    asked     in which share of the frames they do not
     """
 
     full_us: float
@@ -159,6 +164,9 @@ class ScanTimes:
     chips: int
     how: How
     early_ports: float
+    alone_us: float = 0.0
+    alone_ports: float = 0.0
+    asked: float = 1.0
 
 
 def scan_times(
@@ -183,9 +191,15 @@ def scan_times(
     scan = plan_scan(names, tables, harness, bits[rows], codes[rows])
     boards = [(board, keys) for board, keys in zip(harness.scanners, scan.scanners, strict=True) if keys]
     board_us = max((_board_us(board) for board, _ in boards), default=0.0)
-    full_us, early_us, early_ports = (
-        _bus_us(scan, harness, tables, bits, codes, beside) if scan.ports else (0.0, 0.0, 0.0)
-    )
+    ports = [port.elements for port in scan.ports]
+    known = Decided(tables, ports, bits, codes)
+    full_us, early_us, early_ports = _bus_us(scan, harness, known, beside) if ports else (0.0, 0.0, 0.0)
+    alone_us, alone_ports, asked = early_us, early_ports, 1.0
+    if tables.n_joints and len(bits):
+        unknown = Decided(tables, ports, bits, codes, on_demand=True)
+        asked = unknown.undecided((1 << len(ports)) - 1) / len(bits)
+        if ports:
+            _, alone_us, alone_ports = _bus_us(scan, harness, unknown, beside)
     return ScanTimes(
         full_us=max(full_us, board_us),
         early_us=max(early_us, board_us),
@@ -193,6 +207,9 @@ def scan_times(
         chips=len({(port.bus, port.chip) for port in scan.ports}) + len(boards),
         how="model" if boards or beside.scan_us else "wire",
         early_ports=early_ports,
+        alone_us=max(alone_us, board_us),
+        alone_ports=alone_ports,
+        asked=asked,
     )
 
 
@@ -201,17 +218,9 @@ def _board_us(board: ScannerWiring) -> float:
     return own.scan_us + own.key_us * len(board.switches) + scanner_us(board)
 
 
-def _bus_us(
-    scan: ScanMap,
-    harness: Harness,
-    tables: IntegerTables,
-    bits: NDArray[np.bool_],
-    codes: NDArray[np.uint16],
-    beside: Beside,
-) -> tuple[float, float, float]:
+def _bus_us(scan: ScanMap, harness: Harness, frames: Decided, beside: Beside) -> tuple[float, float, float]:
     """Return the time of a whole scan of the chips, and the mean time and number of ports of one that ends early."""
     costs = Costs(scan.ports, harness)
-    frames = Decided(tables, [[switch for _, switch in port.switches] for port in scan.ports], bits, codes)
     always = beside.scan_us + beside.key_us * len(scan.switches)
     whole, weighted, shares, read = [always], [always], list[float](), 0
     for number, port in enumerate(scan.ports):
@@ -228,17 +237,64 @@ def _bus_us(
     return fsum(whole), fsum(weighted), fsum(shares)
 
 
-def joints_time(joints: Sequence[str], given_us: float | None = None, glove: GloveWiring | None = None) -> Time:
-    """Return what reading joints of these names takes.
+@dataclass(frozen=True, slots=True)
+class Records:
+    """What reading joints takes: each of them, and all together besides; no less than least_us.
 
-    It is `given_us`, where that is known; of a CyberGlove's joints, one record at 115200 baud with the status byte,
-    without what the box takes to digitise the sensors before it sends (`shortest_us` of its protocol). A CyberGlove
-    that is wired as `glove` may call its sensors otherwise. Of joints of one's own the time is unknown: 0.
+    how   where these come from: "formula" is the vendor's for a CyberGlove
+    what  in a sentence, what they are
+    """
+
+    fixed_us: float = 0.0
+    each_us: float = 0.0
+    least_us: float = 0.0
+    how: How = "wire"
+    what: str = ""
+
+    def of(self, joints: int) -> Time:
+        """Return what reading so many joints takes."""
+        return Time(max(self.fixed_us + joints * self.each_us, self.least_us), self.how) if joints else NO_TIME
+
+
+NO_RECORDS = Records()
+
+
+def records_of(
+    joints: Sequence[str],
+    given_us: float | None = None,
+    glove: GloveWiring | None = None,
+    *,
+    wire_only: bool = False,
+    filtered: bool = False,
+    masked: bool = True,
+) -> Records:
+    """Return what reading some of the joints of these names takes.
+
+    A CyberGlove, which may call its sensors otherwise where it is wired as `glove`, sends those alone that are asked
+    for where its mask is set (`masked`), else all of its 18 or 22. It takes what `glove_us` says: as measured where
+    glove.toml says so, else by the vendor's formula, or `wire_only`. `given_us` for all joints overrides that. Of other
+    joints the time is unknown.
     """
     if given_us is not None and joints:
-        return Time(given_us, "given")
+        return Records(each_us=given_us / len(joints), how="given")
     named = () if glove is None else glove.joints
     sensors = len(named) if joints and set(joints) <= set(named) else sensors_with(joints)
     if sensors is None:
-        return Time(0.0, "unknown" if joints else "wire")
-    return Time(sending_us(sensors + OVERHEAD + 1, _BAUD), "wire")
+        return Records(how="unknown" if joints else "wire")
+    wired = glove or GloveWiring(port="-", sensors=22 if sensors > SENSORS else None)
+    wired = replace(wired, filter=True) if filtered else wired
+    fixed, more = (glove_us(replace(wired, rate_hz=None), count, wire_only=wire_only) for count in (0, 1))
+    least = 0.0 if masked else fixed + sensors * (more - fixed)
+    if wired.rate_hz and not wire_only:
+        least = max(least, 1e6 / wired.rate_hz)
+    how: How = "wire" if wire_only else "formula" if wired.record_us is None else "measured"
+    return Records(fixed, more - fixed, least, how, _RECORDS[how])
+
+
+_RECORDS: Mapping[How, str] = {
+    "wire": "a CyberGlove's record is its bytes on the line: what the box takes to digitise its sensors is left out",
+    "formula": "a CyberGlove's record is the vendor's formula, of a single source: each sensor is digitised in 250 us "
+    "(376 us through the filter) before the record is sent; thenar doctor measures the glove that is there",
+    "measured": "a CyberGlove's record is what record_us of glove.toml says, as it was measured, and of fewer sensors "
+    "in proportion to the vendor's formula",
+}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from msgspec.structs import replace
 
 from thenar.drivers.i2c import tca9548a
-from thenar.drivers.i2c.chips import CHIPS
+from thenar.drivers.i2c.chips import expanders
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import Harness
 from thenar.runtime.scanning.propose import propose_board, propose_cyberglove, propose_harness
@@ -77,13 +77,18 @@ def wirings(given: Harness | None, target: str = "host") -> tuple[Wiring, ...]:
     An AVR reads its chips itself: without muxes, with registers, at 50 to 400 kHz, as board.toml has it. What is wired
     otherwise, a board of its own included, is none of its wirings.
     """
-    avr = target in TARGETS and "scan" in TARGETS[target].modes
+    avr = reads_by_itself(target)
     found = [] if given is None or not given.switches or (avr and not _of_an_avr(given)) else [_as_wired(given)]
-    for chip in CHIPS.values():
+    for chip in expanders().values():
         if chip.tried and (chip.registers or not avr):
             clocks = (hz for hz in CLOCKS_HZ if hz <= chip.clock_hz and (not avr or hz in _AVR_HZ))
             found += [Wiring(chip.name, hz, muxes=not avr) for hz in clocks]
     return tuple(found if avr else [*found, *(Wiring(BOARD, baud) for baud in BAUDS)])
+
+
+def reads_by_itself(target: str) -> bool:
+    """Return whether thenar's firmware for `target` reads the glove, with no computer besides."""
+    return target in TARGETS and "scan" in TARGETS[target].modes
 
 
 def names_of(count: int) -> list[str]:
@@ -98,5 +103,5 @@ def _as_wired(given: Harness) -> Wiring:
 
 def _of_an_avr(given: Harness) -> bool:
     chips = [chip for bus in given.buses for chip in bus.chips]
-    plain = all(chip.mux is None and CHIPS[chip.kind].registers for chip in chips)
+    plain = all(chip.mux is None and chip.chip.registers and not chip.measures for chip in chips)
     return plain and not given.scanners and len(given.buses) == 1 and given.buses[0].clock_hz in _AVR_HZ

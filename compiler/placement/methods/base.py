@@ -52,6 +52,8 @@ class Method:
         Whether the choice depends on what reading the ports costs.
     sizes : tuple of int
         The parameters that a frontier tries, as far as there are so many switches.
+    nested : bool
+        Whether the first of M switches are those of a smaller M: one ranking answers all, with limits as well.
     all_too : bool
         Whether a frontier also tries to keep all switches.
     tried : {"always", "wired", "unwired", "never"}
@@ -79,6 +81,7 @@ class Method:
     uses_joints: bool = False
     uses_ports: bool = False
     sizes: tuple[int, ...] = COARSE
+    nested: bool = False
     all_too: bool = False
     tried: Literal["always", "wired", "unwired", "never"] = "never"
     imports: str = ""

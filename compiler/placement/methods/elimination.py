@@ -125,12 +125,12 @@ def _varying(samples: Samples) -> Bits:
     return np.asarray(samples.switches.any(axis=0) & ~samples.switches.all(axis=0))
 
 
-def sampled(samples: Samples) -> Samples:
-    """Return MOST_ROWS rows at most, spread evenly over each class's rows, in order: classes keep their shares."""
-    if len(samples.labels) <= MOST_ROWS:
+def sampled(samples: Samples, most: int = MOST_ROWS) -> Samples:
+    """Return so many rows at most, spread evenly over each class's rows, in order: classes keep their shares."""
+    if len(samples.labels) <= most:
         return samples
     by_class = np.argsort(samples.labels, kind="stable")
-    spread = np.arange(MOST_ROWS) * len(by_class) // MOST_ROWS
+    spread = np.arange(most) * len(by_class) // most
     return samples.rows(np.sort(by_class[spread]))
 
 
@@ -203,6 +203,7 @@ MEMBER = (
         name=BEST,
         help="The switch whose row of the score tables is missed least goes, again and again: tables fitted whole",
         learn=lambda samples, _: first_of(elimination_order(samples)),
+        nested=True,
         ours=True,
         uses_joints=True,
         sizes=FINE,
@@ -215,6 +216,7 @@ MEMBER = (
         name="elimination-cost",
         help="Elimination that holds what a switch is worth against its part of the time to read its port",
         learn=lambda samples, ports: first_of(elimination_order(samples, ports)),
+        nested=True,
         ours=True,
         uses_joints=True,
         uses_ports=True,
@@ -228,6 +230,7 @@ MEMBER = (
         name="elimination-boosted",
         help="The same on boosted tables: LogitBoost starts anew once the switches whose removal costs least are gone",
         learn=lambda samples, _: first_of(boosted_elimination_order(samples)),
+        nested=True,
         ours=True,
         uses_joints=True,
         sizes=FINE,

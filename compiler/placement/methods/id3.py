@@ -257,6 +257,7 @@ MEMBER = (
         name="id3-cost",
         help="ID3 that weighs information gain against the scan time that a switch adds, largest nodes first",
         learn=lambda samples, ports: first_of(cost_aware_order(samples, ports)),
+        nested=True,
         ours=True,
         uses_ports=True,
         tried="always",

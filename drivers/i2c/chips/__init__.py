@@ -1,8 +1,25 @@
-"""The port expanders: one file a chip, which holds everything that is true of it."""
+"""The port expanders and converters: one file a chip, which holds everything that is true of it."""
 
 from ...members import Members
-from .base import Chip, Device, Package, Reading, Write, byte_pins, port_pins
+from .base import Chip, Conversion, Converter, Device, Package, Reading, Write, byte_pins, port_pins
 
-__all__ = ["CHIPS", "Chip", "Device", "Package", "Reading", "Write", "byte_pins", "port_pins"]
+__all__ = [
+    "CHIPS",
+    "Chip",
+    "Conversion",
+    "Converter",
+    "Device",
+    "Package",
+    "Reading",
+    "Write",
+    "byte_pins",
+    "expanders",
+    "port_pins",
+]
 
 CHIPS = Members("I2C chip", Chip, __name__, "thenar.chips")  # type: ignore[type-abstract]
+
+
+def expanders() -> dict[str, Chip]:
+    """Return the kinds that read switches, by name."""
+    return {name: chip for name, chip in CHIPS.items() if not isinstance(chip, Converter)}

@@ -1,4 +1,4 @@
-"""What a port expander is: to its bus, to the emulated bus, and as a part to solder.
+"""What a port expander and a converter are: to their bus, to the emulated bus, and as parts to solder.
 
 It needs the standard library alone, as every chip's file does: the system's own Python emulates the chips.
 """
@@ -10,11 +10,12 @@ from typing import ClassVar
 
 from ...errors import SettingError
 
-_BITS = 8
-SUPPLY = ("VDD", "VCC", "VCCI", "VCCP")
-GROUND = ("VSS", "GND", "EP")
+_BITS, _BITS_A_BYTE = 8, 9
+SUPPLY = ("VDD", "VCC", "VCCI", "VCCP", "REF", "VREF")
+GROUND = ("VSS", "GND", "EP", "COM", "AGND", "DGND")
 RESET = "RESET"
 TSSOP24 = "Package_SO:TSSOP-24_4.4x7.8mm_P0.65mm"
+SUPPLY_V = 3.3
 _SELECTS = ("A0", "A1", "A2", "ADDR")
 
 
@@ -45,7 +46,24 @@ class Reading:
     @property
     def scl_periods(self) -> int:
         """SCL periods on the wire, from START to STOP."""
-        return 9 * self.wire_bytes + (2 if self.command else 1) + 1
+        return _BITS_A_BYTE * self.wire_bytes + (2 if self.command else 1) + 1
+
+
+@dataclass(frozen=True, slots=True)
+class Conversion(Reading):
+    """One transaction that reads a channel of a converter, whose pin all bits of the answer are of; -1 for no bit.
+
+    start  what is written to begin it, in a transfer of its own; empty where reading begins it
+    us     how long after that the answer is there, at the latest; 0 where the wire takes longer
+    """
+
+    start: bytes = b""
+    us: float = 0.0
+
+    @property
+    def start_periods(self) -> int:
+        """SCL periods of the transfer that begins it."""
+        return _BITS_A_BYTE * (1 + len(self.start)) + 2 if self.start else 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,10 +126,13 @@ class Package:
     """A chip as a part to buy and to solder: part number, maker, KiCad's symbol and footprint.
 
     pins  the name of pin n of the data sheet's package at pins[n - 1], "NC" where there is nothing inside. Inputs are
-          called as the driver calls them, and the others SDA, SCL, INT, RESET, A0, A1, A2 (or ADDR), and by a supply's
-          or a ground's name (VDD, VCC, VCCI, VCCP; VSS, GND, EP).
+          called as the driver calls them, and the others SDA, SCL, INT, RESET, A0, A1, A2 (or ADDR), on SPI CLK, DIN,
+          DOUT, CS, and by the name of what is tied to the supply (VDD, VCC, VCCI, VCCP, REF, VREF) or to ground (VSS,
+          GND, EP, COM, AGND, DGND).
     sure  whether part number, pins and footprint are each confirmed by two sources
     note  what is not, or what to heed
+    straps    where one pin, ADDR, selects among more than two addresses: what it is tied to, from the lowest on
+    library   KiCad's, of the symbol
     """
 
     part: str
@@ -121,15 +142,21 @@ class Package:
     pins: tuple[str, ...]
     sure: bool = True
     note: str = ""
+    straps: tuple[str, ...] = ()
+    library: str = "Interface_Expansion"
 
     def number(self, name: str) -> str:
         """Return the number of the pin called `name`."""
         return str(self.pins.index(name) + 1)
 
-    def selects(self, offset: int) -> tuple[tuple[str, bool], ...]:
-        """Return the address pins, and whether each must be high for the address so far above the chip's lowest."""
+    def selects(self, offset: int) -> tuple[tuple[str, str], ...]:
+        """Return the address pins, and what each is tied to for the address so far above the chip's lowest: "low",
+        "high", "SDA" or "SCL".
+        """
+        if self.straps:
+            return (("ADDR", self.straps[offset]),)
         names = [name for name in _SELECTS if name in self.pins]
-        return tuple((name, bool(offset >> bit & 1)) for bit, name in enumerate(names))
+        return tuple((name, "high" if offset >> bit & 1 else "low") for bit, name in enumerate(names))
 
 
 class Chip(ABC):
@@ -184,6 +211,41 @@ class Chip(ABC):
         if address not in self.addresses:
             lowest, highest = min(self.addresses), max(self.addresses)
             raise SettingError(f"a {self.name} answers at 0x{lowest:02X} to 0x{highest:02X}, not at 0x{address:02X}")
+
+
+class Converter(Chip):
+    """A kind of analog-to-digital converter: its pins are the channels, its readings a `Conversion` of each, in order.
+
+    bits   of a code; code 0 is 0 V
+    volts  of the code 2 ** bits; None: of the supply, against which it measures
+    """
+
+    pulls_up = False
+    tried = False
+    bits: ClassVar[int]
+    volts: ClassVar[float | None] = None
+    readings: ClassVar[tuple[Conversion, ...]]
+
+    @property
+    def highest(self) -> int:
+        """The code of the supply, 3.3 V, where a channel is saturated."""
+        return (1 << self.bits) - 1 if self.volts is None else int(SUPPLY_V / self.volts * (1 << self.bits))
+
+    def code(self, answer: bytes) -> int:
+        """Return the code of an answer: high byte first, the unused bits on top."""
+        return int.from_bytes(answer, "big") & (1 << self.bits) - 1
+
+
+class ConverterModel(Device):
+    """A converter on an emulated bus: `levels` holds the code at each channel, 16 bits each, the first lowest."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.levels = 0
+
+    def at(self, channel: int) -> int:
+        """Return the code at a channel."""
+        return self.levels >> 16 * channel & 0xFFFF
 
 
 def byte_pins(*ports: int) -> tuple[int, ...]:

@@ -5,12 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.compiler.artifact.ensemble import KIND, LINES, TABLES, ensemble_from_bytes, ensemble_to_bytes
+from thenar.compiler.artifact.ensemble import KIND, LINES, PAIRS, TABLES, ensemble_from_bytes, ensemble_to_bytes
 from thenar.compiler.boosting.stumps import Stumps
 from thenar.compiler.recordings.arrays import pack, unpack
 from thenar.compiler.tables.collapse import Line, ScoreTables
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.sealed import seal, unseal
+from thenar.runtime.tables import Pair
 
 HEADER = b'{"n_inputs":5,"shrinkage":0.5}'
 
@@ -120,6 +121,45 @@ def test_lines_that_contradict_themselves_are_refused(change: dict[str, np.ndarr
     header, arrays = unpack(payload)
     with pytest.raises(ThenarError, match=r"ensemble\.bin is damaged"):
         ensemble_from_bytes(seal(KIND, LINES, pack(header, arrays | change)))
+
+
+def _with_pairs() -> ScoreTables:
+    steps = np.array([4], np.uint16), np.array([7, 9], np.uint16)
+    return replace(_tables(), pairs=(Pair((0, 1), steps, np.random.default_rng(2).normal(size=(2, 3, 3))),))
+
+
+def test_pairs_are_read_again_bit_for_bit() -> None:
+    data = ensemble_to_bytes(_with_pairs())
+    read = ensemble_from_bytes(data)
+    assert isinstance(read, ScoreTables)
+    (ours,), (theirs,) = read.pairs, _with_pairs().pairs
+    assert ours.joints == theirs.joints
+    assert all(map(np.array_equal, (*ours.thresholds, ours.rows), (*theirs.thresholds, theirs.rows)))
+    assert ensemble_to_bytes(read) == data
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"pairs": np.array([[1, 0, 1, 2]])},
+        {"pairs": np.array([[0, 2, 1, 2]])},
+        {"pairs": np.array([[0, 1, 2, 2]])},
+        {"pairs": np.array([[0, 1, -1, 2]])},
+        {"pairs": np.array([[0, 1, 2**62, 2**62]])},
+        {"pairs": np.array([[0, 1, 1]])},
+        {"pairs": np.zeros((0, 4), np.int64)},
+        {"pair_thresholds": np.array([4, 9, 7], np.uint16)},
+        {"pair_thresholds": np.array([4, 9], np.uint16)},
+        {"pair_rows": np.zeros((6, 2))},
+        {"pair_rows": np.zeros((5, 3))},
+        {"pair_rows": np.full((6, 3), np.nan)},
+    ],
+)
+def test_pairs_that_contradict_themselves_are_refused(change: dict[str, np.ndarray]) -> None:
+    _, payload = unseal(ensemble_to_bytes(_with_pairs()), KIND, PAIRS, "ensemble.bin")
+    header, arrays = unpack(payload)
+    with pytest.raises(ThenarError, match=r"ensemble\.bin is damaged"):
+        ensemble_from_bytes(seal(KIND, PAIRS, pack(header, arrays | change)))
 
 
 @pytest.mark.parametrize(

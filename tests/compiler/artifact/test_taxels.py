@@ -16,7 +16,7 @@ from thenar.compiler.artifact.documents import Documents
 from thenar.compiler.artifact.estimator import compile as compile_estimator
 from thenar.compiler.artifact.training import cuts_of
 from thenar.compiler.artifact.verify import verify
-from thenar.compiler.placement.thresholds import taxel_thresholds, with_switches
+from thenar.compiler.placement.elements import bits_of, elements_of, names_of
 from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.samples import Samples
 from thenar.runtime.manifest import Options
@@ -47,34 +47,34 @@ def padded(make_set: Make) -> GraspSet:
 
 def test_a_build_says_at_which_value_each_kept_pad_switches(padded: GraspSet, tmp_path: Path) -> None:
     manifest = compile_build(padded, tmp_path / "build", rounds=5, documents=Documents()).manifest
-    thresholds = taxel_thresholds(Samples.of(padded))
-    assert all(250 < threshold < 1300 for threshold in thresholds)
+    elements = elements_of(Samples.of(padded))
     assert manifest.source.switches == 6
-    pads = {switch.name: switch for switch in manifest.switches if switch.threshold is not None}
-    assert pads
-    for number, taxel in enumerate(padded.taxel_columns):
-        if taxel.name in pads:
-            threshold = pads[taxel.name].threshold
-            assert threshold is not None
-            assert (pads[taxel.name].column, threshold.taxel.column) == (2 + number, number)
-            assert threshold.code == thresholds[number]
-            assert threshold.value == pytest.approx(float(taxel.value(thresholds[number] + 0.5)))
-    rising, falling = pads["pad0"].closed, pads["pull-up"].closed
+    pads = [switch for switch in manifest.switches if switch.threshold is not None]
+    assert len(pads) > len({pad.column for pad in pads})
+    for pad in pads:
+        threshold = pad.threshold
+        assert threshold is not None
+        taxel = padded.taxel_columns[threshold.taxel.column]
+        assert (pad.column, threshold.code) in elements
+        assert (pad.column, pad.source) == (2 + threshold.taxel.column, taxel.name)
+        assert pad.name == f"{taxel.name}>{threshold.code}"
+        assert threshold.value == pytest.approx(float(taxel.value(threshold.code + 0.5)))
+    rising, falling = (next(pad.closed for pad in pads if pad.source == name) for name in ("pad0", "pull-up"))
     assert rising.startswith("closed above ")
     assert " N (codes above " in rising
     assert falling.startswith("closed below ")
     text = " ".join((tmp_path / "build" / "spec" / "README.txt").read_text().split())
-    assert re.search(r"the taxel pad0: set its comparator or converter to \d+\.\d+ N; it is " + re.escape(rising), text)
+    setting = r"of the taxel pad0: set its comparator or converter to \d+\.\d+ N; it is "
+    assert re.search(setting + re.escape(rising), text)
     assert rising in (tmp_path / "build" / "report.html").read_text()
 
 
 def test_it_answers_as_a_build_of_the_switches_that_the_pads_become(padded: GraspSet, tmp_path: Path) -> None:
     made = compile_build(padded, tmp_path / "pads", rounds=5, folds=0)
     samples = Samples.of(padded)
-    bits = with_switches(samples, taxel_thresholds(samples)).switches
-    plain = replace(
-        padded, switches=bits, switch_names=padded.element_names, taxel_columns=(), taxels=np.empty(0, np.uint16)
-    )
+    elements = elements_of(samples)
+    bits, names = bits_of(samples, elements).switches, names_of(padded, elements)
+    plain = replace(padded, switches=bits, switch_names=names, taxel_columns=(), taxels=np.empty(0, np.uint16))
     compile_build(plain, tmp_path / "plain", rounds=5, folds=0)
     for member in ("tables.bin", "ensemble.bin"):
         assert (tmp_path / "pads" / member).read_bytes() == (tmp_path / "plain" / member).read_bytes()
@@ -83,15 +83,15 @@ def test_it_answers_as_a_build_of_the_switches_that_the_pads_become(padded: Gras
     assert found.recognised[0].integers == made.manifest.rates[0].correct
 
 
-def test_thresholds_are_learnt_inside_each_fold(padded: GraspSet, tmp_path: Path) -> None:
+def test_levels_are_learnt_inside_each_fold(padded: GraspSet, tmp_path: Path) -> None:
     """The rates are those of builds of the training rows alone, whose thresholds are others than those of all rows."""
     rates = compile_build(padded, tmp_path / "build", rounds=5).manifest.rates[1:]
-    everything, seen = taxel_thresholds(Samples.of(padded)), set()
+    everything, seen = elements_of(Samples.of(padded)), set()
     for rate, cut in zip(rates, cuts_of(padded, Options()), strict=True):
         correct = 0
         for fold in cut.folds:
             made = compile_build(padded.rows(fold.train), tmp_path / "fold", rounds=5, folds=0)
-            seen.add(made.trained.thresholds)
+            seen.add(made.trained.elements)
             correct += verify(tmp_path / "fold", padded.rows(fold.test)).recognised[0].integers
         assert rate.correct == correct
     assert seen - {everything}
@@ -105,7 +105,7 @@ def test_a_set_is_replayed_by_the_builds_thresholds(
         run(["compile", str(tmp_path / "set.grasps"), "-o", str(tmp_path / "build"), "--folds", "0", "--rounds", "5"])
         == 0
     )
-    assert "pad0: closed above " in capfd.readouterr().out
+    assert "pad0>" in capfd.readouterr().out
     assert run(["run", str(tmp_path / "build"), "--replay", str(tmp_path / "set.grasps")]) == 0
     printed = capfd.readouterr()
     lines = [json.loads(line) for line in printed.out.splitlines()]
@@ -143,4 +143,4 @@ def test_pads_are_placed_like_switches(make_set: Make, tmp_path: Path, crowd: bo
     wanted = ["--crowd", "--keep", "3", "--jobs", "1"] if crowd else []
     assert run(["place", str(tmp_path / "set.grasps"), *wanted, "-o", str(tmp_path / "placement.json")]) == 0
     names = {switch["name"] for switch in json.loads((tmp_path / "placement.json").read_bytes())["switches"]}
-    assert names & {pad.name for pad in PADS}
+    assert {name.partition(">")[0] for name in names} & {pad.name for pad in PADS}

@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -6,6 +7,7 @@ import pytest
 from thenar.compiler import LogitBoostClassifier
 from thenar.compiler.evaluation.folds import Fold, weka_folds
 from thenar.compiler.evaluation.plan import Data, FoldFit, is_blind, predictions, run_fits
+from thenar.compiler.placement.elements import Element
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.trainers.base import Training
 
@@ -17,14 +19,16 @@ QUICK = Training("logitboost", {"rounds": 5})
 def fits(make_grasps: Make) -> tuple[GraspSet, list[FoldFit]]:
     grasps = make_grasps(noise=0.3)
     folds = weka_folds(grasps.labels, 4, 1)
-    return grasps, [FoldFit(fold, columns, (0, 1, 2, 3)) for fold in folds for columns in [(0, 1, 2), (3, 4, 12)]]
+    inputs = [(tuple(map(Element, columns)), joints) for columns, joints in [((0, 1, 2), ()), ((3, 4), (0,))]]
+    return grasps, [FoldFit(fold, *each, (0, 1, 2, 3)) for fold in folds for each in inputs]
 
 
 def test_a_fit_answers_as_the_classifier_does(fits: tuple[GraspSet, list[FoldFit]]) -> None:
     grasps, todo = fits
     data = Data.of(grasps)
     for fit in todo:
-        part = data.X[:, fit.columns]
+        columns = [*(element.column for element in fit.elements), *(12 + joint for joint in fit.joints)]
+        part = data.samples.inputs[:, columns]
         classifier = LogitBoostClassifier(rounds=5, shrinkage=0.5)
         classifier.fit(part[fit.fold.train], grasps.labels[fit.fold.train])
         found = predictions(data, fit, Training("logitboost", {"rounds": 5, "shrinkage": 0.5}))
@@ -35,7 +39,7 @@ def test_labels_keep_their_numbers_where_some_do_not_occur(make_grasps: Make) ->
     grasps = make_grasps(noise=0.0)
     rows = np.flatnonzero(np.isin(grasps.labels, (1, 3)))
     fold = Fold(rows[::2], rows[1::2], "1")
-    found = predictions(Data.of(grasps), FoldFit(fold, tuple(range(12)), (1, 3)), QUICK)
+    found = predictions(Data.of(grasps), FoldFit(fold, tuple(map(Element, range(12))), (), (1, 3)), QUICK)
     assert np.array_equal(found, grasps.labels[fold.test])
 
 
@@ -43,7 +47,7 @@ def test_without_inputs_the_most_frequent_training_label_is_answered(make_grasps
     grasps = make_grasps()
     rows = np.concatenate([np.flatnonzero(grasps.labels == 2)[:5], np.flatnonzero(grasps.labels == 1)[:4]])
     fold = Fold(rows, np.arange(6), "1")
-    found = predictions(Data.of(grasps), FoldFit(fold, (), (0, 1, 2, 3)), QUICK)
+    found = predictions(Data.of(grasps), FoldFit(fold, (), (), (0, 1, 2, 3)), QUICK)
     assert found.tolist() == [2] * 6
 
 
@@ -70,11 +74,11 @@ def test_nothing_to_do_is_done_at_once(make_grasps: Make) -> None:
 def test_where_no_input_varies_the_most_frequent_training_label_is_answered(make_grasps: Make) -> None:
     grasps = make_grasps()
     rows = np.concatenate([np.flatnonzero(grasps.labels == 2)[:5], np.flatnonzero(grasps.labels == 1)[:4]])
-    data = Data.of(grasps)
-    X = data.X
-    X[rows, :2] = 7, 65535
-    fit = FoldFit(Fold(rows, np.arange(6), "1"), (0, 1), (0, 1, 2, 3))
-    assert is_blind(X, fit)
+    codes = grasps.codes.copy()
+    codes[rows, :2] = 7, 65535
+    data = Data.of(replace(grasps, codes=codes))
+    fit = FoldFit(Fold(rows, np.arange(6), "1"), (), (0, 1), (0, 1, 2, 3))
+    assert is_blind(data, fit)
     assert predictions(data, fit, QUICK).tolist() == [2] * 6
-    X[rows[-1], 1] = 0
-    assert not is_blind(X, fit)
+    codes[rows[-1], 1] = 0
+    assert not is_blind(Data.of(replace(grasps, codes=codes)), fit)

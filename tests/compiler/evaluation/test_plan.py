@@ -17,35 +17,38 @@ from thenar.compiler.evaluation.plan import (
     available,
 )
 from thenar.compiler.evaluation.populations import NESTED, PAPER, Protocol, populations
+from thenar.compiler.placement.elements import Element, Elements, columns_of
 from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.samples import Samples
 
 OF_THE_PAPER = {
-    "I": ("Angle + All-Co", (0, 1, 2, 3, 4, 5)),
-    "II": ("Angle + Sel-Co", (1, 3, 4, 5)),
-    "III": ("Angle + NoSel-Co", (0, 2, 4, 5)),
-    "IV": ("Angle", (4, 5)),
-    "V": ("All-Co", (0, 1, 2, 3)),
-    "VI": ("Sel-Co", (1, 3)),
-    "VII": ("NoSel-Co", (0, 2)),
+    "I": ("Angle + All-Co", True, (0, 1, 2, 3)),
+    "II": ("Angle + Sel-Co", True, (1, 3)),
+    "III": ("Angle + NoSel-Co", True, (0, 2)),
+    "IV": ("Angle", True, ()),
+    "V": ("All-Co", False, (0, 1, 2, 3)),
+    "VI": ("Sel-Co", False, (1, 3)),
+    "VII": ("NoSel-Co", False, (0, 2)),
 }
+FOUR, TWENTY = tuple(map(Element, range(4))), tuple(map(Element, range(20)))
 
 
 @pytest.mark.parametrize("composition", COMPOSITIONS, ids=lambda c: c.name)
 def test_compositions_are_the_papers(composition: Composition) -> None:
-    # Four switches, of which 3 and 1 are selected, and two joints in columns 4 and 5.
-    assert (composition.what, composition.columns((3, 1), 4, 2)) == OF_THE_PAPER[composition.name]
+    # Four switches, of which 3 and 1 are selected.
+    found = columns_of(composition.elements((Element(3), Element(1)), FOUR))
+    assert (composition.what, composition.angle, found) == OF_THE_PAPER[composition.name]
 
 
 def test_they_stand_in_the_papers_order() -> None:
     assert [composition.name for composition in COMPOSITIONS] == list(OF_THE_PAPER)
 
 
-@given(st.sets(st.integers(0, 19)), st.integers(1, 5))
-def test_selected_and_others_together_are_all(placement: set[int], n_joints: int) -> None:
-    by_name = {c.name: set(c.columns(tuple(placement), 20, n_joints)) for c in COMPOSITIONS}
-    assert by_name["VI"] | by_name["VII"] == by_name["V"]
+@given(st.sets(st.sampled_from(TWENTY)))
+def test_selected_and_others_together_are_all(placement: set[Element]) -> None:
+    by_name = {c.name: set(c.elements(tuple(placement), TWENTY)) for c in COMPOSITIONS}
+    assert by_name["VI"] | by_name["VII"] == by_name["V"] == set(TWENTY)
     assert not by_name["VI"] & by_name["VII"]
     assert by_name["II"] | by_name["III"] == by_name["I"]
     assert by_name["II"] & by_name["III"] == by_name["IV"]
@@ -99,8 +102,8 @@ def test_what_needs_no_placement_is_the_same_work_under_both_protocols(planner: 
 
 def test_the_papers_placement_is_one_a_subject_and_the_nested_one_differs_by_fold(planner: Planner) -> None:
     for cell in row(planner.table("compositions", PAPER), "VI").cells:
-        assert len({fit.columns for fit in cell.fits}) == 1
-    columns = [{fit.columns for fit in cell.fits} for cell in row(planner.table("compositions", NESTED), "VI").cells]
+        assert len({fit.elements for fit in cell.fits}) == 1
+    columns = [{fit.elements for fit in cell.fits} for cell in row(planner.table("compositions", NESTED), "VI").cells]
     assert max(map(len, columns)) > 1
 
 
@@ -119,7 +122,7 @@ def test_off_the_diagonal_both_protocols_take_the_others_placement(planner: Plan
         for j, cell in enumerate(line.cells):
             if i != j:
                 assert cell == nested[i].cells[j]
-                assert {fit.columns for fit in cell.fits} == {given}
+                assert {fit.elements for fit in cell.fits} == {given}
 
 
 @both_protocols
@@ -128,13 +131,13 @@ def test_pruning_starts_from_all_switches_and_takes_one_placement_for_all_subjec
 ) -> None:
     table = planner.table("pruning", protocol)
     assert [line.name for line in table] == ["all", "0", "30"]
-    assert {fit.columns for cell in table[0].cells for fit in cell.fits} == {tuple(range(12))}
+    assert {fit.elements for cell in table[0].cells for fit in cell.fits} == {tuple(map(Element, range(12)))}
     everyone = np.concatenate([part.rows for part in planner.parts])
     for line, least in zip(table[1:], (0, 30), strict=True):
         for cell in line.cells:
             for fit in cell.fits:
                 seen = everyone if protocol is PAPER else np.setdiff1d(everyone, fit.fold.test)
-                assert fit.columns == tuple(sorted(planner.chosen("id3", seen, least)))
+                assert fit.elements == tuple(sorted(planner.chosen("id3", seen, least)))
 
 
 @both_protocols
@@ -146,8 +149,8 @@ def test_baselines_have_as_many_switches_as_id3_in_every_fold(planner: Planner, 
         for cell, reference in zip(line.cells, id3.cells, strict=True):
             draws = DRAWS if line.name == "random" else 1
             assert len(cell.runs) == draws * len(reference.runs)
-            sizes = [len(fit.columns) for fit in reference.fits] * draws
-            assert [len(fit.columns) for fit in cell.fits] == sizes
+            sizes = [len(fit.elements) for fit in reference.fits] * draws
+            assert [len(fit.elements) for fit in cell.fits] == sizes
 
 
 @both_protocols
@@ -157,7 +160,7 @@ def test_baselines_choose_from_the_rows_that_id3_may_choose_from(planner: Planne
         for cell in row(table, name).cells:
             for fit in cell.fits:
                 seen = cell.part.rows if protocol is PAPER else fit.fold.train
-                assert fit.columns == tuple(sorted(planner.chosen(method, seen, len(fit.columns))))
+                assert fit.elements == tuple(sorted(planner.chosen(method, seen, len(fit.elements))))
 
 
 def test_pruning_by_s_makes_the_placements_of_all_tables_smaller(make_grasps: Make) -> None:
@@ -165,15 +168,15 @@ def test_pruning_by_s_makes_the_placements_of_all_tables_smaller(make_grasps: Ma
     lines: dict[TableName, str] = {"compositions": "VI", "generality": "A", "baselines": "CMIM"}
     for name, line in lines.items():
         full, pruned = (
-            len(row(planner_of(grasps, prune).table(name, PAPER), line).cells[0].fits[0].columns) for prune in (0, 20)
+            len(row(planner_of(grasps, prune).table(name, PAPER), line).cells[0].fits[0].elements) for prune in (0, 20)
         )
         assert pruned < full
 
 
 def test_random_draws_differ_and_follow_the_seed(planner: Planner) -> None:
-    def drawn(seed: int) -> list[tuple[int, ...]]:
+    def drawn(seed: int) -> list[Elements]:
         cell = row(replace(planner, seed=seed).table("baselines", PAPER), "random").cells[0]
-        return [run[0].columns for run in cell.runs[:: len(cell.part.repeats)]]
+        return [run[0].elements for run in cell.runs[:: len(cell.part.repeats)]]
 
     assert len(set(drawn(1))) > 1
     assert drawn(1) == drawn(1) != drawn(100)
@@ -183,11 +186,12 @@ def test_every_method_sees_exactly_the_rows_given_in_whatever_order(make_grasps:
     grasps, rows = make_grasps(noise=0.3), np.arange(5, 40)
     used, fresh = planner_of(grasps), planner_of(grasps)
     seen = Samples.of(grasps, "switches").rows(rows)
-    assert used.chosen("id3", rows, 4) == grow_id3(seen.switches, seen.labels, min_samples=4).inputs
+    assert columns_of(used.chosen("id3", rows, 4)) == grow_id3(seen.switches, seen.labels, min_samples=4).inputs
     assert used.chosen("id3", rows, 20) == fresh.chosen("id3", rows[::-1], 20) != used.chosen("id3", rows, 0)
     assert used.chosen("id3", rows[:20], 0) == fresh.chosen("id3", rows[:20], 0)
     for name in ("cmim", "mutual-information"):
-        assert used.chosen(name, rows, 3) == METHODS[name].chooser(seen)(3) == fresh.chosen(name, rows, 3)
+        assert used.chosen(name, rows, 3) == fresh.chosen(name, rows, 3)
+        assert columns_of(used.chosen(name, rows, 3)) == METHODS[name].chooser(seen)(3)
 
 
 def test_any_method_can_be_a_rival(make_grasps: Make) -> None:

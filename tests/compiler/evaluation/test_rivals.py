@@ -7,6 +7,7 @@ from sklearn.neighbors import KNeighborsClassifier
 from thenar.compiler.evaluation.folds import Fold
 from thenar.compiler.evaluation.plan import Data, FoldFit, predictions
 from thenar.compiler.evaluation.rivals import CLASSIFIERS
+from thenar.compiler.placement.elements import Element
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.trainers.base import Training
 
@@ -18,7 +19,8 @@ def test_rivals_answer_as_scikit_learns_on_the_same_standardised_columns(make_gr
     grasps = make_grasps(noise=0.3, per_type=10)
     data, rows = Data.of(grasps), np.arange(len(grasps))
     fold, columns = Fold(rows[::2], rows[1::2], "1"), (1, 3, 4, 12, 13)
-    learnt = data.X[fold.train][:, columns].astype(float)
+    X = data.samples.inputs
+    learnt = X[fold.train][:, columns].astype(float)
     mean, spread = learnt.mean(axis=0), learnt.std(axis=0)
     oracles = {
         "logistic-regression": LogisticRegression(max_iter=10_000),
@@ -27,8 +29,8 @@ def test_rivals_answer_as_scikit_learns_on_the_same_standardised_columns(make_gr
     assert oracles.keys() == CLASSIFIERS.keys()
     for name, oracle in oracles.items():
         oracle.fit((learnt - mean) / spread, grasps.labels[fold.train])
-        expected = oracle.predict((data.X[fold.test][:, columns] - mean) / spread)
-        fit = FoldFit(fold, columns, (0, 1, 2, 3), 3, learner=name)
+        expected = oracle.predict((X[fold.test][:, columns] - mean) / spread)
+        fit = FoldFit(fold, tuple(map(Element, columns[:3])), (0, 1), (0, 1, 2, 3), learner=name)
         assert np.array_equal(predictions(data, fit, PAPERS), expected)
 
 
@@ -36,5 +38,5 @@ def test_of_a_single_grasp_type_nothing_else_is_answered(make_grasps: Make) -> N
     grasps = make_grasps(noise=0.3)
     rows = np.flatnonzero(grasps.labels == 2)
     for name in CLASSIFIERS:
-        fit = FoldFit(Fold(rows, np.arange(5), "1"), (0, 1, 12), (0, 1, 2, 3), 2, learner=name)
+        fit = FoldFit(Fold(rows, np.arange(5), "1"), (Element(0), Element(1)), (0,), (0, 1, 2, 3), learner=name)
         assert predictions(Data.of(grasps), fit, PAPERS).tolist() == [2] * 5

@@ -12,22 +12,24 @@ from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.evaluation.rivals import CLASSIFIERS
 from thenar.compiler.evaluation.study import TABLES, Options, Study, evaluate
 from thenar.compiler.evaluation.tables import RateTable, Reader, Row
+from thenar.compiler.placement.elements import Element
 from thenar.compiler.recordings.graspset import GraspSet
 from thenar.compiler.trainers.base import TRAINERS
 
-# Six rows of labels 2 and 5 (others do not occur), two folds, two repeats of the same folds; switches are columns 0..2.
+# Six rows of labels 2 and 5 (others do not occur), two folds, two repeats of the same folds; three switches.
 LABELS = np.array([2, 2, 2, 5, 5, 5])
 FOLDS = (Fold(np.arange(3, 6), np.arange(3), "1"), Fold(np.arange(3), np.arange(3, 6), "2"))
 PART = Population("A", np.arange(6), (2, 5), (FOLDS, FOLDS))
-FIRST = tuple(FoldFit(fold, (0, 1, 7), (2, 5)) for fold in FOLDS)
-SECOND = tuple(FoldFit(fold, columns, (2, 5)) for fold, columns in zip(FOLDS, [(0, 1, 2), ()], strict=True))
+FIRST = tuple(FoldFit(fold, (Element(0), Element(1)), (4,), (2, 5)) for fold in FOLDS)
+THREE = tuple(map(Element, range(3)))
+SECOND = tuple(FoldFit(fold, elements, (), (2, 5)) for fold, elements in zip(FOLDS, [THREE, ()], strict=True))
 ANSWERS = {
     FIRST[0]: np.array([2, 2, 5]),
     FIRST[1]: np.array([5, 5, 5]),
     SECOND[0]: np.array([2, 2, 2]),
     SECOND[1]: np.array([2, 2, 5]),
 }
-READER = Reader(LABELS, np.arange(6), (2, 5), 3, ANSWERS, frozenset({SECOND[1]}), "within subject", None)
+READER = Reader(LABELS, np.arange(6), (2, 5), ANSWERS, frozenset({SECOND[1]}), "within subject", None)
 CELL = CellPlan(PART, (FIRST, SECOND))
 
 
@@ -60,7 +62,7 @@ def test_more_runs_than_repeats_are_draws_with_a_range_of_their_own() -> None:
 
 def test_a_row_counts_all_its_subjects_and_only_compositions_carry_confusions() -> None:
     folds = tuple(Fold(fold.train + 6, fold.test + 6, fold.name) for fold in FOLDS)
-    theirs = tuple(FoldFit(fold, fit.columns, fit.grasps) for fold, fit in zip(folds, SECOND, strict=True))
+    theirs = tuple(FoldFit(fold, fit.elements, (), fit.grasps) for fold, fit in zip(folds, SECOND, strict=True))
     answers = ANSWERS | {fit: ANSWERS[like] for fit, like in zip(theirs, SECOND, strict=True)}
     reader = replace(READER, labels=np.tile(LABELS, 2), trials=np.arange(12), predictions=answers)
     other = Population("B", np.arange(6, 12), (2, 5), (folds, folds))

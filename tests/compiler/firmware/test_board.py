@@ -2,6 +2,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+import msgspec
 import pytest
 from msgspec.structs import fields
 
@@ -9,9 +10,11 @@ from thenar.compiler.firmware import FirmwareError
 from thenar.compiler.firmware.board import (
     Board,
     GloveUart,
+    TaxelInputs,
     check_switches,
     glove_toml,
     key_names,
+    keys_of,
     load_board,
     parse_board,
     rows_and_columns,
@@ -19,7 +22,7 @@ from thenar.compiler.firmware.board import (
 from thenar.compiler.firmware.targets.avr import AVRS, best_setting
 from thenar.drivers.errors import ThenarError
 from thenar.runtime.harness.loading import parse_harness
-from thenar.runtime.manifest import Manifest
+from thenar.runtime.manifest import Calibration, Manifest, Switch, Threshold
 from thenar.runtime.tables import IntegerTables
 
 MakeTables = Callable[..., IntegerTables]
@@ -182,7 +185,7 @@ def test_the_hosts_file_names_the_keys_and_debounces_what_the_board_does_not(
 
 def test_every_example_of_the_page_is_a_sound_board() -> None:
     blocks = re.findall(r"^```toml\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)
-    assert len(blocks) == 5
+    assert len(blocks) == 6
     assert all(parse_board(block).wired for block in blocks)
 
 
@@ -193,8 +196,10 @@ def test_the_error_on_the_page_is_what_is_said() -> None:
     assert f"    {complaint(example[1].replace('PD3', 'PD2'))}\n" in page
 
 
-@pytest.mark.parametrize(("struct", "heading"), [(Board, "## The board"), (GloveUart, "### CyberGlove")])
-def test_every_key_is_on_the_page_with_its_default(struct: type[Board | GloveUart], heading: str) -> None:
+@pytest.mark.parametrize(
+    ("struct", "heading"), [(Board, "## The board"), (GloveUart, "### CyberGlove"), (TaxelInputs, "## Taxels")]
+)
+def test_every_key_is_on_the_page_with_its_default(struct: type[Board | GloveUart | TaxelInputs], heading: str) -> None:
     page = PAGE.read_text()
     table = page.partition(heading)[2].partition("\n#")[0]
     for key in fields(struct):
@@ -202,3 +207,44 @@ def test_every_key_is_on_the_page_with_its_default(struct: type[Board | GloveUar
         assert row is not None or f"[{key.encode_name}]" in page, key.encode_name
         if row is not None and isinstance(key.default, int):
             assert row[1] == str(key.default).lower()
+
+
+TAXELS = '[taxels]\ninputs = ["ADC0", "ADC6"]\nselect = ["PB0", "PB1", "PB2", "PB3"]\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (TAXELS.replace(', "PB3"', "") + 'names = ["p"]', "3 pins: a CD74HC4067 is selected by 4, S0 to S3"),
+        (TAXELS + f"names = {['p'] + [''] * 32}", "33 names for 32 channels"),
+        ('[taxels]\ninputs = ["ADC0"]\nnames = ["p", "q"]', "2 names for 1 channels"),
+        (TAXELS.replace("ADC6", "ADC9") + 'names = ["p"]', "has no channel 'ADC9'"),
+        (TAXELS.replace("ADC6", "ADC0") + 'names = ["p"]', "taxels.inputs[0] already: one channel, one input"),
+        ('[analog]\nj = "ADC6"\n' + TAXELS + 'names = ["p"]', "ADC6 is analog.j already"),
+        (PINS + TAXELS + 'names = ["a"]', "switch 'a' is pins.a already"),
+        ('[pins]\na = "PB0"\n' + TAXELS + 'names = ["p"]', "PB0 is"),
+        ('[pins]\na = "PC0"\n' + TAXELS + 'names = ["p"]', "PC0 is"),
+        (MATRIX.replace("PD2", "PB4") + TAXELS.replace("PB0", "PC1") + 'names = ["p"]', "driven on port B"),
+    ],
+)
+def test_taxels_that_cannot_be_wired_so_are_refused(text: str, said: str) -> None:
+    assert said in complaint(UNO + text)
+
+
+def test_levels_of_taxels_are_no_keys_and_the_host_is_told_of_the_channels(
+    describe: Describe, make_tables: MakeTables
+) -> None:
+    taxel = Calibration(9, "p", "counts", 0, 0.0, 1, 1.0)
+    manifest = describe(make_tables(switches=3))
+    switches = (
+        Switch(0, "a", 0.0),
+        Switch(9, "p>5", 0.0, Threshold(5, 5.5, taxel)),
+        Switch(1, "b", 0.0),
+    )
+    manifest = msgspec.structs.replace(manifest, switches=switches)
+    board = parse_board(UNO + PINS + TAXELS + 'names = ["", "p"]\n')
+    assert keys_of(board, switches) == ("a", "b")
+    (scanner,) = parse_harness(glove_toml("hand", board, manifest), "glove.toml").scanners
+    assert (scanner.switches, scanner.taxels, scanner.mux) == (("a", "b"), ("", "p"), "cd74hc4067")
+    # A comparator's pin may stand for a level: then the board knows nothing of the taxel.
+    assert keys_of(parse_board(UNO + PINS), switches) == ("a", "p>5", "b")

@@ -7,7 +7,6 @@ import pytest
 
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.designs import Design, best_designs, designs, points_of, with_whole_scans
-from thenar.compiler.frontier.equipment import NO_TIME
 from thenar.compiler.frontier.finalists import Close
 from thenar.compiler.frontier.latency import POLICIES
 from thenar.compiler.frontier.points import Latency, Time, Way
@@ -16,7 +15,7 @@ from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import Candidate, Search, Shape
 from thenar.compiler.frontier.survey import Judged
 from thenar.compiler.frontier.timing.classify_times import Classified
-from thenar.compiler.frontier.timing.scan_times import ScanTimes, joints_time
+from thenar.compiler.frontier.timing.scan_times import ScanTimes, records_of
 from thenar.compiler.trainers.base import TRAINERS, Training
 from thenar.drivers.cyberglove_protocol import SENSORS_18
 
@@ -51,24 +50,24 @@ def simulated(design: Design, us: float) -> Design:
 
 
 def test_a_scan_that_may_end_early_looks_at_the_scores_once_a_port_that_it_reads() -> None:
-    whole, early = designs(close_of(), NO_TIME)
+    whole, early = designs(close_of())
     assert (whole.scan_kind, whole.scan.us, whole.classify.us) == ("full", 500.0, 50.0)
     assert (early.scan_kind, early.scan.us, early.classify.us) == ("early", 200.0, 75.0)
     assert early.frame.us == 275.0
 
 
 def test_where_no_frame_ends_a_scan_early_it_is_not_offered() -> None:
-    assert [design.scan_kind for design in designs(close_of(early_us=500.0), NO_TIME)] == ["full"]
+    assert [design.scan_kind for design in designs(close_of(early_us=500.0))] == ["full"]
 
 
 def test_joints_alone_have_one_design_a_layout_and_wait_for_a_record() -> None:
-    (design,) = designs(close_of(switches=0), joints_time(SENSORS_18))
+    (design,) = designs(close_of(switches=0), records_of(SENSORS_18).of(18))
     assert (design.scan.us, design.wired, design.classify.us) == (0.0, None, 50.0)
-    assert design.frame.us == pytest.approx(21 * 10 / 115_200 * 1e6 + 50.0)
+    assert design.frame.us == pytest.approx(18 * 250 + 21 * 10 / 115_200 * 1e6 + 50.0)
 
 
 def test_compiling_is_choosing_training_and_making_the_tables() -> None:
-    design = next(designs(close_of(), NO_TIME))
+    design = next(designs(close_of()))
     (point, *_) = points_of(
         [design], dict.fromkeys(((design, kind) for kind in POLICIES), WAIT), {design.judged: 0.0}, NAMES, trained
     )
@@ -77,25 +76,25 @@ def test_compiling_is_choosing_training_and_making_the_tables() -> None:
 
 def test_fronts_hold_the_quickest_and_the_smallest() -> None:
     big, small = close_of(30, 0.95, early_us=100.0), close_of(5, 0.9, early_us=400.0)
-    by_time, by_switches = best_designs([*designs(small, NO_TIME), *designs(big, NO_TIME)])
+    by_time, by_switches = best_designs([*designs(small), *designs(big)])
     assert [design.n_switches for design in by_time] == [30]
     assert [design.n_switches for design in by_switches] == [5, 30]
     assert by_switches[0].scan_kind == "early"
 
 
 def test_a_design_that_ends_early_is_joined_by_the_one_of_whole_scans_once() -> None:
-    whole, early = designs(close_of(), NO_TIME)
+    whole, early = designs(close_of())
     assert [design.scan_kind for design in with_whole_scans([early, early])] == ["early", "full"]
     assert with_whole_scans([whole, early]) == [whole, early]
 
 
 def test_dwell_and_tests_are_for_whole_scans() -> None:
-    whole, early = designs(close_of(), NO_TIME)
+    whole, early = designs(close_of())
     assert (whole.decisions, early.decisions) == (tuple(POLICIES), ("single",))
 
 
 def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
-    one, other = next(designs(close_of(20, 0.9), NO_TIME)), next(designs(close_of(10, 0.8, layout_us=30.0), NO_TIME))
+    one, other = next(designs(close_of(20, 0.9))), next(designs(close_of(10, 0.8, layout_us=30.0)))
     # The model has the other one faster, the simulator the better one: so the other is beaten on time.
     assert other.frame.us < one.frame.us
     several = [simulated(one, 20.0), simulated(other, 60.0)]
@@ -111,7 +110,7 @@ def test_points_are_ordered_and_on_fronts_by_what_was_simulated() -> None:
 
 
 def test_a_points_rate_and_the_lower_end_of_its_interval_are_less_its_luck() -> None:
-    design = next(designs(close_of(20, 0.9), NO_TIME))
+    design = next(designs(close_of(20, 0.9)))
     waits = dict.fromkeys(((design, kind) for kind in POLICIES), WAIT)
     (point, *_) = points_of([design], waits, {design.judged: 0.25}, NAMES, trained)
     found = design.judged.rate
@@ -122,7 +121,7 @@ def test_a_points_rate_and_the_lower_end_of_its_interval_are_less_its_luck() -> 
 
 
 def test_a_decision_that_is_quicker_is_on_its_own_front() -> None:
-    one, other = (next(designs(close_of(n, rate), NO_TIME)) for n, rate in ((20, 0.9), (10, 0.8)))
+    one, other = (next(designs(close_of(n, rate))) for n, rate in ((20, 0.9), (10, 0.8)))
     waits = {(design, kind): WAIT for design in (one, other) for kind in design.decisions}
     waits[other, "sequential"] = replace_latency(WAIT, 10.0)
     points = points_of([one, other], waits, {each.judged: 0.0 for each in (one, other)}, NAMES, trained)
@@ -136,12 +135,12 @@ def replace_latency(latency: Latency, mean_us: float) -> Latency:
 
 
 def test_measured_times_of_early_scans_count_every_look() -> None:
-    _, early = designs(close_of(), NO_TIME)
+    _, early = designs(close_of())
     assert simulated(early, 100.0).classify == Time(150.0, "simulated")
 
 
 def test_a_point_says_its_trainer_and_every_setting_that_is_no_default() -> None:
-    (design, _) = designs(close_of(), NO_TIME)
+    (design, _) = designs(close_of())
     choice = replace(design.close.screened.choice, trainer="logit")
     other = replace(design, close=replace(design.close, screened=replace(design.close.screened, choice=choice)))
     waits = dict.fromkeys(((other, kind) for kind in POLICIES), WAIT)

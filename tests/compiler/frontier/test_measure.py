@@ -9,10 +9,10 @@ import pytest
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.frontier.cache import Cache, Store
 from thenar.compiler.frontier.designs import Design
-from thenar.compiler.frontier.equipment import NO_TIME, Equipment
+from thenar.compiler.frontier.equipment import Equipment
 from thenar.compiler.frontier.finalists import Close
 from thenar.compiler.frontier.measure import measured
-from thenar.compiler.frontier.points import Way
+from thenar.compiler.frontier.points import Time, Way
 from thenar.compiler.frontier.price import PricedTables, Tabled, Wired
 from thenar.compiler.frontier.screen import Screened
 from thenar.compiler.frontier.search import Candidate, Shape
@@ -34,7 +34,7 @@ def design_of(model: ClassifyModel) -> Design:
     judged = Judged(Rate.counted((9,), 10, of="pooled"), np.arange(10), 1)
     screened = Screened(Candidate(Way("id3", 6.0), "switches"), tuple(range(6)), judged, 1.0)
     close = Close(screened, {}, {}, {}, {}, (priced,), 1.0)
-    return Design(close, priced, priced.classified[0], wired, "early", NO_TIME)
+    return Design(close, priced, priced.classified[0], wired, "early", Time(0.0, "wire"))
 
 
 @pytest.mark.slow

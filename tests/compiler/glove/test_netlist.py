@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING, Literal
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from thenar.compiler.glove.files import spec_files
 from thenar.compiler.glove.spec import glove_spec
 from thenar.compiler.hand import HandShape
-from thenar.drivers.i2c.chips import CHIPS
+from thenar.drivers.i2c.chips import CHIPS, expanders
 from thenar.runtime.harness.loading import load_harness, parse_harness
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, MuxChannel, ScannerWiring
-from thenar.runtime.manifest import Manifest
+from thenar.runtime.manifest import Calibration, Manifest, Switch, Threshold
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_harness
 
@@ -53,7 +54,7 @@ def check_address(netlist: "Netlist", ref: str, chip: ChipWiring) -> None:
 
 
 @settings(deadline=None, max_examples=25)
-@given(kind=st.sampled_from(sorted(CHIPS)), data=st.data())
+@given(kind=st.sampled_from(sorted(expanders())), data=st.data())
 def test_every_kept_switch_reaches_one_input_and_the_scan_map_reads_it(
     read_netlist: Reader, manifest_of: Manifests, hand: HandShape, kind: str, data: st.DataObject
 ) -> None:
@@ -176,3 +177,85 @@ def test_a_board_has_a_pin_for_every_kept_key_and_one_for_ground(read_netlist: R
     assert reached(netlist, 2) == [("A1", "key 1")]
     assert netlist.net_of("A1", netlist.pin_of("A1", "GND")) == netlist.net_of("SW1", "2") == "GND"
     assert netlist.off_board == {"SW1", "SW2", "A1"}
+
+
+_TAXELS = """
+[[scanner]]
+port = "/dev/a"
+switches = ["s0"]
+taxels = ["", "t0", "t1"]
+
+[[scanner]]
+port = "/dev/b"
+switches = []
+taxels = ["t2", "spare", {empty}"t3"]
+mux = "cd74hc4067"
+
+[[bus]]
+device = "/dev/i2c-1"
+[[bus.chip]]
+kind = "ads1115"
+address = 0x4A
+[bus.chip.pins]
+AIN2 = "t4"
+[[bus.chip]]
+kind = "ads7828"
+address = 0x49
+mux = {{ address = 0x70, channel = 3 }}
+[bus.chip.pins]
+CH7 = "t5"
+
+[[spi]]
+device = "/dev/spidev1.0"
+kind = "mcp3008"
+[spi.pins]
+CH1 = "t6"
+[[spi]]
+device = "/dev/spidev1.1"
+kind = "mcp3204"
+[spi.pins]
+CH3 = "t7"
+"""
+
+
+def test_every_taxel_is_half_a_divider_at_the_channel_that_measures_it(
+    read_netlist: Reader, manifest_of: Manifests
+) -> None:
+    """Two levels of a taxel are one pad; t3 is on the second multiplexer, on its second channel."""
+    harness = parse_harness(_TAXELS.format(empty='"", ' * 15), "glove.toml")
+    coded = Calibration(0, "t0", "N", 0, 0.0, 1000, 5.0)
+
+    def level(taxel: str, code: int) -> Switch:
+        return Switch(0, f"{taxel}>{code}", 0.1, Threshold(code, code / 200, replace(coded, name=taxel)))
+
+    manifest = replace(
+        manifest_of(["s0"]), switches=(Switch(0, "s0", 0.1), level("t0", 7), *(level(f"t{n}", 9) for n in range(8)))
+    )
+    spec = glove_spec(manifest, None, harness)
+    assert [switch.name for switch in spec.summary.switches] == ["s0", *(f"t{n}" for n in range(8))]
+    netlist = read_netlist(spec_files(manifest, None, harness)["glove.net"])
+    wanted = [
+        *(("A1", "channel 1"), ("A1", "channel 2"), ("U5", "I0"), ("U6", "I1")),
+        *(("U1", "AIN2"), ("U2", "CH7"), ("U3", "CH1"), ("U4", "CH3")),
+    ]
+    for number, channel in enumerate(wanted, start=2):
+        assert reached(netlist, number) == [channel]
+        assert netlist.net_of(f"SW{number}", "2") == "VCC"
+        (divider,) = [ref for ref, _ in netlist.nets[netlist.net_of(f"SW{number}", "1")] if ref[0] == "R"]
+        assert netlist.net_of(divider, "2") == "GND"
+    assert netlist.net_of("U1", netlist.pin_of("U1", "ADDR")) == "SDA0"
+    assert {netlist.net_of(ref, netlist.pin_of(ref, "CS")) for ref in ("U3", "U4")} == {"CS1_0", "CS1_1"}
+    for pin in ("S0", "S1", "S2", "S3"):
+        (shared,) = {netlist.net_of(ref, netlist.pin_of(ref, pin)) for ref in ("U5", "U6")}
+        assert "A2" in [ref for ref, _ in netlist.nets[shared]]
+    commons = {netlist.net_of(ref, netlist.pin_of(ref, "COMMON")) for ref in ("U5", "U6")}
+    assert len(commons) == 2
+    assert all("A2" in [ref for ref, _ in netlist.nets[net]] for net in commons)
+    nodes = [node for net in netlist.nets.values() for node in net]
+    assert len(nodes) == len(set(nodes)), "a pin on two nets"
+    assert spec.scan.taxels == (((1, 7, 1), (1, 9, 2), (2, 9, 3)), ((0, 9, 4), (17, 9, 5)))
+    assert [port.levels for port in spec.scan.ports] == [((9, 6 + n),) for n in range(4)]
+    (said,) = [remark for remark in spec.summary.remarks if "taxel t0," in remark]
+    assert said.startswith("SW2 ")
+    assert "codes above 7" in said
+    assert "codes above 9" in said

@@ -78,10 +78,11 @@ def test_every_key_is_read(tmp_path: Path) -> None:
         ("label = []", "`label` must name a column"),
         ('label = "a"\n[[taxels]]\ncolumns = ["b"]\nthreshold = inf', "`threshold` must be a finite number, 'otsu' or"),
         ('label = "a"\n[[taxels]]\ncolumns = ["b"]\nthreshold = "max"', "'max' is not among its values"),
-        ('label = "a"\n[[taxels]]\ncolumns = ["b"]', "the key threshold is missing"),
+        ('label = "a"\n[[taxels]]\ncolumns = ["b"]\nbits = 17', "bits: "),
+        ('label = "a"\n[[taxels]]\ncolumns = ["b"]\nbits = 12\ngrid = 2', "`bits` is for counts"),
         (
             'label = "a"\n[[taxels]]\ncolumns = ["b"]\nthreshold = 3\ncodes = true',
-            "`codes`, `grid`, `origin` and `calibration` are for a threshold that is 'learnt'",
+            "`codes`, `bits`, `grid`, `origin` and `calibration` are for taxels without `threshold`",
         ),
         ('label = "a"\n[[joints]]\ncolumns = ["b"]\ngrid = 0', "`grid` must be above 0, not 0"),
         ('label = "a"\n[[joints]]\ncolumns = ["b"]\ngrid = nan', "`grid` must be above 0"),

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from thenar.compiler.recordings.columns import Columns, JointColumns, TaxelColumns
+from thenar.compiler.recordings.columns import Calibration, Columns, JointColumns, TaxelColumns
 from thenar.compiler.recordings.errors import ColumnsError, TableError
 from thenar.compiler.recordings.export import export
 from thenar.compiler.recordings.graspset import GraspSet
@@ -248,3 +248,21 @@ def test_a_value_beyond_the_codes_is_named_by_the_users_row() -> None:
     rows = {"g": ["a", "b"], "j": ["0", "1e6"]}
     with pytest.raises(TableError, match="joint 'j': row 9 would get codes outside"):
         import_table(Table("t.csv", rows, np.array([7, 9])), Columns("g", joints=JOINTS))
+
+
+def test_counts_of_a_converter_keep_its_range_and_their_calibration(tmp_path: Path) -> None:
+    """The ends of the range are the two points, in counts or in newtons; a written set reads back as the same."""
+    pads = {"p1": ["0", "90", "1000", "5", "95", "7"], "p2": ["0", "4", "6", "1023", "0", "41"]}
+    plain = TaxelColumns(("p1",), bits=10)
+    newtons = TaxelColumns(("p2",), unit="N", bits=10, calibration=Calibration(23, 0.0, 523, 10.0))
+    grasp_set, report = frames(taxels=(plain, newtons), **pads)
+    one, two = grasp_set.taxel_columns
+    assert (one.code_a, one.value_a, one.code_b, one.value_b) == (0, 0.0, 1023, 1023.0)
+    assert (two.code_a, two.code_b) == (0, 1023)
+    assert two.value([23, 523]) == pytest.approx([0, 10])
+    assert grasp_set.taxels[:, 1].tolist() == [0, 4, 6, 1023, 0, 41]
+    assert report.notes[-1].startswith("2 taxels stay analog")
+    export(grasp_set, tmp_path / "t.csv", True, columns=tmp_path / "c.toml")
+    assert import_file(tmp_path / "t.csv", tmp_path / "c.toml")[0].fingerprint() == grasp_set.fingerprint()
+    with pytest.raises(TableError, match=r"taxel 'p2': row 5 .*exceed 9 bits"):
+        frames(taxels=(plain, TaxelColumns(("p2",), bits=9)), **pads)

@@ -10,16 +10,17 @@ from msgspec.structs import replace
 
 from thenar.compiler.recordings.errors import TableError
 from thenar.compiler.recordings.graspset import Joint
-from thenar.compiler.recordings.mcap_recording import import_recordings
+from thenar.compiler.recordings.mcap_recording import _Grasp, _Part, _taxel, import_recordings
 from thenar.compiler.recordings.taxonomy import KAMAKURA_14
 from thenar.drivers.calibration import GloveCalibration, SensorCalibration
 from thenar.runtime.calibration import CodeTables
 from thenar.runtime.errors import McapError
 from thenar.runtime.frames import GloveFrame, SwitchFrame
-from thenar.runtime.manifest import Calibration
+from thenar.runtime.manifest import Calibration, Threshold
 from thenar.runtime.recording.guide import read_journal
 from thenar.runtime.recording.session import Collection, Label, Session, Task
 from thenar.runtime.recording.writer import Recorder
+from thenar.runtime.taxels import TaxelCalibration, TaxelLine, Taxels, count_limit
 
 SENSORS = ("thumb_mpj", "index_mpj", "wrist_pitch", "wrist_yaw")
 CALIBRATION = GloveCalibration(
@@ -148,6 +149,7 @@ def test_subjects_of_their_own_recordings_become_one_set(write: Write) -> None:
         (replace(SESSION, switches=("s1", "s2", "s9")), "differ in switches"),
         (replace(SESSION, sensors=("a", *SENSORS[1:])), "differ in sensors"),
         (replace(SESSION, calibration=CALIBRATION), "differ in unit of the joints"),
+        (replace(SESSION, taxels=("p",)), "differ in taxels"),
         (
             replace(SESSION, collection=replace(COLLECTION, taxonomy="own", types=("PoS", "Tip"))),
             "differ in taxonomy",
@@ -241,3 +243,66 @@ def test_what_is_no_recording_is_named(tmp_path: Path) -> None:
 def test_codes_are_16_bit_numbers(write: Write) -> None:
     grasp_set, _ = import_recordings([write()])
     assert grasp_set.codes.dtype == np.uint16
+
+
+PADS = TaxelCalibration(unit="N", taxels=(TaxelLine("p", 100, 900, 2.0), TaxelLine("q", 900, 100)))
+ANALOG = replace(SESSION, switches=("s1",), sensors=(), taxels=("p", "q"), taxel_calibration=PADS)
+
+
+def pressed(path: Path, session: Session, *trials: tuple[int | None, ...] | None) -> Path:
+    with Recorder(path, session) as recorder:
+        for trial, codes in enumerate(trials, start=1):
+            time_us = trial * 1000
+            recorder.switches(SwitchFrame(time_us, 1, taxels=codes))
+            for what in ("captured", "accepted"):
+                recorder.label(Label(time_us, what, trial, "PoS", "A", "jar"))  # type: ignore[arg-type]
+            recorder.switches(SwitchFrame(time_us + 1, 1, taxels=(7, 7)))
+    return path
+
+
+def test_taxels_are_imported_with_their_calibration(tmp_path: Path) -> None:
+    grasp_set, _ = import_recordings([pressed(tmp_path / "a.mcap", ANALOG, (120, 800), (900, 0))])
+    assert grasp_set.taxels.tolist() == [[120, 800], [900, 0]]
+    assert grasp_set.taxel_columns == (Joint("p", "N", 100, 0.0, 900, 2.0), Joint("q", "N", 900, 0.0, 100, 1.0))
+    plain = replace(ANALOG, taxel_calibration=None)
+    grasp_set, _ = import_recordings([pressed(tmp_path / "b.mcap", plain, (120, 800))])
+    assert grasp_set.taxel_columns == (Joint("p", "counts", 0, 0.0, 1, 1.0), Joint("q", "counts", 0, 0.0, 1, 1.0))
+
+
+def test_a_trial_of_a_taxel_that_was_not_read_is_left_out_and_told(tmp_path: Path) -> None:
+    path = pressed(tmp_path / "a.mcap", ANALOG, (120, 800), (120, None), None)
+    grasp_set, report = import_recordings([path])
+    assert grasp_set.trials.tolist() == [1]
+    assert "2 trials in which not everything was read were left out" in " ".join(w.message for w in report.warnings)
+
+
+@given(st.integers(0, 65534), st.integers(0, 65535))
+def test_codes_of_another_calibration_are_those_that_the_live_recogniser_gives_it(raw: int, code: int) -> None:
+    own = TaxelLine("p", 800, 300, 1.7)
+    first = PADS.taxels[0]
+    coded = Calibration(0, "p", "N", first.rest, 0.0, first.press, first.value)
+    limit = count_limit(Threshold(code, 0.0, coded), TaxelCalibration(unit="N", taxels=(own,)))
+    closed, _ = Taxels(["p"], [[(limit, 0)]]).read(0, [raw])
+    grasps = [
+        (
+            _Part("", replace(ANALOG, taxel_calibration=TaxelCalibration(unit="N", taxels=(line,))), COLLECTION, ()),
+            grasp,
+        )
+        for line, grasp in (
+            (first, _Grasp(Label(0, "captured", 1, "PoS", "A", "jar"), None, None, (100,))),
+            (own, _Grasp(Label(0, "captured", 1, "PoS", "A", "jar"), None, None, (raw,))),
+        )
+    ]
+    codes, _ = _taxel(0, grasps)
+    assert (codes[1] > code) == bool(closed)
+
+
+def test_baselines_are_taken_off_as_they_are_live(tmp_path: Path) -> None:
+    session = replace(ANALOG, harness="[taxels]\nper_minute = 10.0\n")
+    with Recorder(tmp_path / "a.mcap", session) as recorder:
+        for tenth in range(100):
+            recorder.switches(SwitchFrame(tenth * 100_000, 1, taxels=(110, 910)))
+        for what in ("captured", "accepted"):
+            recorder.label(Label(10**7, what, 1, "PoS", "A", "jar"))  # type: ignore[arg-type]
+    grasp_set, _ = import_recordings([recorder.path])
+    assert grasp_set.taxels.tolist() == [[100, 900]]

@@ -87,7 +87,11 @@ def test_the_table_of_a_home_made_glove_is_imported_as_it_comes(
     expected |= {column: "taxels" if column.startswith("pad") else "joints" for column in HEAD[5:]}
     assert roles(proposal) == expected
     assert (report.rows, report.trials, report.subjects, report.grasp_types) == (810, 54, 6, 3)
-    assert grasp_set.switches.shape == (810, 24)
+    assert grasp_set.taxels.shape == (810, 24)
+    assert {(taxel.unit, taxel.code_a, taxel.code_b, taxel.value_b) for taxel in grasp_set.taxel_columns} == {
+        ("counts", 0, 4095, 4095.0)
+    }
+    assert report.notes[-1].startswith("24 taxels stay analog: a placement chooses their levels; to make switches")
     assert [joint.step for joint in grasp_set.joints] == pytest.approx([0.01] * 5)
     assert sorted(set(grasp_set.subjects.tolist())) == ["Anna", "Bea", "Dan", "Eva", "Jörg", "Käthe"]
     (filled,) = report.warnings
@@ -122,6 +126,8 @@ def test_the_icub_recordings_are_told_by_values_where_names_say_nothing(icub_tab
     proposal, grasp_set, report = imported(icub_table, tmp_path)
     assert (proposal.columns.label, proposal.columns.trial) == ("object", "rep")
     assert grasp_set.switches.shape == (230, 60)
+    assert (grasp_set.taxels.shape, report.taxels, report.joints) == ((230, 60), 60, 9)
+    assert {taxel.code_b for taxel in grasp_set.taxel_columns} == {255}
     left_out = {name for name, role in roles(proposal).items() if role == "left out"}
     assert left_out == {"trial_id", "shape", "n_slices"}
     assert report.trials == 230

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from thenar.drivers.errors import DeviceError, SettingError
 from thenar.drivers.i2c.bus import ChipAt, I2cBus, Port, PortRead, cut
-from thenar.drivers.i2c.chips import CHIPS
+from thenar.drivers.i2c.chips import CHIPS, Reading
 from thenar.drivers.i2c.keeper import PlacedChip, Route
 from thenar.drivers.i2c.node import MOST_MESSAGES, Query, Way
 
@@ -194,7 +194,7 @@ MEMBERS = [
 ]
 ports = st.lists(
     st.builds(
-        lambda member, command: Port(member, Query(member.address, command, 1), 0),
+        lambda member, command: Port(member, Query(member.address, command, 1), Reading("", command, ())),
         st.sampled_from(MEMBERS),
         st.sampled_from([b"", b"\x12"]),
     ),

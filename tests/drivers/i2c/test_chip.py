@@ -2,7 +2,7 @@ import pytest
 
 from thenar.drivers.errors import SettingError
 from thenar.drivers.i2c import tca9548a
-from thenar.drivers.i2c.chips import CHIPS, Package, Write
+from thenar.drivers.i2c.chips import CHIPS, Conversion, Package, Write, expanders
 from thenar.drivers.i2c.chips.base import GROUND, SUPPLY
 
 # Bytes on the wire and SCL periods of one read of all pins, as the data sheets draw them.
@@ -17,6 +17,9 @@ WHOLE_READS = {
     "tca6424a": (6, 57),
 }
 
+# One pin of an ADS1115 goes to four nets.
+STRAPPED = {kind: chip for kind, chip in CHIPS.items() if kind != "ads1115"}
+
 # Read off the data sheets' figures of the packages.
 DRAWN = [
     ("mcp23017", {"GPB0": 1, "GPB7": 8, "VDD": 9, "VSS": 10, "SCL": 12, "SDA": 13, "A0": 15, "RESET": 18, "GPA7": 28}),
@@ -26,11 +29,13 @@ DRAWN = [
     ("pcf8575", {"INT": 1, "A1": 2, "P00": 4, "P07": 11, "GND": 12, "P10": 13, "A0": 21, "SCL": 22, "VCC": 24}),
     ("pca9555", {"INT": 1, "A1": 2, "P00": 4, "P07": 11, "VSS": 12, "P10": 13, "A0": 21, "SDA": 23, "VDD": 24}),
     ("tca9555", {"INT": 1, "A2": 3, "P00": 4, "P07": 11, "GND": 12, "P17": 20, "A0": 21, "SDA": 23, "VCC": 24}),
+    ("ads1115", {"ADDR": 1, "GND": 3, "AIN0": 4, "AIN3": 7, "VDD": 8, "SDA": 9, "SCL": 10}),
+    ("ads7828", {"CH0": 1, "CH7": 8, "GND": 9, "REF": 10, "COM": 11, "A0": 12, "A1": 13, "SCL": 14, "VDD": 16}),
     ("tca6424a", {"P00": 1, "P10": 9, "P27": 24, "GND": 25, "ADDR": 26, "VCCP": 27, "RESET": 28, "VCCI": 31}),
 ]
 
 
-@pytest.mark.parametrize("kind", CHIPS)
+@pytest.mark.parametrize("kind", expanders())
 def test_reading_all_pins_takes_what_the_data_sheets_say(kind: str) -> None:
     chip = CHIPS[kind]
     whole = [reading for reading in chip.readings if sorted(reading.pins) == list(range(len(chip.pins)))]
@@ -52,7 +57,7 @@ def test_the_cheapest_readings_stand_first_and_have_names_of_their_own(kind: str
 def test_pins_have_names_of_their_own_and_every_pin_is_in_some_reading(kind: str) -> None:
     chip = CHIPS[kind]
     assert len(set(chip.pins)) == len(chip.pins)
-    assert {pin for reading in chip.readings for pin in reading.pins} == set(range(len(chip.pins)))
+    assert {pin for reading in chip.readings for pin in reading.pins} - {-1} == set(range(len(chip.pins)))
 
 
 @pytest.mark.parametrize(("kind", "pins"), [("mcp23017", {"GPA7", "GPB7"}), ("mcp23008", {"GP7"})])
@@ -108,15 +113,30 @@ def test_every_chip_has_each_pin_of_its_driver_once_and_can_be_powered_and_reach
 
 @pytest.mark.parametrize(
     ("package", "addresses"),
-    [*((CHIPS[kind].package, CHIPS[kind].addresses) for kind in CHIPS), (tca9548a.PACKAGE, tca9548a.ADDRESSES)],
-    ids=[*CHIPS, "tca9548a"],
+    [
+        *((chip.package, chip.addresses) for chip in STRAPPED.values()),
+        (tca9548a.PACKAGE, tca9548a.ADDRESSES),
+    ],
+    ids=[*STRAPPED, "tca9548a"],
 )
 def test_the_straps_of_an_address_are_its_lowest_bits(package: Package, addresses: range) -> None:
     for address in addresses:
         straps = package.selects(address - min(addresses))
-        assert sum(1 << bit for bit, (_, high) in enumerate(straps) if high) == address - min(addresses)
+        assert sum(1 << bit for bit, (_, to) in enumerate(straps) if to == "high") == address - min(addresses)
     assert len(addresses) == 1 << len(package.selects(0))
 
 
+def test_the_one_address_pin_of_an_ads1115_goes_to_ground_supply_sda_or_scl() -> None:
+    package = CHIPS["ads1115"].package
+    assert [package.selects(offset) for offset in range(4)] == [(("ADDR", to),) for to in ("low", "high", "SDA", "SCL")]
+
+
 def test_only_the_chip_without_pull_ups_is_said_to_have_none() -> None:
-    assert [kind for kind in CHIPS if not CHIPS[kind].pulls_up] == ["tca6424a"]
+    assert [kind for kind, chip in expanders().items() if not chip.pulls_up] == ["tca6424a"]
+
+
+@pytest.mark.parametrize(("kind", "start", "read", "us"), [("ads1115", 38, 48, 1317), ("ads7828", 0, 48, 0)])
+def test_a_conversion_takes_what_the_data_sheet_says(kind: str, start: int, read: int, us: float) -> None:
+    for conversion in CHIPS[kind].readings:
+        assert isinstance(conversion, Conversion)
+        assert (conversion.start_periods, conversion.scl_periods, conversion.us) == (start, read, us)

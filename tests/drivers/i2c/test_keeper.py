@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from thenar.drivers.emulated.i2c_wire import Adapter, Message, Station, Wire
 from thenar.drivers.errors import DeviceError
-from thenar.drivers.i2c.chips import CHIPS
+from thenar.drivers.i2c.chips import CHIPS, Conversion, Converter, expanders
 from thenar.drivers.i2c.keeper import ImpostorError, Keeper, PlacedChip, read_back, set_up, whats_there
 from thenar.drivers.i2c.node import Node, Query, Run
 
@@ -95,7 +95,7 @@ levels = st.integers(0, (1 << 24) - 1)
 leftovers = st.lists(st.tuples(st.integers(0, 0x1A), st.integers(0, 255)), max_size=6)
 
 
-@pytest.mark.parametrize("kind", CHIPS)
+@pytest.mark.parametrize("kind", expanders())
 @given(levels=levels, leftovers=leftovers)
 def test_every_reading_gives_the_pins_whatever_the_chip_was_left_with(
     kind: str, levels: int, leftovers: list[tuple[int, int]]
@@ -125,7 +125,7 @@ def test_a_chip_that_is_another_is_found_out_unless_all_its_pins_are_low(said: s
         set_up(node_with(there, address, pins), CHIPS[said], address, inputs(said))
 
 
-@pytest.mark.parametrize("there", sorted(set(CHIPS) - set(ALIKE)))
+@pytest.mark.parametrize("there", sorted(set(expanders()) - set(ALIKE)))
 def test_what_is_there_instead_is_named_and_its_pins_are_left_inputs(there: str) -> None:
     address = address_of(there, "tca6424a")  # all but a pcf8574a can be there
     node = node_with(there, address, 0xA5A5A5)
@@ -150,13 +150,54 @@ def test_a_chip_left_in_bank_1_by_a_crash_is_brought_back_to_bank_0() -> None:
     assert node.query(Query(0x20, b"\x12", 2)) == bytes((0x15, 0x2A))
 
 
+CONVERTERS = [kind for kind in CHIPS if kind not in expanders()]
+
+
+@pytest.mark.parametrize("kind", CONVERTERS)
+@given(channel=st.integers(0, 3), code=st.integers(0, 0xFFFF), leftovers=leftovers)
+def test_every_conversion_gives_the_code_of_its_channel_whatever_the_chip_was_left_with(
+    kind: str, channel: int, code: int, leftovers: list[tuple[int, int]]
+) -> None:
+    chip, address = CHIPS[kind], address_of(kind)
+    assert isinstance(chip, Converter)
+    node = WireNode(kind, address)
+    node.station.device.levels = code << 16 * channel
+    now = [0.0]
+    node.station.device.clock = lambda: now[0]  # type: ignore[attr-defined]
+    for register, value in leftovers:
+        node.station.device.poke(register, value)
+    set_up(node, chip, address, inputs(kind))
+    for number, reading in enumerate(chip.readings):
+        assert isinstance(reading, Conversion)
+        if reading.start:
+            node.write(address, reading.start)
+        now[0] += reading.us / 1e6
+        answer = node.query(Query(address, reading.command, reading.length))
+        assert chip.code(answer) == (min(code, (1 << chip.bits) - 1) if number == channel else 0)
+
+
+def test_a_conversion_is_not_there_before_its_time_and_another_waits_for_it() -> None:
+    chip, node, now = CHIPS["ads1115"], WireNode("ads1115", 0x48), [0.0]
+    node.station.device.clock = lambda: now[0]  # type: ignore[attr-defined]
+    node.station.device.levels = 1000 | 2000 << 16
+    first, second = chip.readings[:2]
+    assert isinstance(first, Conversion)
+    assert isinstance(second, Conversion)
+    node.write(0x48, first.start)
+    node.write(0x48, second.start)  # it converts: this one is lost
+    now[0] = 1e-3
+    assert node.query(Query(0x48, first.command, 2)) == bytes(2)
+    now[0] = first.us / 1e6
+    assert node.query(Query(0x48, first.command, 2)) == (1000).to_bytes(2, "big")
+
+
 @pytest.mark.parametrize("kind", CHIPS)
 def test_a_reset_shows_in_what_is_watched_of_every_chip_that_a_reset_harms(kind: str) -> None:
     chip, address = CHIPS[kind], address_of(kind)
     node = node_with(kind, address, 0xFFFFFF)
     set_up(node, chip, address, inputs(kind))
     watch = chip.watched(inputs(kind))
-    if watch is None:
+    if watch is None or kind == "ads7828":
         assert not chip.registers  # all pins high is both its reset and its set-up
         return
     assert watch.holds(read_back(node, chip, address, watch))

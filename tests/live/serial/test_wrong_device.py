@@ -12,8 +12,9 @@ import pytest
 from thenar.drivers.emulated.cyberglove import EmulatedCyberGlove
 from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
 from thenar.drivers.emulated.serial_line import PtyLine
-from thenar.runtime.harness.wiring import Debounce, GloveWiring, ScannerWiring
+from thenar.runtime.harness.wiring import GloveWiring, Harness, ScannerWiring
 from thenar.runtime.live.sources import Keeper
+from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.sources.cyberglove import GloveDevice
 from thenar.runtime.sources.scanner import ScannerDevice
 
@@ -80,7 +81,8 @@ RIGHT: dict[str, Callable[[PtyLine], Wrong]] = {"glove": EmulatedCyberGlove, "sc
 def device(kind: str, port: Path) -> GloveDevice | ScannerDevice:
     if kind == "glove":
         return GloveDevice(GloveWiring(port=str(port)))
-    return ScannerDevice(ScannerWiring(port=str(port), baud=115_200, switches=NAMES), NAMES, Debounce())
+    harness = Harness(name="wrong", scanners=(ScannerWiring(port=str(port), baud=115_200, switches=NAMES),))
+    return ScannerDevice(harness, 0, NAMES, whole_scan(harness, NAMES))
 
 
 def lead(link: Path, line: PtyLine) -> None:

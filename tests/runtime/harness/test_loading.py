@@ -11,6 +11,7 @@ from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness import checks, wiring
 from thenar.runtime.harness.loading import load_harness, parse_harness
 from thenar.runtime.harness.wiring import Debounce, GloveWiring, Harness, MuxChannel, ScannerWiring
+from thenar.runtime.taxels import TaxelSettings
 
 Load = Callable[[str], Harness]
 BUS = '[[bus]]\ndevice = "/dev/i2c-1"\n'
@@ -45,8 +46,17 @@ def test_text_that_was_kept_elsewhere_is_read_likewise_its_calibration_as_it_sta
     glove = parse_harness(full_text, "a.mcap").cyberglove
     assert glove is not None
     assert glove.calibration == "anna.toml"
+    assert parse_harness('[taxels]\ncalibration = "pads.toml"', "a").taxel_settings.calibration == "pads.toml"
     with pytest.raises(HarnessError, match=r"a\.mcap, line 1: nam: there is no such key"):
         parse_harness("nam = 1", "a.mcap")
+
+
+def test_the_calibration_of_taxels_counts_from_the_folder_too(load: Load, tmp_path: Path) -> None:
+    settings = load('[taxels]\ncalibration = "pads.toml"\nbaseline = false').taxel_settings
+    assert settings == TaxelSettings(calibration=str(tmp_path / "pads.toml"), baseline=False)
+    assert load('[taxels]\ncalibration = "/pads.toml"').taxel_settings.calibration == "/pads.toml"
+    with pytest.raises(HarnessError, match="drift"):
+        load("[taxels]\ndrift = 2")
 
 
 def test_a_calibration_with_an_absolute_path_stays_where_it_is(load: Load) -> None:

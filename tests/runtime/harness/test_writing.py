@@ -1,10 +1,13 @@
 from collections.abc import Callable
+from pathlib import Path
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from thenar.drivers.i2c.chips import CHIPS
+from thenar.drivers.i2c.chips import CHIPS, expanders
 from thenar.drivers.ports import port_fault
+from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.checks import faults
 from thenar.runtime.harness.wiring import (
     BusWiring,
@@ -15,8 +18,9 @@ from thenar.runtime.harness.wiring import (
     MuxChannel,
     ScannerWiring,
 )
-from thenar.runtime.harness.writing import harness_to_toml
+from thenar.runtime.harness.writing import harness_to_toml, write_record_us
 from thenar.runtime.names import fault
+from thenar.runtime.taxels import TaxelSettings
 
 Load = Callable[[str], Harness]
 
@@ -28,19 +32,21 @@ ports = names.filter(lambda name: not port_fault(name))
 def harnesses(draw: st.DrawFn) -> Harness:
     """Sound harnesses: chips of any kind, each behind a channel of its own if behind any."""
     left = iter(draw(st.lists(names, min_size=30, max_size=30, unique=True)))
-    chips = []
+    chips, switched = [], expanders().values()
     for address in draw(st.lists(st.integers(0, 7), max_size=3, unique=True)):
         kind = CHIPS[draw(st.sampled_from(sorted(CHIPS)))]
         usable = [pin for pin in kind.pins if pin not in kind.not_inputs]
         pins = draw(st.lists(st.sampled_from(usable), max_size=5, unique=True))
-        mux = draw(st.none() | st.builds(MuxChannel, address=st.just(0x73), channel=st.just(address)))
+        few = len(kind.addresses) < 8  # two of them may have one address
+        behind = st.builds(MuxChannel, address=st.just(0x73), channel=st.just(address))
+        mux = draw(behind if few else st.none() | behind)
         chips.append(
             ChipWiring(
                 kind=kind.name,
                 address=kind.addresses[address % len(kind.addresses)],
                 mux=mux,
                 pins={pin: next(left) for pin in pins},
-                closed=draw(st.sampled_from(["low", "high"] if kind.registers else ["low"])),
+                closed=draw(st.sampled_from(["low", "high"] if kind.registers and kind in switched else ["low"])),
             )
         )
     board = ScannerWiring(port="p", switches=("", *(next(left) for _ in range(draw(st.integers(0, 4))))))
@@ -59,6 +65,11 @@ def harnesses(draw: st.DrawFn) -> Harness:
         scanners=(board,),
         buses=(BusWiring(device="/dev/i2c-1", chips=tuple(chips)),),
         debounce=Debounce(enabled=draw(st.booleans()), release_ms=draw(st.floats(0.0, 1000.0))),
+        taxel_settings=TaxelSettings(
+            calibration=draw(st.none() | st.just("/a/c.toml")),
+            baseline=draw(st.booleans()),
+            drift=draw(st.floats(0, 1)),
+        ),
     )
 
 
@@ -75,3 +86,21 @@ def test_addresses_are_written_as_they_are_spoken_of(load: Load, full_text: str)
     text = harness_to_toml(load(full_text))
     assert "address = 0x20\n" in text
     assert "address = 0x70\nchannel = 2\n" in text
+
+
+@pytest.mark.parametrize("rest", ["", "# mine\nbaud = 38_400\n", "record_us = 5.5\n\n[debounce]\nrelease_ms = 4\n"])
+def test_what_was_measured_is_written_and_all_else_is_kept(tmp_path: Path, rest: str) -> None:
+    path = tmp_path / "glove.toml"
+    path.write_text(f'name = "a"  # b\n[cyberglove]  # c\nport = "/dev/x"\n{rest}')
+    write_record_us(path, 6400)
+    rest = rest.replace("record_us = 5.5\n", "")
+    assert path.read_text() == f'name = "a"  # b\n[cyberglove]  # c\nrecord_us = 6400\nport = "/dev/x"\n{rest}'
+
+
+@pytest.mark.parametrize("text", ['cyberglove = { port = "/dev/x" }\n', 'cyberglove.port = "/dev/x"\n', 'name = "a"\n'])
+def test_a_file_in_which_there_is_no_place_for_it_stays_and_what_to_write_is_said(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "glove.toml"
+    path.write_text(text)
+    with pytest.raises(HarnessError, match="write `record_us = 6400` there"):
+        write_record_us(path, 6400)
+    assert path.read_text() == text

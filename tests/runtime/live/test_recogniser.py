@@ -322,3 +322,54 @@ def test_a_replay_gives_the_same_answers(make_build: MakeBuild) -> None:
     first, second = (recognizer(make_build(), Policy()) for _ in range(2))
     for now, switches, glove in calls:
         assert first.step(now, 0, switches, glove).grasp == second.step(now, 0, switches, glove).grasp
+
+
+@pytest.mark.parametrize("policy", [AT_ONCE, Policy(lead=0.3, dwell_us=2000, hold_us=6000)])
+@pytest.mark.parametrize("seed", range(3))
+def test_records_on_demand_change_no_answer_against_records_all_the_time(
+    make_build: MakeBuild, policy: Policy, seed: int
+) -> None:
+    """Every frame once with a record of its own, and once with one only where it is asked for."""
+    build = make_build(seed, switches=SWITCHES, joints=JOINTS)
+    tables = build.tables  # switches must be able to outweigh joints, or every frame needs a record
+    rows = (tables.switch_rows * 5).clip(-900, 900).astype(np.int16)
+    build = Build(build.manifest, replace(tables, switch_rows=rows, switch_means=(rows // 2).astype(np.int16)))
+    always = recognizer(build, policy)
+    seldom = LiveRecognizer(
+        build,
+        sensor_names=SENSORS,
+        switch_period_us=SWITCH_PERIOD,
+        glove_period_us=GLOVE_PERIOD,
+        policy=policy,
+        on_demand=True,
+    )
+    random = np.random.default_rng(seed)
+    asked, last = 0, None
+    for number in range(400):
+        now = 10_000 + 1000 * number
+        frame = SwitchFrame(now - 20, int(random.integers(1 << SWITCHES)), int(random.integers(4) == 0))
+        record = GloveFrame(now - 20, random.integers(1, 256, len(SENSORS)).astype(np.uint8).tobytes())
+        if seldom.wants_record(now, frame, last):
+            asked, last = asked + 1, record
+            assert not seldom.wants_record(now, frame, record)
+        mine, theirs = seldom.step(now, 0, frame, last).grasp, always.step(now, 0, frame, record).grasp
+        assert (mine.grasp, mine.candidate, mine.lost) == (theirs.grasp, theirs.candidate, theirs.lost)
+    assert 0 < asked < 400
+
+
+def test_where_the_switches_have_fallen_silent_records_are_asked_for_as_often_as_they_would_come(
+    make_build: MakeBuild,
+) -> None:
+    seldom = LiveRecognizer(
+        make_build(switches=SWITCHES, joints=JOINTS),
+        sensor_names=SENSORS,
+        switch_period_us=SWITCH_PERIOD,
+        glove_period_us=GLOVE_PERIOD,
+        on_demand=True,
+    )
+    gone = SwitchFrame(1000, 0, (1 << SWITCHES) - 1)
+    record = GloveFrame(50_000, bytes(4))
+    for frame in (None, gone):
+        assert seldom.wants_record(50_000, frame, None)
+        assert not seldom.wants_record(51_000, frame, record)
+        assert seldom.wants_record(53_000, frame, record)

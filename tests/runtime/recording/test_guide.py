@@ -167,3 +167,21 @@ def test_whatever_is_pressed_each_trial_is_accepted_once_and_in_order(
     for (event, trial), (before, other) in zip(told[1:], told, strict=False):
         assert (event == "captured") != (before == "captured")
         assert event == "captured" or trial == other
+
+
+def test_nothing_is_captured_while_a_taxel_cannot_be_read(tmp_path: Path, session: Session) -> None:
+    for switches in (session.switches, ()):
+        wired = replace(session, switches=switches, sensors=(), taxels=("p", "q"), collection=COLLECTION)
+        with Recorder(tmp_path / f"{len(switches)}.mcap", wired) as recorder:
+            guide = Guide(planned(COLLECTION), recorder, 0)
+            for frames, problem in (
+                ([], "are silent"),
+                ([SwitchFrame(0, 0)], "taxels cannot be read: p, q"),
+                ([SwitchFrame(1, 0, taxels=(5, None))], "taxels cannot be read: q"),
+                ([SwitchFrame(2, 0, taxels=(5, 0))], ""),
+            ):
+                guide.press(2, Key.REDO)
+                guide.take(2, frames)
+                assert guide.problem.endswith(problem)
+                assert (guide.problem == "") == (problem == "")
+            assert stage(guide) is Stage.REVIEW

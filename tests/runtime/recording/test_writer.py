@@ -21,14 +21,15 @@ from mcap_ros2.decoder import DecoderFactory
 from msgspec.structs import replace
 
 from thenar.drivers.errors import SettingError
-from thenar.runtime.errors import FrameError
+from thenar.runtime.errors import FrameError, McapError
 from thenar.runtime.frames import GloveFrame, SwitchFrame, now_us
 from thenar.runtime.published import LiveGrasp
 from thenar.runtime.recording.guide import read_journal
-from thenar.runtime.recording.layout import LARGEST_RECORD
+from thenar.runtime.recording.layout import LARGEST_RECORD, Tail
 from thenar.runtime.recording.reader import Reader
 from thenar.runtime.recording.session import Collection, Label, Session
 from thenar.runtime.recording.writer import Recorder
+from thenar.runtime.taxels import TaxelCalibration, TaxelLine
 
 Entry = SwitchFrame | GloveFrame | LiveGrasp | Label
 Record = Callable[[Recorder, Entry], None]
@@ -317,10 +318,10 @@ KILLED = """
     from thenar.runtime.recording.session import Session
     from thenar.runtime.recording.writer import Recorder
 
-    recorder = Recorder(Path(sys.argv[1]), Session(thenar="1", switches=("s",) * 160, sensors=()))
+    recorder = Recorder(Path(sys.argv[1]), Session(thenar="1", switches=("s",) * 160, sensors=(), taxels=("p", "q")))
     number = 0
     while True:
-        recorder.switches(SwitchFrame(number, number))
+        recorder.switches(SwitchFrame(number, number, taxels=(number & 0xFFF, None)))
         sys.stdout.write(f"{number}\\n")
         sys.stdout.flush()
         number += 1
@@ -338,5 +339,50 @@ def test_a_killed_process_has_recorded_all_that_it_said_it_had(tmp_path: Path, a
         process.send_signal(signal.SIGKILL)
         said = after + 1 + len(process.stdout.read().splitlines())
     found = frames_of(path)
-    assert found == [SwitchFrame(number, number) for number in range(len(found))]
+    assert found == [SwitchFrame(number, number, taxels=(number & 0xFFF, None)) for number in range(len(found))]
     assert len(found) >= said
+
+
+def test_a_recording_without_taxels_has_no_topic_for_them_and_one_with_them_goes_on(
+    tmp_path: Path, session: Session
+) -> None:
+    def topics(path: Path) -> dict[str, int]:
+        with path.open("rb") as file:
+            summary = make_reader(file, validate_crcs=True).get_summary()
+            assert summary is not None
+            assert summary.statistics is not None
+            counts = summary.statistics.channel_message_counts
+            return {channel.topic: counts.get(number, 0) for number, channel in summary.channels.items()}
+
+    with Recorder(tmp_path / "plain.mcap", session):
+        pass
+    assert "/thenar/taxels" not in topics(tmp_path / "plain.mcap")
+    analog = replace(session, taxels=("p", "q"), taxel_calibration=TaxelCalibration(taxels=(TaxelLine("p", 1, 9),)))
+    path, frames = tmp_path / "a.mcap", [SwitchFrame(time_us, 1, taxels=(time_us, 3)) for time_us in (5, 6)]
+    with Recorder(path, analog):
+        pass
+    assert topics(path)["/thenar/taxels"] == 0
+    reader = Reader(path)
+    assert replace(reader.session, clock_ns=0) == analog
+    list(reader)
+    with Recorder(path, analog, tail=reader.tail) as recorder:
+        for frame in frames:
+            recorder.switches(frame)
+        recorder.switches(SwitchFrame(7, 1))
+        with pytest.raises(FrameError, match="a frame of 1 taxels, 2 are recorded"):
+            recorder.switches(SwitchFrame(8, 1, taxels=(1,)))
+        with pytest.raises(FrameError, match=r"outside 0\.\.65534"):
+            recorder.switches(SwitchFrame(8, 1, taxels=(65535, 1)))
+    assert frames_of(path) == [*frames, SwitchFrame(7, 1)]
+    assert topics(path)["/thenar/taxels"] == 2
+    other = replace(analog, taxels=("p", "r"))
+    with Recorder(path, other, tail=read_to_the_end(path)):
+        pass
+    with pytest.raises(McapError, match="its switches, taxels or sensors differ"):
+        read_to_the_end(path)
+
+
+def read_to_the_end(path: Path) -> Tail:
+    reader = Reader(path)
+    list(reader)
+    return reader.tail

@@ -1,6 +1,7 @@
 """Decided or not: against every state of every unread switch, and against what the runtime does."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -94,3 +95,35 @@ def test_frames_that_do_not_fit_the_tables_are_refused(
     bits, codes = np.zeros(shapes[0], bool), np.zeros(shapes[1], np.uint16)
     with pytest.raises(FrameError, match="the build has 9 switches and 3 joints"):
         Decided(make_tables(), [[0]], bits, codes)
+
+
+@pytest.mark.parametrize("lead", [0, 2])
+@pytest.mark.parametrize("seed", range(4))
+def test_on_demand_the_record_is_left_out_exactly_when_no_state_of_the_joints_changes_the_winner(
+    seed: int, lead: int
+) -> None:
+    """Against every state of the switches on ports not yet read, and every bin of the joint, or its loss."""
+    small, ports = small_tables(seed), [[0], [3, 1], [4, 2]]
+    tables = replace(small, switch_rows=(5 * small.switch_rows).astype(np.int16))  # else the joint always matters
+    scorer = Scorer(tables)
+    early = EarlyExit(scorer, [sum(1 << switch for switch in port) for port in ports], lead=lead, on_demand=True)
+    seen = set()
+    for bits in product([False, True], repeat=5):
+        early.start([100])  # codes of an earlier record: nothing may rest on them
+        closed = sum(bit << switch for switch, bit in enumerate(bits))
+        for number in range(3):
+            unread = [switch for port in ports[number + 1 :] for switch in port]
+            standings = set()
+            for states in product(("open", "closed", "lost"), repeat=len(unread)):
+                frame, lost = np.array(bits), np.zeros(5, bool)
+                frame[unread] = [state == "closed" for state in states]
+                lost[unread] = [state == "lost" for state in states]
+                for code, gone in ((100, False), (101, False), (0, True)):
+                    lanes = scorer.lanes_without(frame, [code], lost, [gone])
+                    second, best = sorted(lanes)[-2:]
+                    standings.add((lanes.index(best), best - second >= lead))
+            winners, sure = {winner for winner, _ in standings}, all(leads for _, leads in standings)
+            assert early.after(number, closed) == (len(winners) == 1 and sure)
+            assert not early.unread(number) & scorer.joints_bit
+            seen.add(len(winners) == 1 and sure)
+    assert seen == {False, True}

@@ -2,7 +2,7 @@ from itertools import combinations_with_replacement
 
 import pytest
 
-from thenar.drivers.i2c.chips import CHIPS
+from thenar.drivers.i2c.chips import CHIPS, expanders
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.checks import faults
 from thenar.runtime.harness.wiring import GloveWiring, MuxChannel
@@ -10,7 +10,7 @@ from thenar.runtime.scanning.ports import ports_of, whole_scan
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scanning.timing import scan_us
 
-KINDS = sorted(CHIPS)
+KINDS = sorted(expanders())
 
 
 def names_of(count: int) -> list[str]:

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thenar.drivers.i2c.chips import CHIPS
+from thenar.drivers.i2c.chips import CHIPS, expanders
 from thenar.runtime.harness.checks import faults
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
 from thenar.runtime.scanning.ports import cover, ports_of
 from thenar.runtime.scanning.timing import port_us, reading_of
 
 Harnesses = Callable[..., st.SearchStrategy[Harness]]
-_KINDS = sorted(CHIPS)
+_KINDS = sorted(expanders())
 
 
 @given(data=st.data())

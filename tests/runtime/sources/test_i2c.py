@@ -1,6 +1,6 @@
 """What a device makes of the answers of its ports; that the ports are read is shown on real device nodes."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import pytest
 
@@ -27,9 +27,9 @@ class Bench:
         self.slept: list[float] = []
         self.takes_us = 100
 
-    def read(self) -> list[int | None]:
+    def __iter__(self) -> Iterator[list[int | None]]:
         self.now += self.takes_us
-        return self.answers.pop(0)
+        yield self.answers.pop(0)
 
 
 class Bus:
@@ -41,7 +41,7 @@ class Bus:
     def open(self) -> None:
         pass
 
-    def prepare(self, _ports: Sequence[object]) -> Bench:
+    def interleaved(self, _groups: Sequence[Sequence[object]]) -> Bench:
         return self.bench
 
 

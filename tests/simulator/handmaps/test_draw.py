@@ -1,4 +1,5 @@
 import re
+from dataclasses import replace
 from io import BytesIO
 from xml.etree import ElementTree
 
@@ -7,7 +8,7 @@ import pytest
 
 from thenar.compiler.hand import MapError
 from thenar.compiler.pictures import PictureError, painting
-from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import KAMAKURA_14, own
 from thenar.simulator.handmaps.draw import Dot, Panel, Picture, all_switches, colour, contacts, draw, kept
 from thenar.simulator.handmaps.handmap import hand_map
@@ -29,6 +30,20 @@ def two_types() -> GraspSet:
     """Three Tip and one Lat: switch 5 closes in all Tip, switch 9 in Lat only, switch 7 never; only these are known."""
     bits = np.array([[1, 0, 0], [1, 0, 0], [1, 0, 0], [0, 1, 0]], bool)
     return grasp_set(bits, (NAMES[5], NAMES[9], NAMES[7]), ["Tip", "Tip", "Tip", "Lat"])
+
+
+@pytest.fixture
+def pads(two_types: GraspSet) -> GraspSet:
+    """Return the same rows with a pad in place of switch 9, and one that reads noise only."""
+    newtons = np.array([[10, 3], [0, 0], [12, 1], [900, 4]], np.uint16)
+    columns = tuple(Joint(NAMES[place], "N", 0, 0.0, 1000, 1.0) for place in (9, 11))
+    return replace(
+        two_types,
+        switches=two_types.switches[:, [0, 2]],
+        switch_names=(NAMES[5], NAMES[7]),
+        taxels=newtons,
+        taxel_columns=columns,
+    )
 
 
 def titles(svg: bytes, hand: int = 0) -> dict[int, str]:
@@ -144,3 +159,24 @@ def test_any_number_of_hands_shares_a_page(hands: int) -> None:
     picture = Picture(HAND, all_switches(HAND, False).panels * hands, "", "switch")
     svg = draw(picture, "svg")
     assert all(len(titles(svg, hand)) == 160 for hand in range(hands))
+
+
+def test_taxels_are_drawn_by_how_often_they_were_pressed(pads: GraspSet) -> None:
+    picture = contacts(HAND, pads, per_grasp=False)
+    assert picture.full == "share of grasps in which the switch closed or the taxel was pressed"
+    hints = [picture.panels[0].dots[place].hint.partition(": ")[2] for place in (5, 9, 11)]
+    assert hints == [
+        "touched in 3 of 4 grasps (75.0%)",
+        "touched in 1 of 4 grasps (25.0%)",
+        "touched in 0 of 4 grasps (0.0%)",
+    ]
+    only = replace(pads, switches=pads.switches[:, :0], switch_names=())
+    assert contacts(HAND, only, per_grasp=False).hollow == "never pressed"
+
+
+def test_levels_mark_their_taxel_which_bears_the_number_of_the_first() -> None:
+    dots = kept(HAND, [("A", (NAMES[3], f"{NAMES[9]}>400", f"{NAMES[9]}>90"))]).panels[0].dots
+    assert (dots[3].mark, dots[9].mark) == ("1", "2")
+    assert dots[9].hint == f"{NAMES[9]}: kept, number 2 (counts >400), number 3 (counts >90)"
+    with pytest.raises(MapError, match="no switch of the glove"):
+        kept(HAND, [("A", (NAMES[3], "pad>400"))])

@@ -31,6 +31,7 @@ OWN = {
     "glove.sample",
 }
 WIRED = {"glove.send", "glove.receive"}
+FELT = {"glove.feel", "glove.count"}
 OTHERS = [name for name in NAMES if name not in CONTACTS]
 EVERYTHING = ["contact.quasistatic", *OTHERS]
 SUBSETS = st.sets(st.sampled_from(OTHERS)).flatmap(
@@ -59,7 +60,9 @@ def test_a_pipeline_holds_the_scenes_effects_and_the_gloves_own_steps_and_nothin
     stops = compile_pipeline(make_scene(names)).stops
     on_wire = any(name.startswith("wire.") for name in names)
     assert sorted(stop.effect.name for stop in stops if not stop.own) == sorted(names)
-    assert {stop.effect.name for stop in stops if stop.own} == OWN | (WIRED if on_wire else set())
+    felt = any(name.startswith("taxel.") for name in names)
+    own = OWN | (WIRED if on_wire else set()) | (FELT if felt else set())
+    assert {stop.effect.name for stop in stops if stop.own} == own
 
 
 @given(names=SUBSETS, seed=st.integers(0, 100))
@@ -87,9 +90,11 @@ def test_the_order_of_everything(make_scene: SceneMaker) -> None:
     assert " ".join(order(make_scene(EVERYTHING))) == (
         "glove.recall hand.style hand.posture hand.object_pose hand.grip contact.quasistatic "
         "glove.threshold switch.threshold glove.close contact.ramp "
-        "glove.frames frame.jitter bus.latency "
-        "glove.sense hand.transition joint.noise joint.drift glove.encode "
-        "glove.sample switch.bounce switch.stuck_open switch.stuck_closed switch.ghosting port.dead "
+        "glove.frames frame.at_force frame.jitter bus.latency "
+        "glove.sense hand.transition joint.noise joint.drift glove.encode glove.feel "
+        "taxel.gain taxel.hysteresis taxel.creep taxel.crosstalk taxel.noise "
+        "glove.sample glove.count "
+        "switch.bounce switch.stuck_open switch.stuck_closed switch.ghosting port.dead taxel.adc "
         "glove.send wire.lost_bytes wire.damaged_bytes glove.receive"
     )
 
@@ -128,7 +133,7 @@ def test_every_step_reads_and_writes_what_it_says(make_scene: SceneMaker, make_b
     for name in OTHERS:
         assert {*EFFECTS[name].reads, *EFFECTS[name].writes} <= FIELDS
     pipeline = compile_pipeline(make_scene([contact, *light()]))
-    written = {"trials", "previous_deg", "delay_us", "lost"}
+    written = {"trials", "previous_deg", "delay_us", "lost", "ramp", "taxels"}
     for stop in pipeline.stops:
         single = type(pipeline)(pipeline.setting, (stop,))
         single.run([batch], Ledger())
@@ -239,7 +244,10 @@ def test_an_after_that_cannot_be_is_refused_with_its_place_and_its_circle(
 
 def outcome(batch: Batch, row: int) -> dict[str, bytes]:
     names = ["posture_deg", "pose", "grip_n", "forces_n", "settled", "residual_n", "on_us", "off_us", "frame_us"]
-    found = {name: np.asarray(getattr(batch, name)[row]).tobytes() for name in [*names, "bits", "sensors_deg", "raw"]}
+    found = {
+        name: np.asarray(getattr(batch, name)[row]).tobytes()
+        for name in [*names, "bits", "sensors_deg", "raw", "taxels"]
+    }
     return found | ({} if batch.lost is None else {"lost": batch.lost[row].tobytes()})
 
 

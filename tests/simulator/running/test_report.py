@@ -19,6 +19,7 @@ def rows_with(closed: list[list[int]], read_out: list[bool] | None = None) -> Ro
     return Rows(
         bits=np.packbits(bits, axis=1),
         codes=np.zeros((len(closed), 16), dtype=np.uint16),
+        taxels=np.zeros((len(closed), 0), dtype=np.uint16),
         condition=np.zeros(len(closed), dtype=np.uint32),
         trial=numbers,
         read_out=np.array(read_out or [True] * len(closed), dtype=bool),

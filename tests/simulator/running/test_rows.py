@@ -59,7 +59,7 @@ def blocks_of(
 
 def set_of(rows: Rows, recorded: list[Recorded]) -> GraspSet:
     return grasp_set(
-        rows, [condition for condition, _, _ in recorded], SWITCHES, common_joints(), KAMAKURA_14, "scene small"
+        rows, [condition for condition, _, _ in recorded], SWITCHES, (), common_joints(), KAMAKURA_14, "scene small"
     )
 
 

@@ -167,7 +167,7 @@ def test_a_wrong_key_is_named_with_its_line(complaint: Callable[[str], str], old
         ("[recording]\nhold_s = 1", "line 10: recording.hold_s: times are in milliseconds: hold_ms"),
         ("[recording]\nrows = 'every'", "line 10: recording.rows: 'every' is not among its values (there are: all"),
         ("[effects.joint.nois]", "line 9: effects.joint.nois: there is no effect 'joint.nois' (did you mean 'joint.n"),
-        ("[effects.noise]\nsd_deg = 2", "line 9: effects.noise: there is no effect 'noise' (did you mean 'joint.no"),
+        ("[effects.noise]\nsd_deg = 2", "line 9: effects.noise: there is no effect 'noise' (did you mean 'taxel.no"),
         ("[effects.joint]", "line 9: effects.joint: there is no effect 'joint'"),
         (
             '[effects."joint.noise"]',

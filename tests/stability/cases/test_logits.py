@@ -8,6 +8,7 @@ import pytest
 from mpmath import mpf
 
 from thenar.compiler.additive.logit import ColumnTables, fit_logit
+from thenar.compiler.additive.pairs import fit_pairs
 from thenar.stability.cases import logits
 from thenar.stability.reference.boosting import mean_loss
 from thenar.stability.reference.logit import Column, largest_derivative
@@ -18,13 +19,13 @@ from thenar.stability.reference.numbers import precisely
 def test_the_derivative_is_that_of_the_loss() -> None:
     rng = np.random.default_rng(1)
     rows, labels, weights = rng.normal(size=(4, 3)), [0, 1, 2, 1, 0, 2], [1.0, 2.0, 1.0, 3.0, 1.0, 1.0]
-    added, pulls, smoothness = [0, 1, -1, 2, 3, 3], [0.5, 1.0, 2.0, 0.1], [3.0, 0.0, 1.5]
+    added, pulls, smoothness = [0, 1, -1, 2, 3, 3], [0.5, 1.0, 2.0, 0.1], [(0, 1, 3.0), (0, 3, 0.5), (2, 3, 1.5)]
 
     def loss(entries: Any) -> Any:
         scores = [[mpf(0)] * 3 if row < 0 else list(entries[row]) for row in added]
         total = mean_loss(scores, labels, weights) * sum(weights)
         total += sum(pull * sum(each**2 for each in row) for pull, row in zip(pulls, entries, strict=True)) / 2
-        pairs = zip(smoothness, entries, entries[1:], strict=False)
+        pairs = [(s, entries[one], entries[other]) for one, other, s in smoothness]
         return total + sum(s * sum((b - a) ** 2 for a, b in zip(one, two, strict=True)) for s, one, two in pairs) / 2
 
     def slope(row: int, k: int) -> Any:
@@ -47,7 +48,8 @@ def _failing() -> set[str]:
 
 def test_a_fit_that_ends_too_early_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(logits, "fit_logit", partial(fit_logit, tolerance=1e-5))
-    assert "largest derivative at the answer" in _failing()
+    monkeypatch.setattr(logits, "fit_pairs", partial(fit_pairs, tolerance=1e-5))
+    assert _failing() >= {"largest derivative at the answer", "largest derivative with pairs of joints"}
 
 
 def test_a_fit_that_hangs_on_the_order_of_rows_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

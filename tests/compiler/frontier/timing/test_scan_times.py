@@ -14,8 +14,8 @@ from thenar.compiler.frontier.timing.scan_times import (
     beside_wire,
     board_beside,
     firmware_beside,
-    joints_time,
     measured_call_us,
+    records_of,
     scan_times,
 )
 from thenar.compiler.frontier.timing.wirings import BOARD, Wiring
@@ -113,26 +113,51 @@ def test_a_switch_without_a_place_is_an_error() -> None:
         scan_times(names_of(2), random_tables(2, 0, 4), wiring, *frames(2, 0))
 
 
-@pytest.mark.parametrize(
-    ("joints", "sensors"),
-    [(SENSORS_18[:1], 18), (SENSORS_18, 18), (SENSORS_22[::-1], 22), (("index_dij",), 22)],
-)
-def test_a_record_has_18_or_22_sensors_a_letter_a_status_and_an_end(joints: tuple[str, ...], sensors: int) -> None:
-    found = joints_time(joints)
-    assert found.us == pytest.approx((sensors + 3) * 10 / 115_200 * 1e6)
-    assert found.how == "wire"
+@pytest.mark.parametrize("joints", [SENSORS_18[:1], SENSORS_18, SENSORS_22[::-1], ("index_dij",)])
+@pytest.mark.parametrize("filtered", [False, True])
+def test_a_record_is_the_vendors_formula_of_the_sensors_that_are_read(joints: tuple[str, ...], filtered: bool) -> None:
+    """Written out here: 0.25 ms a sensor, 0.1256 more with the filter; ten bits a byte; letter, status and end."""
+    found = records_of(joints, filtered=filtered).of(n := len(joints))
+    assert found.us == pytest.approx(n * (375.6 if filtered else 250.0) + (n + 3) * 10e6 / 115_200)
+    assert found.how == "formula"
+
+
+def test_eighteen_sensors_take_six_milliseconds_of_which_the_wire_has_less_than_two() -> None:
+    assert round(records_of(SENSORS_18).of(18).us) == 6323
+    wire = records_of(SENSORS_18, wire_only=True).of(18)
+    assert (round(wire.us), wire.how) == (1823, "wire")
 
 
 def test_joints_of_ones_own_take_what_the_user_says_and_else_an_unknown_time() -> None:
-    assert joints_time(["bend_1", "thumb_mpj"]) == Time(0.0, "unknown")
-    assert joints_time(["bend_1"], 650.0) == Time(650.0, "given")
-    assert joints_time(SENSORS_18, 650.0) == Time(650.0, "given")
-    assert joints_time([]) == joints_time([], 650.0) == Time(0.0, "wire")
+    assert records_of(["bend_1", "thumb_mpj"]).of(2) == Time(0.0, "unknown")
+    assert records_of(["bend_1", "bend_2"], 650.0).of(2) == Time(650.0, "given")
+    assert records_of(["bend_1", "bend_2"], 650.0).of(1) == Time(325.0, "given")
+    assert records_of(SENSORS_18, 650.0).of(18).us == pytest.approx(650.0)
+    assert records_of([]).of(0) == records_of([], 650.0).of(0) == records_of(SENSORS_18).of(0) == Time(0.0, "wire")
 
 
 def test_a_cyberglove_may_be_wired_under_other_names() -> None:
     names = tuple(f"bend_{number}" for number in range(18))
-    assert joints_time(names[:5], None, GloveWiring(port="/dev/x", joints=names)) == joints_time(SENSORS_18)
+    assert records_of(names[:5], None, GloveWiring(port="/dev/x", joints=names)) == records_of(SENSORS_18)
+
+
+def test_a_glove_that_was_measured_takes_that_and_fewer_sensors_in_proportion() -> None:
+    records = records_of(
+        SENSORS_18[:6], None, GloveWiring(port="/dev/x", record_us=2 * (18 * 250.0 + 21 * 10e6 / 115_200))
+    )
+    assert records.of(6).us == pytest.approx(2 * records_of(SENSORS_18).of(6).us)
+    assert records.how == "measured"
+
+
+def test_a_glove_is_as_fast_as_its_line_and_no_faster_than_it_is_asked() -> None:
+    slow = records_of(SENSORS_18, None, GloveWiring(port="/dev/x", baud=38_400))
+    assert slow.of(18).us == pytest.approx(18 * 250.0 + 21 * 10e6 / 38_400)
+    asked = records_of(SENSORS_18, None, GloveWiring(port="/dev/x", rate_hz=100.0))
+    assert asked.of(2).us == asked.of(18).us == 10_000.0
+
+
+def test_a_firmware_that_sets_no_mask_waits_for_all_sensors() -> None:
+    assert records_of(SENSORS_18[:4], masked=False).of(4) == records_of(SENSORS_18).of(18)
 
 
 @pytest.mark.parametrize("target", timed())

@@ -1,0 +1,98 @@
+"""The additive logit with pairs of joints: what the tables of single inputs leave over, two joints may say together.
+
+First the logit is fitted without pairs. Of each pair of joints, cut into few bins, it is then known how much its cells
+could take from the loss: the residuals of a class in a cell add up to G, their spread to H, and G^2 / H, summed up, is
+twice what one Newton step there gains, each cell alone (as FAST ranks pairs for interpretml's EBM, Lou, Caruana, Gehrke
+and Hooker 2013, which looks at splits into four). The best pair is taken, then the best of joints that are left: so no
+joint is in two, and what a pair of joints adds is known of no other input. Then all tables are fitted at once, with
+steps between neighbouring cells, in both directions, pulled towards zero: a convex function again.
+"""
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.runtime.tables import Pair
+
+from ..boosting.boost import BoostingError, check_rows
+from ..boosting.exactsums import exact_sum, on_one_grid
+from ..limits import check_memory
+from ..tables.collapse import Floats, ScoreTables
+from .logit import TOLERANCE, Column, Fit, column_edges, columns_of, sparse, tables_of
+
+PAIRS, PAIR_BINS, PAIR_SMOOTHNESS = 4, 8, 1.0
+MOST_PAIR_BINS = 16  # 256 cells are the rows of one look-up
+
+
+def fit_pairs(
+    switches: NDArray[np.bool_],
+    codes: NDArray[np.uint16],
+    labels: NDArray[np.intp],
+    n_classes: int,
+    *,
+    penalty: float,
+    smoothness: float,
+    max_bins: int | None,
+    pairs: int = PAIRS,
+    pair_bins: int = PAIR_BINS,
+    pair_smoothness: float = PAIR_SMOOTHNESS,
+    tolerance: float = TOLERANCE,
+) -> ScoreTables:
+    """Fit switches (n, s), codes (n, j) and labels (n,) in 0..n_classes-1, with at most so many `pairs` of joints.
+
+    `pair_smoothness` pulls neighbouring cells of a pair towards each other, whose joints have at most `pair_bins` bins
+    there; all else is as in `fit_logit`. Raises BoostingError.
+    """
+    X, s = np.hstack([switches, codes]), switches.shape[1]
+    if not (0 < penalty < np.inf and 0 <= smoothness < np.inf and 0 <= pair_smoothness < np.inf):
+        raise BoostingError(f"penalty={penalty} must be above 0, and smoothness at least 0, all finite")
+    check_rows(X, labels, n_classes, None)
+    check_memory(len(X), n_classes, BoostingError, *X.shape[1:])
+    columns = columns_of(X, max_bins, None, None)
+    alone = Fit(columns, labels, n_classes, penalty, smoothness, None)
+    rows = alone.minimum(tolerance)
+    edges = column_edges(codes, pair_bins)
+    found = _ranked(edges, codes, alone.residuals(rows), pairs)
+    if found:
+        made = [_cells(edges, codes, pair, pair_smoothness) for pair in found]
+        rows = Fit([*columns, *made], labels, n_classes, penalty, smoothness, None).minimum(tolerance)
+    own = 1 + sum(column.n_rows for column in columns)
+    tables = tables_of(columns, rows[:own], np.ones(len(X))).score_tables(s)
+    blocks = np.split(rows[own:], np.cumsum([column.n_rows for column in made])[:-1]) if found else []
+    made_pairs = []
+    for (a, b), block in sorted(zip(found, blocks, strict=True), key=lambda each: each[0]):
+        one, other = (np.floor(edges[joint]).astype(np.uint16) for joint in (a, b))
+        made_pairs.append(Pair((a, b), (one, other), block.reshape(len(one) + 1, len(other) + 1, n_classes)))
+    return ScoreTables(tables.bias, tables.switch_rows, tables.thresholds, tables.joint_rows, (), tuple(made_pairs))
+
+
+def _bins(edges: Sequence[Floats], codes: NDArray[np.uint16], joint: int) -> NDArray[np.intp]:
+    bins: NDArray[np.intp] = np.searchsorted(edges[joint], codes[:, joint])
+    return bins
+
+
+def _cells(edges: Sequence[Floats], codes: NDArray[np.uint16], pair: tuple[int, int], smoothness: float) -> Column:
+    one, other = (_bins(edges, codes, joint) for joint in pair)
+    shape = len(edges[pair[0]]) + 1, len(edges[pair[1]]) + 1
+    return Column(np.zeros(0), one * shape[1] + other, 0, cells=shape, smoothness=smoothness)
+
+
+def _ranked(
+    edges: Sequence[Floats], codes: NDArray[np.uint16], residuals: tuple[Floats, Floats], most: int
+) -> list[tuple[int, int]]:
+    """Return the pairs of joints that gain most, at most so many, no joint twice; of equal ones the first."""
+    n, gains = len(codes), []
+    over, spread = (on_one_grid(each, n) for each in residuals)
+    bins = {joint: _bins(edges, codes, joint) for joint in range(codes.shape[1]) if len(edges[joint])}
+    for a, b in combinations(bins, 2):
+        cells = bins[a] * (len(edges[b]) + 1) + bins[b]
+        members = sparse(np.ones(n), cells, np.arange(n), (int(cells.max()) + 1, n))
+        sums, spreads = members @ over, members @ spread
+        gains.append((exact_sum(sums * sums / (spreads + 1.0)), a, b))
+    found: list[tuple[int, int]] = []
+    for _, a, b in sorted(gains, key=lambda gain: (-gain[0], *gain[1:])):
+        if len(found) < most and not any({a, b} & set(pair) for pair in found):
+            found.append((a, b))
+    return found

@@ -1,0 +1,43 @@
+"""Which joints to keep beside the kept switches: every sensor takes time to digitise and to send.
+
+Backward elimination: the joint that is missed least goes, again and again, from score tables of the switches and of
+the joints' levels, fitted whole (`logistic`). CANDIDATES are those without which the loss rises least at once; of these
+the one goes without which it is least after TRIAL_STEPS more steps, of equal ones the lowest number.
+"""
+
+import numpy as np
+
+from ..samples import Columns, Samples
+from .logistic import Logistic
+from .methods.elimination import FIRST_STEPS, STEPS, TRIAL_STEPS, sampled, thermometer
+
+MOST_ROWS, CANDIDATES = 2048, 4
+
+
+def joint_order(samples: Samples) -> Columns:
+    """Return the joints that vary, the last one to go first, beside all the switches of these rows."""
+    rows = sampled(samples, MOST_ROWS)
+    levels = [thermometer(rows.codes[:, [joint]]) for joint in range(rows.codes.shape[1])]
+    left = [joint for joint, bits in enumerate(levels) if len(bits)]
+    if len(left) < 2:
+        return tuple(left)
+    fit = Logistic(np.concatenate([*(levels[joint] for joint in left), rows.switches.T]), rows.labels, rows.n_classes)
+    fit.improve(FIRST_STEPS)
+    gone: list[int] = []
+    while len(left) > 1:
+        ends = np.cumsum([0, *(len(levels[joint]) for joint in left)]).tolist()
+        without = [fit.without(list(range(*ends[place : place + 2]))) for place in range(len(left))]
+        likeliest = sorted(range(len(left)), key=lambda place: without[place].loss)[:CANDIDATES]
+        for place in likeliest:
+            without[place].improve(TRIAL_STEPS)
+        worst = min(likeliest, key=lambda place: (without[place].loss, left[place]))
+        fit = without[worst]
+        fit.improve(STEPS - TRIAL_STEPS)
+        gone.append(left.pop(worst))
+    return (*left, *gone[::-1])
+
+
+def kept_joints(samples: Samples, most: int | None) -> Columns:
+    """Return at most `most` joints to keep beside the switches of these rows, ascending; all where None is given."""
+    every = tuple(range(samples.codes.shape[1]))
+    return every if most is None or most >= len(every) else tuple(sorted(joint_order(samples)[:most]))

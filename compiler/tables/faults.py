@@ -1,0 +1,253 @@
+"""What faults of inputs leave of recognition: every fault on every row, counted from the integer tables.
+
+Scores are sums, so a fault changes one term of each: an input that is stuck adds the row of the value at which it is
+stuck, one that is lost its mean row, as the runtime has it. Trials are counted, each recognised as most of its frames.
+
+Answers are found without sorting: with scores S_k, the largest of S_k * K + (K - 1 - k) names the class of the largest
+score, the lowest of several, by its remainder.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations, islice, pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thenar.runtime.manifest import Faults, Faulty
+from thenar.runtime.scanning.scanmap import ScanMap
+from thenar.runtime.tables import IntegerTables, Pair
+
+Numbers = NDArray[np.intp]
+Steps = NDArray[np.int64]
+Found = tuple[int, ...]
+
+# Steps of all inputs that are held at a time, and additions beyond which no pairs are looked at: some minutes.
+_HELD, _MOST = 1 << 23, 1 << 37
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FaultCounts:
+    """How many of `total` trials are recognised: `correct` without a fault, and with each of these.
+
+    lost   (inputs,) each input lost, switches first; stuck: for each input (values,), stuck at each value
+    dead   each group of inputs lost together
+    pairs  for each two inputs, both lost, in the order of itertools.combinations; none where they are too many
+    values for each input, its values in words
+    """
+
+    total: int
+    correct: int
+    lost: Found
+    stuck: tuple[Found, ...]
+    dead: Found
+    pairs: Found
+    values: tuple[tuple[str, ...], ...]
+
+
+def count_faults(
+    tables: IntegerTables,
+    bits: NDArray[np.bool_],
+    codes: NDArray[np.uint16],
+    labels: Numbers,
+    trials: Numbers,
+    groups: Sequence[Sequence[int]] = (),
+    progress: Callable[[int, int], None] | None = None,
+) -> FaultCounts:
+    """Count the trials that each fault leaves, of rows with kept switches (n, s), codes (n, j), labels and trials (n,).
+
+    Labels that are none of the tables' classes are never recognised. `groups` are inputs that fail together, by number:
+    switches first, then joints.
+    """
+    terms = [*_switches(tables), *_joints(tables)]
+    joined = [_Joined.of(tables, pair) for pair in tables.pairs]
+    bins = (np.searchsorted(_steps(tables, joint), codes[:, joint]) for joint in range(tables.n_joints))
+    at = np.vstack([bits.T.astype(np.intp), *(column[np.newaxis] for column in bins)])
+    order, trial = np.argsort(trials, kind="stable"), np.unique(np.sort(trials), return_inverse=True)[1]
+    together = [(), *((element,) for element in range(len(terms))), *map(tuple, groups)]
+    few = len(terms) ** 2 * len(labels) * tables.n_classes <= _MOST
+    cuts, found = _cuts(trial, max(1, _HELD // (tables.n_classes * (len(terms) + 1)))), np.zeros(0, np.int64)
+    for number, (first, end) in enumerate(pairwise(cuts), 1):
+        rows = order[first:end]
+        block = _Block(tables, terms, joined, at[:, rows], labels[rows], trial[first:end])
+        counts = np.fromiter(block.counts(together, pairs=few), np.int64)
+        found = counts + found if found.size else counts
+        if progress is not None:
+            progress(number, len(cuts) - 1)
+    ends = np.cumsum([1, len(terms), len(groups), *(len(term.rows) for term in terms)])
+    (whole,), lost, dead, *stuck, pairs = (tuple(part.tolist()) for part in np.split(found, ends))
+    return FaultCounts(int(trial[-1]) + 1, whole, lost, tuple(stuck), dead, pairs, tuple(term.values for term in terms))
+
+
+def _cuts(trial: Numbers, size: int) -> list[int]:
+    """Return where to cut rows of ascending trials into blocks of about `size` rows that part no trial."""
+    starts = np.flatnonzero(np.diff(trial, prepend=-1))
+    return [*starts[np.flatnonzero(np.diff(starts // size, prepend=-1))].tolist(), len(trial)]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Term:
+    """An input: what each of its values adds, (values, K), what stands in for it (K,), and its values in words."""
+
+    rows: Steps
+    mean: Steps
+    values: tuple[str, ...]
+
+
+def _switches(tables: IntegerTables) -> Iterator[_Term]:
+    for row, mean in zip(tables.switch_rows.astype(np.int64), tables.switch_means.astype(np.int64), strict=True):
+        yield _Term(np.stack([np.zeros_like(row), row]), mean, ("open", "closed"))
+
+
+def _joints(tables: IntegerTables) -> Iterator[_Term]:
+    for joint, mean in enumerate(tables.joint_means.astype(np.int64)):
+        (own, rows), steps = tables.binned(joint), _steps(tables, joint)
+        ends = [-1, *steps.tolist()]
+        words = [f"codes {low + 1} to {high}" for low, high in pairwise(ends)]
+        rows = rows[np.searchsorted(own, np.append(0, steps + 1))]
+        yield _Term(rows.astype(np.int64), mean, (*words, f"codes above {ends[-1]}" if len(ends) > 1 else "any code"))
+
+
+def _steps(tables: IntegerTables, joint: int) -> Steps:
+    """Return the codes after which something of a joint changes; what it says up to the next is one value."""
+    return np.union1d(tables.binned(joint)[0], tables.steps_of(joint)).astype(np.int64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Joined:
+    """What two inputs add together: rows (values + 1, values + 1, K); the last value of each is that it is lost."""
+
+    inputs: tuple[int, int]
+    rows: Steps
+
+    @classmethod
+    def of(cls, tables: IntegerTables, pair: Pair) -> "_Joined":
+        codes = (np.concatenate([[0], _steps(tables, joint) + 1, [0]]) for joint in pair.joints)
+        bins = [np.searchsorted(steps, own) for steps, own in zip(pair.thresholds, codes, strict=True)]
+        one, other = pair.joints
+        return cls((tables.n_switches + one, tables.n_switches + other), pair.rows[np.ix_(*bins)].astype(np.int64))
+
+    def turned(self, first: int) -> tuple[int, Steps]:
+        """Return the other input than `first`, and the rows with the values of `first` first."""
+        one, other = self.inputs
+        return (other, self.rows) if first == one else (one, self.rows.swapaxes(0, 1))
+
+
+class _Block:
+    """Some rows, whole trials of them: at (inputs, n) is the value of each input; labels and trials (n,), ascending."""
+
+    def __init__(
+        self,
+        tables: IntegerTables,
+        terms: Sequence[_Term],
+        joined: Sequence[_Joined],
+        at: Numbers,
+        labels: Numbers,
+        trials: Numbers,
+    ) -> None:
+        self._k = tables.n_classes
+        self._labels, self._trial = labels, trials - trials[0]
+        self._first = np.flatnonzero(np.diff(trials, prepend=-1))
+        # All in one number a class: int64 has room for sums of any faults.
+        self._terms = [np.ascontiguousarray(term.rows.T * self._k) for term in terms]
+        self._at = at
+        self.whole = (tables.bias.astype(np.int64) * self._k + np.arange(self._k)[::-1])[:, None].repeat(at.shape[1], 1)
+        for rows, values in zip(self._terms, at, strict=True):
+            self.whole += rows[:, values]
+        self.lost = [
+            (term.mean * self._k)[:, None] - rows[:, values]
+            for term, rows, values in zip(terms, self._terms, at, strict=True)
+        ]
+        self._joined = {one: pair.turned(one) for pair in joined for one in pair.inputs}
+        # Of two that are lost together, by how much their own two differences are wrong.
+        self._both: dict[tuple[int, int], Steps] = {}
+        for pair in joined:
+            (one, other), now = pair.inputs, self._added(pair.inputs[0], at[pair.inputs[0]])
+            self.whole += now
+            alone = [self._added(each, -1) - now for each in pair.inputs]
+            self._both[pair.inputs] = (pair.rows[-1, -1] * self._k)[:, None] - now - sum(alone)
+            self.lost[one], self.lost[other] = (
+                self.lost[each] + more for each, more in zip(pair.inputs, alone, strict=True)
+            )
+
+    def _added(self, one: int, value: Numbers | int) -> Steps:
+        """Return what a paired input adds, (K, n), at this value in each row, together with the other of its pair."""
+        other, rows = self._joined[one]
+        found: Steps = rows[value, self._at[other]].T * self._k
+        return found
+
+    def right(self, scores: Steps) -> int:
+        """Return how many trials are recognised by scores (K, n)."""
+        found = self._k - 1 - scores.max(axis=0) % self._k
+        if len(self._first) == len(self._labels):
+            return int(np.count_nonzero(found == self._labels))
+        counts = np.bincount(self._trial * self._k + found, minlength=len(self._first) * self._k)
+        return int(np.count_nonzero(counts.reshape(-1, self._k).argmax(axis=1) == self._labels[self._first]))
+
+    def counts(self, together: Sequence[Found], *, pairs: bool) -> Iterator[int]:
+        """Yield the trials recognised with each group of inputs lost, each input stuck at each value, each two lost."""
+        for group in together:
+            both = (more for pair, more in self._both.items() if {*pair} <= {*group})
+            yield self.right(sum(both, sum((self.lost[element] for element in group), self.whole)))
+        for one, (rows, at) in enumerate(zip(self._terms, self._at, strict=True)):
+            without, paired = self.whole - rows[:, at], one in self._joined
+            if paired:
+                without -= self._added(one, at)
+            for value, row in enumerate(rows.T):
+                more: Steps | int = self._added(one, value) if paired else 0
+                yield self.right(without + row[:, None] + more)
+        for one, lost in enumerate(self.lost if pairs else ()):
+            without = self.whole + lost
+            for other, more in enumerate(self.lost[one + 1 :], one + 1):
+                yield self.right(without + more + self._both.get((one, other), 0))
+
+
+def groups_of(scan: ScanMap | None, sources: Sequence[str], n_joints: int) -> Mapping[str, Found]:
+    """Return the inputs that fail together, by what they fail with: a taxel of several levels; a port, a chip or a
+    board of the scan map, counted from 1 as the harness has them; and the device that reads the joints.
+
+    sources  of each kept switch its own name, or that of the taxel that it is a level of
+    """
+    found: dict[str, Found] = {}
+    for taxel, levels in Counter(sources).items():
+        if levels > 1:
+            found[f"taxel {taxel}"] = tuple(one for one, source in enumerate(sources) if source == taxel)
+    for port in () if scan is None else scan.ports:
+        chip = f"chip {port.chip + 1} of bus {port.bus + 1}"
+        found[f"port {port.reading} of {chip}"] = port.elements
+        found[chip] = found.get(chip, ()) + port.elements
+    boards, taxels = ((), ()) if scan is None else (scan.scanners, scan.taxels)
+    for number, (keys, converted) in enumerate(zip(boards, taxels or ((),) * len(boards), strict=True)):
+        if own := tuple(switch for *_, switch in (*keys, *converted)):
+            found[f"scanner board {number + 1}"] = own
+    if n_joints:
+        found["the joints' device"] = tuple(range(len(sources), len(sources) + n_joints))
+    return found
+
+
+def worst_faults(counts: FaultCounts, names: Sequence[str], groups: Mapping[str, Found]) -> Faults:
+    """Return the worst fault of each kind, the first of several; `names` are those of the inputs."""
+    lost = [Faulty("lost", (name,), left) for name, left in zip(names, counts.lost, strict=True)]
+    stuck = [
+        Faulty(f"stuck {'' if value in _BIT else 'at '}{value}", (name,), left)
+        for name, found, values in zip(names, counts.stuck, counts.values, strict=True)
+        for left, value in zip(found, values, strict=True)
+    ]
+    dead = [
+        Faulty(f"lost with {what}", tuple(names[one] for one in group), left)
+        for (what, group), left in zip(groups.items(), counts.dead, strict=True)
+    ]
+    pair = []
+    if counts.pairs:
+        worst = int(np.argmin(counts.pairs))
+        both = next(islice(combinations(names, 2), worst, None))
+        pair = [Faulty("both lost", both, counts.pairs[worst])]
+    return Faults(counts.total, counts.correct, *(_least(kind) for kind in (lost, stuck, dead, pair)))
+
+
+_BIT = ("open", "closed")
+
+
+def _least(faults: Sequence[Faulty]) -> Faulty | None:
+    return min(faults, key=lambda each: each.correct, default=None)

@@ -1,0 +1,38 @@
+"""The additive logit with tables of pairs of joints."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from .base import Report, Setting, Trainer
+from .logit import MEMBER as LOGIT
+
+if TYPE_CHECKING:
+    from ..samples import Samples
+    from ..tables.collapse import ScoreTables
+
+
+class Pairs(Trainer):
+    """What joints say two by two, besides what each says alone, chosen by what it adds."""
+
+    name = "pairs"
+    what = "the logit, and tables for pairs of joints"
+    rank = 2
+    settings = (
+        *(setting for setting in LOGIT.settings if setting.name != "linear"),
+        Setting("pairs", "At most so many pairs of joints, each joint in one.", int, 4, 1),
+        # As additive.pairs.MOST_PAIR_BINS.
+        Setting("pair_bins", "At most so many bins a joint in a pair.", int, 8, 2, 16),
+        Setting("pair_smoothness", "Pull of a pair's neighbouring bins towards each other.", float, 1.0, 0.0, 1e6),
+    )
+    tried = ({"penalty": 0.3, "smoothness": 2.0, "max_bins": 32},)
+
+    def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> "ScoreTables":
+        """Return the tables. Raises BoostingError for settings that make no sense."""
+        from ..additive.logit import BINS
+        from ..additive.pairs import fit_pairs
+
+        given = {**settings, "max_bins": settings["max_bins"] or BINS}
+        return fit_pairs(samples.switches, samples.codes, samples.labels, samples.n_classes, **given)
+
+
+MEMBER = Pairs()

@@ -1,0 +1,74 @@
+"""TI ADS7828: eight channels of 12 bits against the supply, converted within the transfer that reads them (SBAS181)."""
+
+from .base import Conversion, Converter, ConverterModel, Package, Write
+
+# Single-ended, converter on between conversions, reference off: it measures against REF, which is the supply.
+_SINGLE, _ON = 0x80, 0x04
+# Bits that it does not look at; an ADS1115 at the same address takes them for its configuration register.
+_SPARE = 0x01
+
+
+def _command(channel: int) -> int:
+    """Return the byte that selects a channel: the odd ones follow the even ones."""
+    return _SINGLE | (channel & 1) << 6 | (channel >> 1) << 4 | _ON | _SPARE
+
+
+class Ads7828Model(ConverterModel):
+    """No registers: the last command says which channel every message that reads converts."""
+
+    pins = 128
+    has_registers = False
+
+    def reset(self) -> None:
+        """Do as after power-on."""
+        self._command = 0
+
+    def write(self, data: bytes) -> None:
+        """Take the bytes of one message that writes."""
+        if data:
+            self._command = data[-1]
+
+    def read(self, length: int) -> bytes:
+        """Return the bytes of one message that reads."""
+        channel = self._command >> 6 & 1 | (self._command >> 4 & 3) << 1
+        code = min(self.at(channel), 0xFFF) if self._command & _SINGLE else 0
+        return (code.to_bytes(2, "big") * length)[:length]
+
+    def poke(self, register: int, value: int) -> None:
+        """Put `value` where nobody wrote it."""
+        self._command = value
+
+
+class Ads7828(Converter):
+    """Channels CH0 to CH7 against COM, code 4096 at the supply. SCL up to 400 kHz (3.4 MHz in high-speed mode)."""
+
+    name = "ads7828"
+    rank = 21
+    addresses = range(0x48, 0x4C)
+    clock_hz = 400_000
+    pins = tuple(f"CH{channel}" for channel in range(8))
+    bits = 12
+    # The answer's second byte holds the lower eight bits, its first the upper four.
+    readings = tuple(
+        Conversion(f"CH{channel}", bytes((_command(channel),)), (channel,) * 4 + (-1,) * 4 + (channel,) * 8)
+        for channel in range(8)
+    )
+    registers = False
+    model = Ads7828Model
+    package = Package(
+        part="ADS7828E/250",
+        maker="Texas Instruments",
+        symbol="ADS7828",
+        footprint="Package_SO:TSSOP-16_4.4x5mm_P0.65mm",
+        pins=(*(f"CH{n}" for n in range(8)), "GND", "REF", "COM", "A0", "A1", "SCL", "SDA", "VDD"),
+        sure=False,
+        note="REF is tied to the supply, COM to ground; compare symbol and pins before ordering",
+        library="Analog_ADC",
+    )
+
+    def setup(self, used: frozenset[int]) -> tuple[Write, ...]:
+        """Return the write of a command; its answer has four zeros on top, as an ADS1115's configuration has not."""
+        return (Write(bytes((_command(min(used, default=0)),)), b"\x00\x00", b"\xf0\x00"),)
+
+
+MEMBER = Ads7828()

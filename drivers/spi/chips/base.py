@@ -1,0 +1,89 @@
+"""What a converter on SPI is: to its driver, to the emulated device, and as a part to solder.
+
+It needs the standard library alone, as every chip's file does: the system's own Python emulates the chips.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ...i2c.chips.base import Package, Reading
+
+_BITS = 8
+# For so long chip select must be high between two transfers (MCP3208: 500 ns, MCP3008: 270 ns).
+SELECT_US = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Transfer(Reading):
+    """One transaction that reads a channel, the only one of `pins`: as many bytes come in while `command` goes out."""
+
+    @property
+    def wire_bytes(self) -> int:
+        """Bytes on the wire."""
+        return len(self.command)
+
+    @property
+    def scl_periods(self) -> int:
+        """SCLK periods, of which a byte has no ninth."""
+        return _BITS * self.wire_bytes
+
+
+class SpiModel(ABC):
+    """A converter on an emulated device: `levels` holds the code at each channel, 16 bits each, the first lowest."""
+
+    def __init__(self) -> None:
+        self.levels = 0
+
+    @abstractmethod
+    def transfer(self, sent: bytes) -> bytes:
+        """Return what comes in while `sent` goes out, from chip select low to high."""
+
+    def at(self, channel: int) -> int:
+        """Return the code at a channel."""
+        return self.levels >> 16 * channel & 0xFFFF
+
+
+class SpiChip(ABC):
+    """A kind of converter on SPI, mode 0. Its file defines `MEMBER`, one instance, or a tuple of them.
+
+    name      what glove.toml calls it
+    rank      its place in lists
+    clock_hz  the highest SCLK at 3.3 V; most_hz, at 5 V
+    pins      the names of its channels, in the order of their numbers
+    bits      of a code: code 0 is 0 V, and 2 ** bits is the supply, against which it measures
+    package   as a part to solder
+    model     the class that emulates it
+    """
+
+    name: ClassVar[str]
+    rank: ClassVar[int] = 0
+    clock_hz: ClassVar[int]
+    most_hz: ClassVar[int]
+    pins: ClassVar[tuple[str, ...]]
+    bits: ClassVar[int]
+    package: ClassVar[Package]
+    model: ClassVar[type[SpiModel]]
+
+    @abstractmethod
+    def sent(self, channel: int) -> bytes:
+        """Return the bytes that convert a channel, channel by channel of the same length."""
+
+    @property
+    def readings(self) -> tuple[Transfer, ...]:
+        """What reads each channel, in their order."""
+        sent = (self.sent(channel) for channel in range(len(self.pins)))
+        return tuple(
+            Transfer(name, command, (channel,) * _BITS * len(command))
+            for channel, (name, command) in enumerate(zip(self.pins, sent, strict=True))
+        )
+
+    @property
+    def highest(self) -> int:
+        """The code of the supply, where a channel is saturated."""
+        return (1 << self.bits) - 1
+
+    def code(self, answer: bytes) -> int | None:
+        """Return the code of an answer, whose last bits it is; None where the null bit before it is none."""
+        code = int.from_bytes(answer, "big") & (2 << self.bits) - 1
+        return None if code >> self.bits else code

@@ -1,0 +1,99 @@
+"""A converter behind a device node /dev/spidevB.C: all its channels in one call of the kernel."""
+
+import ctypes
+import errno
+import os
+import struct
+from collections.abc import Callable, Sequence
+from fcntl import ioctl
+
+from ..closing import Closing
+from ..errors import DeviceError, SettingError
+from ..i2c.chips import Reading
+from ..names import shortened
+from ..ports import check_node, device_fault
+from .chips import SpiChip
+
+# The kernel's linux/spi/spidev.h: struct spi_ioc_transfer, and _IOW('k', number, size of what is written).
+TRANSFER = struct.Struct("=QQIIHBBBBBB")
+MODE, SPEED = 0x40016B01, 0x40046B04
+_BITS = 8
+_MESSAGE, _SIZE_BITS = 0x40006B00, 16
+
+
+def message(transfers: int) -> int:
+    """Return the request that makes so many transfers."""
+    return _MESSAGE | transfers * TRANSFER.size << _SIZE_BITS
+
+
+class SpiDevice(Closing):
+    """The converter at one device node. To be used by one thread at a time.
+
+    calls   how often the kernel was asked to transfer
+    silent  how many answers were no converter's
+    """
+
+    def __init__(self, device: str, chip: SpiChip, clock_hz: int) -> None:
+        """Raise SettingError if `device` is no path of a device."""
+        if fault := device_fault(device):
+            raise SettingError(f"{shortened(repr(device))} {fault}")
+        self.device, self.chip, self.clock_hz = device, chip, clock_hz
+        self.calls = self.silent = 0
+        self._file: int | None = None
+
+    def open(self) -> None:
+        """Open the node. Raises DeviceError with what to check."""
+        self.close()
+        check_node(self.device)
+        try:
+            self._file = os.open(self.device, os.O_RDWR | os.O_CLOEXEC)
+            ioctl(self._file, MODE, b"\0")
+            ioctl(self._file, SPEED, struct.pack("=I", self.clock_hz))
+        except OSError as error:
+            self.close()
+            raise DeviceError(f"{self.device} cannot be opened: {_cause(error)}") from None
+
+    def prepare(self, transfers: Sequence[Reading]) -> Callable[[], list[int | None]]:
+        """Return what makes these transfers in one call, chip select high in between, and returns the code of each.
+
+        None stands for an answer that is no converter's. It raises DeviceError when the device is gone.
+        """
+        sent = [ctypes.create_string_buffer(each.command, len(each.command)) for each in transfers]
+        came = [ctypes.create_string_buffer(len(each.command)) for each in transfers]
+        between = [1] * (len(transfers) - 1) + [0]
+        # The kernel writes where the table points to; the buffers live as long as what is returned.
+        table = b"".join(
+            TRANSFER.pack(
+                ctypes.addressof(out), ctypes.addressof(in_), len(out), self.clock_hz, 0, _BITS, high, *[0] * 4
+            )
+            for out, in_, high in zip(sent, came, between, strict=True)
+        )
+        request, buffers = message(len(transfers)), (sent, came)
+
+        def run() -> list[int | None]:
+            if self._file is None:
+                raise DeviceError(f"{self.device} is not open: open it first")
+            self.calls += 1
+            try:
+                ioctl(self._file, request, table)
+            except OSError as error:
+                raise DeviceError(f"{self.device} does not work: {_cause(error)}") from None
+            codes = [self.chip.code(answer.raw) for answer in buffers[1]]
+            self.silent += codes.count(None)
+            return codes
+
+        return run
+
+    def close(self) -> None:
+        """Close the node."""
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None
+
+
+def _cause(error: OSError) -> str:
+    if error.errno in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
+        return "there is no such device; is SPI switched on, is the module spidev loaded?"
+    if error.errno in (errno.EACCES, errno.EPERM):
+        return "you may not; is your user in the group spi?"
+    return f"{os.strerror(error.errno or errno.EIO)}; is it an SPI device?"

@@ -1,0 +1,87 @@
+"""Converters on SPI of a harness: all levels of one in one call of the kernel."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+
+from thenar.drivers.spi.device import SpiDevice
+
+from ..frames import PERIODS, Mask, SwitchFrame, now_us
+from ..harness.wiring import Harness
+from ..published import Count
+from ..scanning.scanmap import ScanMap
+from ..scanning.timing import reading_of
+from ..taxels import calibration_of
+from .base import SHORTEST_US, Source, SourceKind
+from .i2c import PortLevels, taxel_faults
+
+# Conversions take some tens of microseconds: a converter is not asked more often than this.
+_PERIOD_S = 0.001
+
+
+class SpiConverter(Source):
+    """SPI device number `number` of a harness, read as `scan` has it, whose levels are limits in counts.
+
+    silent  whether the last answers were no converter's
+    """
+
+    def __init__(self, harness: Harness, number: int, scan: ScanMap) -> None:
+        wiring = harness.spi[number]
+        ports = [port for port in scan.ports if port.bus == len(harness.buses) + number]
+        calibration = calibration_of(harness.taxel_settings)
+        self.name = f"spi at {wiring.device}"
+        self.taxels = tuple(PortLevels(port, harness, calibration) for port in ports)
+        self.owned: Mask = sum(port.targets for port in self.taxels)
+        self.period_us, self.longest_us = SHORTEST_US, PERIODS * SHORTEST_US
+        self.device = SpiDevice(wiring.device, wiring.chip, wiring.clock_hz)
+        self.run: Callable[[], list[int | None]] = self.device.prepare([reading_of(port, harness) for port in ports])
+        self._everything = len(harness.taxel_names)
+        self._due = 0.0
+        self.silent = False
+
+    def open(self) -> None:
+        """Open the device."""
+        self.device.open()
+
+    def read(self, timeout_s: float) -> SwitchFrame | None:
+        """Convert all channels once."""
+        time.sleep(min(max(0.0, self._due - time.monotonic()), timeout_s))
+        self._due = time.monotonic() + _PERIOD_S
+        answers = self.run()
+        self.silent = None in answers
+        closed = lost = 0
+        codes: list[int | None] = [None] * self._everything
+        for taxel, answer in zip(self.taxels, answers, strict=True):
+            shut, silent = taxel.states(answer)
+            closed, lost = closed | shut, lost | silent
+            codes[taxel.place] = answer
+        return SwitchFrame(now_us(), closed, lost, taxels=tuple(codes))
+
+    def counts(self) -> tuple[Count, ...]:
+        """Return how many transfers there were, and how many answers were no converter's."""
+        return (Count("transfers", self.device.calls), Count("silent", self.device.silent))
+
+    def trouble(self) -> str:
+        """Return what is wrong with the converter or its taxels; "" if nothing is."""
+        silent = [f"{self.device.chip.name} does not answer: check its supply, its wires and its chip select"]
+        return "; ".join(silent if self.silent else taxel_faults(self.taxels))
+
+    def close(self) -> None:
+        """Close the device."""
+        self.device.close()
+
+
+def _sources(harness: Harness, _names: Sequence[str], scan: ScanMap) -> Iterator[Source]:
+    return (SpiConverter(harness, number, scan) for number in _numbers(harness, scan))
+
+
+def _periods_us(harness: Harness, scan: ScanMap) -> Iterator[int]:
+    return (SHORTEST_US for _ in _numbers(harness, scan))
+
+
+def _numbers(harness: Harness, scan: ScanMap) -> list[int]:
+    """Return which SPI devices are read."""
+    buses = len(harness.buses)
+    return sorted({port.bus - buses for port in scan.ports if port.bus >= buses})
+
+
+MEMBER = SourceKind("spi", "Converters on SPI: [[spi]].", "switches", _sources, _periods_us, rank=2)

@@ -1,0 +1,332 @@
+"""Taxels live: raw counts of a converter in, levels out, as bits; the calibration of taxels, and their baselines.
+
+A calibration says what a taxel's counts are at rest and when it is pressed, so a count means a value. A build codes
+values by the two points that its recordings were coded by. Both are straight lines, so every level, closed at codes
+above a threshold, is closed above (or below) one count of this glove. `count_limit` finds that count once; live, only
+integers are compared, and a level is decided as it was in the recordings.
+
+The counts of pads of resistive rubber and of fabric wander with temperature, moisture and wear. While a taxel is at
+rest, its baseline follows its counts: by a bounded rate, within bounds of the calibrated rest, and never while it is
+pressed nor shortly after. What the baseline has moved is taken off every count.
+"""
+
+from bisect import bisect_left
+from collections.abc import Sequence
+from math import isfinite
+from pathlib import Path
+from statistics import median_low
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta, Struct
+from msgspec.structs import replace
+
+from thenar.drivers.errors import SettingError
+
+from .calibration import code_of_value
+from .frames import Mask
+from .manifest import Calibration, Switch, Threshold
+from .names import fault, list_names, shortened
+from .scanning.scanmap import ScanMap
+from .toml_source import read_source
+from .toml_struct import convert
+
+COUNTS = 65536
+Raw = Annotated[int, Meta(ge=0, lt=COUNTS)]
+Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+TaxelFault = Literal["", "silent", "open wire", "saturated"]
+# A level: the limit of its counts (see `count_limit`), and the number of the build's switch that it is.
+Level = tuple[int, int]
+
+# Counts of which the median is a press; what moves by less than so many was not moved.
+_IN_A_ROW, _LEAST_TRAVEL = 5, 10
+
+# Parts of a count in which a baseline moves: a share of the span in thousandths, a minute in microseconds.
+_MINUTE_US = 60_000_000
+_PARTS = 1000 * _MINUTE_US
+# A taxel that was not read for longer has not been watched: its baseline moves no further than in this time.
+_LONGEST_US = 100_000
+# Converters miss their ends by a few counts: 1 of 1023, 7 of 4095.
+_END_SHIFT = 9
+
+
+class TaxelLine(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """The straight line of one taxel: its counts with nothing on it mean 0, and those of a press mean `value`.
+
+    Raises SettingError if both are one count, or the value is none that a press can have.
+    """
+
+    name: Annotated[str, Meta(min_length=1)]
+    rest: Raw
+    press: Raw
+    value: float = 1.0
+
+    def __post_init__(self) -> None:
+        if reason := fault(self.name):
+            raise SettingError(f"taxel {shortened(repr(self.name))} {reason}")
+        if self.rest == self.press:
+            raise SettingError(f"{self.name!r}: rest and press are both {self.rest}, which makes no line")
+        if not (isfinite(self.value) and 1e-9 <= self.value <= 1e9):
+            raise SettingError(f"{self.name!r}: the value of a press is a number above 0, not {self.value}")
+
+    def at(self, raw: int) -> float:
+        """Return the value at a count."""
+        return (raw - self.rest) * (self.value / (self.press - self.rest))
+
+
+class TaxelCalibration(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, rename={"taxels": "taxel"}):
+    """The lines of a glove's taxels, each named once, in any order, and the unit of their values.
+
+    The unit "press" says that 1 is the press of the calibration, whatever force it had. Raises SettingError if a taxel
+    is named twice.
+    """
+
+    subject: str = ""
+    unit: str = "press"
+    taxels: tuple[TaxelLine, ...]
+
+    def __post_init__(self) -> None:
+        for what, name in (("subject", self.subject), ("unit", self.unit)):
+            if (name or what == "unit") and (reason := fault(name)):
+                raise SettingError(f"{what} {shortened(repr(name))} {reason}")
+        names = [line.name for line in self.taxels]
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise SettingError(f"calibrated twice: {list_names(twice)}: keep one of each")
+
+    def line(self, name: str) -> TaxelLine | None:
+        """Return the line of a taxel; None where it was not calibrated."""
+        return next((line for line in self.taxels if line.name == name), None)
+
+    def to_toml(self) -> str:
+        """Return the calibration as the text of its file."""
+        return msgspec.toml.encode(self).decode("utf-8")
+
+
+class TaxelSettings(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True):
+    """`[taxels]` of glove.toml: the calibration, and how baselines are followed. Shares are of a taxel's span, which is
+    what lies between rest and press.
+
+    Parameters
+    ----------
+    calibration : str, optional
+        Path of the file that `thenar calibrate --taxels` wrote; relative paths count from the folder of glove.toml.
+    baseline : bool
+        Whether baselines are followed. Without a calibration none are.
+    window : float
+        A taxel within this share of its baseline, or below it, is at rest.
+    drift : float
+        The most that a baseline may leave the calibrated rest.
+    per_minute : float
+        The most that a baseline moves in a minute.
+    settle_s : float
+        For how long a taxel must have rested before its baseline moves: pads creep back after a press.
+    """
+
+    calibration: Annotated[str, Meta(min_length=1)] | None = None
+    baseline: bool = True
+    window: Share = 0.1
+    drift: Share = 0.25
+    per_minute: Annotated[float, Meta(ge=0.001, le=10.0)] = 0.05
+    settle_s: Annotated[float, Meta(ge=0.0, le=3600.0)] = 1.0
+
+
+def calibration_of(settings: TaxelSettings) -> TaxelCalibration | None:
+    """Return the calibration that the settings name; None where they name none. Raises as `load_taxel_calibration`."""
+    return None if settings.calibration is None else load_taxel_calibration(Path(settings.calibration))
+
+
+def load_taxel_calibration(path: Path) -> TaxelCalibration:
+    """Return the calibration that `thenar calibrate --taxels` wrote. Raises SettingError with file, line and key."""
+    source = read_source(path, SettingError)
+    return convert(source, (), source.tables(), TaxelCalibration)
+
+
+def learnt_lines(
+    names: Sequence[str], rested: Sequence[Sequence[int | None]], pressed: Sequence[Sequence[int | None]], value: float
+) -> tuple[TaxelLine, ...]:
+    """Return the lines of the taxels that moved, from counts at rest and counts while each was pressed once.
+
+    The rest is the median; the press is the median of five counts in a row that lies furthest from it, so that a glitch
+    is none. What moved less than three times as far as the counts wandered at rest was not pressed.
+    """
+    lines = []
+    for place, name in enumerate(names):
+        counts = [code for codes in rested if (code := codes[place]) is not None]
+        moved = [code for codes in pressed if (code := codes[place]) is not None]
+        if not counts or len(moved) < _IN_A_ROW:
+            continue
+        rest = median_low(counts)
+        held = (median_low(moved[at : at + _IN_A_ROW]) for at in range(len(moved) - _IN_A_ROW + 1))
+        press = max(held, key=lambda count: abs(count - rest))
+        if abs(press - rest) >= max(_LEAST_TRAVEL, 3 * (max(counts) - min(counts))):
+            lines.append(TaxelLine(name, rest, press, value))
+    return tuple(lines)
+
+
+def count_limit(threshold: Threshold, calibration: TaxelCalibration | None) -> int:
+    """Return where this glove's counts close a level.
+
+    A limit from 0 on closes the level at counts above it. A negative one closes it at counts whose complement `~count`
+    is above it, that is, at counts below `~limit`: recordings and glove are wired the other way round.
+
+    Raises SettingError if the taxel's counts cannot be turned into the build's codes.
+    """
+    coded = threshold.taxel
+    line = None if calibration is None else calibration.line(coded.name)
+    if line is None or calibration is None:
+        _check_counts(coded, calibration is not None)
+        return threshold.code
+    if calibration.unit != coded.unit:
+        raise SettingError(
+            f"taxels are calibrated in {calibration.unit!r}, {coded.name!r} of the build is in {coded.unit!r}: "
+            "compile recordings in that unit"
+        )
+    rising = (coded.code_b > coded.code_a) == ((coded.value_b > coded.value_a) == (line.press > line.rest))
+    first = bisect_left(
+        range(COUNTS), True, key=lambda raw: (code_of_value(coded, line.at(raw)) > threshold.code) == rising
+    )
+    if not rising:
+        return ~first
+    return first - 1 if first else ~COUNTS  # closed at every count
+
+
+def in_counts(scan: ScanMap, switches: Sequence[Switch], calibration: TaxelCalibration | None) -> ScanMap:
+    """Return a build's scan map with the limits of this glove's counts in place of the codes of levels: what sources
+    are given. Raises SettingError as `count_limit` does.
+    """
+
+    def limit(number: int, code: int) -> int:
+        threshold = switches[number].threshold
+        return code if threshold is None else count_limit(threshold, calibration)
+
+    ports = tuple(
+        replace(port, levels=tuple((limit(number, code), number) for code, number in port.levels))
+        if port.levels
+        else port
+        for port in scan.ports
+    )
+    boards = tuple(tuple((at, limit(number, code), number) for at, code, number in board) for board in scan.taxels)
+    return replace(scan, ports=ports, taxels=boards)
+
+
+def _check_counts(coded: Calibration, others: bool) -> None:
+    """Raise SettingError unless the codes of a taxel are counts."""
+    if (coded.code_a, coded.code_b) == (coded.value_a, coded.value_b):
+        return
+    has = "the calibration lacks it" if others else "the glove's taxels are not calibrated"
+    raise SettingError(
+        f"taxel {coded.name!r} of the build is coded in {coded.unit!r}, not in counts, and {has}: calibrate it "
+        "(`thenar calibrate --taxels`) and name the file: `calibration` of [taxels] in glove.toml"
+    )
+
+
+class _Baseline:
+    """The baseline of one taxel, in parts of a count above its calibrated rest, towards the press."""
+
+    __slots__ = ("_bound", "_moved", "_per_us", "_press", "_read_us", "_rest", "_rested_us", "_settle_us", "_window")
+
+    def __init__(self, line: TaxelLine, settings: TaxelSettings) -> None:
+        span = abs(line.press - line.rest)
+        self._rest, self._press = line.rest, 1 if line.press > line.rest else -1
+        self._per_us = span * round(1000 * settings.per_minute)
+        self._bound, self._window = (round(span * share) * _PARTS for share in (settings.drift, settings.window))
+        self._settle_us = round(1e6 * settings.settle_s)
+        self._moved = 0
+        self._read_us: int | None = None
+        self._rested_us = 0
+
+    def follow(self, time_us: int, raw: int) -> int:
+        """Take a sound count; return by how many counts the baseline has left the calibrated rest."""
+        if self._read_us is None:
+            self._read_us = self._rested_us = time_us
+        passed = min(max(time_us - self._read_us, 0), _LONGEST_US)
+        self._read_us = max(time_us, self._read_us)
+        off = self._press * (raw - self._rest) * _PARTS - self._moved
+        if off > self._window:
+            self._rested_us = self._read_us
+        elif self._read_us - self._rested_us > self._settle_us:
+            step = passed * self._per_us
+            self._moved += min(max(off, -step), step)
+            self._moved = min(max(self._moved, -self._bound), self._bound)
+        return self._press * ((self._moved + _PARTS // 2) // _PARTS)
+
+
+class Taxels:
+    """The taxels of one device: what its channels say, as levels of a build. For one thread.
+
+    names        of the taxels, channel by channel
+    levels       of each taxel: limits of its counts (see `count_limit`), with the numbers of the build's switches
+    calibration  rest and press of each taxel, in counts. Of a taxel without, no baseline is followed, and no end of the
+                 converter is a fault: nobody knows at which of them it rests
+    settings     how baselines are followed
+    highest      the converter's highest count; None: its ends are not looked at
+
+    owned   the switches of all levels
+    counts  of each taxel when it was read last, what its baseline has moved taken off; None: it has a fault
+    faults  what was wrong with each taxel when it was read last. An end of the converter is a fault where neither the
+            rest, drifted as far as it may, nor the press of the calibration is near it: on the side of the rest an open
+            wire, on the side of the press saturation
+    drifts  by how many counts each baseline has left the calibrated rest
+    """
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        levels: Sequence[Sequence[Level]],
+        calibration: TaxelCalibration | None = None,
+        settings: TaxelSettings | None = None,
+        highest: int | None = None,
+    ) -> None:
+        settings = settings or TaxelSettings()
+        self.names = tuple(names)
+        self._levels = [[(limit, 1 << switch) for limit, switch in each] for each in levels]
+        self._masks = [sum(bit for _, bit in each) for each in self._levels]
+        self.owned: Mask = sum(self._masks)
+        lines = [None if calibration is None else calibration.line(name) for name in names]
+        self._follows = [_Baseline(line, settings) if line and settings.baseline else None for line in lines]
+        self._ends = [_ends(line, settings, highest) for line in lines]
+        self.counts: list[int | None] = [None] * len(self.names)
+        self.faults: list[TaxelFault] = [""] * len(self.names)
+        self.drifts = [0] * len(self.names)
+
+    def read(self, time_us: int, codes: Sequence[int | None]) -> tuple[Mask, Mask]:
+        """Take the counts of all channels (None: it could not be read); return the closed levels, and the lost ones."""
+        closed = lost = 0
+        for place, raw in enumerate(codes):
+            low, high, at_low, at_high = self._ends[place]
+            if raw is None:
+                found: TaxelFault = "silent"
+            elif low < raw < high:
+                found = ""
+            else:
+                found = at_low if raw <= low else at_high
+            self.faults[place] = found
+            if found or raw is None:
+                lost |= self._masks[place]
+                self.counts[place] = None
+                continue
+            if (baseline := self._follows[place]) is not None:
+                self.drifts[place] = baseline.follow(time_us, raw)
+            self.counts[place] = count = raw - self.drifts[place]
+            for limit, bit in self._levels[place]:
+                if (count if limit >= 0 else ~count) > limit:
+                    closed |= bit
+        return closed, lost
+
+
+def _ends(
+    line: TaxelLine | None, settings: TaxelSettings, highest: int | None
+) -> tuple[int, int, TaxelFault, TaxelFault]:
+    """Return at and below, and at and above which counts a taxel has a fault, and which."""
+    if line is None or highest is None:
+        return -1, COUNTS, "", ""
+    span, margin, rising = abs(line.press - line.rest), highest >> _END_SHIFT, line.press > line.rest
+    # Where a sound taxel can be by itself: drifted from its rest, pressed as firmly as it was calibrated.
+    below_rest, above_press = round(span * (settings.drift + settings.window)), round(span * settings.window)
+    least, most = (
+        (line.rest - below_rest, line.press + above_press)
+        if rising
+        else (line.press - above_press, line.rest + below_rest)
+    )
+    low, high = margin if least > margin else -1, highest - margin if most < highest - margin else COUNTS
+    return (low, high, "open wire", "saturated") if rising else (low, high, "saturated", "open wire")

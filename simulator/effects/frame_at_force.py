@@ -1,0 +1,55 @@
+"""Initial contact, newton by newton: frames come when the place that is pressed hardest bears so and so much.
+
+Of the frames from contact to read-out the first comes at contact and the last as ever, at read-out; those between are
+spread evenly over the force. What never bears so much has its frame at read-out.
+"""
+
+from typing import Annotated
+
+import numpy as np
+from msgspec import Meta
+
+from ..errors import SceneError
+from ..pipeline.batch import Batch
+from ..pipeline.effect import Effect, EffectParameters, Setting, Step, frame_times
+from ..streams import Draw
+
+
+class Parameters(EffectParameters, frozen=True):
+    """The force on the place that is pressed hardest, in newtons, of the last frame but one."""
+
+    to_n: Annotated[float, Meta(gt=0.0, le=100.0)] = 1.0
+
+
+def prepare(parameters: Parameters, setting: Setting) -> Step:
+    """Return the step that moves the frames. Raises SceneError where there are too few."""
+    times = frame_times(setting)
+    held = np.flatnonzero((times >= 0) & (times <= setting.hold_us))
+    between = len(held) - 2
+    if between < 1:
+        raise SceneError(
+            "effects.frame.at_force: needs three frames or more from contact to read-out: raise recording.rate_hz or"
+            " hold_ms"
+        )
+
+    def step(batch: Batch, draw: Draw) -> None:
+        if batch.ramp is None:
+            return  # All force is there at once.
+        steps = [batch.ramp.reached_us(parameters.to_n * number / between) for number in range(1, between + 1)]
+        moved = batch.frame_us.copy()
+        moved[:, held[:-1]] = np.minimum(np.column_stack([np.zeros(len(batch), np.int64), *steps]), setting.hold_us)
+        batch.frame_us = moved
+
+    return step
+
+
+MEMBER = Effect(
+    name="frame.at_force",
+    summary="frames come at even steps of the force of initial contact",
+    stage="frame",
+    reads=("frame_us", "ramp"),
+    writes=("frame_us",),
+    timed=True,
+    parameters=Parameters,
+    prepare=prepare,
+)

@@ -1,0 +1,43 @@
+"""A converter makes counts of forces, in even steps, and ends where its range does.
+
+An amplifier turns a pad's conductance into a voltage in proportion, and so its force (Interlink's FSR integration
+guide, current-to-voltage converter): counts are linear in newtons. 12 bits are those of an MCP3208 or ADS7828; 10 N is
+the end of the range that data sheets of the FSR 402 name (0.1 to 10 N; newer ones: 0.2 to 20 N).
+"""
+
+from typing import Annotated
+
+from msgspec import Meta
+
+from ..pipeline.batch import Batch
+from ..pipeline.effect import Effect, Setting, Step
+from ..pipeline.taxels import Converter
+from ..streams import Draw
+
+
+class Parameters(Converter, frozen=True):
+    """How many bits, and at how many newtons they end."""
+
+    bits: Annotated[int, Meta(ge=1, le=15)] = 12
+    full_n: Annotated[float, Meta(gt=0.0, le=1000.0)] = 10.0
+
+
+def prepare(parameters: Parameters, setting: Setting) -> Step:
+    """Return the step that converts every reading."""
+
+    def step(batch: Batch, draw: Draw) -> None:
+        batch.taxels = parameters.codes(batch.taxels_n)
+
+    return step
+
+
+MEMBER = Effect(
+    name="taxel.adc",
+    summary="a converter of so many bits makes counts of forces",
+    stage="read",
+    place=6,
+    reads=("taxels_n",),
+    writes=("taxels",),
+    parameters=Parameters,
+    prepare=prepare,
+)

@@ -1,0 +1,57 @@
+"""A pad that is pressed reads more and more as time goes on, and does not fall back at once when it is let go.
+
+Resistance under a load that stays falls with the logarithm of time; of Interlink's FSR 400 series (data sheet
+PDS-10004-C) by less than 5 % a decade, which is published. Three relaxations (Kelvin-Voigt), a decade apart, follow
+that law from a few hundredths of a second to ten seconds; that they are three is ours. Nothing is left of the grasp
+before.
+"""
+
+from typing import Annotated
+
+import numpy as np
+from msgspec import Meta
+
+from thenar.compiler.elementary import Floats, exp
+
+from ..pipeline.batch import Batch
+from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..streams import Draw
+
+_TIMES_US = np.array([0.1e6, 1e6, 10e6])
+
+
+class Parameters(EffectParameters, frozen=True):
+    """By what share of the force a reading grows when the time since the load has grown tenfold."""
+
+    per_decade: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.05
+
+
+def prepare(parameters: Parameters, setting: Setting) -> Step:
+    """Return the step that adds to each reading what has crept since contact."""
+
+    def step(batch: Batch, draw: Draw) -> None:
+        crept: list[Floats] = []
+        states = np.zeros((len(_TIMES_US), len(batch), batch.taxels_n.shape[2]))
+        # A frame's force has been there since the frame before, at the earliest since contact.
+        before = np.zeros(len(batch))
+        for frame in range(batch.taxels_n.shape[1]):
+            at, force = np.maximum(batch.frame_us[:, frame], 0).astype(np.float64), batch.taxels_n[:, frame]
+            kept = exp(-(at - before) / _TIMES_US[:, None])
+            states = force + (states - force) * kept[:, :, None]
+            crept.append(states[0] + states[1] + states[2])
+            before = at
+        batch.taxels_n = batch.taxels_n + parameters.per_decade * np.stack(crept, axis=1)
+
+    return step
+
+
+MEMBER = Effect(
+    name="taxel.creep",
+    summary="readings creep up under a load that stays",
+    stage="sense",
+    place=6,
+    reads=("frame_us", "taxels_n"),
+    writes=("taxels_n",),
+    parameters=Parameters,
+    prepare=prepare,
+)

@@ -1,0 +1,71 @@
+import subprocess
+import sys
+from collections import deque
+from collections.abc import Sequence
+from pathlib import Path
+from threading import Event
+
+from thenar.drivers.emulated.scanner import EmulatedScanner, ScannerBoard
+from thenar.drivers.emulated.serial_line import PtyLine
+from thenar.runtime.taxels import TaxelCalibration, TaxelLine, load_taxel_calibration
+
+HANGING_S = 60.0
+REST = (40, 0, 900, 500)
+
+
+class Pressed(ScannerBoard):
+    """A board of four channels whose ANALOGs hold the codes of `script` one after the other, and then the last."""
+
+    def __init__(self) -> None:
+        super().__init__(1, 1, channels=4)
+        self.codes = REST
+        self.script: deque[Sequence[int | None]] = deque()
+        self.done = Event()
+
+    def _converted(self) -> tuple[int, ...]:
+        if self.script:
+            self.codes = self.script.popleft()
+            if not self.script:
+                self.done.set()
+        return super()._converted()
+
+
+def calibrated(folder: Path, presses: Sequence[Sequence[int]], *options: str) -> tuple[int, str]:
+    """Hold each press for ten ANALOGs when asked to; return exit code and what was said on stderr."""
+    glove, board = folder / "glove.toml", Pressed()
+    glove.write_text(
+        f'[[scanner]]\nport = "{folder}/port"\ntaxels = ["p0", "", "p1", "p2"]\n[taxels]\ncalibration = "pads.toml"\n'
+    )
+    command = [sys.executable, "-m", "thenar.cli", "calibrate", str(glove), "--taxels", "-o", str(folder / "pads.toml")]
+    with PtyLine(folder / "port", 1_000_000) as line, EmulatedScanner(line, 1, board=board):
+        pipe = subprocess.PIPE
+        with subprocess.Popen(
+            [*command, "--hold", "0.05", *options], stdin=pipe, stdout=subprocess.DEVNULL, stderr=pipe, text=True
+        ) as process:
+            assert process.stdin is not None
+            assert process.stderr is not None
+            said = ""
+            for text in process.stderr:
+                said += text
+                if text.startswith("Press every"):
+                    board.script.extend(codes for codes in (*presses, REST) for _ in range(10))
+                elif text.startswith("Enter"):
+                    assert not board.script or board.done.wait(HANGING_S)
+                    process.stdin.write("\n")
+                    process.stdin.flush()
+            return process.wait(HANGING_S), said
+
+
+def test_rest_and_press_are_learnt_and_what_was_not_pressed_is_left_out(tmp_path: Path) -> None:
+    code, said = calibrated(tmp_path, [(800, 0, 900, 503), (40, 7, 120, 500)], "--newtons", "2.5", "--subject", "anna")
+    assert code == 0, said
+    assert "Not calibrated, because their counts did not move: p2" in said
+    lines = (TaxelLine("p0", 40, 800, 2.5), TaxelLine("p1", 900, 120, 2.5))
+    assert load_taxel_calibration(tmp_path / "pads.toml") == TaxelCalibration(subject="anna", unit="N", taxels=lines)
+
+
+def test_where_nothing_moves_nothing_is_written(tmp_path: Path) -> None:
+    code, said = calibrated(tmp_path, [REST])
+    assert code == 2
+    assert "no taxel moved" in said
+    assert not (tmp_path / "pads.toml").exists()

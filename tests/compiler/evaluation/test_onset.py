@@ -1,0 +1,74 @@
+"""Recognition at initial contact, by the force on the taxel that is pressed hardest."""
+
+import numpy as np
+import pytest
+
+from thenar.compiler.evaluation.folds import EvaluationError
+from thenar.compiler.evaluation.onset import onset
+from thenar.compiler.recordings.graspset import GraspSet, Joint
+from thenar.compiler.recordings.taxonomy import own
+from thenar.runtime.manifest import Options
+
+NEWTONS = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
+FAST = Options(trainer="logitboost", rounds=10)
+
+
+def pressed(trials: int = 24, joints: int = 0, unit: str = "N") -> GraspSet:
+    """Return trials of two types on two taxels, frames of 0 to 1.2 N: from 0.4 N on, each type presses its own."""
+    random = np.random.default_rng(3)
+    force = np.tile(np.linspace(0.0, 1.2, 7), trials)
+    kind = np.repeat(np.arange(trials) % 2, 7)
+    # Below, which is pressed is by chance.
+    which = np.where(force < 0.3, np.repeat(random.integers(0, 2, trials), 7), kind)
+    codes = np.zeros((len(force), 2))
+    codes[np.arange(len(force)), which] = np.rint(force * 1000)
+    return GraspSet(
+        switches=np.zeros((len(force), 0), bool),
+        switch_names=(),
+        codes=np.repeat(random.integers(0, 9, (trials, joints)), 7, axis=0).astype(np.uint16),
+        joints=tuple(Joint(f"j{n}", "deg", 0, 0.0, 100, 90.0) for n in range(joints)),
+        grasps=np.array(["hook", "pinch"])[kind],
+        taxonomy=own(["hook", "pinch"]),
+        subjects=np.full(len(force), "A"),
+        objects=np.full(len(force), "pen"),
+        trials=np.repeat(np.arange(trials), 7),
+        taxels=codes.astype(np.uint16),
+        taxel_columns=tuple(Joint(f"pad{n}", unit, 0, 0.0, 1000, 1.0) for n in range(2)),
+    )
+
+
+def test_levels_and_codes_tell_what_switches_do_not_before_their_force() -> None:
+    found = onset(pressed(), NEWTONS, jobs=1, options=FAST)
+    curves = {curve.title: [rate.mean for rate in curve.rates if rate is not None] for curve in found.curves}
+    assert list(curves) == ["switches", "levels", "codes"]
+    assert curves["levels"][1:] == curves["codes"][1:] == [1.0] * 5
+    assert max(curves["switches"][:5]) < 0.8
+    assert curves["switches"][5] == 1.0
+    assert curves["levels"][0] < 0.8
+
+
+def test_every_trial_counts_once_and_rates_have_wilsons_interval() -> None:
+    found = onset(pressed(24), NEWTONS, jobs=1, options=FAST)
+    for curve in found.curves:
+        for rate in curve.rates:
+            assert rate is not None
+            assert (rate.total, rate.over, rate.unit) == (24, 24, "trials")
+            assert rate.low < 1.0
+    assert found.curves[1].rates[1].low == pytest.approx(24 / (24 + 1.959964**2), abs=1e-4)  # type: ignore[union-attr]
+
+
+def test_joints_are_read_alone_and_with_each() -> None:
+    titles = [curve.title for curve in onset(pressed(joints=1), NEWTONS, jobs=1, options=FAST).curves]
+    assert titles[3:] == ["joints", "switches and joints", "levels and joints", "codes and joints"]
+
+
+def test_a_force_that_no_trial_reads_has_no_rate_and_none_at_all_is_refused() -> None:
+    found = onset(pressed(), (1.0, 1.2, 1.4), jobs=1, options=FAST)
+    assert [rate is None for rate in found.curves[0].rates] == [False, False, True]
+    with pytest.raises(EvaluationError, match="no trial has a frame"):
+        onset(pressed(), (5.0, 6.0), jobs=1, options=FAST)
+
+
+def test_taxels_in_counts_are_no_forces() -> None:
+    with pytest.raises(EvaluationError, match="calibrate them to N"):
+        onset(pressed(unit="counts"), NEWTONS, jobs=1, options=FAST)

@@ -1,0 +1,144 @@
+"""Limits: every method obeys them, contradictions are refused, and the bound on the best subset holds under them."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+
+from thenar.compiler.placement.constraints import Bound, Limits
+from thenar.compiler.placement.elements import Element, Elements
+from thenar.compiler.placement.inputs import PlacementError
+from thenar.compiler.placement.methods.base import METHODS
+from thenar.compiler.placement.optimum import Pairs, best_subset
+from thenar.compiler.placement.placement import choose
+from thenar.compiler.placement.ports import PortCosts
+from thenar.compiler.samples import Samples
+
+# Three switches, then two taxels of three and two levels.
+NAMES = ("a", "b", "c", "p", "q")
+ELEMENTS: Elements = (*map(Element, range(3)), *(Element(3, code) for code in (1, 2, 3)), Element(4, 1), Element(4, 2))
+PORTS = PortCosts((0, 0, 1, 2, 2, 2, 3, 3), (10.0, 5.5, 7.0, 7.0))
+PLACES = {"a": (0.0, 0.0), "b": (6.0, 0.0), "c": (0.0, 9.0), "p": (5.0, 5.0), "q": (30.0, 0.0)}
+
+
+def samples_of(seed: int, n: int = 40) -> Samples:
+    random = np.random.default_rng(seed)
+    raw = np.hstack([random.integers(0, 2, (n, 3)), random.integers(0, 5, (n, 2))])
+    bits = np.stack([raw[:, element.column] > element.code for element in ELEMENTS], axis=1)
+    labels = (raw.sum(axis=1) + random.integers(0, 2, n)) % 3
+    return Samples(bits, np.zeros((n, 0), np.uint16), labels, ("x", "y", "z"))
+
+
+def obeys(limits: Limits, kept: tuple[int, ...]) -> bool:
+    """Return whether these elements obey, by the words of the limits."""
+    names = [NAMES[ELEMENTS[one].column] for one in kept]
+    taxels = {name for name in names if name in ("p", "q")}
+    apart = all(
+        one == other or np.hypot(*np.subtract(PLACES[one], PLACES[other])) >= limits.apart_mm
+        for one, other in combinations(names, 2)
+    )
+    us = sum(PORTS.us[port] for port in {PORTS.port_of[one] for one in kept})
+    return (
+        set(limits.keep) <= set(names)
+        and set(limits.never).isdisjoint(names)
+        and apart
+        and (limits.taxels is None or len(taxels) <= limits.taxels)
+        and (limits.budget_us is None or us <= limits.budget_us)
+    )
+
+
+@st.composite
+def bound_limits(draw: st.DrawFn) -> tuple[Limits, Bound]:
+    some = st.lists(st.sampled_from(NAMES), max_size=2, unique=True).map(tuple)
+    try:
+        limits = Limits(
+            names=NAMES,
+            n_switches=3,
+            keep=draw(some),
+            never=draw(some),
+            apart_mm=draw(st.sampled_from([0.0, 6.0, 6.5, 9.5])),
+            taxels=draw(st.sampled_from([None, 0, 1])),
+            budget_us=draw(st.sampled_from([None, 6.0, 15.5, 22.5])),
+            places=PLACES,
+        )
+        return limits, limits.on(ELEMENTS, PORTS)
+    except PlacementError:
+        assume(False)
+        raise
+
+
+@settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.filter_too_much])
+@given(found=bound_limits(), seed=st.integers(0, 2**32 - 1), m=st.integers(1, 5))
+def test_the_bound_and_the_best_subset_hold_against_all_subsets(found: tuple[Limits, Bound], seed: int, m: int) -> None:
+    limits, bound = found
+    assume(len(limits.keep) <= m)
+    samples = samples_of(seed)
+    pairs = Pairs(samples)
+    allowed = [s for size in range(m + 1) for s in combinations(range(len(ELEMENTS)), size) if obeys(limits, s)]
+    least = min(pairs.alike(subset) for subset in allowed)
+    best = best_subset(samples, m, limits=bound)
+    assert best.least <= least <= best.alike == pairs.alike(best.columns)
+    assert not best.proved or best.alike == least
+    # What tells no pairs apart may be left out of the best, but for what must be kept and varies.
+    assert obeys(limits, tuple(dict.fromkeys((*best.columns, *bound.required(best.columns)))))
+
+
+@settings(deadline=None, max_examples=15, suppress_health_check=[HealthCheck.filter_too_much])
+@given(found=bound_limits(), seed=st.integers(0, 2**32 - 1), m=st.integers(2, 5))
+def test_every_method_obeys(found: tuple[Limits, Bound], seed: int, m: int) -> None:
+    limits, bound = found
+    samples = samples_of(seed)
+    for name in (
+        "id3",
+        "id3-cost",
+        "id3-ccp",
+        "id3-rep",
+        "elimination-cost",
+        "cmim",
+        "mrmr",
+        "mutual-information",
+        "random",
+    ):
+        by_number = METHODS[name].by_number
+        chosen = choose(samples, name, m if by_number else 4, PORTS, bound)
+        assert obeys(limits, chosen.columns), name
+        assert len(chosen.columns) == len(set(chosen.columns)) == len(chosen.gains)
+        assert not by_number or len(chosen.columns) <= m
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name, method in METHODS.items() if method.installed])
+def test_a_limit_that_forbids_nothing_changes_nothing_and_one_that_does_is_obeyed(name: str) -> None:
+    samples, parameter = samples_of(5, 120), 3 if METHODS[name].by_number else 10
+    free = Limits(names=NAMES, n_switches=3, taxels=9).on(ELEMENTS, PORTS)
+    plain = choose(samples, name, parameter, PORTS)
+    assert choose(samples, name, parameter, PORTS, free) == plain
+    limits = Limits(names=NAMES, n_switches=3, never=(NAMES[ELEMENTS[plain.columns[0]].column],), taxels=1)
+    assert obeys(limits, choose(samples, name, parameter, PORTS, limits.on(ELEMENTS, PORTS)).columns)
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        ({"keep": ("a",), "never": ("b", "a")}, "--keep-these and --never both name a"),
+        ({"keep": ("a", "b"), "apart_mm": 6.5}, "--keep-these a,b are 6.0 mm apart, --apart-mm asks for 6.5"),
+        ({"keep": ("p", "q"), "taxels": 1}, "--keep-these names more taxels than --at-most 1 taxels"),
+        ({"keep": ("a", "c"), "budget_us": 12.0}, "--keep-these takes 15.5 us to read, --budget-us allows 12"),
+        ({"budget_us": 5.0}, "--never and --budget-us leave nothing"),
+        ({"never": ("pp",)}, "no switch or taxel 'pp'"),
+        ({"apart_mm": 1.0, "places": {"a": (0.0, 0.0)}}, "--apart-mm: where b, c, p, q lie is not known"),
+    ],
+)
+def test_contradictions_are_refused_by_both_names(asked: dict[str, object], message: str) -> None:
+    with pytest.raises(PlacementError, match=message):
+        Limits(names=NAMES, n_switches=3, **{"places": PLACES, **asked}).on(ELEMENTS, PORTS)  # type: ignore[arg-type]
+
+
+def test_more_to_keep_than_there_is_room_for_and_a_budget_without_costs_are_refused() -> None:
+    limits = Limits(names=NAMES, n_switches=3, keep=("a", "b", "q"), budget_us=99.0)
+    with pytest.raises(PlacementError, match="--keep-these names 3, --keep allows 2"):
+        choose(samples_of(1), "cmim", 2, PORTS, limits.on(ELEMENTS, PORTS))
+    with pytest.raises(PlacementError, match="--budget-us needs to know what reading"):
+        limits.on(ELEMENTS, None)

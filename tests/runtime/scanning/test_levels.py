@@ -1,0 +1,257 @@
+"""Levels of taxels in scan maps: one conversion each, checked with the wiring, in the order that decides earliest."""
+
+from collections.abc import Callable, Sequence
+from itertools import permutations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from thenar.runtime.errors import HarnessError
+from thenar.runtime.harness.loading import parse_harness
+from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness, ScannerWiring, SpiWiring
+from thenar.runtime.harness.writing import harness_to_toml
+from thenar.runtime.manifest import Calibration, Switch, Threshold
+from thenar.runtime.scanning.decided import EarlyExit
+from thenar.runtime.scanning.plan import Costs, check_harness, plan_scan
+from thenar.runtime.scanning.ports import whole_scan, wired_names
+from thenar.runtime.scanning.propose import propose_board, propose_harness
+from thenar.runtime.scanning.scanmap import Port, check_switches, scanmap_from_bytes, scanmap_to_bytes
+from thenar.runtime.scanning.timing import overlapped_us, port_us, reading_of, scan_us
+from thenar.runtime.scores import Scorer
+from thenar.runtime.tables import IntegerTables
+
+MakeTables = Callable[..., IntegerTables]
+START, READ, WAIT = 38 / 0.4 + 1.3, 48 / 0.4 + 1.3, 1317.0  # of an ADS1115 at 400 kHz
+
+
+def ads1115(number: int, *taxels: str) -> ChipWiring:
+    pins = {f"AIN{channel}": taxel for channel, taxel in enumerate(taxels)}
+    return ChipWiring(kind="ads1115", address=0x48 + number, pins=pins)
+
+
+def glove(*chips: ChipWiring, spi: tuple[SpiWiring, ...] = (), scanners: tuple[ScannerWiring, ...] = ()) -> Harness:
+    bus = BusWiring(device="/dev/i2c-1", clock_hz=400_000, chips=chips)
+    return Harness(name="x", scanners=scanners, buses=(bus,), spi=spi)
+
+
+MIXED = glove(
+    ChipWiring(kind="mcp23017", address=0x20, pins={"GPA0": "s0", "GPB3": "s>1"}),
+    ads1115(0, "t0", "t1", "t2"),
+    ChipWiring(kind="ads7828", address=0x4B, pins={"CH6": "t3"}),
+    spi=(SpiWiring(device="/dev/spidev0.0", kind="mcp3208", pins={"CH0": "t4", "CH5": "t5"}),),
+    scanners=(ScannerWiring(port="p", switches=("s2",), taxels=("", "t6")),),
+)
+names = st.one_of(
+    st.sampled_from(["s0", "s>1", "s2"]),
+    st.builds("t{}>{}".format, st.integers(0, 6), st.integers(0, 4095)),
+)
+
+
+@settings(deadline=None)
+@given(kept=st.lists(names, unique=True, max_size=25))
+def test_all_levels_of_a_taxel_are_one_conversion_and_every_kept_name_is_read_once(
+    make_tables: MakeTables, kept: list[str]
+) -> None:
+    scan = plan_scan(kept, make_tables(switches=len(kept), joints=1), MIXED)
+    check_switches(scan, len(kept))
+    check_harness(scan, MIXED, kept)
+    assert scanmap_from_bytes(scanmap_to_bytes(scan)) == scan
+    taxels = {name.split(">")[0] for name in kept if name[0] == "t"}
+    measured = [port for port in scan.ports if port.levels]
+    assert len(measured) == len(taxels - {"t6"})
+    for port in measured:
+        chip = MIXED.chip_of(port.bus, port.chip)
+        taxel = chip.numbered_pins[chip.chip.pins.index(port.reading)]
+        assert {kept[number]: code for code, number in port.levels} == {
+            name: int(name.split(">")[1]) for name in kept if name.startswith(f"{taxel}>")
+        }
+    boards = scan.taxels[0] if scan.taxels else ()
+    assert [(kept[number], channel) for channel, _, number in boards] == sorted(
+        ((name, 1) for name in kept if name.startswith("t6>")), key=lambda pair: int(pair[0][3:])
+    )
+    assert bool(scan.taxels) == ("t6" in taxels)
+
+
+def test_a_map_without_levels_has_the_bytes_that_it_always_had() -> None:
+    data = scanmap_to_bytes(whole_scan(MIXED, ["s0", "s>1", "s2"]))
+    assert b"levels" not in data
+    assert b"taxels" not in data
+
+
+def test_with_every_taxel_those_without_levels_are_converted_too() -> None:
+    scan = whole_scan(MIXED, ["s0", "t1>5"], every_taxel=True)
+    assert [(port.reading, port.levels) for port in scan.ports if not port.switches] == [
+        *(("AIN0", ()), ("AIN1", ((5, 1),)), ("AIN2", ()), ("CH6", ()), ("CH0", ()), ("CH5", ())),
+    ]
+
+
+def test_a_name_that_looks_like_a_level_and_is_a_switch_of_the_wiring_is_one() -> None:
+    harness = glove(ChipWiring(kind="mcp23017", address=0x20, pins={"GPA0": "t0>7"}), ads1115(0, "t0"))
+    scan = whole_scan(harness, ["t0>7", "t0>8"])
+    assert [(port.switches, port.levels) for port in scan.ports] == [(((0, 0),), ()), ((), ((8, 1),))]
+
+
+def test_a_level_of_an_older_build_is_found_on_a_converter_and_on_a_comparators_pin() -> None:
+    threshold = Threshold(83, 0.41, Calibration(0, "t0", "N", 0, 0.0, 100, 1.0))
+    old = [Switch(0, "t0", 0.1, threshold), Switch(1, "s0", 0.1)]
+    assert wired_names(glove(ads1115(0, "t0")), old) == ["t0>83", "s0"]
+    assert wired_names(glove(ChipWiring(kind="mcp23017", address=0x20, pins={"GPA0": "t0"})), old) == ["t0", "s0"]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"levels": ((8, 0),)},
+        {"levels": ((7, 1),)},
+        {"levels": ((7, 0), (9, 1))},
+        {"reading": "AIN1"},
+        {"reading": "A"},
+        {"bus": 1},
+        {"chip": 1},
+        {"closed_high": False},
+    ],
+)
+def test_a_conversion_that_the_wiring_does_not_have_is_refused(
+    make_tables: MakeTables, change: dict[str, object]
+) -> None:
+    harness = glove(ads1115(0, "t0", "t1"))
+    scan = plan_scan(["t0>7"], make_tables(switches=1), harness)
+    with pytest.raises(HarnessError, match="reads other pins or keys than harness 'x'"):
+        check_harness(replace(scan, ports=(replace(scan.ports[0], **change),)), harness, ["t0>7"])
+
+
+def test_taxels_that_are_wired_to_nothing_are_named(make_tables: MakeTables) -> None:
+    with pytest.raises(HarnessError, match="'x' has no pin or key for t9>7, t1, which the build keeps"):
+        plan_scan(["t0>7", "t9>7", "t1"], make_tables(switches=3), glove(ads1115(0, "t0")))
+
+
+def test_what_hangs_where_is_in_the_fingerprint_and_an_old_wirings_is_as_it_was() -> None:
+    (chip, *_), bus = MIXED.buses[0].chips, MIXED.buses[0]
+    plain = Harness(
+        name="x", scanners=(ScannerWiring(port="p", switches=("s2",)),), buses=(replace(bus, chips=(chip,)),)
+    )
+    assert plain.fingerprint.startswith("c4d6577dcb549f708877628c79b7de99")
+    others = [
+        MIXED,
+        replace(MIXED, spi=()),
+        replace(MIXED, spi=(replace(MIXED.spi[0], kind="mcp3008"),)),
+        replace(MIXED, spi=(replace(MIXED.spi[0], pins={"CH1": "t4", "CH5": "t5"}),)),
+        replace(MIXED, scanners=(replace(MIXED.scanners[0], taxels=("t6",)),)),
+    ]
+    assert len({other.fingerprint for other in others}) == len(others)
+    moved = replace(MIXED, spi=(replace(MIXED.spi[0], device="/dev/spidev1.1", hz=500_000),))
+    assert moved.fingerprint == MIXED.fingerprint
+
+
+# Times.
+
+
+def test_one_converter_alone_waits_for_each_conversion() -> None:
+    harness = glove(ads1115(0, "t0", "t1", "t2"))
+    time = scan_us(whole_scan(harness, ["t0>1", "t1>1", "t2>1"]), harness)
+    assert time.us == pytest.approx(3 * (START + WAIT + READ))
+    assert time.chips[0].us == pytest.approx(time.us)
+
+
+def test_several_convert_at_the_same_time_and_expanders_are_read_meanwhile() -> None:
+    harness = glove(
+        *(ads1115(number, f"a{number}", f"b{number}") for number in range(4)),
+        ChipWiring(kind="mcp23017", address=0x20, pins={"GPA0": "s0"}),
+        ChipWiring(kind="mcp23008", address=0x21, pins={"GP0": "s1"}),
+    )
+    kept = [*(f"{taxel}{number}>1" for number in range(4) for taxel in "ab"), "s0", "s1"]
+    time = scan_us(whole_scan(harness, kept), harness)
+    alone = 2 * (START + WAIT + READ)
+    # The first two conversions of the others begin one after the other; the expanders are read while all convert.
+    assert time.us == pytest.approx(alone + 3 * (READ + START), abs=START + READ)
+    assert time.us < 0.3 * sum(chip.us for chip in time.chips)
+
+
+@settings(deadline=None, max_examples=40)
+@given(data=st.data())
+def test_no_order_takes_less_than_what_the_plan_counts(data: st.DataObject) -> None:
+    """The plan's sum is the busier of wire and slowest chip; what the driver does takes a transfer or two longer."""
+    taxels = [data.draw(st.integers(0, 4)) for _ in range(3)]
+    switches = data.draw(st.integers(0, 4))
+    harness = glove(
+        *(ads1115(number, *(f"t{number}{n}" for n in range(count))) for number, count in enumerate(taxels) if count),
+        *(ChipWiring(kind="pca9555", address=0x20 + n, pins={"P00": f"s{n}"}) for n in range(switches)),
+    )
+    scan = whole_scan(harness, [*harness.switches, *(f"{name}>5" for name in harness.taxel_names)])
+    ports = data.draw(st.permutations(scan.ports))
+    if not ports:
+        return
+    costs, read, counted = Costs(ports, harness), 0, 0
+    for port in data.draw(st.permutations(range(len(ports)))):
+        counted += costs.after(read, port)
+        read |= 1 << port
+    taken = overlapped_us(ports, harness)
+    assert counted / 1000 <= taken + 0.01
+    # In the worst case the last conversion of each chip is waited for after the others'.
+    assert taken <= counted / 1000 + sum(map(bool, taxels)) * (WAIT + START + READ)
+
+
+def expected_us(ports: Sequence[Port], harness: Harness, tables: IntegerTables, bits: np.ndarray) -> float:
+    """The mean wire time until the runtime's own early exit stops a scan of `ports`."""
+    early = EarlyExit(Scorer(tables), [sum(1 << number for number in port.elements) for port in ports])
+    total = 0.0
+    for row in bits:
+        closed = sum(1 << number for number in np.flatnonzero(row).tolist())
+        early.start([], closed, lost=0)
+        for place, port in enumerate(ports):
+            total += port_us(reading_of(port, harness), harness.line_of(port.bus).clock_hz)
+            if early.after(place, closed):
+                break
+    return total / len(bits)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_levels_come_in_the_order_that_decides_earliest(seed: int) -> None:
+    """Three taxels of several levels and an expander; no other order is faster on the frames, which are monotone."""
+    harness = glove(
+        ChipWiring(kind="ads7828", address=0x48, pins={"CH0": "t0", "CH1": "t1", "CH5": "t2"}),
+        ChipWiring(kind="mcp23008", address=0x20, pins={"GP0": "s0", "GP1": "s1"}),
+        spi=(SpiWiring(device="/dev/spidev0.0", kind="mcp3208", pins={"CH0": "t3"}),),
+    )
+    random = np.random.default_rng(seed)
+    kept = ["t0>100", "s0", "t1>900", "t0>2000", "t3>5", "t1>50", "t2>300", "s1", "t0>700"]
+    codes = random.integers(0, 4096, (80, 4)) * (random.random((80, 4)) < 0.6)
+    bits = np.array(
+        [
+            [row[int(name[1])] > int(name[3:]) if name[0] == "t" else random.random() < 0.4 for name in kept]
+            for row in codes
+        ]
+    )
+    rows = (random.normal(0, 60, (9, 4)) * np.exp(random.normal(0, 1.5, (9, 1)))).astype(np.int16)
+    none = np.zeros((0, 4), np.int16)
+    tables = IntegerTables(np.zeros(4, np.int16), rows, (), (), (rows * 0.4).astype(np.int16), none, 1.0)
+    scan = plan_scan(kept, tables, harness, bits)
+    times = {some: expected_us(some, harness, tables, bits) for some in permutations(scan.ports)}
+    assert len(times) == 120
+    assert times[scan.ports] == pytest.approx(min(times.values()), rel=1e-12)
+    assert max(times.values()) > 1.02 * min(times.values())
+
+
+# Proposals.
+
+
+@pytest.mark.parametrize("count", [1, 8, 9, 40, 160])
+def test_a_new_glove_has_its_taxels_on_converters(count: int) -> None:
+    kept = ["s0", *(f"t{number}>{code}" for number in range(count) for code in (5, 70))]
+    harness = propose_harness(kept)
+    assert harness.switches == ("s0",)
+    assert harness.taxel_names == tuple(f"t{number}" for number in range(count))
+    assert sorted(whole_scan(harness, kept).switches) == list(range(2 * count + 1))
+    assert parse_harness(harness_to_toml(harness), "glove.toml") == harness
+    if count <= 128:
+        board = propose_board(kept)
+        assert (board.scanners[0].switches, board.scanners[0].taxels) == (("s0",), harness.taxel_names)
+        assert (board.scanners[0].mux is None) == (count <= 8)
+
+
+def test_no_board_has_so_many_channels() -> None:
+    with pytest.raises(HarnessError, match="129 taxels, one board has 128 channels: share them between boards by hand"):
+        propose_board([f"t{number}>5" for number in range(129)])

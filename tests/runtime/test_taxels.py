@@ -1,0 +1,214 @@
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thenar.drivers.errors import SettingError
+from thenar.runtime.calibration import code_of_value
+from thenar.runtime.manifest import Calibration, Switch, Threshold
+from thenar.runtime.scanning.scanmap import Port, ScanMap
+from thenar.runtime.taxels import (
+    TaxelCalibration,
+    TaxelLine,
+    Taxels,
+    TaxelSettings,
+    count_limit,
+    in_counts,
+    learnt_lines,
+    load_taxel_calibration,
+)
+
+COUNTS = Calibration(0, "pad", "counts", 0, 0.0, 1, 1.0)
+NEWTONS = Calibration(0, "pad", "N", 10, 0.0, 210, 2.0)
+RISING, FALLING = TaxelLine("pad", 100, 900), TaxelLine("pad", 900, 100)
+SECOND, MINUTE = 1_000_000, 60_000_000
+HARD = TaxelSettings(per_minute=0.1)
+
+counts = st.integers(0, 65535)
+
+
+def lines(name: str = "pad") -> st.SearchStrategy[TaxelLine]:
+    ends = st.tuples(counts, counts).filter(lambda both: both[0] != both[1])
+    return st.builds(
+        lambda both, value: TaxelLine(name, both[0], both[1], value), ends, st.floats(0.01, 100, allow_nan=False)
+    )
+
+
+def taxels(line: TaxelLine | None, *limits: int, settings: TaxelSettings | None = None) -> Taxels:
+    calibration = None if line is None else TaxelCalibration(taxels=(line,))
+    levels = [(limit, number) for number, limit in enumerate(limits)]
+    return Taxels(["pad"], [levels], calibration, settings, highest=1023)
+
+
+def closes(limit: int, raw: int) -> bool:
+    return taxels(None, limit).read(0, [raw])[0] == 1
+
+
+@given(
+    line=lines(),
+    points=st.tuples(counts, counts).filter(lambda both: both[0] != both[1]),
+    value=st.floats(-50, 50).filter(lambda number: abs(number) > 0.01),
+    code=counts,
+    tried=st.lists(counts, max_size=20),
+)
+def test_a_level_is_decided_as_the_build_codes_values(
+    line: TaxelLine, points: tuple[int, int], value: float, code: int, tried: list[int]
+) -> None:
+    coded = Calibration(0, "pad", "N", points[0], 0.0, points[1], value)
+    limit = count_limit(Threshold(code, 0.0, coded), TaxelCalibration(unit="N", taxels=(line,)))
+    edge = limit if limit >= 0 else ~limit
+    for raw in {*tried, *(near for near in (edge - 1, edge, edge + 1, 0, 65535) if 0 <= near < 65536)}:
+        assert closes(limit, raw) == (code_of_value(coded, line.at(raw)) > code)
+
+
+@given(counts, counts)
+def test_without_a_calibration_counts_are_codes(code: int, raw: int) -> None:
+    assert closes(count_limit(Threshold(code, 0.0, COUNTS), None), raw) == (raw > code)
+
+
+def test_codes_that_are_no_counts_need_a_calibration() -> None:
+    threshold = Threshold(100, 0.9, NEWTONS)
+    with pytest.raises(SettingError, match=r"coded in 'N', not in counts.*thenar calibrate --taxels"):
+        count_limit(threshold, None)
+    with pytest.raises(SettingError, match="calibration lacks it"):
+        count_limit(threshold, TaxelCalibration(unit="N", taxels=(TaxelLine("other", 1, 2),)))
+    with pytest.raises(SettingError, match="calibrated in 'press', 'pad' of the build is in 'N'"):
+        count_limit(threshold, TaxelCalibration(taxels=(RISING,)))
+
+
+@given(
+    line=lines().filter(lambda line: abs(line.press - line.rest) > 100),
+    readings=st.lists(st.tuples(st.integers(0, 500_000), counts), max_size=200),
+)
+def test_a_baseline_is_slow_and_bounded(line: TaxelLine, readings: list[tuple[int, int]]) -> None:
+    pad, time_us, before = taxels(line), 0, 0
+    span, settings = abs(line.press - line.rest), TaxelSettings()
+    for passed_us, raw in readings:
+        time_us += passed_us
+        pad.read(time_us, [raw])
+        moved = abs(pad.drifts[0] - before)
+        assert moved <= span * settings.per_minute * min(passed_us, 100_000) / MINUTE + 1
+        assert abs(pad.drifts[0]) <= span * settings.drift + 1
+        before = pad.drifts[0]
+
+
+@pytest.mark.parametrize("line", [RISING, FALLING])
+def test_a_baseline_follows_a_pad_at_rest_and_levels_move_with_it(line: TaxelLine) -> None:
+    towards_press = 1 if line is RISING else -1
+    pad = taxels(line, 140 if line is RISING else ~860, settings=HARD)
+    at_rest = line.rest + 50 * towards_press
+    assert pad.read(0, [at_rest]) == (1, 0)
+    for tenth in range(1, 601):
+        pad.read(tenth * SECOND // 10, [at_rest])
+    assert pad.drifts == [50 * towards_press]
+    assert pad.read(MINUTE, [at_rest]) == (0, 0)
+    assert pad.read(MINUTE, [at_rest + 41 * towards_press]) == (1, 0)
+
+
+@given(st.lists(st.integers(190, 900), min_size=1, max_size=300))
+def test_a_baseline_never_moves_while_pressed_nor_shortly_after(pressed: list[int]) -> None:
+    pad = taxels(RISING, settings=HARD)
+    for place, raw in enumerate(pressed):
+        pad.read(place * SECOND, [raw])
+    for tenth in range(10):
+        pad.read((len(pressed) - 1) * SECOND + tenth * SECOND // 10, [60])
+    assert pad.drifts == [0]
+
+
+def test_what_is_not_watched_does_not_move() -> None:
+    pad = taxels(RISING, settings=HARD)
+    for hour in range(4):
+        pad.read(hour * 60 * MINUTE, [50])
+    assert pad.drifts == [0]  # a tenth of a second each, of 80 counts a minute
+
+
+def test_following_can_be_switched_off() -> None:
+    pad = taxels(RISING, settings=TaxelSettings(baseline=False, per_minute=10.0))
+    for tenth in range(3000):
+        pad.read(tenth * SECOND // 10, [50])
+    assert pad.drifts == [0]
+
+
+@pytest.mark.parametrize(
+    ("rest", "press", "raw", "found"),
+    [
+        (400, 900, 0, "open wire"),
+        (400, 900, 1, "open wire"),
+        (400, 900, 2, ""),
+        (400, 900, 1022, "saturated"),
+        (400, 900, 1021, ""),
+        (600, 100, 1023, "open wire"),
+        (600, 100, 0, "saturated"),
+        (5, 900, 0, ""),  # a pad that rests at the converter's end cannot be told from an open wire
+        (400, 1015, 1023, ""),  # nor can one be saturated that reached the end when it was calibrated
+    ],
+)
+def test_ends_of_the_converter(rest: int, press: int, raw: int, found: str) -> None:
+    pad = taxels(TaxelLine("pad", rest, press), 500)
+    closed, lost = pad.read(0, [raw])
+    assert (pad.faults, lost) == ([found], 1 if found else 0)
+    assert not closed & lost
+
+
+def test_what_could_not_be_read_is_lost_and_the_rest_is_not() -> None:
+    both = Taxels(["one", "two"], [[(10, 0), (20, 2)], [(10, 1)]])
+    assert both.owned == 0b111
+    assert both.read(0, [None, 11]) == (0b010, 0b101)
+    assert both.faults == ["silent", ""]
+    assert both.read(1, [15, None]) == (0b001, 0b010)
+
+
+def test_a_calibration_is_read_as_it_was_written(tmp_path: Path) -> None:
+    written = TaxelCalibration(subject="anna", unit="N", taxels=(TaxelLine("a", 3, 800, 2.5), TaxelLine("b", 900, 80)))
+    file = tmp_path / "anna.toml"
+    file.write_text(written.to_toml())
+    assert load_taxel_calibration(file) == written
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("taxel = [{name = 'a', rest = 5, press = 5}]", "rest and press are both 5"),
+        ("taxel = [{name = 'a', rest = 5, press = 9, value = 0.0}]", "a number above 0"),
+        ("taxel = [{name = 'a', rest = 5, press = 9, value = nan}]", "a number above 0"),
+        ("taxel = [{name = 'a', rest = 5, press = 9}, {name = 'a', rest = 1, press = 2}]", "calibrated twice: a"),
+        ("taxel = [{name = 'a', rest = 5, press = 70000}]", "press"),
+        ("taxel = [{name = '', rest = 5, press = 7}]", "name"),
+    ],
+)
+def test_a_wrong_calibration_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    file = tmp_path / "wrong.toml"
+    file.write_text(text)
+    with pytest.raises(SettingError, match=said):
+        load_taxel_calibration(file)
+
+
+@given(
+    rest=st.integers(0, 1000),
+    noise=st.integers(0, 5),
+    press=st.integers(0, 1000),
+    glitches=st.lists(st.integers(0, 1023), max_size=2),
+)
+def test_rest_and_press_are_learnt_though_there_are_glitches(
+    rest: int, noise: int, press: int, glitches: list[int]
+) -> None:
+    rested = [(rest - noise,), (rest,), (rest,), (rest + noise,), (rest,), (None,)]
+    pressed = [(code,) for code in (*[rest] * 9, *glitches, *[rest] * 9, *[press] * 9, *[rest] * 9)]
+    moved = abs(press - rest) >= max(10, 6 * noise)
+    assert learnt_lines(["pad"], rested, pressed, 2.0) == ((TaxelLine("pad", rest, press, 2.0),) if moved else ())
+
+
+def test_a_taxel_that_was_never_read_is_not_learnt() -> None:
+    assert learnt_lines(["a", "b"], [(None, 5)], [(None, 500)] * 9, 1.0) == (TaxelLine("b", 5, 500),)
+
+
+def test_a_scan_map_is_turned_into_counts() -> None:
+    switches = [Switch(0, "s", 0.0), Switch(1, "pad>60", 0.0, Threshold(60, 0.5, NEWTONS))]
+    port = Port(0, 0, "CH3", (), True, ((60, 1),))
+    scan = ScanMap(1, "0" * 64, (port, Port(0, 1, "A", ((0, 0),), False)), ((),), (((3, 60, 1),),))
+    counted = in_counts(scan, switches, TaxelCalibration(unit="N", taxels=(TaxelLine("pad", 100, 900, 2.0),)))
+    # Above 0.5 N by half a code of 0.01 N, of 400 counts a newton.
+    assert counted.ports[0].levels == ((302, 1),)
+    assert counted.taxels == (((3, 302, 1),),)
+    assert counted.ports[1] == scan.ports[1]
