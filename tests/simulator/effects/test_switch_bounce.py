@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.simulator.effects.switch_bounce import Parameters, prepare
-from thenar.simulator.pipeline.batch import NEVER, Batch
+from thenar.simulator.pipeline.batch import Batch
+from thenar.simulator.pipeline.ramp import NEVER
 
 ON_US, OFF_US = 20_000, 100_000
 
