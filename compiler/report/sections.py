@@ -93,7 +93,7 @@ def kept_table(content: ReportContent) -> PlainTable:
             rows[-1] += (switch.closed,)
     columns = ("Order", "Switch", "Part", "Column", "Bits", *(() if tree is None else ("Together",)))
     columns += ("Taxel",) * taxels
-    caption = "Kept switches, in the order in which they were chosen"
+    caption = f"Kept {'switches and levels' if taxels else 'switches'}, in the order in which they were chosen"
     return PlainTable(caption, columns, tuple(rows), words=(1, 2, *((len(columns) - 1,) * taxels)), head=1)
 
 
