@@ -74,7 +74,8 @@ class Ours:
 
 
 BINS = ("max_bins", 8)
-FEW, LINE = (("max_bins", 5),), (("linear", 1), ("penalty", 0.3))
+# The pull of a line is that of scikit-learn's logistic regression with C = 1, which the peers take.
+FEW, LINE = (("max_bins", 5),), (("linear", 1), ("penalty", 0.5))
 OURS = (
     Ours("logitboost", 16, (("rounds", 100), BINS)),
     Ours("logitboost", 8, (("rounds", 100), BINS)),
@@ -82,6 +83,8 @@ OURS = (
     Ours("logit", 8, (BINS,)),
     Ours("logit", 8, FEW, width=9),
     Ours("logit", 8, FEW, width=8),
+    Ours("logit", 8, (("max_bins", 4),), width=8),
+    Ours("logit", 8, (("max_bins", 3),), width=8),
     Ours("logit", 8, LINE),
     Ours("logitboost", 8, (("rounds", 100), BINS), joints=False),
     Ours("logit", 8, (BINS,), joints=False),

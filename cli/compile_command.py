@@ -73,16 +73,26 @@ _GROUPS = {
 def _chips() -> Iterable[str]:
     from thenar.drivers.i2c.chips import expanders
 
-    return (*expanders(), _BOARD)
+    return (*expanders(), _BOARD, *_converters())
+
+
+def _converters() -> list[str]:
+    """Return the kinds of chips that measure taxels."""
+    from thenar.drivers.i2c.chips import CHIPS, expanders
+    from thenar.drivers.spi.chips import SPI_CHIPS
+
+    return [kind for kind in (*CHIPS, *SPI_CHIPS) if kind not in expanders()]
 
 
 class _ChipOption(click.Option):
     """Its help, which is only made when it is asked for, names the chips."""
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
-        *chips, board = _chips()
+        measuring = _converters()
+        chips = [kind for kind in _chips() if kind != _BOARD and kind not in measuring]
         self.help = (
-            f"Port expander to propose: {', '.join(chips)}; or {board}, a switch-scanner board.  [default: {chips[0]}]"
+            f"Port expander to propose: {', '.join(chips)}; or {_BOARD}, a scanner board; or what measures taxels: "
+            f"{', '.join(measuring)}.  [default: {chips[0]}, and ads7828 for taxels]"
         )
         return super().get_help_record(ctx)
 

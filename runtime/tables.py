@@ -118,10 +118,6 @@ class Slope:
         """What the middle comes to, where nothing is added."""
         return (self.most + 1) // 2
 
-    def distance(self, code: int) -> int:
-        """Return the distance of a code."""
-        return self._gained(min(max(code, self.low), self.high) - self.low) - self.zero
-
     def distances(self, codes: NDArray[np.integer]) -> NDArray[np.int64]:
         """Return the distances of codes (n,)."""
         above = np.clip(codes.astype(np.int64), self.low, self.high) - self.low
@@ -194,6 +190,13 @@ class IntegerTables:
         """What all rows of switches and bins are multiples of, where joints have slopes: 256 if they are, else 1."""
         rows = [self.switch_rows, *(rows for rows in self.joint_rows if len(rows) > 1)]
         return COARSE if self.slopes and not any((each % COARSE).any() for each in rows) else 1
+
+    @property
+    def relative(self) -> bool:
+        """Whether scores are relative to the last class, to which no input adds anything."""
+        held: list[NDArray[np.integer]] = [self.bias, self.switch_rows, self.switch_means, self.joint_means]
+        held += [*self.joint_rows, *(slope.row for slope in self.slopes)]
+        return not any(rows[..., -1].any() for rows in held)
 
     def slope_of(self, joint: int) -> Slope | None:
         """Return the slope of a joint, if it has one."""

@@ -22,7 +22,7 @@ from ..limits import check_memory
 from ..tables.collapse import Floats, ScoreTables
 from .logit import TOLERANCE, Column, Fit, column_edges, columns_of, sparse, tables_of
 
-PAIRS, PAIR_BINS, PAIR_SMOOTHNESS = 4, 8, 1.0
+PAIRS, PAIR_BINS, PAIR_SMOOTHNESS = 4, 8, 0.5
 MOST_PAIR_BINS = 16  # 256 cells are the rows of one look-up
 
 

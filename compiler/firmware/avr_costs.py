@@ -223,7 +223,7 @@ def _counted(part: _Part, near: bool, elpm: bool) -> Counts:
     layout = replace(part.layout, lookups=part.lookups)
     values = assembly_values("x", numbered(layout.tables), layout, near=near)
     common = {"name": "x", "opening": "", "biased": layout.biased, "width": layout.parts.width}
-    common |= {"classes": layout.tables.n_classes, "n_rows": layout.n_rows}
+    common |= {"classes": layout.tables.n_classes, "n_rows": layout.n_rows, "relative": layout.tables.relative}
     found = Assembly(render("classifier/thenar_NAME_avr.S.j2", **common, **values), elpm=elpm)
     _, update = found.cycles("thenar_x_update")
     uncalled = found.size(".text.thenar_x_update") + found.size(".text.thenar_x_start_without")
@@ -241,7 +241,7 @@ class AvrCosts:
         self._layout, self._counter = layout, 3 if flash > 128 << 10 else 2
         self._near = calls_are_near(layout)
         kind = layout.entry_bits, layout.sum_bits, layout.entry_shift, layout.code_bits, layout.adding
-        self._of_all = (layout.tables.n_classes, layout.tables.slopes, *kind)
+        self._of_all = (layout.tables.n_classes, layout.tables.relative, layout.tables.slopes, *kind)
         ordered = sorted(layout.lookups, key=lambda lookup: not lookup.joints)
         self._counts, rest = self._count(*ordered[:1]), ordered[1:]
         kinds = {bool(lookup.joints): lookup for lookup in layout.lookups}
@@ -308,6 +308,8 @@ def rises(layout: Layout, bits: NDArray[np.bool_], codes: NDArray[np.uint16]) ->
     how many codes of 16 bits are beyond their slopes: the cycles that classify takes beyond the fixed ones.
     """
     scores = layout.scores(bits, codes)
+    if len(layout.parts.firsts) == 1:
+        scores = scores[:, : layout.parts.width]  # a last class to which the others are relative takes none
     best = np.maximum.accumulate(scores, axis=1)
     cycles: NDArray[np.int64] = np.count_nonzero(scores[:, 1:] > best[:, :-1], axis=1)
     for slope in layout.tables.slopes if layout.code_bits == 16 else ():

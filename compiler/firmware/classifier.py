@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from thenar.firmware_templates.rendering import render
 from thenar.runtime.manifest import Calibration
-from thenar.runtime.tables import Slope
 
 from .assembly import assembly_values, calls_are_near, check_size
 from .layout import MOST_INLINE, NO_SWITCH, Field, JointLayout, Layout, Lookup, Parts
@@ -32,7 +31,6 @@ def portable_values(name: str, layout: Layout) -> dict[str, object]:
     """Return what the templates of the portable C ask for."""
     parts, biased, bits = layout.parts, layout.biased, layout.sum_bits
     lanes = _lanes(parts.width, biased, bits)
-    starts, open_sums = (_start_lines(_in_parts(scores, parts), lanes) for scores in (layout.start, layout.all_open))
     n_lanes = max(lane for lane, _ in lanes) + 1
     adding, replacing = _arithmetic(n_lanes, biased, layout.entry_shift)
     slopes = [slope.row.astype(int) for slope in layout.tables.slopes]
@@ -41,22 +39,21 @@ def portable_values(name: str, layout: Layout) -> dict[str, object]:
         "slopes": [
             _lane_words([row[first : first + parts.width].tolist() for row in slopes], lanes) for first in parts.firsts
         ],
-        "open_distances": number_lines(slope.distance(0) for slope in layout.tables.slopes),
-        "distances": [_distance(name, slope) for slope in layout.tables.slopes],
+        "tabled": _tabled(layout),
+        "distances": [_distance(name, layout, at) for at in range(len(slopes))],
         "words": -(-parts.width // entries),
         "lanes": n_lanes,
         "in_words": {2: "two", 4: "four"}[entries],
         "sum_bits": bits,
-        "takes": _takes(lanes, len(parts.firsts) > 1, bits),
+        "stores": [(_stored(lane, shift, bits), k) for k, (lane, shift) in enumerate(lanes)],
+        "takes": [(_upmost(lane, shift, bits), k) for k, (lane, shift) in enumerate(lanes)],
         "word_macros": _narrow_macros(parts.width) if biased else _sum_macros(parts.width, bits),
-        "start": starts,
-        "open_sums": open_sums,
-        "open_rows": [f"&thenar_{name}_rows[{lookup.first_row + lookup.zero_row}]," for lookup in layout.lookups],
-        "finds": [line for lookup in layout.lookups for line in _find(name, layout, lookup)],
+        "start": _start_lines(_in_parts(layout.start, parts), lanes),
+        "finds": [_find(name, layout, lookup) for lookup in layout.lookups],
         "n_lookups": len(layout.lookups),
         "adding": adding,
-        "begun": [f"from[{lane}]" if _started(lane, biased, layout.entry_shift) else "0u" for lane in range(n_lanes)],
-        "storing": _storing(n_lanes, biased, layout.entry_shift),
+        "began": [f"start[{lane}]" if _started(lane, biased, layout.entry_shift) else "0u" for lane in range(n_lanes)],
+        "finishing": _finishing(n_lanes, biased, layout.entry_shift),
         "replacing": replacing,
     }
 
@@ -118,16 +115,15 @@ def _start_lines(starts: Sequence[Sequence[int]], lanes: Sequence[tuple[int, int
     return lines
 
 
-def _takes(lanes: Sequence[tuple[int, int]], several: bool, bits: int) -> list[str]:
-    """Return the arguments that say the sum and the number of each class of a part."""
-    words, mask = "sum" if several else "sums", {8: "0xFFu", 16: "0xFFFFu"}[bits]
-    numbers = (f"first + {k}u" if several and k else "first" if several else f"{k}u" for k in range(len(lanes)))
-    taken = []
-    for (lane, shift), number in zip(lanes, numbers, strict=True):
-        lowered = f"{words}[{lane}] >> {shift}" if shift else f"{words}[{lane}]"
-        inner = shift + bits < 32
-        taken.append(f"{f'({lowered})' if shift and inner else lowered}{f' & {mask}' if inner else ''}, {number}")
-    return taken
+def _stored(lane: int, shift: int, bits: int) -> str:
+    """Return the expression that has the score of a class in its lowest bits."""
+    scores = f"SCORES(s{lane})" if bits == 16 else f"s{lane}"
+    return f"{scores} >> {shift}" if shift else scores
+
+
+def _upmost(lane: int, shift: int, bits: int) -> str:
+    """Return the expression that has the sum of a class in its highest bits."""
+    return f"s{lane} << {32 - bits - shift}" if shift + bits < 32 else f"s{lane}"
 
 
 def _arithmetic(lanes: int, biased: bool, shift: int) -> tuple[list[str], list[str]]:
@@ -152,18 +148,22 @@ def _started(lane: int, biased: bool, shift: int) -> bool:
     return not biased or (lane % 2 == 1 and not shift)
 
 
-def _storing(lanes: int, biased: bool, shift: int) -> list[str]:
-    """Return the statements that put the sums s0, s1..., in words of two, into sum[]."""
-    stored = []
-    for lane in range(lanes):
-        text = f"s{lane} - ((s{lane - 1} >> 16) << 8)" if biased and lane % 2 else f"s{lane}"
-        text = f"(({text}) << {shift})" if biased and shift else text
-        stored.append(f"sum[{lane}] = {'' if _started(lane, biased, shift) else f'from[{lane}] + '}{text};")
-    return stored
+def _finishing(lanes: int, biased: bool, shift: int) -> list[str]:
+    """Return the statements that make the sums of s0, s1... that rows have been added to, in words of two."""
+    if not biased:
+        return []
+    finished = []
+    for lane in reversed(range(lanes)):  # an odd one before the even one beside it
+        text = f"s{lane} - ((s{lane - 1} >> 16) << 8)" if lane % 2 else f"s{lane}"
+        if _started(lane, biased, shift):
+            finished.append(f"s{lane} = {text};")
+        else:
+            finished.append(f"s{lane} = start[{lane}] + {f'(({text}) << {shift})' if shift else text};")
+    return finished
 
 
 def _find(name: str, layout: Layout, lookup: Lookup) -> list[str]:
-    """Return the statement that finds the row of one look-up, in lines."""
+    """Return the expression of the number of one look-up's row, in lines."""
     source = f"thenar_{name}_input."
     found: list[str] = []
     if lookup.group is not None:
@@ -184,8 +184,9 @@ def _find(name: str, layout: Layout, lookup: Lookup) -> list[str]:
             whole = len(joint.bins) == 1 << layout.code_bits
             place = code if whole else f"clamped({code}, {joint.first}u, {len(joint.bins) - 1}u)"
             found.append(f"thenar_{name}_bins[{_after(joint.first_bin, place)}]")
-    statement = f"row[{lookup.index}] = &thenar_{name}_rows[{_after(lookup.first_row, ' + '.join(found))}];"
-    return textwrap.wrap(statement, COLUMNS - 8, subsequent_indent=_INDENT, break_long_words=False)
+    width = COLUMNS - 8 - len(f"row[999] = &thenar_{name}_rows[];")
+    number = _after(lookup.first_row, " + ".join(found))
+    return textwrap.wrap(number, width, subsequent_indent=_INDENT, break_long_words=False)
 
 
 def _field(field: Field) -> str:
@@ -206,11 +207,22 @@ def _lane_words(rows: list[list[int]], lanes: Sequence[tuple[int, int]]) -> list
     return found
 
 
-def _distance(name: str, slope: Slope) -> str:
+def _distance(name: str, layout: Layout, at: int) -> str:
     """Return the expression of the distance of a slope's code."""
-    above = f"clamped(thenar_{name}_input.codes[{slope.joint}], {slope.low}u, {slope.high - slope.low}u)"
+    slope = layout.tables.slopes[at]
+    code = f"thenar_{name}_input.codes[{slope.joint}]"
+    if layout.stores_distances:
+        return f"distance_of[{at}][{code}]"
+    above = f"clamped({code}, {slope.low}u, {slope.high - slope.low}u)"
     shift = f" {'<<' if slope.gain > 0 else '>>'} {abs(slope.gain)}" if slope.gain else ""
     return f"(int16_t)(({above}{shift}) - {slope.zero})"
+
+
+def _tabled(layout: Layout) -> list[list[str]]:
+    """Return the lines of the distances of all codes, for each slope, where they are stored."""
+    if not layout.stores_distances:
+        return []
+    return [number_lines(slope.distances(np.arange(256)).tolist()) for slope in layout.tables.slopes]
 
 
 def _after(first: int, place: str) -> str:
@@ -381,6 +393,7 @@ def _common_values(name: str, names: Names, layout: Layout, avr: bool) -> dict[s
         "width": layout.parts.width,
         "n_rows": layout.n_rows,
         "n_slopes": len(layout.tables.slopes),
+        "relative": layout.tables.relative,
     }
 
 
@@ -399,7 +412,8 @@ def _source_values(names: Names, layout: Layout) -> dict[str, object]:
         "bins": [line for joint in trimmed for line in _bin_lines(names, joint)],
         "n_bins": sum(len(joint.bins) for joint in trimmed),
         "paged": layout.bins == "direct" and bool(trimmed),
-        "clamped": (layout.bins == "trimmed" and bool(trimmed)) or bool(layout.tables.slopes),
+        "clamped": (layout.bins == "trimmed" and bool(trimmed))
+        or (bool(layout.tables.slopes) and not layout.stores_distances),
         "compared": bool(searched),
         "thresholds": number_lines(steps),
         "n_thresholds": len(steps),

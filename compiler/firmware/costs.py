@@ -1,7 +1,7 @@
 """What a classifier costs: in portable C, which adds words of two sums, by a model that is rough but not too low.
 
 The model is fitted to what qemu counts of code by arm-none-eabi-gcc 12 with -O2, for 3 to 30 classes and 2 to 33
-look-ups, from the bytes of ports: 1 to 35 % above on an M0+ and on an M4; with two look-ups more. Entries of 8 bits
+look-ups, from the bytes of ports: 1 to 37 % above on an M0+ and on an M4; with two look-ups more. Entries of 8 bits
 that are added up in 16 take longer there than those of 16 bits, for they must be taken apart before they are added.
 Other compilers and cores differ.
 """
@@ -38,15 +38,18 @@ class Cost:
 
 @dataclass(frozen=True, slots=True)
 class Core:
-    """Instructions of a class, and how many more where classes are added up in parts; of a look-up; in each part of a
-    look-up, of a word of two 16-bit entries, of four 8-bit entries, and of all of those together; in update() of a word
-    of two or of four that is replaced, and more of four upper halves; of a word of two sums that a slope adds to; of a
-    threshold that is compared.
+    """Instructions of an answer; of a class, and how many more where classes are added up in parts; of a look-up, and
+    of a joint in it; in each part of a look-up, of a word of two 16-bit entries, of four 8-bit entries, and of all of
+    those together; in update() of a word of two or of four that is replaced, and more of four upper halves; of a word
+    of two sums that a slope adds to; of a threshold that is compared.
     """
+
+    fixed: int
 
     a_class: int
     in_parts: int
     lookup: int
+    found: int
     part: int
     pair: int
     quad: int
@@ -59,9 +62,11 @@ class Core:
 
 
 CORTEX_M4 = Core(
-    a_class=10,
-    in_parts=3,
+    fixed=20,
+    a_class=8,
+    in_parts=7,
     lookup=0,
+    found=5,
     part=0,
     pair=3,
     quad=5,
@@ -73,21 +78,19 @@ CORTEX_M4 = Core(
 """What other cores of 32 bits are taken to be like."""
 
 
-_FIXED, _REPLACING = 20, 13  # of an answer; of a row in update(), but for its words
-# More of a row in update() for each part but the first.
-_REPLACING_PART = 3
-# A joint in a look-up; more than for a code that is looked up directly: a threshold that is compared; a byte clamped
-# below and above, where it can lie there; a code of 16 bits clamped; a code searched, and each step of the search.
-_FOUND, _BELOW, _ABOVE, _WIDE = 4, 6, 4, 10
+_REPLACING, _REPLACING_PART = 13, 32  # of a row in update(), but for its words; more for each part but the first
+# More than for a code that is looked up directly: a byte clamped below and above, where it can lie there; a code of 16
+# bits clamped; a code searched, and each step of the search.
+_BELOW, _ABOVE, _WIDE = 6, 4, 10
 _SEARCHED, _SEARCH_STEP = 16, 11
-# The distance of a code, and how much more in update(); in each part all but the products; and of each word of sums,
-# at the end and where entries are upper halves.
-_DISTANCE, _MOVED, _MULTIPLYING, _WORD, _HALVES = 14, 5, 27, 2, 8
+# The distance of a code, looked up or not, and how much more in update(); in each part all but the products; and of
+# each word of sums, at the end and where entries are upper halves.
+_DISTANCE_KNOWN, _DISTANCE, _MOVED, _MULTIPLYING, _WORD, _HALVES = 7, 14, 5, 27, 2, 8
 
 # Of code; where classes are added up in parts, that takes more.
 _BYTES, _BYTES_PARTS, _BYTES_CLASS = 186, 432, 15
 _BYTES_WORD, _BYTES_QUAD, _BYTES_START = 7, 20, 41
-_BYTES_UPDATE, _BYTES_UPDATE_PAIR, _BYTES_UPDATE_QUAD = 172, 11, 40
+_BYTES_UPDATE, _BYTES_UPDATE_CLASS, _BYTES_UPDATE_PAIR, _BYTES_UPDATE_QUAD = 180, 10, 11, 40
 _BYTES_JOINT, _BYTES_CLAMPED, _BYTES_COMPARED, _BYTES_SEARCHED = 11, 35, 11, 55
 _BYTES_MULTIPLYING, _BYTES_PRODUCT, _BYTES_DISTANCE = 150, 30, 24
 # Of what replaces missing inputs, beside the table of their means; instructions that take a field of a port's byte, and
@@ -105,12 +108,13 @@ def word_cost(layout: Layout, core: Core) -> Cost:
     replaced += core.replaced_halves if layout.entry_shift else 0
     adding = parts * (core.part + (core.quads if layout.biased else 0) + words * word)
     replacing = _REPLACING + _REPLACING_PART * (parts - 1) + parts * words * replaced
-    answering = (core.a_class + (core.in_parts if parts > 1 else 0)) * classes + finding + _FIXED
+    answering = (core.a_class + (core.in_parts if parts > 1 else 0)) * classes + finding + core.fixed
     classify, update = (len(layout.lookups) * (core.lookup + each) + answering for each in (adding, replacing))
     multiplying, slopes = _multiplying(layout, core), len(layout.tables.slopes)
     classify, update = classify + multiplying, update + multiplying + _MOVED * slopes
     flash = _flash(layout) + NAME_BYTES * (classes + 1)
-    update_flash = _BYTES_UPDATE + words * (_BYTES_UPDATE_QUAD if layout.biased else _BYTES_UPDATE_PAIR)
+    replaced_bytes = _BYTES_UPDATE_QUAD if layout.biased else _BYTES_UPDATE_PAIR
+    update_flash = _BYTES_UPDATE + _BYTES_UPDATE_CLASS * classes + words * replaced_bytes
     losing = _BYTES_LOSING + layout.means.size * (1 if layout.narrow_means else 2)
     return Cost(classify, update, flash + update_flash + losing, flash, _ram(layout))
 
@@ -121,7 +125,8 @@ def _multiplying(layout: Layout, core: Core) -> int:
     if not slopes:
         return 0
     word = slopes * core.product + _WORD + (core.product + _HALVES if layout.entry_shift else 0)
-    return slopes * _DISTANCE + len(parts.firsts) * (_MULTIPLYING + -(-parts.width // 2) * word)
+    distance = _DISTANCE_KNOWN if layout.stores_distances else _DISTANCE
+    return slopes * distance + len(parts.firsts) * (_MULTIPLYING + -(-parts.width // 2) * word)
 
 
 def _words(layout: Layout) -> int:
@@ -133,15 +138,15 @@ def _finding(layout: Layout, joint: JointLayout, core: Core) -> int:
     """Return the instructions that a joint takes in finding a row."""
     if joint.compared:
         steps = len(joint.thresholds)
-        return _FOUND + (
+        return core.found + (
             core.compared * steps if steps <= MOST_INLINE else _SEARCHED + _SEARCH_STEP * steps.bit_length()
         )
     if len(joint.bins) == 1 << layout.code_bits:
-        return _FOUND
+        return core.found
     if layout.code_bits == 16:
-        return _FOUND + _WIDE
+        return core.found + _WIDE
     above = joint.first + len(joint.bins) <= 255
-    return _FOUND + _BELOW * (joint.first > 0) + _ABOVE * above
+    return core.found + _BELOW * (joint.first > 0) + _ABOVE * above
 
 
 def _flash(layout: Layout) -> int:
@@ -158,6 +163,7 @@ def _flash(layout: Layout) -> int:
     if slopes := len(layout.tables.slopes):
         lanes = -(-parts.width // 2)
         code += _BYTES_MULTIPLYING + _BYTES_PRODUCT * lanes + _BYTES_DISTANCE * slopes
+        code += 256 * slopes * layout.stores_distances
         starts += slopes * (2 + 4 * lanes * len(parts.firsts))
     return rows + places + starts + code + sum(_joint_flash(layout, joint) for joint in layout.joints)
 

@@ -160,7 +160,7 @@ class Field:
     to: int
 
 
-SMALLEST_GROUP, LARGEST_GROUP = 2, 6
+SMALLEST_GROUP, LARGEST_GROUP = 2, 8
 MOST_TABLE_ROWS = 65535  # their numbers are 16 bits wide
 
 Adding = Literal["called", "unrolled"]
@@ -233,6 +233,11 @@ class Layout:
         return 8 if self.entry_bits == 8 and self.tables.grid == COARSE else 0
 
     @property
+    def stores_distances(self) -> bool:
+        """Whether portable C looks the distances of slopes' codes up, as it does bins."""
+        return self.bins == "direct" and self.code_bits == 8
+
+    @property
     def padding(self) -> int:
         """Bytes, 0 or 1, between the ports' bytes and the codes, so that codes of 16 bits lie at even offsets."""
         return len(self.ports) % 2 if self.code_bits == 16 else 0
@@ -242,10 +247,12 @@ class Layout:
         """Bytes of a frame as `frame_bytes` makes them."""
         return len(self.ports) + self.padding + self.tables.n_joints * self.code_bits // 8
 
-    @property
+    @cached_property
     def parts(self) -> Parts:
-        """How the classes are divided among passes."""
-        return parts_of(self.tables.n_classes, self.sum_bits)
+        """How the classes that are added up are divided among passes: all, or all but the last, where the others are
+        relative to it.
+        """
+        return parts_of(self.tables.n_classes - self.tables.relative, self.sum_bits)
 
     @property
     def joints(self) -> tuple[JointLayout, ...]:
@@ -370,7 +377,7 @@ def arrange(
     adding: Adding = "called",
     shared: Sequence[Shared] = (),
 ) -> Layout:
-    """Return `tables` with the switches in groups of at most `group_size` (2 to 6), in the order of `ports`.
+    """Return `tables` with the switches in groups of at most `group_size` (2 to 8), in the order of `ports`.
 
     There are as few groups as that size allows, or `n_groups` where given: more look-ups and less flash. They are as
     even as can be, and none is of two ports where as few can do without. Where no wiring is known, `ports` are left

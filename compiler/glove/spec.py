@@ -151,7 +151,7 @@ def glove_spec(
         wires=wires,
         materials=bill_of(circuit, wires),
         expected=expected_of(manifest, read, wired),
-        remarks=tuple(_remarks(manifest, wired, switches, known)),
+        remarks=(*_remarks(manifest, wired, switches, known), *_of_boards(boards)),
     )
     return GloveSpec(summary, wired, read, circuit, pattern)
 
@@ -180,6 +180,16 @@ def _portable(harness: Harness) -> Harness:
         return harness
     name = glove.calibration.replace("\\", "/").rsplit("/", 1)[-1]
     return replace(harness, cyberglove=replace(glove, calibration=name or None))
+
+
+def _of_boards(boards: Sequence[BoardPins | None]) -> Iterator[str]:
+    """Yield where the multiplexers of each board go, as far as it is known."""
+    for number, pins in enumerate(boards, start=1):
+        if pins is not None and pins.selects:
+            yield (
+                f"A{number}: S0 to S3 of its multiplexers go to {', '.join(pins.selects)}, their commons to "
+                f"{', '.join(pins.channels)}"
+            )
 
 
 def _readers(ends: Sequence[End]) -> tuple[SwitchReader, ...]:

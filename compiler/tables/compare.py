@@ -13,7 +13,7 @@ from thenar.runtime.tables import LIMIT, IntegerTables
 from ..boosting.stumps import TIE, Stumps, winners
 from .collapse import Floats, Model, ScoreTables, collapse, model_scores
 from .furthest import furthest
-from .quantise import rounding_error
+from .quantise import as_deployed, rounding_error
 from .worstcase import Rounding
 
 COLLAPSE_TOLERANCE = 1e-12  # of the sum of the magnitudes that are added up
@@ -89,7 +89,7 @@ def worst_case(
 
     They were made of `model`; `grasps` and `switches` are the names of its classes and kept switches.
     """
-    rounding = Rounding(collapse(model, integers.n_switches), integers)
+    rounding = Rounding(as_deployed(collapse(model, integers.n_switches), integers.grid), integers)
     frame, furthest_sum = rounding.worst_of_all(), furthest(integers)
     safe = float(rounding.safe_margin())
     # Scores that the ensemble takes for tied are decided by the number of the class.
@@ -142,10 +142,11 @@ def compare(
     by_model = model_scores(model, bits, codes)
     by_tables = tables.scores(bits, codes)
     by_integers = _deployed_scores(integers, bits, codes, report)
-    steps = by_tables * integers.scale
+    deployed = as_deployed(tables, integers.grid)
+    steps = deployed.scores(bits, codes) * integers.scale
     best_two = np.sort(steps, axis=1)[:, -2:]
     margins = best_two[:, 1] - best_two[:, 0]
-    error, slack = rounding_error(tables, integers.scale, integers.grid), float_slack(tables, integers.scale)
+    error, slack = rounding_error(deployed, integers.scale, integers.grid), float_slack(deployed, integers.scale)
     return Comparison(
         collapse_difference=float(np.abs(by_model - by_tables).max()),
         collapse_bound=COLLAPSE_TOLERANCE * _magnitudes(model),

@@ -11,7 +11,9 @@ scale for that is some 4 steps per unit of score, where one for 16 bits is some 
 The row of a line becomes whole steps per distance from the middle of its range (runtime/tables.py), a byte each: half a
 step times the largest distance, at most 127, is what that moves a score. Where tables have lines and entries are of 8
 bits, these are the upper halves of steps: rows of switches and bins are then rounded to multiples of 256 steps, and
-only lines and bias are as fine as the sums of 16 bits allow.
+only lines and bias are as fine as the sums of 16 bits allow. The bias takes back what rounding moves scores by in the
+mean: x times the error of a switch's row becomes x less its mean times the error, which is no more for an x of 0 or 1.
+Such scores are relative to the last class, which is then one class less to add up.
 """
 
 import math
@@ -49,6 +51,20 @@ def balance(tables: ScoreTables) -> ScoreTables:
     return replace(tables, bias=tables.bias + moved.sum(axis=0), joint_rows=rows)
 
 
+def as_deployed(tables: ScoreTables, grid: int) -> ScoreTables:
+    """Return the tables that integers with rows on a `grid` are made of: there, scores are relative to the last."""
+    if grid == 1:
+        return tables
+
+    def less_last(rows: Floats) -> Floats:
+        found: Floats = rows - rows[..., -1:]
+        return found
+
+    lines = tuple(replace(line, row=less_last(line.row)) for line in tables.lines)
+    rows = tuple(map(less_last, tables.joint_rows))
+    return ScoreTables(less_last(tables.bias), less_last(tables.switch_rows), tables.thresholds, rows, lines)
+
+
 def slope_of(line: Line, scale: float) -> tuple[Slope, Floats]:
     """Return a line in whole steps, without its row; and the row (K,), in whole steps per distance, that it should
     have.
@@ -81,7 +97,7 @@ TRIED, _TRIED_OF_ALL = 32, 160
 _LARGEST = 127  # entry of a slope's row
 
 
-def finest_scale(tables: ScoreTables, limit: int, widest: int, grid: int = 1) -> float:
+def finest_scale(tables: ScoreTables, limit: float, widest: int, grid: int = 1) -> float:
     """Return the largest double below FINEST_SCALE at which no sum of rounded rows exceeds `limit` and no look-up
     spans more than `widest`; 1 for tables of zeros.
 
@@ -116,11 +132,11 @@ def kindest_scale(
     most = max(rounding_error(tables, scale, grid) for scale in scales[[0, -1]].tolist())
     near = _leads(scores) * scales[-1] <= 2 * most + 1  # no scale can change the others: quantise.py
     right, closed = winners(scores[near]), bits[near].astype(np.float64)
-    asked = codes[near]
-    changed = [
-        np.count_nonzero(_whole_scores(tables, scale, closed, asked, grid).argmax(axis=1) != right)
-        for scale in scales.tolist()
-    ]
+    asked, means = codes[near], _mean(bits.astype(np.int64))
+    changed = []
+    for scale in scales.tolist():
+        whole = _whole_scores(tables, scale, closed, asked, grid) + _whole_bias(tables, scale, grid, means)
+        changed.append(np.count_nonzero(whole.argmax(axis=1) != right))
     return float(scales[int(np.argmin(changed))])
 
 
@@ -174,9 +190,11 @@ def _leads(scores: Floats) -> Floats:
 
 
 def _whole_scores(tables: ScoreTables, scale: float, closed: Floats, codes: NDArray[np.uint16], grid: int) -> Floats:
-    """Return the scores (n, K) of the tables in whole steps: closed (n, s) switches, and the joints' codes (n, j)."""
+    """Return the scores (n, K) of the tables but for the bias in whole steps: closed (n, s) switches, and the joints'
+    codes (n, j).
+    """
     # Sums of whole numbers are exact, in any order: a matrix product may add them up.
-    scores: Floats = closed @ _whole(tables.switch_rows * scale, grid) + np.rint(tables.bias * scale)
+    scores: Floats = closed @ _whole(tables.switch_rows * scale, grid)
     for column, steps, rows in zip(codes.T, tables.thresholds, _middle_rows(tables, scale, grid), strict=True):
         scores += rows[np.searchsorted(steps, column)]
     for line in tables.lines:
@@ -185,6 +203,16 @@ def _whole_scores(tables: ScoreTables, scale: float, closed: Floats, codes: NDAr
     for pair in tables.pairs:
         scores += np.rint(pair.of(codes) * scale)
     return scores
+
+
+def _whole_bias(tables: ScoreTables, scale: float, grid: int, means: Floats) -> Floats:
+    """Return the bias in whole steps, with what the rounding of switches' rows to a `grid` takes from scores in the
+    mean, where each of the switches is closed in `means` (s,) of all rows.
+    """
+    rows = tables.switch_rows * scale
+    lost = means[:, np.newaxis] * (rows - _whole(rows, grid)) if grid > 1 else 0 * rows
+    whole: Floats = np.rint(tables.bias * scale + [math.fsum(column) for column in lost.T])
+    return whole
 
 
 def _whole(rows: Floats, grid: int) -> Floats:
@@ -240,20 +268,28 @@ def quantise(
     16 that is no limit, as sums of 16 bits span no more, and the scale is the finest; with fewer it is the kindest.
     With lines, entries of fewer than 16 bits are multiples of 256 instead.
     """
-    balanced, grid = balance(tables), COARSE if tables.lines and entry_bits < 16 else 1
-    scale = finest_scale(balanced, 2 ** (width - 1) - 1, 2**entry_bits - 1, grid)
-    if entry_bits < 16:
-        scale = kindest_scale(balanced, scale, bits, codes, grid)
+    grid, means = COARSE if tables.lines and entry_bits < 16 else 1, _mean(bits.astype(np.int64))
+    balanced = balance(as_deployed(tables, grid))
+    limit, room = 2 ** (width - 1) - 1, 0.0
+    while True:
+        scale = finest_scale(balanced, limit - room, 2**entry_bits - 1, grid)
+        if entry_bits < 16:
+            scale = kindest_scale(balanced, scale, bits, codes, grid)
+        bias = _whole_bias(balanced, scale, grid, means)
+        beyond = reach(replace(balanced, bias=bias / scale), scale, grid=grid) - limit
+        if grid == 1 or beyond <= 0:
+            break
+        room += beyond  # what the bias takes back, too, needs room
     lines = {line.joint: line.of(codes) for line in balanced.lines}
     switch_rows = _whole(balanced.switch_rows * scale, grid).astype(np.int16)
-    switch_means = np.rint(balanced.switch_rows * _mean(bits.astype(np.int64))[:, np.newaxis] * scale)
+    switch_means = np.rint(balanced.switch_rows * means[:, np.newaxis] * scale)
     merged = [
         _merged(steps, rows.astype(np.int16))
         for steps, rows in zip(balanced.thresholds, _middle_rows(balanced, scale, grid), strict=True)
     ]
     slopes = (slope_of(line, scale) for line in balanced.lines)
     integers = IntegerTables(
-        bias=_rounded(balanced.bias, scale),
+        bias=bias.astype(np.int16),
         switch_rows=switch_rows,
         thresholds=tuple(steps for steps, _ in merged),
         joint_rows=tuple(rows for _, rows in merged),
@@ -270,10 +306,6 @@ def quantise(
         added = integers.choices(joint)[1].sum(axis=0)
         joint_means.append(np.clip(mean, added.min(axis=0), added.max(axis=0)))
     return replace(integers, joint_means=np.array(joint_means, np.int16).reshape(len(joint_means), len(tables.bias)))
-
-
-def _rounded(rows: Floats, scale: float) -> Integers:
-    return np.rint(rows * scale).astype(np.int16)
 
 
 def _merged(thresholds: NDArray[np.uint16], rows: Integers) -> tuple[NDArray[np.uint16], Integers]:

@@ -119,8 +119,8 @@ FAULTS = (
     Fault(
         "halves are rounded up, not to even",
         "compiler/tables/quantise.py",
-        "return np.rint(rows * scale).astype(np.int16)",
-        "return np.floor(rows * scale + 0.5).astype(np.int16)",
+        "np.rint(rows / grid) * grid",
+        "np.floor(rows / grid + 0.5) * grid",
         "tests/compiler/tables/test_quantise.py",
     ),
     Fault(

@@ -25,7 +25,7 @@ from thenar.runtime.tables import COARSE, IntegerTables, Slope
 Tool = Callable[[str], str]
 
 # Classes, switches, joints, of which the first so many have bins and the last so many slopes; whether codes are wide,
-# and rows multiples of 256.
+# and rows multiples of 256, and scores relative to the last class.
 Shape = tuple[int, int, int, int, int, bool, bool]
 SHAPES: dict[str, Shape] = {
     "slopes alone": (14, 0, 3, 0, 3, False, False),
@@ -57,7 +57,7 @@ def _tables(seed: int, shape: Shape) -> IntegerTables:
         return np.sort(random.choice(200, 4 if joint < binned else 0, replace=False) + first).astype(np.uint16)
 
     steps = tuple(thresholds(joint) for joint in range(joints))
-    return IntegerTables(
+    made = IntegerTables(
         bias=random.integers(-99, 100, classes).astype(np.int16),
         switch_rows=rows(switches, classes),
         thresholds=steps,
@@ -67,6 +67,18 @@ def _tables(seed: int, shape: Shape) -> IntegerTables:
         scale=100.0,
         slopes=tuple(_slope(random, joint, classes, top, slopes) for joint in range(joints - slopes, joints)),
     )
+    return _relative(made) if coarse else made
+
+
+def _relative(tables: IntegerTables) -> IntegerTables:
+    """Return the tables with nothing for the last class, to which the scores of the others are relative."""
+
+    def without(rows: np.ndarray) -> np.ndarray:
+        return np.where(np.arange(tables.n_classes) == tables.n_classes - 1, 0, rows).astype(rows.dtype)
+
+    held = {name: without(getattr(tables, name)) for name in ("bias", "switch_rows", "switch_means", "joint_means")}
+    slopes = tuple(replace(slope, row=without(slope.row)) for slope in tables.slopes)
+    return replace(tables, **held, joint_rows=tuple(map(without, tables.joint_rows)), slopes=slopes)
 
 
 def _slope(random: np.random.Generator, joint: int, classes: int, top: int, share: int) -> Slope:

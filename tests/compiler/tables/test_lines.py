@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from thenar.compiler.tables.collapse import Line, ScoreTables
 from thenar.compiler.tables.compare import compare, worst_case
 from thenar.compiler.tables.furthest import furthest
-from thenar.compiler.tables.quantise import integer_scores, quantise, reach
+from thenar.compiler.tables.quantise import as_deployed, balance, integer_scores, quantise, reach
 from thenar.compiler.tables.worstcase import Rounding
 from thenar.runtime.scores import LANE_OFFSET, Scorer
 from thenar.runtime.tables import LIMIT, tables_from_bytes, tables_to_bytes
@@ -71,6 +71,7 @@ def test_integers_keep_their_bounds_on_every_row(seed: int, entry_bits: int) -> 
     assert integers.bound <= LIMIT
     for row in range(5):
         exact = _exact(tables, bits[row], codes[row])
+        exact = [x - exact[-1] for x in exact] if integers.grid > 1 else exact
         steps = integer_scores(integers, bits[row : row + 1], codes[row : row + 1])[0].tolist()
         most = max(abs(x * Fraction(integers.scale) - n) for x, n in zip(exact, steps, strict=True))
         assert most <= comparison.integer_bound + comparison.slack
@@ -94,7 +95,7 @@ def test_the_runtime_adds_up_what_arrays_add_up_and_nothing_of_what_is_lost(seed
                 int
             )
             slope = integers.slope_of(joint)
-            mine = mine + (0 if slope is None else slope.row.astype(int) * slope.distance(int(codes[row, joint])))
+            mine = mine + (0 if slope is None else slope.of(codes[row : row + 1, joint])[0])
             left += mine - integers.joint_means[joint]
         assert (left == scores[row]).all()
 
@@ -170,8 +171,22 @@ def test_rows_of_a_byte_are_upper_halves_of_steps_and_no_coarser(seed: int) -> N
         return
     coarse, fine = (quantise(tables, bits, codes, entry_bits=entry) for entry in (8, 16))
     assert coarse.grid == 256
+    assert coarse.relative  # to a last class: the furthest score is up to twice as far
     assert coarse.scale <= 4 * fine.scale
-    assert fine.scale <= 4 * coarse.scale
+    assert fine.scale <= 8 * coarse.scale
+
+
+@given(seed=seeds)
+def test_of_upper_halves_the_bias_takes_back_what_rounding_takes_in_the_mean(seed: int) -> None:
+    tables, bits, codes = _made(seed)
+    if not tables.lines:
+        return
+    integers = quantise(tables, bits, codes, entry_bits=8)
+    wanted = as_deployed(tables, integers.grid)
+    steps = integers.scale * wanted.switch_rows
+    lost = bits.mean(axis=0) @ (steps - integers.switch_rows)
+    assert np.abs(steps - integers.switch_rows).max(initial=0) <= 128
+    assert np.allclose(balance(wanted).bias * integers.scale + lost, integers.bias, rtol=0, atol=0.51)
 
 
 def test_a_line_of_few_codes_and_much_weight_takes_a_gain() -> None:

@@ -1,6 +1,6 @@
 /* thenar_glove.h: recognises 3 grasp types from 6 switches and 2 joints of a glove.
    Layout for atmega2560: 16-bit entries, up to 6 switches a look-up, codes compared with thresholds, up to 2 joints
-   a look-up, rows added in line: the fastest of 84 layouts in 49152 bytes of flash, at most 137 cycles (284 by
+   a look-up, rows added in line: the fastest of 108 layouts in 49152 bytes of flash, at most 137 cycles (284 by
    update()) and 1648 bytes.
 
    From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME.h.j2. */

@@ -1,7 +1,7 @@
 /* thenar_glove.c: tables and integer arithmetic; the header says how it is used.
    Layout for cortex-m0plus: 16-bit entries, up to 6 switches a look-up, codes looked up in 256 bytes a joint, up to
-   2 joints a look-up: the fastest of 42 layouts in 65536 bytes of flash, about 86 instructions (124 by update()) and
-   2133 bytes.
+   2 joints a look-up: the fastest of 54 layouts in 65536 bytes of flash, about 107 instructions (157 by update())
+   and 2171 bytes.
 
    From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME.c.j2. */
 #include "thenar_glove.h"
@@ -194,7 +194,6 @@ const char *thenar_glove_grasp(thenar_glove_class grasp)
 #define LANES 2u /* words of two sums */
 
 /* Sums begin 2^15 too high, so that no lane is negative in the end, when all have taken what they borrowed. */
-#define TOO_HIGH 32768
 #define LANE(start, shift) (((uint32_t)(int32_t)(start) + 32768u) << (shift))
 #define START(a, b) (LANE(a, 0) + LANE(b, 16))
 
@@ -202,14 +201,11 @@ static uint32_t start[LANES] = {
     START(120, -40), START(7, 0),
 };
 
-/* The rows that are in the sums: at first those of all open and all codes 0. */
-static const thenar_glove_row *added[LOOKUPS] = {
-    &thenar_glove_rows[0],
-    &thenar_glove_rows[75],
-};
-static uint32_t sums[LANES] = {
-    START(-390, 180), START(317, 0),
-};
+/* What is in the sums of update(), once it has begun: after classify() it begins anew. */
+static bool begun;
+static const thenar_glove_row *added[LOOKUPS];
+static const thenar_glove_row nothing = {0u};
+static uint32_t sums[LANES];
 
 /* Open the switches that are missing, and make the codes of such joints 0. */
 static void leave_out(void)
@@ -224,6 +220,12 @@ static void leave_out(void)
     }
 }
 
+/* Add a row to the sums. */
+#define ADD(row) do { \
+    s0 += (row)[0]; \
+    s1 += (row)[1]; \
+} while (0)
+
 static void find_rows(const thenar_glove_row **row)
 {
     const uint8_t *const ports = thenar_glove_input.switches;
@@ -233,21 +235,57 @@ static void find_rows(const thenar_glove_row **row)
         thenar_glove_input.codes[1]]];
 }
 
-/* Set the sums to the start and what the rows add. */
-#define ADD(row) do { \
-    s0 += (row)[0]; \
-    s1 += (row)[1]; \
-} while (0)
+/* The first class of the largest sum: that sum in the upper bits of a word, and ones below. */
+typedef struct {
+    uint32_t sum;
+    uint_fast16_t grasp;
+} largest;
 
-static void add_up(const uint32_t *from, uint32_t *sum)
+/* Two scores in the place of two sums; and what is in the lowest sixteen bits is stored. */
+#define SCORES(sums) ((sums) ^ 0x80008000u)
+
+static void store(uint32_t lane, uint_fast16_t k)
 {
-    uint32_t s0 = from[0];
-    uint32_t s1 = from[1];
+    thenar_glove_scores[k] = (int16_t)(uint16_t)(lane & 0xFFFFu);
+}
 
-    ADD(*added[0]);
-    ADD(*added[1]);
-    sum[0] = s0;
-    sum[1] = s1;
+/* Take the upper bits of the word, the sum of class k, for the largest sum if it is. */
+static void take(uint32_t word, uint_fast16_t k, largest *best)
+{
+    if (word > best->sum) {
+        best->sum = word | 0xFFFFu;
+        best->grasp = k;
+    }
+}
+
+/* Add up the sums, and take them. */
+static void add_up(const thenar_glove_row *const *row, largest *best)
+{
+    uint32_t s0 = start[0];
+    uint32_t s1 = start[1];
+
+    ADD(*row[0]);
+    ADD(*row[1]);
+    store(SCORES(s0), 0u);
+    store(SCORES(s0) >> 16, 1u);
+    store(SCORES(s1), 2u);
+    take(s0 << 16, 0u, best);
+    take(s0, 1u, best);
+    take(s1 << 16, 2u, best);
+}
+
+thenar_glove_class thenar_glove_classify(void)
+{
+    largest best = {0u, 0u};
+    const thenar_glove_row *row[LOOKUPS];
+
+    begun = false;
+    if (n_lost > 0u) {
+        leave_out();
+    }
+    find_rows(row);
+    add_up(row, &best);
+    return (thenar_glove_class)best.grasp;
 }
 
 /* Replace a row in the sums. */
@@ -257,48 +295,40 @@ static void replace(const uint32_t *before, const uint32_t *after, uint32_t *sum
     sum[1] += after[1] - before[1];
 }
 
-/* The largest sum so far, and the first class that has it. */
-typedef struct {
-    uint32_t sum;
-    uint_fast16_t grasp;
-} largest;
-
-static void take(uint32_t sum, uint_fast16_t k, largest *best)
+static void begin(void)
 {
-    thenar_glove_scores[k] = (int16_t)((int32_t)sum - TOO_HIGH);
-    if (sum > best->sum) {
-        best->sum = sum;
-        best->grasp = k;
+    for (uint_fast16_t lane = 0u; lane < LANES; lane++) {
+        sums[lane] = start[lane];
     }
+    for (uint_fast16_t i = 0u; i < LOOKUPS; i++) {
+        added[i] = &nothing;
+    }
+    begun = true;
 }
 
-/* Set the scores to the sums; return the first class whose score is largest. */
-static thenar_glove_class unpack(void)
+static void answer(const uint32_t *sum, largest *best)
 {
-    largest best = {0u, 0u};
+    const uint32_t s0 = sum[0];
+    const uint32_t s1 = sum[1];
 
-    take(sums[0] & 0xFFFFu, 0u, &best);
-    take(sums[0] >> 16, 1u, &best);
-    take(sums[1] & 0xFFFFu, 2u, &best);
-    return (thenar_glove_class)best.grasp;
-}
-
-thenar_glove_class thenar_glove_classify(void)
-{
-    if (n_lost > 0u) {
-        leave_out();
-    }
-    find_rows(added);
-    add_up(start, sums);
-    return unpack();
+    store(SCORES(s0), 0u);
+    store(SCORES(s0) >> 16, 1u);
+    store(SCORES(s1), 2u);
+    take(s0 << 16, 0u, best);
+    take(s0, 1u, best);
+    take(s1 << 16, 2u, best);
 }
 
 thenar_glove_class thenar_glove_update(void)
 {
+    largest best = {0u, 0u};
     const thenar_glove_row *now[LOOKUPS];
 
     if (n_lost > 0u) {
         leave_out();
+    }
+    if (!begun) {
+        begin();
     }
     find_rows(now);
     for (uint_fast16_t i = 0u; i < LOOKUPS; i++) {
@@ -307,7 +337,8 @@ thenar_glove_class thenar_glove_update(void)
             added[i] = now[i];
         }
     }
-    return unpack();
+    answer(sums, &best);
+    return (thenar_glove_class)best.grasp;
 }
 
 /* Add steps to the score of a class from now on, and to what classify() begins with. */

@@ -1,6 +1,6 @@
 /* thenar_glove.h: recognises 3 grasp types from 6 switches and 2 joints of a glove.
    Layout for atmega328p: 16-bit entries, up to 6 switches a look-up, codes looked up in 256 bytes a joint, up to 2
-   joints a look-up, rows added in line: the fastest of 84 layouts in 16384 bytes of flash, at most 128 cycles (269
+   joints a look-up, rows added in line: the fastest of 108 layouts in 16384 bytes of flash, at most 128 cycles (269
    by update()) and 2375 bytes.
 
    From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME.h.j2. */
