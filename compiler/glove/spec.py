@@ -18,7 +18,7 @@ from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import glove_us, scan_us, scanner_us
 
 from ..hand import HandShape
-from .circuit import BillLine, Circuit, bill_of, glove_circuit
+from .circuit import BillLine, bill_of, glove_circuit
 from .layout import (
     BoardPins,
     End,
@@ -31,6 +31,7 @@ from .layout import (
     place_switches,
     wires_of,
 )
+from .parts import Circuit
 from .pattern import Pattern, pattern_of
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from thenar.drivers.spi.device import SpiDevice
 from thenar.runtime.frames import SwitchFrame
 from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Debounce, Harness, SpiWiring
 from thenar.runtime.scanning.ports import whole_scan
@@ -34,7 +35,7 @@ def answers(monkeypatch: pytest.MonkeyPatch) -> list[list[int | None]]:
     def prepare(_self: object, _transfers: Sequence[object]) -> Callable[[], list[int | None]]:
         return lambda: given.pop(0)
 
-    monkeypatch.setattr(spi.SpiDevice, "prepare", prepare)
+    monkeypatch.setattr(SpiDevice, "prepare", prepare)
     monkeypatch.setattr(spi, "now_us", lambda: 5)
     monkeypatch.setattr(i2c, "now_us", lambda: 5)
     monkeypatch.setattr("time.sleep", lambda _: None)
