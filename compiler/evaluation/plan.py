@@ -220,7 +220,7 @@ class Planner:
     """Plans the tables for populations of one set.
 
     samples  of all rows; prune: S of the paper's placements; rivals: methods of the baselines; levels: of a taxel, at
-             most; keep_joints: how many joints classifiers get, chosen from the training rows beside the switches.
+             most; keep_joints: how many joints classifiers get, chosen from the training rows, given the switches.
              A method learns once from the same rows.
     """
 
@@ -339,7 +339,7 @@ class Planner:
         return tuple(elements[place] for place in self._choosers[key](parameter))
 
     def joints(self, rows: Rows, elements: Elements, most: int | None) -> Columns:
-        """Return at most so many joints, ascending: the best beside these elements, by these rows; None: all."""
+        """Return at most so many joints, ascending: the best, given these elements, by these rows; None: all."""
         if most is None or most >= self.n_joints:
             return tuple(range(self.n_joints))
         key = elements, rows.tobytes()

@@ -292,7 +292,7 @@ def place(
     levels : int, optional
         How many levels of a taxel there are to choose from, at most.
     keep_joints : int, optional
-        How many joints to keep, chosen beside the kept switches; None: joints are not chosen.
+        How many joints to keep, in addition to the kept switches; None: joints are not chosen.
     limits : Limits, optional
         What the placement must obey.
     robust : bool

@@ -297,7 +297,7 @@ def quantise(
         joint_means=np.zeros((len(merged), len(tables.bias)), np.int16),
         scale=scale,
         slopes=tuple(replace(slope, row=row.astype(np.int8)) for slope, row in slopes),
-        pairs=tuple(replace(pair, rows=_rounded(pair.rows, scale)) for pair in balanced.pairs),
+        pairs=tuple(replace(pair, rows=np.rint(pair.rows * scale).astype(np.int16)) for pair in balanced.pairs),
     )
     joint_means = []
     for joint, (column, steps, rows) in enumerate(zip(codes.T, balanced.thresholds, balanced.joint_rows, strict=True)):

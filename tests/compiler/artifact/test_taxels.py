@@ -187,4 +187,5 @@ def test_commands_choose_levels_and_joints(padded: GraspSet, tmp_path: Path, cap
     assert run(["evaluate", str(path), *cut, "--json"]) == 0
     (table,) = json.loads(capfd.readouterr().out)["tables"]
     assert [row["name"] for row in table["rows"]] == [str(n) for n in range(1, len(padded.joints) + 1)]
-    assert str(LEVELS) in next(each.help for each in place_command.params if each.name == "levels")
+    (levels,) = (each for each in place_command.params if each.name == "levels")
+    assert f"[default: {LEVELS}]" in str(getattr(levels, "help", ""))
