@@ -62,7 +62,9 @@ def as_deployed(tables: ScoreTables, grid: int) -> ScoreTables:
 
     lines = tuple(replace(line, row=less_last(line.row)) for line in tables.lines)
     rows = tuple(map(less_last, tables.joint_rows))
-    return ScoreTables(less_last(tables.bias), less_last(tables.switch_rows), tables.thresholds, rows, lines)
+    pairs = tuple(replace(pair, rows=less_last(pair.rows)) for pair in tables.pairs)
+    bias, switch_rows = less_last(tables.bias), less_last(tables.switch_rows)
+    return ScoreTables(bias, switch_rows, tables.thresholds, rows, lines, pairs)
 
 
 def slope_of(line: Line, scale: float) -> tuple[Slope, Floats]:
@@ -297,7 +299,7 @@ def quantise(
         joint_means=np.zeros((len(merged), len(tables.bias)), np.int16),
         scale=scale,
         slopes=tuple(replace(slope, row=row.astype(np.int8)) for slope, row in slopes),
-        pairs=tuple(replace(pair, rows=_rounded(pair.rows, scale)) for pair in balanced.pairs),
+        pairs=tuple(replace(pair, rows=np.rint(pair.rows * scale).astype(np.int16)) for pair in balanced.pairs),
     )
     joint_means = []
     for joint, (column, steps, rows) in enumerate(zip(codes.T, balanced.thresholds, balanced.joint_rows, strict=True)):
