@@ -25,7 +25,7 @@ from thenar.compiler.trainers.base import Training
 from thenar.runtime.manifest import Options
 from thenar.simulator import load_scene, simulate
 
-KEPT, FOLDS, CLOSES_N = 33, 4, 1.0
+KEPT, FOLDS, CLOSES_N, LEVELS = 33, 4, 1.0, 3
 LOGIT = Options(trainer="logit")
 
 
@@ -36,7 +36,7 @@ def read(learning: Samples, test: Samples, pads: GraspSet, reading: Reading) -> 
     if reading == "switches":
         elements = tuple(closed[pad] for pad in kept)
     elif reading == "levels":
-        elements = tuple(element for element in elements_of(learning) if element.column in kept)
+        elements = tuple(element for element in elements_of(learning, LEVELS) if element.column in kept)
     else:
         return coded(learning, kept), coded(test, kept)
     return bits_of(learning, elements), bits_of(test, elements)
@@ -77,7 +77,7 @@ def main(arguments: list[str]) -> None:
     for reading, alone, both in rates(simulate(analog).grasp_set):
         cells = (f"{100 * rate.mean:.1f} [{100 * rate.low:.1f}, {100 * rate.high:.1f}]" for rate in (alone, both))
         print(f"| {reading} | {' | '.join(cells)} |", flush=True)
-    found = onset(simulate(contact).grasp_set, closes_n=CLOSES_N, options=LOGIT)
+    found = onset(simulate(contact).grasp_set, closes_n=CLOSES_N, options=LOGIT, levels=LEVELS)
     forces = " | ".join(f"{force:g}" for force in found.newtons)
     print(f"\n| N on the hardest pressed pad | {forces} |\n|---|{'---|' * len(found.newtons)}")
     trials = (str(rate.total if rate else 0) for rate in found.curves[0].rates)

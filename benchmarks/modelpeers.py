@@ -200,6 +200,7 @@ OURS = tuple(
         ("logitboost", "100 rounds, the paper's"),
         ("logit", "as it is by default"),
         ("sum", "as it is by default"),
+        ("pairs", "as it is by default"),
         (AUTO, "chosen by inner folds"),
     )
 )

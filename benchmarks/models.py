@@ -34,7 +34,17 @@ from thenar.runtime.manifest import Of
 
 CONSOLE = Console(width=150)
 QUICK_SETS = ("icub", "aml")
-CURVE_MODELS = ("logitboost", "logit", "sum", "auto", "logistic regression", "random forest", "extra trees", "RBF SVM")
+CURVE_MODELS = (
+    "logitboost",
+    "logit",
+    "sum",
+    "pairs",
+    "auto",
+    "logistic regression",
+    "random forest",
+    "extra trees",
+    "RBF SVM",
+)
 # What a rival may be ahead by.
 WITHIN = 0.5
 

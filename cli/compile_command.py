@@ -73,16 +73,26 @@ _GROUPS = {
 def _chips() -> Iterable[str]:
     from thenar.drivers.i2c.chips import expanders
 
-    return (*expanders(), _BOARD)
+    return (*expanders(), _BOARD, *_converters())
+
+
+def _converters() -> list[str]:
+    """Return the kinds of chips that measure taxels."""
+    from thenar.drivers.i2c.chips import CHIPS, expanders
+    from thenar.drivers.spi.chips import SPI_CHIPS
+
+    return [kind for kind in (*CHIPS, *SPI_CHIPS) if kind not in expanders()]
 
 
 class _ChipOption(click.Option):
     """Its help, which is only made when it is asked for, names the chips."""
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
-        *chips, board = _chips()
+        measuring = _converters()
+        chips = [kind for kind in _chips() if kind != _BOARD and kind not in measuring]
         self.help = (
-            f"Port expander to propose: {', '.join(chips)}; or {board}, a switch-scanner board.  [default: {chips[0]}]"
+            f"Port expander to propose: {', '.join(chips)}; or {_BOARD}, a scanner board; or what measures taxels: "
+            f"{', '.join(measuring)}.  [default: {chips[0]}, and ads7828 for taxels]"
         )
         return super().get_help_record(ctx)
 
@@ -344,7 +354,7 @@ def _kept(manifest: "Manifest", made: "BuildReport") -> str:
 
 
 def _print_training(manifest: "Manifest") -> None:
-    from thenar.drivers.cyberglove_protocol import shortest_us
+    from thenar.drivers.cyberglove_protocol import sensors_with, shortest_us
 
     console = out()
     if manifest.switches:
@@ -353,9 +363,10 @@ def _print_training(manifest: "Manifest") -> None:
         if switch.threshold is not None:
             console.print(f"{switch.name}: {switch.closed}, learnt")
     if manifest.options.keep_joints is not None:
-        names = ", ".join(joint.name for joint in manifest.joints)
-        us = shortest_us(len(manifest.joints), 115_200, status=True)
-        console.print(f"joints: {names}; a CyberGlove's record of them takes {duration(us)}", soft_wrap=True)
+        names = [joint.name for joint in manifest.joints]
+        us = shortest_us(len(names), 115_200, status=True)
+        record = f"; a CyberGlove's record of them takes {duration(us)}" if sensors_with(names) else ""
+        console.print(f"joints: {', '.join(names)}{record}", soft_wrap=True)
     console.print(f"trained by {manifest.fit}{': ' if manifest.fit.why else ''}{manifest.fit.why}", soft_wrap=True)
     for each in manifest.fit.compared:
         console.print(f"  {each}", soft_wrap=True)

@@ -24,7 +24,7 @@ from .common import (
     warning,
     write_json,
 )
-from .options import Training, asked_settings, method_list, trainer_option
+from .options import Training, asked_settings, keep_joints_option, levels_option, method_list, trainer_option
 
 if TYPE_CHECKING:
     from rich.table import Table as Grid
@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     from thenar.compiler.evaluation.study import Study
     from thenar.compiler.evaluation.tables import Cell, RateTable
 
-TABLES = ("compositions", "generality", "pruning", "baselines", "trainers")
+_USUAL = ("compositions", "generality", "pruning", "baselines", "trainers")
+TABLES = (*_USUAL, "joints")
 
 
 def _numbers(_: click.Context, __: click.Parameter, value: str) -> tuple[int, ...]:
@@ -98,10 +99,12 @@ def _protocols(_: click.Context, __: click.Parameter, value: str) -> tuple[str, 
 @click.option(
     "--tables",
     type=ListOf("table", lambda: TABLES, none=True),
-    default=",".join(TABLES),
+    default=",".join(_USUAL),
     show_default=True,
-    help="Which tables, or none.",
+    help="Which tables, or none; joints: the best 1, 2, ... of them.",
 )
+@levels_option
+@keep_joints_option
 @click.option(
     "--permute",
     type=click.IntRange(min=0, max=100_000),
@@ -154,6 +157,7 @@ def command(
         thenar evaluate set.grasps
         thenar evaluate set.grasps --tables none --learning-curve --plot pictures/
         thenar evaluate set.grasps --by subject --permute 100
+        thenar evaluate set.grasps --by subject --tables joints
         thenar evaluate set.grasps --by subject --protocol nested --plot pictures/ -o result.json
     """
     from thenar.compiler.evaluation.study import Options, evaluate

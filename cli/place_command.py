@@ -272,7 +272,7 @@ def _sentences(placement: "Placement") -> Iterator[str]:
         levels = sum(kept.above is not None for kept in placement.switches)
         yield f"{counted(levels, 'level')} of {counted(len(taxels), 'taxel')}: a taxel is converted once"
     if placement.kept_joints:
-        yield f"the best {counted(len(placement.kept_joints), 'joint')} beside them: {', '.join(placement.kept_joints)}"
+        yield f"the best {counted(len(placement.kept_joints), 'joint')} in addition: {', '.join(placement.kept_joints)}"
     if placement.exact is not None:
         yield from _of_exact(placement.exact, len(placement.switches))
 

@@ -83,19 +83,25 @@ def _harness(folder: Path, loaded: "Build", glove: Path | None, board: Path | No
 
 def _board_pins(path: Path, manifest: "Manifest") -> "BoardPins":
     """Return how the board in a `board.toml` reaches its keys."""
-    from thenar.compiler.firmware.board import check_switches, key_names, load_board
+    from dataclasses import replace
+
+    from thenar.compiler.firmware.board import check_switches, key_names, keys_of, load_board
     from thenar.compiler.glove.layout import BoardPins
     from thenar.runtime.harness.wiring import BusWiring
 
     board = load_board(path)
-    names = [switch.name for switch in manifest.switches]
+    names = keys_of(board, manifest.switches)
     check_switches(board, names)
+    taxels = board.taxels
+    pins = BoardPins() if taxels is None else BoardPins(channels=taxels.inputs, selects=taxels.select)
     if board.chips:
-        return BoardPins(bus=BusWiring(device=board.part, clock_hz=board.bus.clock_hz, chips=board.chips))
+        return replace(pins, bus=BusWiring(device=board.part, clock_hz=board.bus.clock_hz, chips=board.chips))
     if board.matrix is None:
-        return BoardPins(tuple(board.pins[name] for name in key_names(board, names)), ("",) * len(names))
+        keys = tuple(board.pins[name] for name in key_names(board, names))
+        return replace(pins, signals=keys, lows=("",) * len(keys))
     rows, columns = board.matrix.rows, board.matrix.columns
-    return BoardPins(columns * len(rows), tuple(row for row in rows for _ in columns), board.matrix.diodes)
+    lows = tuple(row for row in rows for _ in columns)
+    return replace(pins, signals=columns * len(rows), lows=lows, diodes=board.matrix.diodes)
 
 
 def _print(spec: "SpecSummary", written: str) -> None:

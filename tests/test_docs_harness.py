@@ -53,7 +53,7 @@ def test_every_example_is_a_sound_harness(number: int, tmp_path: Path) -> None:
 
 
 def test_there_are_examples() -> None:
-    assert len(EXAMPLES) == 3
+    assert len(EXAMPLES) == 4
 
 
 def documented() -> Iterator[tuple[str, str, str]]:

@@ -1,6 +1,8 @@
 """Every example runs as its docstring says, beside an emulated glove, and fits on a card."""
 
 import ast
+import csv
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -162,6 +164,44 @@ def test_the_sample_table_is_what_its_script_makes(tmp_path: Path) -> None:
     run(tmp_path, *example("home_glove.py", "made.csv"))
     assert (tmp_path / "made.csv").read_bytes() == TABLE.read_bytes()
     assert TABLE.stat().st_size < 400_000
+
+
+@slow
+def test_the_home_made_glove_goes_from_its_table_to_firmware_in_at_most_ten_commands(tmp_path: Path) -> None:
+    script = (EXAMPLES / "home_glove.sh").read_text()
+    commands = [line for line in script.splitlines() if line.startswith("thenar ")]
+    assert len(commands) <= 10
+    page = (EXAMPLES.parent / "docs" / "home-glove.md").read_text()
+    for command in commands:
+        shown = command.replace('"$TABLE"', "table.csv").replace(" --overwrite", "")
+        assert f"    {shown}\n" in page
+    # Of the table three people's first two trials, three frames each.
+    folder = tmp_path / "home_glove"
+    folder.mkdir()
+    with TABLE.open(newline="", encoding="utf-8") as file:
+        header, *rows = csv.reader(file)
+    few = [row for row in rows if row[0] in ("Ana", "Ben", "Chloe") and row[3] != "3" and int(row[4]) <= 3]
+    with (folder / "table.csv").open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file).writerows([header, *few])
+    found = tmp_path / "bin"
+    found.mkdir()
+    (found / "thenar").write_text(f'#!/bin/sh\nexec "{sys.executable}" -m thenar.cli "$@"\n')
+    (found / "thenar").chmod(0o755)
+    path = f"{found}:{os.environ['PATH']}"
+    done = subprocess.run(
+        ["sh", str(EXAMPLES / "home_glove.sh")],
+        cwd=tmp_path, env={**os.environ, "PATH": path}, capture_output=True, text=True, timeout=600, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    grasp_set, build = GraspSet.load(folder / "set.grasps"), Build.load(folder / "build")
+    assert (len(grasp_set.taxel_columns), len(grasp_set.joints), len(grasp_set)) == (24, 5, len(few))
+    kept = build.manifest.switches
+    assert len(kept) == 16
+    assert all(switch.threshold is not None for switch in kept)
+    lines = (folder / "grasps.jsonl").read_text().splitlines()
+    assert len(lines) >= len(few)
+    subprocess.run(["make", "-C", str(folder / "firmware-host"), "check"], check=True, capture_output=True)
+    assert list((folder / "firmware-avr").glob("*.c"))
 
 
 @pytest.fixture(scope="module")

@@ -42,6 +42,7 @@ ALLOWED = {
         "runtime",
         "drivers.errors",
         "drivers.members",
+        "compiler.additive",
         "compiler.boosting",
         "compiler.elementary",
         "compiler.limits",

@@ -22,7 +22,7 @@ from ..limits import check_memory
 from ..tables.collapse import Floats, ScoreTables
 from .logit import TOLERANCE, Column, Fit, column_edges, columns_of, sparse, tables_of
 
-PAIRS, PAIR_BINS, PAIR_SMOOTHNESS = 4, 8, 1.0
+PAIRS, PAIR_BINS, PAIR_SMOOTHNESS = 4, 8, 0.5
 MOST_PAIR_BINS = 16  # 256 cells are the rows of one look-up
 
 
@@ -45,6 +45,8 @@ def fit_pairs(
     `pair_smoothness` pulls neighbouring cells of a pair towards each other, whose joints have at most `pair_bins` bins
     there; all else is as in `fit_logit`. Raises BoostingError.
     """
+    if not 2 <= pair_bins <= MOST_PAIR_BINS:
+        raise BoostingError(f"pair_bins={pair_bins} must be 2 to {MOST_PAIR_BINS}: a pair is one look-up of bytes")
     X, s = np.hstack([switches, codes]), switches.shape[1]
     if not (0 < penalty < np.inf and 0 <= smoothness < np.inf and 0 <= pair_smoothness < np.inf):
         raise BoostingError(f"penalty={penalty} must be above 0, and smoothness at least 0, all finite")

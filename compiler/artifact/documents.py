@@ -153,6 +153,8 @@ def _study(made: BuildReport, jobs: int, progress: Progress | None) -> "tuple[St
         seed=asked.seed,
         trainer=fit.trainer,
         settings=settings,
+        levels=asked.levels,
+        keep_joints=asked.keep_joints,
     )
     try:
         work = _TRAININGS * len(made.grasp_set) * (options.rounds or USUAL_ROUNDS)

@@ -101,7 +101,7 @@ def _further(progress: Progress, before: int, total: int) -> Progress:
 def _predicted(grasp_set: GraspSet, jobs: int, progress: Progress | None) -> dict[str, Labels]:
     """Return for each kind of inputs the label (n,) that each row was given when it was left out of training."""
     parts = populations(grasp_set, "trial", FOLDS, repeats=1, seed=SEED)
-    planner = Planner(parts, Samples.of(grasp_set, "switches"), len(grasp_set.joints), 0, (), SEED)
+    planner = Planner(parts, Samples.of(grasp_set), 0, (), SEED)
     fits = {
         name: [fit for part in parts for fit in planner.cell(part, kind, lambda *_: ()).fits]
         for name, kind in _KINDS.items()

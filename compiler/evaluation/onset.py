@@ -63,6 +63,7 @@ def onset(
     seed: int = 1,
     jobs: int = -1,
     options: Options | None = None,
+    levels: int | None = None,
 ) -> Onset:
     """Return the curves of initial contact of a set with a row a frame, such as the scene `initial-contact` makes.
 
@@ -80,6 +81,8 @@ def onset(
         Worker processes; the answer is the same for any number of them.
     options : Options, optional
         What trains; the additive logit, where none are given.
+    levels : int, optional
+        The most levels of a taxel, found in each fold's training rows; as placements have it, where none is given.
 
     Raises
     ------
@@ -103,7 +106,7 @@ def onset(
         kinds += [("nothing", True), *((reading, True) for reading in READINGS)]
     folds = trial_folds(samples.labels, samples.trials, n_folds, seed)
     training = Training.of(options or Options(trainer="logit"))
-    tasks = ((samples, closed, kind, fold, training) for kind in kinds for fold in folds)
+    tasks = ((samples, closed, levels, kind, fold, training) for kind in kinds for fold in folds)
     predicted = {kind: np.empty(len(samples.labels), np.intp) for kind in kinds}
     for kind, fold, labels in in_workers(_predicted, tasks, jobs):
         predicted[kind][fold.test] = labels
@@ -133,17 +136,17 @@ def _rows(grasp_set: GraspSet, taxels: list[int], newtons: NDArray[np.float64]) 
     return found
 
 
-_Task = tuple[Samples, Elements, tuple[Reading, bool], Fold, Training]
+_Task = tuple[Samples, Elements, int | None, tuple[Reading, bool], Fold, Training]
 
 
 def _predicted(task: _Task) -> tuple[tuple[Reading, bool], Fold, NDArray[np.intp]]:
-    samples, closed, kind, fold, training = task
+    samples, closed, levels, kind, fold, training = task
     reading, joints = kind
     n_switches, learning = samples.n_switches, samples.rows(fold.train)
     if not joints:
         samples, learning = samples.with_joints(()), learning.with_joints(())
     if reading in ("levels", "switches"):
-        elements = elements_of(learning) if reading == "levels" else (*map(Element, range(n_switches)), *closed)
+        elements = elements_of(learning, levels) if reading == "levels" else (*map(Element, range(n_switches)), *closed)
         learning, test = bits_of(learning, elements), bits_of(samples.rows(fold.test), elements)
     else:
         learning, test = _coded(learning, reading), _coded(samples.rows(fold.test), reading)

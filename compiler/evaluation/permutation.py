@@ -86,7 +86,7 @@ def _counted(task: tuple[Permutations, GraspSet, Composition, int]) -> tuple[int
     how, grasp_set, kind, number = task
     made = shuffled_labels(grasp_set, (how.seed, number)) if number else grasp_set
     parts = populations(made, "trial", how.folds, 1, how.seed) if how.scheme == "trial" else how.parts
-    planner = Planner(parts, Samples.of(made, "switches"), len(made.joints), how.prune, (), how.seed)
+    planner = Planner(parts, Samples.of(made), how.prune, (), how.seed)
     cells = [planner.cell(part, kind, partial(planner.own, NESTED)) for part in parts]
     cells = [replace(cell, runs=cell.runs[:1]) for cell in cells]
     data = Data.of(made)

@@ -13,6 +13,7 @@ from thenar.runtime.manifest import Options
 
 from ..boosting.stumps import winners
 from ..placement.elements import Elements, bits_of, elements_of
+from ..placement.joints import joint_order
 from ..placement.methods.base import METHODS, PAPERS, Chooser
 from ..placement.methods.filters import random_placement
 from ..recordings.graspset import GraspSet
@@ -169,11 +170,12 @@ def available(n_switches: int, n_joints: int) -> tuple[Composition, ...]:
     return tuple(c for c in COMPOSITIONS if (n_joints or not c.angle) and (n_switches or not c.has_switches))
 
 
-TableName = Literal["compositions", "generality", "pruning", "baselines", "trainers"]
+TableName = Literal["compositions", "generality", "pruning", "baselines", "trainers", "joints"]
 Select = Callable[[Population, Fold], Elements]
 
 RIVALS = ("cmim", "mutual-information")
 REFERENCE = "logitboost"  # of the trainers: the others are compared with it
+JOINTS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 18)  # how many are kept, of the joints alone
 DRAWS = 5  # random placements that a placement is compared with
 
 
@@ -217,20 +219,22 @@ class RowPlan:
 class Planner:
     """Plans the tables for populations of one set.
 
-    samples  of all rows, with n_joints joints besides; prune: S of the paper's placements; rivals: methods of the
-             baselines; levels: of a taxel, at most. A method learns once from the same rows.
+    samples  of all rows; prune: S of the paper's placements; rivals: methods of the baselines; levels: of a taxel, at
+             most; keep_joints: how many joints classifiers get, chosen from the training rows, given the switches.
+             A method learns once from the same rows.
     """
 
     parts: tuple[Population, ...]
     samples: Samples
-    n_joints: int
     prune: int
     prune_list: tuple[int, ...]
     seed: int
     rivals: tuple[str, ...] = RIVALS
     levels: int | None = None
+    keep_joints: int | None = None
     _choosers: dict[tuple[str, bytes], Chooser] = field(default_factory=dict, init=False, repr=False)
     _elements: dict[bytes, Elements] = field(default_factory=dict, init=False, repr=False)
+    _joint_orders: dict[tuple[Elements, bytes], Columns] = field(default_factory=dict, init=False, repr=False)
 
     def table(self, name: TableName, protocol: Protocol) -> list[RowPlan]:
         """Return the rows of a table under a protocol."""
@@ -240,6 +244,7 @@ class Planner:
             "pruning": self._pruning,
             "baselines": self._baselines,
             "trainers": self._trainers,
+            "joints": lambda _: self._best_joints(),
         }
         return rows[name](protocol)
 
@@ -292,11 +297,20 @@ class Planner:
         once = replace(self, parts=tuple(replace(part, repeats=part.repeats[:1]) for part in self.parts))
         return [once._row(name, kind.what, kind, chosen, name) for kind in self.kinds for name in learners()]
 
+    def _best_joints(self) -> list[RowPlan]:
+        sizes = [*(size for size in JOINTS if size < self.n_joints), self.n_joints]
+        return [self._row(str(n), f"the best {n} joints", ANGLE, lambda *_: (), most=n) for n in sizes]
+
     @property
     def kinds(self) -> tuple[Composition, ...]:
         """What trainers are compared on: selected switches and joints, or what of them there is; and each alone."""
         there = available(self._n_switches, self.n_joints)
         return tuple(kind for kind in (ANGLE_SELECTED, ANGLE, SELECTED) if kind in there)
+
+    @property
+    def n_joints(self) -> int:
+        """How many joints there are."""
+        return int(self.samples.codes.shape[1])
 
     @property
     def _n_switches(self) -> int:
@@ -320,19 +334,36 @@ class Planner:
         rows = np.sort(rows)
         key, elements = (method, rows.tobytes()), self.elements(rows)
         if key not in self._choosers:
-            self._choosers[key] = METHODS.named(method).chooser(bits_of(self.samples.rows(rows), elements))
+            alone = self.samples.rows(rows).with_joints(())
+            self._choosers[key] = METHODS.named(method).chooser(bits_of(alone, elements))
         return tuple(elements[place] for place in self._choosers[key](parameter))
 
-    def _row(self, name: str, what: str, kind: Composition, select: Select, learner: str = "") -> RowPlan:
-        return RowPlan(name, what, tuple(self.cell(part, kind, select, learner) for part in self.parts))
+    def joints(self, rows: Rows, elements: Elements, most: int | None) -> Columns:
+        """Return at most so many joints, ascending: the best, given these elements, by these rows; None: all."""
+        if most is None or most >= self.n_joints:
+            return tuple(range(self.n_joints))
+        key = elements, rows.tobytes()
+        if key not in self._joint_orders:
+            self._joint_orders[key] = joint_order(bits_of(self.samples.rows(rows), elements))
+        return tuple(sorted(self._joint_orders[key][:most]))
 
-    def cell(self, part: Population, kind: Composition, select: Select, learner: str = "") -> CellPlan:
-        """Return the fits of composition `kind` on every fold of `part`; `select` gives the placement for a fold."""
+    def _row(
+        self, name: str, what: str, kind: Composition, select: Select, learner: str = "", most: int | None = None
+    ) -> RowPlan:
+        return RowPlan(name, what, tuple(self.cell(part, kind, select, learner, most) for part in self.parts))
+
+    def cell(
+        self, part: Population, kind: Composition, select: Select, learner: str = "", most: int | None = None
+    ) -> CellPlan:
+        """Return the fits of composition `kind` on every fold of `part`; `select` gives the placement for a fold, and
+        `most` is how many joints are kept, None: `keep_joints`.
+        """
 
         def fit(fold: Fold) -> FoldFit:
             placement = select(part, fold) if kind.needs_placement else ()
             elements = kind.elements(placement, self.elements(fold.train) if kind.others else ())
-            return FoldFit(fold, elements, tuple(range(self.n_joints * kind.angle)), part.grasps, learner)
+            joints = self.joints(fold.train, elements, most or self.keep_joints) if kind.angle else ()
+            return FoldFit(fold, elements, joints, part.grasps, learner)
 
         return CellPlan(part, tuple(tuple(map(fit, folds)) for folds in part.repeats))
 

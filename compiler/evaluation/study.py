@@ -23,6 +23,7 @@ from .populations import NESTED, OF, PROTOCOLS, Population, ProtocolName, Scheme
 from .tables import RateTable, Reader
 
 TABLES: tuple[TableName, ...] = ("compositions", "generality", "pruning", "baselines", "trainers")
+_NESTED: tuple[TableName, ...] = ("trainers", "joints")
 
 _ROUNDS = 100  # the paper's
 # Those with a row that is trained on all switches at once.
@@ -43,6 +44,8 @@ class Options:
     rivals      methods that ID3 is compared with in the baselines, besides random placements
     trainer     what makes every classifier, with its `settings`; rounds are LogitBoost's, None: the paper's hundred. In
                 the table of trainers and the learning curve, what is not given is chosen from the training rows
+    levels      most levels of a taxel that there are to choose from, None: as many as are usual
+    keep_joints how many joints classifiers get, chosen from the training rows, None: all
     learning    whether to find learning curves
     permute     how often to evaluate with shuffled labels, for the chance level; 0: not at all
     """
@@ -62,6 +65,8 @@ class Options:
     settings: Mapping[str, float | str] = field(default_factory=dict)
     permute: int = 0
     learning: bool = False
+    levels: int | None = None
+    keep_joints: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,12 +167,13 @@ def evaluate(
         _check_all_switches(chosen, parts)
     planner = Planner(
         parts,
-        Samples.of(chosen, "switches"),
-        len(chosen.joints),
+        Samples.of(chosen),
         options.prune,
         options.prune_list,
         options.seed,
         options.rivals,
+        options.levels,
+        options.keep_joints,
     )
     protocols = [protocol for protocol in PROTOCOLS if protocol.name in options.protocols]
     plans = {
@@ -175,7 +181,7 @@ def evaluate(
         for name, reason in reasons.items()
         if reason is None
         for each in protocols
-        if each is NESTED or name != "trainers"
+        if each is NESTED or name not in _NESTED
     }
     data, curves = Data.of(chosen, options.scheme), None
     if options.learning:
@@ -247,8 +253,10 @@ def _check_all_switches(grasp_set: GraspSet, parts: tuple[Population, ...]) -> N
 
 def _why_not(name: TableName, grasp_set: GraspSet, parts: tuple[Population, ...], options: Options) -> str | None:
     """Return why a table has no meaning for the set and what is asked, or None."""
-    if name == "trainers":
-        return None if "nested" in options.protocols else "trainers are compared under the nested protocol alone"
+    if name == "joints" and not grasp_set.joints:
+        return "the set has no joints"
+    if name in _NESTED:
+        return None if "nested" in options.protocols else f"{name} are compared under the nested protocol alone"
     if name != "compositions" and not grasp_set.element_names:
         return "a placement needs switches, and the set has none"
     if name == "generality" and len(parts) < 2:

@@ -3,6 +3,7 @@
 from collections.abc import Collection, Sequence
 from math import ceil
 
+from thenar.drivers.scanner_protocol import OVERHEAD, Analog
 from thenar.runtime.harness.wiring import BusWiring, Harness
 from thenar.runtime.scanning.plan import plan_scan
 from thenar.runtime.scanning.scanmap import Port
@@ -75,8 +76,9 @@ def twi_files(board: Board) -> dict[str, str]:
 
 
 # Cycles of the firmware as libsimavr counts them, rounded up: of a scan whatever it reads, of a key that is read, of a
-# byte on the bus beside its SCL periods, of a reading; and of an answer, of a look-up for it, of a class of a look-up.
-_SCAN, _KEY, _BUS_BYTE, _READING = 3000, 60, 110, 600
+# byte on the bus beside its SCL periods, of a reading, of a byte of an ANALOG; and of an answer, of a look-up for it,
+# of a class of a look-up. The interrupts of a converter take less than a tenth.
+_SCAN, _KEY, _BUS_BYTE, _READING, _ANALOG_BYTE = 3000, 60, 110, 600, 80
 _ANSWER, _LOOKUP, _CLASS = 600, 40, 10
 
 
@@ -117,6 +119,9 @@ def shortest_scan_us(board: Board, switches: Sequence[str], tables: IntegerTable
         reading = next(each for each in board.chips[port.chip].chip.readings if each.name == port.reading)
         seconds += reading.scl_periods / board.bus.clock_hz
         cycles += _READING + _BUS_BYTE * reading.wire_bytes
+    if board.channels and not recognises:
+        cycles += _ANALOG_BYTE * (OVERHEAD + Analog.LAYOUT.size + 2 * board.channels)
+        cycles += cycles // 10
     if recognises:
         lookups = tables.n_switches // 2 + tables.n_joints
         answers = len(ports) if exits_early(board, ports) else 1

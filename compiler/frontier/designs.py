@@ -200,12 +200,14 @@ def points_of(
     luck: Mapping[Judged, float],
     names: Sequence[str],
     training: Callable[[Candidate], Training],
+    joints: Callable[[Candidate], Sequence[str]] = lambda _: (),
 ) -> tuple[Point, ...]:
     """Return those that are on a front, numbered from the fastest frame on.
 
     luck   by how much the rate of each is to be corrected
     names  of all switches of the set
     training  how a choice is trained
+    joints    the names of its joints, where they are not all or none
     """
     fronts = _fronts(several, latencies)
     ordered = sorted(several, key=lambda design: (design.frame.us, design.n_switches))
@@ -220,6 +222,7 @@ def points_of(
             fronts[design, kind],
             names,
             training(design.close.screened.choice),
+            tuple(joints(design.close.screened.choice)),
         )
         for number, (design, kind) in enumerate(found, 1)
     )
@@ -261,6 +264,7 @@ def _point(
     fronts: tuple[str, ...],
     names: Sequence[str],
     training: Training,
+    joints: tuple[str, ...],
 ) -> Point:
     wired, tabled, close = design.wired, design.tables.tabled, design.close
     choice = close.screened.choice
@@ -277,6 +281,7 @@ def _point(
             wiring="" if wired is None else wired.wiring,
             clock_hz=0 if wired is None else wired.clock_hz,
             table_bits=tabled.shape.table_bits,
+            keep_joints=choice.keep_joints,
             **_trained(training),
         ),
         switches=tuple(names[column] for column in close.screened.columns),
@@ -296,4 +301,5 @@ def _point(
         compile_s=round(close.choosing_s + design.tables.seconds, 2),
         fronts=fronts,
         asked=design.asked,
+        joints=joints,
     )

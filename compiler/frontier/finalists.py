@@ -113,6 +113,7 @@ def look_closely(survey: Survey, chosen: Sequence[Screened]) -> tuple[Close, ...
     searches = {choice: survey.search.alone(choice.trainer) for choice in choices}
     typical = survey.typical(choices)
     survey.choose("finalists' placements", choices, cuts.others)
+    survey.choose_joints("finalists' joints", choices, cuts.others)
     survey.settle("finalists' settings", typical, cuts.others)
     fits = survey.fit("finalists", choices, cuts.screening, lambda one: (searches[one].stages, searches[one].tabled))
     rows = len(cuts.trials)
@@ -125,7 +126,7 @@ def look_closely(survey: Survey, chosen: Sequence[Screened]) -> tuple[Close, ...
     calls = [
         price.call(
             PRICE_S,
-            survey.inputs(one.choice.joints),
+            survey.read(one.choice, cuts.everything),
             tuple(survey.switch_names[column] for column in one.columns),
             one.columns,
             tuple(dict.fromkeys([*worthwhile(judged[one.choice][1]), papers_tables(searches[one.choice])])),

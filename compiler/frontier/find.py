@@ -36,8 +36,8 @@ from .latency import Pace, latencies
 from .measure import TRIAL_S, measured
 from .plots import PICTURES, pictures
 from .points import SCHEMA, Frontier, FrontierError, Mark, Point, Tried, Way, frontier_to_bytes
-from .screen import OTHER_TRAINERS, QUICK_PRICE_S, Screened, screen, screen_others
-from .search import Candidate, Search, available_inputs, curve_ways, ways
+from .screen import FEWER_JOINTS, OTHER_TRAINERS, QUICK_PRICE_S, Screened, screen, screen_fewer, screen_others
+from .search import JOINTS, Candidate, Search, available_inputs, curve_ways, ways
 from .stream import Stream, stream_of
 from .survey import Cuts, Survey, fit_s, path_s, settle_s
 from .timing.scan_times import records_of, scan_times
@@ -61,6 +61,8 @@ _UNTIMED = (
 _MARKED, _DESIGNS, _DIFFERENT, _CHECKED = 3, 2, 0.8, 30
 # So many times as many placements as there are finalists are screened with the other trainers.
 _WIDER = 3
+# So many placements are tried with fewer joints.
+_FEWER = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,6 +288,7 @@ def foreseen(survey: Survey) -> dict[str, float]:
     trainers = [search.alone(name) for name in search.trainers]
     last, again = min(search.finalists + _MARKED, choices), min(_WIDER * search.finalists, choices)
     few = papers_depth(search)
+    fewer = min(_FEWER, choices) * sum(size < survey.n_joints for size in JOINTS)
 
     def settling(some: Sequence[Search], sizes: Sequence[int]) -> float:
         open_ones = [each for each in some if len(each.candidates) > 1]
@@ -301,6 +304,7 @@ def foreseen(survey: Survey) -> dict[str, float]:
         f"settings{OTHER_TRAINERS}": settling(trainers[1:], (rows, *train)),
         "finalists' settings": settling(trainers, more),
         "screening": (_DIFFERENT * choices + rivals) * screening(trainers[:1]),
+        f"screening{FEWER_JOINTS}": fewer * screening(trainers[:1]),
         f"screening{OTHER_TRAINERS}": again * screening(trainers[1:]),
         "times": _DIFFERENT * choices * QUICK_PRICE_S,
         f"times{OTHER_TRAINERS}": again * len(trainers[1:]) * QUICK_PRICE_S,
@@ -322,14 +326,18 @@ def _found(survey: Survey, stream: Stream, wanted: Wanted, own: tuple[Mark, ...]
             f"no placement that was tried can be built for {survey.equipment.model.target}: name other --methods or "
             "another --target"
         )
-    screened += screen_others(survey, finalists(screened, (), _WIDER * search.finalists))
+    several = finalists(screened, (), _WIDER * search.finalists)
+    screened += screen_fewer(survey, finalists([one for one in screened if one.choice.joints], (), _FEWER))
+    screened += screen_others(survey, several)
     named = choices_to_mark(n_switches, survey.n_joints, search.trainers[0])
     closes = look_closely(survey, finalists(screened, list(named), search.finalists))
     every = [design for close in closes for design in designs(close, survey.transfer(close.screened.choice))]
     by_time, by_switches = best_designs(every)
     kept, checks, skipped = measured(with_whole_scans([*by_time, *by_switches]), survey.equipment, survey.cache)
     luck = lucks((by_time, by_switches), every, screened, survey.cuts, search.seed)
-    points = points_of(kept, _latencies(survey, stream, kept), luck, survey.switch_names, survey.training)
+    points = points_of(
+        kept, _latencies(survey, stream, kept), luck, survey.switch_names, survey.training, survey.some_joints
+    )
     picked, tried = wanted.pick(points), _tried(screened, closes, search)
     claimed = [sentence(INDEPENDENT)] if survey.grasp_set.independent else []
     early = [_EARLY] if any(design.scan_kind == "early" for design in kept) else []
@@ -370,10 +378,10 @@ def _latencies(survey: Survey, stream: Stream, kept: Sequence[Design]) -> Latenc
     calls = [
         latencies.call(
             2.0 + len(mine),
-            survey.inputs(choice.joints),
+            survey.read(choice, fold),
             fold.train,
             survey.columns(choice, fold),
-            stream,
+            stream.with_joints(survey.joints(choice, fold)),
             tuple(
                 Pace(design.tables.tabled, design.frame.us, design.decisions, design.slow_us, design.asked)
                 for design in mine
@@ -404,6 +412,7 @@ def _tried(screened: Sequence[Screened], closes: Sequence[Close], search: Search
             rate,
             one.frame_us,
             sys.intern(one.choice.trainer),
+            one.choice.keep_joints,
         )
         for one, rounds, rate in (*first, *then)
     )

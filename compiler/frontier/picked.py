@@ -41,6 +41,8 @@ class Picked:
         }
         if setting.max_bins is not None:
             settled["max_bins"] = setting.max_bins
+        if setting.keep_joints is not None:
+            settled["keep_joints"] = setting.keep_joints
         if setting.rounds is not None:
             settled["rounds"] = setting.rounds
         if setting.inputs == "joints":
@@ -70,7 +72,7 @@ class Picked:
                 )
             if given is not None and setting.wiring == AS_WIRED:
                 return given
-            joints = () if setting.inputs == "switches" else self.joints
+            joints = () if setting.inputs == "switches" else self.point.joints or self.joints
             made = Wiring(setting.wiring, setting.clock_hz).harness_of(kept, joints)
             if setting.scan == "demand" and made.cyberglove is not None:
                 return replace(made, cyberglove=replace(made.cyberglove, mode="demand"))

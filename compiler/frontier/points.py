@@ -62,6 +62,7 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     wiring      "as wired" (the given glove.toml), "board" (a switch scanner) or a kind of port expander; clock_hz of
                 its bus, or baud of the board's line; 0 where no switch is read
     trainer     what makes the model, and `settings` of it that are no defaults; the paper's is not written
+    keep_joints  how many joints are read; None: all, where `inputs` has any
     """
 
     way: Way
@@ -77,6 +78,7 @@ class Recipe(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
     max_bins: Annotated[int, Meta(ge=2, le=2**53)] | None = field(default_factory=lambda: None)
     trainer: Name = PAPERS_TRAINER
     settings: dict[Name, Given] = {}
+    keep_joints: Annotated[int, Meta(ge=1, le=2**16)] | None = None
 
 
 class Latency(Struct, frozen=True, forbid_unknown_fields=True):
@@ -97,6 +99,7 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     number      what `compile --from frontier.json --point` takes
     switches    names of the kept switches, in the order in which they were chosen from all rows
+    joints      names of the joints that are read, where these are not all or none
     rate        of new subjects, or pooled: what the point was chosen by, less its luck
     luck        by how much it looked better, as the best of all that was tried (`evaluation.luck`)
     frames      the same of single frames, as it came out (None: a trial has one frame)
@@ -127,6 +130,7 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     compile_s: Amount
     fronts: tuple[str, ...] = ()
     asked: Share = 1.0
+    joints: tuple[str, ...] = ()
 
 
 class Tried(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -141,6 +145,7 @@ class Tried(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True)
     rate: Rate
     frame_us: Microseconds
     trainer: Name = PAPERS_TRAINER
+    keep_joints: Annotated[int, Meta(ge=1, le=2**16)] | None = None
 
 
 class Curve(Struct, frozen=True, forbid_unknown_fields=True):

@@ -7,14 +7,14 @@ from ..placement.methods.base import METHODS
 from ..samples import Columns
 from .points import Curve
 from .price import Tabled, price
-from .search import NO_SWITCHES, Candidate, Shape, available_inputs, curve_ways, ways
+from .search import JOINTS, NO_SWITCHES, Candidate, Shape, available_inputs, curve_ways, ways
 from .survey import Judged, Survey
 
 # How long a frame takes hardly depends on how many rounds and rows there were: tables of few tell it.
 _TABLED = Tabled(12, Shape(16))
 QUICK_PRICE_S = 0.3
 # What stages of trainers but the first are called besides.
-OTHER_TRAINERS = ", other trainers"
+OTHER_TRAINERS, FEWER_JOINTS = ", other trainers", ", fewer joints"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +53,15 @@ def screen(survey: Survey) -> tuple[tuple[Screened, ...], tuple[Curve, ...]]:
     return _screened(survey, "", choices, rates), curves
 
 
+def screen_fewer(survey: Survey, worth: Sequence[Screened]) -> tuple[Screened, ...]:
+    """Return how well and how fast those are that are `worth` it, with fewer joints, where these take time."""
+    cuts, sizes = survey.cuts, [size for size in JOINTS if size < survey.n_joints]
+    mine = [one.choice for one in worth if one.choice.joints] if survey.equipment.records.each_us else []
+    choices = [replace(choice, keep_joints=size) for choice in mine for size in sizes]
+    survey.choose_joints(f"joints{FEWER_JOINTS}", choices, (cuts.everything, *cuts.screening))
+    return _screened(survey, FEWER_JOINTS, choices, _rates(survey, FEWER_JOINTS, choices)) if choices else ()
+
+
 def screen_others(survey: Survey, worth: Sequence[Screened]) -> tuple[Screened, ...]:
     """Return how well and how fast those are that are `worth` it, with each of the other trainers."""
     choices = [replace(one.choice, trainer=name) for name in survey.search.trainers[1:] for one in worth]
@@ -78,7 +87,7 @@ def _screened(
     for choice in choices:
         columns = survey.columns(choice, survey.cuts.everything)
         names = tuple(survey.switch_names[column] for column in columns)
-        some, training = survey.inputs(choice.joints, few=True), survey.training(choice)
+        some, training = survey.read(choice, survey.cuts.everything, few=True), survey.training(choice)
         calls.append(price.call(QUICK_PRICE_S, some, names, columns, (_TABLED,), training, survey.equipment, None))
     found = []
     for choice, (priced,) in zip(choices, survey.cache.ask(f"times{stage}", calls), strict=True):

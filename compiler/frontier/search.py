@@ -26,19 +26,22 @@ class Shape(NamedTuple):
 
 
 SHAPES = (*(Shape(width) for width in (16, 12, 8, 6, 5, 4)), Shape(16, 8))
+# So many joints are tried besides all of them.
+JOINTS = (2, 3, 4, 5, 6, 7, 8, 10, 12, 16)
 # Rounds of whose ensembles integer tables are made, in every shape.
 TABLED = (10, 30, 100)
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A way to choose switches, whether the joints are read besides, and who trains; inputs "joints" have
-    NO_SWITCHES.
+    """A way to choose switches, whether the joints are read besides, who trains, and how many joints are kept (None:
+    all); inputs "joints" have NO_SWITCHES.
     """
 
     way: Way
     inputs: Inputs
     trainer: str = PAPERS_TRAINER
+    keep_joints: int | None = None
 
     @property
     def joints(self) -> bool:

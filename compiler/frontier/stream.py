@@ -14,12 +14,13 @@ wrong for the whole hold, and no number of frames makes up for it; contacts that
 passing.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..recordings.graspset import GraspSet
+from ..samples import Columns
 from .movements import Movements, holds_movements, movements_of
 from .points import FrontierError
 
@@ -67,6 +68,10 @@ class Stream:
 
     def __len__(self) -> int:
         return len(self.at_us)
+
+    def with_joints(self, joints: Columns) -> "Stream":
+        """Return the same stream with the joints `joints` alone, where there are any: who reads none looks at none."""
+        return replace(self, codes=self.codes[:, list(joints)]) if 0 < len(joints) < self.codes.shape[1] else self
 
 
 def stream_of(

@@ -15,6 +15,7 @@ from ..boosting.stumps import winners
 from ..evaluation.choosing import choose_training
 from ..evaluation.folds import EvaluationError, Fold, Rows, leave_groups_out, trial_folds
 from ..evaluation.rates import Rate
+from ..placement.joints import joint_order
 from ..placement.methods.base import METHODS
 from ..placement.ports import PortCosts
 from ..recordings.graspset import GraspSet
@@ -30,6 +31,7 @@ from .search import NO_SWITCHES, SHAPES, Candidate, Search, Shape
 # Expected seconds of one core, for so many rows: they only say how the time that is left is told.
 _ROWS = 3000
 _ROUND_S, _WHOLE_S, _TABLE_S = 0.004, 0.4, 0.03
+_RANK_S = 3.0
 
 
 # Settings are chosen on the placement that keeps about as many switches as the paper's.
@@ -173,6 +175,7 @@ class Survey:
     cache: Cache
     _columns: dict[tuple[Way, bool, Fold], Columns] = field(default_factory=dict, init=False)
     _seconds: dict[tuple[str, bool], float] = field(default_factory=dict, init=False)
+    _joints: dict[tuple[Way, bool, Fold], Columns] = field(default_factory=dict, init=False)
     _trainings: dict[tuple[str, Inputs, Fold], Training] = field(default_factory=dict, init=False)
 
     @property
@@ -196,7 +199,24 @@ class Survey:
 
     def transfer(self, choice: Candidate) -> Time:
         """Return what reading the joints of a choice takes."""
-        return self.equipment.records.of(self.n_joints if choice.joints else 0)
+        return self.equipment.records.of(len(self.joints(choice, self.cuts.everything)))
+
+    def joints(self, choice: Candidate, fold: Fold) -> Columns:
+        """Return the joints of a choice, ascending, once chosen from the training rows of `fold`."""
+        if choice.keep_joints is None or not choice.joints:
+            return tuple(range(self.n_joints)) if choice.joints else ()
+        order = self._joints[choice.way, choice.learns_from_joints, fold]
+        return tuple(sorted(order[: choice.keep_joints]))
+
+    def some_joints(self, choice: Candidate) -> tuple[str, ...]:
+        """Return the names of the joints of a choice from all rows, where they are some of several."""
+        names = self.grasp_set.joint_names
+        return () if choice.keep_joints is None else tuple(names[n] for n in self.joints(choice, self.cuts.everything))
+
+    def read(self, choice: Candidate, fold: Fold, *, few: bool = False) -> Samples:
+        """Return all rows, or a few of them, with the joints of a choice."""
+        some = self.inputs(choice.joints, few=few)
+        return some if choice.keep_joints is None else some.with_joints(self.joints(choice, fold))
 
     def inputs(self, joints: bool, *, few: bool = False) -> Samples:
         """Return all rows, or a few of them, with the joints or without."""
@@ -263,6 +283,17 @@ class Survey:
             if fold is self.cuts.everything:
                 self._seconds[method, joints] = path.seconds
 
+    def choose_joints(self, stage: str, choices: Iterable[Candidate], folds: Sequence[Fold]) -> None:
+        """Have the joints ranked beside the switches of those choices that keep only some, by rows of these folds."""
+        alike = {(one.way, one.learns_from_joints): one for one in choices if one.keep_joints is not None}
+        places = [(key, fold) for key in alike for fold in folds]
+        calls = [
+            rank_joints.call(_RANK_S, self.inputs(True), fold.train, self.columns(alike[key], fold))
+            for key, fold in places
+        ]
+        for (key, fold), order in zip(places, self.cache.ask(stage, calls), strict=True):
+            self._joints[(*key, fold)] = order
+
     def columns(self, choice: Candidate, fold: Fold) -> Columns:
         """Return the switches of a choice, once chosen, from the training rows of `fold`."""
         return () if choice.way == NO_SWITCHES else self._columns[choice.way, choice.learns_from_joints, fold]
@@ -283,7 +314,7 @@ class Survey:
         calls = [
             fit_stages.call(
                 fit_s(self.search.alone(choice.trainer), depth(choice), len(fold.train)),
-                self.inputs(choice.joints),
+                self.read(choice, fold),
                 fold,
                 self.columns(choice, fold),
                 *depth(choice),
@@ -320,6 +351,12 @@ def choose_path(
     choose = METHODS[method].chooser(samples.rows(rows), ports)
     columns = tuple(choose(parameter) for parameter in parameters)
     return Ladder(columns, time.perf_counter() - began)
+
+
+@stored(1)
+def rank_joints(samples: Samples, rows: Rows, columns: Columns) -> Columns:
+    """Return the joints by how much they are missed beside these switches, in some rows."""
+    return joint_order(samples.rows(rows).keeping(columns))
 
 
 @stored(1)

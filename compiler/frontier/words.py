@@ -29,7 +29,7 @@ COLUMNS = (
         "transfer_how",
     ),
     *("classify_us", "classify_how", "frame_us", "frame_how", "latency_mean_us", "latency_p99_us", "missed", "wrong"),
-    *("flash", "ram", "ports", "chips", "compile_s", "switches", "asked"),
+    *("flash", "ram", "ports", "chips", "compile_s", "switches", "asked", "joints"),
 )
 
 # They follow only where a point's trainer, or a setting of it, is not the default.
@@ -42,8 +42,11 @@ _SPARED = 0.005  # what a rate may lack and still count as level: half a point
 def inputs_of(point: Point) -> str:
     """Return what a point reads: "33 switches", "joints alone", "8 switches + joints"."""
     if point.setting.inputs == "joints":
-        return "joints alone"
-    return counted(len(point.switches), "switch", "switches") + (" + joints" if point.setting.inputs == "both" else "")
+        return f"{counted(len(point.joints), 'joint')} alone" if point.joints else "joints alone"
+    joints = counted(len(point.joints), "joint") if point.joints else "joints"
+    return counted(len(point.switches), "switch", "switches") + (
+        f" + {joints}" if point.setting.inputs == "both" else ""
+    )
 
 
 def shorten(name: str) -> str:
@@ -154,7 +157,8 @@ def rates_of(frontier: Frontier) -> dict[str, Callable[[Point], Rate | None]]:
 
 def _inputs(frontier: Frontier, point: Point) -> str:
     some = f"{len(point.switches)} of {frontier.n_switches} switches"
-    joints = counted(frontier.n_joints, "joint")
+    some_joints = f"{len(point.joints)} of {counted(frontier.n_joints, 'joint')}"
+    joints = some_joints if point.joints else counted(frontier.n_joints, "joint")
     return {"switches": some, "joints": joints, "both": f"{some} and {joints}"}[point.setting.inputs]
 
 
@@ -195,6 +199,7 @@ def _values(point: Point) -> Iterator[object]:
         yield from _time(time)
     yield from (latency.mean_us, latency.p99_us, latency.missed, latency.wrong)
     yield from (point.flash, point.ram, point.ports, point.chips, point.compile_s, _list(point.switches), point.asked)
+    yield _list(point.joints)
 
 
 def _rate(rate: Rate | None) -> tuple[object, ...]:

@@ -17,9 +17,9 @@ from thenar.runtime.scanning.scanmap import ScanMap
 
 from ..hand import HandShape
 from ..publication import check_folder, entries, publish_folder
-from .circuit import Circuit, Component, Kind
 from .layout import BoardPins
 from .lists import materials_csv, readme_of, switches_csv, wiring_csv
+from .parts import Circuit, Component, Kind
 from .pattern import LAYERS, Circle, Line, Pattern, Shape, Text
 from .spec import GloveSpec, SpecError, glove_spec
 

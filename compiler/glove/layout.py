@@ -80,13 +80,15 @@ class BoardPins:
 
     lows[k] is the pin that is driven low to read it, the row of a matrix; "" where the switch goes to ground. With
     `diodes` there is one to every switch, its cathode towards the row. A board that reads its keys from expanders has
-    their `bus` instead.
+    their `bus` instead. channels are the pins of its converter, each for a taxel, or with `selects` for a multiplexer.
     """
 
     signals: tuple[str, ...] = ()
     lows: tuple[str, ...] = ()
     diodes: bool = False
     bus: BusWiring | None = None
+    channels: tuple[str, ...] = ()
+    selects: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +191,8 @@ def _of_boards(
         measured = (
             [] if scanner.mux else [(at, numbers[name]) for at, name in enumerate(scanner.taxels) if name in numbers]
         )
-        channels = [f"channel {channel}" for channel, _ in measured]
+        at = () if pins is None else pins.channels
+        channels = [at[channel] if at else f"channel {channel}" for channel, _ in measured]
         pads = {name: str(pad) for pad, name in enumerate(dict.fromkeys([*signals, *channels]), start=1)}
         for (_, switch), signal in zip(measured, channels, strict=True):
             yield End(switch, unit, signal, pads[signal], SUPPLY, taxel=True)

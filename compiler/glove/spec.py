@@ -18,7 +18,7 @@ from thenar.runtime.scanning.scanmap import ScanMap
 from thenar.runtime.scanning.timing import glove_us, scan_us, scanner_us
 
 from ..hand import HandShape
-from .circuit import BillLine, Circuit, bill_of, glove_circuit
+from .circuit import BillLine, bill_of, glove_circuit
 from .layout import (
     BoardPins,
     End,
@@ -31,6 +31,7 @@ from .layout import (
     place_switches,
     wires_of,
 )
+from .parts import Circuit
 from .pattern import Pattern, pattern_of
 
 
@@ -151,7 +152,7 @@ def glove_spec(
         wires=wires,
         materials=bill_of(circuit, wires),
         expected=expected_of(manifest, read, wired),
-        remarks=tuple(_remarks(manifest, wired, switches, known)),
+        remarks=(*_remarks(manifest, wired, switches, known), *_of_boards(boards)),
     )
     return GloveSpec(summary, wired, read, circuit, pattern)
 
@@ -180,6 +181,16 @@ def _portable(harness: Harness) -> Harness:
         return harness
     name = glove.calibration.replace("\\", "/").rsplit("/", 1)[-1]
     return replace(harness, cyberglove=replace(glove, calibration=name or None))
+
+
+def _of_boards(boards: Sequence[BoardPins | None]) -> Iterator[str]:
+    """Yield where the multiplexers of each board go, as far as it is known."""
+    for number, pins in enumerate(boards, start=1):
+        if pins is not None and pins.selects:
+            yield (
+                f"A{number}: S0 to S3 of its multiplexers go to {', '.join(pins.selects)}, their commons to "
+                f"{', '.join(pins.channels)}"
+            )
 
 
 def _readers(ends: Sequence[End]) -> tuple[SwitchReader, ...]:

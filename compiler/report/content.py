@@ -71,7 +71,7 @@ class ReportContent:
             raise ReportError(f"a confusion matrix of {grasps} grasp types is not {self.confusion.shape}")
         if self.tree is not None and len(self.tree.classes) > grasps:
             raise ReportError("the tree knows more grasp types than the build: it is of other recordings")
-        if self.hand is not None and not self.hand.knows(self.switch_names):
+        if self.hand is not None and not self.hand.knows(self.sources):
             raise ReportError("the hand lacks a kept switch: it is of another glove")
         if self.scan is not None and (self.harness is None or self.scan.harness != self.harness.fingerprint):
             raise ReportError("the scan map is not of this harness: compile with --glove and the glove.toml in use")
@@ -80,6 +80,11 @@ class ReportContent:
     def switch_names(self) -> tuple[str, ...]:
         """Names of the kept switches, in the order in which they were chosen."""
         return tuple(switch.name for switch in self.manifest.switches)
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """Names of the kept switches, and of the taxels that levels are kept of, in the order of the first of each."""
+        return tuple(dict.fromkeys(switch.source for switch in self.manifest.switches))
 
 
 @dataclass(frozen=True, slots=True)

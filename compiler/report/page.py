@@ -85,17 +85,18 @@ def _tree(content: ReportContent) -> TreeView | None:
     tree = content.tree
     if tree is None or not tree.inputs:
         return None
-    kept = {switch.column: switch.name for switch in content.manifest.switches}
+    # The kept elements are those that the tree asks for, in the order of its nodes.
+    kept = dict(zip(tree.inputs, content.switch_names, strict=True))
     names = [kept.get(number, f"switch {number}") for number in range(tree.n_inputs)]
     return tree_view(tree, names, content.manifest.grasps)
 
 
 def _hand(content: ReportContent) -> HandPicture | None:
-    if content.hand is None or not content.switch_names:
+    if content.hand is None or not content.sources:
         return None
-    kept, most = len(content.switch_names), len(content.hand.names)
+    kept, most = len(content.sources), len(content.hand.names)
     summary = (
         f"{content.hand.view}; {kept} of {most} switches are kept and numbered in the order in which they were chosen. "
         "The table beside it says which they are."
     )
-    return hand_picture(content.hand, content.switch_names, "kept-hand", "Kept switches on the hand", sentence(summary))
+    return hand_picture(content.hand, content.sources, "kept-hand", "Kept switches on the hand", sentence(summary))

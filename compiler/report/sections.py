@@ -93,7 +93,7 @@ def kept_table(content: ReportContent) -> PlainTable:
             rows[-1] += (switch.closed,)
     columns = ("Order", "Switch", "Part", "Column", "Bits", *(() if tree is None else ("Together",)))
     columns += ("Taxel",) * taxels
-    caption = "Kept switches, in the order in which they were chosen"
+    caption = f"Kept {'switches and levels' if taxels else 'switches'}, in the order in which they were chosen"
     return PlainTable(caption, columns, tuple(rows), words=(1, 2, *((len(columns) - 1,) * taxels)), head=1)
 
 
@@ -288,18 +288,19 @@ def options_set(manifest: Manifest) -> Pairs:
     fields = [field.name for field in msgspec.structs.fields(options) if field.name not in foreign]
     values = {name: getattr(options, name) for name in fields} | options.settings
     called = {name: "method" if name == "placement" else name.replace("_", "-") for name in values}
+    called["at_most_taxels"] = "at-most"
     return tuple(
-        (f"--{called[name]}", _plain(value))
+        (f"--{called[name]}", _plain(value) + " taxels" * (name == "at_most_taxels"))
         for name, value in values.items()
-        if value is not None and value is not False
+        if value is not None and value is not False and value != ()
     )
 
 
 def commands(content: ReportContent) -> tuple[str, str]:
     """Return the commands that make the build again, and verify it."""
-    flags = "".join(
-        f" {name} {shlex.quote(value)}" if value else f" {name}" for name, value in options_set(content.manifest)
-    )
+    pairs = options_set(content.manifest)
+    words = (value if name == "--at-most" else value and shlex.quote(value) for name, value in pairs)
+    flags = "".join(f" {name} {value}".rstrip() for (name, _), value in zip(pairs, words, strict=True))
     glove = "" if content.scan is None else " --glove glove.toml"
     return f"thenar compile SET.grasps -o build/{flags}{glove}", "thenar verify build/ SET.grasps"
 

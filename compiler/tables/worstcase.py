@@ -47,10 +47,10 @@ class Rounding:
 
     def __init__(self, tables: ScoreTables, integers: IntegerTables) -> None:
         """Compare the two, bin by bin of either. They must have the same classes and inputs."""
-        choices = list(_choices(tables, integers))
         self._n_switches, self._units = integers.n_switches, integers.units
         if (len(tables.switch_rows), len(tables.joint_rows)) != (integers.n_switches, integers.n_joints):
             raise ValueError("the tables and the integers are of other inputs")
+        choices = list(_choices(tables, integers))
         self._values = [choice.values for choice in choices[1:]]
         errors, self._step = _errors(choices, integers.scale)
         self._pairs = _Pairs(errors)

@@ -22,9 +22,12 @@ class Pairs(Trainer):
         Setting("pairs", "At most so many pairs of joints, each joint in one.", int, 4, 1),
         # As additive.pairs.MOST_PAIR_BINS.
         Setting("pair_bins", "At most so many bins a joint in a pair.", int, 8, 2, 16),
-        Setting("pair_smoothness", "Pull of a pair's neighbouring bins towards each other.", float, 1.0, 0.0, 1e6),
+        Setting("pair_smoothness", "Pull of a pair's neighbouring bins towards each other.", float, 0.5, 0.0, 1e6),
     )
-    tried = ({"penalty": 0.3, "smoothness": 2.0, "max_bins": 32},)
+    tried = (
+        {"penalty": 1.0, "smoothness": 8.0, "max_bins": 32, "pair_smoothness": 1.0},
+        {"penalty": 0.3, "smoothness": 2.0, "max_bins": 32, "pair_smoothness": 0.3},
+    )
 
     def train(self, samples: "Samples", settings: Mapping[str, Any], report: Report | None = None) -> "ScoreTables":
         """Return the tables. Raises BoostingError for settings that make no sense."""

@@ -24,6 +24,8 @@ def faults(harness: Harness) -> Iterator[Fault]:
         yield from _of_glove(harness.cyberglove)
     yield from _of_devices(harness)
     for number, scanner in enumerate(harness.scanners):
+        if not (scanner.switches or scanner.taxels):
+            yield ("scanner", number), "the key switches is missing: a board has switches, taxels or both"
         if scanner.mux and not scanner.taxels:
             yield ("scanner", number, "mux"), "a multiplexer without taxels: name them, or leave it out"
     for number, bus in enumerate(harness.buses):

@@ -7,6 +7,7 @@ from typing import Literal
 from thenar.drivers.cyberglove_protocol import SENSORS, sensors_with
 from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips import CHIPS, Chip, Converter, expanders
+from thenar.drivers.spi.chips import SPI_CHIPS
 
 from ..errors import HarnessError
 from ..harness.wiring import (
@@ -18,6 +19,7 @@ from ..harness.wiring import (
     Harness,
     MuxChannel,
     ScannerWiring,
+    SpiWiring,
 )
 from ..names import list_names, nearest, taxel_and_code
 
@@ -41,19 +43,35 @@ def propose_harness(
     """Return a harness with all the switches on chips of one kind on one bus, the first names on the first chips; and
     `taxels`, and those whose levels are among the names, on converters.
 
-    Each chip is read in one transaction, as few as the kind allows, and of as few the shortest on the wire. Chips
-    beyond the kind's addresses go behind a TCA9548A, those that come first stay before it. Raises HarnessError if there
-    is no such kind, or no room for so many switches.
+    kind may be a converter's, on I2C or SPI: switches are then on the usual expander. Each chip is read in one
+    transaction, as few as the kind allows, and of as few the shortest on the wire. Chips beyond the kind's addresses go
+    behind a TCA9548A, those that come first stay before it. Raises HarnessError if there is no such kind, or no room
+    for so many switches.
     """
-    if kind not in expanders():
-        raise HarnessError(f"there is no chip {kind!r}{nearest(kind, list(expanders()))}")
+    if kind not in CHIPS and kind not in SPI_CHIPS:
+        raise HarnessError(f"there is no chip {kind!r}{nearest(kind, [*CHIPS, *SPI_CHIPS])}")
     switches, measured = _parted(switch_names, taxels)
-    chips = (*_hung(kind, switches), *_hung(CONVERTER, measured))
+    expander, converter = (kind, CONVERTER) if kind in expanders() else (next(iter(CHIPS)), kind)
+    spi = _on_spi(converter, measured) if converter in SPI_CHIPS else ()
+    chips = (*_hung(expander, switches), *(() if spi else _hung(converter, measured)))
     clock_hz = min([CLOCK_HZ, *(each.chip.clock_hz for each in chips)])
     return Harness(
         name=name,
         cyberglove=cyberglove,
         buses=(BusWiring(device=device, clock_hz=clock_hz, chips=chips),) if chips else (),
+        spi=spi,
+    )
+
+
+def _on_spi(kind: str, names: Sequence[str]) -> tuple[SpiWiring, ...]:
+    channels, left = SPI_CHIPS[kind].pins, iter(names)
+    return tuple(
+        SpiWiring(
+            device=f"/dev/spidev0.{number}",
+            kind=kind,
+            pins=dict(zip(channels, islice(left, len(channels)), strict=False)),
+        )
+        for number in range(-(-len(names) // len(channels)))
     )
 
 

@@ -98,7 +98,8 @@ class SourceKind:
         What its frames hold.
     sources : callable
         `sources(harness, switch_names, scan)` yields a `Source` for each device. Switch k of the frames is
-        `switch_names[k]`; `scan` says which ports of expanders to read, in which order.
+        `switch_names[k]`; `scan` says which ports to read, in which order, and where levels of taxels close: at limits
+        of this glove's counts (`taxels.count_limit`), once a build has been put together with it.
     periods_us : callable
         `periods_us(harness, scan)` yields how often each of them should deliver at least. Nothing is opened for it: a
         replay asks, too.

@@ -9,6 +9,7 @@ from thenar.drivers.serial_line import BITS_A_BYTE
 
 from ..frames import PERIODS, Mask, Pauses, Rewired, SwitchFrame
 from ..harness.wiring import Harness, ScannerWiring
+from ..names import list_names
 from ..published import Count
 from ..scanning.scanmap import ScanMap
 from ..taxels import Level, Taxels, calibration_of
@@ -134,6 +135,13 @@ class ScannerDevice(Source):
     def counts(self) -> tuple[Count, ...]:
         """Return what the driver counts."""
         return counted(self.driver.counts)
+
+    def trouble(self) -> str:
+        """Return what is wrong with taxels; "" if nothing is."""
+        if (taxels := self.taxels.taxels) is None:
+            return ""
+        faulty = [f"{name}: {fault}" for name, fault in zip(taxels.names, taxels.faults, strict=True) if fault]
+        return f"taxels with faults: {list_names(faulty)}" if faulty else ""
 
     def close(self) -> None:
         """Close the board."""

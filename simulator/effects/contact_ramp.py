@@ -14,9 +14,9 @@ from msgspec import Meta
 
 from ..contact.model import Contact, ContactModel, Load
 from ..errors import SceneError
-from ..pipeline.batch import NEVER, Batch
+from ..pipeline.batch import Batch
 from ..pipeline.effect import Effect, EffectParameters, Setting, Together
-from ..pipeline.ramp import Ramp, crossings
+from ..pipeline.ramp import NEVER, Ramp, crossings
 from ..streams import Draw
 
 

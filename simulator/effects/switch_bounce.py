@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from thenar.compiler.elementary import Floats
 
-from ..pipeline.batch import NEVER, Batch
+from ..pipeline.batch import Batch
 from ..pipeline.effect import Effect, EffectParameters, Setting, Step
+from ..pipeline.ramp import NEVER
 from ..streams import Draw
 
 Bits = NDArray[np.bool_]

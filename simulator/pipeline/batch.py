@@ -1,7 +1,6 @@
 """A batch: repetitions of one condition on their way through the pipeline."""
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +10,7 @@ from thenar.compiler.elementary import Floats
 from ..body.condition import Condition
 from ..contact.model import Contact, Load
 from ..streams import Site
-
-if TYPE_CHECKING:
-    from .ramp import Ramp
+from .ramp import Ramp
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,8 +36,6 @@ Bits = NDArray[np.bool_]
 
 # An object that slid so far was dropped: ours.
 SLID_OUT_MM = 20.0
-# The time of a switch that never closes or never opens.
-NEVER = np.iinfo(np.int64).max
 
 
 @dataclass(slots=True, eq=False)
@@ -98,7 +93,7 @@ class Batch:
     raw: NDArray[np.uint8] = field(init=False)
     traffic: Traffic = field(init=False)
     lost: Bits | None = None
-    ramp: "Ramp | None" = None
+    ramp: Ramp | None = None
     taxels_n: Floats = field(init=False)
     taxels: NDArray[np.uint16] | None = None
 

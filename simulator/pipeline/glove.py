@@ -9,8 +9,9 @@ import numpy as np
 
 from ..body.cyberglove import Calibration, sensors_deg
 from ..streams import Draw
-from .batch import NEVER, Batch
+from .batch import Batch
 from .effect import Effect, EffectParameters, Setting, Stage, Step, frame_times
+from .ramp import NEVER
 
 Act = Callable[[Batch, Setting], None]
 STEPS: tuple[Effect, ...] = ()

@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 
 from thenar.compiler.elementary import Floats
 
-from .batch import NEVER
-
 Integers = NDArray[np.int64]
 Bits = NDArray[np.bool_]
+
+# The time of a switch that never closes or never opens.
+NEVER = np.iinfo(np.int64).max
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from thenar.compiler import GraspSet
@@ -237,3 +238,40 @@ def test_a_glove_toml_of_the_users_is_replaced_only_if_asked(
     assert thenar(*played, "--overwrite").returncode == 0
     assert load_harness(folder / "glove.toml").cyberglove is not None
     assert (folder / "notes.txt").read_text() == "mine"
+
+
+@pytest.mark.slow
+def test_a_scene_with_taxels_is_recognised_live_from_a_boards_switches_and_counts(
+    thenar: Thenar, tmp_path: Path
+) -> None:
+    scene = tmp_path / "pads.toml"
+    tables = '[glove]\ntaxels = ["thumb_distal", "index_distal", "middle_distal"]\n\n'
+    tables += "[effects.taxel.noise]\n[effects.taxel.adc]\n"
+    scene.write_text(SCENE.replace("repetitions = 1\n", "repetitions = 2\n") + tables)
+    made, build, glove = tmp_path / "set.grasps", tmp_path / "build", tmp_path / "glove.toml"
+    done = thenar("simulate", scene, "-o", made)
+    assert done.returncode == 0, done.stderr
+    training = ("--inputs", "switches", "--rounds", 20, "--folds", 0, "--no-report")
+    done = thenar("compile", made, "-o", build, *training, "--propose", glove, "--chip", "board")
+    assert done.returncode == 0, done.stderr
+    harness = load_harness(glove)
+    assert harness.scanners[0].taxels
+    assert harness.scanners[0].switches
+    log, grasps = tmp_path / "played.jsonl", tmp_path / "grasps.jsonl"
+    done = thenar(
+        *("emulate", scene, "--glove", glove, "--dir", tmp_path / "em", "--period-ms", 250, "--log", log, "--repeat"),
+        *("--", sys.executable, "-m", "thenar.cli", "run", build, "--glove", "{glove}"),
+        *("--sink", f"jsonl:{grasps}", "--frames", 500),
+    )
+    assert done.returncode == 0, done.stderr
+    played = [json.loads(line) for line in log.read_text().splitlines()]
+    times = [row["time_us"] for row in played]
+    rows, right = set[int](), []
+    for line in map(json.loads, grasps.read_text().splitlines()):
+        row = int(np.searchsorted(times, line["time_us"])) - 1
+        # A tenth of a second after a change everything has arrived; without health no grasp is announced.
+        if line["kind"] == "grasp" and line["health"] == "ok" and row >= 0 and line["time_us"] > times[row] + 100_000:
+            right.append(line["grasp"] == played[row]["grasp"])
+            rows.add(row)
+    assert len(rows) >= 4
+    assert np.mean(right) > 0.9

@@ -1,6 +1,8 @@
 """Pads with levels from a set to recognition: compiled for a board, emulated, recognised, recorded, imported."""
 
 import json
+import os
+import shutil
 import sys
 from bisect import bisect
 from collections.abc import Callable
@@ -21,7 +23,39 @@ pytestmark = pytest.mark.slow
 
 Thenar = Callable[..., Any]
 ROWS, CODES = 60, {"cup": (800, 100, 400), "pen": (100, 820, 380), "rod": (420, 430, 60)}
-GLOVE = '[[scanner]]\nport = "/dev/ttyACM0"\nswitches = ["s0"]\ntaxels = ["p0", "", "p1", "p2"]\n'
+_BUS = """
+[[bus]]
+device = "/dev/i2c-7"
+clock_hz = 400_000
+[[bus.chip]]
+kind = "mcp23017"
+address = 0x20
+pins = { GPB1 = "s0" }
+"""
+GLOVES = {
+    "board": '[[scanner]]\nport = "/dev/ttyACM0"\nswitches = ["s0"]\ntaxels = ["p0", "", "p1", "p2"]\n',
+    "i2c": f"""{_BUS}
+[[bus.chip]]
+kind = "ads1115"
+address = 0x48
+pins = {{ AIN1 = "p0" }}
+[[bus.chip]]
+kind = "ads7828"
+address = 0x49
+mux = {{ address = 0x70, channel = 2 }}
+pins = {{ CH6 = "p2", CH3 = "p1" }}
+""",
+    "spi and i2c": f"""{_BUS}
+[[spi]]
+device = "/dev/spidev0.1"
+kind = "mcp3008"
+pins = {{ CH7 = "p1", CH2 = "p2" }}
+[[bus.chip]]
+kind = "ads1115"
+address = 0x4B
+pins = {{ AIN3 = "p0" }}
+""",
+}
 
 
 def pads(folder: Path) -> Path:
@@ -45,9 +79,13 @@ def pads(folder: Path) -> Path:
     return folder / "set.grasps"
 
 
-def test_a_glove_of_pads_recognises_by_their_levels(thenar: Thenar, tmp_path: Path) -> None:
+@pytest.mark.parametrize("wiring", GLOVES)
+def test_a_glove_of_pads_recognises_by_their_levels(thenar: Thenar, tmp_path: Path, wiring: str) -> None:
+    if wiring != "board" and shutil.which("umockdev-wrapper") is None:
+        message = "program umockdev-wrapper is missing"
+        (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)(message)
     grasps, glove, build = pads(tmp_path), tmp_path / "glove.toml", tmp_path / "build"
-    glove.write_text(GLOVE)
+    glove.write_text(GLOVES[wiring])
     done = thenar("compile", grasps, "-o", build, "--rounds", "10", "--folds", "0", "--glove", glove, "--no-report")
     assert done.returncode == 0, done.stderr
     record, log = tmp_path / "run.mcap", tmp_path / "log.jsonl"
@@ -68,3 +106,34 @@ def test_a_glove_of_pads_recognises_by_their_levels(thenar: Thenar, tmp_path: Pa
     assert len(coded) > 100
     done = thenar("run", build, "--replay", record)
     assert done.returncode == 0, done.stderr
+
+
+def test_doctor_finds_converters_and_what_is_wrong_with_them(thenar: Thenar, tmp_path: Path) -> None:
+    if shutil.which("umockdev-wrapper") is None:
+        message = "program umockdev-wrapper is missing"
+        (pytest.fail if os.environ.get("THENAR_REQUIRE_ALL") == "1" else pytest.skip)(message)
+    grasps, glove, own = pads(tmp_path), tmp_path / "glove.toml", tmp_path / "own.toml"
+    glove.write_text(GLOVES["spi and i2c"])
+    # A converter more than there is: its address acknowledges nothing.
+    own.write_text(GLOVES["spi and i2c"] + '[[bus.chip]]\nkind = "ads7828"\naddress = 0x48\npins = { CH0 = "gone" }\n')
+    doctor = (sys.executable, "-m", "thenar.cli", "doctor", own, "--json")
+    emulate = ("emulate", grasps, "--glove", glove, "--dir", tmp_path / "emulated", "--period-ms", "20000")
+    done = thenar(*emulate, "--", *doctor)
+    assert done.returncode == 1, done.stderr
+    found = {(one["device"][:3], one["part"]): one for one in json.loads(done.stdout)}
+    there = [
+        ("i2c", "ads1115 at 0x4B"),
+        ("spi", "mcp3008"),
+        ("i2c", "taxel p0"),
+        ("spi", "taxel p1"),
+        ("spi", "taxel p2"),
+    ]
+    assert [found[key]["present"] for key in there] == [True] * 5
+    assert not found["i2c", "ads7828 at 0x48"]["present"]
+    assert "does not answer" in found["i2c", "ads7828 at 0x48"]["remarks"][0]
+    assert found["i2c", "taxel gone"]["remarks"] == ["silent"]
+    codes = GraspSet.load(grasps).taxels[0]
+    for key, code in zip(there[2:], codes, strict=True):
+        assert found[key]["remarks"][0].startswith(f"{code} counts, noise 0.0")
+    assert found["i2c", "ads1115 at 0x4B"]["predicted_us"] == pytest.approx(96.3 + 1317 + 121.3)
+    assert found["spi", "mcp3008"]["predicted_us"] == pytest.approx(2 * (24 / 1.35 + 0.5))

@@ -250,6 +250,7 @@ def test_voltages_behind_multiplexers_arrive_at_the_host(firmware: Callable[...,
             next_one = scanner.read(0.5)
             reading = reading if next_one is None else next_one
         assert reading.closed == 0b01
+        assert scanner.faults is None  # no scan was late, no frame was dropped
         on.board.do("reset")
         measured(scanner, [code_of(4000), code_of(millivolts[16]), code_of(100)])
         assert scanner.counts.misfits == 0

@@ -9,6 +9,7 @@ from thenar.drivers.i2c import tca9548a
 from thenar.drivers.i2c.chips import expanders
 from thenar.runtime.errors import HarnessError
 from thenar.runtime.harness.wiring import Harness
+from thenar.runtime.scanning.plan import unwired
 from thenar.runtime.scanning.propose import propose_board, propose_cyberglove, propose_harness
 
 from ...firmware.targets import TARGETS
@@ -55,11 +56,18 @@ class Wiring:
     def fits(self, names: Sequence[str]) -> bool:
         """Return whether there is a place for every one of these switches."""
         try:
-            return set(names) <= set(self.harness_of(names).switches)
+            return not unwired(self.harness_of(names), names)
         except HarnessError:
             return False
 
     def _check_muxes(self, harness: Harness) -> None:
+        measuring = [chip for bus in harness.buses for chip in bus.chips if chip.measures]
+        if measuring and not self.muxes:
+            raise HarnessError(f"taxels need a {measuring[0].kind}, which the firmware does not read")
+        if measuring and self.clock_hz > measuring[0].chip.clock_hz:
+            raise HarnessError(
+                f"taxels need a {measuring[0].kind}, which runs at {measuring[0].chip.clock_hz} Hz at most"
+            )
         if not any(chip.mux for bus in harness.buses for chip in bus.chips):
             return
         if not self.muxes:
@@ -78,7 +86,11 @@ def wirings(given: Harness | None, target: str = "host") -> tuple[Wiring, ...]:
     otherwise, a board of its own included, is none of its wirings.
     """
     avr = reads_by_itself(target)
-    found = [] if given is None or not given.switches or (avr and not _of_an_avr(given)) else [_as_wired(given)]
+    found = (
+        []
+        if given is None or not (given.switches or given.taxel_names) or (avr and not _of_an_avr(given))
+        else [_as_wired(given)]
+    )
     for chip in expanders().values():
         if chip.tried and (chip.registers or not avr):
             clocks = (hz for hz in CLOCKS_HZ if hz <= chip.clock_hz and (not avr or hz in _AVR_HZ))
@@ -98,10 +110,13 @@ def names_of(count: int) -> list[str]:
 
 def _as_wired(given: Harness) -> Wiring:
     clocks = [bus.clock_hz for bus in given.buses if bus.chips]
-    return Wiring(AS_WIRED, min(clocks or [board.baud for board in given.scanners]), given)
+    lines = [board.baud for board in given.scanners] or [chip.clock_hz for chip in given.spi]
+    return Wiring(AS_WIRED, min(clocks or lines), given)
 
 
 def _of_an_avr(given: Harness) -> bool:
     chips = [chip for bus in given.buses for chip in bus.chips]
     plain = all(chip.mux is None and chip.chip.registers and not chip.measures for chip in chips)
-    return plain and not given.scanners and len(given.buses) == 1 and given.buses[0].clock_hz in _AVR_HZ
+    return (
+        plain and not given.scanners and not given.spi and len(given.buses) == 1 and given.buses[0].clock_hz in _AVR_HZ
+    )

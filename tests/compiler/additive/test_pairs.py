@@ -98,7 +98,9 @@ def test_no_joint_is_in_two_pairs_and_none_without_two_bins_in_one() -> None:
     assert not fit_pairs(switches, codes[:, :1], labels, 3, **FIXED).pairs
 
 
-@pytest.mark.parametrize("wrong", [{"penalty": 0.0}, {"smoothness": -1.0}, {"pair_smoothness": np.inf}])
-def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(BoostingError, match="finite"):
+@pytest.mark.parametrize(
+    "wrong", [{"penalty": 0.0}, {"smoothness": -1.0}, {"pair_smoothness": np.inf}, {"pair_bins": 17}]
+)
+def test_settings_that_make_no_sense_are_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(BoostingError, match=r"finite|pair_bins=17 must be 2 to 16"):
         fit_pairs(*grasps(0), 3, **{**FIXED, **wrong})

@@ -10,12 +10,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from thenar.compiler import TRAINERS, GraspSet, compile_build, grow_id3
-from thenar.compiler.artifact import CompileError
-from thenar.compiler.artifact.training import cuts_of
+from thenar.compiler.artifact import CompileError, training
+from thenar.compiler.artifact.training import answers_of, cuts_of
 from thenar.compiler.artifact.verify import verify
+from thenar.compiler.evaluation.choosing import choose_training
 from thenar.compiler.evaluation.folds import EvaluationError
+from thenar.compiler.samples import Samples
 from thenar.drivers.errors import ThenarError
 from thenar.runtime import Build
 from thenar.runtime.manifest import Inputs, Options
@@ -375,3 +378,23 @@ def test_decisions_without_a_gain_are_in_the_build_and_none_are_left_out(grasp_s
     assert '"zero_gain_nodes": 1' in (tmp_path / "xor" / "build.json").read_text()
     assert compile_build(grasp_set, tmp_path / "other", rounds=2, folds=0).manifest.zero_gain_nodes == 0
     assert "zero_gain_nodes" not in (tmp_path / "other" / "build.json").read_text()
+
+
+def test_an_outer_fold_chooses_by_the_subjects_of_its_training_rows(
+    make_set: Callable[..., GraspSet], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    grasp_set, options = make_set(subjects=4), Options(trainer="logit")
+    seen: list[tuple[np.ndarray, str]] = []
+
+    def chosen(*args: Any, groups: np.ndarray, of: Any, **named: Any) -> Any:
+        seen.append((groups, of))
+        return choose_training(args[0], args[1][:1], groups=groups, of=of, **named)
+
+    monkeypatch.setattr(training, "choose_training", chosen)
+    (cut, *_) = cuts_of(grasp_set, structs.replace(options, by="subject"))
+    for fold in cut.folds:
+        answers_of(Samples.of(grasp_set), options, None, cut.groups, None, fold)
+    for (groups, of), fold in zip(seen, cut.folds, strict=True):
+        assert of == "new subject"
+        assert np.array_equal(groups, grasp_set.subjects[fold.train])
+        assert not set(groups) & set(grasp_set.subjects[fold.test])

@@ -5,18 +5,20 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from thenar.cli import run
+from thenar.cli.place_command import command as place_command
 from thenar.compiler import GraspSet, LogitBoostClassifier, compile_build
 from thenar.compiler.artifact import CompileError
 from thenar.compiler.artifact.documents import Documents
 from thenar.compiler.artifact.estimator import compile as compile_estimator
 from thenar.compiler.artifact.training import cuts_of
 from thenar.compiler.artifact.verify import verify
-from thenar.compiler.placement.elements import bits_of, elements_of, names_of
+from thenar.compiler.placement.elements import LEVELS, bits_of, elements_of, names_of
 from thenar.compiler.recordings.graspset import Joint
 from thenar.compiler.samples import Samples
 from thenar.runtime.manifest import Options
@@ -64,8 +66,7 @@ def test_a_build_says_at_which_value_each_kept_pad_switches(padded: GraspSet, tm
     assert " N (codes above " in rising
     assert falling.startswith("closed below ")
     text = " ".join((tmp_path / "build" / "spec" / "README.txt").read_text().split())
-    setting = r"of the taxel pad0: set its comparator or converter to \d+\.\d+ N; it is "
-    assert re.search(setting + re.escape(rising), text)
+    assert re.search(r"is the taxel pad0, whose counts thenar compares: .*" + re.escape(rising), text)
     assert rising in (tmp_path / "build" / "report.html").read_text()
 
 
@@ -144,3 +145,49 @@ def test_pads_are_placed_like_switches(make_set: Make, tmp_path: Path, crowd: bo
     assert run(["place", str(tmp_path / "set.grasps"), *wanted, "-o", str(tmp_path / "placement.json")]) == 0
     names = {switch["name"] for switch in json.loads((tmp_path / "placement.json").read_bytes())["switches"]}
     assert {name.partition(">")[0] for name in names} & {pad.name for pad in PADS}
+
+
+def test_the_best_joints_are_chosen_inside_each_fold_and_read_alone(make_set: Make, tmp_path: Path) -> None:
+    """A build reads the kept joints, by name; rates are those of builds of the training rows, which keep others."""
+    recorded = make_set(subjects=2, joints=3)
+    options: dict[str, Any] = {"rounds": 4, "keep_joints": 2}
+    build = compile_build(recorded, tmp_path / "build", **options)
+    kept = [joint.column for joint in build.manifest.joints]
+    assert len(kept) == 2 < len(recorded.joints)
+    assert [joint.name for joint in build.manifest.joints] == [recorded.joint_names[column] for column in kept]
+    assert build.tables.n_joints == 2
+    assert verify(tmp_path / "build", recorded).holds
+    for rate, cut in zip(build.manifest.rates[1:], cuts_of(recorded, Options()), strict=True):
+        correct = 0
+        for fold in cut.folds:
+            compile_build(recorded.rows(fold.train), tmp_path / "fold", folds=0, **options)
+            correct += verify(tmp_path / "fold", recorded.rows(fold.test)).recognised[0].integers
+        assert rate.correct == correct
+    with pytest.raises(CompileError, match="there are no joints to keep some of"):
+        compile_build(recorded, tmp_path / "none", inputs="switches", **options)
+
+
+def test_commands_choose_levels_and_joints(padded: GraspSet, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    padded.save(path := tmp_path / "set.grasps")
+    few = ["--method", "elimination-cost", "--keep", "4", "--keep-joints", "1"]
+    assert run(["compile", str(path), "-o", str(tmp_path / "build"), "--rounds", "4", "--folds", "0", *few]) == 0
+    said = capfd.readouterr().out
+    assert re.search(r"from \d of 2 switches, \d levels? of \d of 4 taxels and 1 of \d joints;", said)
+    assert re.search(
+        rf"\njoints: ({'|'.join(padded.joint_names)})(; a CyberGlove's record of them takes .* ms)?\n", said
+    )
+    assert run(["place", str(path), "--levels", "1", *few, "--json"]) == 0
+    placed = json.loads(capfd.readouterr().out)
+    assert (placed["n_switches"], len(placed["kept_joints"])) == (6, 1)
+    assert all(("above" in kept) == (kept["number"] > 1) for kept in placed["switches"])
+    assert run(["place", str(path), *few, "--exact"]) == 0
+    said = " ".join(capfd.readouterr().out.split())
+    assert " of 4 taxels" not in said
+    assert re.search(r"\d levels? of \d taxels?: a taxel is converted once", said)
+    assert "elements" in said
+    cut = ["--tables", "joints", "--folds", "2", "--repeats", "1", "--rounds", "3", "--jobs", "1"]
+    assert run(["evaluate", str(path), *cut, "--json"]) == 0
+    (table,) = json.loads(capfd.readouterr().out)["tables"]
+    assert [row["name"] for row in table["rows"]] == [str(n) for n in range(1, len(padded.joints) + 1)]
+    (levels,) = (each for each in place_command.params if each.name == "levels")
+    assert f"[default: {LEVELS}]" in str(getattr(levels, "help", ""))

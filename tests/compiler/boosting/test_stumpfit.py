@@ -79,7 +79,11 @@ def large_problems(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 @given(large_problems())
 def test_what_is_not_looked_at_exactly_cannot_win(problem: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
-    X, weights, responses = problem
+    _is_looked_at_exactly(*problem)
+
+
+def _is_looked_at_exactly(X: np.ndarray, weights: np.ndarray, responses: np.ndarray) -> None:
+    """Hold the stumps against those of a fit that looks at every split exactly."""
     binned, targets = bin_columns(X), Targets(weights, responses)
     if not binned.groups:
         return
@@ -89,6 +93,19 @@ def test_what_is_not_looked_at_exactly_cannot_win(problem: tuple[np.ndarray, np.
         whole = fit_stumps(binned, targets, Z_MAX)
     assert np.array_equal(quick.columns, whole.columns)
     assert np.array_equal(quick.thresholds, whole.thresholds)
+
+
+@pytest.mark.parametrize("decades", [9, 16, 20])
+@pytest.mark.parametrize("seed", range(30))
+def test_a_rough_look_takes_no_split_of_light_branches_for_a_better_one(decades: int, seed: int) -> None:
+    """Sorted by weight, branches of next to nothing are many: divided by that, what they say looked like much."""
+    random = np.random.default_rng(seed)
+    X = random.integers(0, [3, 5, 9, 20, 40], size=(40, 5)).astype(np.float64)
+    weights = 10.0 ** random.uniform(-decades, 0, size=(4, 40))
+    if seed % 2:
+        weights, X = np.sort(weights, axis=1), np.sort(X, axis=0) + random.integers(0, 2, X.shape)
+    ratios = random.uniform(1, Z_MAX, size=(4, 40)) * random.choice([-1.0, 1.0], size=(4, 40))
+    _is_looked_at_exactly(X, weights, weights * ratios)
 
 
 @given(problems())

@@ -24,7 +24,7 @@ QUICK = Options(rounds=3, repeats=1, tables=(), protocols=("nested",), learning=
 
 
 def planned(grasps: GraspSet) -> Planner:
-    return Planner((), Samples.of(grasps, "switches"), len(grasps.joints), 0, (), seed=3)
+    return Planner((), Samples.of(grasps), 0, (), seed=3)
 
 
 @given(st.floats(0, 0.5), st.floats(0, 0.5), st.integers(1, 60))

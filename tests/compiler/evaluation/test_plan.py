@@ -72,7 +72,7 @@ both_protocols = pytest.mark.parametrize("protocol", [PAPER, NESTED], ids=lambda
 
 def planner_of(grasps: GraspSet, prune: int = 0, repeats: int = 2) -> Planner:
     parts = populations(grasps, "trial", 4, repeats, 1)
-    return Planner(parts, Samples.of(grasps, "switches"), len(grasps.joints), prune, (0, 30), 1)
+    return Planner(parts, Samples.of(grasps), prune, (0, 30), 1)
 
 
 @pytest.fixture(scope="module")

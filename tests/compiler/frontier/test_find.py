@@ -28,6 +28,7 @@ from thenar.compiler.samples import Samples
 from thenar.compiler.tables.collapse import collapse
 from thenar.compiler.tables.quantise import quantise
 from thenar.compiler.trainers.base import TRAINERS
+from thenar.drivers.cyberglove_protocol import SENSORS_18
 from thenar.drivers.members import MemberError
 from thenar.runtime.scanning.propose import propose_harness
 from thenar.runtime.scores import Scorer
@@ -71,7 +72,8 @@ def first(tmp_path_factory: pytest.TempPathFactory, make_set: Make) -> tuple[Req
 
 def test_a_frame_is_reading_on_lines_of_their_own_and_classifying(first: tuple[Request, Frontier]) -> None:
     for point in first[1].points:
-        assert point.frame.us == pytest.approx(max(point.scan.us, point.transfer.us) + point.classify.us)
+        if point.setting.scan != "demand":
+            assert point.frame.us == pytest.approx(max(point.scan.us, point.transfer.us) + point.classify.us)
 
 
 def test_points_are_numbered_from_the_fastest_frame_on(first: tuple[Request, Frontier]) -> None:
@@ -385,3 +387,33 @@ def test_settings_are_chosen_inside_the_training_rows(make_set: Make) -> None:
     shuffled = samples.labels.copy()
     shuffled[fold.test] = shuffled[fold.test][::-1]
     assert choose_settings(replace_rows(samples, labels=shuffled), fold.train, (0, 1, 2), candidates, 1, True) == found
+
+
+def with_sensors(grasp_set: GraspSet, sensors: int) -> GraspSet:
+    """Return the set with joints of a CyberGlove: its own, again and again, each with more noise."""
+    random, n = np.random.default_rng(3), len(grasp_set.joints)
+    columns = [number % n for number in range(sensors)]
+    noise = random.integers(0, 1 + 12 * np.arange(sensors), (len(grasp_set), sensors))
+    codes = np.clip(grasp_set.codes[:, columns].astype(int) + noise, 1, 255).astype(np.uint16)
+    joints = tuple(replace_rows(grasp_set.joints[n], name=name) for n, name in zip(columns, SENSORS_18, strict=False))
+    return replace_rows(grasp_set, codes=codes, joints=joints)
+
+
+def test_points_may_read_some_of_the_joints_and_what_is_built_of_them_reads_these(
+    tmp_path: Path, make_set: Make
+) -> None:
+    grasp_set = with_sensors(make_set(switches=3, subjects=2), 5)
+    found = found_of(asked(tmp_path, grasp_set, finalists=6, rivals=(), methods=("elimination",)))
+    fewer = [point for point in found.points if point.joints]
+    assert fewer
+    for point in found.points:
+        n = len(point.joints) if point.joints else 0 if point.setting.inputs == "switches" else 5
+        assert point.setting.keep_joints == (len(point.joints) or None)
+        assert set(point.joints) <= {joint.name for joint in grasp_set.joints}
+        if n and point.setting.scan != "demand":
+            assert point.transfer.us == pytest.approx(250 * n + (n + 3) * 10e6 / 115_200)
+    assert {each.keep_joints for each in found.tried} == {None, 2, 3, 4}
+    chosen = picked(tmp_path / "out" / "frontier.json", fewer[0].number, grasp_set)
+    options: dict[str, Any] = dict(chosen.options)
+    made = compile_build(grasp_set, tmp_path / "build", folds=0, harness=chosen.wired(None), jobs=1, **options)
+    assert tuple(joint.name for joint in made.manifest.joints) == fewer[0].joints

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from thenar.compiler.glove.files import spec_files
+from thenar.compiler.glove.layout import BoardPins
 from thenar.compiler.glove.spec import glove_spec
 from thenar.compiler.hand import HandShape
 from thenar.drivers.i2c.chips import CHIPS, expanders
@@ -255,6 +256,12 @@ def test_every_taxel_is_half_a_divider_at_the_channel_that_measures_it(
     assert len(nodes) == len(set(nodes)), "a pin on two nets"
     assert spec.scan.taxels == (((1, 7, 1), (1, 9, 2), (2, 9, 3)), ((0, 9, 4), (17, 9, 5)))
     assert [port.levels for port in spec.scan.ports] == [((9, 6 + n),) for n in range(4)]
+    pins = BoardPins(signals=("PD2",), lows=("",), channels=("ADC0", "ADC1", "ADC2"))
+    muxed = BoardPins(channels=("ADC0", "ADC1"), selects=("PB0", "PB1", "PB2", "PB3"))
+    named = read_netlist(spec_files(manifest, None, harness, None, (pins, muxed))["glove.net"])
+    assert [reached(named, number)[0] for number in (1, 2, 3)] == [("A1", "PD2"), ("A1", "ADC1"), ("A1", "ADC2")]
+    remarks = glove_spec(manifest, None, harness, None, (pins, muxed)).summary.remarks
+    assert remarks[-1] == "A2: S0 to S3 of its multiplexers go to PB0, PB1, PB2, PB3, their commons to ADC0, ADC1"
     (said,) = [remark for remark in spec.summary.remarks if "taxel t0," in remark]
     assert said.startswith("SW2 ")
     assert "codes above 7" in said

@@ -7,8 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.compiler.placement.inputs import PlacementError
-from thenar.compiler.placement.ports import PortCosts, port_costs
+from thenar.compiler.placement.ports import PortCosts, port_costs, ports_of_whole_glove
 from thenar.runtime.errors import HarnessError
+from thenar.runtime.harness.wiring import BusWiring, ChipWiring, Harness
 from thenar.runtime.scanning.ports import whole_scan
 from thenar.runtime.scanning.propose import propose_board, propose_harness
 from thenar.runtime.scanning.timing import scan_us, scanner_us
@@ -66,3 +67,21 @@ def test_a_board_is_one_port_that_costs_its_whole_frame() -> None:
 def test_a_switch_that_is_wired_to_nothing_is_named() -> None:
     with pytest.raises(HarnessError, match="'thumb'"):
         port_costs(propose_harness(["index"]), ["index", "thumb"])
+
+
+def test_a_taxel_costs_its_conversion_on_the_converter_that_it_hangs_on_or_on_a_new_one() -> None:
+    """An ADS1115 takes 38 and 48 SCL periods at 400 kHz and 1317 us between them; an ADS7828 48."""
+    chips = (
+        ChipWiring(kind="ads1115", address=0x48, pins={"AIN0": "t0", "AIN3": "t1"}),
+        ChipWiring(kind="mcp23008", address=0x20, pins={"GP0": "s0"}),
+    )
+    harness = Harness(name="x", buses=(BusWiring(device="d", clock_hz=400_000, chips=chips),))
+    own = ports_of_whole_glove(harness, ["s0", "t0", "t1"], 2)
+    assert own is not None
+    assert [own.us[port] for port in own.port_of] == pytest.approx([98.8, 96.3 + 1317 + 121.3, 96.3 + 1317 + 121.3])
+    assert len(set(own.port_of)) == 3
+    assert own == ports_of_whole_glove(harness, ["s0", "t0>7", "t1>9"])
+    new = ports_of_whole_glove(None, ["s0", "t0", "t1"], 2)
+    assert new is not None
+    assert [new.us[port] for port in new.port_of] == pytest.approx([98.8, 121.3, 121.3])
+    assert ports_of_whole_glove(harness, ["s0", "t2"], 1) is None

@@ -246,12 +246,23 @@ def test_a_new_glove_has_its_taxels_on_converters(count: int) -> None:
     assert harness.taxel_names == tuple(f"t{number}" for number in range(count))
     assert sorted(whole_scan(harness, kept).switches) == list(range(2 * count + 1))
     assert parse_harness(harness_to_toml(harness), "glove.toml") == harness
-    if count <= 128:
+    if count <= 122:
         board = propose_board(kept)
         assert (board.scanners[0].switches, board.scanners[0].taxels) == (("s0",), harness.taxel_names)
         assert (board.scanners[0].mux is None) == (count <= 8)
 
 
+@pytest.mark.parametrize("kind", ["ads1115", "ads7828", "mcp3208", "mcp3004"])
+def test_the_converters_of_a_new_glove_may_be_chosen(kind: str) -> None:
+    harness = propose_harness(["s0", *(f"t{number}>9" for number in range(10))], kind)
+    chips = [(chip.kind, len(chip.pins)) for bus in harness.buses for chip in bus.chips]
+    chips += [(chip.kind, len(chip.pins)) for chip in harness.spi]
+    channels = {"ads1115": [4, 4, 2], "mcp3004": [4, 4, 2]}.get(kind, [8, 2])
+    assert chips == [("mcp23017", 1), *((kind, count) for count in channels)]
+    assert len({chip.device for chip in harness.spi}) == len(harness.spi)
+    assert parse_harness(harness_to_toml(harness), "glove.toml") == harness
+
+
 def test_no_board_has_so_many_channels() -> None:
-    with pytest.raises(HarnessError, match="129 taxels, one board has 128 channels: share them between boards by hand"):
-        propose_board([f"t{number}>5" for number in range(129)])
+    with pytest.raises(HarnessError, match="123 taxels, one board has 122 channels: share them between boards by hand"):
+        propose_board([f"t{number}>5" for number in range(123)])

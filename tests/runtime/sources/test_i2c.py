@@ -134,3 +134,49 @@ def test_after_a_pause_a_reading_counts_at_once(bench: Bench, pause_us: int) -> 
     assert [frame(made).closed for _ in range(20)] == [1] * 20
     bench.now += pause_us
     assert frame(made).closed == 0
+
+
+def measuring(debounce: Debounce) -> I2cDevice:
+    """An expander's port and two taxels on an ADS7828, of which the second has two levels."""
+    chips = (
+        ChipWiring(kind="pcf8574", address=0x20, pins={"P0": "s0"}),
+        ChipWiring(kind="ads7828", address=0x48, pins={"CH2": "t0", "CH5": "t1"}),
+    )
+    harness = Harness(name="x", buses=(BusWiring(device="/dev/i2c-1", chips=chips),), debounce=debounce)
+    return I2cDevice(harness, 0, whole_scan(harness, ["t1>900", "s0", "t0>100", "t1>40"]))
+
+
+@pytest.mark.parametrize(
+    ("codes", "closed"),
+    [((100, 40), 0), ((101, 41), 0b1100), ((4095, 900), 0b1100), ((0, 901), 0b1001), ((0, 4095), 0b1001)],
+)
+def test_levels_are_closed_above_their_codes_and_the_codes_go_along(
+    bench: Bench, codes: tuple[int, int], closed: int
+) -> None:
+    bench.answers = [[HIGH, *codes]]
+    assert frame(measuring(OFF)) == SwitchFrame(bench.now, closed, taxels=codes)
+
+
+def test_the_levels_of_a_conversion_that_failed_are_lost_and_its_code_is_none(bench: Bench) -> None:
+    made = measuring(OFF)
+    bench.answers = [[HIGH & ~1, 500, None], [HIGH, None, None]]
+    assert frame(made) == SwitchFrame(bench.now, 0b0110, lost=0b1001, taxels=(500, None))
+    assert frame(made) == SwitchFrame(bench.now, 0, lost=0b1101)
+
+
+def test_levels_are_debounced_as_switches_are(bench: Bench) -> None:
+    made = measuring(Debounce())
+    bench.takes_us = 1000
+    bench.answers = [[HIGH, code, 0] for code in (101, 100, 101, 101, 101)]
+    assert [frame(made).closed for _ in range(5)] == [0b100] * 5
+
+
+def test_a_scan_that_ends_early_leaves_levels_unread(bench: Bench, make_build: MakeBuild) -> None:
+    build = make_build(joints=3)
+    joints, glove = Joints(build.manifest.joints, ("j0", "j1", "j2"), None, 10_000), Newest[GloveFrame]()
+    glove.take(GloveFrame(bench.now, b"\x10\x20\x30"), bench.now, 20_000)
+    made = measuring(OFF)
+    made.end_early(lambda ports: AtOnce(build.scorer, ports), joints, glove)
+    bench.answers = [[HIGH]]
+    found = frame(made)
+    assert (found.closed, found.lost, found.unread, found.taxels) == (0, 0, 0b1101, None)

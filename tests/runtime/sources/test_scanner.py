@@ -103,10 +103,10 @@ def test_a_saturated_taxel_and_one_that_is_not_there_are_lost(
         device = opened(whole_scan(harness, NAMES), calibrated)
         frame = until(device, lambda frame: frame.taxels is not None)
         assert (frame.closed, frame.lost, frame.taxels) == (0, 0b1110, (1023, None, None))
-        assert device.taxels.taxels is not None
-        assert device.taxels.taxels.faults == ["saturated", "silent"]
+        assert device.trouble() == "taxels with faults: p0: saturated, p2: silent"
         board.press((500,))
         assert until(device, lambda frame: not frame.lost & 0b10).closed == 0b10
+        assert device.trouble() == "taxels with faults: p2: silent"
 
 
 def test_codes_of_long_ago_are_none(

@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -6,7 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.simulator.effects.switch_bounce import Parameters, prepare
-from thenar.simulator.pipeline.batch import NEVER, Batch
+from thenar.simulator.pipeline.ramp import NEVER
+
+if TYPE_CHECKING:
+    from thenar.simulator.pipeline.batch import Batch
 
 ON_US, OFF_US = 20_000, 100_000
 

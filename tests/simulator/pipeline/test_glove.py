@@ -10,8 +10,9 @@ from hypothesis.extra.numpy import arrays
 
 from thenar.simulator.body.cyberglove import Calibration, sensors_deg
 from thenar.simulator.pipeline import glove
-from thenar.simulator.pipeline.batch import NEVER, Batch
+from thenar.simulator.pipeline.batch import Batch
 from thenar.simulator.pipeline.effect import Setting, frame_times
+from thenar.simulator.pipeline.ramp import NEVER
 from thenar.simulator.streams import Draw
 
 BatchMaker = Callable[..., Batch]

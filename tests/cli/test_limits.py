@@ -1,0 +1,91 @@
+"""Limits and --robust of `place` and `compile`."""
+
+import html
+import json
+import re
+import shlex
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from thenar.runtime.manifest import manifest_from_bytes
+
+Thenar = Callable[..., subprocess.CompletedProcess[str]]
+
+LAYOUT = """
+[places]
+s0 = [0.0, 0.0]
+s1 = [5.0, 0.0]
+s2 = [20.0, 0.0]
+s3 = [0.0, 20.0]
+s4 = [3.0, 20.0]
+s5 = [40.0, 40.0]
+"""
+
+
+def layout(folder: Path) -> Path:
+    (folder / "layout.toml").write_text(LAYOUT)
+    return folder / "layout.toml"
+
+
+def test_a_placement_obeys_and_its_bound_is_of_those_that_do(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+    asked = ["--method", "cmim", "--keep", 4, "--keep-these", "s4", "--never", "s2,s5", "--apart-mm", 6]
+    done = thenar("place", set_file, *asked, "--layout", layout(tmp_path), "--exact", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    names = {each["name"] for each in found["switches"]}
+    assert "s4" in names
+    assert names in ({"s4", "s0"}, {"s4", "s1"})
+    assert found["exact"]["proved"]
+    assert {each["name"] for each in found["exact"]["best"]} in ({"s4", "s0"}, {"s4", "s1"})
+
+
+def test_what_contradicts_or_is_not_known_is_refused(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+    where = ("--layout", layout(tmp_path))
+    for asked, reason in (
+        (("--keep-these", "s4,s3", "--apart-mm", 6, *where), "s4,s3 are 3.0 mm apart, --apart-mm asks for 6"),
+        (("--keep-these", "s4", "--never", "s4"), "--keep-these and --never both name s4"),
+        (("--never", "s9"), "no input 's9'"),
+        (("--apart-mm", 6), "where s0, s1, s2, s3, s4 and 1 more lie is not known"),
+        (("--budget-us", 0), "--never and --budget-us leave nothing"),
+        (("--at-most", 3, "pads"), "'pads' is not"),
+        (("--crowd", "--keep", 2, "--robust"), "--crowd looks for the placement of many subjects"),
+        (where, "--layout says where switches lie, for --apart-mm"),
+    ):
+        done = thenar("place", set_file, *asked)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert reason in done.stderr
+
+
+def test_a_build_says_what_it_obeys_and_its_report_how_to_make_it_again(
+    thenar: Thenar, set_file: Path, tmp_path: Path
+) -> None:
+    build = tmp_path / "build"
+    asked = "--method elimination --keep 3 --never s2 --keep-these s5,s0 --at-most 4 taxels --budget-us 300 --robust"
+    done = thenar("compile", set_file, "-o", build, "--rounds", 4, "--folds", 2, *asked.split())
+    assert done.returncode == 0, done.stderr
+    options = manifest_from_bytes((build / "build.json").read_bytes()).options
+    assert (options.never, options.keep_these, options.at_most_taxels) == (("s2",), ("s5", "s0"), 4)
+    assert options.robust
+    assert {"s5", "s0"} <= {each.name for each in manifest_from_bytes((build / "build.json").read_bytes()).switches}
+    page = html.unescape((build / "report.html").read_text())
+    line = next(each for each in re.findall(r"thenar compile SET.grasps -o build/ .*", page) if "--prune" in each)
+    again = tmp_path / "again"
+    words = shlex.split(line)[5:]
+    assert words[words.index("--at-most") :][:3] == ["--at-most", "4", "taxels"]
+    done = thenar("compile", set_file, "-o", again, *words)
+    assert done.returncode == 0, done.stderr
+    assert (again / "build.json").read_bytes() == (build / "build.json").read_bytes()
+
+
+def test_rows_with_lost_inputs_are_trained_on_and_never_tested(thenar: Thenar, set_file: Path, tmp_path: Path) -> None:
+    rates = []
+    for name, more in (("plain", ()), ("robust", ("--robust",))):
+        done = thenar("compile", set_file, "-o", tmp_path / name, "--rounds", 6, "--folds", 2, "--no-report", *more)
+        assert done.returncode == 0, done.stderr
+        rates.append(manifest_from_bytes((tmp_path / name / "build.json").read_bytes()).rates)
+    assert [[rate.total for rate in each] for each in rates] == [[60, 60], [60, 60]]
+    assert (tmp_path / "plain" / "tables.bin").read_bytes() != (tmp_path / "robust" / "tables.bin").read_bytes()
+    assert not np.array_equal([rate.correct for rate in rates[0]], [0, 0])
