@@ -354,7 +354,7 @@ def _kept(manifest: "Manifest", made: "BuildReport") -> str:
 
 
 def _print_training(manifest: "Manifest") -> None:
-    from thenar.drivers.cyberglove_protocol import shortest_us
+    from thenar.drivers.cyberglove_protocol import sensors_with, shortest_us
 
     console = out()
     if manifest.switches:
@@ -363,9 +363,10 @@ def _print_training(manifest: "Manifest") -> None:
         if switch.threshold is not None:
             console.print(f"{switch.name}: {switch.closed}, learnt")
     if manifest.options.keep_joints is not None:
-        names = ", ".join(joint.name for joint in manifest.joints)
-        us = shortest_us(len(manifest.joints), 115_200, status=True)
-        console.print(f"joints: {names}; a CyberGlove's record of them takes {duration(us)}", soft_wrap=True)
+        names = [joint.name for joint in manifest.joints]
+        us = shortest_us(len(names), 115_200, status=True)
+        record = f"; a CyberGlove's record of them takes {duration(us)}" if sensors_with(names) else ""
+        console.print(f"joints: {', '.join(names)}{record}", soft_wrap=True)
     console.print(f"trained by {manifest.fit}{': ' if manifest.fit.why else ''}{manifest.fit.why}", soft_wrap=True)
     for each in manifest.fit.compared:
         console.print(f"  {each}", soft_wrap=True)

@@ -103,8 +103,8 @@ def limit_options(command: Command) -> Command:
             metavar="MM",
             help="Least distance of any two that are kept.",
         ),
-        click.option("--never", callback=_names, metavar="NAMES", help="Switches and taxels that are not kept: a,b."),
-        click.option("--keep-these", callback=_names, metavar="NAMES", help="Switches and taxels that are kept: a,b."),
+        click.option("--never", callback=_names, metavar="NAMES", help="Inputs that are not kept, by name: a,b."),
+        click.option("--keep-these", callback=_names, metavar="NAMES", help="Inputs that are kept, by name: a,b."),
     ):
         command = option(command)
     return command

@@ -133,7 +133,7 @@ def train(
     if not columns and not samples.codes.shape[1]:
         raise CompileError("no switch is worth keeping: lower --prune, or record switches that differ between grasps")
     kept = samples.keeping(columns)
-    joints = kept_joints(kept, options.keep_joints)
+    joints = kept_joints(kept, options.keep_joints, limits)
     kept = kept.with_joints(joints)
     check_inputs(len(samples.grasps), len(columns), len(joints), CompileError)
     inputs = kept.inputs

@@ -27,13 +27,14 @@ Places = Mapping[str, tuple[float, float]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """What is asked of a placement, by the names of switches and taxels.
+    """What is asked of a placement, by the names of switches, taxels and joints.
 
     keep, never  what must be kept, and what must not
     apart_mm     no two that are kept may be nearer to each other, by their `places` (mm); levels of a taxel may
     taxels       the most taxels that may be kept, with however many levels
     budget_us    the most that reading the ports of what is kept may take
     names        of all switches, `n_switches`, and then of the taxels
+    joints       names of the joints
     places       where switches and taxels lie on the hand, where that is known
 
     Raises PlacementError for a name that is not there, and where these contradict each other.
@@ -41,6 +42,7 @@ class Limits:
 
     names: tuple[str, ...]
     n_switches: int
+    joints: tuple[str, ...] = ()
     keep: tuple[str, ...] = ()
     never: tuple[str, ...] = ()
     apart_mm: float = 0.0
@@ -50,17 +52,15 @@ class Limits:
 
     def __post_init__(self) -> None:
         for name in (*self.keep, *self.never):
-            if name not in self.names:
-                raise PlacementError(
-                    f"there is no switch or taxel {name!r} to keep or to leave out{nearest(name, self.names)}"
-                )
+            if name not in (every := (*self.names, *self.joints)):
+                raise PlacementError(f"there is no input {name!r} to keep or to leave out{nearest(name, every)}")
         if self.apart_mm and (lost := [name for name in self.names if name not in self.places]):
             raise PlacementError(f"--apart-mm: where {list_names(lost)} lie is not known: --layout takes your glove")
         if both := [name for name in self.keep if name in self.never]:
             raise PlacementError(f"--keep-these and --never both name {list_names(both)}: take it out of one of them")
         for at, name in enumerate(self.keep):
-            for other in self.keep[:at]:
-                if self.apart_mm and self._apart(name, other) < self.apart_mm:
+            for other in self.keep[:at] if self.apart_mm and name in self.names else ():
+                if other in self.names and self._apart(name, other) < self.apart_mm:
                     raise PlacementError(
                         f"--keep-these {other},{name} are {self._apart(name, other):.1f} mm apart, --apart-mm asks for "
                         f"{self.apart_mm:g}: drop one of them, or allow less"
@@ -75,6 +75,7 @@ class Limits:
         return cls(
             names=grasp_set.element_names,
             n_switches=len(grasp_set.switch_names),
+            joints=grasp_set.joint_names,
             keep=options.keep_these,
             never=options.never,
             apart_mm=options.apart_mm or 0.0,
@@ -91,9 +92,13 @@ class Limits:
         if self.budget_us is not None and ports is None:
             raise PlacementError("--budget-us needs to know what reading the glove costs: name its --glove")
         own = [self.names[element.column] for element in elements]
+        if lost := [name for name in self.keep if name in self.names and name not in own]:
+            raise PlacementError(f"--keep-these names {list_names(lost)}, and --inputs leaves that out")
         bound = Bound(
             self,
-            groups=tuple(tuple(at for at, each in enumerate(own) if each == name) for name in self.keep),
+            groups=tuple(
+                tuple(at for at, each in enumerate(own) if each == name) for name in self.keep if name in self.names
+            ),
             never=np.isin(own, self.never),
             near=self._near(own),
             taxel=np.array([one.column if one.column >= self.n_switches else -1 for one in elements], np.intp),
@@ -101,6 +106,15 @@ class Limits:
         )
         bound.check()
         return bound
+
+    def on_joints(self, most: int | None) -> tuple[Columns, Columns]:
+        """Return the joints to keep in any case, and those not to keep. Raises PlacementError for more than `most`."""
+        keep, never = (
+            tuple(joint for joint, name in enumerate(self.joints) if name in asked) for asked in (self.keep, self.never)
+        )
+        if most is not None and len(keep) > most:
+            raise PlacementError(f"--keep-these names {len(keep)} joints, --keep-joints allows {most}: name fewer")
+        return keep, never
 
     def _apart(self, one: str, other: str) -> float:
         (x, y), (u, v) = self.places[one], self.places[other]
@@ -204,7 +218,7 @@ class Bound:
                     f"--keep-these takes {taken / 1000:.1f} us to read, --budget-us allows {limits.budget_us:g}: name "
                     "fewer, or allow more"
                 )
-        if not kept and not self.addable(()).any():
+        if self.never.size and not kept and not self.addable(()).any():
             raise PlacementError("--never and --budget-us leave nothing to choose: allow more")
 
     def required(self, order: Sequence[int]) -> list[int]:

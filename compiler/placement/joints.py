@@ -8,6 +8,7 @@ the one goes without which it is least after TRIAL_STEPS more steps, of equal on
 import numpy as np
 
 from ..samples import Columns, Samples
+from .constraints import Limits
 from .logistic import Logistic
 from .methods.elimination import FIRST_STEPS, STEPS, TRIAL_STEPS, sampled, thermometer
 
@@ -37,7 +38,15 @@ def joint_order(samples: Samples) -> Columns:
     return (*left, *gone[::-1])
 
 
-def kept_joints(samples: Samples, most: int | None) -> Columns:
-    """Return at most `most` joints to keep, given the switches of these rows, ascending; all where None is given."""
-    every = tuple(range(samples.codes.shape[1]))
-    return every if most is None or most >= len(every) else tuple(sorted(joint_order(samples)[:most]))
+def kept_joints(samples: Samples, most: int | None, limits: Limits | None = None) -> Columns:
+    """Return at most `most` joints to keep, given the switches of these rows, ascending, as many as `limits` leave
+    where None is given.
+
+    Raises PlacementError where the limits name more joints to keep.
+    """
+    keep, never = ((), ()) if limits is None else limits.on_joints(most)
+    every = tuple(joint for joint in range(samples.codes.shape[1]) if joint not in never)
+    if most is None or most >= len(every):
+        return every
+    order = dict.fromkeys((*keep, *joint_order(samples)))
+    return tuple(sorted([joint for joint in order if joint not in never][:most]))

@@ -332,7 +332,9 @@ def place(
         n_levels=len(elements) - len(grasp_set.switch_names),
         grasps=samples.grasps,
         tree=chosen.tree,
-        kept_joints=() if keep_joints is None else _joints_kept(grasp_set, read.keeping(chosen.columns), keep_joints),
+        kept_joints=()
+        if keep_joints is None
+        else _joints_kept(grasp_set, read.keeping(chosen.columns), keep_joints, limits),
         exact=_exactly(samples, chosen.columns, bound, name, on_round) if exact else None,
     )
 
@@ -371,10 +373,10 @@ def kept_of(grasp_set: GraspSet, elements: Elements, columns: Columns) -> tuple[
     )
 
 
-def _joints_kept(grasp_set: GraspSet, samples: Samples, most: int) -> tuple[str, ...]:
+def _joints_kept(grasp_set: GraspSet, samples: Samples, most: int, limits: Limits | None) -> tuple[str, ...]:
     if not grasp_set.joints:
         raise PlacementError("the set has no joints to keep some of: leave --keep-joints out")
-    return tuple(grasp_set.joint_names[joint] for joint in kept_joints(samples, most))
+    return tuple(grasp_set.joint_names[joint] for joint in kept_joints(samples, most, limits))
 
 
 def _exactly(

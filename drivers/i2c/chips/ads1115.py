@@ -24,7 +24,7 @@ class Ads1115Model(ConverterModel):
 
     def reset(self) -> None:
         """Do as after power-on."""
-        self._values = list(_DEFAULTS)
+        self._values: list[int] = list(_DEFAULTS)
         self._pointer, self._ready = 0, 0.0
 
     def write(self, data: bytes) -> None:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from thenar.compiler.placement.constraints import Bound, Limits
 from thenar.compiler.placement.elements import Element, Elements
 from thenar.compiler.placement.inputs import PlacementError
+from thenar.compiler.placement.joints import kept_joints
 from thenar.compiler.placement.methods.base import METHODS
 from thenar.compiler.placement.optimum import Pairs, best_subset
 from thenar.compiler.placement.placement import choose
@@ -127,7 +128,7 @@ def test_a_limit_that_forbids_nothing_changes_nothing_and_one_that_does_is_obeye
         ({"keep": ("p", "q"), "taxels": 1}, "--keep-these names more taxels than --at-most 1 taxels"),
         ({"keep": ("a", "c"), "budget_us": 12.0}, "--keep-these takes 15.5 us to read, --budget-us allows 12"),
         ({"budget_us": 5.0}, "--never and --budget-us leave nothing"),
-        ({"never": ("pp",)}, "no switch or taxel 'pp'"),
+        ({"never": ("pp",)}, "no input 'pp'"),
         ({"apart_mm": 1.0, "places": {"a": (0.0, 0.0)}}, "--apart-mm: where b, c, p, q lie is not known"),
     ],
 )
@@ -142,3 +143,20 @@ def test_more_to_keep_than_there_is_room_for_and_a_budget_without_costs_are_refu
         choose(samples_of(1), "cmim", 2, PORTS, limits.on(ELEMENTS, PORTS))
     with pytest.raises(PlacementError, match="--budget-us needs to know what reading"):
         limits.on(ELEMENTS, None)
+
+
+def test_joints_are_kept_and_left_out_by_name_as_switches_are() -> None:
+    random = np.random.default_rng(7)
+    labels = np.arange(60) % 3
+    codes = np.stack([labels * 40, labels * 30, random.integers(0, 99, 60), random.integers(0, 99, 60)], axis=1)
+    samples = Samples(np.zeros((60, 0), bool), codes.astype(np.uint16), labels, ("x", "y", "z"))
+    own = {"names": NAMES, "n_switches": 3, "joints": ("j0", "j1", "j2", "j3")}
+    limits = Limits(**own, keep=("j3",), never=("j0",))  # type: ignore[arg-type]
+    assert kept_joints(samples, 2, limits) == (1, 3)
+    assert kept_joints(samples, None, limits) == (1, 2, 3)
+    assert kept_joints(samples, 1, limits) == (3,)
+    with pytest.raises(PlacementError, match="--keep-these names 2 joints, --keep-joints allows 1"):
+        kept_joints(samples, 1, Limits(**own, keep=("j3", "j1")))  # type: ignore[arg-type]
+    with pytest.raises(PlacementError, match="--keep-these names a, and --inputs leaves that out"):
+        Limits(**own, keep=("a",)).on((), None)  # type: ignore[arg-type]
+    limits.on((), None)

@@ -255,7 +255,7 @@ def pressed(path: Path, session: Session, *trials: tuple[int | None, ...] | None
             time_us = trial * 1000
             recorder.switches(SwitchFrame(time_us, 1, taxels=codes))
             for what in ("captured", "accepted"):
-                recorder.label(Label(time_us, what, trial, "PoS", "A", "jar"))  # type: ignore[arg-type]
+                recorder.label(Label(time_us, what, trial, "PoS", "A", "jar"))
             recorder.switches(SwitchFrame(time_us + 1, 1, taxels=(7, 7)))
     return path
 
@@ -303,6 +303,6 @@ def test_baselines_are_taken_off_as_they_are_live(tmp_path: Path) -> None:
         for tenth in range(100):
             recorder.switches(SwitchFrame(tenth * 100_000, 1, taxels=(110, 910)))
         for what in ("captured", "accepted"):
-            recorder.label(Label(10**7, what, 1, "PoS", "A", "jar"))  # type: ignore[arg-type]
+            recorder.label(Label(10**7, what, 1, "PoS", "A", "jar"))
     grasp_set, _ = import_recordings([recorder.path])
     assert grasp_set.taxels.tolist() == [[100, 900]]
