@@ -195,7 +195,7 @@ class IntegerTables:
     def relative(self) -> bool:
         """Whether scores are relative to the last class, to which no input adds anything."""
         held: list[NDArray[np.integer]] = [self.bias, self.switch_rows, self.switch_means, self.joint_means]
-        held += [*self.joint_rows, *(slope.row for slope in self.slopes)]
+        held += [*self.joint_rows, *(slope.row for slope in self.slopes), *(pair.rows for pair in self.pairs)]
         return not any(rows[..., -1].any() for rows in held)
 
     def slope_of(self, joint: int) -> Slope | None:

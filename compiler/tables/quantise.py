@@ -62,7 +62,9 @@ def as_deployed(tables: ScoreTables, grid: int) -> ScoreTables:
 
     lines = tuple(replace(line, row=less_last(line.row)) for line in tables.lines)
     rows = tuple(map(less_last, tables.joint_rows))
-    return ScoreTables(less_last(tables.bias), less_last(tables.switch_rows), tables.thresholds, rows, lines)
+    pairs = tuple(replace(pair, rows=less_last(pair.rows)) for pair in tables.pairs)
+    bias, switch_rows = less_last(tables.bias), less_last(tables.switch_rows)
+    return ScoreTables(bias, switch_rows, tables.thresholds, rows, lines, pairs)
 
 
 def slope_of(line: Line, scale: float) -> tuple[Slope, Floats]:

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 import pytest
@@ -76,7 +77,9 @@ def _relative(tables: IntegerTables) -> IntegerTables:
     def without(rows: np.ndarray) -> np.ndarray:
         return np.where(np.arange(tables.n_classes) == tables.n_classes - 1, 0, rows).astype(rows.dtype)
 
-    held = {name: without(getattr(tables, name)) for name in ("bias", "switch_rows", "switch_means", "joint_means")}
+    held: dict[str, Any] = {
+        name: without(getattr(tables, name)) for name in ("bias", "switch_rows", "switch_means", "joint_means")
+    }
     slopes = tuple(replace(slope, row=without(slope.row)) for slope in tables.slopes)
     return replace(tables, **held, joint_rows=tuple(map(without, tables.joint_rows)), slopes=slopes)
 

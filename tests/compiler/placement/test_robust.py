@@ -1,6 +1,7 @@
 """Placement and training for the worst single lost input."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -82,7 +83,7 @@ def test_the_worst_lost_switch_costs_other_men_at_most_five_points_and_nothing_e
 ) -> None:
     """As docs/placement.md has it of all repetitions: every fault on every row of men that nothing was learnt from."""
     learnt, judged = (simulate(load_scene(name).varied(20), 1).grasp_set for name in ("kamakura", "kamakura-def"))
-    usual = {"inputs": "switches", "folds": 0, "rounds": 60}
+    usual: dict[str, Any] = {"inputs": "switches", "folds": 0, "rounds": 60}
     compile_build(learnt, tmp_path / "paper", prune=62, **usual)
     compile_build(learnt, tmp_path / "robust", placement="elimination", keep=39, robust=True, **usual)
     paper, robust = (verify_faults(tmp_path / name, judged).worst for name in ("paper", "robust"))

@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thenar.simulator.contact.model import Contact, Load
-from thenar.simulator.effects.contact_ramp import Parameters, crossings, prepare
+from thenar.simulator.effects.contact_ramp import Parameters, prepare
 from thenar.simulator.errors import SceneError
 from thenar.simulator.pipeline.batch import Batch
-from thenar.simulator.pipeline.ramp import NEVER
+from thenar.simulator.pipeline.ramp import NEVER, crossings
 
 RISE_US, HOLD_US, LETS_GO_US = 100_000, 250_000, 260_000
 

@@ -17,6 +17,7 @@ from thenar.simulator.scenes.decode import load_scene
 from thenar.simulator.scenes.scene import Glove, Recording, Scene
 
 ALL = Glove(taxels="all")
+LOSES: Any = {"rate": 0.02}
 
 
 @pytest.fixture
@@ -116,6 +117,7 @@ def test_counts_go_over_the_scanners_line_and_come_through_where_nothing_happens
 ) -> None:
     plain, sent = run(("taxel.noise",)), run(("taxel.noise", "wire.lost_bytes"))
     assert plain.taxels is not None
+    assert sent.taxels is not None
     assert sent.lost is not None
     whole = np.flatnonzero(~sent.lost[:, 0])
     assert whole.size
@@ -123,7 +125,7 @@ def test_counts_go_over_the_scanners_line_and_come_through_where_nothing_happens
 
 
 def test_counts_that_are_lost_leave_those_of_the_frame_before(make_scene: Any, make_batch: Any) -> None:
-    effects = ["contact.ramp", ("wire.lost_bytes", EFFECTS["wire.lost_bytes"].parameters(rate=0.02))]
+    effects = ["contact.ramp", ("wire.lost_bytes", EFFECTS["wire.lost_bytes"].parameters(**LOSES))]
     recording = Recording(rows="all", rate_hz=20.0, hold_ms=500.0)
     found = []
     for listed in (effects[:1], effects):

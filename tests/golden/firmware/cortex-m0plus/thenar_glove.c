@@ -1,6 +1,6 @@
 /* thenar_glove.c: tables and integer arithmetic; the header says how it is used.
    Layout for cortex-m0plus: 16-bit entries, up to 6 switches a look-up, codes looked up in 256 bytes a joint, up to
-   2 joints a look-up: the fastest of 54 layouts in 65536 bytes of flash, about 107 instructions (157 by update())
+   2 joints a look-up: the fastest of 54 layouts in 65536 bytes of flash, about 106 instructions (156 by update())
    and 2171 bytes.
 
    From the tables 0123456789abcdef; thenar 0.1.0, template classifier/thenar_NAME.c.j2. */
