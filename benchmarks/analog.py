@@ -11,10 +11,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from onset import READINGS, Reading, onset
 
 from thenar.compiler.boosting.stumps import winners
 from thenar.compiler.evaluation.folds import trial_folds
-from thenar.compiler.evaluation.onset import READINGS, Reading, onset
 from thenar.compiler.evaluation.rates import Rate
 from thenar.compiler.placement.elements import Element, bits_of, elements_of
 from thenar.compiler.placement.placement import choose

@@ -205,7 +205,7 @@ def test_what_cannot_be_laid_out_is_refused(make_tables: MakeTables) -> None:
     wide = make_tables(highest=800)
     assert "nothing to make firmware of" in refused(make_tables(switches=0, joints=0))
     assert "entries of 12 bits" in refused(make_tables(), entry_bits=12)
-    assert "groups of 7 switches" in refused(make_tables(), group_size=7)
+    assert "groups of 9 switches" in refused(make_tables(), group_size=9)
     assert "1 groups of at most 5 for 9 switches: 2 or more" in refused(make_tables(), n_groups=1)
     assert '"trimmed" or "search", not "direct"' in refused(wide)
     assert 'found by "search"' in refused(wide, bins="trimmed")

@@ -12,17 +12,16 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from thenar.compiler.boosting.stumps import winners
+from thenar.compiler.evaluation.folds import EvaluationError, Fold, trial_folds
+from thenar.compiler.evaluation.rates import Rate
+from thenar.compiler.placement.elements import Element, Elements, bits_of, elements_of
+from thenar.compiler.recordings.graspset import GraspSet
+from thenar.compiler.samples import Samples
+from thenar.compiler.tables.collapse import model_scores
+from thenar.compiler.trainers.base import Training
+from thenar.compiler.workers import in_workers
 from thenar.runtime.manifest import Of, Options
-
-from ..boosting.stumps import winners
-from ..placement.elements import Element, Elements, bits_of, elements_of
-from ..recordings.graspset import GraspSet
-from ..samples import Samples
-from ..tables.collapse import model_scores
-from ..trainers.base import Training
-from ..workers import in_workers
-from .folds import EvaluationError, Fold, trial_folds
-from .rates import Rate
 
 Reading = Literal["switches", "levels", "codes", "nothing"]
 READINGS: tuple[Reading, ...] = ("switches", "levels", "codes")

@@ -1,16 +1,28 @@
 """Recognition at initial contact, by the force on the taxel that is pressed hardest."""
 
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
 from thenar.compiler.evaluation.folds import EvaluationError
-from thenar.compiler.evaluation.onset import onset
 from thenar.compiler.recordings.graspset import GraspSet, Joint
 from thenar.compiler.recordings.taxonomy import own
 from thenar.runtime.manifest import Options
 
 NEWTONS = (0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
 FAST = Options(trainer="logitboost", rounds=10)
+
+
+@pytest.fixture
+def onset(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
+    """Return the benchmarks' function of a set, forces and options."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[1] / "benchmarks"))
+    made: Callable[..., Any] = import_module("onset").onset
+    return made
 
 
 def pressed(trials: int = 24, joints: int = 0, unit: str = "N") -> GraspSet:
@@ -37,7 +49,7 @@ def pressed(trials: int = 24, joints: int = 0, unit: str = "N") -> GraspSet:
     )
 
 
-def test_levels_and_codes_tell_what_switches_do_not_before_their_force() -> None:
+def test_levels_and_codes_tell_what_switches_do_not_before_their_force(onset: Callable[..., Any]) -> None:
     found = onset(pressed(), NEWTONS, jobs=1, options=FAST)
     curves = {curve.title: [rate.mean for rate in curve.rates if rate is not None] for curve in found.curves}
     assert list(curves) == ["switches", "levels", "codes"]
@@ -47,28 +59,28 @@ def test_levels_and_codes_tell_what_switches_do_not_before_their_force() -> None
     assert curves["levels"][0] < 0.8
 
 
-def test_every_trial_counts_once_and_rates_have_wilsons_interval() -> None:
+def test_every_trial_counts_once_and_rates_have_wilsons_interval(onset: Callable[..., Any]) -> None:
     found = onset(pressed(24), NEWTONS, jobs=1, options=FAST)
     for curve in found.curves:
         for rate in curve.rates:
             assert rate is not None
             assert (rate.total, rate.over, rate.unit) == (24, 24, "trials")
             assert rate.low < 1.0
-    assert found.curves[1].rates[1].low == pytest.approx(24 / (24 + 1.959964**2), abs=1e-4)  # type: ignore[union-attr]
+    assert found.curves[1].rates[1].low == pytest.approx(24 / (24 + 1.959964**2), abs=1e-4)
 
 
-def test_joints_are_read_alone_and_with_each() -> None:
+def test_joints_are_read_alone_and_with_each(onset: Callable[..., Any]) -> None:
     titles = [curve.title for curve in onset(pressed(joints=1), NEWTONS, jobs=1, options=FAST).curves]
     assert titles[3:] == ["joints", "switches and joints", "levels and joints", "codes and joints"]
 
 
-def test_a_force_that_no_trial_reads_has_no_rate_and_none_at_all_is_refused() -> None:
+def test_a_force_that_no_trial_reads_has_no_rate_and_none_at_all_is_refused(onset: Callable[..., Any]) -> None:
     found = onset(pressed(), (1.0, 1.2, 1.4), jobs=1, options=FAST)
     assert [rate is None for rate in found.curves[0].rates] == [False, False, True]
     with pytest.raises(EvaluationError, match="no trial has a frame"):
         onset(pressed(), (5.0, 6.0), jobs=1, options=FAST)
 
 
-def test_taxels_in_counts_are_no_forces() -> None:
+def test_taxels_in_counts_are_no_forces(onset: Callable[..., Any]) -> None:
     with pytest.raises(EvaluationError, match="calibrate them to N"):
         onset(pressed(unit="counts"), NEWTONS, jobs=1, options=FAST)
